@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from hobble.channels.limits import CANNOT_HURRY, TOP, UNLIMITED, USUAL, Limits, Pace, together
+from hobble.channels.speed_limits import CANNOT_HURRY, TOP, UNLIMITED, USUAL, LimitLearner, Limits, together
 
 WALK, JOG, GAITS = 1, 2, 6
 LIMITS = Limits(
@@ -27,8 +27,8 @@ def rows(speeds, values, gait: int = WALK, each: int = 40, others: bool = False)
     }
 
 
-def pace(labels: int = 2, across=None) -> Pace:
-    return Pace(10.0, np.arange(labels) if across is None else np.array(across), GAITS)
+def pace(labels: int = 2, across=None) -> LimitLearner:
+    return LimitLearner(10.0, np.arange(labels) if across is None else np.array(across), GAITS)
 
 
 @pytest.mark.parametrize(

@@ -10,7 +10,7 @@ import yaml
 
 from hobble.cli.__main__ import main
 from hobble.motion.read import read_bvh
-from hobble.synthetic.clip import write_clip
+from hobble.synthetic.generate_clip import write_clip
 from hobble.synthetic.options import Synthetic
 
 

@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from hobble.config.load import Catalogue, merge, read_layers, read_yaml, validate
+from hobble.config.load_configuration import Catalogue, merge, read_layers, read_yaml, validate
 from hobble.config.models import ClipEntry, Configuration, Dataset, SkeletonFile
 from hobble.core.errors import HobbleError
 

@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 from scipy.spatial.transform import Rotation
 
-from hobble.config.load import Catalogue
+from hobble.config.load_configuration import Catalogue
 from hobble.core import quat
 from hobble.core.errors import HobbleError
 from hobble.core.skeleton import Skeleton, forward_kinematics, local_rotations, other_side

@@ -15,10 +15,10 @@ from hypothesis import strategies as st
 
 from hobble.core.errors import InputError
 from hobble.evaluation.compare_configurations import compare
-from hobble.evaluation.compare_tables import tables
+from hobble.evaluation.comparison_csv import tables
 from hobble.evaluation.configuration_results import read_results
+from hobble.evaluation.csv_tables import write_csv
 from hobble.evaluation.series import difference, line
-from hobble.evaluation.tables import write_csv
 from hobble.measures.responsivity.run import parameter_counts
 
 SIZES = {

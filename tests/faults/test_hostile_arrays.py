@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from hobble.config.load import Catalogue
+from hobble.config.load_configuration import Catalogue
 from hobble.core.clip import load_clip
 from hobble.core.errors import InputError
 from hobble.core.files import load_npz, read_json

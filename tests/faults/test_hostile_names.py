@@ -10,7 +10,7 @@ import pytest
 import yaml
 
 from hobble.channels.injury.table import write_statuses
-from hobble.config.load import Catalogue
+from hobble.config.load_configuration import Catalogue
 from hobble.core.errors import HobbleError, InputError
 from hobble.motion.rig import load_skeleton
 from hobble.workflow.project import Project

@@ -15,7 +15,7 @@ from hobble.gait.__main__ import main
 from hobble.gait.comparison import compare, healthy_profile
 from hobble.gait.graded import HEALTHY
 from hobble.motion.mirror import mirror_clip
-from hobble.synthetic.clip import walk
+from hobble.synthetic.generate_clip import walk
 from hobble.synthetic.recipes import WALK, Segment
 
 

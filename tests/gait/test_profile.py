@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from hobble.core.errors import HobbleError
-from hobble.gait.cycles import Walk, measure
-from hobble.gait.effects import effects
+from hobble.gait.cycles import WalkCycles, measure
+from hobble.gait.effect_sizes import effects
 from hobble.gait.features import features
 from hobble.gait.graded import grade
 from hobble.gait.profile import NAMES, mirrored, profile
@@ -100,7 +100,7 @@ def test_a_shorter_stance_and_step_are_the_hurt_legs(holden31, stepper):
 
 def test_no_cycle_is_refused():
     with pytest.raises(HobbleError, match="no whole cycle"):
-        profile(Walk(60.0, (), ()))
+        profile(WalkCycles(60.0, (), ()))
 
 
 def test_names_are_unique():

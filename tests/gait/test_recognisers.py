@@ -12,7 +12,7 @@ from hobble.core.clip import Clip
 from hobble.core.files import load_npz
 from hobble.gait.comparison import compare, healthy_profile, measure_clip
 from hobble.gait.cycles import SCALARS
-from hobble.gait.effects import EFFECTS, effects_of_people
+from hobble.gait.effect_sizes import EFFECTS, effects_of_people
 from hobble.gait.features import features
 from hobble.gait.graded import PARTS, grade, healthy_covariance, learn_grader
 from hobble.gait.people import GAITS, NORMAL, people

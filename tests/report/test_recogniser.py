@@ -18,7 +18,7 @@ from hobble.gait.graded import grade, grader
 from hobble.gait.people import people
 from hobble.gait.profile import profile
 from hobble.models.network import Network
-from hobble.report.recogniser import healthy_walk, learnt, playable_with_recogniser, words
+from hobble.report.pack_recogniser import healthy_walk, learnt, playable_with_recogniser, words
 
 
 @pytest.fixture(scope="module")
@@ -111,7 +111,7 @@ def test_a_walk_is_compared_with_the_healthy_walk_of_the_same_figure(
     assert spec["recogniser"]["healthy"]["speed_per_leg"] > 0.5
     without = {role: joint for role, joint in holden31.roles.items() if role != "left_knee"}
     assert healthy_walk(network, replace(holden31, roles=without), examples.RUNTIME) is None
-    monkeypatch.setattr("hobble.report.recogniser.SPEED", 0.0)
+    monkeypatch.setattr("hobble.report.pack_recogniser.SPEED", 0.0)
     assert healthy_walk(network, holden31, examples.RUNTIME) is None
     assert "recogniser" not in playable_with_recogniser(network, examples.RUNTIME)
 

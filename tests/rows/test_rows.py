@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from hobble.config import sections
-from hobble.config.load import Catalogue
+from hobble.config.load_configuration import Catalogue
 from hobble.core import quat
 from hobble.core.clip import Clip
 from hobble.core.errors import InputError
@@ -18,7 +18,7 @@ from hobble.core.skeleton import Skeleton
 from hobble.labels.label import label_clip
 from hobble.motion.make import make_clip
 from hobble.motion.options import ClipMotion
-from hobble.rows.build import clip_rows, cycle_frames, cycle_phase, phase_change
+from hobble.rows.build_rows import clip_rows, cycle_frames, cycle_phase, phase_change
 from hobble.rows.clip_rows import ClipRows, expanded
 from hobble.rows.layout import GAITS, RowLayout
 from hobble.terrain.clip_fits import clip_fits
@@ -70,7 +70,7 @@ def rows_as_configured(shared: Path, root: Path, margins: str = "drop", **terrai
         ClipMotion(**options("motion")),
     )
     files = [folder / f"{NAME}{end}" for end in (".phase", ".gait", "_footsteps.txt", "_gait.txt")]
-    labelling = sections.Labels.model_validate(options("labels", margins=margins))
+    labelling = sections.LabelOptions.model_validate(options("labels", margins=margins))
     labels = vars(label_clip(clip, files, report, "walk", "flat", labelling)[0])
     ground, database = options("terrain", **terrain), options("database")
     any_map = TerrainMap("any", np.zeros((200, 200)), ground["cell"])

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from hobble.core import quat
-from hobble.synthetic.clip import generate, walk
+from hobble.synthetic.generate_clip import generate, walk
 from hobble.synthetic.recipes import Segment
 
 SIDES = ("Left", "Right")

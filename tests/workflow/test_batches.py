@@ -14,7 +14,7 @@ import pytest
 from hobble.core.errors import InputError
 from hobble.core.files import write_text
 from hobble.workflow.batch_job import make_each, pieces
-from hobble.workflow.batches import (
+from hobble.workflow.clip_batches import (
     LARGEST,
     SMALLEST,
     ClipBatch,

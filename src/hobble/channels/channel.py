@@ -49,8 +49,8 @@ class Channel(ABC):
     clip that holds values, or None. old_keys: keys of this channel in older files. Options: model of the data
     set's section `channels.<name>`. If it is None, every data set has the channel; else only those with the
     section. slows: whether values above 0 make the body slower. Then its speed limits are learnt from the
-    rows (see `hobble.channels.limits`). manner: whether a column above 0 is a manner in which a whole clip
-    walks, such as a mood. Then `hobble.measures.manners` measures whether a recogniser sees it. targets:
+    rows (see `hobble.channels.speed_limits`). manner: whether a column above 0 is a manner in which a whole
+    clip walks, such as a mood. Then `hobble.measures.manners` measures whether a recogniser sees it. targets:
     folders of results/<configuration>/ that only a configuration with this channel can have.
     """
 

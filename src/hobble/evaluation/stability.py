@@ -34,7 +34,7 @@ LIMITS = {
 
 @dataclass(frozen=True)
 class SteadyTarget:
-    """A constant wish for `frames` frames: velocity (2,) cm a frame, facing (2,) or None, gait."""
+    """A constant target for `frames` frames: velocity (2,) cm a frame, facing (2,) or None, gait."""
 
     kind: str
     velocity: Array

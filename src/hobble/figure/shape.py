@@ -10,7 +10,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from hobble.core.quat import Array
-from hobble.figure.bind import SIDES, Bind
+from hobble.figure.bind import SIDES, BindPose
 from hobble.figure.solids import Ball, Floor, Owner, Rod, Solid, SweptSolid
 
 LEG_LENGTH = 81.0  # cm from hip to ankle in the body of the tables
@@ -101,7 +101,7 @@ FOOT = (
 )
 
 
-def person(bind: Bind) -> Iterator[Solid]:
+def person(bind: BindPose) -> Iterator[Solid]:
     """The solids of a person, in the order in which they are added to the body or cut from it."""
     at = bind.at
     legs = [np.linalg.norm(at[f"{s}_heel"] - at[f"{s}_knee"]) for s in SIDES]
@@ -117,7 +117,7 @@ def person(bind: Bind) -> Iterator[Solid]:
     yield from _head(at, size)
 
 
-def scale(bind: Bind) -> float:
+def scale(bind: BindPose) -> float:
     """Leg length of the body, divided by LEG_LENGTH."""
     legs = [np.linalg.norm(bind.at[f"{s}_{a}"] - bind.at[f"{s}_{b}"]) for s in SIDES for a, b in
             (("heel", "knee"), ("knee", "hip"))]  # fmt: skip

@@ -6,8 +6,8 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
 from hobble.core.clip import Clip
-from hobble.gait.cycles import Walk, joined, measure
-from hobble.gait.effects import effects
+from hobble.gait.cycles import WalkCycles, joined, measure
+from hobble.gait.effect_sizes import effects
 from hobble.gait.graded import Grade, grade
 from hobble.gait.people import people
 from hobble.gait.profile import Profile, profile
@@ -15,7 +15,7 @@ from hobble.gait.recogniser import RIGHT, SIDES, Impairment, recognise, windows
 
 
 @dataclass(frozen=True)
-class Comparison:
+class WalkComparison:
     """Measurements of a clip and the recognisers' answers.
 
     walk: its cycles. profile: its numbers. answer: the linear classifier's, for the whole clip. grade: the
@@ -23,7 +23,7 @@ class Comparison:
     window. effects: side -> sizes, as if that side were hurt.
     """
 
-    walk: Walk = field(repr=False)
+    walk: WalkCycles = field(repr=False)
     profile: Profile = field(repr=False)
     answer: Impairment
     grade: Grade
@@ -50,7 +50,7 @@ def _shares(answers: Sequence[Impairment | Grade]) -> dict[str, float]:
     return {name: names.count(name) / len(names) for name in dict.fromkeys(names)}
 
 
-def measure_clip(clip: Clip) -> Walk:
+def measure_clip(clip: Clip) -> WalkCycles:
     """The cycles of a clip on any skeleton with roles."""
     return measure(clip.skeleton, clip.positions, clip.fps)
 
@@ -63,16 +63,16 @@ def healthy_profile(clips: Sequence[Clip]) -> Profile:
     return profile(joined(measure_clip(clip) for clip in clips)) if clips else people().normal()
 
 
-def compare(clip: Clip, healthy: Profile, seconds: float = 4.0) -> Comparison:
+def compare(clip: Clip, healthy: Profile, seconds: float = 4.0) -> WalkComparison:
     """Compare a clip with a healthy profile, in windows of `seconds`. Raises HobbleError without a cycle."""
     return compare_walk(measure_clip(clip), len(clip), healthy, seconds)
 
 
-def compare_walk(walk: Walk, frames: int, healthy: Profile, seconds: float = 4.0) -> Comparison:
+def compare_walk(walk: WalkCycles, frames: int, healthy: Profile, seconds: float = 4.0) -> WalkComparison:
     """The same for the cycles that `measure` found in a motion of `frames` frames."""
     own = profile(walk)
     parts = [(start, profile(part)) for start, part in windows(walk, frames, seconds)]
-    return Comparison(
+    return WalkComparison(
         walk,
         own,
         recognise(own, healthy),

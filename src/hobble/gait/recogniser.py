@@ -14,7 +14,7 @@ from functools import cache
 import numpy as np
 
 from hobble.core.quat import Array
-from hobble.gait.cycles import Walk
+from hobble.gait.cycles import WalkCycles
 from hobble.gait.discriminant import Discriminant, learn
 from hobble.gait.features import features
 from hobble.gait.people import GAITS, NORMAL, People, people
@@ -85,7 +85,9 @@ def recognise(walk: Profile, healthy: Profile, judge: Discriminant | None = None
     return Impairment(label, side, labels, sides)
 
 
-def windows(walk: Walk, frames: int, seconds: float = 4.0, step: float = 1.0) -> list[tuple[int, Walk]]:
+def windows(
+    walk: WalkCycles, frames: int, seconds: float = 4.0, step: float = 1.0
+) -> list[tuple[int, WalkCycles]]:
     """(first frame, its cycles) of each window of a clip of `frames` with at least LEAST_CYCLES cycles.
 
     Windows begin every `step` seconds and last `seconds`.

@@ -22,14 +22,14 @@ from hobble.motion.tree import above, common, path
 
 
 @dataclass(frozen=True)
-class Found:
+class FoundBody:
     """The body of a rig. sided: whether names distinguish left and right."""
 
     body: Body
     sided: bool
 
 
-def find_body(names: Sequence[str], parents: Sequence[int], positions: Array) -> Found:
+def find_body(names: Sequence[str], parents: Sequence[int], positions: Array) -> FoundBody:
     """Find the parts of a body.
 
     positions: (F, J, 3) in the world, any unit, any axes. Raises Doubt if the rig and the motion do not
@@ -62,7 +62,7 @@ def find_body(names: Sequence[str], parents: Sequence[int], positions: Array) ->
     )
     if other := _second(names, parents, positions, hips):
         raise TwoFigures(f"it holds two figures, {names[hips]} and {names[other]}")
-    return Found(body, sided)
+    return FoundBody(body, sided)
 
 
 def _second(names: Sequence[str], parents: Sequence[int], positions: Array, hips: int) -> int | None:

@@ -15,6 +15,7 @@ from hobble.core.skeleton import Skeleton
 from hobble.motion.axes import turned
 from hobble.motion.body import body_by_roles
 from hobble.motion.check import check, compare
+from hobble.motion.file_motion import FOUND, FileMotion, load_source
 from hobble.motion.loop import loop_clip
 from hobble.motion.options import ClipMotion
 from hobble.motion.pace import check_pace
@@ -23,7 +24,6 @@ from hobble.motion.resample import sample_positions, sample_rotations, sample_ti
 from hobble.motion.retarget import plan, retarget_clip
 from hobble.motion.rig import load_skeleton
 from hobble.motion.root import facing
-from hobble.motion.source import FOUND, FileMotion, load_source
 from hobble.motion.stance import upright
 
 SAME = 1e-3  # cm: offsets that differ less from the skeleton's are equal

@@ -10,8 +10,8 @@ from scipy.ndimage import maximum_filter1d
 
 from hobble.core import quat
 from hobble.core.quat import Array
-from hobble.synthetic.footsteps import FOOT, Stance
-from hobble.synthetic.ground import Ground
+from hobble.synthetic.footsteps import FOOT, PlannedStance
+from hobble.synthetic.planned_ground import Ground
 from hobble.synthetic.style import Style
 
 X_AXIS = np.array([1.0, 0.0, 0.0])
@@ -26,7 +26,7 @@ SOLE_HEIGHT = 2.0  # cm: a moving joint of the foot stays this and the clearance
 
 
 @dataclass(frozen=True)
-class Foot:
+class FootPoses:
     """One foot over F frames in the world: ankle (F, 3), foot (F, 4), toes (F, 4)."""
 
     ankle: Array
@@ -34,11 +34,11 @@ class Foot:
     toes: Array
 
 
-def move_foot(steps: list[Stance], style: Style, side: int, ground: Ground) -> Foot:
+def move_foot(steps: list[PlannedStance], style: Style, side: int, ground: Ground) -> FootPoses:
     """The path of one foot through its stances. Frames before the first and after the last one stay 0."""
     frames = len(style.duty)
     turns = np.tile(quat.IDENTITY, (frames, 1))
-    foot = Foot(np.zeros((frames, 3)), turns, turns.copy())
+    foot = FootPoses(np.zeros((frames, 3)), turns, turns.copy())
     rolls = [_Roll.of(step, style, side) for step in steps]
     for i, (here, there) in enumerate(pairwise(rolls)):
         rests = not there.step.swings
@@ -59,7 +59,7 @@ def _frames(start: float, end: float) -> np.ndarray:
 class _Roll:
     """A stance and the foot's pitch in it: down from its landing, flat, then up over the toe."""
 
-    step: Stance
+    step: PlannedStance
     land: float
     off: float
     rest: Array
@@ -68,7 +68,7 @@ class _Roll:
     power: float
 
     @classmethod
-    def of(cls, step: Stance, style: Style, side: int) -> _Roll:
+    def of(cls, step: PlannedStance, style: Style, side: int) -> _Roll:
         t = np.arange(len(style.duty), dtype=float)
         land = np.interp(step.land, t, style.land_pitch[:, side])
         off = np.interp(step.leave, t, style.off_pitch[:, side])
@@ -110,13 +110,13 @@ class _Roll:
         return self.step.ankle + quat.rotate(self.step.turn, FOOT) - quat.rotate(turned, FOOT)
 
 
-def _stand(foot: Foot, t: np.ndarray, roll: _Roll, pitch: Array) -> None:
+def _stand(foot: FootPoses, t: np.ndarray, roll: _Roll, pitch: Array) -> None:
     foot.ankle[t] = roll.ankle(pitch)
     foot.foot[t] = quat.mul(roll.step.turn, quat.from_axis_angle(X_AXIS, -pitch))
     foot.toes[t] = quat.mul(roll.step.turn, quat.from_axis_angle(X_AXIS, -np.maximum(pitch, 0)))
 
 
-def _swing(foot: Foot, here: _Roll, there: _Roll, style: Style, side: int, ground: Ground) -> None:
+def _swing(foot: FootPoses, here: _Roll, there: _Roll, style: Style, side: int, ground: Ground) -> None:
     start, end = here.step.leave, there.step.land
     t = _frames(start, end)
     if not len(t):

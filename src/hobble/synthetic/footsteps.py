@@ -8,8 +8,8 @@ import numpy as np
 
 from hobble.core import quat
 from hobble.core.quat import Array
-from hobble.synthetic.ground import Ground
-from hobble.synthetic.path import Path
+from hobble.synthetic.planned_ground import Ground
+from hobble.synthetic.planned_path import PlannedPath
 from hobble.synthetic.style import LEFT, RIGHT, SIGN, Style
 
 ANKLE_HEIGHT = 7.0  # cm, of the ankle joint above the sole; the toe joint is 4.5 cm lower
@@ -23,7 +23,7 @@ SHIFTS = sorted(np.arange(-20.0, 21.0, 2.0), key=abs)  # cm by which a foot may 
 
 
 @dataclass(frozen=True)
-class Stance:
+class PlannedStance:
     """A foot on the ground from frame `land` to frame `leave` (with fractions, of the padded path).
 
     ankle: (3,) of the flat foot. turn: (4,) its world rotation. swings: whether it was lifted to get here.
@@ -49,12 +49,12 @@ def landings(phase: Array, side: int) -> Array:
 
 
 def stances(
-    path: Path, style: Style, phase: Array, ground: Ground, rng: np.random.Generator
-) -> tuple[list[Stance], list[Stance]]:
+    path: PlannedPath, style: Style, phase: Array, ground: Ground, rng: np.random.Generator
+) -> tuple[list[PlannedStance], list[PlannedStance]]:
     """All stances of the left and of the right foot along the path, in the order of their landings."""
     frames = np.arange(len(path), dtype=float)
     events = [(land, side) for side in (LEFT, RIGHT) for land in landings(phase, side)[:-1]]
-    out: tuple[list[Stance], list[Stance]] = ([], [])
+    out: tuple[list[PlannedStance], list[PlannedStance]] = ([], [])
     for land, side in sorted(events):
         here = np.interp(land, frames, phase)
         # How long a foot stands depends on the speed at the time of leaving, so a foot leaves sooner if the
@@ -65,19 +65,19 @@ def stances(
         ankle, turn = _footprint(path, style, ground, side, middle, other, rng)
         standing = np.interp(middle, frames, path.speed) < STILL
         if before and standing and _close(before, ankle, turn):
-            out[side].append(Stance(land, leave, before.ankle, before.turn, swings=False))
+            out[side].append(PlannedStance(land, leave, before.ankle, before.turn, swings=False))
         else:
-            out[side].append(Stance(land, leave, ankle, turn))
+            out[side].append(PlannedStance(land, leave, ankle, turn))
     return out
 
 
 def _footprint(
-    path: Path,
+    path: PlannedPath,
     style: Style,
     ground: Ground,
     side: int,
     middle: float,
-    other: Stance | None,
+    other: PlannedStance | None,
     rng: np.random.Generator,
 ) -> tuple[Array, Array]:
     """The place of a foot: under the body in mid-stance, but never across the other foot."""
@@ -119,6 +119,6 @@ def _planted(ground: Ground, place: Array, yaw: float) -> tuple[Array, Array]:
     return np.array([x, heel + ANKLE_HEIGHT, z]), turn
 
 
-def _close(old: Stance, ankle: Array, turn: Array) -> bool:
+def _close(old: PlannedStance, ankle: Array, turn: Array) -> bool:
     moved = np.linalg.norm(ankle - old.ankle)
     return bool(moved < STAY[0] and quat.angle(old.turn, turn) < STAY[1])

@@ -105,7 +105,7 @@ def _joined(pieces: Sequence[Piece], nothing: Piece) -> Piece:
     return torch.cat(x), torch.cat(y), torch.cat(p), np.concatenate(clip), np.concatenate(frame)
 
 
-class Watch:
+class LossWatch:
     """Adds up the losses of a section, and stops the training if it diverges.
 
     where: the pass and section, for messages. clips: names by index. processes: all stop together, with the

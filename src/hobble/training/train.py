@@ -12,7 +12,7 @@ from tqdm import tqdm
 from hobble.core.errors import HobbleError
 from hobble.database.reader import Database
 from hobble.models.options import Options
-from hobble.training.batches import TRAIN, Watch
+from hobble.training.batches import TRAIN, LossWatch
 from hobble.training.checkpoint import Saver, State, pack
 from hobble.training.device_rows import rows_for
 from hobble.training.held_out import SPLIT, HeldOut
@@ -65,12 +65,16 @@ def train(
         _run(state, database, training, processes, None)
         return state
     with Saver(path) as saver:
-        _run(state, database, training, processes, Record(state, database, training, saver))
+        _run(state, database, training, processes, TrainingRecorder(state, database, training, saver))
     return state
 
 
 def _run(
-    state: State, database: Database, training: Training, processes: Processes, record: Record | None
+    state: State,
+    database: Database,
+    training: Training,
+    processes: Processes,
+    record: TrainingRecorder | None,
 ) -> None:
     passes, sections, seed = training.passes, training.sections, training.seed
     device, batch_size = state.network.flat.device, training.batch
@@ -87,7 +91,7 @@ def _run(
             break
         pass_index, section = divmod(turn, sections)
         where = f"pass {pass_index + 1} of {passes}, section {section + 1} of {sections}"
-        watch = Watch(where, database.clips, processes)
+        watch = LossWatch(where, database.clips, processes)
         step.seed(section_seed(seed, turn))
         others.begin()
         roll_out.begin()
@@ -113,7 +117,7 @@ def section_seed(seed: int, turn: int) -> int:
     return int(np.random.SeedSequence([seed, 1, turn]).generate_state(1, np.uint64)[0] >> 1)
 
 
-class Record:
+class TrainingRecorder:
     """Records a training: held-out errors, history, checkpoints, progress bar, and one log line a section."""
 
     def __init__(self, state: State, database: Database, training: Training, saver: Saver) -> None:

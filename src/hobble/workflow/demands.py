@@ -19,7 +19,7 @@ from hobble.models import model
 from hobble.models.model import Trained
 from hobble.rows.layout import RowLayout
 from hobble.training.options import Machines
-from hobble.workflow.batches import ClipBatch
+from hobble.workflow.clip_batches import ClipBatch
 from hobble.workflow.clips import original
 from hobble.workflow.project import Project
 

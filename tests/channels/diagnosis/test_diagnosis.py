@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from hobble.channels import ClipSource, channel
+from hobble.channels.clip_values import clip_values
 from hobble.channels.diagnosis.channel import read_table
-from hobble.channels.files import clip_values
 from hobble.core.clip import Clip
 from hobble.core.errors import InputError
 from hobble.core.skeleton import Skeleton

@@ -13,10 +13,10 @@ import pytest
 from hobble.channels import channel
 from hobble.channels.injury.limp import page, together
 from hobble.channels.injury.limp import run as module
-from hobble.channels.injury.limp.captured import VERSION, HurtSeconds, Limp, healthy_of
+from hobble.channels.injury.limp.captured_limps import VERSION, HurtSeconds, Limp, healthy_of
+from hobble.channels.injury.limp.crowd_walks import FigureWalk
 from hobble.channels.injury.limp.run import SEVERITIES, distance, hurt_side, limp
-from hobble.channels.injury.limp.walks import FigureWalk
-from hobble.gait.cycles import SCALARS, Cycle, Walk
+from hobble.gait.cycles import SCALARS, Cycle, WalkCycles
 from hobble.gait.people import NORMAL, people
 from hobble.gait.profile import profile
 from hobble.gait.signals import CURVES, SIGN_CHANGES
@@ -52,7 +52,7 @@ def walking(limp: dict[str, float], speed: float) -> FigureWalk:
     curves = np.array([mixed(lambda gait, n=n: known.curve(gait, n)[0]) for n in CURVES])
     scalars = {n: float(mixed(lambda gait, n=n: known.scalar(gait, n)[0])) for n in SCALARS}
     cycles = [Cycle(start, start + 70, scalars, curves) for start in range(0, FRAMES - 70, 70)]
-    walk = Walk(60.0, tuple(cycles), tuple(map(mirrored, cycles)))
+    walk = WalkCycles(60.0, tuple(cycles), tuple(map(mirrored, cycles)))
     walk = walk.mirrored() if "left" in limp else walk
     return FigureWalk(walk, profile(walk), speed, FRAMES)
 

@@ -12,10 +12,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.stats import spearmanr
 
+from hobble.channels.injury.crowd_severities import severities
 from hobble.channels.injury.response.cases import divided_severities, into_a_jog, second_injuries
 from hobble.channels.injury.response.run import GAITS, injury_response, largest_accelerations
 from hobble.channels.injury.response.sweep import SEVERITIES, sweeps
-from hobble.channels.injury.walks import severities
 from hobble.evaluation.captured import Captured
 from hobble.evaluation.crowd import SPEEDS, CrowdTarget, run
 from hobble.evaluation.pose_distance import mean_cycle, settling

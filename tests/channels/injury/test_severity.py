@@ -12,7 +12,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from hobble.channels import ClipSource
-from hobble.channels.files import load_values, save_values, write_report
+from hobble.channels.clip_values import load_values, save_values, write_report
 from hobble.channels.injury.channel import CHANNEL
 from hobble.channels.injury.severity import (
     clip_severity,
@@ -21,7 +21,7 @@ from hobble.channels.injury.severity import (
     severity_matrix,
     source_rows,
 )
-from hobble.channels.injury.status import Spell, Status, read_status
+from hobble.channels.injury.status import InjurySpell, Status, read_status
 from hobble.core.clip import Clip
 from hobble.core.errors import InputError
 from hobble.core.skeleton import Skeleton
@@ -46,14 +46,14 @@ def column(holden31: Skeleton, link: str) -> int:
 
 
 def test_ranges_are_one_based_and_inclusive():
-    out = severity_matrix(Status(10, (Spell(3, 5, ((THIGH, 7.0),)),)), (ARM, THIGH))
+    out = severity_matrix(Status(10, (InjurySpell(3, 5, ((THIGH, 7.0),)),)), (ARM, THIGH))
     assert out[:, 0].tolist() == [0] * 10
     assert out[:, 1].tolist() == [0, 0, 7, 7, 7, 0, 0, 0, 0, 0]
 
 
 def test_the_later_line_counts_from_its_first_frame_on_for_its_links_alone():
-    first = Spell(1, 8, ((THIGH, 3.0), (ARM, 2.0)), 2)
-    later = Spell(5, 9, ((THIGH, 9.0),), 3)
+    first = InjurySpell(1, 8, ((THIGH, 3.0), (ARM, 2.0)), 2)
+    later = InjurySpell(5, 9, ((THIGH, 9.0),), 3)
     out = severity_matrix(Status(10, (first, later)), (THIGH, ARM))
     assert out[:, 0].tolist() == [3, 3, 3, 3, 9, 9, 9, 9, 9, 0]
     assert out[:, 1].tolist() == [2] * 8 + [0, 0]
@@ -61,10 +61,10 @@ def test_the_later_line_counts_from_its_first_frame_on_for_its_links_alone():
 
 def test_odd_ranges_are_told_with_their_lines():
     spells = (
-        Spell(0, 12, ((THIGH, 3.0),), 2),
-        Spell(5, 6, ((THIGH, 4.0), (ARM, 1.0)), 3),
-        Spell(11, 14, ((ARM, 4.0),), 4),
-        Spell(1, 10, ((ARM, 1.0),), 5),
+        InjurySpell(0, 12, ((THIGH, 3.0),), 2),
+        InjurySpell(5, 6, ((THIGH, 4.0), (ARM, 1.0)), 3),
+        InjurySpell(11, 14, ((ARM, 4.0),), 4),
+        InjurySpell(1, 10, ((ARM, 1.0),), 5),
     )
     said = odd_ranges(Status(10, spells), "walk_injuries.txt")
     assert [s.split(": ")[0] for s in said] == [

@@ -8,7 +8,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from hobble.channels.injury.status import Spell, Status, format_status, read_status, write_status
+from hobble.channels.injury.status import InjurySpell, Status, format_status, read_status, write_status
 from hobble.core.errors import InputError
 
 LINKS = ("Hips-LHipJoint", "LeftUpLeg-LeftLeg", "RightUpLeg-RightLeg", "LeftShoulder-LeftArm")
@@ -31,7 +31,7 @@ def test_reads_what_the_facts_page_shows(status_file):
     )
     status = read_status(path, LINKS)
     assert status.frames == 2500
-    assert status.spells[0] == Spell(1, 225, (("RightUpLeg-RightLeg", 10.0),), 2)
+    assert status.spells[0] == InjurySpell(1, 225, (("RightUpLeg-RightLeg", 10.0),), 2)
     assert status.spells[1].links == (("LeftShoulder-LeftArm", 5.0), ("LeftUpLeg-LeftLeg", 10.0))
     assert status.spells[1].line == 3
 
@@ -90,7 +90,7 @@ def test_a_binary_and_a_missing_file_are_refused(tmp_path):
 
 severities = st.integers(0, 100).map(lambda n: n / 10)
 spells = st.builds(
-    lambda first, length, links: Spell(first, first + length, tuple(links.items())),
+    lambda first, length, links: InjurySpell(first, first + length, tuple(links.items())),
     st.integers(0, 500),
     st.integers(0, 500),
     st.dictionaries(st.sampled_from(LINKS), severities, min_size=1),

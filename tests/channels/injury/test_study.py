@@ -11,9 +11,9 @@ from typing import Any
 
 import pytest
 
+from hobble.channels.injury.study.answer_tables import NUMERALS, tables
 from hobble.channels.injury.study.answers import FilmAnswer, Study, read_answers, read_study
-from hobble.channels.injury.study.films import FILMS, FPS, GAIT, ONE, PARTS, SEVERAL, wish
-from hobble.channels.injury.study.tables import NUMERALS, tables
+from hobble.channels.injury.study.films import FILMS, FPS, GAIT, ONE, PARTS, SEVERAL, hurts_and_gait
 from hobble.cli.__main__ import main
 from hobble.core.errors import InputError
 
@@ -55,11 +55,11 @@ def test_the_thirteen_are_those_of_the_study() -> None:
 
 @pytest.mark.parametrize("film", FILMS)
 def test_each_begins_healthy_hurts_and_changes_its_gait_while_it_hurts(film) -> None:
-    told = [wish(film, f) for f in range(round(film.seconds * FPS))]
-    hurts = [hurt for hurt, _ in told]
+    states = [hurts_and_gait(film, f) for f in range(round(film.seconds * FPS))]
+    hurts = [hurt for hurt, _ in states]
     assert hurts.index(True) == 3 * FPS
     assert all(hurts[3 * FPS :])
-    gaits = [gait for _, gait in told]
+    gaits = [gait for _, gait in states]
     assert (gaits[0], gaits[-1]) == film.gaits
     assert len(set(gaits[: 5 * FPS])) == 1, "two seconds hurt before the gait changes"
 

@@ -7,7 +7,7 @@ import pytest
 from pydantic import ValidationError
 
 from hobble.channels import ClipSource, channel
-from hobble.channels.files import clip_values
+from hobble.channels.clip_values import clip_values
 from hobble.channels.mood import CHANNEL
 from hobble.core.clip import Clip
 from hobble.core.errors import InputError

@@ -2,7 +2,7 @@
 
 from hobble.measures.joints import Joints
 from hobble.measures.measure import Cost, Measure
-from hobble.measures.sampling import SampleOptions
+from hobble.measures.sample_options import SampleOptions
 
 
 class Options(Joints, SampleOptions):

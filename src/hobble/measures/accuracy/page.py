@@ -11,9 +11,9 @@ from hobble.measures.given import Json
 from hobble.report.charts import Chart, axis, mark
 from hobble.report.formats import duration, number
 from hobble.report.gather import Material
-from hobble.report.parts import Fragment, Part, Section, Words
+from hobble.report.page_parts import PageSection, Paragraph, SectionPart, TemplatePart
 from hobble.report.published import cited
-from hobble.report.summary import Figure, Hint, placed
+from hobble.report.summary import Hint, KeyFigure, placed
 from hobble.report.tables import Column, Table
 
 INTRODUCTION = (
@@ -180,20 +180,20 @@ def published_table(found: Json, material: Material) -> Table:
     return Table(f"{material.name}-published", columns, rows, "Comparison with published results")
 
 
-def section(found: Json, material: Material) -> Section:
+def section(found: Json, material: Material) -> PageSection:
     """The charts and tables, and the view of captured and predicted motion. Empty if it was not measured."""
     if not found.get("clips"):
-        return Section("accuracy", [])
-    return Section(
+        return PageSection("accuracy", [])
+    return PageSection(
         "accuracy",
         [
-            Part(0, Words(INTRODUCTION + sampled(found))),
-            Part(9, Words(caveat(material))),
-            Part(10, published_table(found, material), open=True, short=True),
-            Part(20, clip_bars(found, material), tall=True),
-            Part(30, clip_boxes(found), tall=True),
-            Part(60, accuracy_table(found, material.name)),
-            Part(90, Fragment("captured.html.j2")),
+            SectionPart(0, Paragraph(INTRODUCTION + sampled(found))),
+            SectionPart(9, Paragraph(caveat(material))),
+            SectionPart(10, published_table(found, material), open=True, short=True),
+            SectionPart(20, clip_bars(found, material), tall=True),
+            SectionPart(30, clip_boxes(found), tall=True),
+            SectionPart(60, accuracy_table(found, material.name)),
+            SectionPart(90, TemplatePart("captured.html.j2")),
         ],
         title="Accuracy",
         at=10,
@@ -228,7 +228,7 @@ def sampled(found: Json) -> str:
     )
 
 
-def figures(found: Json, material: Material) -> Iterator[Figure]:
+def figures(found: Json, material: Material) -> Iterator[KeyFigure]:
     """The error of each split."""
     for at, split, label in (
         (10, "held_out", "Error on held-out clips"),
@@ -241,7 +241,7 @@ def figures(found: Json, material: Material) -> Iterator[Figure]:
             theirs = material.published_entry("accuracy") if split == "held_out" else None
             if theirs:
                 note += f"; published for {theirs['label']}: {100 * theirs['mean']:.2f} %, on other clips"
-            yield Figure(label, f"{100 * part['mean']:.2f}", "%", note, at)
+            yield KeyFigure(label, f"{100 * part['mean']:.2f}", "%", note, at)
 
 
 def _centimetres(error: float, split: str, material: Material) -> str:

@@ -19,12 +19,12 @@ from hobble.evaluation.crowd import FPS
 from hobble.gait.discriminant import Discriminant, learn
 from hobble.measures.given import Given, Outcome, Row
 from hobble.measures.manners.left_out import left_out, share
-from hobble.measures.manners.results import Effect, Manners, Named, OfChannel, Together
+from hobble.measures.manners.results import ChannelResult, CombinedResult, Effect, Manners, NamedWindows
 from hobble.measures.manners.windows import (
     EFFECTS,
     NONE,
-    Figure,
     MannerWindow,
+    WalkerInputs,
     captured_windows,
     generated,
     mean_effect,
@@ -72,7 +72,7 @@ def of_channel(
     splits: Mapping[str, str],
     people: Mapping[str, str],
     runtime: Runtime,
-) -> OfChannel | None:
+) -> ChannelResult | None:
     """The result for one channel; None with walks of fewer than two manners.
 
     captured: see `left_out`. generated: for each manner and value the share of `windows` recognised with what
@@ -90,7 +90,7 @@ def of_channel(
     speed = float(np.median([w.values["speed"] for w in known if w.manner == NONE] or [ASKED])) / FPS
     single = [{}, *({manner: value} for value in (HALF, FULL) for manner in seen)]
     given = [*single, *(dict.fromkeys(pair, FULL) for pair in combinations(seen, 2))]
-    figures = [Figure({name: values}, speed * pace) for values in given for pace in PACES]
+    figures = [WalkerInputs({name: values}, speed * pace) for values in given for pace in PACES]
     walks = generated(network, figures, name, runtime)
     per = len(PACES)
     each = [[w for walk in walks[i : i + per] for w in walk] for i in range(0, len(walks), per)]
@@ -115,7 +115,7 @@ def of_channel(
 
 def together(
     network: Network, name: str, judge: Discriminant, seen: Sequence[str], speed: float, runtime: Runtime
-) -> list[Together]:
+) -> list[CombinedResult]:
     """How often each manner at 1 is named while a column of another channel is at its highest value.
 
     It has a row for each manner (or NONE) and each column that was above 0 in training.
@@ -127,11 +127,11 @@ def together(
     if not cases:
         return []
     figures = [
-        Figure({name: {} if m == NONE else {m: FULL}, other: {column: channel(other).highest}}, speed)
+        WalkerInputs({name: {} if m == NONE else {m: FULL}, other: {column: channel(other).highest}}, speed)
         for m, other, column in cases
     ]
     walks = generated(network, figures, name, runtime)
-    rows: list[Together] = []
+    rows: list[CombinedResult] = []
     for (manner, other, column), some in zip(cases, walks, strict=True):
         names = judge.names(table(some))
         rows.append(
@@ -163,7 +163,7 @@ def run(given: Given, options: Section) -> Outcome:
     return Outcome(result, tables, says or result.get("reason", ""))
 
 
-def _named(judge: Discriminant, values: Mapping[str, float], windows: Sequence[MannerWindow]) -> Named:
+def _named(judge: Discriminant, values: Mapping[str, float], windows: Sequence[MannerWindow]) -> NamedWindows:
     names = judge.names(table(windows))
     wanted = set(values) or {NONE}
     return {

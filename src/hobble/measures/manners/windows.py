@@ -42,7 +42,7 @@ class MannerWindow:
 
 
 @dataclass(frozen=True)
-class Figure:
+class WalkerInputs:
     """The inputs of a generated figure: channel -> column -> value, and a speed in cm a frame."""
 
     channels: Mapping[str, Mapping[str, float]]
@@ -74,7 +74,7 @@ def captured_windows(clip: Captured, network: Network, name: str) -> list[Manner
 
 
 def generated(
-    network: Network, figures: Sequence[Figure], name: str, runtime: Runtime
+    network: Network, figures: Sequence[WalkerInputs], name: str, runtime: Runtime
 ) -> list[list[MannerWindow]]:
     """The windows of each figure's straight walk. name: the channel whose columns are the manners."""
     assert network.skeleton is not None

@@ -9,7 +9,7 @@ from pydantic import AfterValidator, Field
 from hobble.core.section import Positive
 from hobble.measures.joints import Joints
 from hobble.measures.measure import Cost, Measure
-from hobble.measures.sampling import SampleOptions
+from hobble.measures.sample_options import SampleOptions
 
 
 def _some(lengths: tuple[int, ...]) -> tuple[int, ...]:

@@ -8,12 +8,12 @@ from hobble.measures.accuracy.page import COLOURS, NAMES
 from hobble.measures.given import Json
 from hobble.report.charts import Chart, axis, line, log_axis
 from hobble.report.gather import Material
-from hobble.report.parts import Part, Section
+from hobble.report.page_parts import PageSection, SectionPart
 
 
-def section(found: Json, material: Material) -> Section:
+def section(found: Json, material: Material) -> PageSection:
     """The chart, which is added to the section on accuracy."""
-    return Section("accuracy", [Part(50, rollout_chart(found))])
+    return PageSection("accuracy", [SectionPart(50, rollout_chart(found))])
 
 
 def sampled(found: Json) -> str:

@@ -27,8 +27,8 @@ from hobble.measures.accuracy.run import (
 from hobble.measures.given import Given, Outcome, Row
 from hobble.measures.results import SPLITS
 from hobble.measures.rollouts import Options
-from hobble.measures.rollouts.crowd import Crowd, RollOuts, inputs
 from hobble.measures.rollouts.results import ErrorsOf, ErrorsOfClip, RollOutsFound
+from hobble.measures.rollouts.roll_outs import Crowd, RollOuts, inputs
 from hobble.measures.sample import Sample, drawn
 from hobble.models.load import load_network
 from hobble.models.network import Network, Predictor
@@ -104,11 +104,11 @@ def _groups(rows: ClipRows, layout: RowLayout, lengths: Sequence[int]) -> list[R
     """The roll-outs of a clip."""
     out = []
     for chosen in unbroken(rows.frame):
-        asked = inputs(rows, chosen, layout)
+        given = inputs(rows, chosen, layout)
         for length in lengths:
             starts = np.arange(1, len(chosen), max(1, length // OVERLAP))
             if len(starts):
-                out.append(RollOuts(asked, starts, length))
+                out.append(RollOuts(given, starts, length))
     return out
 
 
@@ -125,10 +125,10 @@ def _errors(
     truth = crowd.y[:, layout.y_joint_position].reshape(len(crowd.y), -1, 3)[:, joints]
     moments = [Moments.nothing(2) for _ in owners]
     last: list[Array] = [np.zeros((0, len(joints), 2)) for _ in owners]
-    for age, (at, place, bounds) in enumerate(crowd.frames()):
+    for age, (at, place, places) in enumerate(crowd.frames()):
         errors = relative_and_distance(truth[at].astype(float), place[:, joints])
-        for g in np.flatnonzero(np.diff(bounds)):
-            own = errors[bounds[g] : bounds[g + 1]]
+        for g, of_group in places.items():
+            own = errors[of_group]
             weights = np.full(own[..., 0].size, 1 / len(joints))
             moments[g] = moments[g] + Moments.of(own.reshape(-1, 2), weights)
             if age == owners[g][1].length - 1:
@@ -140,12 +140,12 @@ def _errors(
 
 def _of_group(group: RollOuts, moments: Moments, end: Array, phase: Array) -> RollOutErrors:
     """The errors of a group. end: (n', joints, 2) in the last frame; phase: (n,) after it."""
-    frames = int(np.minimum(group.length, len(group.asked.x) - group.starts).sum())
+    frames = int(np.minimum(group.length, len(group.given.x) - group.starts).sum())
     # The phase is already that of the next frame, so that one has to be in the stretch too.
-    ended = int(np.searchsorted(group.starts, len(group.asked.x) - group.length))
+    ended = int(np.searchsorted(group.starts, len(group.given.x) - group.length))
     if not ended:
         return RollOutErrors(frames, len(group.starts), moments)
-    truth = group.asked.phase[group.starts[:ended] + group.length]
+    truth = group.given.phase[group.starts[:ended] + group.length]
     off = np.abs(np.mod(phase[:ended] - truth + 0.5, 1.0) - 0.5)
     last = np.stack([end[:ended, :, 1].mean(axis=1), off], axis=1)
     return RollOutErrors(frames, len(group.starts), moments, Moments.of(last), ended)

@@ -12,22 +12,22 @@ from typing import Any
 
 import numpy as np
 
+from hobble.channels.injury.crowd_severities import hurt_links
+from hobble.channels.injury.crowd_severities import links as links_of
 from hobble.channels.injury.limp import Options
-from hobble.channels.injury.limp.captured import HurtSeconds, Limp, healthy_of, limps
+from hobble.channels.injury.limp.captured_limps import HurtSeconds, Limp, healthy_of, limps
+from hobble.channels.injury.limp.crowd_walks import FigureWalk, walk_figures
 from hobble.channels.injury.limp.together import limps_together, named_together
-from hobble.channels.injury.limp.walks import FigureWalk, walk_figures
-from hobble.channels.injury.walks import hurt_links
-from hobble.channels.injury.walks import links as links_of
 from hobble.core.errors import HobbleError
 from hobble.core.skeleton import Skeleton
 from hobble.evaluation.spearman import spearman
 from hobble.gait.comparison import compare_walk
-from hobble.gait.effects import EFFECTS, effects, effects_of_people
+from hobble.gait.effect_sizes import EFFECTS, effects, effects_of_people
 from hobble.gait.features import features
 from hobble.gait.people import people
 from hobble.gait.profile import Profile, profile
 from hobble.gait.recogniser import RIGHT, SIDES, examples
-from hobble.hurt.parts import part_of_link
+from hobble.hurt.body_parts import part_of_link
 from hobble.measures.given import Given, Outcome
 from hobble.models.load import load_network
 from hobble.models.network import Network

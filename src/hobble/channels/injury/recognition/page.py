@@ -5,12 +5,12 @@ from __future__ import annotations
 from hobble.measures.given import Json
 from hobble.report.charts import Chart, Trace
 from hobble.report.gather import Material
-from hobble.report.parts import Part, Section
+from hobble.report.page_parts import PageSection, SectionPart
 
 
-def section(found: Json, material: Material) -> Section:
+def section(found: Json, material: Material) -> PageSection:
     """The chart, which is added to the section on the response to injury."""
-    return Section("injury", [Part(30, recognition_chart(found))])
+    return PageSection("injury", [SectionPart(30, recognition_chart(found))])
 
 
 def recognition_chart(found: Json) -> Chart | None:

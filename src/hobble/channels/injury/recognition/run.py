@@ -14,9 +14,9 @@ from typing import Any
 
 import numpy as np
 
-from hobble.channels.injury.limp.captured import VERSION
-from hobble.channels.injury.walks import links as links_of
-from hobble.channels.injury.walks import severities
+from hobble.channels.injury.crowd_severities import links as links_of
+from hobble.channels.injury.crowd_severities import severities
+from hobble.channels.injury.limp.captured_limps import VERSION
 from hobble.core.quat import Array
 from hobble.core.section import Section
 from hobble.core.skeleton import Skeleton
@@ -25,7 +25,7 @@ from hobble.evaluation.crowd import FPS, CrowdTarget
 from hobble.evaluation.crowd import run as run_walks
 from hobble.evaluation.gait_features import features
 from hobble.gait.discriminant import Discriminant, learn
-from hobble.hurt.parts import part_of_link
+from hobble.hurt.body_parts import part_of_link
 from hobble.measures.given import Given, Outcome
 from hobble.models.load import load_network
 from hobble.models.network import Network

@@ -7,16 +7,16 @@ from itertools import product
 
 import numpy as np
 
+from hobble.channels.injury.crowd_severities import severities
 from hobble.channels.injury.response.results import Divided, IntoAJog, SecondInjury
 from hobble.channels.injury.response.sweep import WALK_IN
-from hobble.channels.injury.walks import severities
 from hobble.core.quat import Array
 from hobble.core.skeleton import Skeleton
 from hobble.evaluation.crowd import FPS, CrowdTarget, Walks, run
 from hobble.evaluation.motion_measures import gait_measures
 from hobble.evaluation.pose_distance import distance_to_cycle, mean_cycle
 from hobble.evaluation.spearman import spearman
-from hobble.hurt.parts import part_of_link
+from hobble.hurt.body_parts import part_of_link
 from hobble.models.network import Network
 from hobble.runtime.options import Runtime
 
@@ -74,16 +74,15 @@ def second_injuries(
     script += [CrowdTarget(_frames(1, seconds), gait, hurt(s)) for s in SECOND]
     walks = run(network, script, runtime)
     last = len(SECOND)
-    alone = {b: i for i, (a, b) in enumerate(pairs) if a is None}
+    alone = {b: _alone(walks, last, i) for i, (a, b) in enumerate(pairs) if a is None}
     out: list[SecondInjury] = []
     for i, (first, second) in enumerate(pairs):
         if first is None:
             continue
-        base, of_second = _cycle(walks, 1, i), _cycle(walks, last, alone[second])
+        of_second, own, normal = alone[second]
+        base = _cycle(walks, 1, i)
         away = [_from(walks, 1 + k, i, base) for k in range(last)]
-        j = alone[second]
-        normal = _from(walks, last, j, _cycle(walks, 1, j)) - _from(walks, 1, j, _cycle(walks, 1, j))
-        both = _from(walks, last, i, of_second) - _from(walks, last, j, of_second)
+        both = _from(walks, last, i, of_second) - own
         out.append(
             {
                 "first": first,
@@ -95,6 +94,17 @@ def second_injuries(
             }
         )
     return out
+
+
+def _alone(walks: Walks, last: int, figure: int) -> tuple[Array, float, float]:
+    """What one injury does to a figure that is healthy in stretch 1 and hurt in stretch `last`.
+
+    The mean cycle in `last`; the distance of the walk from that cycle, cm; the effect: how much further the
+    hurt walk is from the healthy cycle than the healthy walk is, cm.
+    """
+    healthy, cycle = _cycle(walks, 1, figure), _cycle(walks, last, figure)
+    effect = _from(walks, last, figure, healthy) - _from(walks, 1, figure, healthy)
+    return cycle, _from(walks, last, figure, cycle), effect
 
 
 def one_of_each_part(skeleton: Skeleton, links: Sequence[str]) -> list[str]:

@@ -7,12 +7,12 @@ from typing import Any
 
 import numpy as np
 
+from hobble.channels.injury.crowd_severities import hurt_links
+from hobble.channels.injury.crowd_severities import links as links_of
 from hobble.channels.injury.response import Options
 from hobble.channels.injury.response.cases import divided_severities, into_a_jog, second_injuries
 from hobble.channels.injury.response.results import InjuryResponse, LinkResponse, Summary, SweepRow
 from hobble.channels.injury.response.sweep import SEVERITIES, sweeps
-from hobble.channels.injury.walks import hurt_links
-from hobble.channels.injury.walks import links as links_of
 from hobble.evaluation.captured import Captured, captured_clips
 from hobble.evaluation.crowd import SPEEDS
 from hobble.measures.given import Given, Outcome, Row

@@ -12,8 +12,8 @@ from typing import cast
 
 import numpy as np
 
+from hobble.channels.injury.crowd_severities import severities
 from hobble.channels.injury.response.results import Response, SweepRow
-from hobble.channels.injury.walks import severities
 from hobble.core.skeleton import Skeleton
 from hobble.evaluation.crowd import FPS, CrowdTarget, Walks, run
 from hobble.evaluation.motion_measures import gait_measures

@@ -11,10 +11,10 @@ from hobble.core import quat
 from hobble.core.clip import Clip
 from hobble.core.quat import Array
 from hobble.core.smooth import gaussian
-from hobble.hurt.parts import LEFT, RIGHT, SIDES
+from hobble.hurt.body_parts import LEFT, RIGHT, SIDES
 from hobble.labels.footfall import find_swings
 from hobble.labels.model import GAITS, Labels
-from hobble.labels.options import Labels as LabelOptions
+from hobble.labels.options import LabelOptions
 from hobble.labels.phase import phase_of_footsteps
 
 UP = np.array([0.0, 1.0, 0.0])
@@ -26,7 +26,7 @@ FACING = 0.2
 
 
 @dataclass(frozen=True)
-class Stance:
+class SourceStance:
     """A foot on the ground from source frame `land` to `off`."""
 
     land: float
@@ -51,7 +51,7 @@ class HealthyClip:
 
     clip: Clip
     labels: Labels
-    stances: tuple[list[Stance], list[Stance]] = field(repr=False)
+    stances: tuple[list[SourceStance], list[SourceStance]] = field(repr=False)
     up: np.ndarray = field(repr=False)
     swing: Array = field(repr=False)
     phase: Array = field(repr=False)
@@ -84,7 +84,7 @@ def read_source(clip: Clip, labels: Labels) -> HealthyClip:
             swing[start:end, side] = np.sin(np.pi * u) ** 2
         ends = [0, *(x for pair in own for x in pair), frames - 1]
         stances.append(
-            [Stance(float(a), float(max(a, b))) for a, b in zip(ends[::2], ends[1::2], strict=True)]
+            [SourceStance(float(a), float(max(a, b))) for a, b in zip(ends[::2], ends[1::2], strict=True)]
         )
     phase, known = phase_of_footsteps(labels.footsteps, frames)
     step = np.diff(phase, prepend=phase[:1])
@@ -120,7 +120,7 @@ def _length(clip: Clip, side: str) -> float:
     return float(sum(np.linalg.norm(offsets[clip.skeleton.role(f"{side}_{b}")]) for b in ("knee", "heel")))
 
 
-def _cycles(stances: tuple[list[Stance], list[Stance]], frames: int, fps: float) -> Array:
+def _cycles(stances: tuple[list[SourceStance], list[SourceStance]], frames: int, fps: float) -> Array:
     """(frames,) frames from a foot's landing to its next, around each frame. Landings of both feet count."""
     middles, lengths = [], []
     for own in stances:

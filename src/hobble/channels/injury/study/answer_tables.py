@@ -15,7 +15,7 @@ import numpy as np
 from hobble.channels.injury.study.answers import FilmAnswer, ShownFilm, Study
 from hobble.channels.injury.study.films import without_side
 from hobble.core.files import write_text
-from hobble.evaluation.tables import write_csv
+from hobble.evaluation.csv_tables import write_csv
 
 NUMERALS = ("III", "IV", "V", "VI", "VII", "VIII", "IX", "X", "XI", "XII", "XIII", "XIV", "XV", "XVI")
 ALL = "all"

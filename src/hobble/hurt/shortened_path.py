@@ -9,13 +9,13 @@ import numpy as np
 from hobble.core.quat import Array
 from hobble.core.smooth import gaussian
 from hobble.hurt.effects import Effects
-from hobble.hurt.source import HealthyClip
+from hobble.hurt.healthy_clip import HealthyClip
 
 SLOPE = 0.3  # seconds: sigma of the Gaussian over the heights of the ground under the feet
 
 
 @dataclass(frozen=True)
-class Path:
+class ShortenedPath:
     """Old and new horizontal path (F, 2) and height of the ground (F,) at each source frame.
 
     Flat ground stays at 0. On other ground, rises shrink like the path, so that slopes stay.
@@ -35,14 +35,14 @@ class Path:
         )
 
 
-def shorten(source: HealthyClip, effects: Effects, slower: Array, ground: Array | None) -> Path:
+def shorten(source: HealthyClip, effects: Effects, slower: Array, ground: Array | None) -> ShortenedPath:
     """The path at the speed of `effects`.
 
     slower: (F,) factor of the stride time. ground: (F,) height of the ground below the body, None if flat.
     """
     share = effects.ratio("speed") * slower
     flat = np.zeros(len(source))
-    return Path(
+    return ShortenedPath(
         source.path,
         _shrunk(source.path, share[:, None]),
         flat if ground is None else ground,

@@ -9,10 +9,10 @@ from hobble.core.ik import aim
 from hobble.core.quat import Array
 from hobble.core.skeleton import Skeleton
 from hobble.core.smooth import gaussian
+from hobble.hurt.body_parts import LEFT, RIGHT, SIDES, ancestors
 from hobble.hurt.effects import Effects
-from hobble.hurt.parts import LEFT, RIGHT, SIDES, ancestors
-from hobble.hurt.people import HARMONICS
-from hobble.hurt.source import HealthyClip
+from hobble.hurt.healthy_clip import HealthyClip
+from hobble.hurt.impairment_profiles import HARMONICS
 
 X, Y, Z = np.eye(3)
 PELVIS = 0.35  # the pelvis tilts by this share of the trunk's lean

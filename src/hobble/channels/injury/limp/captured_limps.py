@@ -9,12 +9,12 @@ from pathlib import Path
 
 import numpy as np
 
-from hobble.channels.injury.walks import INJURY
+from hobble.channels.injury.crowd_severities import INJURY
 from hobble.core.quat import Array
 from hobble.core.skeleton import Skeleton
 from hobble.evaluation.captured import captured, rotate_by_yaw
 from hobble.evaluation.crowd import FPS
-from hobble.gait.cycles import Walk, joined, measure
+from hobble.gait.cycles import WalkCycles, joined, measure
 from hobble.gait.people import people
 from hobble.gait.profile import Profile, profile
 from hobble.rows.clip_rows import ClipRows, load_clip_rows
@@ -30,7 +30,7 @@ class Limp:
 
     clip: str
     hurt: Mapping[str, float]
-    walk: Walk = field(repr=False)
+    walk: WalkCycles = field(repr=False)
     speed: float
 
     @property
@@ -96,7 +96,7 @@ def _walked(rows: ClipRows, links: Sequence[str], skeleton: Skeleton) -> list[Li
         yaw = np.concatenate([[0.0], -np.cumsum(turn[part.rows])[:-1]])
         walks.append(measure(skeleton, _placed(part.local, part.root, yaw), FPS))
         speeds.append(np.hypot(part.velocity[:, 0], part.velocity[:, 1]).mean())
-    walk = joined(walks) if walks else Walk(FPS, (), ())
+    walk = joined(walks) if walks else WalkCycles(FPS, (), ())
     if not len(walk):
         return []
     hurt = {link: float(value) for link, value in zip(links, severity[0], strict=True) if value > 0}
