@@ -38,7 +38,7 @@ class Recipe(Section):
     )
     other_paces: Annotated[float, Field(ge=1, le=2)] = Field(
         1.0,
-        description="for such channels, too: largest factor by which the motion of a sample is played slower or "
+        description="for such channels, too: largest factor by which a sample is played slower or "
         "faster, along a smoother path; 1: none",
     )
     keep_channels: bool = Field(False, description="dropout never drops the inputs of channels")
