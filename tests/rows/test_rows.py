@@ -53,8 +53,8 @@ def original(shared: Path) -> dict[str, np.ndarray]:
 
 def options(section: str, **changed: object) -> dict[str, Any]:
     """A section of the original's data set, as its stage gets it."""
-    model = getattr(sections, section.capitalize())
-    return model(**getattr(RELEASE, section).model_dump() | changed).model_dump(mode="json")
+    kept = getattr(RELEASE, section)
+    return type(kept)(**kept.model_dump() | changed).model_dump(mode="json")
 
 
 def rows_as_configured(shared: Path, root: Path, margins: str = "drop", **terrain: object) -> ClipRows:
