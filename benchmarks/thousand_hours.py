@@ -159,7 +159,7 @@ def arguments() -> argparse.Namespace:
     parser.add_argument("--shards", type=int, default=1, help="of the database")
     parser.add_argument("--training-nodes", type=int, default=1)
     parser.add_argument("--batch", type=int, default=0, help="samples of a step; 0: that of the run")
-    parser.add_argument("--passes", type=int, default=0, help="0: those of the run")
+    parser.add_argument("--passes", type=float, default=0.0, help="0: those of the run")
     return parser.parse_args()
 
 

@@ -10,7 +10,7 @@ from hobble.models.pfnn.predictor import PfnnPredictor
 from hobble.runtime.options import Runtime
 
 
-def test_a_figure_walks_the_same_alone_and_among_others(hurtable) -> None:
+def test_a_figure_walks_the_same_alone_and_in_a_crowd(hurtable) -> None:
     links = list(hurtable.channels["injury"][:5])
     hurt = channel_values(hurtable, "injury", [{link: 2.0 * i} for i, link in enumerate(links)])
     gaits = ["walk", "jog", "walk", "jog", "walk"]

@@ -48,7 +48,7 @@ def test_hips_without_ground_under_them_are_found(hurtable: Pfnn, monkeypatch: p
     assert found["hips_highest_cm"] > HIPS + 10
 
 
-def test_a_leg_that_snaps_is_seen(hurtable: Pfnn, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_leg_that_snaps_is_found(hurtable: Pfnn, monkeypatch: pytest.MonkeyPatch) -> None:
     whole = soak(on_its_feet(hurtable), 8, 150)
     assert whole["added_turn_degrees"] <= LIMITS["added_turn_degrees"]
     plain = feet.place_feet
@@ -73,7 +73,7 @@ def test_a_leg_that_snaps_is_seen(hurtable: Pfnn, monkeypatch: pytest.MonkeyPatc
     assert not found["holds"]
 
 
-def test_slides_are_those_of_whole_stances() -> None:
+def test_slides_are_measured_over_whole_stances() -> None:
     slides = StanceSlides(np.zeros((1, 2)), np.zeros((1, 2), int))
     before = np.zeros((1, 2, 3))
     for k in range(8):
@@ -83,7 +83,7 @@ def test_slides_are_those_of_whole_stances() -> None:
     np.testing.assert_allclose(np.concatenate(slides.done), [2.5])  # the right foot's contact was too short
 
 
-def test_grounds_are_of_many_kinds() -> None:
+def test_random_grounds_are_flat_sloping_and_steep() -> None:
     ground = grounds(200, np.random.default_rng(1))
     x = np.linspace(-400, 400, 801)
     tall = [np.ptp(ground(x + 4e4 * c, 0 * x)) for c in range(200)]

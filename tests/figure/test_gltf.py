@@ -76,7 +76,7 @@ def run(code: str, *arguments: str, module: bool, modules: Path) -> dict:
     return json.loads(done.stdout)
 
 
-def test_the_validator_finds_nothing(file: Path, page_modules: Path) -> None:
+def test_the_gltf_validator_finds_no_problem(file: Path, page_modules: Path) -> None:
     report = run(VALIDATE, str(file), module=False, modules=page_modules)
     issues = report["issues"]
     assert (issues["numErrors"], issues["numWarnings"]) == (0, 0), issues["messages"][:5]
@@ -84,7 +84,7 @@ def test_the_validator_finds_nothing(file: Path, page_modules: Path) -> None:
     assert report["info"]["totalTriangleCount"] > 20_000
 
 
-def test_three_loads_it_and_moves_it_as_python_does(
+def test_three_js_moves_the_loaded_body_as_python_does(
     file: Path, walk: BodyMotion, holden31: Skeleton, page_modules: Path
 ) -> None:
     mesh = body(holden31)
@@ -99,7 +99,7 @@ def test_three_loads_it_and_moves_it_as_python_does(
     assert np.abs(100 * np.array(found["out"]) - expected).max() < 0.25
 
 
-def test_it_stands_on_the_ground(file: Path) -> None:
+def test_the_exported_body_stands_on_the_ground(file: Path) -> None:
     data = file.read_bytes()
     length = int.from_bytes(data[12:16], "little")
     document = json.loads(data[20 : 20 + length])

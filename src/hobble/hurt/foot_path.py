@@ -9,6 +9,7 @@ import numpy as np
 from scipy.ndimage import maximum_filter1d
 
 from hobble.core import quat
+from hobble.core.curve_value import value_at
 from hobble.core.quat import Array
 from hobble.core.smooth import gaussian
 from hobble.hurt.body_parts import SIDES
@@ -163,12 +164,14 @@ def _moved(
 
     It moves with the body; the hurt foot lands less far ahead, both wider apart.
     """
-    frames = np.arange(len(source))
     at = min(round(when), len(source) - 1)
-    speed = np.gradient(source.path, axis=0)[at] if len(source) > 1 else np.zeros(2)
-    step = effects.sided["step"] * (1 - JOGGING * source.jog)[:, None]
-    ahead = np.interp(when, frames, step[:, side] - step[:, 1 - side]) / 2 * speed * source.cycle[at] / 2
-    width = np.interp(when, frames, effects.sided["width"].max(axis=1)) * source.leg / 2
+    # Only frames around it are read: there are thousands of footprints in a long clip.
+    near = slice(max(at - 1, 0), at + 2)
+    speed = np.gradient(source.path[near], axis=0)[at - near.start] if len(source) > 1 else np.zeros(2)
+    step = effects.sided["step"][near] * (1 - JOGGING * source.jog[near])[:, None]
+    ahead = value_at(step[:, side] - step[:, 1 - side], when - near.start)
+    ahead = ahead / 2 * speed * source.cycle[at] / 2
+    width = value_at(effects.sided["width"][near].max(axis=1), when - near.start) * source.leg / 2
     outward = quat.rotate(source.heading[at], np.array([SIGN[side] * width, 0.0, 0.0]))
     return path.moved(place, when) + np.array([ahead[0], 0.0, ahead[1]]) + outward
 

@@ -6,6 +6,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from hobble.core.curve_value import value_at
 from hobble.core.quat import Array
 from hobble.core.smooth import gaussian
 from hobble.hurt.effects import Effects
@@ -28,11 +29,11 @@ class ShortenedPath:
 
     def moved(self, point: Array, when: float) -> Array:
         """(3,) a point of source frame `when`, moved to the new world."""
-        frames = np.arange(len(self.old))
-        shift = [np.interp(when, frames, self.new[:, i] - self.old[:, i]) for i in (0, 1)]
-        return point + np.array(
-            [shift[0], np.interp(when, frames, self.new_ground - self.old_ground), shift[1]]
-        )
+        first = min(int(when), len(self.old) - 1)
+        near = slice(first, first + 2)  # reading all frames for each footprint would take long
+        moved = self.new[near] - self.old[near]
+        curves = moved[:, 0], self.new_ground[near] - self.old_ground[near], moved[:, 1]
+        return point + np.array([value_at(curve, when - first) for curve in curves])
 
 
 def shorten(source: HealthyClip, effects: Effects, slower: Array, ground: Array | None) -> ShortenedPath:

@@ -9,8 +9,13 @@ SPLITS: tuple[Split, Split] = ("train", "held_out")
 
 
 class SampleSize(TypedDict):
-    """How many clips were measured, `of` how many, from how many strata."""
+    """How many excerpts were measured, `of_excerpts` how many, from how many clips, `of` how many.
 
+    strata: their number.
+    """
+
+    excerpts: int
+    of_excerpts: int
     clips: int
     of: int
     strata: int

@@ -36,7 +36,7 @@ def lead(material: Material) -> str:
         if network["sizes"]
         else f"A character driven by {network['described']}, built"
     )
-    text += f" for {passes} passes" if passes and network["sizes"] else ""
+    text += f" for {passes:g} passes" if passes and network["sizes"] else ""
     text += f" on {len(clips) - kept} clips of {material.dataset}"
     text += f" and tested on {kept} held-out clips" if kept else ""
     return f"{text}. All clips together have {frames:,} frames at 60\u00a0Hz."

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from hobble.core import quat
+from hobble.core.curve_value import value_at
 from hobble.core.quat import Array
 from hobble.synthetic.planned_ground import Ground
 from hobble.synthetic.planned_path import PlannedPath
@@ -52,18 +53,19 @@ def stances(
     path: PlannedPath, style: Style, phase: Array, ground: Ground, rng: np.random.Generator
 ) -> tuple[list[PlannedStance], list[PlannedStance]]:
     """All stances of the left and of the right foot along the path, in the order of their landings."""
-    frames = np.arange(len(path), dtype=float)
+    frames, speed = np.arange(len(path), dtype=float), path.speed
+    leaving = [phase - style.duty[:, side] for side in (LEFT, RIGHT)]
     events = [(land, side) for side in (LEFT, RIGHT) for land in landings(phase, side)[:-1]]
     out: tuple[list[PlannedStance], list[PlannedStance]] = ([], [])
     for land, side in sorted(events):
-        here = np.interp(land, frames, phase)
+        here = value_at(phase, land)
         # How long a foot stands depends on the speed at the time of leaving, so a foot leaves sooner if the
         # walker has become faster.
-        leave = np.interp(here, phase - style.duty[:, side], frames)
-        middle = np.interp((here + np.interp(leave, frames, phase)) / 2, phase, frames)
+        leave = np.interp(here, leaving[side], frames)
+        middle = np.interp((here + value_at(phase, leave)) / 2, phase, frames)
         before, other = (out[s][-1] if out[s] else None for s in (side, 1 - side))
         ankle, turn = _footprint(path, style, ground, side, middle, other, rng)
-        standing = np.interp(middle, frames, path.speed) < STILL
+        standing = value_at(speed, middle) < STILL
         if before and standing and _close(before, ankle, turn):
             out[side].append(PlannedStance(land, leave, before.ankle, before.turn, swings=False))
         else:
@@ -81,10 +83,9 @@ def _footprint(
     rng: np.random.Generator,
 ) -> tuple[Array, Array]:
     """The place of a foot: under the body in mid-stance, but never across the other foot."""
-    frames = np.arange(len(path), dtype=float)
 
     def value(curve: Array) -> float:
-        return float(np.interp(middle, frames, curve))
+        return float(value_at(curve, middle))
 
     moving = 1 - value(path.gait[:, 0])
     facing = value(path.facing)

@@ -128,14 +128,14 @@ def _restored(
     """Restore `state` from the own checkpoint or the start, if there is one; and the path of its own."""
     state.recipe = run_name(recipe, begun)
     own = checkpoints / state.recipe / "checkpoint.npz"
-    goal = training.passes * training.sections
+    goal = training.all_sections
     if own.exists():
         data = load_npz(own)
         if int(data.get("sections", 0)) <= goal:
             unpack(data, state, own)
             log.info("resuming from %s, after section %d of %d", own, state.sections, goal)
             return state, own
-        log.warning("%s is past %d passes; starting again", own, training.passes)
+        log.warning("%s is past %g passes; starting again", own, training.passes)
     if start is not None and begun is not None:
         unpack(begun, state, start)
         _check_start(state, training, start)
@@ -154,11 +154,11 @@ def _check_start(state: State, training: Training, path: Path) -> None:
             f"was trained with {sections} sections a pass, but training.sections is {training.sections}",
             fix=f"Set training.sections to {sections}, or remove training.continues.",
         )
-    passes = state.sections // sections
-    if passes > training.passes:
+    if state.sections > training.all_sections:
+        passes = f"{state.sections / sections:g}"
         raise InputError(
             path,
-            f"has {passes} passes, but training.passes is {training.passes}",
+            f"has {passes} passes, but training.passes is {training.passes:g}",
             fix=f"Set training.passes to more than {passes}, or remove training.continues.",
         )
 

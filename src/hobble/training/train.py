@@ -76,7 +76,7 @@ def _run(
     processes: Processes,
     record: TrainingRecorder | None,
 ) -> None:
-    passes, sections, seed = training.passes, training.sections, training.seed
+    sections, seed = training.sections, training.seed
     device, batch_size = state.network.flat.device, training.batch
     step = step_for(state.network, training)
     update = update_for(step, state.adam, batch_size, processes)
@@ -85,12 +85,12 @@ def _run(
     others = OtherPoses(database, training.other_poses, len(places), device, places.start)
     roll_out = RollOut(database, training.rollout, len(places), device, places.start)
     pairs = database.pairs(TRAIN)
-    for turn in range(state.sections, passes * sections):
+    for turn in range(state.sections, training.all_sections):
         if training.patience and processes.numbers_of_first(state.since_best)[0] >= training.patience:
             log.info("no lower held-out error for %d sections: training ends", training.patience)
             break
         pass_index, section = divmod(turn, sections)
-        where = f"pass {pass_index + 1} of {passes}, section {section + 1} of {sections}"
+        where = f"pass {pass_index + 1} of {training.passes:g}, section {section + 1} of {sections}"
         watch = LossWatch(where, database.clips, processes)
         step.seed(section_seed(seed, turn))
         others.begin()
@@ -124,7 +124,7 @@ class TrainingRecorder:
         self.state, self.saver = state, saver
         pairs = database.pairs(TRAIN)
         self.held_out = HeldOut(database, state.network.flat.device, pairs // training.sections)
-        self.goal, self.first, self.before = training.passes * pairs, state.samples, state.seconds
+        self.goal, self.first, self.before = round(training.passes * pairs), state.samples, state.seconds
         self.began = time.perf_counter()
         self.bar = tqdm(
             total=self.goal, initial=state.samples, unit=" samples", unit_scale=True, disable=None

@@ -34,6 +34,7 @@ VISITS_PER_PASS = 10  # how often a pass of training uses a row
 HEADER_BYTES = 1 << 20  # the motion of a BVH file begins within this many bytes
 SHARD_MB = 10  # of a shard's job, for a thousand frames of its longest clip
 ROW_BYTES = 24  # of a shard's job, for each of its rows: the place in the order
+EXCERPT_THOUSANDS = 2.0  # of frames that a measurement of a sample reads at once
 WEEK_MINUTES = 7 * 24 * 60  # longest time that a job requests
 
 
@@ -77,6 +78,8 @@ class Demands:
     def measure_memory(self, configuration: str, name: str, attempt: int = 1) -> int:
         """MB for the measurement `name`."""
         cost = measure(name).cost
+        if self._measured_share(configuration, name) < 1:
+            return _megabytes(cost.memory_mb + cost.memory_each * EXCERPT_THOUSANDS, attempt)
         more = math.ceil(MEMORY_MARGIN * cost.memory_mb * attempt)
         return more + self.evaluation_memory(configuration, cost.memory_each, attempt)
 

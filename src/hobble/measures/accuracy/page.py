@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from hobble.measures.chosen import sampled_words
 from hobble.measures.given import Json
 from hobble.report.charts import Chart, axis, mark
 from hobble.report.formats import duration, number
@@ -212,9 +213,8 @@ def caveat(material: Material) -> str:
 
 
 def sampled(found: Json) -> str:
-    """A sentence on which clips were measured; empty if all of them were."""
-    sample = found.get("sample")
-    if not sample:
+    """A sentence on what was measured; empty if all clips were."""
+    if not found.get("sample"):
         return ""
     widths = [
         f"{NAMES[split]} {100 * found[split]['mean']:.2f} ± {100 * found[split]['interval']['mean']:.2f} %"
@@ -222,9 +222,8 @@ def sampled(found: Json) -> str:
         if (found.get(split) or {}).get("interval")
     ]
     return (
-        f" Measured on a sample of {sample['clips']:,} of {sample['of']:,} clips, stratified by gait, speed, "
-        "channel and split and weighted to represent all clips. 95 % confidence intervals: "
-        f"{', '.join(widths)}."
+        f" Measured on {sampled_words(found)}, and weighted to represent all of them. 95 % confidence "
+        f"intervals, of the means over all frames of these clips: {', '.join(widths)}."
     )
 
 

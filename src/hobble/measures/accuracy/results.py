@@ -31,6 +31,13 @@ class ErrorsOfClip(ErrorsOf):
     split: str
 
 
+class ErrorsOfExcerpt(ErrorsOfClip):
+    """The errors of an excerpt of a clip, with the frames of its first and last row."""
+
+    first_frame: int
+    last_frame: int
+
+
 class ErrorsOfSplit(ErrorsOf):
     """The errors of all clips of a split.
 
@@ -44,7 +51,7 @@ class ErrorsOfSplit(ErrorsOf):
 
 
 class Accuracy(TypedDict):
-    """accuracy.json. joints: how many were measured."""
+    """accuracy.json. joints: how many were measured. excerpts: those of a sample; only in their table."""
 
     configuration: str
     joints: int
@@ -52,3 +59,4 @@ class Accuracy(TypedDict):
     train: ErrorsOfSplit
     held_out: ErrorsOfSplit
     sample: NotRequired[SampleSize]
+    excerpts: NotRequired[list[ErrorsOfExcerpt]]

@@ -19,15 +19,16 @@ from hobble.core.errors import HobbleError, InputError
 from hobble.core.quat import Array
 from hobble.database.statistics import Moments
 from hobble.measures.accuracy import Options
-from hobble.measures.accuracy.results import Accuracy, ErrorsOf, ErrorsOfClip, ErrorsOfSplit
+from hobble.measures.accuracy.results import Accuracy, ErrorsOf, ErrorsOfClip, ErrorsOfExcerpt, ErrorsOfSplit
+from hobble.measures.chosen import chosen, sample_of
 from hobble.measures.given import Given, Json, Outcome, Row
 from hobble.measures.joints import Joints
 from hobble.measures.results import SPLITS
-from hobble.measures.sample import Sample, drawn
+from hobble.measures.sample import Sample
 from hobble.models.load import load_network
 from hobble.models.network import Network
-from hobble.rows.clip_rows import ClipRows, expanded, load_clip_rows
-from hobble.rows.facts import load_facts
+from hobble.rows.clip_rows import ClipRows, expanded
+from hobble.rows.excerpts import Excerpt
 from hobble.rows.layout import RowLayout
 
 LEAST = 1e-3  # cm; a joint nearer to the root has no meaningful relative error
@@ -119,21 +120,31 @@ def measure(
     """accuracy.json: `train` and `held_out` over their frames, and `clips`, one entry a clip in name order.
 
     clips: name -> file of rows. equivalents: names of the joints to measure; all by default. sample: the
-    clips to measure in place of all; the result then has `sample` with their number, and confidence
-    intervals. `mean_of_clips` is the mean over clips, as in the published tables. Raises InputError where
-    rows and network differ.
+    excerpts to measure in place of all clips; the result then has `sample` with their number, confidence
+    intervals, and the excerpts with their frames. `mean_of_clips` is the mean over clips, as in the published
+    tables. Raises InputError where rows and network differ.
     """
     network = load_network(weights)
     joints = joint_indices(network, equivalents)
-    entries: list[ErrorsOfClip] = []
+    of_clip: dict[str, Errors] = {}
+    excerpts: dict[Excerpt, ErrorsOfExcerpt] = {}
     totals: dict[str, Errors] = dict.fromkeys(SPLITS, Errors())
-    for name, weight in (sample.weights if sample else dict.fromkeys(sorted(clips), 1.0)).items():
-        rows = load_clip_rows(clips[name])
-        check_layout(clips[name], rows, network)
-        errors = clip_errors(network, rows, joints)
-        totals[splits[name]] += errors.weighing(weight)
-        entries.append({"clip": name, "split": splits[name], **errors.to_dict()})
-        log.info("%s: %s", name, entries[-1])
+    for one in chosen(clips, sample):
+        read = one.load()
+        check_layout(one.path, read.rows, network)
+        errors = clip_errors(network, read.rows, joints)
+        split = splits[one.clip]
+        totals[split] += errors.weighing(one.weight)
+        of_clip[one.clip] = of_clip.get(one.clip, Errors()) + errors.weighing(one.weight)
+        found = errors.to_dict()
+        if one.excerpt is not None:
+            first, last = read.frames
+            place = {"clip": one.clip, "split": split, "first_frame": first, "last_frame": last}
+            excerpts[one.excerpt] = ErrorsOfExcerpt(**place, **found)  # type: ignore[typeddict-item]
+        log.info("%s: %s", one.excerpt or one.clip, found)
+    entries: list[ErrorsOfClip] = [
+        {"clip": name, "split": splits[name], **errors.to_dict()} for name, errors in of_clip.items()
+    ]
     train, held_out = (_of_split(split, totals[split], entries) for split in SPLITS)
     result: Accuracy = {
         "configuration": configuration,
@@ -142,7 +153,7 @@ def measure(
         "train": train,
         "held_out": held_out,
     }
-    return result if sample is None else with_sample(result, sample)
+    return result if sample is None else _with_intervals(result, sample, excerpts)
 
 
 def _of_split(split: str, errors: Errors, entries: Sequence[ErrorsOfClip]) -> ErrorsOfSplit:
@@ -151,19 +162,24 @@ def _of_split(split: str, errors: Errors, entries: Sequence[ErrorsOfClip]) -> Er
     return {**errors.to_dict(), "clips": len(means), "mean_of_clips": mean}
 
 
-def with_sample(result: Accuracy, sample: Sample) -> Accuracy:
-    """The result with the sample, and half the width of the 95 % confidence interval of each split."""
+def _with_intervals(
+    result: Accuracy, sample: Sample, excerpts: Mapping[Excerpt, ErrorsOfExcerpt]
+) -> Accuracy:
+    """The result with the sample, and half the width of the 95 % confidence interval of each split.
+
+    excerpts: the errors of each excerpt that was measured.
+    """
     for split in SPLITS:
-        clips = [clip for clip in result["clips"] if clip["split"] == split]
-        weights = [sample.clip_weights[clip["clip"]] for clip in clips]
-        # Every clip of a sample has rows, so no value is None.
-        means, distances = ({clip["clip"]: clip[key] or 0.0 for clip in clips} for key in MEASURED)
+        own = {one: entry for one, entry in excerpts.items() if entry["split"] == split}
+        weights = [sample.clip_weights[one] for one in own]
+        # Every excerpt of a sample has rows, so no value is None.
+        means, distances = ({one: entry[key] or 0.0 for one, entry in own.items()} for key in MEASURED)
         found = result[split]
-        if clips:
+        if own:
             found["mean_of_clips"] = float(np.average(list(means.values()), weights=weights))
-        pairs = zip(MEASURED, (means, distances), strict=True) if clips else ()
+        pairs = zip(MEASURED, (means, distances), strict=True) if own else ()
         found["interval"] = {key: sample.half_width(split, values) for key, values in pairs}
-    return {**result, "sample": sample.to_dict()}
+    return {**result, "sample": sample.to_dict(), "excerpts": list(excerpts.values())}
 
 
 def equivalent_joints(skeleton: Json, of: str = REFERENCE) -> list[str] | None:
@@ -206,9 +222,10 @@ def clip_rows(result: Accuracy) -> list[Row]:
 
 
 def run(given: Given, options: Options) -> Outcome:
-    """accuracy.json, and its `clips` as a table."""
-    sample = drawn(map(load_facts, given.facts), given.splits, options.sample_frames)
+    """accuracy.json, and its clips and excerpts as tables."""
+    sample = sample_of(given, options)
     result = measure(
         given.weights, given.clips, given.splits, given.configuration, chosen_joints(given, options), sample
     )
-    return Outcome(result, {"clips": clip_rows(result)})
+    excerpts = {"excerpts": result.pop("excerpts")} if sample else {}
+    return Outcome(result, {"clips": clip_rows(result), **excerpts})

@@ -6,6 +6,7 @@ from collections.abc import Callable
 from typing import Literal
 
 from hobble.channels.shown import speaker
+from hobble.measures.chosen import captured_sampled
 from hobble.measures.given import Json
 from hobble.measures.manners.results import ChannelResult
 from hobble.measures.manners.windows import EFFECTS, NONE
@@ -32,7 +33,7 @@ def section(found: Json, material: Material) -> PageSection:
     for i, one in enumerate(found["channels"]):
         charts = [together_chart(one, say), *(effect_chart(one, effect) for effect in EFFECTS)]
         parts += [
-            SectionPart(10 * i, Paragraph(summary(one))),
+            SectionPart(10 * i, Paragraph(summary(one) + captured_sampled(found))),
             *(SectionPart(10 * i + 1 + k, c) for k, c in enumerate(charts)),
         ]
     title = " and ".join(one["title"] for one in found["channels"])

@@ -13,10 +13,10 @@ import numpy as np
 
 from hobble.channels import channel
 from hobble.core.quat import Array
-from hobble.core.section import Section
-from hobble.evaluation.captured import Captured, captured_clips
+from hobble.evaluation.captured import Captured
 from hobble.evaluation.crowd import FPS
 from hobble.gait.discriminant import Discriminant, learn
+from hobble.measures.chosen import captured_motion, sample_of, with_sample
 from hobble.measures.given import Given, Outcome, Row
 from hobble.measures.manners.left_out import left_out, share
 from hobble.measures.manners.results import ChannelResult, CombinedResult, Effect, Manners, NamedWindows
@@ -30,6 +30,7 @@ from hobble.measures.manners.windows import (
     mean_effect,
     table,
 )
+from hobble.measures.sample_options import SampleOptions
 from hobble.models.load import load_network
 from hobble.models.network import Network
 from hobble.runtime.options import Runtime
@@ -148,9 +149,10 @@ def together(
     return rows
 
 
-def run(given: Given, options: Section) -> Outcome:
+def run(given: Given, options: SampleOptions) -> Outcome:
     """manners.json, the effects and the figures with values of two channels as tables."""
-    motion = captured_clips(given.clips.values())
+    sample = sample_of(given, options)
+    motion = captured_motion(given.clips, sample)
     result = manners(load_network(given.weights), motion, given.splits, given.people, given.runtime)
     found = result.get("channels", [])
     tables: dict[str, list[Row]] = {
@@ -160,7 +162,7 @@ def run(given: Given, options: Section) -> Outcome:
         ],
     }
     says = "; ".join(f"{one['channel']} named right: {one['right_at_1']}" for one in found)
-    return Outcome(result, tables, says or result.get("reason", ""))
+    return Outcome(with_sample(result, sample), tables, says or result.get("reason", ""))
 
 
 def _named(judge: Discriminant, values: Mapping[str, float], windows: Sequence[MannerWindow]) -> NamedWindows:

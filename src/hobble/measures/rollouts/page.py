@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 from hobble.measures.accuracy.page import COLOURS, NAMES
+from hobble.measures.chosen import sampled_words
 from hobble.measures.given import Json
 from hobble.report.charts import Chart, axis, line, log_axis
 from hobble.report.gather import Material
@@ -17,14 +18,9 @@ def section(found: Json, material: Material) -> PageSection:
 
 
 def sampled(found: Json) -> str:
-    """A sentence on which clips were measured; empty if all of them were."""
-    sample = found.get("sample")
-    if not sample:
-        return ""
-    return (
-        f" Measured on a sample of {sample['clips']:,} of {sample['of']:,} clips, stratified by gait, speed, "
-        "channel and split. Whiskers are 95 % confidence intervals."
-    )
+    """A sentence on what was measured; empty if all clips were."""
+    words = sampled_words(found)
+    return f" Measured on {words}. Whiskers are 95 % confidence intervals." if words else ""
 
 
 def _whiskers(found: Json, split: str) -> dict[str, Any]:

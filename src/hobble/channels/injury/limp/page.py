@@ -7,6 +7,7 @@ from typing import Any
 
 from hobble.channels.injury.response.page import in_words
 from hobble.channels.shown import speaker
+from hobble.measures.chosen import captured_sampled
 from hobble.measures.given import Json
 from hobble.report.charts import Chart, Trace, axis, line
 from hobble.report.formats import number
@@ -37,7 +38,7 @@ def section(found: Json, material: Material) -> PageSection:
     return PageSection(
         "injury",
         [
-            SectionPart(1, Paragraph(provenance(found["hurt_seconds"], say))),
+            SectionPart(1, Paragraph(provenance(found["hurt_seconds"], say) + captured_sampled(found))),
             SectionPart(2, size_chart(found)),
             SectionPart(
                 3,

@@ -8,7 +8,7 @@ figures (Ferre 2019).
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import product
 from typing import Any
 
@@ -18,15 +18,16 @@ from hobble.channels.injury.crowd_severities import links as links_of
 from hobble.channels.injury.crowd_severities import severities
 from hobble.channels.injury.limp.captured_limps import VERSION
 from hobble.core.quat import Array
-from hobble.core.section import Section
 from hobble.core.skeleton import Skeleton
-from hobble.evaluation.captured import Captured, captured_clips
+from hobble.evaluation.captured import Captured
 from hobble.evaluation.crowd import FPS, CrowdTarget
 from hobble.evaluation.crowd import run as run_walks
 from hobble.evaluation.gait_features import features
 from hobble.gait.discriminant import Discriminant, learn
 from hobble.hurt.body_parts import part_of_link
+from hobble.measures.chosen import captured_motion, sample_of, with_sample
 from hobble.measures.given import Given, Outcome
+from hobble.measures.sample_options import SampleOptions
 from hobble.models.load import load_network
 from hobble.models.network import Network
 from hobble.runtime.options import Runtime
@@ -182,20 +183,22 @@ def rows(result: Mapping[str, Any]) -> list[dict[str, Any]]:
     ]
 
 
-def run(given: Given, options: Section) -> Outcome:
+def run(given: Given, options: SampleOptions) -> Outcome:
     """recognition.json, and all its confusion tables as one table."""
     # Generated hurt versions are left out: the classifier would learn the generator's table of injuries.
-    files = [file for clip, file in given.clips.items() if not VERSION.search(clip)]
+    clips = {clip: file for clip, file in given.clips.items() if not VERSION.search(clip)}
+    facts = [file for file in given.facts if file.stem in clips]
+    sample = sample_of(replace(given, facts=facts), options)
     result = recognition(
         load_network(given.weights),
-        captured_clips(files),
+        captured_motion(clips, sample),
         given.splits,
         configuration=given.configuration,
         runtime=given.runtime,
         people=given.published["recognition"]["share"],
     )
     right = f"named right: {result['generated']['right']} of generated windows" if result["applies"] else ""
-    return Outcome(result, {"confusion": rows(result)}, right or result["reason"])
+    return Outcome(with_sample(result, sample), {"confusion": rows(result)}, right or result["reason"])
 
 
 def _values(skeleton: Skeleton, local: Array, contacts: Array, root: Array, span: slice) -> dict[str, float]:

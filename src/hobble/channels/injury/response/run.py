@@ -13,8 +13,9 @@ from hobble.channels.injury.response import Options
 from hobble.channels.injury.response.cases import divided_severities, into_a_jog, second_injuries
 from hobble.channels.injury.response.results import InjuryResponse, LinkResponse, Summary, SweepRow
 from hobble.channels.injury.response.sweep import SEVERITIES, sweeps
-from hobble.evaluation.captured import Captured, captured_clips
+from hobble.evaluation.captured import Captured
 from hobble.evaluation.crowd import SPEEDS
+from hobble.measures.chosen import captured_motion, sample_of, with_sample
 from hobble.measures.given import Given, Outcome, Row
 from hobble.models.load import load_network
 from hobble.models.network import Network
@@ -141,9 +142,10 @@ def _mean(values: Sequence[float | None]) -> float | None:
 
 def run(given: Given, options: Options) -> Outcome:
     """injury.json, and its sweeps as tables."""
+    sample = sample_of(given, options)
     result = injury_response(
         load_network(given.weights),
-        captured_clips(given.clips.values()),
+        captured_motion(given.clips, sample),
         configuration=given.configuration,
         runtime=given.runtime,
         seconds=options.seconds,
@@ -154,4 +156,4 @@ def run(given: Given, options: Options) -> Outcome:
         "divided": result.get("divided", []),
         "sweep": [*result.get("rows", []), *result.get("falling", [])],
     }
-    return Outcome(result, tables, str(result.get("summary", result.get("reason"))))
+    return Outcome(with_sample(result, sample), tables, str(result.get("summary", result.get("reason"))))
