@@ -55,7 +55,8 @@ from hobble.report.tables import Column, Table
 def section(found, material):
     rows = [[row["clip"], row["highest"]] for row in found["clips"]]
     table = Table("hips", [Column("clip"), Column.number("highest, cm")], rows)
-    return PageSection("hips", [SectionPart(10, table), SectionPart(0, Paragraph("How high <they> are."))], title="Hips", at=15)
+    parts = [SectionPart(10, table), SectionPart(0, Paragraph("How high <they> are."))]
+    return PageSection("hips", parts, title="Hips", at=15)
 
 
 def figures(found, material):
