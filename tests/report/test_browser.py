@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Iterator
 from pathlib import Path
 from types import ModuleType
@@ -229,7 +230,7 @@ AXE = """axe.run({ exclude: [[".main-svg"]] }, { resultTypes: ["violations"] }).
 def test_axe_finds_nothing(tab: Any, modules: Path) -> None:
     """In a wide and in a narrow window, in light and in dark."""
     tab.run((modules / "axe-core" / "axe.min.js").read_text(encoding="utf-8") + "; 0")
-    for width, theme in ((1440, "light"), (390, "dark")):
+    for width, theme in itertools.product((1440, 390), ("light", "dark")):
         tab.size(width, 900)
         tab.run(f"document.documentElement.dataset.theme = '{theme}'")
         assert tab.run(AXE) == []
