@@ -9,7 +9,7 @@ from hurt_gait import SIDES, fastest, knee, measures, slide, toe_heights
 from hobble.core import quat
 from hobble.core.errors import HobbleError
 from hobble.core.skeleton import other_side
-from hobble.hurt.clip import hurt_clip
+from hobble.hurt.hurt_clip import hurt_clip
 from hobble.labels.label import mirror_labels
 from hobble.labels.model import LabelReport
 from hobble.motion.mirror import mirror_clip

@@ -9,8 +9,8 @@ import pytest
 import yaml
 
 from hobble.core.errors import HobbleError
+from hobble.hurt.body_parts import part_of_link
 from hobble.hurt.options import Hurt
-from hobble.hurt.parts import part_of_link
 from hobble.hurt.schedule import severities
 from hobble.hurt.version import WHOLE
 from hobble.workflow.project import Project

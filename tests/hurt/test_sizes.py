@@ -9,7 +9,7 @@ from hurt_gait import effects, measures
 from hobble.core.skeleton import other_side
 from hobble.gait.cycles import measure
 from hobble.gait.signals import CURVES
-from hobble.hurt.clip import hurt_clip
+from hobble.hurt.hurt_clip import hurt_clip
 
 LEG = {
     "hip": "RHipJoint-RightUpLeg",

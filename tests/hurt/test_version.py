@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 from hurt_gait import measures
 
-from hobble.hurt.clip import hurt_clip
 from hobble.hurt.effects import POWER
+from hobble.hurt.hurt_clip import hurt_clip
 from hobble.hurt.options import Hurt
 from hobble.hurt.version import NEAR, hurt_version
 from hobble.labels.label import mirror_labels
@@ -24,19 +24,19 @@ THIGH = "RightUpLeg-RightLeg"
 def changing(made, hurting):
     """A walk of 20 s whose thigh hurts at 10 from 5 s on and at 3 from 12 s on: the request, the result."""
     clip, labels, flat = made("straight")
-    asked = hurting(len(clip), {THIGH: 10.0})
-    asked[:300] = 0.0
-    asked[720:] *= 0.3
-    return asked, hurt_clip(clip, labels, asked, flat=flat)
+    wanted = hurting(len(clip), {THIGH: 10.0})
+    wanted[:300] = 0.0
+    wanted[720:] *= 0.3
+    return wanted, hurt_clip(clip, labels, wanted, flat=flat)
 
 
 def test_severities_are_those_asked_for_away_from_a_change(changing, holden31) -> None:
-    asked, hurt = changing
+    wanted, hurt = changing
     column = holden31.link_names.index(THIGH)
-    when = np.clip(hurt.when.astype(int), 0, len(asked) - 1)
-    calm = np.ptp([asked[np.clip(when + d, 0, len(asked) - 1), column] for d in (-80, 0, 80)], axis=0) == 0
+    when = np.clip(hurt.when.astype(int), 0, len(wanted) - 1)
+    calm = np.ptp([wanted[np.clip(when + d, 0, len(wanted) - 1), column] for d in (-80, 0, 80)], axis=0) == 0
     assert calm.mean() > 0.6
-    np.testing.assert_allclose(hurt.severity[calm], asked[when][calm], atol=0.01)
+    np.testing.assert_allclose(hurt.severity[calm], wanted[when][calm], atol=0.01)
     assert not np.delete(hurt.severity, column, axis=1).any()
 
 

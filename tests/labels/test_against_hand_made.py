@@ -15,10 +15,10 @@ from hobble.config.sections import Synthetic
 from hobble.core.clip import Clip
 from hobble.labels.label import label_clip
 from hobble.labels.model import Labels
-from hobble.labels.options import Labels as Options
+from hobble.labels.options import LabelOptions as Options
 from hobble.motion.make import make_clip
 from hobble.motion.options import ClipMotion
-from hobble.synthetic.clip import write_clip
+from hobble.synthetic.generate_clip import write_clip
 
 SUFFIXES = (".phase", ".gait", "_footsteps.txt", "_gait.txt")
 PFNN = ["pfnn/LocomotionFlat04_000", "pfnn/LocomotionFlat09_000"]

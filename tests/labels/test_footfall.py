@@ -8,12 +8,12 @@ import numpy as np
 import pytest
 
 from hobble.labels.footfall import SETTLING, feet_up, find_swings, foot_speeds, landings
-from hobble.labels.options import Labels
+from hobble.labels.options import LabelOptions
 from hobble.labels.phase import find_cycles, phase_of_footsteps, rows_of_landings
 
 
 def found(clip):
-    swings = find_swings(clip, Labels())
+    swings = find_swings(clip, LabelOptions())
     return swings, landings(swings, len(clip), 5)
 
 

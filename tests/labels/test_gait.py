@@ -10,11 +10,11 @@ import pytest
 from hobble.labels import gait as g
 from hobble.labels.contacts import stance
 from hobble.labels.model import GAITS
-from hobble.labels.options import Labels
+from hobble.labels.options import LabelOptions
 
 
 def automatic(clip, dominant=None):
-    return g.automatic_gait(clip, stance(clip, Labels()), dominant)
+    return g.automatic_gait(clip, stance(clip, LabelOptions()), dominant)
 
 
 def clearly(gait):

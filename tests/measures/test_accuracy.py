@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 from hobble.core.errors import HobbleError, InputError
-from hobble.evaluation.tables import write_csv
+from hobble.evaluation.csv_tables import write_csv
 from hobble.measures.accuracy.run import (
     QUANTILES,
     Errors,

@@ -21,12 +21,12 @@ from hobble.measures.manners.windows import (
     STEP,
     USED,
     WINDOW,
-    Figure,
-    Window,
+    MannerWindow,
+    WalkerInputs,
     captured_windows,
 )
 from hobble.models.network import Network
-from hobble.report.parts import Words
+from hobble.report.page_parts import Paragraph
 from hobble.runtime.options import Runtime
 
 FRAMES = 300
@@ -85,8 +85,8 @@ def test_windows_with_an_injury_or_half_a_mood_are_left_out(both: Network) -> No
     assert captured_windows(clip(both, "a", "sad", lean=0, value=0.5), both, "mood") == []
 
 
-def window(who: str, manner: str, *values: float) -> Window:
-    return Window(who, manner, dict(enumerate(map(float, values))), dict.fromkeys(EFFECTS, 0.0))
+def window(who: str, manner: str, *values: float) -> MannerWindow:
+    return MannerWindow(who, manner, dict(enumerate(map(float, values))), dict.fromkeys(EFFECTS, 0.0))
 
 
 def test_whole_people_are_left_out() -> None:
@@ -144,11 +144,11 @@ def test_each_manner_is_tried_with_each_column_of_another_channel(
     mood.
     """
     real = {m: captured_windows(clip(both, f"{m}-9", m, lean=lean), both, "mood") for m, lean in LEANS}
-    asked: list[Figure] = []
+    walked: list[WalkerInputs] = []
     broken = both.channels["injury"][3]
 
-    def generated(network: Network, figures: Sequence[Figure], name: str, runtime: Runtime):
-        asked.extend(figures)
+    def generated(network: Network, figures: Sequence[WalkerInputs], name: str, runtime: Runtime):
+        walked.extend(figures)
         moods = [next(iter(f.channels["mood"]), None) for f in figures]
         lost = [broken in f.channels.get("injury", {}) for f in figures]
         return [real[None if gone else mood] for mood, gone in zip(moods, lost, strict=True)]
@@ -163,9 +163,9 @@ def test_each_manner_is_tried_with_each_column_of_another_channel(
     assert len(rows) == 3 * 25
     assert {r["column"] for r in rows if r["share"] != 1.0} == {broken}
     assert [r["share"] for r in rows if r["column"] == broken] == [1.0, 0.0, 0.0]
-    channels = [f.channels for f in asked if "injury" in f.channels]
+    channels = [f.channels for f in walked if "injury" in f.channels]
     assert {value for one in channels for value in one["injury"].values()} == {10.0}
-    assert [f.speed for f in asked if "injury" in f.channels] == pytest.approx([2.0] * 75, rel=1e-3)
+    assert [f.speed for f in walked if "injury" in f.channels] == pytest.approx([2.0] * 75, rel=1e-3)
     effect = found["effects"][2]
     assert (effect["manner"], effect["effect"]) == ("old", "trunk")
     rest = both.y_mean[both.layout.y_joint_position].reshape(-1, 3)
@@ -191,7 +191,7 @@ def test_a_network_walks_all_that_is_asked(both: Network, motion: list[Captured]
     assert "between" in found["generated"][-1]
     shown = page.section({"applies": True, "channels": [found]}, SimpleNamespace(network={"skeleton": {}}))
     assert shown.title == "Mood"
-    assert len({part.content.name for part in shown.parts if not isinstance(part.content, Words)}) == 6
+    assert len({part.content.name for part in shown.parts if not isinstance(part.content, Paragraph)}) == 6
 
 
 def test_says_why_there_is_nothing(hurtable, both: Network, motion: list[Captured]) -> None:

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from hobble.evaluation.tables import write_csv
+from hobble.evaluation.csv_tables import write_csv
 from hobble.measures.responsivity import run as module
 from hobble.measures.responsivity.run import lap_rows, parameter_counts, responsivity
 from hobble.runtime.controller import STEPS
@@ -53,11 +53,11 @@ def test_what_was_asked_is_what_was_taken_unless_it_was_held_back() -> None:
     rng = np.random.default_rng(3)
     taken = rng.normal(size=(5, 4, 4))
     taken /= np.linalg.norm(taken, axis=-1, keepdims=True)
-    asked = -taken  # the same rotations
-    assert module._held_back(asked, taken) == 0
-    asked[2, 1] = asked[2, 2]
-    assert module._held_back(asked, taken) == 1
-    assert module._held_back(asked[:0], taken[:0]) == 0
+    predicted = -taken  # the same rotations
+    assert module._held_back(predicted, taken) == 0
+    predicted[2, 1] = predicted[2, 2]
+    assert module._held_back(predicted, taken) == 1
+    assert module._held_back(predicted[:0], taken[:0]) == 0
 
 
 def test_a_steady_figure_is_asked_for_what_is_drawn(steady) -> None:

@@ -317,14 +317,14 @@ def test_the_ground_is_looked_up_where_it_was_in_training(tmp_path: Path, holden
             made["meta"]["terrain_side"] = side
         save(tmp_path / "weights.npz", made)
         network = load_network(tmp_path)
-        asked: list[np.ndarray] = []
+        places: list[np.ndarray] = []
 
-        def ground(x: np.ndarray, z: np.ndarray, asked: list[np.ndarray] = asked) -> np.ndarray:
-            asked.append(np.stack([x, z], axis=-1))
+        def ground(x: np.ndarray, z: np.ndarray, places: list[np.ndarray] = places) -> np.ndarray:
+            places.append(np.stack([x, z], axis=-1))
             return np.zeros_like(x)
 
         ProceduralAnimation(network).next_pose((0, 0.5), terrain=ground)
-        left, path, right = asked[0].reshape(-1, 3, 2).transpose(1, 0, 2)
+        left, path, right = places[0].reshape(-1, 3, 2).transpose(1, 0, 2)
         expected = side or 25.0
         np.testing.assert_allclose(np.linalg.norm(left - path, axis=-1), expected, rtol=1e-6)
         np.testing.assert_allclose(np.linalg.norm(right - path, axis=-1), expected, rtol=1e-6)

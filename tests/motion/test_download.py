@@ -39,7 +39,7 @@ def test_a_file_arrives_whole_and_leaves_nothing_else(server, fetch):
     path = fetch()
     assert path.read_bytes() == CONTENT
     assert [p.name for p in path.parent.iterdir()] == ["walk.bvh"]  # no part is left
-    assert (server.asked, fetch.waits) == ([None], [])
+    assert (server.requests, fetch.waits) == ([None], [])
 
 
 def test_a_server_that_fails_twice_is_asked_a_third_time_after_longer_waits(server, fetch):
@@ -51,7 +51,7 @@ def test_a_server_that_fails_twice_is_asked_a_third_time_after_longer_waits(serv
 def test_a_file_cut_short_is_gone_on_with_where_it_broke_off(server, fetch):
     server.faults = [70_000, 50_000]
     assert fetch().read_bytes() == CONTENT
-    assert server.asked == [None, "bytes=70000-", "bytes=120000-"]
+    assert server.requests == [None, "bytes=70000-", "bytes=120000-"]
 
 
 def test_a_later_run_goes_on_too(server, fetch):
@@ -60,25 +60,25 @@ def test_a_later_run_goes_on_too(server, fetch):
         fetch(attempts=1)
     assert fetch.part.stat().st_size == 90_000
     assert fetch().read_bytes() == CONTENT
-    assert server.asked[1:] == ["bytes=90000-"]
+    assert server.requests[1:] == ["bytes=90000-"]
 
 
 def test_a_server_without_ranges_starts_anew(server, fetch):
     server.faults, server.ranges = [70_000], False
     assert fetch().read_bytes() == CONTENT
-    assert server.asked == [None, "bytes=70000-"]
+    assert server.requests == [None, "bytes=70000-"]
 
 
 def test_a_server_that_sends_another_part_is_not_believed(server, fetch):
     server.faults = [70_000, "other part"]
     assert fetch().read_bytes() == CONTENT
-    assert server.asked == [None, "bytes=70000-", None]
+    assert server.requests == [None, "bytes=70000-", None]
 
 
 def test_what_is_cut_short_without_a_length_is_told_by_its_checksum(server, fetch):
     server.faults, server.announces = [70_000], False
     assert fetch().read_bytes() == CONTENT
-    assert server.asked == [None, None]
+    assert server.requests == [None, None]
 
 
 @pytest.mark.parametrize("left", [b"not how it begins", CONTENT, CONTENT + b"more"])
@@ -86,7 +86,7 @@ def test_a_leftover_of_another_file_or_a_whole_one_does_no_harm(server, fetch, l
     fetch.part.parent.mkdir()
     fetch.part.write_bytes(left)
     assert fetch().read_bytes() == CONTENT
-    assert len(server.asked) == (1 if left == CONTENT else 2)
+    assert len(server.requests) == (1 if left == CONTENT else 2)
 
 
 def test_lines_may_end_either_way(server, fetch):
@@ -105,14 +105,14 @@ def test_a_wrong_checksum_is_refused_with_both_and_nothing_is_kept(server, fetch
         "put walk.bvh into data/mine yourself."
     )
     assert list(fetch.part.parent.iterdir()) == []
-    assert server.asked == [None, None]
+    assert server.requests == [None, None]
 
 
 def test_what_is_not_there_is_asked_for_once(server, fetch):
     server.faults = [404] * 9
     with pytest.raises(InputError, match=r"cannot be downloaded: the server says 404 Not Found\. Run"):
         fetch()
-    assert (len(server.asked), fetch.waits) == (1, [])
+    assert (len(server.requests), fetch.waits) == (1, [])
 
 
 def test_a_server_that_never_answers_is_given_up(server, fetch):
@@ -162,12 +162,12 @@ class Babbler(threading.Thread):
     def run(self) -> None:
         with contextlib.suppress(OSError):
             while True:
-                asked, _ = self.socket.accept()
-                with asked, contextlib.suppress(OSError):
-                    asked.recv(10_000)
-                    asked.sendall(self.begin)
+                connection, _ = self.socket.accept()
+                with connection, contextlib.suppress(OSError):
+                    connection.recv(10_000)
+                    connection.sendall(self.begin)
                     while True:
-                        asked.sendall(self.more)
+                        connection.sendall(self.more)
                         time.sleep(0.01)
 
 
@@ -190,7 +190,7 @@ def test_of_a_file_that_is_too_large_nothing_is_kept(server, fetch, announces: b
     with pytest.raises(InputError, match=r"larger than 0\.05 MB, which is the most that a clip may be"):
         fetch(most=50_000)
     assert list(fetch.part.parent.iterdir()) == []
-    assert len(server.asked) == 1
+    assert len(server.requests) == 1
 
 
 def test_what_a_server_says_cannot_steer_the_terminal(tmp_path):

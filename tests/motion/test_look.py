@@ -7,7 +7,7 @@ import sys
 
 import pytest
 
-from hobble.motion.look import Look, look, shared_warnings, table
+from hobble.motion.look import ClipSummary, look, shared_warnings, table
 
 
 @pytest.fixture
@@ -54,7 +54,7 @@ def test_a_refused_file_has_its_line(root, folder):
 
 def test_a_warning_of_many_clips_is_told_once():
     rare, common = "1 repaired", "The same for all."
-    clips = [Look(str(i), warnings=(common, rare)) for i in range(6)]
+    clips = [ClipSummary(str(i), warnings=(common, rare)) for i in range(6)]
     short, notes = shared_warnings(clips)
     assert notes == [f"6 of 6 clips: {common}"]
     assert [clip.warnings for clip in short] == [(rare,)] * 6

@@ -57,16 +57,16 @@ def test_a_foot_is_down_where_one_of_four_is():
 
 
 def test_of_very_many_clips_a_sample_is_read_and_every_clip_has_a_line(walker, holden31):
-    clip, asked = walker(holden31, 240, 60.0), []
+    clip, numbers = walker(holden31, 240, 60.0), []
 
     def read(n: int) -> tuple[Any, np.ndarray]:
-        asked.append(n)
+        numbers.append(n)
         return clip, np.ones((10, 4))
 
     reports, labels = many(10_000, warnings={7: ["odd"], 9_876: ["odd"]}, unsure={123: ["no idea"]})
     page = look_page("mine", reports, labels, read)
-    assert len(asked) == module.MOST_READ == page.count("<canvas")
-    assert {7, 123, 9_876} <= set(asked)
+    assert len(numbers) == module.MOST_READ == page.count("<canvas")
+    assert {7, 123, 9_876} <= set(numbers)
     assert page.count("<tr>") == 10_001
     assert "clip-04321" in page
     assert "only 600 clips were read" in page

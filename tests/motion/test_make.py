@@ -14,11 +14,11 @@ from hobble.core import quat
 from hobble.core.clip import Clip
 from hobble.core.errors import InputError
 from hobble.motion.decode import frame_rate
+from hobble.motion.file_motion import load_source
 from hobble.motion.options import ClipMotion
 from hobble.motion.read import read_bvh
 from hobble.motion.resample import sample_positions, sample_rotations, sample_times
 from hobble.motion.rig import load_skeleton
-from hobble.motion.source import load_source
 
 
 def test_a_clip_on_the_skeleton_passes_through_untouched(walk, bvh, make):

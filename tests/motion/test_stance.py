@@ -13,10 +13,10 @@ from hobble.core.clip import Clip
 from hobble.core.errors import InputError
 from hobble.core.skeleton import Skeleton, forward_kinematics, rest_positions
 from hobble.motion.decode import decode
+from hobble.motion.file_motion import load_source
 from hobble.motion.options import ClipMotion
 from hobble.motion.read import read_bvh
 from hobble.motion.rig import load_skeleton
-from hobble.motion.source import load_source
 from tests.motion.other_rigs import PLAIN, rigged
 from tests.motion.scramble import outcome
 

@@ -193,7 +193,7 @@ def test_networks_that_are_too_large_together_are_left_out(
     assert 'id="play-second"' not in page
 
 
-def test_two_figures_take_the_same_wishes(tab: Any) -> None:
+def test_two_figures_get_the_same_targets(tab: Any) -> None:
     tab.run("document.getElementById('play-view').scrollIntoView({ behavior: 'instant', block: 'center' })")
     tab.run("document.getElementById('play-stage').focus({ preventScroll: true })")
     assert tab.run("Hobble.player.actors.length") == 2

@@ -139,11 +139,11 @@ def test_problems_come_first_and_data_comes_before_training(material: Material) 
 
 def test_a_limited_turn_is_reported(material: Material) -> None:
     lap = material.measured["responsivity"]
-    asked = {**lap, "largest_turn_degrees": 25.0, "predicted_turn_degrees": 170.0, "turns_held_back": 3}
-    assert heads(material, responsivity=asked)[
+    limited = {**lap, "largest_turn_degrees": 25.0, "predicted_turn_degrees": 170.0, "turns_held_back": 3}
+    assert heads(material, responsivity=limited)[
         "The network predicted a turn of a joint by 170 degrees in one frame."
     ]
-    figure = next(f for f in track_figures(asked) if f.label == "Largest predicted turn")
+    figure = next(f for f in track_figures(limited) if f.label == "Largest predicted turn")
     assert figure.value == "170"
     assert "which changed 3 of" in figure.note
     assert "largest turn drawn: 25.0°" in figure.note

@@ -67,7 +67,7 @@ def test_inputs_that_weigh_nothing_are_left_out(
     assert sorted(set(range(network.layout.x_size)) - set(seen)) == [unseen]
 
 
-def wish(frame: int) -> dict[str, Any]:
+def target_at(frame: int) -> dict[str, Any]:
     """The target in each frame: walk ahead, turn, strafe, stop, turn on the spot, crouch; hurt in the last
     two thirds.
     """
@@ -98,10 +98,10 @@ def test_the_page_moves_as_python_does(
     animation = ProceduralAnimation(network, storage="int16", **dict(examples.RUNTIME))
     expected = []
     for frame in range(FRAMES):
-        asked = wish(frame)
-        injury = {"LeftUpLeg-LeftLeg": 7.0, "Hips-LowerBack": 3.0} if asked["hurt"] else None
+        target = target_at(frame)
+        injury = {"LeftUpLeg-LeftLeg": 7.0, "Hips-LowerBack": 3.0} if target["hurt"] else None
         pose = animation.next_pose(
-            asked["velocity"], asked["facing"], asked["gait"], injury=injury, terrain=hills
+            target["velocity"], target["facing"], target["gait"], injury=injury, terrain=hills
         )
         world, places = jointed(network.skeleton, pose.positions[None], pose.rotations[None])
         expected.append(
@@ -111,7 +111,8 @@ def test_the_page_moves_as_python_does(
     script = f"""(() => {{
       const spec = Hobble.material.playable.example, c = Hobble.character(spec), rig = Hobble.rig(spec);
       const hills = (x, z) => 14 * Math.sin(x / 170) * Math.cos(z / 140) + 8 * Math.sin((x + z) / 260);
-      return {json.dumps([wish(f) for f in range(FRAMES)])}.map(({{ velocity, facing, gait, hurt }}) => {{
+      const targets = {json.dumps([target_at(f) for f in range(FRAMES)])};
+      return targets.map(({{ velocity, facing, gait, hurt }}) => {{
         if (hurt) {{
           c.channelTargets[{links.index("LeftUpLeg-LeftLeg")}] = 7;
           c.channelTargets[{links.index("Hips-LowerBack")}] = 3;

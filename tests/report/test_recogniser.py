@@ -18,7 +18,7 @@ from hobble.gait.graded import grade, grader
 from hobble.gait.people import people
 from hobble.gait.profile import profile
 from hobble.models.network import Network
-from hobble.report.recogniser import healthy_walk, learnt, playable_with_recogniser, words
+from hobble.report.pack_recogniser import healthy_walk, learnt, playable_with_recogniser, words
 
 
 @pytest.fixture(scope="module")

@@ -13,7 +13,7 @@ from hobble.channels.injury.response import page as injury_page
 from hobble.channels.injury.response import page_cases
 from hobble.core.errors import InputError
 from hobble.core.skeleton import Skeleton
-from hobble.evaluation.tables import read_numbers
+from hobble.evaluation.csv_tables import read_numbers
 from hobble.measures.accuracy import page as accuracy_page
 from hobble.measures.responsivity import lap_charts
 from hobble.measures.responsivity import page as responsivity_page
@@ -25,11 +25,11 @@ from hobble.report import (
     terrain_section,
     training_section,
 )
-from hobble.report.charts import Chart, Family
+from hobble.report.charts import Chart, ChartGroup
 from hobble.report.gather import Material, describe_network
 from hobble.report.ground_pictures import ground_pictures
-from hobble.report.parts import Pair
-from hobble.report.summary import Figure
+from hobble.report.page_parts import ChartPair
+from hobble.report.summary import KeyFigure
 from hobble.rows.clip_rows import load_clip_rows, save_clip_rows
 
 
@@ -164,7 +164,7 @@ def test_steps_of_a_frame_in_their_order(material: Material) -> None:
 
 
 def test_feet_that_hardly_stood_have_no_slide(material: Material) -> None:
-    def slide(steps: int) -> Figure:
+    def slide(steps: int) -> KeyFigure:
         laps = [{**lap, "steps": steps} for lap in material.measured["responsivity"]["laps"][:2]]
         found = {**material.measured["responsivity"], "laps": laps, "foot_slide_cm": 0.0}
         figures = responsivity_page.track_figures(found)
@@ -186,8 +186,8 @@ def test_links_never_hurt_in_training_are_told_from_the_others(material: Materia
     ]
     injury = {**material.measured["injury"], "responses": responses, "into_a_jog": rows}
     parts = [part.content for part in injury_page.section(injury, material).parts]
-    (curves,) = [content for content in parts if isinstance(content, Family)]
-    overview, (_, into_a_jog) = [content.charts for content in parts if isinstance(content, Pair)]
+    (curves,) = [content for content in parts if isinstance(content, ChartGroup)]
+    overview, (_, into_a_jog) = [content.charts for content in parts if isinstance(content, ChartPair)]
     never = {"right shank", "lower back"}
     for chart in overview:
         hollow = [t for t in chart.traces if t["name"].endswith(", never hurt in training")]
@@ -217,7 +217,7 @@ def test_ground_profiles_are_the_centre_heights_of_now(tmp_path: Path) -> None:
 def test_a_damaged_terrain_file_is_named(tmp_path: Path) -> None:
     path = tmp_path / "clip.npz"
     np.savez(path, frame=np.arange(3))
-    with pytest.raises(InputError, match=r"clip\.npz: damaged or not an npz file"):
+    with pytest.raises(InputError, match=r"clip\.npz: holds no array 'fits'"):
         terrain_section.read_fits(path)
 
 

@@ -21,14 +21,14 @@ from hobble.models.load import load_network
 from hobble.models.network import Network
 from hobble.motion.read import read_bvh
 from hobble.report import stimuli
-from hobble.report.raster import BODY, Camera, Studio
+from hobble.report.raster import BODY, BodyRenderer, Camera
 
 UPRIGHT = np.tile(quat.IDENTITY, (19, 1))
 
 
 @pytest.fixture(scope="module")
-def studio(holden31: Skeleton) -> Studio:
-    return Studio(body(holden31), regions(holden31, holden31.link_names))
+def studio(holden31: Skeleton) -> BodyRenderer:
+    return BodyRenderer(body(holden31), regions(holden31, holden31.link_names))
 
 
 @pytest.fixture(scope="module")
@@ -48,7 +48,7 @@ def test_thirteen_are_asked_about_and_each_preset_is_shown(network: Network) -> 
     assert dict(wanted[1].values) == {"LeftUpLeg-LeftLeg": injury_shown.SEVERITY}
 
 
-def test_the_body_stands_where_the_camera_says(studio: Studio, standing: np.ndarray) -> None:
+def test_the_body_stands_where_the_camera_says(studio: BodyRenderer, standing: np.ndarray) -> None:
     camera = Camera(np.array([0.0, 82.0, 0.0]), yaw=0.0, pitch=0.1, size=200)
     picture = studio.draw(standing, UPRIGHT, camera).astype(float)
     bare = studio.draw(standing + np.array([0, 0, -5000.0]), UPRIGHT, camera).astype(float)
@@ -63,7 +63,9 @@ def test_the_body_stands_where_the_camera_says(studio: Studio, standing: np.ndar
     assert np.ptp(front / BODY) < 0.05, "grey, lighter or darker"
 
 
-def test_what_hurts_is_coloured_where_asked(studio: Studio, standing: np.ndarray, holden31: Skeleton) -> None:
+def test_what_hurts_is_coloured_where_asked(
+    studio: BodyRenderer, standing: np.ndarray, holden31: Skeleton
+) -> None:
     camera = Camera(np.array([0.0, 82.0, 0.0]), yaw=0.0, pitch=0.1, size=200)
     severity = np.zeros(len(holden31.link_names))
     severity[holden31.link_names.index("LeftLeg-LeftFoot")] = 1
@@ -104,8 +106,8 @@ def test_a_walk_is_no_distance_from_itself_however_cut_and_turned(holden31: Skel
     swing = 20 * np.sin(2 * np.pi * (time[:, None] / 67 + np.linspace(0, 1, joints)))
     place = np.stack([0 * swing, 90 + swing, 2.0 * time[:, None] + swing], axis=-1)
 
-    def loop(positions: np.ndarray, way: tuple[float, float, float]) -> stimuli.Loop:
-        return stimuli.Loop(positions, np.zeros((*positions.shape[:2], 4)), np.array(way), 0.0)
+    def loop(positions: np.ndarray, way: tuple[float, float, float]) -> stimuli.RepeatedWalk:
+        return stimuli.RepeatedWalk(positions, np.zeros((*positions.shape[:2], 4)), np.array(way), 0.0)
 
     walk = loop(place, (0, 0, 268))
     turned = loop(np.roll(place, 20, axis=0)[..., [2, 1, 0]] * [1, 1, -1] + [500, 0, 7], (268, 0, 0))

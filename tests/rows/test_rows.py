@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from hobble.config import sections
-from hobble.config.load import Catalogue
+from hobble.config.load_configuration import Catalogue
 from hobble.core import quat
 from hobble.core.clip import Clip
 from hobble.core.errors import InputError
@@ -18,12 +18,12 @@ from hobble.core.skeleton import Skeleton
 from hobble.labels.label import label_clip
 from hobble.motion.make import make_clip
 from hobble.motion.options import ClipMotion
-from hobble.rows.build import clip_rows, cycle_frames, cycle_phase, phase_change
+from hobble.rows.build_rows import clip_rows, cycle_frames, cycle_phase, phase_change
 from hobble.rows.clip_rows import ClipRows, expanded
 from hobble.rows.layout import GAITS, RowLayout
 from hobble.terrain.clip_fits import clip_fits
-from hobble.terrain.heightmaps import Heightmap
-from hobble.terrain.options import Sampling
+from hobble.terrain.heightmaps import TerrainMap
+from hobble.terrain.options import HeightSampling
 from hobble.terrain.patches import draw_patches
 
 NAME = "LocomotionFlat09_000"
@@ -53,8 +53,8 @@ def original(shared: Path) -> dict[str, np.ndarray]:
 
 def options(section: str, **changed: object) -> dict[str, Any]:
     """A section of the original's data set, as its stage gets it."""
-    model = getattr(sections, section.capitalize())
-    return model(**getattr(RELEASE, section).model_dump() | changed).model_dump(mode="json")
+    kept = getattr(RELEASE, section)
+    return type(kept)(**kept.model_dump() | changed).model_dump(mode="json")
 
 
 def rows_as_configured(shared: Path, root: Path, margins: str = "drop", **terrain: object) -> ClipRows:
@@ -70,13 +70,13 @@ def rows_as_configured(shared: Path, root: Path, margins: str = "drop", **terrai
         ClipMotion(**options("motion")),
     )
     files = [folder / f"{NAME}{end}" for end in (".phase", ".gait", "_footsteps.txt", "_gait.txt")]
-    labelling = sections.Labels.model_validate(options("labels", margins=margins))
+    labelling = sections.LabelOptions.model_validate(options("labels", margins=margins))
     labels = vars(label_clip(clip, files, report, "walk", "flat", labelling)[0])
     ground, database = options("terrain", **terrain), options("database")
-    any_map = Heightmap("any", np.zeros((200, 200)), ground["cell"])
+    any_map = TerrainMap("any", np.zeros((200, 200)), ground["cell"])
     drawn = {name: ground[name] for name in ("cell", "size", "highest", "seed")}
     patches = draw_patches([any_map], count=10, **drawn)
-    sampling = Sampling(**{name: database[name] for name in Sampling.model_fields})
+    sampling = HeightSampling(**{name: database[name] for name in HeightSampling.model_fields})
     fits = clip_fits(clip, labels, patches, "flat", sections.Terrain(**ground), sampling)
     severity = np.zeros((len(clip), len(clip.skeleton.links)), np.float32)
     window = {name: database[name] for name in OPTIONS}

@@ -13,7 +13,9 @@ import pytest
 from hobble.core import quat
 from hobble.evaluation.motion_measures import foot_slide, largest_turn
 from hobble.models.load import load_network
+from hobble.models.network import Network
 from hobble.runtime import ProceduralAnimation
+from hobble.runtime.waypoints import TRACK
 from tests.runtime.walking import KNEE, hills, walk
 
 
@@ -156,8 +158,8 @@ def test_gaits(network) -> None:
 
     def shares(velocity, gait=None) -> dict[str, float]:
         character.next_pose(velocity, gait=gait)
-        wish = dict(zip(network.gaits, character._wish_gait[0], strict=True))
-        return {name: share for name, share in wish.items() if share}
+        target = dict(zip(network.gaits, character._target_gait[0], strict=True))
+        return {name: share for name, share in target.items() if share}
 
     assert shares((0, 0.05), "jog") == {"stand": 1}
     assert shares((0, 0.05), "crouch") == {"stand": 1, "crouch": 1}
@@ -249,7 +251,7 @@ def test_the_released_network_keeps_its_feet_on_hills(shared: Path, holden31) ->
     """A quarter of a minute in a curve over rolling ground: soles neither sink nor float nor slide."""
     network = load_network(shared / "reference" / "pfnn_release_network.npz", holden31)
     character = ProceduralAnimation(network)
-    legs, _, soles = character._controller._legs
+    legs, _, soles, *_ = character._controller._legs
     sole = np.tile(soles, 2)
 
     def rolling(x: np.ndarray, z: np.ndarray) -> np.ndarray:
@@ -276,3 +278,24 @@ def test_a_character_starts_on_the_ground_at_any_height(steady) -> None:
         a = low.next_pose((0, 1.5)).positions
         b = high.next_pose((0, 1.5), terrain=lambda x, z: 500.0).positions
         np.testing.assert_allclose(b - a, np.broadcast_to([0, 500.0, 0], a.shape), atol=1e-3)
+
+
+def test_copies_go_on_as_their_characters_would(hurtable: Network) -> None:
+    """Copies of two characters, one of them twice, walk as three that were there from the beginning."""
+    wishes = np.array([(0.0, 2.5), (1.5, 1.0), (0.0, 2.5)])
+    link = hurtable.channels["injury"][4]
+    three, two = (ProceduralAnimation(hurtable, characters=n) for n in (3, 2))
+    for _ in range(25):
+        three.next_pose(wishes, injury={link: [0, 6, 0]})
+        two.next_pose(wishes[:2], injury={link: [0, 6]})
+    copies = two.copies(np.array([0, 1, 0]))
+    two.next_pose((3.0, 0.0))  # what the first does after the copy changes nothing
+    for _ in range(25):
+        asked, made = (c.next_pose(wishes, injury={link: [0, 6, 9]}) for c in (three, copies))
+        for name in ("positions", "rotations", "contacts", "phase", "root", "yaw"):
+            np.testing.assert_array_equal(getattr(made, name), getattr(asked, name), name)
+
+
+def test_characters_on_waypoints_are_not_copied(network: Network) -> None:
+    with pytest.raises(ValueError, match="waypoints"):
+        ProceduralAnimation(network, waypoints=TRACK).copies(np.array([0]))

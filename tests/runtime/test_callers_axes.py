@@ -8,7 +8,7 @@ import pytest
 from hobble.core import quat
 from hobble.core.skeleton import forward_kinematics
 from hobble.runtime import ProceduralAnimation
-from hobble.runtime.axes import MATRICES, Axes
+from hobble.runtime.caller_axes import MATRICES, Axes
 from hobble.runtime.ground import CELL, Heightmap
 from tests.runtime.walking import hills, walk
 
@@ -53,18 +53,18 @@ def test_a_heightmap_is_in_the_callers_axes_and_unit(network, handed: str, up: s
         return rise * axes.scale
 
     def root(ground) -> np.ndarray:
-        wish = axes.points_out(np.array([0.5, 0, 2.0]))
-        made = walk(ProceduralAnimation(network, axes=axes), 30, target_velocity=wish, terrain=ground)
+        target = axes.points_out(np.array([0.5, 0, 2.0]))
+        made = walk(ProceduralAnimation(network, axes=axes), 30, target_velocity=target, terrain=ground)
         return made[-1].root / axes.scale
 
     def sampled(cell: float, centre: tuple[float, float] = (0, 0)) -> np.ndarray:
         along = (np.arange(401) - 200) * cell
         return terrain(along[None, :] + centre[0], along[:, None] + centre[1])
 
-    asked = root(terrain)
+    expected = root(terrain)
     cell, centre = 4.0 * axes.scale, (30 * axes.scale, -50 * axes.scale)
-    np.testing.assert_allclose(root(Heightmap(sampled(cell, centre), cell, centre)), asked, atol=0.5)
-    np.testing.assert_allclose(root(sampled(CELL * axes.scale)), asked, atol=0.5)
+    np.testing.assert_allclose(root(Heightmap(sampled(cell, centre), cell, centre)), expected, atol=0.5)
+    np.testing.assert_allclose(root(sampled(CELL * axes.scale)), expected, atol=0.5)
     level = root(np.full((8, 8), 1.0))["XYZ".index(up)]
     assert level == pytest.approx(1 / axes.scale, abs=1e-3)
 
@@ -99,9 +99,9 @@ def test_the_callers_axes(network, handed: str, up: str, unit: str) -> None:
     velocity = np.array([0.5, 0, 2.0])
     for k in range(25):
         a = native.next_pose(velocity, (1, 0, 0), terrain=hills)
-        wish = axes.points_out(velocity)
+        target = axes.points_out(velocity)
         b = theirs.next_pose(
-            wish if k % 2 else wish[level], axes.directions_out(np.array([1.0, 0, 0])), terrain=terrain
+            target if k % 2 else target[level], axes.directions_out(np.array([1.0, 0, 0])), terrain=terrain
         )
     np.testing.assert_allclose(axes.points_in(b.positions), a.positions, atol=1e-3)
     np.testing.assert_allclose(axes.points_in(b.root), a.root, atol=1e-3)

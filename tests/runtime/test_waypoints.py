@@ -23,7 +23,7 @@ def test_the_published_track() -> None:
     assert [i for i, w in enumerate(TRACK) if w.facing] == [1, 5]
 
 
-def test_a_point_that_follows_the_wish_goes_around() -> None:
+def test_a_point_that_follows_the_target_goes_around() -> None:
     follower = Follower(SQUARE, arrived=20.0)
     place = follower.start[0][None]
     assert follower.start[1] == 0.0
@@ -65,13 +65,13 @@ def test_the_character_follows_waypoints(network) -> None:
     character = ProceduralAnimation(network, waypoints=SQUARE, steering=0.0)
     pose = character.next_pose()
     np.testing.assert_allclose(pose.root, 0, atol=1e-9)
-    np.testing.assert_allclose(character.state.target_velocity, [[0, 0.9 * 2.5]])
+    np.testing.assert_allclose(character.state.smoothed_velocity, [[0, 0.9 * 2.5]])
     character.follower.reached[:] = 1
     character.next_pose()
-    assert character._wish_gait[0].tolist() == [0, 0, 1, 0, 0, 0]
+    assert character._target_gait[0].tolist() == [0, 0, 1, 0, 0, 0]
     # On the way to the second it strafes, facing +Z.
-    np.testing.assert_allclose(character.state.target_direction, [[0, 1]], atol=1e-9)
+    np.testing.assert_allclose(character.state.smoothed_direction, [[0, 1]], atol=1e-9)
     assert character.state.strafe[0] > 0.5
     # A velocity of the caller's own takes precedence.
     character.next_pose((0.0, -1.0))
-    np.testing.assert_allclose(character._wish_gait[0], np.eye(6)[1])
+    np.testing.assert_allclose(character._target_gait[0], np.eye(6)[1])

@@ -21,7 +21,7 @@ def test_a_severity_out_of_range(hurtable, injury) -> None:
         ProceduralAnimation(hurtable).next_pose((0, 1), injury=injury)
 
 
-def test_invalid_wishes_are_refused(network) -> None:
+def test_invalid_targets_are_refused(network) -> None:
     character = ProceduralAnimation(network, characters=2)
     with pytest.raises(ValueError, match="target_velocity is not a finite vector"):
         character.next_pose((0, np.nan))
@@ -90,7 +90,7 @@ def test_a_network_without_skeleton_is_refused(tmp_path: Path, network) -> None:
 
 
 @pytest.mark.parametrize(
-    ("wishes", "message"),
+    ("targets", "message"),
     [
         ({"target_velocity": (1e30, 0)}, "faster than a body"),
         ({"target_velocity": (0, 31.0)}, "faster than a body"),
@@ -103,12 +103,12 @@ def test_a_network_without_skeleton_is_refused(tmp_path: Path, network) -> None:
         ({"injury": {KNEE: 10.5}}, "from 0 to"),
     ],
 )
-def test_impossible_wishes_are_refused_and_change_nothing(hurtable, wishes: dict, message: str) -> None:
+def test_impossible_targets_are_refused_and_change_nothing(hurtable, targets: dict, message: str) -> None:
     character = ProceduralAnimation(hurtable)
     walk(character, 5, injury={KNEE: 3.0})
     before = copy.deepcopy(character.state)
     with pytest.raises(ValueError, match=message):
-        character.next_pose(**{"target_velocity": (0.5, 2.0), "injury": {KNEE: 9.0}, **wishes})
+        character.next_pose(**{"target_velocity": (0.5, 2.0), "injury": {KNEE: 9.0}, **targets})
     assert same(before, character.state)
     assert np.isfinite(character.next_pose((0.5, 2.0)).positions).all()
 

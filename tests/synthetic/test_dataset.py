@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 import yaml
 
-from hobble.synthetic.path import GAITS
+from hobble.synthetic.planned_path import GAITS
 from hobble.synthetic.recipes import GROUND, RECIPES, plan
 
 

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import tracemalloc
+
 import numpy as np
 import pytest
 
 from hobble.core import quat
-from hobble.synthetic.clip import generate, walk
+from hobble.synthetic.generate_clip import generate, walk
 from hobble.synthetic.recipes import Segment
 
 SIDES = ("Left", "Right")
@@ -213,3 +215,13 @@ def test_no_foot_goes_through_the_edge_of_a_step(holden31):
         tip = toe + 6 * ahead / np.linalg.norm(ahead, axis=1, keepdims=True)
         for point in (toe, tip):
             assert (point[:, 1] - made.ground(point[:, 0], point[:, 2])).min() > -0.5
+
+
+def test_memory_grows_with_the_length_of_a_clip_and_not_with_its_square(holden31):
+    peaks = []
+    for frames in (2000, 8000):
+        tracemalloc.start()
+        generate("long", holden31, frames, "sidesteps", 120, 1)
+        peaks.append(tracemalloc.get_traced_memory()[1])
+        tracemalloc.stop()
+    assert peaks[1] < 4.1 * peaks[0]

@@ -14,9 +14,9 @@ from hobble.core.skeleton import Skeleton
 from hobble.motion.options import ClipMotion
 from hobble.motion.root import RootFrames, root_frames
 from hobble.terrain.clip_fits import clip_fits, heights_under, sample_points, save_fits
-from hobble.terrain.ground import fit_cycle
+from hobble.terrain.cycle_ground import fit_cycle
 from hobble.terrain.heightmaps import heightmaps
-from hobble.terrain.options import Heightmap
+from hobble.terrain.options import HeightmapOptions
 from hobble.terrain.patches import Patches, draw_patches
 from hobble.terrain.soles import IS_HEEL, Feet, find_soles, heel_above_toe, held_above_other
 
@@ -271,7 +271,7 @@ def test_a_single_low_frame_lowers_the_soles_a_fault_of_capture_does_not(made: S
 def honest_over(heightmap: dict, files: list[Path], made: SimpleNamespace) -> None:
     """A walk over waves, fitted to patches of one heightmap."""
     options = made.options(patches=100)
-    maps = heightmaps([Heightmap(**heightmap)], files, cell=options.cell, height_scale=3.0)
+    maps = heightmaps([HeightmapOptions(**heightmap)], files, cell=options.cell, height_scale=3.0)
     drawn = options.model_dump(include={"cell", "size", "highest", "seed"})
     patches = draw_patches(maps, count=100, **drawn)
     walk = made.walk(GROUNDS["waves"])
@@ -293,7 +293,7 @@ def test_the_originals_heightmap_is_ground_to_walk_on(shared: Path, made: Simple
 @pytest.mark.shared
 def test_real_clips_stand_on_their_ground(shared: Path, root: Path, made: SimpleNamespace) -> None:
     """Uneven ground, a limp, and the original's own flat clip, whose ground stays at zero."""
-    from hobble.config.sections import Labels, Terrain
+    from hobble.config.sections import LabelOptions, Terrain
     from hobble.labels.label import label_clip
     from hobble.motion.make import make_clip
 
@@ -316,7 +316,7 @@ def test_real_clips_stand_on_their_ground(shared: Path, root: Path, made: Simple
             options=ClipMotion(),
         )
         beside = [p for s in (".phase", "_footsteps.txt") if (p := bvh.with_name(bvh.stem + s)).is_file()]
-        labels, _ = label_clip(clip, beside, report, "walk", kind, Labels())
+        labels, _ = label_clip(clip, beside, report, "walk", kind, LabelOptions())
         arrays = {"contacts": labels.contacts, "cycles": labels.cycles}
         fits = clip_fits(clip, arrays, patches, kind, terrain, made.database())
         assert len(fits.frame) > 60, file

@@ -12,7 +12,7 @@ from PIL.TiffImagePlugin import ImageFileDirectory_v2
 from hobble.core.errors import InputError
 from hobble.terrain.generate import KINDS, generate
 from hobble.terrain.heightmaps import elevation, heightmaps, read_heights
-from hobble.terrain.options import Heightmap
+from hobble.terrain.options import HeightmapOptions
 
 CELL = 3.937007874
 RAMP = np.add.outer(np.arange(5.0), 10 * np.arange(4.0))
@@ -100,9 +100,9 @@ def test_files_are_scaled_and_may_say_their_own_cell_and_scale(tmp_path: Path) -
     write(tmp_path / "a.txt", RAMP)
     write(tmp_path / "b.txt", RAMP)
     entries = [
-        Heightmap(kind="file", path="a.txt"),
-        Heightmap(kind="hills", height_scale=0.5),
-        Heightmap(kind="file", path="b.txt", cell=10.0, height_scale=2.0),
+        HeightmapOptions(kind="file", path="a.txt"),
+        HeightmapOptions(kind="hills", height_scale=0.5),
+        HeightmapOptions(kind="file", path="b.txt", cell=10.0, height_scale=2.0),
     ]
     maps = heightmaps(entries, [tmp_path / "a.txt", tmp_path / "b.txt"], cell=CELL, height_scale=3.0)
     assert np.array_equal(maps[0].heights, 3 * RAMP)
@@ -144,6 +144,6 @@ def test_a_missing_file_and_an_npz_that_could_mean_two_arrays_are_refused(tmp_pa
 @pytest.mark.shared
 def test_the_original_heightmap(shared: Path) -> None:
     path = shared / "mocap/pfnn/hmap_001_smooth.txt"
-    (made,) = heightmaps([Heightmap(kind="file", path="x")], [path], cell=CELL, height_scale=3.0)
+    (made,) = heightmaps([HeightmapOptions(kind="file", path="x")], [path], cell=CELL, height_scale=3.0)
     assert made.heights.shape == (504, 302)
     assert np.allclose(made.heights, 3 * np.loadtxt(path))

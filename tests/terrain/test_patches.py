@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from scipy.ndimage import map_coordinates
 
 from hobble.core.errors import HobbleError, InputError
-from hobble.terrain.heightmaps import Heightmap
+from hobble.terrain.heightmaps import TerrainMap
 from hobble.terrain.patches import Patches, draw_patches, load_patches, save_patches
 
 CELL = 3.937007874
@@ -21,11 +21,11 @@ CELLS = np.stack(np.meshgrid(*[np.arange(SIZE) - SIZE // 2] * 2, indexing="ij"),
 CELLS = CELLS.astype(np.float32)
 
 
-def plane(a: float, b: float, rows: int = 260, columns: int = 300, cell: float = CELL) -> Heightmap:
-    return Heightmap("plane", np.add.outer(a * np.arange(rows), b * np.arange(columns)), cell)
+def plane(a: float, b: float, rows: int = 260, columns: int = 300, cell: float = CELL) -> TerrainMap:
+    return TerrainMap("plane", np.add.outer(a * np.arange(rows), b * np.arange(columns)), cell)
 
 
-def draw(*maps: Heightmap, count: int = 40, highest: float = 50.0, seed: int = 1) -> Patches:
+def draw(*maps: TerrainMap, count: int = 40, highest: float = 50.0, seed: int = 1) -> Patches:
     return draw_patches(maps, count=count, cell=CELL, size=SIZE, highest=highest, seed=seed)
 
 
@@ -65,7 +65,7 @@ def test_no_view_that_passes_is_left_out() -> None:
     """On a cliff only views that pass are drawn, whatever part of the cliff they contain."""
     cliff = np.zeros((400, 400))
     cliff[200:] = 60.0
-    heights = draw(Heightmap("cliff", cliff, CELL), count=200).at(range(200), CELLS)
+    heights = draw(TerrainMap("cliff", cliff, CELL), count=200).at(range(200), CELLS)
     share = (heights > heights.min(axis=1, keepdims=True) + 30).mean(axis=1)
     spread = np.ptp(heights, axis=1)
     assert np.abs(heights).max() <= 50.001
@@ -102,7 +102,7 @@ def test_no_patch_shows_a_hole() -> None:
     heights = plane(0.02, 0.02, 800, 800).heights.copy()
     heights[100:-100:150, 100:-100:150] = np.nan
     patches = draw_patches(
-        [Heightmap("holed", heights, CELL / 4)], count=40, cell=CELL, size=32, highest=50.0, seed=1
+        [TerrainMap("holed", heights, CELL / 4)], count=40, cell=CELL, size=32, highest=50.0, seed=1
     )
     points = np.random.default_rng(0).uniform(-16, 15, (40_000, 2)).astype(np.float32)
     at = np.einsum("pij,nj->pin", patches.affine, np.column_stack([points, np.ones(len(points))]))

@@ -164,6 +164,24 @@ def test_more_passes_resume_and_fewer_start_again(
     assert torch.equal(to(2, "b"), to(2, "c"))
 
 
+def test_a_fraction_of_a_pass_is_its_first_sections(
+    data: Database, network: Settings, training: Settings, tmp_path: Path
+) -> None:
+    def to(passes: float, folder: str) -> State:
+        settings = training | {"passes": passes}
+        return train(data, network=network, training=settings, checkpoints=tmp_path / folder, threads=2)
+
+    third, whole = to(1 / 3, "a"), to(1, "b")
+    assert third.samples == data.section_pairs("train", 0, 3) < data.pairs("train")
+    assert [row[:3] for row in third.history] == [row[:3] for row in whole.history[:1]]
+    resumed = to(1, "a")
+    assert torch.equal(resumed.network.flat, whole.network.flat)
+    assert not torch.equal(third.network.flat, whole.network.flat)
+    assert torch.equal(to(4 / 3, "a").network.flat, to(4 / 3, "c").network.flat)
+    with pytest.raises(ValueError, match="whole number"):
+        training | {"passes": 0.5}
+
+
 def test_one_configuration_continues_another_as_if_it_were_one(
     small_database: Path, data: Database, network: Settings, training: Settings, tmp_path: Path
 ) -> None:

@@ -14,10 +14,10 @@ import pytest
 from hobble.core.errors import InputError
 from hobble.core.files import write_text
 from hobble.workflow.batch_job import make_each, pieces
-from hobble.workflow.batches import (
+from hobble.workflow.clip_batches import (
     LARGEST,
     SMALLEST,
-    Batch,
+    ClipBatch,
     batch_count,
     batch_of,
     dataset_of,
@@ -118,7 +118,7 @@ def test_batches_depend_on_the_clip_alone_and_double_by_splitting() -> None:
 
 
 def test_names_of_rules_lead_back_to_the_data_set() -> None:
-    batch = Batch("cmu__ava x", 7, "07_hurt", ("a b",), True, hurt=True)
+    batch = ClipBatch("cmu__ava x", 7, "07_hurt", ("a b",), True, hurt=True)
     rule = batch.rule("terrain_fits")
     assert (family_of(rule), dataset_of(rule)) == ("terrain_fits", "cmu__ava x")
     assert (family_of("training"), dataset_of("training")) == ("training", "")
@@ -127,12 +127,12 @@ def test_names_of_rules_lead_back_to_the_data_set() -> None:
 
 
 def test_paths_of_clips_and_mirrors() -> None:
-    batch = Batch("d", 0, "a", ("a", "b_hurt2"), True)
+    batch = ClipBatch("d", 0, "a", ("a", "b_hurt2"), True)
     assert batch.of_names("motion/{clip}.npz") == [
         f"results/datasets/d/motion/{name}.npz" for name in ("a", "b_hurt2", "a_mirror", "b_hurt2_mirror")
     ]
     assert batch.of_originals("labels/{clip}.json")[1] == "results/datasets/d/labels/b.json"
-    assert Batch("d", 0, "a", ("a",), False).of_mirrors("motion/{clip}.npz") == []
+    assert ClipBatch("d", 0, "a", ("a",), False).of_mirrors("motion/{clip}.npz") == []
 
 
 def test_each_piece_gets_its_files() -> None:

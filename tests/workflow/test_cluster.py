@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 import yaml
 
-from hobble.workflow.batches import SMALLEST, Batch, batch_of
+from hobble.workflow.clip_batches import SMALLEST, ClipBatch, batch_of
 from hobble.workflow.demands import ENGINE_MB, WEEK_MINUTES, Demands, bvh_seconds
 from hobble.workflow.project import Project
 from hobble.workflow.resource_use import planned_jobs, with_use
@@ -98,8 +98,8 @@ def test_a_gpu_is_asked_for_where_training_is_told_to_use_one(workflow) -> None:
     assert "gpu=1" not in workflow.run("-np", weights)
 
 
-def alone(dataset: str, clip: str) -> Batch:
-    return Batch(dataset, 0, clip, (clip,), mirrored=True)
+def alone(dataset: str, clip: str) -> ClipBatch:
+    return ClipBatch(dataset, 0, clip, (clip,), mirrored=True)
 
 
 def test_requests_grow_with_motion_and_attempt(demands) -> None:
@@ -115,7 +115,7 @@ def test_requests_grow_with_motion_and_attempt(demands) -> None:
 
 
 def test_a_batch_requests_the_memory_of_its_longest_clip_and_the_time_of_all(demands) -> None:
-    both = Batch("synthetic", 0, "0", ("jog-1", "jog-2"), mirrored=True)
+    both = ClipBatch("synthetic", 0, "0", ("jog-1", "jog-2"), mirrored=True)
     each = [alone("synthetic", clip) for clip in both.clips]
     assert demands.batch_memory(both, 200) == max(demands.batch_memory(one, 200) for one in each)
     assert demands.batch_minutes(both, 6000) == pytest.approx(

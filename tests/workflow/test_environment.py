@@ -9,7 +9,7 @@ import sys
 from pathlib import Path
 
 from hobble.workflow import environment
-from hobble.workflow.environment import Line, follow
+from hobble.workflow.environment import ProgressLine, follow
 
 SAID = """Collecting torch==2.13.0
   Downloading torch-2.13.0-cp311-none-linux.whl.metadata (31 kB)
@@ -31,7 +31,7 @@ class Screen(io.StringIO):
 
 def test_on_a_terminal_one_line_says_what_is_fetched_and_how_far_it_is() -> None:
     screen = Screen()
-    words = follow(SAID, Line(screen))
+    words = follow(SAID, ProgressLine(screen))
     shown = [text.partition("\x1b[K")[2] for text in screen.getvalue().split("\r")]
     assert "environment: 95 MB fetched; torch 95 of 190 MB" in shown
     assert "environment: 207 MB fetched; unpacking 2 packages, which takes a while"[:78] in shown
@@ -43,7 +43,7 @@ def test_on_a_terminal_one_line_says_what_is_fetched_and_how_far_it_is() -> None
 
 def test_in_a_file_a_line_comes_now_and_then() -> None:
     out = io.StringIO()
-    follow(SAID * 20, Line(out))
+    follow(SAID * 20, ProgressLine(out))
     lines = out.getvalue().splitlines()
     assert len(lines) == 1 + 20  # and the unpacking at once, because pip prints nothing about it
     assert "unpacking 2 packages" in lines[-1]

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from hobble.workflow.batches import SMALLEST, batch_of
+from hobble.workflow.clip_batches import SMALLEST, batch_of
 
 pytestmark = pytest.mark.workflow
 

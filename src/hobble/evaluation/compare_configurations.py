@@ -11,8 +11,8 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from typing import Any
 
+from hobble.evaluation.comparison_rows import SideBySide, published_row
 from hobble.evaluation.configuration_results import ConfigurationResults
-from hobble.evaluation.side_by_side import SideBySide, published_row
 from hobble.measures.given import Json
 from hobble.measures.registry import MEASURES
 from hobble.models import network_options

@@ -33,8 +33,8 @@ LIMITS = {
 
 
 @dataclass(frozen=True)
-class Stretch:
-    """A constant wish for `frames` frames: velocity (2,) cm a frame, facing (2,) or None, gait."""
+class SteadyTarget:
+    """A constant target for `frames` frames: velocity (2,) cm a frame, facing (2,) or None, gait."""
 
     kind: str
     velocity: Array
@@ -43,7 +43,7 @@ class Stretch:
     frames: int
 
 
-def stretches(minutes: float, seed: int = 1) -> Iterator[Stretch]:
+def stretches(minutes: float, seed: int = 1) -> Iterator[SteadyTarget]:
     """Random stretches of 2 to 8 seconds in random directions, `minutes` in total."""
     rng = np.random.default_rng(seed)
     left = int(minutes * 60 * FPS)
@@ -53,7 +53,7 @@ def stretches(minutes: float, seed: int = 1) -> Iterator[Stretch]:
         going, looking = rng.uniform(-np.pi, np.pi, 2)
         speed, aside, gait = KINDS[kind]
         facing = np.array([np.sin(looking), np.cos(looking)]) if aside else None
-        yield Stretch(kind, speed * np.array([np.sin(going), np.cos(going)]), facing, gait, frames)
+        yield SteadyTarget(kind, speed * np.array([np.sin(going), np.cos(going)]), facing, gait, frames)
         left -= frames
 
 

@@ -29,7 +29,7 @@ ARRAY, ELEMENTS = 34962, 34963
 
 
 @dataclass(frozen=True)
-class Motion:
+class BodyMotion:
     """A motion of the body: root positions (F, 3) in cm, local rotations (F, J, 4), frames per second."""
 
     name: str
@@ -79,7 +79,7 @@ class _Buffer:
         return len(self.accessors) - 1
 
 
-def write_glb(path: str | Path, skeleton: Skeleton, motions: Iterable[Motion] = ()) -> None:
+def write_glb(path: str | Path, skeleton: Skeleton, motions: Iterable[BodyMotion] = ()) -> None:
     """Write the body of a skeleton, standing with its soles at height 0, and its motions as animations."""
     mesh, buffer = body(skeleton), _Buffer()
     nodes = _nodes(skeleton, mesh)
@@ -167,7 +167,7 @@ def _undoing(mesh: Mesh) -> NDArray[np.float32]:
     return out.swapaxes(1, 2).reshape(-1, 16).astype(np.float32)
 
 
-def _animation(motion: Motion, buffer: _Buffer) -> dict[str, Any]:
+def _animation(motion: BodyMotion, buffer: _Buffer) -> dict[str, Any]:
     times = (np.arange(len(motion.root)) / motion.fps).astype(np.float32)
     at = buffer.add(times, "SCALAR", FLOAT, bounds=True)
     ends = buffer.add(times[[0, -1]], "SCALAR", FLOAT, bounds=True) if len(times) > 2 else at

@@ -15,6 +15,7 @@ from hobble.core.skeleton import Skeleton
 from hobble.motion.axes import turned
 from hobble.motion.body import body_by_roles
 from hobble.motion.check import check, compare
+from hobble.motion.file_motion import FOUND, FileMotion, load_source
 from hobble.motion.loop import loop_clip
 from hobble.motion.options import ClipMotion
 from hobble.motion.pace import check_pace
@@ -23,7 +24,6 @@ from hobble.motion.resample import sample_positions, sample_rotations, sample_ti
 from hobble.motion.retarget import plan, retarget_clip
 from hobble.motion.rig import load_skeleton
 from hobble.motion.root import facing
-from hobble.motion.source import FOUND, Source, load_source
 from hobble.motion.stance import upright
 
 SAME = 1e-3  # cm: offsets that differ less from the skeleton's are equal
@@ -142,7 +142,7 @@ class Fitted:
     unsure: list[str] = field(default_factory=list)
 
 
-def fit_skeleton(clip: Clip, source: Source, target: Skeleton, proportions: str) -> Fitted:
+def fit_skeleton(clip: Clip, source: FileMotion, target: Skeleton, proportions: str) -> Fitted:
     """The clip's motion on the target skeleton, or on its joints with the clip's own bone lengths.
 
     clip: the source's, at another frame rate.
@@ -176,7 +176,7 @@ def _reordered(clip: Clip, order: Array, target: Skeleton) -> Clip:
     return Clip(clip.name, skeleton, clip.fps, clip.rotations[:, order], clip.root, translations)
 
 
-def _report(file: Bvh, source: Source, made: Clip) -> dict[str, Any]:
+def _report(file: Bvh, source: FileMotion, made: Clip) -> dict[str, Any]:
     return {
         "clip": made.name,
         "source": file.path.name,

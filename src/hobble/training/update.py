@@ -5,7 +5,7 @@ from __future__ import annotations
 import torch
 from torch import Tensor
 
-from hobble.models.trainable import Step
+from hobble.models.trainable import TrainingStep
 from hobble.training.optimiser import Adam
 from hobble.training.processes import ALONE, Processes
 
@@ -16,7 +16,7 @@ WARM_UP = 3  # runs before the capture, in which libraries choose algorithms and
 class Update:
     """Draws the dropout masks of a batch, finds the gradient and takes a step."""
 
-    def __init__(self, step: Step, adam: Adam) -> None:
+    def __init__(self, step: TrainingStep, adam: Adam) -> None:
         self.step, self.adam = step, adam
 
     def __call__(self, x: Tensor, y: Tensor, p: Tensor, share: float, total: int | None = None) -> Tensor:
@@ -36,7 +36,7 @@ class SharedUpdate(Update):
     share of the rows, and the sum over the processes is that of the whole batch. One message holds both.
     """
 
-    def __init__(self, step: Step, adam: Adam, processes: Processes, batch: int) -> None:
+    def __init__(self, step: TrainingStep, adam: Adam, processes: Processes, batch: int) -> None:
         super().__init__(step, adam)
         self.processes, self.own = processes, processes.places(batch)
         self.sent = torch.empty(len(adam.network.flat) + 1, dtype=adam.network.flat.dtype)
@@ -69,7 +69,7 @@ class CapturedUpdate(Update):
     is registered with the graph, so it advances and can be seeded as usual.
     """
 
-    def __init__(self, step: Step, adam: Adam, rows: int) -> None:
+    def __init__(self, step: TrainingStep, adam: Adam, rows: int) -> None:
         super().__init__(step, adam)
         flat, columns = adam.network.flat, (adam.network.inputs, adam.network.outputs)
         self.x, self.y = (torch.zeros(rows, size, device=flat.device) for size in columns)
@@ -109,7 +109,7 @@ class CapturedUpdate(Update):
         return self.loss.clone()
 
 
-def update_for(step: Step, adam: Adam, rows: int, processes: Processes = ALONE) -> Update:
+def update_for(step: TrainingStep, adam: Adam, rows: int, processes: Processes = ALONE) -> Update:
     """The update to use: captured on CUDA for small batches of one process, where it is faster."""
     if not processes.alone:
         return SharedUpdate(step, adam, processes, rows)

@@ -12,8 +12,8 @@ from hobble.core.errors import InputError
 from hobble.core.skeleton import Skeleton
 from hobble.models import model
 from hobble.models.matching.build import in_runs, on_mean_ground
-from hobble.models.matching.features import groups
 from hobble.models.matching.options import MatchingOptions
+from hobble.models.matching.search_features import groups
 from hobble.rows.clip_rows import pairs, save_clip_rows
 from hobble.rows.layout import RowLayout
 

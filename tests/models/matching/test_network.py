@@ -158,7 +158,9 @@ def test_the_page_finds_the_same_frames_as_python(made: Made, tmp_path: Path) ->
         "yMean": packed(network.y_mean[rows]),
         "yStd": packed(network.y_std[rows]),
     }
-    (tmp_path / "asked.json").write_text(json.dumps({"spec": spec, "x": x.tolist(), "phase": phase.tolist()}))
+    (tmp_path / "inputs.json").write_text(
+        json.dumps({"spec": spec, "x": x.tolist(), "phase": phase.tolist()})
+    )
     script = Path(__file__).parents[3] / "src/hobble/models/matching/network.js"
     (tmp_path / "run.mjs").write_text(
         f'import {{ createNetwork }} from {json.dumps(str(script))};\nimport {{ readFileSync }} from "fs";\n'
@@ -168,7 +170,7 @@ def test_the_page_finds_the_same_frames_as_python(made: Made, tmp_path: Path) ->
         "console.log(JSON.stringify(made));\n"
     )
     done: subprocess.CompletedProcess = node(
-        [str(tmp_path / "run.mjs"), str(tmp_path / "asked.json")],
+        [str(tmp_path / "run.mjs"), str(tmp_path / "inputs.json")],
         return_completed_process=True,
         capture_output=True,
         text=True,

@@ -10,7 +10,7 @@ import torch
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from hobble.models.pfnn.fused import FusedStep
+from hobble.models.pfnn.fused import FusedPfnnStep
 from hobble.models.pfnn.trainable import TrainablePfnn, coefficients, initialise, parameters
 
 from .definition import output, spline
@@ -38,7 +38,7 @@ def test_the_spline_goes_through_its_control_points_and_around(k: int) -> None:
 def test_compiled_coefficients_are_the_same() -> None:
     network = initialise((3, 4, 2), 5, 1)
     p = torch.tensor([0.0, 0.2, 0.37, 0.999, 1.0])
-    assert torch.allclose(FusedStep(network, 0.3).coefficients(p), coefficients(p, 5), atol=1e-6)
+    assert torch.allclose(FusedPfnnStep(network, 0.3).coefficients(p), coefficients(p, 5), atol=1e-6)
 
 
 @pytest.mark.parametrize(

@@ -8,8 +8,8 @@ from typing import Any
 
 import numpy as np
 
+from hobble.evaluation.comparison_rows import SideBySide, pair, published_row
 from hobble.evaluation.configuration_results import ConfigurationResults
-from hobble.evaluation.side_by_side import SideBySide, pair, published_row
 from hobble.measures.accuracy.run import SPLITS, clip_rows
 from hobble.measures.given import Json
 

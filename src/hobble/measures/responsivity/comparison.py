@@ -8,10 +8,10 @@ from typing import Any
 
 import numpy as np
 
-from hobble.evaluation.compare_tables import flat
+from hobble.evaluation.comparison_csv import flat
+from hobble.evaluation.comparison_rows import SideBySide, pair, published_row
 from hobble.evaluation.configuration_results import ConfigurationResults
 from hobble.evaluation.series import line
-from hobble.evaluation.side_by_side import SideBySide, pair, published_row
 from hobble.measures.given import Json
 
 NAME = "responsivity"

@@ -21,12 +21,12 @@ from hobble.models.trainable import ALL_ROWS
 Kept = tuple[Tensor, Tensor]
 
 
-class Step:
+class MannStep:
     """The gradient of the mean squared error of a network under dropout, in PyTorch, on any device.
 
     network: the network in training, read at every call. dropout: share of units dropped before each layer of
     the gate and of the experts, inputs included. half: round the factors of the experts' products to
-    bfloat16. gradients, error: as in `hobble.models.trainable.Step`.
+    bfloat16. gradients, error: as in `hobble.models.trainable.TrainingStep`.
     """
 
     def __init__(self, network: TrainableMann, dropout: float, half: bool = False) -> None:

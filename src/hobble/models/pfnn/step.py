@@ -19,7 +19,7 @@ from hobble.models.products import product
 from hobble.models.trainable import ALL_ROWS
 
 
-class Step:
+class PfnnStep:
     """The gradient of the mean squared error of a network under dropout, in PyTorch, on any device.
 
     network: the network in training, read at every call.

@@ -37,6 +37,7 @@ export const createCharacter = (spec, place = [0, 0], heading = 0) => {
     for (let t = 0; t < c.px.length; t++) { c.px[t] += by[0]; c.pz[t] += by[1]; }
     for (const points of [c.joints, c.pose]) for (let j = 0; j < points.length; j += 3) { points[j] += by[0]; points[j + 2] += by[1]; }
     for (const hold of c.hold) { hold[0] += by[0]; hold[1] += by[1]; }
+    for (const point of c.shown.flat()) { point[0] += by[0]; point[2] += by[1]; }
     c.root = [c.root[0] + by[0], c.root[1], c.root[2] + by[1]];
   };
   c.frame = (velocity, ahead, gait, ground) => {

@@ -35,6 +35,7 @@ export const createRows = (spec, c) => {
   const moveJoints = (y) => {
     const si = c.dx[M], co = c.dz[M];
     const climbed = c.height - c.root[1];
+    c.raised += min(max(climbed, -k.mostClimb), k.mostClimb) - climbed;
     c.root = [c.px[M], c.height, c.pz[M]];
     for (let j = 0; j < 3 * J; j += 3) {
       const p = Y.joint_position + j, v = Y.joint_velocity + j;

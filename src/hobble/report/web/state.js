@@ -1,6 +1,6 @@
 // The state of one character, at first in a frame of the clips. Fields and units as in `hobble.runtime.controller`.
 import { bytes } from "./numbers.js";
-import { at4, multiply } from "./turns.js";
+import { at3, at4, multiply } from "./turns.js";
 
 // Sets the rotations to draw from those of the network. Joints that move no bone keep the rotation of their parent.
 export const createDrawnTurns = (spec) => {
@@ -22,7 +22,7 @@ export const createState = (spec, place, heading) => {
     channelValues: filled(L), channelTargets: filled(L), memory: filled(spec.network.memory ?? 0),
     velocity: [0, 0], direction: [sin(heading), cos(heading)], strafe: 0, correction: [0, 0],
     lock: [0, 0], hold: [[0, 0], [0, 0]], step: [0, 0], missed: [0, 0], lift: [0, 0], raised: 0,
-    added: [0, 1].map(() => [[1, 0, 0, 0], [1, 0, 0, 0]]), contacts: [0, 0, 0, 0],
+    added: [0, 1].map(() => [[1, 0, 0, 0], [1, 0, 0, 0]]), shown: [], contacts: [0, 0, 0, 0],
   };
   startInClip(spec, c, place, heading);
   return c;
@@ -46,6 +46,7 @@ const startInClip = (spec, c, place, heading) => {
   c.gait.set(at("gait"));
   c.phase = spec.start.phase;
   c.pose.set(c.joints);
+  c.shown = spec.legs.map(([, ...below]) => below.map((j) => at3(c.joints, j)));
   const rotations = at("joint_rotation"), facing = [cos(heading / 2), 0, sin(heading / 2), 0];
   for (let j = 0; j < J; j++) c.rotations.set(multiply(facing, at4(rotations, j)), 4 * j);
   createDrawnTurns(spec)(c);

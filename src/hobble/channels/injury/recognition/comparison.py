@@ -6,8 +6,8 @@ from collections.abc import Sequence
 from typing import Any
 
 from hobble.channels.injury.recognition.run import rows
+from hobble.evaluation.comparison_rows import SideBySide, published_row
 from hobble.evaluation.configuration_results import ConfigurationResults
-from hobble.evaluation.side_by_side import SideBySide, published_row
 from hobble.measures.given import Json
 
 NAME = "recognition"

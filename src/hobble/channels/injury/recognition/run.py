@@ -8,25 +8,26 @@ figures (Ferre 2019).
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import product
 from typing import Any
 
 import numpy as np
 
-from hobble.channels.injury.limp.captured import VERSION
-from hobble.channels.injury.walks import links as links_of
-from hobble.channels.injury.walks import severities
+from hobble.channels.injury.crowd_severities import links as links_of
+from hobble.channels.injury.crowd_severities import severities
+from hobble.channels.injury.limp.captured_limps import VERSION
 from hobble.core.quat import Array
-from hobble.core.section import Section
 from hobble.core.skeleton import Skeleton
-from hobble.evaluation.captured import Captured, captured_clips
-from hobble.evaluation.crowd import FPS, Stretch
+from hobble.evaluation.captured import Captured
+from hobble.evaluation.crowd import FPS, CrowdTarget
 from hobble.evaluation.crowd import run as run_walks
 from hobble.evaluation.gait_features import features
 from hobble.gait.discriminant import Discriminant, learn
-from hobble.hurt.parts import part_of_link
+from hobble.hurt.body_parts import part_of_link
+from hobble.measures.chosen import captured_motion, sample_of, with_sample
 from hobble.measures.given import Given, Outcome
+from hobble.measures.sample_options import SampleOptions
 from hobble.models.load import load_network
 from hobble.models.network import Network
 from hobble.runtime.options import Runtime
@@ -47,7 +48,7 @@ TOO_FEW = "fewer than two parts hurt in the captured clips, or no clip walks"
 
 
 @dataclass(frozen=True)
-class Window:
+class InjuryWindow:
     """A stretch of walking: its clip, the link that hurts (or HEALTHY), its highest severity, features and
     fold.
     """
@@ -104,7 +105,7 @@ def recognition(
     }
 
 
-def walking_windows(clip: Captured, network: Network) -> list[Window]:
+def walking_windows(clip: Captured, network: Network) -> list[InjuryWindow]:
     """The windows of a captured stretch that walk straight ahead with constant severities."""
     assert network.skeleton is not None
     walk = clip.gait[:, network.gaits.index("walk")]
@@ -122,17 +123,21 @@ def walking_windows(clip: Captured, network: Network) -> list[Window]:
             names = [links_of(network)[i] for i in np.flatnonzero(hurts[first])]
             values = _values(network.skeleton, clip.local, clip.contacts, clip.root, span)
             severity = float(clip.channels[INJURY][span].max())
-            out.append(Window(clip.clip, " and ".join(names) or HEALTHY, severity, values, part))
+            out.append(InjuryWindow(clip.clip, " and ".join(names) or HEALTHY, severity, values, part))
     return out
 
 
-def generated(network: Network, classes: Sequence[str], healthy: bool, runtime: Runtime) -> list[Window]:
+def generated(
+    network: Network, classes: Sequence[str], healthy: bool, runtime: Runtime
+) -> list[InjuryWindow]:
     """Windows of generated walks, each class at each severity and speed."""
     assert network.skeleton is not None
     cases = [(name, s, v) for name, s, v in product(classes, GENERATED, SPEEDS)]
     cases += [(HEALTHY, 0.0, v) for v in SPEEDS] if healthy else []
     hurt = [{} if name == HEALTHY else dict.fromkeys(name.split(" and "), s) for name, s, _ in cases]
-    script = Stretch(WARM_UP + USED, ["walk"] * len(cases), severities(network, hurt), [v for *_, v in cases])
+    script = CrowdTarget(
+        WARM_UP + USED, ["walk"] * len(cases), severities(network, hurt), [v for *_, v in cases]
+    )
     walks = run_walks(network, [script], runtime)
     out = []
     for i, (name, severity, speed) in enumerate(cases):
@@ -141,7 +146,7 @@ def generated(network: Network, classes: Sequence[str], healthy: bool, runtime: 
             values = _values(
                 network.skeleton, walks.local[:, i], walks.contacts[:, i], walks.root[:, i], span
             )
-            out.append(Window(f"{name} {severity:g} {speed:g}", name, severity, values, 0))
+            out.append(InjuryWindow(f"{name} {severity:g} {speed:g}", name, severity, values, 0))
     return out
 
 
@@ -160,7 +165,7 @@ def sides_of(skeleton: Skeleton) -> Plain:
     return parts
 
 
-def table(windows: Sequence[Window]) -> Array:
+def table(windows: Sequence[InjuryWindow]) -> Array:
     """(n, D) features."""
     return np.array([list(w.values.values()) for w in windows])
 
@@ -178,29 +183,31 @@ def rows(result: Mapping[str, Any]) -> list[dict[str, Any]]:
     ]
 
 
-def run(given: Given, options: Section) -> Outcome:
+def run(given: Given, options: SampleOptions) -> Outcome:
     """recognition.json, and all its confusion tables as one table."""
     # Generated hurt versions are left out: the classifier would learn the generator's table of injuries.
-    files = [file for clip, file in given.clips.items() if not VERSION.search(clip)]
+    clips = {clip: file for clip, file in given.clips.items() if not VERSION.search(clip)}
+    facts = [file for file in given.facts if file.stem in clips]
+    sample = sample_of(replace(given, facts=facts), options)
     result = recognition(
         load_network(given.weights),
-        captured_clips(files),
+        captured_motion(clips, sample),
         given.splits,
         configuration=given.configuration,
         runtime=given.runtime,
         people=given.published["recognition"]["share"],
     )
     right = f"named right: {result['generated']['right']} of generated windows" if result["applies"] else ""
-    return Outcome(result, {"confusion": rows(result)}, right or result["reason"])
+    return Outcome(with_sample(result, sample), {"confusion": rows(result)}, right or result["reason"])
 
 
 def _values(skeleton: Skeleton, local: Array, contacts: Array, root: Array, span: slice) -> dict[str, float]:
     return features(skeleton, local[span], contacts[span], root[span])
 
 
-def _cross_validated(windows: Sequence[Window], sided: Plain) -> dict[str, Any]:
+def _cross_validated(windows: Sequence[InjuryWindow], sided: Plain) -> dict[str, Any]:
     """The classes of windows, each quarter judged by a classifier that learnt from the other three."""
-    judged: list[Window] = []
+    judged: list[InjuryWindow] = []
     named: list[str] = []
     for part in range(FOLDS):
         rest = [w for w in windows if w.part != part]
@@ -211,11 +218,11 @@ def _cross_validated(windows: Sequence[Window], sided: Plain) -> dict[str, Any]:
     return _confusion(sorted({w.hurt for w in windows}), judged, named, sided)
 
 
-def _judged(judge: Discriminant, windows: Sequence[Window], sided: Plain) -> dict[str, Any]:
+def _judged(judge: Discriminant, windows: Sequence[InjuryWindow], sided: Plain) -> dict[str, Any]:
     return _confusion(judge.classes, windows, judge.names(table(windows)) if windows else [], sided)
 
 
-def _by_walk(judge: Discriminant, windows: Sequence[Window], sided: Plain) -> dict[str, Any]:
+def _by_walk(judge: Discriminant, windows: Sequence[InjuryWindow], sided: Plain) -> dict[str, Any]:
     """One answer for each walk, from all its windows together."""
     scores = judge.scores(table(windows))
     walks, named = [], []
@@ -228,7 +235,7 @@ def _by_walk(judge: Discriminant, windows: Sequence[Window], sided: Plain) -> di
 
 def _confusion(
     classes: Sequence[str],
-    windows: Sequence[Window],
+    windows: Sequence[InjuryWindow],
     named: Sequence[str],
     sided: Plain,
     what: str = "windows",
