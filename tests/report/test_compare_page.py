@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Iterator
 from pathlib import Path
 from types import ModuleType
@@ -218,6 +219,17 @@ def test_another_configuration_is_chosen_and_linked_to(tab: Any) -> None:
     assert tab.run("Hobble.player.actors.map(({ spec }) => spec.channels.length)") == [0, 0]
     tab.run("document.getElementById('play-share').click()")
     assert "of=ava%2Cava" in tab.run("location.hash")
+
+
+def test_axe_finds_nothing(tab: Any, modules: Path) -> None:
+    """In a wide and in a narrow window, in light and in dark."""
+    for width, theme in itertools.product((1440, 390), ("light", "dark")):
+        tab.size(width, 900)
+        tab.run(f"document.documentElement.dataset.theme = '{theme}'")
+        assert tab.violations(modules) == []
+        assert tab.until(f"document.documentElement.scrollWidth <= {width}")
+    tab.run("delete document.documentElement.dataset.theme")
+    tab.size(1280, 900)
 
 
 def test_charts_are_drawn_and_nothing_is_said_or_asked_for(tab: Any, pictures: Path) -> None:

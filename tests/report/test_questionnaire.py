@@ -134,6 +134,20 @@ def test_orders_differ_and_a_closed_page_goes_on(tab: Any) -> None:
     assert tab.run("Study.state.order") == order
 
 
+def test_axe_finds_nothing_on_each_of_its_three_parts(tab: Any, modules: Path) -> None:
+    again(tab, forget=True)
+    assert tab.violations(modules) == []
+    tab.run("document.getElementById('begin').click()")
+    assert tab.violations(modules) == []
+    for _ in range(4):
+        tab.run(
+            "document.querySelector('#parts input').click(); document.querySelector('#marks input').click()"
+        )
+        tab.run("document.getElementById('next').click()")
+    assert not tab.run("document.getElementById('done').hidden")
+    assert tab.violations(modules) == []
+
+
 def test_films_in_which_nothing_can_be_seen_are_told() -> None:
     rows = [
         {"film": 1, "from_healthy_cm": 3.0, "untrained": []},
