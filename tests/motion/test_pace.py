@@ -39,7 +39,7 @@ def test_a_root_in_another_unit_than_the_bones_is_refused(bvh, walk, make, facto
 
 
 @pytest.mark.parametrize("factor", [0.85, 1.0, 1.2])
-def test_a_pace_that_people_have_is_accepted(bvh, walk, make, factor):
+def test_a_plausible_speed_is_accepted(bvh, walk, make, factor):
     assert make(bvh(walk, "near", edit=root(factor)))[1]["unsure"] == []
 
 
@@ -48,7 +48,7 @@ def test_walking_in_place_is_noted(bvh, walk, make):
     assert "stay in place" in make(path)[1]["unsure"][0]
 
 
-def test_standing_says_nothing(bvh, walk, make):
+def test_a_standing_figure_gets_no_note(bvh, walk, make):
     still = replace(walk, rotations=np.repeat(walk.rotations[:1], len(walk), axis=0))
     assert make(bvh(replace(still, root=walk.root[:1] + 0 * walk.root), "stands"))[1]["unsure"] == []
 

@@ -66,7 +66,7 @@ def test_a_job_on_another_machine_has_the_rules_of_its_batch_only(workflow) -> N
 
 
 @pytest.mark.parametrize("name", ["slurm", "kubernetes", "s3"])
-def test_a_profile_keeps_what_the_default_one_says(root, name: str) -> None:
+def test_cluster_profiles_have_the_settings_of_the_default_one(root, name: str) -> None:
     ours, default = profile(root, name), profile(root, "default")
     del default["logger"]  # on a cluster Snakemake's full output says which job went where
     asked = default.pop("default-resources")
@@ -91,7 +91,7 @@ def test_configurations_train_side_by_side(workflow) -> None:
 
 
 @pytest.mark.workflow
-def test_a_gpu_is_asked_for_where_training_is_told_to_use_one(workflow) -> None:
+def test_a_gpu_is_requested_if_training_uses_one(workflow) -> None:
     weights = "results/test/network/weights.npz"
     told = workflow.run("-np", "--config", "training={device: cuda}", "--", weights)
     assert len(re.findall("gpu=1", told)) == 1
@@ -123,7 +123,7 @@ def test_a_batch_requests_the_memory_of_its_longest_clip_and_the_time_of_all(dem
     )
 
 
-def test_the_length_of_a_clip_is_that_of_its_rows_not_what_its_header_promises(tmp_path) -> None:
+def test_the_length_of_a_clip_is_counted_from_its_rows(tmp_path) -> None:
     assert bvh_seconds(bvh(tmp_path / "a.bvh", 500, 2_000_000_000)) == pytest.approx(5.0)
     assert bvh_seconds(bvh(tmp_path / "b.bvh", 500, 500, "1e9")) <= 500
     assert bvh_seconds(bvh(tmp_path / "c.bvh", 0, 500)) is None
