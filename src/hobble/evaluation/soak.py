@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
-from typing import Any
+from typing import TypedDict
 
 import numpy as np
 
@@ -13,6 +13,7 @@ from hobble.core.quat import Array
 from hobble.evaluation.motion_measures import SHORTEST_STANCE, STANCE
 from hobble.models.network import Network
 from hobble.runtime.animation import ProceduralAnimation
+from hobble.runtime.options import Runtime
 
 FPS = 60
 GAITS = ("walk", "jog", "crouch")
@@ -102,10 +103,27 @@ def turns(now: Array, before: Array) -> Array:
     return np.asarray(np.degrees(2 * np.arccos(np.minimum(1.0, dot))))
 
 
+class Soak(TypedDict):
+    """The worst values over all characters and frames. See `soak`."""
+
+    frames: int
+    finite: bool
+    hips_lowest_cm: float
+    hips_highest_cm: float
+    network_turn_degrees: float
+    turn_degrees: float
+    added_turn_degrees: float
+    frames_beyond: int
+    fastest_joint_cm: float
+    slide_cm: float | None
+    stances: int
+    holds: bool
+
+
 def soak(
-    network: Network, characters: int = 200, frames: int = 5000, seed: int = 1, **options: Any
-) -> dict[str, Any]:
-    """The worst values over all characters and frames. options: of ProceduralAnimation.
+    network: Network, characters: int = 200, frames: int = 5000, seed: int = 1, runtime: Runtime | None = None
+) -> Soak:
+    """The worst values over all characters and frames.
 
     `finite`: whether all numbers are finite. `hips_lowest_cm`, `hips_highest_cm`: above the ground under
     them. `network_turn_degrees`: largest turn of a joint in a frame by the network, `turn_degrees`: by the
@@ -118,7 +136,9 @@ def soak(
     assert skeleton is not None
     starts = np.zeros((characters, 3))
     starts[:, 0] = START_SPACING_CM * np.arange(characters)
-    animation = ProceduralAnimation(network, characters=characters, position=starts, **options)
+    animation = ProceduralAnimation(
+        network, characters=characters, position=starts, **dict(runtime or Runtime())
+    )
     ground, targets = grounds(characters, rng), Targets.none(characters, dict(network.layout.channels))
     hips = skeleton.role("hips")
     toes = [skeleton.role("left_toe"), skeleton.role("right_toe")]
@@ -145,7 +165,7 @@ def soak(
             slides.add(now[0][:, toes], old[0][:, toes], pose.contacts[:, 1::2] >= STANCE)
         old = now
     slide = np.concatenate(slides.done)
-    out = {
+    return {
         "frames": characters * frames,
         "finite": finite,
         "hips_lowest_cm": round(low, 1),
@@ -157,11 +177,8 @@ def soak(
         "fastest_joint_cm": round(worst["speed"], 1),
         "slide_cm": round(float(slide.mean()), 3) if len(slide) else None,
         "stances": len(slide),
-    }
-    out["holds"] = (
-        finite
+        "holds": finite
         and low >= LIMITS["hips_lowest_cm"]
         and high <= LIMITS["hips_highest_cm"]
-        and worst["added"] <= LIMITS["added_turn_degrees"]
-    )
-    return out
+        and worst["added"] <= LIMITS["added_turn_degrees"],
+    }

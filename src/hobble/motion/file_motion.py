@@ -91,20 +91,21 @@ def _known(file: Bvh, hips: int, match: RigMatch, repairs: list[str], options: C
         raise _boneless(file, bone)
     straight = straighten(clip, options.up, options.handedness)
     moving = decoded.translations is not None
-    source = _mended(
-        file,
+    source = FileMotion(
         straight.clip,
         match,
-        (unit, unit_name),
+        unit,
+        unit_name,
         straight.axes,
-        repairs + decoded.repairs,
-        decoded.notes + straight.notes,
-        "its zero pose",
-        moving,
-        False,
-        options,
+        first_frame=0,
+        repairs=repairs + decoded.repairs,
+        notes=decoded.notes + straight.notes,
+        stance="its zero pose",
+        moving=moving,
+        straightened=False,
+        unsure=straight.unsure,
     )
-    return replace(source, unsure=straight.unsure)
+    return _repaired(file, source, options)
 
 
 def _unknown(
@@ -147,21 +148,21 @@ def _unknown(
         named or pairs(standing_clip.clip.skeleton, standing_clip.body, target.skeleton, theirs),
     )
     notes = decoded.notes + straight.notes + ([] if known else _said(found, options.handedness))
-    moving = _moving(decoded, body, unit)
-    source = _mended(
-        file,
+    source = FileMotion(
         standing_clip.clip,
         match,
-        (unit, unit_name),
+        unit,
+        unit_name,
         axes,
-        repairs + decoded.repairs,
-        notes,
-        standing_clip.rest,
-        moving,
-        True,
-        options,
+        first_frame=0,
+        repairs=repairs + decoded.repairs,
+        notes=notes,
+        stance=standing_clip.rest,
+        moving=_moving(decoded, body, unit),
+        straightened=True,
+        unsure=straight.unsure + standing_clip.notes,
     )
-    return replace(source, unsure=straight.unsure + standing_clip.notes)
+    return _repaired(file, source, options)
 
 
 def _found(file: Bvh, rig: Skeleton, raw: Clip, known: RigMatch | None, options: ClipMotion) -> FoundBody:
@@ -198,30 +199,21 @@ def _said(found: FoundBody, handedness: str) -> list[str]:
     return out
 
 
-def _mended(
-    file: Bvh,
-    clip: Clip,
-    match: RigMatch,
-    unit: tuple[float, str],
-    axes: RigAxes,
-    repairs: list[str],
-    notes: list[str],
-    stance: str,
-    moving: bool,
-    straightened: bool,
-    options: ClipMotion,
-) -> FileMotion:
-    """The source with broken frames repaired and its floor at height zero."""
+def _repaired(file: Bvh, source: FileMotion, options: ClipMotion) -> FileMotion:
+    """The motion with broken frames repaired and its floor at height zero."""
     leave = options.defects == "leave"
-    repaired = Repaired(clip, 0, []) if leave else repair(clip)
+    repaired = Repaired(source.clip, 0, []) if leave else repair(source.clip)
     flat = options.ground == "flat" and not leave
     clip, moved, uneven = on_floor(repaired.clip) if flat else (repaired.clip, [], [])
-    mended = repaired.sentences + moved
-    if mended and options.defects == "refuse":
-        raise InputError(file.path, mended[0], fix="Set motion.defects: repair to repair it this way.")
-    notes = notes + uneven + flips(clip, repaired.first)
-    return FileMotion(
-        clip, match, *unit, axes, repaired.first, repairs + mended, notes, stance, moving, straightened
+    repairs = repaired.sentences + moved
+    if repairs and options.defects == "refuse":
+        raise InputError(file.path, repairs[0], fix="Set motion.defects: repair to repair it this way.")
+    return replace(
+        source,
+        clip=clip,
+        first_frame=repaired.first,
+        repairs=source.repairs + repairs,
+        notes=source.notes + uneven + flips(clip, repaired.first),
     )
 
 

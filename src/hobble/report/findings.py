@@ -155,7 +155,7 @@ def _repairs(material: Material) -> Iterator[Hint]:
     if repaired or warned:
         yield Hint(
             "note",
-            f"Check these clips: {len(repaired)} repaired, {len(warned)} with warnings.",
+            f"Check {len(repaired | warned)} clips. Repaired: {len(repaired)}. With warnings: {len(warned)}.",
             "They are listed under Data. The network also learns the errors in a clip.",
         )
 

@@ -4,16 +4,16 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from itertools import combinations
-from typing import Any
 
 import numpy as np
 
-from hobble.evaluation.comparison_rows import SideBySide, pair, published_row
+from hobble.evaluation.comparison_rows import DifferenceOf, PublishedRow, SideBySide, pair, published_row
 from hobble.evaluation.configuration_results import ConfigurationResults
 from hobble.measures.accuracy.run import SPLITS, clip_rows
-from hobble.measures.given import Json
+from hobble.measures.given import Json, Row
 
 NAME = "accuracy"
+WORDS = {"train": "training", "held_out": "held-out"}
 
 
 def compared(all_measured: Sequence[ConfigurationResults], published: Json) -> SideBySide:
@@ -26,9 +26,9 @@ def compared(all_measured: Sequence[ConfigurationResults], published: Json) -> S
     )
 
 
-def tables(compared: Json) -> dict[str, list[dict[str, Any]]]:
+def tables(compared: Json) -> dict[str, list[Row]]:
     """Every clip of every configuration."""
-    rows = [
+    rows: list[Row] = [
         {"configuration": entry["configuration"], **row}
         for entry in compared[NAME]
         for row in clip_rows(entry)
@@ -36,9 +36,9 @@ def tables(compared: Json) -> dict[str, list[dict[str, Any]]]:
     return {NAME: rows}
 
 
-def accuracy_differences(all_measured: Sequence[ConfigurationResults]) -> list[dict[str, Any]]:
+def accuracy_differences(all_measured: Sequence[ConfigurationResults]) -> list[DifferenceOf]:
     """Eq. 3.2 of each pair: over each split, and for each clip that both were measured on."""
-    out = []
+    out: list[DifferenceOf] = []
     for a, b in combinations(all_measured, 2):
         ours, theirs = ({**_of_splits(m), **_clips(m)} for m in (a, b))
         for over in ours:
@@ -47,7 +47,7 @@ def accuracy_differences(all_measured: Sequence[ConfigurationResults]) -> list[d
     return out
 
 
-def _of_splits(measured: ConfigurationResults) -> dict[str, Any]:
+def _of_splits(measured: ConfigurationResults) -> dict[str, Json]:
     """Split -> its errors over all frames, and the `means` of its clips."""
     found = measured.found(NAME)
     return {split: {**found[split], "means": clip_means(found, split)} for split in SPLITS}
@@ -58,25 +58,24 @@ def clip_means(found: Json, split: str) -> list[float]:
     return [c["mean"] for c in found["clips"] if c["split"] == split and c["mean"] is not None]
 
 
-def _splits(all_measured: Sequence[ConfigurationResults], published: Json) -> list[dict[str, Any]]:
+def _splits(all_measured: Sequence[ConfigurationResults], published: Json) -> list[PublishedRow]:
     found = {m.name: m for m in all_measured}
     out = []
     for row in published["accuracy"]:
         m = found.get(row["configuration"])
         for split in SPLITS:
             ours = m.found(NAME)[split]["mean_of_clips"] if m else None
-            out.append(published_row(f"relative error, {split} clips", row, row["mean"], ours))
+            out.append(published_row(f"relative error, {WORDS[split]} clips", row, row["mean"], ours))
             if "sd" in row:
                 in_text = {**row, "table": None}
                 means = clip_means(m.found(NAME), split) if m else []
                 sd = float(np.std(means)) if len(means) > 1 else None
-                out.append(
-                    published_row(f"standard deviation of the means of {split} clips", in_text, row["sd"], sd)
-                )
+                what = f"standard deviation of the means of {WORDS[split]} clips"
+                out.append(published_row(what, in_text, row["sd"], sd))
     return out
 
 
-def _published_clips(all_measured: Sequence[ConfigurationResults], published: Json) -> list[dict[str, Any]]:
+def _published_clips(all_measured: Sequence[ConfigurationResults], published: Json) -> list[PublishedRow]:
     """Published errors of single clips, next to our clips of the same names."""
     out = []
     for row in published["clips"]:
@@ -90,5 +89,5 @@ def _published_clips(all_measured: Sequence[ConfigurationResults], published: Js
     return out
 
 
-def _clips(measured: ConfigurationResults) -> dict[str, Any]:
+def _clips(measured: ConfigurationResults) -> dict[str, Json]:
     return {entry["clip"]: entry for entry in measured.found(NAME)["clips"]}
