@@ -244,6 +244,6 @@ def _line_of(body: bytes, frame: int, first_line: int) -> int | None:
     return None if at is None else first_line + at
 
 
-def cut(bvh: Bvh, frames: slice | Array) -> Bvh:
+def keep_frames(bvh: Bvh, frames: slice | Array) -> Bvh:
     """The same file with only some of its frames."""
     return replace(bvh, values=bvh.values[frames])
