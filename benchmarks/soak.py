@@ -13,6 +13,7 @@ import sys
 from hobble.core.errors import HobbleError
 from hobble.evaluation.soak import LIMITS, soak
 from hobble.models.load import load_network
+from hobble.runtime.options import Runtime
 
 
 def main() -> int:
@@ -37,8 +38,7 @@ def main() -> int:
         arguments.characters,
         arguments.frames,
         arguments.seed,
-        mode=arguments.mode,
-        foot_locking=not arguments.without_locking,
+        Runtime(mode=arguments.mode, foot_locking=not arguments.without_locking),
     )
     for name, value in found.items():
         print(f"{name:<24}{value}")

@@ -42,8 +42,8 @@ ATTACKS: dict[str, tuple[str, str, tuple[str, ...]]] = {
         (
             "tests/runtime/test_wrong_calls.py::test_impossible_targets_are_refused_and_change_nothing",
             "tests/runtime/test_wrong_calls.py::test_invalid_targets_are_refused",
-            "tests/runtime/test_wrong_calls.py::test_severities_of_another_shape",
-            "tests/runtime/test_wrong_calls.py::test_a_severity_out_of_range",
+            "tests/runtime/test_wrong_calls.py::test_severities_of_another_shape_are_refused",
+            "tests/runtime/test_wrong_calls.py::test_a_severity_out_of_range_is_refused",
             "tests/runtime/test_wrong_calls.py::test_a_terrain_that_raises_leaves_the_state_as_it_was",
         ),
     ),

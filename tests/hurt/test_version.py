@@ -30,7 +30,7 @@ def changing(made, hurting):
     return wanted, hurt_clip(clip, labels, wanted, flat=flat)
 
 
-def test_severities_are_those_asked_for_away_from_a_change(changing, holden31) -> None:
+def test_severities_far_from_a_change_are_the_requested_ones(changing, holden31) -> None:
     wanted, hurt = changing
     column = holden31.link_names.index(THIGH)
     when = np.clip(hurt.when.astype(int), 0, len(wanted) - 1)
@@ -40,7 +40,7 @@ def test_severities_are_those_asked_for_away_from_a_change(changing, holden31) -
     assert not np.delete(hurt.severity, column, axis=1).any()
 
 
-def test_a_change_sets_in_over_a_second_with_the_motion(changing, holden31) -> None:
+def test_a_change_of_severity_sets_in_over_a_second_like_the_motion(changing, holden31) -> None:
     _, hurt = changing
     severity = hurt.severity[:, holden31.link_names.index(THIGH)]
     assert np.abs(np.diff(severity)).max() < 0.6
@@ -48,7 +48,7 @@ def test_a_change_sets_in_over_a_second_with_the_motion(changing, holden31) -> N
     assert severity[at] == pytest.approx(10 * 0.5 ** (1 / POWER), abs=0.25)
 
 
-def test_a_stretch_that_shows_a_severity_is_as_fast_as_a_clip_with_it(changing, made, hurting) -> None:
+def test_frames_with_a_severity_are_as_fast_as_a_clip_with_it_throughout(changing, made, hurting) -> None:
     _, hurt = changing
     clip, labels, flat = made("straight")
     throughout = hurt_clip(clip, labels, hurting(len(clip), {THIGH: 10.0}), flat=flat)
@@ -64,7 +64,7 @@ def test_a_stretch_that_shows_a_severity_is_as_fast_as_a_clip_with_it(changing, 
 
 
 @pytest.mark.parametrize("mirrored", [False, True])
-def test_without_severities_in_between_no_cycle_shows_one(made, mirrored) -> None:
+def test_without_in_between_no_cycle_has_a_severity_in_between(made, mirrored) -> None:
     clip, labels, _ = made("straight")
     options = Hurt(severities=(10.0,), seconds=5, at_once=1, in_between=False, longest=1)
     hurt, report = hurt_version(clip, labels, REPORT, options, name="a_hurt1", turn=0, ground="flat")

@@ -16,7 +16,7 @@ NAMES = ("w_footsteps.txt", "w_gait.txt", "w.phase")
 
 
 @pytest.mark.parametrize(("fps", "start"), [(60.0, 0), (120.0, 0), (30.0, 0), (120.0, 8), (100.0, 3)])
-def test_what_is_written_is_read_again(walker, tmp_path, fps, start):
+def test_written_label_files_read_back_unchanged(walker, tmp_path, fps, start):
     clip = walker(frames=700, start=150, limp=0.4)
     frames = round(len(clip) * fps / 60) + start
     motion = {"source_frames": frames, "source_fps": fps, "source_start": start}

@@ -108,7 +108,7 @@ def test_whole_people_are_left_out() -> None:
     assert by_clip["right"] > by_person["right"] + 0.2
 
 
-def test_the_features_are_read_once_and_the_best_shrinkage_is_taken(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_features_are_tabled_once_and_the_best_shrinkage_is_chosen(monkeypatch: pytest.MonkeyPatch) -> None:
     rng = np.random.default_rng(4)
     windows = [window(f"{k}", "sad" if k % 2 else NONE, *rng.normal(k % 2, 1, 4)) for k in range(30)]
     people = {w.clip: w.clip for w in windows}
@@ -123,7 +123,7 @@ def test_the_features_are_read_once_and_the_best_shrinkage_is_taken(monkeypatch:
     assert min(one["right"] for one in alone) < best["right"]
 
 
-def test_a_manner_of_one_person_is_never_named_without_that_person() -> None:
+def test_a_manner_of_a_single_person_is_never_named_when_that_person_is_left_out() -> None:
     rng = np.random.default_rng(3)
     windows = [
         window(f"{m}{n}", m, *(place + rng.normal(0, 0.1, 2)))
@@ -181,7 +181,7 @@ def test_each_manner_is_tried_with_each_column_of_another_channel(
 LEANS = ((None, 1.0), ("sad", 13.0), ("old", 31.0))
 
 
-def test_a_network_walks_all_that_is_asked(both: Network, motion: list[Captured]) -> None:
+def test_a_network_walks_in_every_manner_and_mixture(both: Network, motion: list[Captured]) -> None:
     [found] = measured(both, motion)["channels"]
     per = (USED - WINDOW) // STEP + 1
     assert [row["windows"] for row in found["generated"]] == [3 * per] * 6
@@ -194,7 +194,7 @@ def test_a_network_walks_all_that_is_asked(both: Network, motion: list[Captured]
     assert len({part.content.name for part in shown.parts if not isinstance(part.content, Paragraph)}) == 6
 
 
-def test_says_why_there_is_nothing(hurtable, both: Network, motion: list[Captured]) -> None:
+def test_missing_results_are_explained(hurtable, both: Network, motion: list[Captured]) -> None:
     assert measured(hurtable, [])["reason"] == run.REASON
     assert measured(both, motion[:6:2])["reason"] == run.TOO_FEW
     assert page.section(measured(hurtable, []), SimpleNamespace(network={"skeleton": {}})).parts == []

@@ -66,7 +66,7 @@ def recorded(network: Network, frames: int, ground: Any) -> tuple[RollOutInputs,
 
 
 @pytest.mark.parametrize("ground", [None, hills])
-def test_a_roll_out_is_what_the_runtime_does(hurtable: Network, ground: Any) -> None:
+def test_a_roll_out_equals_the_motion_of_the_runtime(hurtable: Network, ground: Any) -> None:
     """With the runtime's inputs, joints and phase equal those of the runtime."""
     scale = hurtable.x_std.copy()  # one that feels its own velocities and its phase
     scale[hurtable.layout.x_joint_velocity] = 1.0
@@ -140,7 +140,7 @@ def test_lengths_together_are_as_each_alone_in_fewer_predictions(
     assert sum(predicted) == sum(longest.values()) < apart
 
 
-def test_every_frame_is_reached_four_times(hurtable: Network) -> None:
+def test_roll_outs_start_four_times_within_each_length(hurtable: Network) -> None:
     rows = clip_rows(hurtable, 240, 1, gap=90)
     found = clip_roll_outs(PfnnPredictor(hurtable), rows, range(31), (1, 10, 20, 200))
     # Of 90 and 150 frames in a row the first of each starts none.
@@ -154,7 +154,7 @@ def test_every_frame_is_reached_four_times(hurtable: Network) -> None:
     assert found[10].moments.weight == pytest.approx(found[10].frames)
 
 
-def test_one_frame_is_half_the_prediction_and_half_the_pose_carried_on(hurtable: Network) -> None:
+def test_after_one_frame_a_pose_is_the_mean_of_prediction_and_extrapolation(hurtable: Network) -> None:
     rows = clip_rows(hurtable, 40, 2)
     given = inputs(rows, np.arange(40), rows.layout)
     layout = hurtable.layout
@@ -177,7 +177,9 @@ def test_one_frame_is_half_the_prediction_and_half_the_pose_carried_on(hurtable:
     )
 
 
-def test_splits_add_up_and_come_out_the_same(hurtable: Network, tmp_path: Path, monkeypatch) -> None:
+def test_results_of_splits_are_means_of_their_clips_and_reproducible(
+    hurtable: Network, tmp_path: Path, monkeypatch
+) -> None:
     weights = tmp_path / "weights.npz"
     save(weights, hurtable)
     clips = {}

@@ -55,14 +55,14 @@ def estimate(sample: Sample, split: str, values: dict[Excerpt, float]) -> float:
     return float(np.average([values[one] for one in own], weights=weights))
 
 
-def test_where_there_are_few_frames_all_clips_are_measured():
+def test_with_few_frames_all_clips_are_measured():
     clips, splits, _ = population(0)
     rows = sum(one.rows for one in clips)
     assert drawn(clips, splits, rows) is None
     assert drawn(clips, splits, rows - 1) is not None
 
 
-def test_the_sample_is_as_large_as_asked_and_has_something_of_every_kind():
+def test_the_sample_has_the_requested_size_and_every_kind_of_clip():
     clips, splits, _ = population(1)
     sample = drawn(clips, splits, 300_000)
     assert sample is not None
@@ -93,7 +93,7 @@ def test_of_two_long_clips_only_excerpts_are_drawn():
     assert found["of"] == 24
 
 
-def test_one_clip_more_changes_little():
+def test_an_additional_clip_hardly_changes_the_sample():
     clips, splits, _ = population(2)
     more = [*clips, Facts("another", 900, (Kind("walk", 3.0, ()),))]
     before = drawn(clips, splits, 300_000)
@@ -106,7 +106,7 @@ def test_one_clip_more_changes_little():
 
 @pytest.mark.parametrize("split", ["train", "held_out"])
 @pytest.mark.parametrize("long", [False, True])
-def test_the_interval_holds_the_truth_nearly_as_often_as_it_says(split, long):
+def test_the_interval_contains_the_true_mean_about_as_often_as_stated(split, long):
     """The intervals hold in nearly 95 % of samples, although excerpts of a clip resemble each other.
 
     Without strata or weights they hold far less often.

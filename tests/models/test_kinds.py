@@ -74,6 +74,11 @@ def near(network: Network, y: np.ndarray, expected: np.ndarray, within: float) -
     np.testing.assert_allclose((y - expected) / network.y_std, 0, atol=within)
 
 
+def test_the_modes_that_a_kind_names_are_those_of_its_networks(made: Made) -> None:
+    kind = json.loads(str(made[1]["meta"]))["kind"]
+    assert model(kind).modes == made[2].modes
+
+
 def test_the_read_network_equals_the_trained_one(made: Made) -> None:
     trainable, _, network = made
     x, phase = random_inputs(network)
@@ -84,7 +89,7 @@ def test_the_read_network_equals_the_trained_one(made: Made) -> None:
 
 
 @pytest.mark.parametrize("rows", [1, 2, 3, 4, 5, 11])
-def test_the_predictor_is_the_plain_prediction(made: Made, rows: int) -> None:
+def test_the_compiled_predictor_equals_the_plain_prediction(made: Made, rows: int) -> None:
     network = made[2]
     x, phase = (array[:rows] for array in random_inputs(network, max(rows, 4)))
     expected = network.predict(x, phase)
@@ -98,7 +103,7 @@ def test_the_predictor_is_the_plain_prediction(made: Made, rows: int) -> None:
 
 
 @pytest.mark.parametrize("storage", STORAGES)
-def test_a_crowd_has_the_bits_of_single_characters(made: Made, storage: str) -> None:
+def test_a_crowd_is_bitwise_equal_to_single_characters(made: Made, storage: str) -> None:
     """For some characters the share of an expert is 0, so that the rows of a product are not all
     consecutive.
     """
@@ -119,7 +124,7 @@ def test_a_network_without_phase_ignores_it(made: Made) -> None:
     assert same == (not network.phase)
 
 
-def test_the_page_computes_the_same(made: Made, tmp_path: Path) -> None:
+def test_javascript_predicts_the_same_as_python(made: Made, tmp_path: Path) -> None:
     """The page lacks the first input, which has no weight, and has some outputs only, in another order."""
     network = made[2]
     object.__setattr__(network, "x_std", np.where(np.arange(len(network.x_std)) == 0, 0, network.x_std))
@@ -154,7 +159,7 @@ def test_the_page_computes_the_same(made: Made, tmp_path: Path) -> None:
     np.testing.assert_allclose(difference / network.y_std[rows], 0, atol=5e-3)
 
 
-def test_onnxruntime_computes_the_same(made: Made, tmp_path: Path) -> None:
+def test_onnxruntime_predicts_the_same_as_python(made: Made, tmp_path: Path) -> None:
     pytest.importorskip("onnx")
     runtime = pytest.importorskip("onnxruntime")
     network = made[2]
@@ -165,7 +170,7 @@ def test_onnxruntime_computes_the_same(made: Made, tmp_path: Path) -> None:
     near(network, y, network.predict(x, phase), 1e-4)
 
 
-def test_a_character_goes(made: Made) -> None:
+def test_a_character_moves(made: Made) -> None:
     animation = ProceduralAnimation(made[2], characters=2)
     for _ in range(3):
         pose = animation.next_pose([1.0, 0.0])

@@ -208,11 +208,11 @@ MALFORMED: dict[str, tuple[Change, str]] = {
 
 
 def save(path: Path, made: Content) -> None:
-    told = made["meta"]
-    np.savez(path, **{**made, "meta": told if isinstance(told, np.ndarray) else np.array(json.dumps(told))})
+    meta = made["meta"]
+    np.savez(path, **{**made, "meta": meta if isinstance(meta, np.ndarray) else np.array(json.dumps(meta))})
 
 
-def test_a_sound_file_is_read(tmp_path: Path, holden31: Skeleton) -> None:
+def test_a_valid_network_file_is_read(tmp_path: Path, holden31: Skeleton) -> None:
     save(tmp_path / "weights.npz", content(holden31))
     network = load_network(tmp_path)
     assert (network.sizes, network.gaits, network.terrain_side) == ((372, 6, 5, 311), GAITS, 25.0)
@@ -307,7 +307,7 @@ def test_entries_that_overlap_take_no_memory(tmp_path: Path, holden31: Skeleton)
         load_network(path)
 
 
-def test_the_ground_is_looked_up_where_it_was_in_training(tmp_path: Path, holden31: Skeleton) -> None:
+def test_the_ground_is_sampled_as_far_to_the_side_as_in_training(tmp_path: Path, holden31: Skeleton) -> None:
     """The runtime and the page look as far to the side as the file says, or 25 cm if it does not say."""
     for side in (40.0, None):
         made = content(holden31)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+from collections.abc import Iterator
 
 import numpy as np
 import pytest
@@ -10,6 +11,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from hobble.core.errors import InputError
+from hobble.motion import read, read_numbers
 from hobble.motion.read import read_bvh
 
 SMALL = """HIERARCHY
@@ -37,6 +39,17 @@ Frame Time: 0.0333333
 1 2 3 4 5 6 7 8 9
 1.5e1 -2 3 4 5 6 7 8 -9
 """
+
+
+@pytest.fixture(scope="module", autouse=True, params=["compiled", "general"])
+def reader(request: pytest.FixtureRequest) -> Iterator[None]:
+    """Read the numbers by compiled code wherever it can, or never."""
+    with pytest.MonkeyPatch.context() as patch:
+        if request.param == "compiled":
+            patch.setattr(read_numbers, "LARGE", 0)
+        else:
+            patch.setattr(read, "read_numbers", lambda *_: None)
+        yield
 
 
 @pytest.fixture
@@ -75,7 +88,7 @@ VARIANTS = {
 
 
 @pytest.mark.parametrize("variant", VARIANTS)
-def test_reads_variants_alike(written, variant):
+def test_variants_of_the_format_are_read_alike(written, variant):
     plain = read_bvh(written(SMALL))
     other = read_bvh(written(VARIANTS[variant](SMALL)))
     assert other.names == plain.names
@@ -141,7 +154,7 @@ BROKEN = {
 
 
 @pytest.mark.parametrize("what", BROKEN)
-def test_refuses_with_file_and_line(written, what):
+def test_a_malformed_file_is_refused_with_its_line(written, what):
     change, message, line = BROKEN[what]
     path = written(change(SMALL))
     with pytest.raises(InputError) as raised:
@@ -176,7 +189,7 @@ def test_a_deep_chain_reads(written):
     assert read_bvh(written(text)).parents[-1] == deep - 1
 
 
-def test_one_frame_short_is_read_and_can_be_told(written):
+def test_a_file_with_a_frame_too_few_is_read_with_both_counts(written):
     clip = read_bvh(written(SMALL.replace("Frames: 2", "Frames: 3")))
     assert (len(clip), clip.declared) == (2, 3)
 
@@ -193,7 +206,7 @@ def test_every_shared_file_loads(shared):
 
 @settings(max_examples=200, deadline=None)
 @given(st.data())
-def test_whatever_happens_to_a_file_ends_in_a_clip_or_one_message(tmp_path_factory, data):
+def test_a_file_with_random_damage_gives_a_clip_or_one_message(tmp_path_factory, data):
     text = bytearray(SMALL.encode())
     for _ in range(data.draw(st.integers(1, 4))):
         at = data.draw(st.integers(0, len(text) - 1))

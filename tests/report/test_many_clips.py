@@ -87,7 +87,7 @@ def test_seconds_are_estimated_from_random_excerpts_of_clips(
     assert few["estimate"] == " Estimated from 4 of 8 clips and 75 % of their frames."
 
 
-def test_many_remarks_are_told_by_kind(material: Material, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_many_remarks_are_grouped_by_kind(material: Material, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(data_section, "MOST_REMARKS", 3)
     sentences = ["frames 1-3 held", "frames 20-31 held", "frames 4-5 held", "no foot down for 2.5 s"]
     motion = [{**material.motion[0], "clip": f"c{i}", "repairs": [s]} for i, s in enumerate(sentences)]

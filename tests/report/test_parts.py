@@ -19,7 +19,7 @@ def chart(name: str) -> Chart:
     return Chart(name, name.title(), "", [{"type": "bar", "y": [1]}])
 
 
-def test_sections_of_one_name_are_one_with_the_parts_of_all_in_their_order() -> None:
+def test_sections_with_one_name_are_joined_and_their_parts_sorted() -> None:
     table = Table("t", [Column("a")], [["x"]])
     guest = PageSection("errors", [SectionPart(20, chart("b")), SectionPart(5, None)])
     owner = PageSection(
@@ -38,7 +38,7 @@ def test_sections_of_one_name_are_one_with_the_parts_of_all_in_their_order() -> 
     assert [part.kind for part in second.parts] == ["words", "chart", "table"]
 
 
-def test_a_pair_without_charts_is_nothing() -> None:
+def test_a_pair_without_charts_is_left_out() -> None:
     assert (
         joined([PageSection("s", [SectionPart(0, ChartPair([None, None])), SectionPart(5, None)], title="S")])
         == []

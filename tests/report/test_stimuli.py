@@ -39,7 +39,7 @@ def standing(holden31: Skeleton) -> np.ndarray:
     return place[body(holden31).bones] - [0, place[:, 1].min() - 2.7, 0]
 
 
-def test_thirteen_are_asked_about_and_each_preset_is_shown(network: Network) -> None:
+def test_there_are_thirteen_walks_of_the_study_and_one_for_each_preset(network: Network) -> None:
     wanted = [loop for *_, loop in stimuli.all_loops(network)]
     assert len(injury_shown.STUDY) == 13
     assert [loop.coloured for loop in wanted] == [False] * 13 + [True] * 4
@@ -63,7 +63,7 @@ def test_the_body_stands_where_the_camera_says(studio: BodyRenderer, standing: n
     assert np.ptp(front / BODY) < 0.05, "grey, lighter or darker"
 
 
-def test_what_hurts_is_coloured_where_asked(
+def test_the_injured_part_is_coloured_if_requested(
     studio: BodyRenderer, standing: np.ndarray, holden31: Skeleton
 ) -> None:
     camera = Camera(np.array([0.0, 82.0, 0.0]), yaw=0.0, pitch=0.1, size=200)
@@ -82,7 +82,7 @@ def test_what_hurts_is_coloured_where_asked(
     assert np.all(np.abs(columns - x[knee]) < 15)
 
 
-def test_the_ground_goes_round_with_the_loop() -> None:
+def test_the_ground_repeats_with_the_loop() -> None:
     from hobble.report.raster import GRID, _ground
 
     still = _ground(Camera(np.array([0.0, 82.0, 0.0]), size=80))
@@ -101,7 +101,7 @@ def test_a_walk_is_cut_where_it_repeats() -> None:
     assert gap < 1e-6
 
 
-def test_a_walk_is_no_distance_from_itself_however_cut_and_turned(holden31: Skeleton) -> None:
+def test_the_distance_of_walks_ignores_start_and_heading(holden31: Skeleton) -> None:
     time, joints = np.arange(134), len(holden31.joints)
     swing = 20 * np.sin(2 * np.pi * (time[:, None] / 67 + np.linspace(0, 1, joints)))
     place = np.stack([0 * swing, 90 + swing, 2.0 * time[:, None] + swing], axis=-1)
@@ -116,7 +116,7 @@ def test_a_walk_is_no_distance_from_itself_however_cut_and_turned(holden31: Skel
     assert stimuli.apart(loop(lame, (0, 0, 268)), walk) == pytest.approx(31 / joints)
 
 
-def test_stimuli_in_which_nothing_hurts_are_told() -> None:
+def test_stimuli_without_a_visible_injury_get_a_warning() -> None:
     def row(name: str, hurt: str, never: str, cm: float) -> dict:
         return {
             "name": name,
@@ -135,7 +135,9 @@ def test_stimuli_in_which_nothing_hurts_are_told() -> None:
     assert never.startswith("Never above 0 in training: B, C.")
 
 
-def test_files_of_a_loop(network: Network, examples: ModuleType, tmp_path: Path, monkeypatch) -> None:
+def test_a_loop_is_written_as_pictures_and_bvh(
+    network: Network, examples: ModuleType, tmp_path: Path, monkeypatch
+) -> None:
     monkeypatch.setattr(injury_shown, "STUDY", {"healthy": (), "left-foot": ("left foot",)})
     monkeypatch.setattr(injury_shown, "PRESETS", {"Bad back": {"lower back": 8}})
     x_mean = network.x_mean.copy()

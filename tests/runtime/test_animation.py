@@ -19,7 +19,7 @@ from hobble.runtime.waypoints import TRACK
 from tests.runtime.walking import KNEE, hills, walk
 
 
-def test_the_row_is_that_of_the_definition(hurtable) -> None:
+def test_the_input_row_follows_its_definition(hurtable) -> None:
     """X computed in numpy from the state, column by column."""
     character = ProceduralAnimation(hurtable)
     walk(character, 90, injury={KNEE: 6.0}, terrain=hills)
@@ -60,7 +60,7 @@ def test_the_row_is_that_of_the_definition(hurtable) -> None:
     assert x[layout.x_channel("injury")].sum() == 6.0
 
 
-def test_the_pose_is_that_of_the_prediction(network) -> None:
+def test_the_pose_follows_from_the_prediction(network) -> None:
     character = ProceduralAnimation(network, foot_locking=False)
     walk(character, 50, terrain=hills)
     old = character.state.joint_position[0].copy()
@@ -83,7 +83,7 @@ def test_the_pose_is_that_of_the_prediction(network) -> None:
     assert pose.rotations.shape == (31, 4)
 
 
-def test_no_joint_turns_faster_than_a_joint_can(steady) -> None:
+def test_no_joint_turns_faster_than_the_limit(steady) -> None:
     """After a jump of the prediction by half a turn, the pose follows at 25 degrees a frame."""
     character = ProceduralAnimation(steady)
     evaluate, hand = character._predictor.evaluate, steady.skeleton.role("left_wrist")
@@ -143,7 +143,7 @@ def test_the_same_calls_give_the_same_motion(network) -> None:
     np.testing.assert_array_equal(motion, [p.positions for p in walk(first, 30)])
 
 
-def test_reset_places_the_figure(steady) -> None:
+def test_reset_puts_the_figure_at_the_given_place(steady) -> None:
     character = ProceduralAnimation(steady, position=(100, 0, -50), facing=(1, 0, 0))
     pose = character.next_pose((0, 0))
     np.testing.assert_allclose(pose.root, [100, 0, -50])
@@ -153,7 +153,7 @@ def test_reset_places_the_figure(steady) -> None:
     assert pose.positions[left, 2] < -50 < pose.positions[right, 2]
 
 
-def test_gaits(network) -> None:
+def test_the_gait_follows_from_speed_and_argument(network) -> None:
     character = ProceduralAnimation(network)
 
     def shares(velocity, gait=None) -> dict[str, float]:
@@ -175,7 +175,7 @@ def test_gaits(network) -> None:
         character.next_pose((0, 1), gait="swim")
 
 
-def test_gait_blends_slowly_into_the_future(network) -> None:
+def test_a_new_gait_blends_slowly_into_the_future(network) -> None:
     character = ProceduralAnimation(network)
     middle = network.layout.window
     for n in range(1, 20):
@@ -198,7 +198,7 @@ def test_severities_change_at_their_rate_and_are_scaled(hurtable) -> None:
     assert healed.channels["injury"].sum() == 0
 
 
-def test_a_zero_facing_looks_where_the_character_goes(network) -> None:
+def test_with_a_zero_facing_the_character_looks_where_it_goes(network) -> None:
     crowd, one = ProceduralAnimation(network, characters=2), ProceduralAnimation(network)
     for _ in range(20):
         many = crowd.next_pose((1, 2), [(0, 0), (1, 0)])
@@ -207,7 +207,7 @@ def test_a_zero_facing_looks_where_the_character_goes(network) -> None:
     assert np.abs(many.positions[1] - single.positions).max() > 0.1
 
 
-def test_what_a_game_loads(root: Path) -> None:
+def test_the_runtime_imports_no_heavy_package(root: Path) -> None:
     """The runtime imports neither torch nor anything that only the workflow or an export needs."""
     heavy = "{'torch', 'snakemake', 'pydantic', 'onnx', 'onnxruntime', 'matplotlib', 'plotly'}"
     code = f"import sys, hobble.runtime; sys.exit({heavy} & set(sys.modules) or 0)"
@@ -218,7 +218,7 @@ def test_what_a_game_loads(root: Path) -> None:
 
 @pytest.mark.shared
 @pytest.mark.parametrize("mode", ["constant", "linear", "cubic"])
-def test_the_released_network_does_not_fall_apart(shared: Path, holden31, mode: str) -> None:
+def test_the_released_network_keeps_its_bones_together(shared: Path, holden31, mode: str) -> None:
     """A minute of walking, jogging, crouching, strafing, stopping and turning on flat ground."""
     network = load_network(shared / "reference" / "pfnn_release_network.npz", holden31)
     character = ProceduralAnimation(network, mode=mode)
@@ -247,7 +247,7 @@ def test_the_released_network_does_not_fall_apart(shared: Path, holden31, mode: 
 
 
 @pytest.mark.shared
-def test_the_released_network_keeps_its_feet_on_hills(shared: Path, holden31) -> None:
+def test_the_released_network_keeps_its_feet_on_the_ground_of_hills(shared: Path, holden31) -> None:
     """A quarter of a minute in a curve over rolling ground: soles neither sink nor float nor slide."""
     network = load_network(shared / "reference" / "pfnn_release_network.npz", holden31)
     character = ProceduralAnimation(network)

@@ -65,7 +65,7 @@ def test_wild_predictions_do_not_break_the_character(make_network) -> None:
     assert np.ptp(free_hips) > np.ptp(hips)
 
 
-def test_bounds_do_not_change_a_sound_network(make_network) -> None:
+def test_bounds_do_not_change_a_well_behaved_network(make_network) -> None:
     """If no value is outside the bounds, every bit stays the same."""
     network = make_network()
     seen = walked(network)
@@ -94,7 +94,7 @@ def test_a_character_starts_in_the_start_frame(make_network) -> None:
     np.testing.assert_allclose(state.joint_position[0], np.stack([z + 100, y, 50 - x], axis=1), atol=1e-4)
 
 
-def test_clip_rows() -> None:
+def test_rows_are_clipped_to_the_bounds() -> None:
     rows = np.array([[0, 5, -5], [np.nan, 1, np.inf]], np.float32)
     low, high, wild = np.full(3, -1, np.float32), np.full(3, 2, np.float32), np.zeros(2, bool)
     assert clip_rows(rows, low, high, wild)
@@ -132,7 +132,7 @@ def test_a_state_that_is_not_finite_restarts_and_warns_once(hurtable, part: str,
         assert np.isfinite(character.next_pose((0, 2.0)).positions).all()
 
 
-def test_seen_round_trip(network, holden31: Skeleton) -> None:
+def test_the_ranges_of_the_training_data_survive_their_file(network, holden31: Skeleton) -> None:
     seen, sizes = walked(network), (network.layout.x_size, network.layout.y_size)
     back = SeenInTraining.read("x.npz", seen.arrays(), *sizes)
     assert back is not None

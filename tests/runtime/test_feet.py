@@ -52,7 +52,7 @@ def crouched(skeleton: Skeleton, thigh: float = 0.5, knee: float = 0.9) -> tuple
 
 @given(coordinate, coordinate, coordinate)
 @settings(max_examples=40, deadline=None)
-def test_reach_is_two_bone_ik(holden31: Skeleton, x: float, y: float, z: float) -> None:
+def test_reaching_with_a_leg_equals_two_bone_ik(holden31: Skeleton, x: float, y: float, z: float) -> None:
     position, rotation = crouched(holden31)
     hip, knee, heel, _ = leg_joints(holden31)[0]
     before, turned = position.copy(), rotation.copy()
@@ -177,7 +177,7 @@ def test_a_held_foot_ahead_of_the_body_stays_flat(holden31: Skeleton) -> None:
     assert stretched(shown, feet.legs) > STRETCH
 
 
-def test_what_a_foot_carries(holden31: Skeleton) -> None:
+def test_a_foot_moves_the_joints_below_it(holden31: Skeleton) -> None:
     below = carried(holden31, leg_joints(holden31))
     names = [[holden31.joints[j] for j in np.flatnonzero(row == TOES)] for row in below]
     assert names == [["LeftToeBase"], ["RightToeBase"]]
@@ -243,7 +243,7 @@ def test_a_foot_waits_while_the_other_is_in_the_air(holden31: Skeleton) -> None:
     assert (both.step > 0).sum() == 1, "never both at once"
 
 
-def test_a_foot_that_steps_goes_along_when_the_network_moves_it_far(holden31: Skeleton) -> None:
+def test_a_stepping_foot_follows_large_movements_of_the_network(holden31: Skeleton) -> None:
     """A metre within a step: the shown foot is never far from the network's, and never much faster."""
     feet = Feet(holden31)
     toe = holden31.role("left_toe")

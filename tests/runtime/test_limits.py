@@ -47,18 +47,18 @@ def speed_and_gait(
     ("hurt", "speed"),
     [({}, 2.5), ({KNEE: 10}, 1.0), ({KNEE: 5}, 1.5), ({ARM: 10}, 1.8), ({KNEE: 5, ARM: 10}, 1.5)],
 )
-def test_the_target_stops_at_what_the_worst_injury_allows(limited: Network, hurt, speed: float) -> None:
+def test_the_target_speed_is_limited_by_the_worst_injury(limited: Network, hurt, speed: float) -> None:
     assert speed_and_gait(limited, (0, 2.5), hurt)[0] == pytest.approx(speed, abs=1e-6)
     assert speed_and_gait(limited, (2.5, 0), hurt)[0] == pytest.approx(speed, abs=1e-6)
     assert speed_and_gait(limited, (0, 2.5), hurt, limits=False)[0] == pytest.approx(2.5, abs=1e-6)
 
 
-def test_a_slower_target_is_left_alone(limited: Network) -> None:
+def test_a_target_below_the_limit_is_unchanged(limited: Network) -> None:
     assert speed_and_gait(limited, (0, 0.8), {KNEE: 10})[0] == pytest.approx(0.8, abs=1e-6)
     assert speed_and_gait(limited, (0, 0.0), {KNEE: 10})[0] == 0.0
 
 
-def test_a_body_that_cannot_jog_walks_faster(limited: Network) -> None:
+def test_a_body_that_cannot_jog_walks_a_little_faster_instead(limited: Network) -> None:
     speed, gait = speed_and_gait(limited, (0, 7.0), {KNEE: 8})
     assert speed == pytest.approx(1.25 * 1.2, abs=1e-6)
     assert gait[WALK] > 0.99
@@ -68,7 +68,7 @@ def test_a_body_that_cannot_jog_walks_faster(limited: Network) -> None:
     assert speed_and_gait(limited, (0, 7.0), {KNEE: 8}, limits=False)[1][JOG] > 0.99
 
 
-def test_steering_makes_up_to_the_limit_and_not_beyond(limited: Network) -> None:
+def test_steering_does_not_exceed_the_limit(limited: Network) -> None:
     """The network always glides at 1.5, which is above the limit of 1."""
     speed, _ = speed_and_gait(limited, (0, 2.5), {KNEE: 10}, steering=2.0)
     assert speed < 1.0
@@ -76,7 +76,7 @@ def test_steering_makes_up_to_the_limit_and_not_beyond(limited: Network) -> None
     assert speed > 2.5
 
 
-def test_each_of_a_crowd_has_its_own_limit(limited: Network) -> None:
+def test_each_character_of_a_crowd_has_its_own_limit(limited: Network) -> None:
     crowd = ProceduralAnimation(limited, characters=3, steering=0.0)
     for _ in range(90):
         crowd.next_pose((0, 2.5), injury={KNEE: np.array([0.0, 5.0, 10.0])})

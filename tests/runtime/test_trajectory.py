@@ -74,7 +74,7 @@ def test_yaw_velocity_is_that_of_the_world_seen_from_the_root() -> None:
     np.testing.assert_allclose(direction[0, MIDDLE], [np.sin(0.05), np.cos(0.05)], atol=1e-6)
 
 
-def test_future_samples_stand_at_their_frames_and_the_line_goes_on_past_them() -> None:
+def test_future_samples_are_at_their_frames_and_continue_in_a_line() -> None:
     position, direction, gait = path()
     y = prediction(speed=2.0)
     y[0, LAYOUT.y_position][: LAYOUT.future] = [0, 1, 4, 9, 16, 25]
@@ -87,7 +87,7 @@ def test_future_samples_stand_at_their_frames_and_the_line_goes_on_past_them() -
     np.testing.assert_allclose(np.linalg.norm(direction[0], axis=-1), 1, atol=1e-6)
 
 
-def test_a_standing_figure_is_held() -> None:
+def test_a_standing_figure_does_not_drift() -> None:
     position, direction, gait = path(stand=1.0)
     phase = move(prediction(speed=2.0, turn=0.1), position, direction, gait)
     np.testing.assert_allclose(position[0, MIDDLE], 0, atol=1e-12)
@@ -95,7 +95,7 @@ def test_a_standing_figure_is_held() -> None:
     assert phase[0] == pytest.approx(0.1 * 0.02)
 
 
-def test_a_rooted_network_is_not_held_while_standing() -> None:
+def test_a_rooted_network_may_move_while_standing() -> None:
     position, direction, gait = path(stand=1.0)
     phase = move(prediction(speed=2.0, turn=-0.1), position, direction, gait, rooted=True)
     np.testing.assert_allclose(position[0, MIDDLE], [0, 2.0], atol=1e-6)
@@ -130,14 +130,14 @@ def test_movement_against_the_target_is_reduced(target, moved) -> None:
         ((3.0, 4.0), (0.12 + 0.32, 2.0 + 0.16 - 0.24)),  # faster, and more to the left
     ],
 )
-def test_movement_is_pulled_toward_the_target_by_a_share_of_itself(target, moved) -> None:
+def test_movement_is_changed_toward_the_target_by_at_most_a_share_of_itself(target, moved) -> None:
     """Half of the share along the target, all of it across."""
     position, direction, gait = path(stand=0.5)
     move(prediction(speed=2.0), position, direction, gait, target=target, rooted=True, pull=0.2)
     np.testing.assert_allclose(position[0, MIDDLE], moved, atol=1e-6)
 
 
-def test_no_correction_if_the_target_is_reached() -> None:
+def test_a_reached_target_needs_no_correction() -> None:
     position, direction, gait = path(1.5, 0.4)
     before = position.copy(), direction.copy()
     ahead = direction[:, MIDDLE].copy()
@@ -147,7 +147,7 @@ def test_no_correction_if_the_target_is_reached() -> None:
 
 
 @pytest.mark.parametrize(("strafe", "position_bias", "direction_bias"), [(0.0, 0.5, 2.0), (1.0, 1.0, 0.5)])
-def test_strafe_share_and_facing_of_the_target(
+def test_strafing_follows_from_velocity_and_facing(
     strafe: float, position_bias: float, direction_bias: float
 ) -> None:
     position, direction, gait = path(1.0)
@@ -162,7 +162,7 @@ def test_strafe_share_and_facing_of_the_target(
     np.testing.assert_allclose(yaw, np.pi / 2 * (1 - (1 - t) ** direction_bias), atol=1e-9)
 
 
-def test_targets_are_taken_up_at_their_rates() -> None:
+def test_velocity_direction_and_gait_approach_the_target_at_their_rates() -> None:
     position, heading, gait = path(0.0, stand=1.0)
     velocity, direction, strafe = np.zeros((1, 2)), np.array([[0.0, 1.0]]), np.zeros(1)
     shares = np.eye(6)[[1]]
@@ -243,7 +243,7 @@ def test_when_the_error_is_not_integrated(target, steering: float, expected) -> 
 
 @pytest.mark.parametrize("sign", [1, -1])
 @pytest.mark.parametrize(("degrees", "beyond"), [(0, 0), (20, 20), (60, 60), (100, 37), (140, 0), (179, 0)])
-def test_steering_asks_for_more_than_the_remaining_turn(degrees: float, beyond: float, sign: int) -> None:
+def test_steering_turns_further_than_the_remaining_angle(degrees: float, beyond: float, sign: int) -> None:
     facing = np.radians(sign * degrees)
     target = 1.5 * np.array([np.sin(facing), np.cos(facing)])
     for speed, extra in ((1.5, beyond), (0.0, 0)):

@@ -16,7 +16,7 @@ from tests.runtime.walking import KNEE, hills, same, walk
 
 
 @pytest.mark.parametrize("injury", [{"LeftUpLeg-LeftLeg": 11}, {KNEE: -0.1}, {KNEE: np.nan}])
-def test_a_severity_out_of_range(hurtable, injury) -> None:
+def test_a_severity_out_of_range_is_refused(hurtable, injury) -> None:
     with pytest.raises(ValueError, match=r"the severity of LeftUpLeg-LeftLeg is .* from 0 to 10"):
         ProceduralAnimation(hurtable).next_pose((0, 1), injury=injury)
 
@@ -55,7 +55,7 @@ def test_invalid_targets_are_refused(network) -> None:
         ProceduralAnimation(network, waypoints=[Waypoint((0, 0), "walk", 2), Waypoint((9, 0), "jogging", 2)])
 
 
-def test_unknown_links_are_named(hurtable, network) -> None:
+def test_unknown_links_are_refused_by_name(hurtable, network) -> None:
     with pytest.raises(KeyError, match=r"^injury has no 'Tail': there are Hips-LHipJoint, "):
         ProceduralAnimation(hurtable).next_pose((0, 1), injury={"Tail": 1})
     with pytest.raises(
@@ -68,7 +68,7 @@ def test_unknown_links_are_named(hurtable, network) -> None:
         ProceduralAnimation(network).next_pose((0, 1), injury={KNEE: 1})
 
 
-def test_severities_of_another_shape(hurtable, network) -> None:
+def test_severities_of_another_shape_are_refused(hurtable, network) -> None:
     crowd = ProceduralAnimation(hurtable, characters=3)
     for injury in (np.ones((3, 30)), np.ones(30), {KNEE: [1, 2, 3]}, {KNEE: 4}, {}):
         crowd.next_pose((0, 1), injury=injury)

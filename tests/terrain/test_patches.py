@@ -31,7 +31,7 @@ def draw(*maps: TerrainMap, count: int = 40, highest: float = 50.0, seed: int = 
 
 @settings(max_examples=15, deadline=None)
 @given(st.floats(-0.3, 0.3), st.floats(-0.3, 0.3), st.integers(0, 99))
-def test_views_of_a_plane_are_exactly_planes_through_their_middle(a: float, b: float, seed: int) -> None:
+def test_patches_of_a_plane_are_planes_of_mean_zero(a: float, b: float, seed: int) -> None:
     patches = draw(plane(a, b), count=5, seed=seed)
     points = np.random.default_rng(seed).uniform(-64, 63, (50, 2)).astype(np.float32)
     turn = patches.affine[:, :, :2].astype(float)
@@ -61,7 +61,7 @@ def test_every_patch_has_mean_zero_and_no_cell_beyond_the_limit(patches: Patches
     assert np.abs(heights).max() <= 50.001
 
 
-def test_no_view_that_passes_is_left_out() -> None:
+def test_every_valid_view_can_be_drawn() -> None:
     """On a cliff only views that pass are drawn, whatever part of the cliff they contain."""
     cliff = np.zeros((400, 400))
     cliff[200:] = 60.0
@@ -88,7 +88,7 @@ def test_patches_are_shared_evenly_among_the_maps() -> None:
     assert np.bincount(patches.which).tolist() == [4, 4, 3]
 
 
-def test_a_map_with_wider_cells_is_seen_at_its_own_scale() -> None:
+def test_a_map_with_wider_cells_keeps_its_scale() -> None:
     wide = plane(0.2, 0.0, rows=100, columns=100, cell=4 * CELL)
     patches = draw(wide, count=5)
     slope = np.linalg.norm(patches.affine[:, 0, :2], axis=1) * 0.2
@@ -107,8 +107,8 @@ def test_no_patch_shows_a_hole() -> None:
     points = np.random.default_rng(0).uniform(-16, 15, (40_000, 2)).astype(np.float32)
     at = np.einsum("pij,nj->pin", patches.affine, np.column_stack([points, np.ones(len(points))]))
     seen = at.astype(int)
-    for beside in ((0, 0), (0, 1), (1, 0), (1, 1)):
-        rows, columns = seen[:, 0] + beside[0], seen[:, 1] + beside[1]
+    for shift in ((0, 0), (0, 1), (1, 0), (1, 1)):
+        rows, columns = seen[:, 0] + shift[0], seen[:, 1] + shift[1]
         assert not np.isnan(heights[rows, columns]).any()
     assert np.isfinite(patches.heights).all()
 

@@ -52,7 +52,7 @@ def straight(data: Database) -> RollOutInputs:
     return RollOutInputs(x, y, still, still, still, np.zeros((rows, 2)), still)
 
 
-def test_poses_carry_the_errors_of_a_character(data: Database) -> None:
+def test_poses_carry_the_same_errors_as_a_roll_out(data: Database) -> None:
     """On consecutive rows, the result equals that of the evaluation's roll-out of the same clip."""
     layout, s = data.layout, data.statistics
     given, predictor = straight(data), Mixer(data)
@@ -99,7 +99,7 @@ def test_each_place_restarts_after_its_frames(data: Database) -> None:
         assert set(np.sum(zero[frames : 2 * frames], axis=0)) == {1}
 
 
-def test_sections_do_not_depend_on_each_other_and_a_short_batch_is_one(data: Database) -> None:
+def test_roll_outs_do_not_depend_on_earlier_sections_or_short_batches(data: Database) -> None:
     carried = RollOut(data, 4, 6, CPU)
     carried.begin()
     carried.remember(torch.ones(6, data.layout.y_size))
@@ -148,7 +148,7 @@ def test_training_uses_the_roll_outs(
 
 
 @pytest.mark.parametrize("kind", [PfnnStep, FusedPfnnStep])
-def test_a_step_keeps_its_errors(kind: type[PfnnStep]) -> None:
+def test_the_training_step_keeps_its_errors_for_the_roll_out(kind: type[PfnnStep]) -> None:
     network = initialise((6, 5, 4), 4, 1)
     generator = torch.Generator().manual_seed(1)
     x, y = (torch.randn(7, n, generator=generator) for n in (6, 4))

@@ -72,7 +72,7 @@ def test_each_batch_has_the_rate_of_its_place(
 
 
 @pytest.mark.parametrize("changes", [FAST, FAST | {"batch": 32, "schedule": "constant"}])
-def test_an_interrupted_training_with_a_schedule_ends_at_the_same_bits(
+def test_an_interrupted_training_with_a_schedule_ends_with_the_same_bits(
     data: Database,
     network: Settings,
     training: Settings,

@@ -65,7 +65,7 @@ def updates() -> tuple[Update, CapturedUpdate]:
 
 
 @pytest.mark.usefixtures("cuda")
-def test_a_captured_update_is_the_plain_one() -> None:
+def test_a_captured_cuda_update_equals_the_plain_one() -> None:
     """Also with a shorter batch among others, and rates that change."""
     plain, captured = updates()
     assert torch.equal(plain.adam.network.flat, captured.adam.network.flat)

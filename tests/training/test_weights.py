@@ -45,7 +45,7 @@ def test_the_file_holds_the_network_bit_for_bit(data: Database, tmp_path: Path) 
         np.testing.assert_array_equal(found[name[0].upper() + name[2:]], getattr(data.statistics, name))
 
 
-def test_the_file_says_what_its_columns_are(data: Database, tmp_path: Path) -> None:
+def test_the_weights_file_describes_its_columns(data: Database, tmp_path: Path) -> None:
     write(tmp_path / "weights.npz", data)
     meta = json.loads(str(load_npz(tmp_path / "weights.npz")["meta"]))
     assert RowLayout.from_dict(meta["layout"]) == data.layout
@@ -58,9 +58,7 @@ def test_the_file_says_what_its_columns_are(data: Database, tmp_path: Path) -> N
     assert (meta["kind"], meta["configuration"], meta["passes"]) == ("pfnn", "mine", 3)
 
 
-def test_the_file_says_what_was_seen_in_training_and_not_what_was_held_out(
-    data: Database, tmp_path: Path
-) -> None:
+def test_the_weights_file_has_the_ranges_of_the_training_rows_only(data: Database, tmp_path: Path) -> None:
     write(tmp_path / "weights.npz", data)
     arrays = load_npz(tmp_path / "weights.npz")
     seen = SeenInTraining.read("weights.npz", arrays, data.layout.x_size, data.layout.y_size)
@@ -77,7 +75,7 @@ def test_the_file_says_what_was_seen_in_training_and_not_what_was_held_out(
 
 
 @pytest.mark.parametrize("memory", [64, 0])
-def test_what_was_seen_is_that_of_every_row_with_every_fit(small_database: Path, memory: int) -> None:
+def test_the_ranges_cover_every_row_with_every_fit(small_database: Path, memory: int) -> None:
     data = Database.open(small_database, memory)
     s = data.statistics
     seen = SeenInTraining.of(data.layout, data.each_row("train"), s)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
-from typing import Any
+from typing import TypedDict
 
 import numpy as np
 
@@ -13,6 +13,7 @@ from hobble.core.quat import Array
 from hobble.evaluation.motion_measures import SHORTEST_STANCE, STANCE
 from hobble.models.network import Network
 from hobble.runtime.animation import ProceduralAnimation
+from hobble.runtime.options import Runtime
 
 FPS = 60
 GAITS = ("walk", "jog", "crouch")
@@ -96,16 +97,33 @@ class StanceSlides:
         self.frames = np.where(standing, self.frames + 1, 0)
 
 
-def turns(now: Array, before: Array) -> Array:
+def turn_angles(now: Array, before: Array) -> Array:
     """(...) angle between rotations (..., 4), degrees."""
     dot = np.abs(np.sum(now * before, axis=-1))
     return np.asarray(np.degrees(2 * np.arccos(np.minimum(1.0, dot))))
 
 
+class Soak(TypedDict):
+    """The worst values over all characters and frames. See `soak`."""
+
+    frames: int
+    finite: bool
+    hips_lowest_cm: float
+    hips_highest_cm: float
+    network_turn_degrees: float
+    turn_degrees: float
+    added_turn_degrees: float
+    frames_beyond: int
+    fastest_joint_cm: float
+    slide_cm: float | None
+    stances: int
+    holds: bool
+
+
 def soak(
-    network: Network, characters: int = 200, frames: int = 5000, seed: int = 1, **options: Any
-) -> dict[str, Any]:
-    """The worst values over all characters and frames. options: of ProceduralAnimation.
+    network: Network, characters: int = 200, frames: int = 5000, seed: int = 1, runtime: Runtime | None = None
+) -> Soak:
+    """The worst values over all characters and frames.
 
     `finite`: whether all numbers are finite. `hips_lowest_cm`, `hips_highest_cm`: above the ground under
     them. `network_turn_degrees`: largest turn of a joint in a frame by the network, `turn_degrees`: by the
@@ -118,7 +136,9 @@ def soak(
     assert skeleton is not None
     starts = np.zeros((characters, 3))
     starts[:, 0] = START_SPACING_CM * np.arange(characters)
-    animation = ProceduralAnimation(network, characters=characters, position=starts, **options)
+    animation = ProceduralAnimation(
+        network, characters=characters, position=starts, **dict(runtime or Runtime())
+    )
     ground, targets = grounds(characters, rng), Targets.none(characters, dict(network.layout.channels))
     hips = skeleton.role("hips")
     toes = [skeleton.role("left_toe"), skeleton.role("right_toe")]
@@ -137,7 +157,7 @@ def soak(
         low, high = min(low, float(height.min())), max(high, float(height.max()))
         now = pose.positions, pose.rotations, animation.state.joint_rotation.copy()
         if old is not None:
-            predicted, drawn = turns(now[2], old[2]), turns(now[1], old[1])
+            predicted, drawn = turn_angles(now[2], old[2]), turn_angles(now[1], old[1])
             moved = np.linalg.norm(now[0] - old[0], axis=-1)
             for key, value in zip(worst, (predicted, drawn, drawn - predicted, moved), strict=True):
                 worst[key] = max(worst[key], float(value.max()))
@@ -145,7 +165,7 @@ def soak(
             slides.add(now[0][:, toes], old[0][:, toes], pose.contacts[:, 1::2] >= STANCE)
         old = now
     slide = np.concatenate(slides.done)
-    out = {
+    return {
         "frames": characters * frames,
         "finite": finite,
         "hips_lowest_cm": round(low, 1),
@@ -157,11 +177,8 @@ def soak(
         "fastest_joint_cm": round(worst["speed"], 1),
         "slide_cm": round(float(slide.mean()), 3) if len(slide) else None,
         "stances": len(slide),
-    }
-    out["holds"] = (
-        finite
+        "holds": finite
         and low >= LIMITS["hips_lowest_cm"]
         and high <= LIMITS["hips_highest_cm"]
-        and worst["added"] <= LIMITS["added_turn_degrees"]
-    )
-    return out
+        and worst["added"] <= LIMITS["added_turn_degrees"],
+    }

@@ -20,12 +20,14 @@ class TrainingStep(Protocol):
     """The gradient of the mean squared error on one batch.
 
     gradients: of the last call, one for each layer, with the layer's numbers in the same order. error: of the
-    last call, (B, Y), prediction minus y. generator: for dropout on CUDA.
+    last call, (B, Y), prediction minus y. generator: for dropout on CUDA. input_mask: which of the masks is
+    that of all inputs.
     """
 
     gradients: list[Tensor]
     error: Tensor
     generator: torch.Generator
+    input_mask: int
 
     def __call__(self, x: Tensor, y: Tensor, p: Tensor, masks: list[Tensor]) -> Tensor:
         """Find `gradients` for x (B, X), y (B, Y), p (B,). Returns the mean squared error, a scalar."""

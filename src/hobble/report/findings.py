@@ -155,8 +155,7 @@ def _repairs(material: Material) -> Iterator[Hint]:
     if repaired or warned:
         yield Hint(
             "note",
-            f"Check {len(repaired | warned)} clips: {len(repaired)} were repaired, {len(warned)} have "
-            "warnings.",
+            f"Check {len(repaired | warned)} clips. Repaired: {len(repaired)}. With warnings: {len(warned)}.",
             "They are listed under Data. The network also learns the errors in a clip.",
         )
 

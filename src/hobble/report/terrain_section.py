@@ -118,8 +118,8 @@ def distances(found: list[ShownFits]) -> Chart:
     return Chart(
         "terrain-feet",
         "Distance of the feet from the ground",
-        "Mean distance of a foot in contact from the fitted ground, after the residual correction. Each box "
-        "covers the cycles and fits of a clip. Less than a centimetre is invisible.",
+        "Mean distance of a foot in contact from the fitted ground, which was corrected to meet the feet. "
+        "Each box covers the cycles and fits of a clip. Less than a centimetre is invisible.",
         traces,
         {
             "xaxis": axis("cm", rangemode="tozero"),

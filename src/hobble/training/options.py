@@ -50,6 +50,12 @@ class Recipe(Section):
         description="share of the samples whose input pose is moved towards that of another clip, for "
         "channels that say how a whole clip walks",
     )
+    other_paces: Annotated[float, Field(ge=1, le=2)] = Field(
+        1.0,
+        description="for such channels, too: largest factor by which a sample is played slower or "
+        "faster, along a smoother path; 1: none",
+    )
+    keep_channels: bool = Field(False, description="dropout never drops the inputs of channels")
     keep: Literal["last", "best"] = Field(
         "last",
         description="weights to write: those at the end, as in the original, or those with the lowest "

@@ -18,6 +18,7 @@ from hobble.training.device_rows import rows_for
 from hobble.training.held_out import SPLIT, HeldOut
 from hobble.training.history import duration
 from hobble.training.options import Training
+from hobble.training.other_paces import OtherPaces
 from hobble.training.other_poses import OtherPoses
 from hobble.training.processes import ALONE, Processes
 from hobble.training.rollout import RollOut
@@ -50,7 +51,7 @@ def train(
     if an error is not finite (the message names the batch, and the last checkpoint stays), if there are fewer
     samples than sections, and if `keep` or `patience` need a held-out error but no clip is held out.
     """
-    use_threads(threads)
+    use_threads(threads, training.batch)
     if (training.patience or training.keep == "best") and not database.rows(SPLIT):
         raise HobbleError(
             "training.keep: best and training.patience need the held-out error, but no clip is held out. "
@@ -79,10 +80,11 @@ def _run(
     sections, seed = training.sections, training.seed
     device, batch_size = state.network.flat.device, training.batch
     step = step_for(state.network, training)
-    update = update_for(step, state.adam, batch_size, processes)
+    update = update_for(step, state.adam, batch_size, processes, _kept(database, training))
     rows = rows_for(database, device, processes, training.stretches)
     places = processes.places(batch_size)
     others = OtherPoses(database, training.other_poses, len(places), device, places.start)
+    paces = OtherPaces(database, training.other_paces, len(places), device, places.start)
     roll_out = RollOut(database, training.rollout, len(places), device, places.start)
     pairs = database.pairs(TRAIN)
     for turn in range(state.sections, training.all_sections):
@@ -94,8 +96,10 @@ def _run(
         watch = LossWatch(where, database.clips, processes)
         step.seed(section_seed(seed, turn))
         others.begin()
+        paces.begin()
         roll_out.begin()
         for batch in rows.batches(pass_index, section, sections, seed, batch_size):
+            paces.play(batch.x, batch.y)
             others.mix(batch.x, batch.p)
             roll_out.add(batch.x)
             rate = learning_rate_share(training, (state.samples + watch.seen) / pairs)
@@ -110,6 +114,12 @@ def _run(
             record.section(where, [pass_index + 1, section + 1], train_mse)
     if record:
         record.close()
+
+
+def _kept(database: Database, training: Training) -> list[slice]:
+    """The blocks of inputs that dropout keeps."""
+    layout = database.layout
+    return [layout.x_channel(name) for name, _ in layout.channels] if training.keep_channels else []
 
 
 def section_seed(seed: int, turn: int) -> int:

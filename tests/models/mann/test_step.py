@@ -49,7 +49,7 @@ def test_loss_and_gradient_are_those_of_the_definition(kind, sizes, gate, column
         assert torch.allclose(gradient.view(layer.shape), layer.grad, rtol=1e-9, atol=1e-13)
 
 
-def test_without_dropout_the_step_goes_through_the_network() -> None:
+def test_without_dropout_the_error_is_that_of_the_network() -> None:
     network, x, y, p = problem(*SHAPES[1])
     step = FusedMannStep(network, 0.0)
     step(x.clone(), y, p, step.masks(len(x)))
@@ -79,7 +79,7 @@ def test_batches_of_other_sizes_share_the_buffers() -> None:
             assert torch.allclose(one, other, rtol=1e-9, atol=1e-13)
 
 
-def test_a_fresh_network_fills_its_bounds_and_blends_its_experts_alike() -> None:
+def test_initial_weights_fill_their_bounds_and_experts_have_equal_shares() -> None:
     network: TrainableMann = initialise((40, 30, 20), (5, 8, 4), (0, 1, 2, 3, 4), 1)
     for layer, (a, b) in zip(network.layers, ((5, 8), (8, 4), (40, 30), (30, 20)), strict=True):
         bound = (6 / (a * b)) ** 0.5

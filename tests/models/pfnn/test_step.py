@@ -47,7 +47,7 @@ def test_loss_and_gradient_are_those_of_the_definition(
 
 
 @pytest.mark.parametrize("kind", STEPS)
-def test_a_training_is_that_of_the_definition(kind: type[PfnnStep]) -> None:
+def test_ten_training_steps_equal_those_of_autograd_and_torch_adam(kind: type[PfnnStep]) -> None:
     """Ten steps with dropout, the L1 term and Adam, against autograd and PyTorch's own Adam."""
     network, x, y, p = problem((6, 5, 5, 3), 4, 12)
     layers = definition.parameters(network)
@@ -66,7 +66,7 @@ def test_a_training_is_that_of_the_definition(kind: type[PfnnStep]) -> None:
 
 
 @pytest.mark.parametrize("kind", STEPS)
-def test_float32_is_that_to_its_precision(kind: type[PfnnStep]) -> None:
+def test_the_gradient_in_float32_equals_that_in_float64_to_its_precision(kind: type[PfnnStep]) -> None:
     network, x, y, p = problem((30, 24, 24, 20), 4, 40, torch.float32)
     exact = network.to("cpu", torch.float64)
     step, reference = kind(network, 0.3), PfnnStep(exact, 0.3)
@@ -104,7 +104,7 @@ def test_both_steps_round_to_bfloat16_alike() -> None:
 
 @pytest.mark.parametrize("kind", STEPS)
 @pytest.mark.parametrize("dropout", [0.0, 0.3])
-def test_masks_keep_their_share_and_scale_it_up(kind: type[PfnnStep], dropout: float) -> None:
+def test_dropout_keeps_its_share_and_scales_it_up(kind: type[PfnnStep], dropout: float) -> None:
     network = initialise((300, 200, 10), 4, 1)
     step = kind(network, dropout)
     step.seed(9)

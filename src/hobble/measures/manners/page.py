@@ -85,8 +85,8 @@ def together_chart(found: ChannelResult, say: Callable[[str], str] = str) -> Cha
     }
     words = (
         f"The share of windows in which the classifier names the right {found['title'].lower()} while the "
-        "value at the left is at its highest: none in a pale field, all in a dark one. It is "
-        f'{_percent(manner / whole)} over all columns but "{NONE}".'
+        "value at the left is at its highest: none in a pale field, all in a dark one. "
+        f'Without the column "{NONE}" it is {_percent(manner / whole)} on average.'
     )
     return Chart(
         f"{found['channel']}-together", "Two at once", words, [trace], layout, 120 + 20 * len(columns)

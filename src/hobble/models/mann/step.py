@@ -38,7 +38,7 @@ class MannStep:
         self.gradients: list[Tensor] = []
         self.error = torch.empty(0, network.sizes[-1], device=network.flat.device)
         self.columns = torch.tensor(network.columns, device=network.flat.device)
-        self.gates = len(network.gate_sizes) - 1
+        self.gates = self.input_mask = len(network.gate_sizes) - 1
         self.widths = (*network.gate_sizes[:-1], *network.sizes[:-1])
 
     def __call__(self, x: Tensor, y: Tensor, p: Tensor, masks: list[Tensor]) -> Tensor:

@@ -176,7 +176,7 @@ def together_table(name: str, rows: Sequence[Mapping[str, Any]]) -> Table | None
         Column.number("wrong side"),
     ]
     keys = ("column", "walks", "speed_share", "impaired", "named", "wrong_side")
-    title = "Is the limp of a hurt leg (severity 10) recognised together with another value?"
+    title = "Is the limp of a hurt leg (severity 10) recognised if another channel is high too?"
     return Table(f"{name}-limp-together", columns, [[row.get(key) for key in keys] for row in rows], title)
 
 

@@ -10,13 +10,14 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import product
-from typing import Any
+from typing import cast
 
 import numpy as np
 
 from hobble.channels.injury.crowd_severities import links as links_of
 from hobble.channels.injury.crowd_severities import severities
 from hobble.channels.injury.limp.captured_limps import VERSION
+from hobble.channels.injury.recognition.results import Judged, Recognition
 from hobble.core.quat import Array
 from hobble.core.skeleton import Skeleton
 from hobble.evaluation.captured import Captured
@@ -26,7 +27,7 @@ from hobble.evaluation.gait_features import features
 from hobble.gait.discriminant import Discriminant, learn
 from hobble.hurt.body_parts import part_of_link
 from hobble.measures.chosen import captured_motion, sample_of, with_sample
-from hobble.measures.given import Given, Outcome
+from hobble.measures.given import Given, Outcome, Row
 from hobble.measures.sample_options import SampleOptions
 from hobble.models.load import load_network
 from hobble.models.network import Network
@@ -68,7 +69,7 @@ def recognition(
     configuration: str,
     runtime: Runtime,
     people: float,
-) -> dict[str, Any]:
+) -> Recognition:
     """How well a classifier of captured clips recognises generated walks: the content of recognition.json.
 
     motion: the captured clips. splits: clip -> "train" or "held_out". people: the published share.
@@ -80,19 +81,20 @@ def recognition(
     counts of hurt -> recognised. If the network or the clips do not allow the measurement, `applies` is false
     and `reason` says why.
     """
-    head: dict[str, Any] = {"configuration": configuration, "people": people}
+    refused: Recognition = {"configuration": configuration, "people": people, "applies": False}
     if not links_of(network) or network.skeleton is None:
-        return {**head, "applies": False, "reason": REASON}
+        return {**refused, "reason": REASON}
     windows = [w for clip in motion for w in walking_windows(clip, network)]
     known = [w for w in windows if splits[w.clip] == "train"]
     classes = sorted({w.hurt for w in known})
     if len(classes) < 2:
-        return {**head, "applies": False, "reason": TOO_FEW}
+        return {**refused, "reason": TOO_FEW}
     judge = learn(table(known), [w.hurt for w in known])
     sided = sides_of(network.skeleton)
     walks = generated(network, [c for c in classes if c != HEALTHY], HEALTHY in classes, runtime)
     return {
-        **head,
+        "configuration": configuration,
+        "people": people,
         "applies": True,
         "classes": classes,
         "features": list(known[0].values),
@@ -170,11 +172,16 @@ def table(windows: Sequence[InjuryWindow]) -> Array:
     return np.array([list(w.values.values()) for w in windows])
 
 
-def rows(result: Mapping[str, Any]) -> list[dict[str, Any]]:
+def rows(result: Recognition) -> list[Row]:
     """The confusion tables as flat rows: kind of motion, what hurts, what was recognised, count."""
     if not result["applies"]:
         return []
-    tables = {**result["captured"], "generated": result["generated"]}
+    captured = result["captured"]
+    tables: dict[str, Judged] = {
+        "cross_validated": captured["cross_validated"],
+        "held_out": captured["held_out"],
+        "generated": result["generated"],
+    }
     return [
         {"motion": of, "hurt": hurt, "named": named, "windows": count}
         for of, found in tables.items()
@@ -205,7 +212,7 @@ def _values(skeleton: Skeleton, local: Array, contacts: Array, root: Array, span
     return features(skeleton, local[span], contacts[span], root[span])
 
 
-def _cross_validated(windows: Sequence[InjuryWindow], sided: Plain) -> dict[str, Any]:
+def _cross_validated(windows: Sequence[InjuryWindow], sided: Plain) -> Judged:
     """The classes of windows, each quarter judged by a classifier that learnt from the other three."""
     judged: list[InjuryWindow] = []
     named: list[str] = []
@@ -218,11 +225,11 @@ def _cross_validated(windows: Sequence[InjuryWindow], sided: Plain) -> dict[str,
     return _confusion(sorted({w.hurt for w in windows}), judged, named, sided)
 
 
-def _judged(judge: Discriminant, windows: Sequence[InjuryWindow], sided: Plain) -> dict[str, Any]:
+def _judged(judge: Discriminant, windows: Sequence[InjuryWindow], sided: Plain) -> Judged:
     return _confusion(judge.classes, windows, judge.names(table(windows)) if windows else [], sided)
 
 
-def _by_walk(judge: Discriminant, windows: Sequence[InjuryWindow], sided: Plain) -> dict[str, Any]:
+def _by_walk(judge: Discriminant, windows: Sequence[InjuryWindow], sided: Plain) -> Judged:
     """One answer for each walk, from all its windows together."""
     scores = judge.scores(table(windows))
     walks, named = [], []
@@ -239,14 +246,14 @@ def _confusion(
     named: Sequence[str],
     sided: Plain,
     what: str = "windows",
-) -> dict[str, Any]:
+) -> Judged:
     """Counts of hurt -> recognised: a row for each class that hurts, a column for each known class."""
     counts = {h: dict.fromkeys(classes, 0) for h in sorted({w.hurt for w in windows})}
     right: dict[float, list[bool]] = {}
     for w, name in zip(windows, named, strict=True):
         counts[w.hurt][name] += 1
         right.setdefault(w.severity, []).append(w.hurt == name)
-    return {
+    found = {
         what: len(windows),
         "right": _share([r for some in right.values() for r in some]),
         "right_without_side": _share(
@@ -257,6 +264,7 @@ def _confusion(
         ],
         "confusion": counts,
     }
+    return cast(Judged, found)
 
 
 def _share(right: Sequence[bool]) -> float | None:

@@ -198,7 +198,7 @@ def overview(responses: Sequence[Mapping[str, Any]]) -> list[Chart]:
             2.0,
             "Distance from the healthy walk at the same phase, mean over joints. Hollow dots are links that "
             "were never hurt in training. They have no effect, so they show how much healthy walks differ. A "
-            "filled dot at the same distance means that this link has no effect either.",
+            "filled dot as far left as the hollow ones means that this link has no effect either.",
         ),
         (
             "injury-speed",
