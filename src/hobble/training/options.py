@@ -36,6 +36,11 @@ class Recipe(Section):
         description="share of the samples whose input pose is moved towards that of another clip, for "
         "channels that say how a whole clip walks",
     )
+    version_poses: Annotated[float, Field(ge=0, le=1)] = Field(
+        1.0,
+        description="share of the samples of clips with hurt versions whose input pose is moved towards that "
+        "of another version of the clip",
+    )
     keep: Literal["last", "best"] = Field(
         "last",
         description="weights to write: those at the end, as in the original, or those with the lowest "
