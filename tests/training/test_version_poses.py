@@ -175,7 +175,7 @@ def test_a_database_without_versions_changes_nothing(data: Database) -> None:
     assert np.array_equal(block.x, moved)
 
 
-def test_training_moves_poses_unless_told_otherwise(
+def test_training_moves_poses_only_if_asked(
     healthy_and_hurt: Database, network: Any, training: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     given: list[torch.Tensor] = []
@@ -186,7 +186,7 @@ def test_training_moves_poses_unless_told_otherwise(
 
     plain = Update.__call__
     monkeypatch.setattr(Update, "__call__", noted)
-    for options in ({}, {"version_poses": 0.0}):
+    for options in ({}, {"version_poses": 1.0}):
         settings = type(training).model_validate(
             training.model_dump() | {"passes": 1, "sections": 2, "batch": 90, "rollout": 1} | options
         )

@@ -37,9 +37,9 @@ class Recipe(Section):
         "channels that say how a whole clip walks",
     )
     version_poses: Annotated[float, Field(ge=0, le=1)] = Field(
-        1.0,
-        description="share of the samples of clips with hurt versions whose input pose is moved towards that "
-        "of another version of the clip",
+        0.0,
+        description="share of the samples of clips with hurt versions whose input pose is moved along the "
+        "line to that of another version of the clip",
     )
     keep: Literal["last", "best"] = Field(
         "last",

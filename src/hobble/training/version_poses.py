@@ -35,8 +35,7 @@ class VersionPoses:
     several processes get what one gets. Rows of clips without versions stay.
 
     The parts have the mean 0. If all poses moved towards the other version, the network would learn that Y
-    is further from it than X is. Then a running character exaggerates: on captured clips its healthy knees
-    bent by 84 degrees instead of 60, and its hurt trunk leaned more than in any clip.
+    is further from it than X is. Then a running character exaggerates.
 
     share: share of the rows that are moved; 0 changes nothing. batch: largest number of this process's rows
     in a batch. first: the place of its first row in the whole batch.
