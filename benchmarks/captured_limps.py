@@ -11,14 +11,14 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
-from hobble.channels.injury.limp.captured import Limp
+from hobble.channels.injury.crowd_severities import links
+from hobble.channels.injury.limp.captured_limps import Limp
 from hobble.channels.injury.limp.run import compare_held_out
 from hobble.channels.injury.status import read_status
-from hobble.channels.injury.walks import links
 from hobble.core.errors import InputError
 from hobble.gait.cycles import measure
 from hobble.gait.profile import NO_CYCLE
-from hobble.gait.read import read_clip
+from hobble.gait.read_clip import read_clip
 from hobble.models.load import load_network
 from hobble.models.network import Network
 from hobble.runtime.options import Runtime

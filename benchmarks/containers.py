@@ -218,15 +218,15 @@ def main() -> None:
     parser.add_argument("--size-mb", type=int, default=512)
     parser.add_argument("--rounds", type=int, default=3)
     parser.add_argument("--folder", type=Path)
-    asked = parser.parse_args()
-    base = Path(tempfile.mkdtemp(prefix="hobble-containers-", dir=asked.folder))
-    table = rows(asked.size_mb << 20)
+    arguments = parser.parse_args()
+    base = Path(tempfile.mkdtemp(prefix="hobble-containers-", dir=arguments.folder))
+    table = rows(arguments.size_mb << 20)
     count, room = len(table) // BLOCK, np.empty((BLOCK, COLUMNS), np.float32)
     rng = np.random.default_rng(2)
     rates: dict[str, list[tuple[float, ...]]] = {name: [] for name in CONTAINERS}
     size = {}
     try:
-        for _ in range(asked.rounds):
+        for _ in range(arguments.rounds):
             for name, container in CONTAINERS.items():
                 folder = base / name.replace(" ", "-")
                 shutil.rmtree(folder, ignore_errors=True)
@@ -244,7 +244,7 @@ def main() -> None:
         shutil.rmtree(base)
     medians = {name: np.median(found, axis=0) for name, found in rates.items()}
     baseline = medians[".npy files"][2]
-    print(f"{table.nbytes / 1e6:.0f} MB in {count} blocks, MB/s, medians of {asked.rounds} rounds")
+    print(f"{table.nbytes / 1e6:.0f} MB in {count} blocks, MB/s, medians of {arguments.rounds} rounds")
     print(f"{'':<26}{'written':>9}{'in order':>10}{'at random':>11}{'ratio':>7}{'CPU s/GB':>10}{'bytes':>8}")
     for name, (written, in_order, at_random, used) in medians.items():
         print(f"{name:<26}{written:>9.0f}{in_order:>10.0f}{at_random:>11.0f}", end="")

@@ -35,17 +35,17 @@ LENGTHS = (1, 60, 300)
 def frame_ratios(networks: dict[str, Network], characters: int, turns: int) -> dict[str, tuple[float, float]]:
     """Name -> microseconds a frame (median of the stretches), and how many times those of the first."""
     made = {name: ProceduralAnimation(n, characters=characters) for name, n in networks.items()}
-    wishes = [s for s in stretches(10.0) for _ in range(s.frames)]
+    targets = [s for s in stretches(10.0) for _ in range(s.frames)]
     for animation in made.values():
-        for wish in wishes[:: len(wishes) // 20]:
-            animation.next_pose(wish.velocity, wish.facing, wish.gait)
+        for target in targets[:: len(targets) // 20]:
+            animation.next_pose(target.velocity, target.facing, target.gait)
     took: dict[str, list[float]] = {name: [] for name in made}
     for turn in range(turns):
-        part = wishes[turn * FRAMES : (turn + 1) * FRAMES]
+        part = targets[turn * FRAMES : (turn + 1) * FRAMES]
         for name, animation in made.items():
             begin = perf_counter()
-            for wish in part:
-                animation.next_pose(wish.velocity, wish.facing, wish.gait)
+            for target in part:
+                animation.next_pose(target.velocity, target.facing, target.gait)
             took[name].append((perf_counter() - begin) / len(part))
     first = np.array(next(iter(took.values())))
     return {

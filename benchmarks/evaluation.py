@@ -15,9 +15,9 @@ from time import process_time
 import numpy as np
 from runtime import SKELETON, load_skeleton, random_network
 
-from hobble.channels.injury.walks import severities
-from hobble.evaluation.crowd import Stretch, run
-from hobble.measures.rollouts.crowd import Crowd, Inputs, RollOuts
+from hobble.channels.injury.crowd_severities import severities
+from hobble.evaluation.crowd import CrowdTarget, run
+from hobble.measures.rollouts.roll_outs import Crowd, RollOutInputs, RollOuts
 from hobble.models.load import load_network
 from hobble.models.network import Network
 from hobble.models.pfnn.predictor import PfnnPredictor
@@ -42,7 +42,7 @@ def sweep(network: Network) -> tuple[float, float]:
 
     def walk(which: slice) -> None:
         channels = {name: rows[which] for name, rows in hurt.items()}
-        run(network, [Stretch(FRAMES, ["walk"] * len(links[which]), channels)], RUNTIME)
+        run(network, [CrowdTarget(FRAMES, ["walk"] * len(links[which]), channels)], RUNTIME)
 
     per, alone = 1e6 / FRAMES / len(links), [slice(i, i + 1) for i in range(len(links))]
     return per * seconds(lambda: walk(slice(None))), per * seconds(lambda: [walk(one) for one in alone])
@@ -56,7 +56,7 @@ def roll_outs(network: Network) -> tuple[float, float]:
     rng = np.random.default_rng(1)
     x = (network.x_mean + 0.1 * rng.normal(size=(count, layout.x_size))).astype(np.float32)
     still = np.zeros(count)
-    asked = Inputs(
+    recorded = RollOutInputs(
         x,
         np.zeros((count, layout.y_size), np.float32),
         still,
@@ -70,7 +70,7 @@ def roll_outs(network: Network) -> tuple[float, float]:
     per = 1e6 / length / len(starts)
 
     def roll_out(chosen: np.ndarray) -> None:
-        for _ in Crowd(predictor, [RollOuts(asked, chosen, length)]).frames():
+        for _ in Crowd(predictor, [RollOuts(recorded, chosen, length)]).frames():
             pass
 
     together = seconds(lambda: roll_out(starts))
@@ -83,8 +83,8 @@ def main() -> None:
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
     parser.add_argument("network", nargs="?", type=Path, help="weights.npz, or a folder with one")
-    asked = parser.parse_args().network
-    network = load_network(asked) if asked else random_network(load_skeleton(SKELETON))
+    path = parser.parse_args().network
+    network = load_network(path) if path else random_network(load_skeleton(SKELETON))
     print("microseconds of CPU a frame       at once  one by one  ratio")
     for name, (together, apart) in (("injury sweep", sweep(network)), ("roll-outs", roll_outs(network))):
         print(f"{name:32}{together:9.0f}{apart:12.0f}{apart / together:7.1f}")

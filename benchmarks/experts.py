@@ -6,8 +6,8 @@ As in `training.py`, all variants run in each turn, and the best turn of each co
 
 - per sample: the experts' weights blended for every sample, by autograd, PyTorch's Adam;
 - blended: outputs of all experts blended, by autograd: the usual good implementation;
-- PyTorch, float32: `hobble.models.mann.step.Step`, as on other devices than a CPU;
-- fused: `hobble.models.mann.fused.FusedStep`, with float32 and with bfloat16 factors;
+- PyTorch, float32: `hobble.models.mann.step.MannStep`, as on other devices than a CPU;
+- fused: `hobble.models.mann.fused.FusedMannStep`, with float32 and with bfloat16 factors;
 - products: only the experts' matrix products of a step, with the same factors.
 
 Predictions are of random networks of one size on one core: median microseconds, the controllers in turns, the
@@ -36,8 +36,8 @@ from hobble.core.processors import multiplies_bfloat16
 from hobble.models import model
 from hobble.models.load import network_from_arrays
 from hobble.models.mann.forward import GATE_INPUTS
-from hobble.models.mann.fused import FusedStep
-from hobble.models.mann.step import Step
+from hobble.models.mann.fused import FusedMannStep
+from hobble.models.mann.step import MannStep
 from hobble.models.mann.trainable import initialise, with_one
 from hobble.models.products import product
 from hobble.rows.layout import RowLayout
@@ -97,7 +97,7 @@ def by_autograd(forward: Callable, part: int, sizes: tuple[int, ...]) -> Callabl
     return step
 
 
-def by_hand(kind: type[Step], half: bool, sizes: tuple[int, ...], moves: bool = True) -> Callable:
+def by_hand(kind: type[MannStep], half: bool, sizes: tuple[int, ...], moves: bool = True) -> Callable:
     network = fresh(sizes)
     adam, step = Adam(network, RATE, 0.9, 0.999, L1), kind(network, 1 - KEEP, half)
 
@@ -136,14 +136,14 @@ def steps(batches: list[int], sizes: tuple[int, ...], turns: int) -> None:
     ways = {
         "per sample": by_autograd(per_sample, PART, sizes),
         "blended": by_autograd(blended, 1 << 30, sizes),
-        "PyTorch, float32": by_hand(Step, False, sizes),
-        "fused, float32": by_hand(FusedStep, False, sizes),
-        "  without Adam": by_hand(FusedStep, False, sizes, moves=False),
+        "PyTorch, float32": by_hand(MannStep, False, sizes),
+        "fused, float32": by_hand(FusedMannStep, False, sizes),
+        "  without Adam": by_hand(FusedMannStep, False, sizes, moves=False),
         "products, float32": products(False, sizes),
     }
     if multiplies_bfloat16():
-        ways["fused, bfloat16"] = by_hand(FusedStep, True, sizes)
-        ways["  without Adam, bf16"] = by_hand(FusedStep, True, sizes, moves=False)
+        ways["fused, bfloat16"] = by_hand(FusedMannStep, True, sizes)
+        ways["  without Adam, bf16"] = by_hand(FusedMannStep, True, sizes, moves=False)
         ways["products, bfloat16"] = products(True, sizes)
     for rows in batches:
         batch = (torch.randn(rows, sizes[0]), torch.randn(rows, sizes[-1]), torch.rand(rows))

@@ -26,10 +26,10 @@ from hobble.labels.label import label_clip, mirror_labels
 from hobble.motion.make import make_clip
 from hobble.motion.mirror import mirror_clip
 from hobble.motion.options import ClipMotion
-from hobble.synthetic.clip import write_clip
+from hobble.synthetic.generate_clip import write_clip
 from hobble.terrain.clip_fits import clip_fits
 from hobble.terrain.heightmaps import heightmaps
-from hobble.terrain.options import Sampling
+from hobble.terrain.options import HeightSampling
 from hobble.terrain.patches import Patches, draw_patches
 from hobble.workflow.project import Project
 
@@ -108,7 +108,7 @@ def found(job: Job) -> list[Found]:
     """The fits of one clip and its mirror."""
     project = Project(BASE, {"mocap": str(job.mocap)})
     options = project.catalogue.dataset(job.dataset).terrain
-    sampling = Sampling(**project.datasets.part(job.dataset, "database", Sampling))
+    sampling = HeightSampling(**project.datasets.part(job.dataset, "database", HeightSampling))
     out = []
     with tempfile.TemporaryDirectory() as folder:
         try:
@@ -133,12 +133,14 @@ def main() -> None:
     parser.add_argument("--mocap", type=Path, default=BASE / "data")
     parser.add_argument("--kinds", nargs="*", default=[], choices=["flat", "rocky", "jumpy", "beam"])
     parser.add_argument("--workers", type=int, default=2)
-    asked = parser.parse_args()
-    project = Project(BASE, {"mocap": str(asked.mocap)})
+    arguments = parser.parse_args()
+    project = Project(BASE, {"mocap": str(arguments.mocap)})
     jobs = [
-        Job(d, clip, tuple(asked.kinds), asked.mocap) for d in asked.datasets for clip in project.clips.of(d)
+        Job(d, clip, tuple(arguments.kinds), arguments.mocap)
+        for d in arguments.datasets
+        for clip in project.clips.of(d)
     ]
-    with ProcessPoolExecutor(asked.workers) as pool:
+    with ProcessPoolExecutor(arguments.workers) as pool:
         results = [one for some in pool.map(found, jobs) for one in some]
     print("data set      ground  clips  cycles   worst mean of a clip   of a fit   deepest below")
     for dataset, kind in sorted({(r.dataset, r.kind) for r in results}):

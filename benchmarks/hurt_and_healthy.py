@@ -65,12 +65,14 @@ def main() -> None:
     parser.add_argument("healthy", type=Path, help="results of the one without")
     parser.add_argument("database", type=Path, help="the database of healthy clips")
     parser.add_argument("--minutes", type=float, default=10.0)
-    asked = parser.parse_args()
-    database = Database.open(asked.database, Training().memory_mb)
+    arguments = parser.parse_args()
+    database = Database.open(arguments.database, Training().memory_mb)
     splits = {c["clip"]: c["split"] for c in database.manifest.clips if c["rows"]}
-    files = {name: asked.database.parent / "clips" / f"{name}.npz" for name in splits}
-    hurt, healthy = (values(folder, files, splits, asked.minutes) for folder in (asked.hurt, asked.healthy))
-    print(f"{'':28}{asked.hurt.name:>12}{asked.healthy.name:>12}{'ratio':>8}")
+    files = {name: arguments.database.parent / "clips" / f"{name}.npz" for name in splits}
+    hurt, healthy = (
+        values(folder, files, splits, arguments.minutes) for folder in (arguments.hurt, arguments.healthy)
+    )
+    print(f"{'':28}{arguments.hurt.name:>12}{arguments.healthy.name:>12}{'ratio':>8}")
     for name, value in hurt.items():
         other = healthy[name]
         if isinstance(value, float) and isinstance(other, float):

@@ -14,7 +14,7 @@ from pathlib import Path
 
 import yaml
 
-from hobble.config.sections import Labels, Synthetic
+from hobble.config.sections import LabelOptions, Synthetic
 from hobble.core.clip import Clip, load_clip
 from hobble.labels.contacts import contacts, stance
 from hobble.labels.footfall import find_swings, landings
@@ -22,7 +22,7 @@ from hobble.labels.gait import automatic_gait
 from hobble.labels.label import label_clip
 from hobble.motion.make import make_clip
 from hobble.motion.options import ClipMotion
-from hobble.synthetic.clip import write_clip
+from hobble.synthetic.generate_clip import write_clip
 
 ROOT = Path(__file__).resolve().parents[1]
 
@@ -59,7 +59,7 @@ def main() -> None:
     )
     folder = parser.parse_args().folder
     clips = [load_clip(p) for p in sorted(folder.glob("*.npz"))] if folder else [synthetic_minute()]
-    options = Labels()
+    options = LabelOptions()
     frames = sum(map(len, clips))
     kinematics = best_of(1, lambda: [clip.positions for clip in clips])
     parts = {

@@ -27,12 +27,12 @@ from hobble.gait.derive_healthy import REFERENCE, healthy_windows
 from hobble.gait.graded import HEALTHY, Grader, grade, healthy_covariance, learn_grader
 from hobble.gait.people import GAITS, NORMAL, people
 from hobble.gait.profile import NAMES, Profile, mirrored, profile
-from hobble.gait.read import read_clip
+from hobble.gait.read_clip import read_clip
 from hobble.gait.recogniser import SHRINKAGE, examples, learn, recognise
-from hobble.hurt.clip import hurt_clip
+from hobble.hurt.hurt_clip import hurt_clip
 from hobble.labels.label import label_clip
 from hobble.labels.model import Labels
-from hobble.labels.options import Labels as LabelOptions
+from hobble.labels.options import LabelOptions
 from hobble.motion.make import make_clip
 from hobble.motion.options import ClipMotion
 

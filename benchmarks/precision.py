@@ -50,12 +50,12 @@ def main() -> None:
     parser.add_argument("--passes", type=int, default=3)
     parser.add_argument("--seeds", type=int, nargs="+", default=[1, 2])
     parser.add_argument("--threads", type=int, default=2)
-    asked = parser.parse_args()
-    made = Manifest.load(asked.folder / "database/plain")
+    arguments = parser.parse_args()
+    made = Manifest.load(arguments.folder / "database/plain")
     splits = {clip["clip"]: clip["split"] for clip in made.clips}
-    clips = {name: asked.folder / f"database/clips/{name}.npz" for name in splits}
+    clips = {name: arguments.folder / f"database/clips/{name}.npz" for name in splits}
     frames = f"{made.rows('train'):,} frames to learn from, {made.rows('held_out'):,} held out"
-    print(f"{frames}, {asked.passes} passes")
+    print(f"{frames}, {arguments.passes} passes")
     print("on disk    share of the original's bytes   seed   held-out error    cm a joint   to float32")
     errors: dict[tuple[str, int], float] = {}
     with tempfile.TemporaryDirectory() as name:
@@ -63,14 +63,16 @@ def main() -> None:
             database = Path(name, dtype)
             options = {"channels": [], "joint_weight": made.joint_weight, "dtype": dtype}
             manifest = write_database(database, clips, splits, **options)
-            for seed in asked.seeds:
-                weights = trained(database, Path(name, f"{dtype}-{seed}"), asked.passes, seed, asked.threads)
+            for seed in arguments.seeds:
+                weights = trained(
+                    database, Path(name, f"{dtype}-{seed}"), arguments.passes, seed, arguments.threads
+                )
                 found = measure(weights, clips, splits, "precision")["held_out"]
                 errors[dtype, seed] = found["mean"]
                 more = found["mean"] / errors["float32", seed] - 1
                 print(f"{dtype:<10} {manifest.bytes / manifest.original_bytes:29.1%} {seed:6}", end="")
                 print(f"{found['mean']:16.4%} {found['position_error_cm']:13.3f} {more:+12.2%}", flush=True)
-    full = np.array([errors["float32", seed] for seed in asked.seeds])
+    full = np.array([errors["float32", seed] for seed in arguments.seeds])
     if len(full) > 1:
         print(f"between seeds, float32: {np.ptp(full) / full.mean():.2%} from the least to the largest")
 

@@ -87,15 +87,15 @@ def main() -> None:
     parser.add_argument("--seconds", type=float, default=5.0, help="how long Play is watched")
     parser.add_argument("--width", type=int, default=1280, help="of the window, pixels")
     parser.add_argument("--python", type=Path, help="folder of the same network, to compare with")
-    asked = parser.parse_args()
+    arguments = parser.parse_args()
     tools = browser_module()
     path = tools.executable()
     if path is None:
         raise SystemExit(f"no browser here ({', '.join(tools.BROWSERS)})")
-    for page in asked.pages:
+    for page in arguments.pages:
         print(f"{page}: {page.stat().st_size / 1e6:.1f} MB, of 20 allowed")
         with tempfile.TemporaryDirectory() as folder:
-            browser = tools.Browser(path, Path(folder), asked.width, 900)
+            browser = tools.Browser(path, Path(folder), arguments.width, 900)
             browser.send("Performance.enable", timeDomain="threadTicks")
             browser.send("Page.navigate", url=page.resolve().as_uri())
             if (walks := browser.until(WALKS, 60)) > 0:
@@ -112,14 +112,14 @@ def main() -> None:
             print("  read after {:.0f} ms, ready after {:.0f} ms, loaded after {:.0f} ms".format(*opened))
             for name, (median, slow) in browser.run(CHARACTER).items():
                 ratio = ""
-                if asked.python:
-                    ratio = f", {median / python_milliseconds(asked.python):.1f} times Python's"
+                if arguments.python:
+                    ratio = f", {median / python_milliseconds(arguments.python):.1f} times Python's"
                 share = f"{median / FRAME:.1%} of a frame at 60 Hz"
                 print(
                     f"  character {name}: {median:.2f} ms a frame ({share}{ratio}), "
                     f"one in a hundred over {slow:.2f} ms"
                 )
-            drawn = browser.run(f"{DRAWING}({asked.seconds})")
+            drawn = browser.run(f"{DRAWING}({arguments.seconds})")
             width, height = drawn["view"]
             print(
                 f"  Play at {width} x {height} on software GL: {drawn['median']:.0f} ms from picture to "

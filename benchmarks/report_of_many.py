@@ -21,8 +21,8 @@ from hobble.core.files import read_json
 from hobble.models.load import load_network
 from hobble.report.captured_and_predicted import comparisons
 from hobble.report.gather import gather
+from hobble.report.pack_recogniser import playable_with_recogniser
 from hobble.report.page import render
-from hobble.report.recogniser import playable_with_recogniser
 from hobble.report.scenes import scenes
 from hobble.runtime.options import Runtime
 

@@ -146,11 +146,11 @@ def crowds(network: Pfnn) -> None:
     for count in (1, 2, 4, 10, 32, 100, 200):
         x = (network.x_mean + network.x_std * rng.normal(size=(count, network.layout.x_size))).astype("f4")
         phase = rng.random(count)
-        asked = {"x": x, "phase": phase.astype(np.float32)}
+        fed = {"x": x, "phase": phase.astype(np.float32)}
         ours, theirs = [], []
         for _ in range(max(15, 200 // count)):
             ours.append(timed(lambda _, x=x, p=phase: predictor.predict(x, p), 1, process_time)[0])
-            theirs.append(timed(lambda _, asked=asked: session.run(None, asked), 1, process_time)[0])
+            theirs.append(timed(lambda _, fed=fed: session.run(None, fed), 1, process_time)[0])
         a, b = np.median(ours), np.median(theirs)
         speed = 2e-3 * network.parameters * network.control_points * count / a
         print(f"{count:<14}{a:9.0f}{b:13.0f}{b / a:7.2f}{speed:9.1f}{a * 60e-6:17.2f}")
@@ -179,9 +179,9 @@ def main() -> None:
     )
     parser.add_argument("network", nargs="?", help="weights.npz, a folder with one, or the original's folder")
     parser.add_argument("skeleton", nargs="?", type=Path, default=SKELETON, help="for networks without one")
-    asked = parser.parse_args()
-    skeleton = load_skeleton(asked.skeleton)
-    network = load_network(asked.network, skeleton) if asked.network else random_network(skeleton)
+    arguments = parser.parse_args()
+    skeleton = load_skeleton(arguments.skeleton)
+    network = load_network(arguments.network, skeleton) if arguments.network else random_network(skeleton)
     network = replace(network, skeleton=network.skeleton or skeleton)
     print(f"{'-'.join(map(str, network.sizes))}, microseconds, one core of {cpu()}")
     predictions(network)

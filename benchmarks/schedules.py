@@ -26,7 +26,7 @@ matplotlib.use("Agg")
 import matplotlib.pyplot as plt
 import torch
 
-from hobble.config.load import Catalogue
+from hobble.config.load_configuration import Catalogue
 from hobble.database.reader import Database
 from hobble.training.checkpoint import State
 from hobble.training.held_out import HeldOut

@@ -105,14 +105,17 @@ def main() -> None:
     parser.add_argument("--memory-mb", type=int, default=64)
     parser.add_argument("--rounds", type=int, default=5)
     parser.add_argument("--folder", type=Path)
-    asked = parser.parse_args()
+    arguments = parser.parse_args()
     use_threads(int(os.environ.get("OMP_NUM_THREADS", "2")))
-    folder = Path(tempfile.mkdtemp(prefix="hobble-shards-", dir=asked.folder))
+    folder = Path(tempfile.mkdtemp(prefix="hobble-shards-", dir=arguments.folder))
     try:
-        one, many = built(folder, asked.size_mb, asked.shards)
-        dbs = {"one": Database.open(one, asked.memory_mb), "shards": Database.open(many, asked.memory_mb)}
-        print(f"reading within {asked.memory_mb} MB, rows a second: {turns(dbs, asked.rounds, read)}")
-        print(f"training, samples a second: {turns(dbs, asked.rounds, trainer(dbs['one']))}")
+        one, many = built(folder, arguments.size_mb, arguments.shards)
+        dbs = {
+            "one": Database.open(one, arguments.memory_mb),
+            "shards": Database.open(many, arguments.memory_mb),
+        }
+        print(f"reading within {arguments.memory_mb} MB, rows a second: {turns(dbs, arguments.rounds, read)}")
+        print(f"training, samples a second: {turns(dbs, arguments.rounds, trainer(dbs['one']))}")
     finally:
         shutil.rmtree(folder)
 

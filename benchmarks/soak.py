@@ -13,6 +13,7 @@ import sys
 from hobble.core.errors import HobbleError
 from hobble.evaluation.soak import LIMITS, soak
 from hobble.models.load import load_network
+from hobble.runtime.options import Runtime
 
 
 def main() -> int:
@@ -26,19 +27,18 @@ def main() -> int:
     parser.add_argument(
         "--skeleton", default="config/skeletons/holden31.yaml", help="where the network has none"
     )
-    asked = parser.parse_args()
+    arguments = parser.parse_args()
     try:
-        network = load_network(asked.network, asked.skeleton)
+        network = load_network(arguments.network, arguments.skeleton)
     except HobbleError as error:
         print(error, file=sys.stderr)
         return 2
     found = soak(
         network,
-        asked.characters,
-        asked.frames,
-        asked.seed,
-        mode=asked.mode,
-        foot_locking=not asked.without_locking,
+        arguments.characters,
+        arguments.frames,
+        arguments.seed,
+        Runtime(mode=arguments.mode, foot_locking=not arguments.without_locking),
     )
     for name, value in found.items():
         print(f"{name:<24}{value}")

@@ -16,6 +16,7 @@ from hobble.core.errors import HobbleError
 from hobble.evaluation.stability import LIMITS, stability
 from hobble.models.load import load_network
 from hobble.models.pfnn.predictor import MODES
+from hobble.runtime.options import Runtime
 
 
 def main() -> int:
@@ -36,7 +37,8 @@ def main() -> int:
     except HobbleError as error:
         print(error, file=sys.stderr)
         return 2
-    found = stability(network, options.minutes, options.seed, mode=options.mode, steering=options.steering)
+    runtime = Runtime(mode=options.mode, steering=options.steering)
+    found = stability(network, options.minutes, options.seed, runtime)
     print(f"{'':<8}{'frames':>8}{'hips, cm':>16}{'turn, deg':>11}{'slide, cm':>11}{'steps':>7}", end="")
     print(f"{'foot down':>11}{'skating, cm':>13}")
     for name, row in {**found["kinds"], "all": found}.items():

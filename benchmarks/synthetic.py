@@ -13,7 +13,7 @@ import yaml
 
 from hobble.core.bvh import write_bvh
 from hobble.core.skeleton import Skeleton
-from hobble.synthetic.clip import generate
+from hobble.synthetic.generate_clip import generate
 
 ROOT = Path(__file__).resolve().parents[1]
 

@@ -23,7 +23,7 @@ from pathlib import Path
 import numpy as np
 from scipy.ndimage import map_coordinates
 
-from hobble.config.sections import Database, Labels, Synthetic, Terrain
+from hobble.config.sections import DatabaseOptions, LabelOptions, Synthetic, Terrain
 from hobble.core.clip import Clip
 from hobble.core.errors import HobbleError
 from hobble.labels.label import label_clip, mirror_labels
@@ -32,16 +32,16 @@ from hobble.motion.make import make_clip
 from hobble.motion.mirror import mirror_clip
 from hobble.motion.options import ClipMotion
 from hobble.motion.rig import load_skeleton
-from hobble.synthetic.clip import write_clip
+from hobble.synthetic.generate_clip import write_clip
 from hobble.terrain import search
 from hobble.terrain.clip_fits import clip_fits
 from hobble.terrain.heightmaps import heightmaps
-from hobble.terrain.options import Sampling
+from hobble.terrain.options import HeightSampling
 from hobble.terrain.patches import Patches, draw_patches
 
 SKELETONS = Path(__file__).resolve().parents[1] / "config/skeletons"
 OPTIONS = Terrain()
-SAMPLING = Sampling(**Database().model_dump(include=set(Sampling.model_fields)))
+SAMPLING = HeightSampling(**DatabaseOptions().model_dump(include=set(HeightSampling.model_fields)))
 Labelled = tuple[Clip, ClipLabels]
 
 
@@ -55,7 +55,7 @@ def made(bvh: Path, ground: str) -> list[Labelled]:
         )
     except HobbleError:
         return []
-    labels, labels_report = label_clip(clip, [], report, "walk", ground, Labels())
+    labels, labels_report = label_clip(clip, [], report, "walk", ground, LabelOptions())
     mirror = mirror_clip(clip, f"{clip.name}_mirror")
     both = [(clip, labels), (mirror, mirror_labels(labels, labels_report, mirror)[0])]
     return [(c, found) for c, found in both if len(found.cycles)]
@@ -96,7 +96,7 @@ def plain_heights(patches: Patches, p: int, points: np.ndarray) -> np.ndarray:
     return map_coordinates(cells, at, order=1) - patches.mean[p]
 
 
-def plain_error(patches: Patches, p: int, footing: search.Footing) -> float:
+def plain_error(patches: Patches, p: int, footing: search.FootPoints) -> float:
     """The error of one patch on rocky ground, in plain numpy."""
     under = plain_heights(patches, p, footing.down[:, :2])
     over = plain_heights(patches, p, footing.up[:, :2]) - under.mean() - footing.up[:, 2]
@@ -104,13 +104,13 @@ def plain_error(patches: Patches, p: int, footing: search.Footing) -> float:
     return float(0.1 * np.mean(spread**2) + np.mean(np.maximum(over, 0) ** 2))
 
 
-def footings(clips: list[Labelled], patches: Patches, most: int) -> list[search.Footing]:
+def footings(clips: list[Labelled], patches: Patches, most: int) -> list[search.FootPoints]:
     """The arguments of the search for the first cycles of the clips."""
     few = replace(patches, which=patches.which[:20], affine=patches.affine[:20], mean=patches.mean[:20])
-    caught: list[search.Footing] = []
+    caught: list[search.FootPoints] = []
     real = search.best_patches
 
-    def catch(patches: Patches, footing: search.Footing, count: int) -> tuple[np.ndarray, np.ndarray]:
+    def catch(patches: Patches, footing: search.FootPoints, count: int) -> tuple[np.ndarray, np.ndarray]:
         caught.append(footing)
         return real(patches, footing, count)
 
@@ -171,7 +171,7 @@ def parts(clips: list[Labelled]) -> None:
     print(f"no foot more than {max(r[2] for r in results):.2f} cm below it")
 
 
-def agreement(patches: Patches, footing: search.Footing) -> bool:
+def agreement(patches: Patches, footing: search.FootPoints) -> bool:
     """Whether the search finds the ten patches with the lowest errors, or others with equal errors.
 
     Plain numpy computes the errors of the best forty.
@@ -211,13 +211,13 @@ def main() -> None:
     parser.add_argument("--cycles", type=int, help="make and time so many cycles instead")
     parser.add_argument("--flat", type=float, default=0.48, help="share of them on flat ground")
     parser.add_argument("--workers", type=int, default=2)
-    asked = parser.parse_args()
+    arguments = parser.parse_args()
     clips = synthetic()
-    if asked.folder:
-        clips = [c for path in sorted(asked.folder.glob("*.bvh")) for c in made(path, "rocky")]
+    if arguments.folder:
+        clips = [c for path in sorted(arguments.folder.glob("*.bvh")) for c in made(path, "rocky")]
     print(f"{len(clips)} clips with {sum(len(labels.cycles) for _, labels in clips)} cycles")
-    if asked.cycles:
-        released(clips, asked.cycles, asked.flat, asked.workers)
+    if arguments.cycles:
+        released(clips, arguments.cycles, arguments.flat, arguments.workers)
     else:
         parts(clips)
 

@@ -27,8 +27,8 @@ import numpy as np
 import yaml
 
 from hobble.measures.registry import MEASURES
-from hobble.measures.sampling import Sampling
-from hobble.workflow.batches import batch_count
+from hobble.measures.sample_options import SampleOptions
+from hobble.workflow.clip_batches import batch_count
 from hobble.workflow.costs import BATCH_RULES
 
 ROOT = Path(__file__).resolve().parents[1]
@@ -85,7 +85,7 @@ class Rate:
 
 @dataclass(frozen=True)
 class Plan:
-    """motion: seconds asked for. clips, nodes, shards: as asked. training: hours on the clock."""
+    """motion: seconds in all. clips, nodes, shards: their numbers. training: hours on the clock."""
 
     motion: float
     clips: int
@@ -105,7 +105,7 @@ class Plan:
                 rule == "database_merge" and "database_shard" not in run.seconds(stage)
             )
             jobs = batch_count(self.clips) if rule in OF_BATCHES else self.shards if sharded else 1
-            most = Sampling().sample_frames / FPS if rule in SAMPLED else self.motion
+            most = SampleOptions().sample_frames / FPS if rule in SAMPLED else self.motion
             hours = Rate.of(rule, stage, run, less).hours(min(most, self.motion))
             # The largest shard has about twice the average.
             one = self.training if rule == "training" else hours / jobs * (2 if sharded and jobs > 1 else 1)
@@ -118,14 +118,14 @@ class Plan:
         return line
 
 
-def training_hours(run: Run, less: Run | None, asked: argparse.Namespace) -> float:
+def training_hours(run: Run, less: Run | None, options: argparse.Namespace) -> float:
     """Hours on the clock of so many nodes, each as fast as the one of the run."""
     recipe = run.resolved["configuration"]["training"]
-    motion = 3600 * asked.hours
+    motion = 3600 * options.hours
     history = (run.home / "network/history.csv").read_text()
     samples = int(history.splitlines()[-1].split(",")[2]) * motion / run.motion
-    share = asked.passes / recipe["passes"] if asked.passes else 1.0
-    nodes, steps = asked.training_nodes, samples * share / (asked.batch or recipe["batch"])
+    share = options.passes / recipe["passes"] if options.passes else 1.0
+    nodes, steps = options.training_nodes, samples * share / (options.batch or recipe["batch"])
     with np.load(run.home / "network/checkpoint.npz") as checkpoint:
         sent = 4 * checkpoint["weights"].size
     ring = 2 * (nodes - 1) * (sent / nodes / LINK + DELAY)
@@ -159,29 +159,29 @@ def arguments() -> argparse.Namespace:
     parser.add_argument("--shards", type=int, default=1, help="of the database")
     parser.add_argument("--training-nodes", type=int, default=1)
     parser.add_argument("--batch", type=int, default=0, help="samples of a step; 0: that of the run")
-    parser.add_argument("--passes", type=int, default=0, help="0: those of the run")
+    parser.add_argument("--passes", type=float, default=0.0, help="0: those of the run")
     return parser.parse_args()
 
 
 def main() -> None:
-    asked = arguments()
-    run = Run(asked.folder, asked.configuration)
-    less = Run(asked.folder, asked.against) if asked.against else None
+    options = arguments()
+    run = Run(options.folder, options.configuration)
+    less = Run(options.folder, options.against) if options.against else None
     if less is not None:
         if less.motion >= run.motion:
             raise SystemExit("--against needs a run with less motion")
         show_growth(run, less)
-    print(f"from {run.motion:.0f} s of motion of `{asked.configuration}` to {asked.hours:g} hours\n")
+    print(f"from {run.motion:.0f} s of motion of `{options.configuration}` to {options.hours:g} hours\n")
     print("| stage | jobs | hours of work | on the clock | longest job | GB |")
     print("|---|---|---|---|---|---|")
-    training = training_hours(run, less, asked)
-    plan = Plan(3600 * asked.hours, asked.clips, asked.nodes, asked.shards, training)
+    training = training_hours(run, less, options)
+    plan = Plan(3600 * options.hours, options.clips, options.nodes, options.shards, training)
     lines = {stage: plan.line(stage, run, less) for stage in run.stages}
     for stage, line in lines.items():
         show(stage, line)
     total = {key: sum(line[key] for line in lines.values()) for key in next(iter(lines.values()))}
     show("all", {**total, "longest": max(line["longest"] for line in lines.values())})
-    print(f"\n{asked.clips} clips in {batch_count(asked.clips)} batches")
+    print(f"\n{options.clips} clips in {batch_count(options.clips)} batches")
 
 
 def show(name: str, line: dict[str, float]) -> None:

@@ -8,8 +8,8 @@ floor is the time of the matrix products alone, at their best, with the same fac
 - per sample: weights built for every sample, differentiated by autograd, PyTorch's Adam (sixty-four samples
   at a time, since 1,024 need 5 GB);
 - blended: outputs of the control points blended, otherwise the same: the usual good implementation;
-- PyTorch, float32: `hobble.models.pfnn.step.Step`, as on other devices than a CPU;
-- fused, float32: `hobble.models.pfnn.fused.FusedStep`, the default below batch 256;
+- PyTorch, float32: `hobble.models.pfnn.step.PfnnStep`, as on other devices than a CPU;
+- fused, float32: `hobble.models.pfnn.fused.FusedPfnnStep`, the default below batch 256;
 - fused, bfloat16: the same with factors rounded to bfloat16, the default from there on.
 
 `training_cuda.py` measures a GPU.
@@ -29,8 +29,8 @@ import torch
 from torch import Tensor
 
 from hobble.core.processors import multiplies_bfloat16
-from hobble.models.pfnn.fused import FusedStep
-from hobble.models.pfnn.step import Step
+from hobble.models.pfnn.fused import FusedPfnnStep
+from hobble.models.pfnn.step import PfnnStep
 from hobble.models.pfnn.trainable import coefficients, initialise
 from hobble.models.products import product
 from hobble.training.optimiser import Adam
@@ -77,7 +77,7 @@ def by_autograd(forward: Callable, part: int, sizes: tuple[int, ...]) -> Callabl
     return step
 
 
-def by_hand(kind: type[Step], half: bool, sizes: tuple[int, ...]) -> Callable[[Batch], None]:
+def by_hand(kind: type[PfnnStep], half: bool, sizes: tuple[int, ...]) -> Callable[[Batch], None]:
     network = initialise(sizes, POINTS, 1)
     adam, step = Adam(network, RATE, 0.9, 0.999, L1), kind(network, 1 - KEEP, half)
 
@@ -133,12 +133,12 @@ def main() -> None:
     ways = {
         "per sample": by_autograd(per_sample, PART, sizes),
         "blended": by_autograd(blended, 1 << 30, sizes),
-        "PyTorch, float32": by_hand(Step, False, sizes),
-        "fused, float32": by_hand(FusedStep, False, sizes),
+        "PyTorch, float32": by_hand(PfnnStep, False, sizes),
+        "fused, float32": by_hand(FusedPfnnStep, False, sizes),
         "floor, float32": products(False, sizes),
     }
     if multiplies_bfloat16():
-        ways["fused, bfloat16"] = by_hand(FusedStep, True, sizes)
+        ways["fused, bfloat16"] = by_hand(FusedPfnnStep, True, sizes)
         ways["floor, bfloat16"] = products(True, sizes)
     inputs = sum(size * out for size, out in pairwise(sizes[:2]))
     all_layers = sum(size * out for size, out in pairwise(sizes))

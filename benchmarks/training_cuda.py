@@ -29,7 +29,7 @@ from hobble.database.merge import write_database
 from hobble.database.reader import Database
 from hobble.models.pfnn.options import PfnnOptions
 from hobble.models.pfnn.trainable import initialise
-from hobble.training.batches import Watch
+from hobble.training.batches import LossWatch
 from hobble.training.device_rows import DeviceRows
 from hobble.training.optimiser import Adam
 from hobble.training.start import step_for, use_threads
@@ -43,7 +43,7 @@ PRECISIONS = ("float32", "tf32", "bfloat16")
 def samples(rows: DeviceRows, size: int, update: Update) -> Iterator[int]:
     """Trains batch by batch, section by section; yields how many samples each batch had."""
     for turn in range(1_000_000):
-        watch = Watch("the benchmark", rows.database.clips)
+        watch = LossWatch("the benchmark", rows.database.clips)
         update.step.seed(turn)
         for batch in rows.batches(*divmod(turn, SECTIONS), SECTIONS, 1, size):
             watch.add(update(*batch[:3], 1.0), batch)

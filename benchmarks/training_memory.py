@@ -31,7 +31,7 @@ def peak_mb() -> float:
 
 def child(database: Path, configuration: str) -> None:
     """Train for a while; prints the database's size and the peaks, in MB."""
-    from hobble.config.load import Catalogue
+    from hobble.config.load_configuration import Catalogue
     from hobble.database.reader import Database
     from hobble.training.train import train
 

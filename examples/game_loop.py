@@ -1,4 +1,4 @@
-"""A game loop: 60 times a second it passes a wish to the character and gets a pose.
+"""A game loop: 60 times a second it passes a target velocity to the character and gets a pose.
 
 python examples/game_loop.py results/injured/network
 """
@@ -8,7 +8,7 @@ import sys
 import numpy as np
 
 from hobble.runtime import ProceduralAnimation
-from hobble.runtime.axes import Axes
+from hobble.runtime.caller_axes import Axes
 
 # These are Unity's axes. For Unreal use Axes("left", "Z"), for Blender Axes("right", "Z", "m").
 character = ProceduralAnimation.load(sys.argv[1], axes=Axes("left", "Y", "m"), mode="cubic")

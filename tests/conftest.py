@@ -49,7 +49,7 @@ class Server:
     """A server on the loopback address that serves `content`.
 
     Each answer takes the next of `faults`: an error's status, or the bytes after which it breaks off.
-    asked: the Range of each request.
+    requests: the Range of each request.
     """
 
     url: str = ""
@@ -57,7 +57,7 @@ class Server:
     faults: list[int | str] = field(default_factory=list)
     ranges: bool = True
     announces: bool = True
-    asked: list[str | None] = field(default_factory=list)
+    requests: list[str | None] = field(default_factory=list)
 
 
 @pytest.fixture
@@ -68,7 +68,7 @@ def server() -> Iterator[Server]:
     class Handler(BaseHTTPRequestHandler):
         def do_GET(self) -> None:
             wanted = self.headers.get("Range")
-            told.asked.append(wanted)
+            told.requests.append(wanted)
             fault = told.faults.pop(0) if told.faults else 0
             if isinstance(fault, int) and 400 <= fault < 600:
                 return self.send_error(fault)

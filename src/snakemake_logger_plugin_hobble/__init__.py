@@ -15,13 +15,16 @@ class LogHandler(LogHandlerBase):
     """Prints short messages to standard error; with -p, --verbose or --debug-dag, all of Snakemake's."""
 
     def __post_init__(self) -> None:
-        asked = self.common_settings
-        stream = sys.stdout if asked.stdout else sys.stderr
-        self.full = asked.printshellcmds or asked.verbose or asked.debug_dag
-        quiet, debug = asked.quiet, (asked.debug_dag, asked.verbose, asked.dryrun, asked.printshellcmds)
+        settings = self.common_settings
+        stream = sys.stdout if settings.stdout else sys.stderr
+        self.full = settings.printshellcmds or settings.verbose or settings.debug_dag
+        quiet, debug = (
+            settings.quiet,
+            (settings.debug_dag, settings.verbose, settings.dryrun, settings.printshellcmds),
+        )
         self.snakemake_filter = DefaultFilter(quiet, *debug)
-        self.snakemake_formatter = DefaultFormatter(quiet, asked.show_failed_logs)
-        self.terminal = Terminal(stream, stream.isatty(), asked.dryrun)
+        self.snakemake_formatter = DefaultFormatter(quiet, settings.show_failed_logs)
+        self.terminal = Terminal(stream, stream.isatty(), settings.dryrun)
 
     def emit(self, record: LogRecord) -> None:
         """Print a record, in short or in full."""

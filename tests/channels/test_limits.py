@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from hobble.channels.limits import CANNOT_HURRY, TOP, UNLIMITED, USUAL, Limits, Pace, together
+from hobble.channels.speed_limits import CANNOT_HURRY, TOP, UNLIMITED, USUAL, LimitLearner, Limits, together
 
 WALK, JOG, GAITS = 1, 2, 6
 LIMITS = Limits(
@@ -27,8 +27,8 @@ def rows(speeds, values, gait: int = WALK, each: int = 40, others: bool = False)
     }
 
 
-def pace(labels: int = 2, across=None) -> Pace:
-    return Pace(10.0, np.arange(labels) if across is None else np.array(across), GAITS)
+def pace(labels: int = 2, across=None) -> LimitLearner:
+    return LimitLearner(10.0, np.arange(labels) if across is None else np.array(across), GAITS)
 
 
 @pytest.mark.parametrize(
@@ -39,14 +39,14 @@ def test_between_levels_the_speed_is_interpolated(values, speed: float) -> None:
     np.testing.assert_array_equal(LIMITS.allowed(np.array([values], float)), [[speed]])
 
 
-def test_two_are_as_slow_as_the_worse_one() -> None:
+def test_two_injuries_have_the_limit_of_the_slower_one() -> None:
     values = np.random.default_rng(1).uniform(0, 10, (50, 2))
     both = LIMITS.allowed(values)
     alone = [LIMITS.allowed(values * keep) for keep in ([1, 0], [0, 1])]
     np.testing.assert_array_equal(both, np.minimum(*alone))
 
 
-def test_a_version_is_set_beside_its_own_source() -> None:
+def test_a_hurt_version_is_compared_with_its_own_healthy_clip() -> None:
     """The source walks slowly. Compared with all healthy clips, the version would seem slower than it is."""
     found = pace()
     speeds = np.linspace(1.0, 3.0, 41)
@@ -68,7 +68,7 @@ def test_a_version_is_set_beside_its_own_source() -> None:
     assert (limits.speeds[JOG] == UNLIMITED).all()
 
 
-def test_a_captured_injury_is_set_beside_what_is_usual_in_its_gait() -> None:
+def test_a_captured_injury_is_compared_with_the_usual_speed_of_its_gait() -> None:
     found = pace()
     found.add("healthy", **rows(np.full(30, 2.0), np.zeros((30, 2))))
     found.add("jogs", **rows(np.full(30, 6.0), np.zeros((30, 2)), JOG))
@@ -80,7 +80,7 @@ def test_a_captured_injury_is_set_beside_what_is_usual_in_its_gait() -> None:
     assert jog == pytest.approx(3.0, rel=0.1)  # by what the link does in other gaits
 
 
-def test_what_is_learnt_never_rises_and_is_the_same_on_both_sides() -> None:
+def test_learnt_limits_never_rise_with_severity_and_are_equal_on_both_sides() -> None:
     rng = np.random.default_rng(4)
     found = pace(3, across=[1, 0, 2])
     found.add("healthy", **rows(rng.uniform(1.5, 2.5, 200), np.zeros((200, 3))))
@@ -96,7 +96,7 @@ def test_what_is_learnt_never_rises_and_is_the_same_on_both_sides() -> None:
     np.testing.assert_allclose(again.speeds, limits.speeds, atol=1e-4)
 
 
-def test_channels_multiply_what_they_leave_of_the_usual_speed() -> None:
+def test_the_shares_of_speed_that_two_channels_allow_are_multiplied() -> None:
     free, half, third, fast = (np.full((1, 2), v) for v in (np.inf, 1.0, 2 / 3, 2.6))
     usual = np.array([2.0, 0.0])  # no body without values goes in the second gait
     for one in (free, half, fast):
@@ -107,7 +107,7 @@ def test_channels_multiply_what_they_leave_of_the_usual_speed() -> None:
     np.testing.assert_allclose(together([fast, fast + 1], usual), [[2.6, 2.6]])
 
 
-def test_a_channel_takes_no_blame_for_another() -> None:
+def test_the_slowness_of_one_channel_is_not_learnt_for_another() -> None:
     """A neutral clip moves at 2, a sad one at 1, and their hurt versions at .6 of that."""
     mood, injury = pace(), pace()
     none, sad = np.zeros((60, 2)), np.tile([10.0, 0.0], (60, 1))
@@ -125,7 +125,7 @@ def test_a_channel_takes_no_blame_for_another() -> None:
         assert limits.speeds[WALK, 0, -1] == pytest.approx(expected, rel=0.02)
 
 
-def test_where_nothing_is_told_nothing_is_limited() -> None:
+def test_without_channel_values_no_limit_is_learnt() -> None:
     found = pace()
     found.add("healthy", **rows(np.full(30, 2.0), np.zeros((30, 2))))
     assert found.learn() is None
@@ -143,7 +143,7 @@ def test_where_nothing_is_told_nothing_is_limited() -> None:
         ({"usual": np.array([-1.0])}, "usual speeds"),
     ],
 )
-def test_a_strangers_table_is_refused(changes, says: str) -> None:
+def test_a_malformed_table_of_limits_is_refused(changes, says: str) -> None:
     data = {key: value.tolist() for key, value in vars(replace(LIMITS, **changes)).items()}
     with pytest.raises(ValueError, match=says):
         Limits.from_dict(data, 1, 2, 10.0)
@@ -151,6 +151,6 @@ def test_a_strangers_table_is_refused(changes, says: str) -> None:
         Limits.from_dict({"levels": "all"}, 1, 2, 10.0)
 
 
-def test_an_older_table_counts_the_highest_speed_as_usual() -> None:
+def test_without_usual_speeds_the_highest_speed_is_the_usual_one() -> None:
     data = {"levels": LIMITS.levels.tolist(), "speeds": LIMITS.speeds.tolist()}
     assert Limits.from_dict(data, 1, 2, 10.0).usual.tolist() == [4.0]

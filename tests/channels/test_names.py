@@ -53,7 +53,7 @@ def test_no_file_outside_its_folder_names_a_channel(name: str) -> None:
     assert naming(name) == []
 
 
-def test_one_that_does_is_found(tmp_path: Path) -> None:
+def test_a_file_that_names_a_channel_is_found(tmp_path: Path) -> None:
     (tmp_path / "a.py").write_text('"""Of moods, as mood."""\nHURTS = "mood"\n')
     (tmp_path / "b.py").write_text('def f(mood):\n    """x"""\n')
     (tmp_path / "c.js").write_text("x[X.mood]")

@@ -11,14 +11,14 @@ from hobble.character import rule
 from hobble.runtime import controller, trajectory
 
 
-def test_the_rule_in_numbers() -> None:
+def test_places_standing_and_phase_follow_the_formulas() -> None:
     assert rule.joint_place(2.0, 5.0) == 3.5
     assert [rule.moving(s) for s in (0.0, 0.9375, 1.0, 1.5)] == [1.0, 0.5, 0.0, 0.0]
     assert rule.phase_change(0.0, 2.0) == pytest.approx(0.2)
     assert rule.phase_change(1.0, 2.0) == pytest.approx(2.0)
 
 
-def test_compiled_and_plain_callers_get_the_same() -> None:
+def test_the_rule_is_the_same_compiled_and_in_python() -> None:
     rng = np.random.default_rng(0)
 
     @njit

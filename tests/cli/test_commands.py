@@ -10,7 +10,7 @@ import yaml
 
 from hobble.cli.__main__ import main
 from hobble.motion.read import read_bvh
-from hobble.synthetic.clip import write_clip
+from hobble.synthetic.generate_clip import write_clip
 from hobble.synthetic.options import Synthetic
 
 
@@ -36,7 +36,7 @@ def folder(tmp_path_factory, root: Path) -> Path:
     return out
 
 
-def test_a_folder_becomes_a_folder_at_another_rate(folder, tmp_path, capsys):
+def test_a_folder_of_clips_is_resampled_into_another_folder(folder, tmp_path, capsys):
     out = tmp_path / "out"
     assert main(["motion", str(folder), str(out), "--fps", "30", "--skeleton", "holden31", "--mirror"]) == 1
     assert sorted(p.name for p in out.iterdir()) == ["one.bvh", "one_mirror.bvh", "two.bvh", "two_mirror.bvh"]
@@ -52,7 +52,7 @@ def test_a_clip_keeps_its_own_rig_where_no_skeleton_is_named(folder, tmp_path):
     assert np.abs(after.offsets[1:] - before.offsets[1:]).max() < 1e-3
 
 
-def test_labels_are_written_once(folder, tmp_path, capsys):
+def test_existing_label_files_are_not_overwritten(folder, tmp_path, capsys):
     source = str(folder / "one.bvh")
     assert main(["labels", source, str(tmp_path), "--gait", "walk"]) == 0
     names = ["one.phase", "one_footsteps.txt", "one_gait.txt"]
@@ -75,7 +75,7 @@ def test_a_missing_report_is_named_with_the_command_that_makes_it(tmp_path, monk
     assert capsys.readouterr().out.strip() == page.as_uri() + "#play"
 
 
-def test_help_says_what_there_is(capsys):
+def test_help_lists_every_command(capsys):
     with pytest.raises(SystemExit) as stop:
         main(["--help"])
     assert stop.value.code == 0

@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from hobble.config.load import Catalogue, merge, read_layers, read_yaml, validate
+from hobble.config.load_configuration import Catalogue, merge, read_layers, read_yaml, validate
 from hobble.config.models import ClipEntry, Configuration, Dataset, SkeletonFile
 from hobble.core.errors import HobbleError
 
@@ -20,7 +20,7 @@ TREES = st.dictionaries(
 
 
 @given(TREES, TREES)
-def test_merge_takes_the_upper_value_and_keeps_the_rest(base: dict, over: dict) -> None:
+def test_merging_replaces_given_keys_and_keeps_the_others(base: dict, over: dict) -> None:
     merged = merge(base, over)
     assert set(merged) == set(base) | set(over)
     for key in merged:
@@ -39,17 +39,17 @@ def folder(tmp_path: Path) -> Path:
     return tmp_path
 
 
-def test_extends_keeps_what_the_child_does_not_say(folder: Path) -> None:
+def test_extends_keeps_the_keys_that_the_child_does_not_set(folder: Path) -> None:
     model = Catalogue(folder).configuration("child")
     assert (model.training.passes, model.training.batch) == (3, 16)
 
 
-def test_overrides_go_on_top_of_every_configuration(folder: Path) -> None:
+def test_command_line_overrides_apply_to_every_configuration(folder: Path) -> None:
     catalogue = Catalogue(folder, {"training": {"passes": 7}})
     assert [catalogue.configuration(n).training.passes for n in ("base", "child")] == [7, 7]
 
 
-def test_a_training_can_be_named(folder: Path) -> None:
+def test_a_training_section_can_be_given_by_name(folder: Path) -> None:
     """`training: NAME` stands for the whole section, in files and on the command line."""
     (folder / "quick.yaml").write_text("extends: base\ntraining: {batch: 256}\n")
     (folder / "like.yaml").write_text("channels: [injury]\ntraining: quick\n")
@@ -71,7 +71,7 @@ def test_a_missing_training_is_reported(folder: Path) -> None:
 
 
 @pytest.mark.parametrize("text", ["held_out: [02_02]", "held_out: [on]", "clips: {02_01: {gait: walk}}"])
-def test_a_name_that_yaml_takes_for_a_number_belongs_in_quotes(tmp_path: Path, text: str) -> None:
+def test_a_name_that_yaml_reads_as_a_number_has_to_be_quoted(tmp_path: Path, text: str) -> None:
     (tmp_path / "datasets").mkdir()
     (tmp_path / "datasets/mine.yaml").write_text(f"skeleton: s\nfolder: mine\n{text}\n")
     with pytest.raises(HobbleError, match=r"not (130|True|129)\. Put the name in quotes"):
@@ -143,7 +143,7 @@ def test_an_impossible_data_set_is_refused(values: dict, message: str) -> None:
         ({"share": 4}, r"clips\.a\.share: only clips of a `synthetic` data set"),
     ],
 )
-def test_keys_of_the_walker_are_refused_for_other_clips(entry: dict, message: str) -> None:
+def test_keys_of_the_synthetic_walker_are_refused_for_other_clips(entry: dict, message: str) -> None:
     values = {"skeleton": "s", "clips": {"a": entry, "b": None}}
     assert validate(Dataset, {**values, "synthetic": {}}, "d.yaml").clips["a"] == ClipEntry(**entry)
     with pytest.raises(HobbleError, match=message):
@@ -168,7 +168,7 @@ def test_a_key_given_twice_is_refused_with_its_lines(
         read_yaml(tmp_path / "x.yaml")
 
 
-def test_a_key_may_be_in_several_sections_and_override_merged_ones(tmp_path: Path) -> None:
+def test_equal_keys_in_different_sections_are_no_duplicates(tmp_path: Path) -> None:
     (tmp_path / "x.yaml").write_text("a: &a {x: 1, y: 2}\nb: *a\nc: {<<: *a, x: 3}\n")
     assert read_yaml(tmp_path / "x.yaml")["c"] == {"x": 3, "y": 2}
 
@@ -179,7 +179,7 @@ def test_broken_yaml_names_its_line(tmp_path: Path) -> None:
         read_yaml(tmp_path / "x.yaml")
 
 
-def test_yaml_cannot_make_objects(tmp_path: Path) -> None:
+def test_yaml_tags_that_make_objects_are_refused(tmp_path: Path) -> None:
     (tmp_path / "x.yaml").write_text("a: !!python/object/apply:os.system ['true']\n")
     with pytest.raises(HobbleError, match="not valid YAML"):
         read_yaml(tmp_path / "x.yaml")
@@ -228,7 +228,7 @@ def test_shipped_configurations_are_the_published_ones(root: Path) -> None:
     assert catalogue.dataset("synthetic").synthetic.frames == 11_412
 
 
-def test_the_release_has_its_forty_clips_on_their_ground(root: Path) -> None:
+def test_the_shipped_release_lists_forty_clips_and_their_ground(root: Path) -> None:
     """The 40 clips of the original database and their mirrors."""
     release = Catalogue(root / "config").dataset("pfnn")
     grounds = Counter(entry.ground if entry else "flat" for entry in release.clips.values())

@@ -62,7 +62,7 @@ def test_no_writable_folder_gives_one_warning(tmp_path):
 
 
 @pytest.mark.parametrize("content", [b"", b"rubbish", b"\x80\x04."])
-def test_a_damaged_cache_is_a_miss(tmp_path, content):
+def test_damaged_cache_files_are_compiled_again(tmp_path, content):
     cache = str(tmp_path / "cache")
     run(tmp_path, NUMBA_CACHE_DIR=cache)
     for path in cached(tmp_path):
@@ -72,7 +72,7 @@ def test_a_damaged_cache_is_a_miss(tmp_path, content):
     assert result.stderr.count("RuntimeWarning") == 1
 
 
-def test_a_cache_that_is_a_folder_of_folders_is_a_miss(tmp_path):
+def test_folders_in_place_of_cache_files_are_compiled_again(tmp_path):
     cache = str(tmp_path / "cache")
     run(tmp_path, NUMBA_CACHE_DIR=cache)
     for path in cached(tmp_path):

@@ -19,7 +19,7 @@ def leftovers(folder):
     return [path.name for path in folder.iterdir() if path.name.startswith(".")]
 
 
-def test_a_failure_half_way_leaves_the_old_file_and_no_other(tmp_path):
+def test_a_failed_write_leaves_the_old_file_and_no_temporary_one(tmp_path):
     path = tmp_path / "sub" / "a.txt"
     write_text(path, "old")
 
@@ -63,7 +63,7 @@ def test_equal_values_give_equal_bytes(tmp_path):
     assert (tmp_path / "a.npz").read_bytes() == (tmp_path / "b.npz").read_bytes()
 
 
-def test_json_without_numbers_is_refused_when_written(tmp_path):
+def test_nan_and_infinity_are_refused_in_written_json(tmp_path):
     with pytest.raises(ValueError, match="JSON"):
         write_json(tmp_path / "a.json", {"x": float("nan")})
     assert not (tmp_path / "a.json").exists()
@@ -91,7 +91,7 @@ def test_damaged_arrays_are_found(tmp_path):
         load_npz(tmp_path / "b.npz")
 
 
-def test_some_arrays_only(tmp_path):
+def test_only_the_requested_arrays_are_loaded(tmp_path):
     save_npz(tmp_path / "a.npz", x=np.arange(3), y=np.arange(4))
     assert list(load_npz(tmp_path / "a.npz", ["y"])) == ["y"]
     with pytest.raises(InputError):
@@ -131,7 +131,7 @@ def test_leftovers_of_killed_processes_are_removed(tmp_path):
     assert leftovers(tmp_path) == [alive.name]
 
 
-def test_every_flipped_bit_of_an_npz_is_noticed_or_changes_nothing(tmp_path):
+def test_every_flipped_bit_of_an_npz_is_detected_or_harmless(tmp_path):
     path = tmp_path / "a.npz"
     arrays = {
         "x": np.arange(6, dtype=np.float32).reshape(2, 3),

@@ -36,7 +36,7 @@ def test_without_topology_each_processor_counts(tmp_path: Path) -> None:
         ("avx2 avx512f avx512_bf16", "AVX512_CORE_BF16", True),
     ],
 )
-def test_bfloat16_by_the_cpu_and_by_what_onednn_may_use(
+def test_bfloat16_depends_on_the_cpu_and_on_the_onednn_limit(
     tmp_path: Path, flags: str, limit: str | None, fast: bool
 ) -> None:
     file = tmp_path / "cpuinfo"

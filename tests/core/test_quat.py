@@ -62,7 +62,7 @@ def test_gimbal_lock_keeps_the_rotation(order: str) -> None:
     assert same(quat.from_euler(quat.to_euler(q, order), order), q, 1e-5)
 
 
-def test_fewer_angles_than_three_are_a_rotation_too():
+def test_one_or_two_euler_angles_make_a_rotation():
     q = quat.from_euler(np.array([[0.3, -0.2]]), "ZX")
     expected = Rotation.from_euler("ZX", [[0.3, -0.2]]).as_quat(scalar_first=True)
     assert same(q, expected)
@@ -87,7 +87,7 @@ def test_log_and_exp_near_identity():
 
 @FEW
 @given(vectors, vectors)
-def test_between_is_the_shortest_way(a, b):
+def test_between_is_the_shortest_rotation(a, b):
     if min(np.linalg.norm(a), np.linalg.norm(b)) < 1e-3:
         return
     q = quat.between(a, b)
@@ -114,12 +114,12 @@ def test_slerp_agrees_with_scipy(a, b, t):
     assert same(quat.slerp(a, b, t), expected, 1e-6)
 
 
-def test_slerp_takes_the_shorter_way_whatever_the_signs():
+def test_slerp_takes_the_shorter_arc_whatever_the_signs():
     a, b = quat.IDENTITY, -quat.yaw(0.2)
     assert quat.angle(quat.slerp(a, b, np.array(0.5)), quat.yaw(0.1)) < 1e-9
 
 
-def test_continuous_flips_signs_and_nothing_else():
+def test_continuous_only_flips_signs():
     q = quat.yaw(np.linspace(0, 20, 300))[:, None]
     signs = np.where(np.random.default_rng(1).random((300, 1, 1)) < 0.5, -1.0, 1.0)
     mended = quat.continuous(q * signs)
@@ -132,7 +132,7 @@ def test_yaw_turns_forward_to_the_left():
     np.testing.assert_allclose(quat.yaw(0.7), quat.from_axis_angle(np.array([0, 1.0, 0]), 0.7), atol=1e-15)
 
 
-def test_one_function_serves_one_pose_and_a_whole_clip():
+def test_functions_take_one_pose_or_a_whole_clip():
     rng = np.random.default_rng(2)
     a, b = quat.normalize(rng.normal(size=(5, 7, 4))), quat.normalize(rng.normal(size=(7, 4)))
     v = rng.normal(size=(7, 3))

@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 from scipy.spatial.transform import Rotation
 
-from hobble.config.load import Catalogue
+from hobble.config.load_configuration import Catalogue
 from hobble.core import quat
 from hobble.core.errors import HobbleError
 from hobble.core.skeleton import Skeleton, forward_kinematics, local_rotations, other_side
@@ -62,7 +62,7 @@ def test_rest_poses_are_people_standing_upright(skeleton):
     np.testing.assert_allclose(get("left_hip")[1], get("right_hip")[1], atol=0.1)
 
 
-def test_plain_data_round_trip(skeleton):
+def test_a_skeleton_survives_conversion_to_plain_data(skeleton):
     again = Skeleton.from_dict(skeleton.to_dict())
     assert again.to_dict() == skeleton.to_dict()
     np.testing.assert_allclose(again.offsets, skeleton.offsets, atol=1e-6)
@@ -95,7 +95,7 @@ def renamed(skeleton, left, right):
     [("L_{}", "R_{}"), ("{}_L", "{}_R"), ("{}.L", "{}.R"), ("{}_l", "{}_r"), ("l{}", "r{}"), ("L{}", "R{}"),
      ("LEFT_{}", "RIGHT_{}"), ("Bip01 L {}", "Bip01 R {}"), ("CC_Base_L_{}", "CC_Base_R_{}")],
 )  # fmt: skip
-def test_sides_are_known_by_the_common_ways_to_name_them(holden31, left, right):
+def test_sides_are_recognised_in_common_naming_styles(holden31, left, right):
     other = renamed(holden31, left, right)
     np.testing.assert_array_equal(other.mirror_joints, holden31.mirror_joints)
     np.testing.assert_array_equal(other.mirror_links, holden31.mirror_links)
@@ -127,7 +127,7 @@ def test_links_of_the_31_joints(holden31):
     assert swap[15] == 15
 
 
-def test_unseen_joints_are_those_of_the_facts_page(holden31):
+def test_unseen_joints_are_the_documented_ones(holden31):
     indices = [holden31.index(name) for name in holden31.unseen]
     assert indices == [1, 6, 11, 14, 17, 21, 22, 23, 24, 28, 29, 30]
     assert (holden31.index("Head"), holden31.role("left_heel"), holden31.role("right_toe")) == (16, 4, 10)
@@ -138,7 +138,7 @@ def test_an_unknown_joint_is_named_with_all_joints(holden31):
         holden31.index("Tail")
 
 
-def test_forward_kinematics_against_matrices(skeleton):
+def test_forward_kinematics_equals_products_of_matrices(skeleton):
     rotations, root = random_pose(skeleton)
     world, positions = forward_kinematics(skeleton, rotations, root)
     matrices = np.zeros((len(skeleton.joints), 4, 4))
@@ -160,7 +160,7 @@ def test_bones_keep_their_lengths(skeleton):
             np.testing.assert_allclose(length, np.linalg.norm(skeleton.offsets[j]), atol=1e-9)
 
 
-def test_translations_replace_offsets_below_the_root(holden31):
+def test_joint_translations_replace_the_offsets_of_joints_below_the_root(holden31):
     rotations, root = random_pose(holden31)
     moved = np.tile(holden31.offsets * 2, (3, 1, 1))
     moved[:, 0] = 999.0
@@ -193,6 +193,6 @@ def test_turning_the_root_turns_everything(holden31, angles):
      ("Hand_L", "Hand_R"), ("UpperLeg.R", "UpperLeg.L"), ("fLeftEye", "fRightEye"), ("Spine", "Spine"),
      ("Root", "Root"), ("lowerback", "lowerback"), ("RibCage", "RibCage"), ("rShin", "lShin")],
 )  # fmt: skip
-def test_other_sides(name, other):
+def test_the_other_side_of_a_joint_name_is_found(name, other):
     assert other_side(name) == other
     assert other_side(other) == name

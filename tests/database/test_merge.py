@@ -39,7 +39,7 @@ def read_all(path: Path) -> np.ndarray:
     return rows[np.lexsort(rows.T[::-1])]
 
 
-def test_rows_survive_their_file_and_files_merge_as_rows_do(rows_of, tmp_path):
+def test_rows_round_trip_and_files_merge_like_rows_in_memory(rows_of, tmp_path):
     rows = {name: rows_of(name, 40, None, seed=i) for i, name in enumerate("abc")}
     splits = {"a": "train", "b": "held_out", "c": "train"}
     for name, clip in rows.items():
@@ -58,7 +58,7 @@ def test_rows_survive_their_file_and_files_merge_as_rows_do(rows_of, tmp_path):
     assert list(Database.open(tmp_path / "two").skeleton["joints"]) == ["Hips", "Spine", "Head"]
 
 
-def test_every_row_is_there_once_wherever_the_buckets_cut(rows_of, tmp_path, monkeypatch):
+def test_every_row_is_stored_once_whatever_the_bucket_size(rows_of, tmp_path, monkeypatch):
     monkeypatch.setattr(plan, "BUCKET_BYTES", 90_000)
     monkeypatch.setattr(scatter, "PART_ROWS", 17)
     rows = {name: rows_of(name, 150, None, seed=i) for i, name in enumerate("ab")}
@@ -69,7 +69,7 @@ def test_every_row_is_there_once_wherever_the_buckets_cut(rows_of, tmp_path, mon
     np.testing.assert_array_equal(read_all(tmp_path / "db"), expected)
 
 
-def test_buckets_bring_rows_and_their_fits_into_the_final_order(tmp_path):
+def test_buckets_put_rows_and_their_fits_into_the_final_order(tmp_path):
     rng = np.random.default_rng(0)
     count = rng.choice([1, 3], 100)
     index = np.zeros(100, INDEX)
@@ -99,7 +99,7 @@ def test_rows_are_shuffled_globally(rows_of, tmp_path):
     assert abs(np.corrcoef(clip, np.arange(len(clip)))[0, 1]) < 0.1
 
 
-def test_size_against_the_original_layout(rows_of, tmp_path):
+def test_the_database_is_smaller_than_the_original_layout(rows_of, tmp_path):
     """31 joints: at most 27% of the original's bytes in float32, half of that in float16 or bfloat16."""
     layout = RowLayout(31, channels=(("injury", 30),))
     rng = np.random.default_rng(0)
@@ -205,7 +205,7 @@ def test_a_full_disk_gives_a_message_and_keeps_the_old_database(rows_of, tmp_pat
     assert contents(tmp_path / "db") == before
 
 
-def test_a_damaged_database_is_mended_by_building_it_again(rows_of, tmp_path):
+def test_building_again_repairs_a_damaged_database(rows_of, tmp_path):
     rows = {"a": rows_of("a", 60)}
     manifest = write_database(tmp_path / "db", rows, {"a": "train"}, **OPTIONS)
     before = contents(tmp_path / "db")
@@ -214,7 +214,7 @@ def test_a_damaged_database_is_mended_by_building_it_again(rows_of, tmp_path):
     assert contents(tmp_path / "db") == before
 
 
-def test_what_cannot_be_merged_is_refused(rows_of, tmp_path):
+def test_clips_that_do_not_fit_together_are_refused(rows_of, tmp_path):
     a = rows_of("a", 30)
     with pytest.raises(HobbleError, match="nothing to train on"):
         write_database(tmp_path / "db", {"a": a}, {"a": "held_out"}, **OPTIONS)

@@ -26,21 +26,21 @@ def test_sections_cut_the_layers_into_near_equal_parts(rows, visits, sections):
 
 @given(st.integers(1, 40), st.integers(0, 99), st.integers(0, 5))
 @settings(max_examples=30, deadline=None)
-def test_over_the_layers_each_row_shows_each_fit_once(rows, seed, pass_index):
+def test_over_all_layers_each_row_uses_each_fit_equally_often(rows, seed, pass_index):
     count = np.random.default_rng(seed).choice([1, 2, 5, 10], rows)
     shown = np.stack([order.picks(count, 10, seed, pass_index, layer, 3) for layer in range(10)], axis=1)
     for fits, of_row in zip(count, shown, strict=True):
         np.testing.assert_array_equal(np.bincount(of_row, minlength=fits), np.full(fits, 10 // fits))
 
 
-def test_a_rows_fits_come_in_an_order_of_their_own():
+def test_each_row_has_its_own_order_of_fits():
     shown = np.stack([order.picks(np.full(500, 10), 10, 1, 0, layer, 0) for layer in range(10)], axis=1)
     assert len(np.unique(shown, axis=0)) > 480
     again = np.stack([order.picks(np.full(500, 10), 10, 1, 1, layer, 0) for layer in range(10)], axis=1)
     assert (shown == again).mean() < 0.15  # a tenth by chance
 
 
-def test_windows_hold_every_chunk_once_in_another_order_each_layer():
+def test_every_layer_has_every_chunk_once_in_a_new_order():
     one_shard = np.zeros(37, int)
     groups = order.groups(one_shard, 8, seed=1, pass_index=0, layer=0)
     assert [len(g) for g in groups] == [1, 2, 4, 8, 8, 8, 6]  # the first is soon read
@@ -75,7 +75,7 @@ def test_chunks_of_a_shard_come_in_another_order_each_layer():
         assert abs(np.corrcoef(own[0], np.arange(len(own[0])))[0, 1]) < 0.6
 
 
-def test_what_is_drawn_depends_on_every_number_and_on_nothing_else():
+def test_the_order_depends_on_seed_pass_layer_and_chunk_only():
     base = order.row_order(1000, 1, 2, 3, 4)
     np.testing.assert_array_equal(base, order.row_order(1000, 1, 2, 3, 4))
     for other in ((9, 2, 3, 4), (1, 9, 3, 4), (1, 2, 9, 4), (1, 2, 3, 9)):

@@ -13,7 +13,7 @@ from hobble.database.precision import narrow, widen
 
 
 @given(st.lists(st.floats(-(2.0**99), 2.0**99, width=32), min_size=1, max_size=40))
-def test_bfloat16_is_that_of_torch(values):
+def test_bfloat16_rounding_equals_torchs(values):
     array = np.array(values, np.float32)
     expected = torch.from_numpy(array).to(torch.bfloat16)
     stored = narrow(array, "bfloat16")
@@ -27,7 +27,7 @@ def test_ties_round_to_even():
 
 
 @pytest.mark.parametrize("precision", ["float32", "float16"])
-def test_other_types_equal_numpy(precision):
+def test_rounding_to_other_types_equals_numpys(precision):
     values = np.random.default_rng(0).normal(size=99)
     np.testing.assert_array_equal(widen(narrow(values, precision)), values.astype(precision))
 

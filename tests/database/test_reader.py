@@ -60,7 +60,7 @@ def keys(block: Block) -> list[tuple[int, int, bytes]]:
 
 
 @pytest.mark.parametrize("memory", [MEMORY, DISK])
-def test_a_pass_is_every_pair_standardised_and_a_flat_one_ten_times(path, sources, memory):
+def test_a_pass_has_every_standardised_pair_and_flat_rows_ten_times(path, sources, memory):
     db = Database.open(path, memory)
     assert len(db.manifest.chunks["train"]) > 5
     s = db.statistics
@@ -85,7 +85,9 @@ def test_a_pass_is_every_pair_standardised_and_a_flat_one_ten_times(path, source
 
 @given(st.integers(1, 13), st.integers(0, 3), st.integers(1, 70), st.sampled_from([MEMORY, DISK]))
 @settings(max_examples=25, deadline=None)
-def test_each_pair_comes_once_whatever_the_sections_and_blocks(path, sections, pass_index, rows, memory):
+def test_each_pair_comes_once_whatever_the_number_of_sections_and_blocks(
+    path, sections, pass_index, rows, memory
+):
     db = Database.open(path, memory)
     got = whole_pass(db, "train", pass_index, sections, rows=rows)
     assert Counter(keys(got)) == Counter(keys(whole_pass(db, "train", 7, 10)))
@@ -102,7 +104,7 @@ def test_no_section_of_a_usual_pass_shows_a_frame_twice(path, memory):
 
 
 @pytest.mark.parametrize("memory", [MEMORY, DISK])
-def test_passes_share_no_order_and_a_section_does_not_depend_on_what_was_read(path, memory):
+def test_passes_differ_in_order_and_a_section_is_the_same_after_a_restart(path, memory):
     db = Database.open(path, memory)
     first, second = (whole_pass(db, "train", i, 10) for i in range(2))
     places = first.clip * 1000 + first.frame, second.clip * 1000 + second.frame
@@ -131,7 +133,7 @@ def test_rows_are_mixed_like_independent_draws(rows_of, tmp_path):
     assert 0.85 < means.var() * 32 < 1.15  # 1 for independent draws; rows in the clips' order give 32
 
 
-def test_severities_are_columns_only_where_they_are_inputs(path, sources, tmp_path):
+def test_severities_are_columns_only_if_they_are_inputs(path, sources, tmp_path):
     splits = dict.fromkeys(sources, "train")
     write_database(tmp_path / "db", sources, splits, channels=[], joint_weight=0.1)
     healthy, injured = Database.open(tmp_path / "db"), Database.open(path)
@@ -143,9 +145,7 @@ def test_severities_are_columns_only_where_they_are_inputs(path, sources, tmp_pa
 
 
 @pytest.mark.parametrize(("dtype", "relative"), [("float16", 2.0**-11), ("bfloat16", 2.0**-8)])
-def test_half_precision_takes_half_the_bytes_and_hardly_moves_a_value(
-    path, sources, tmp_path, dtype, relative
-):
+def test_half_precision_halves_the_size_and_hardly_changes_values(path, sources, tmp_path, dtype, relative):
     splits = {name: "held_out" if name == "kept" else "train" for name in sources}
     half = write_database(
         tmp_path / "db",
@@ -196,7 +196,7 @@ def test_a_damaged_chunk_is_named(sources, tmp_path, harm):
             whole_pass(Database.open(tmp_path / "db", memory), "train", 0, 10)
 
 
-def test_any_byte_of_a_chunk_that_changes_is_noticed(sources, tmp_path):
+def test_any_changed_byte_of_a_chunk_is_detected(sources, tmp_path):
     manifest = write_database(
         tmp_path / "db", {"a": sources["rocky"]}, {"a": "train"}, channels=["injury"], joint_weight=0.1
     )
@@ -214,7 +214,7 @@ def test_any_byte_of_a_chunk_that_changes_is_noticed(sources, tmp_path):
     assert len(whole_pass(Database.open(tmp_path / "db", DISK), "train", 0, 10).p) == 400
 
 
-def test_a_manifest_that_differs_from_its_chunks_is_noticed(sources, tmp_path):
+def test_a_manifest_that_differs_from_its_chunks_is_refused(sources, tmp_path):
     write_database(tmp_path, {"a": sources["rocky"]}, {"a": "train"}, channels=["injury"], joint_weight=0.1)
     manifest = json.loads((tmp_path / "manifest.json").read_text())
     chunk = manifest["chunks"]["train"][0]
@@ -249,7 +249,7 @@ def test_reading_can_stop_at_any_block(path):
         assert len(list(islice(db.blocks("train", 0, 0, 10, 1, 32), count))) == count
 
 
-def test_ahead_keeps_order_and_passes_errors_on():
+def test_reading_ahead_keeps_the_order_and_raises_errors():
     assert list(ahead(iter(range(100)))) == list(range(100))
 
     def breaking():
@@ -262,7 +262,7 @@ def test_ahead_keeps_order_and_passes_errors_on():
         next(items)
 
 
-def test_a_chunk_is_a_file_that_other_tools_open(path):
+def test_a_chunk_can_be_opened_with_numpy(path):
     """As the description of safetensors says: header length, header, arrays."""
     db = Database.open(path)
     chunk = db.manifest.chunks["train"][0]

@@ -71,7 +71,9 @@ def a_pass(path: Path, split: str, memory: int) -> Block:
 
 @pytest.mark.parametrize("memory", [MEMORY, DISK])
 @pytest.mark.parametrize("groups", [["ab", "", "cdefg"], ["g", "be", "a", "d", "cf"]])
-def test_a_pass_shows_the_same_pairs_as_from_one_job(clips, tmp_path, monkeypatch, groups, memory):
+def test_a_pass_over_shards_has_the_pairs_of_an_unsharded_database(
+    clips, tmp_path, monkeypatch, groups, memory
+):
     monkeypatch.setattr(plan, "BUCKET_BYTES", 50_000)
     write_database(tmp_path / "one", clips, SPLITS, sources=SOURCES, **OPTIONS)
     many = in_shards(tmp_path, clips, SPLITS, groups, sources=SOURCES)
@@ -83,7 +85,7 @@ def test_a_pass_shows_the_same_pairs_as_from_one_job(clips, tmp_path, monkeypatc
         np.testing.assert_allclose(a.y, b.y, rtol=1e-5, atol=2e-5)
 
 
-def test_its_statistics_and_limits_are_those_of_one_job(clips, tmp_path):
+def test_statistics_and_limits_equal_those_of_an_unsharded_database(clips, tmp_path):
     one = write_database(tmp_path / "one", clips, SPLITS, sources=SOURCES, **OPTIONS)
     many = in_shards(tmp_path, clips, SPLITS, ["gb", "e", "ad", "cf"], sources=SOURCES)
     found = Database.open(many)
@@ -95,14 +97,14 @@ def test_its_statistics_and_limits_are_those_of_one_job(clips, tmp_path):
     assert sorted(found.clips) == sorted(SPLITS)
 
 
-def test_one_shard_is_the_database_of_one_job(clips, tmp_path):
+def test_a_single_shard_equals_an_unsharded_database(clips, tmp_path):
     write_database(tmp_path / "one", clips, SPLITS, sources=SOURCES, **OPTIONS)
     in_shards(tmp_path / "many", clips, SPLITS, [list(clips)], sources=SOURCES)
     assert contents(tmp_path / "many" / "db") == contents(tmp_path / "one")
 
 
 @pytest.mark.parametrize(("dtype", "relative"), [("float16", 2.0**-11), ("bfloat16", 2.0**-8)])
-def test_half_precision_is_rounded_twice_and_not_more(clips, tmp_path, dtype, relative):
+def test_values_in_half_precision_are_rounded_at_most_twice(clips, tmp_path, dtype, relative):
     """Once by the statistics of the shard, once by those of the database."""
     groups = ["ab", "cde", "fg"]
     full = a_pass(in_shards(tmp_path / "full", clips, SPLITS, groups), "train", DISK)
@@ -128,7 +130,7 @@ def test_a_new_clip_changes_its_shard_and_the_merge_only(clips, tmp_path):
     assert contents(tmp_path / "db") == contents(other)
 
 
-def test_the_rows_are_not_copied_and_a_shard_made_again_leaves_the_database_as_it_is(clips, tmp_path):
+def test_rows_are_linked_and_a_remade_shard_does_not_change_the_database(clips, tmp_path):
     db = in_shards(tmp_path, clips, SPLITS, ["abcd", "efg"])
     before = contents(db)
     chunks = list((tmp_path / "shards").rglob("*.safetensors"))
@@ -154,7 +156,7 @@ def test_rows_of_all_shards_are_mixed_like_independent_draws(rows_of, tmp_path):
     assert 0.85 < means.var() * 32 < 1.15
 
 
-def test_shards_refuse_what_one_job_refuses(clips, tmp_path, rows_of):
+def test_shards_refuse_the_same_bad_clips(clips, tmp_path, rows_of):
     with pytest.raises(HobbleError, match="nothing to train on"):
         in_shards(tmp_path, clips, dict.fromkeys(clips, "held_out"), ["abc", "defg"])
     other = replace(rows_of("z", 0), layout=RowLayout(3, window=30, channels=(("injury", 2),)))
@@ -183,7 +185,7 @@ def test_scales_of_other_shards_are_refused(clips, tmp_path):
         Database.open(db)
 
 
-def test_a_job_holds_no_more_where_there_are_more_shards(rows_of, tmp_path, monkeypatch):
+def test_the_memory_of_a_job_does_not_grow_with_the_shards(rows_of, tmp_path, monkeypatch):
     monkeypatch.setattr(plan, "BUCKET_BYTES", 100_000)
     files = {}
     for number in range(16):

@@ -16,7 +16,7 @@ PUBLISHED = {31: 7.12e9, 191: 10.4e9}  # bytes; the larger figure's with a quart
 
 @pytest.mark.parametrize("dtype", ["float32", "bfloat16"])
 @pytest.mark.parametrize("joints", PUBLISHED)
-def test_the_released_data_would_take_what_its_share_of_flat_rows_says(rows_of, tmp_path, joints, dtype):
+def test_the_size_of_the_released_data_follows_from_its_share_of_flat_rows(rows_of, tmp_path, joints, dtype):
     layout, frames = RowLayout(joints), 1000
     flat = round(frames * RELEASED_FLAT)
 

@@ -35,7 +35,7 @@ def written_out(rows: ClipRows) -> tuple[np.ndarray, np.ndarray]:
 
 @given(st.integers(1, 40), st.integers(0, 99), st.sampled_from([1, 10, None]))
 @settings(max_examples=15, deadline=None)
-def test_moments_are_those_of_every_pair_written_out(rows_of, size, seed, fits):
+def test_moments_equal_those_of_all_pairs_written_out(rows_of, size, seed, fits):
     rows = rows_of(rows=size, fits=fits, seed=seed)
     for moments, values in zip(clip_moments(rows, rows.layout), written_out(rows), strict=True):
         assert moments.weight == size
@@ -45,7 +45,7 @@ def test_moments_are_those_of_every_pair_written_out(rows_of, size, seed, fits):
 
 @given(st.lists(st.integers(0, 9), min_size=1, max_size=6), st.integers(0, 99))
 @settings(max_examples=25, deadline=None)
-def test_parts_merge_into_the_whole_in_any_cut(cuts, seed):
+def test_moments_of_parts_add_up_to_those_of_the_whole(cuts, seed):
     rng = np.random.default_rng(seed)
     parts = [rng.normal(1e6, 1.0, (n, 3)) for n in cuts]
     weights = [rng.random(n) + 0.1 for n in cuts]
@@ -66,7 +66,7 @@ def test_a_long_clip_in_batches_gives_the_same_moments(rows_of, monkeypatch):
         np.testing.assert_allclose(a.squares, b.squares, rtol=1e-9)
 
 
-def test_deviations_are_shared_in_the_originals_groups_and_weighed(rows_of, layout):
+def test_deviations_are_shared_in_the_groups_of_the_original_and_weighted(rows_of, layout):
     rows = rows_of(rows=300, fits=10)
     x, y = clip_moments(rows, rows.layout)
     s = finish(layout, x, y, 0.1, [1])
@@ -103,19 +103,19 @@ def test_nothing_is_ever_divided_by_zero(rows_of, layout):
     assert (s.x_std[layout.x_terrain] == np.float32(SILENT)).all()  # always flat: heights mean nothing yet
 
 
-def test_a_gait_never_seen_takes_its_groups_deviation(layout):
+def test_a_gait_without_rows_has_the_deviation_of_its_group(layout):
     std = np.ones(layout.x_size)
     std[layout.x_gait] = np.repeat([0.6, 0.6, 0, 0, 0, 0], layout.samples)
     np.testing.assert_allclose(grouped(std, x_groups(layout), SILENT)[layout.x_gait], 0.2)
 
 
-def test_severities_share_one_deviation_and_unknown_ones_are_silent():
+def test_severities_share_one_deviation_and_unused_ones_are_scaled_to_0():
     out = channel("injury").deviation(np.array([3.0, 0.0, 4.0]))
     np.testing.assert_allclose(out, [5.0, SILENT, 5.0])
     np.testing.assert_allclose(channel("injury").deviation(np.array([0.01, 0.0])), [1.0, SILENT])
 
 
-def test_without_links_the_severities_leave_no_trace(rows_of, layout):
+def test_without_the_channel_severities_change_no_statistics(rows_of, layout):
     healthy = RowLayout(layout.joints)
     moments = clip_moments(rows_of(rows=30), healthy)
     s = finish(healthy, *moments, 0.1, [])

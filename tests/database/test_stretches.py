@@ -7,7 +7,7 @@ from itertools import accumulate, chain, pairwise, product
 import numpy as np
 import pytest
 
-from hobble.database.stretches import Sharing, Stretch
+from hobble.database.stretches import SampleRange, Sharing
 
 
 def read(sharing: Sharing) -> list[list[int]]:
@@ -26,7 +26,7 @@ def read(sharing: Sharing) -> list[list[int]]:
 
 @pytest.mark.parametrize("total", [1, 7, 64, 65, 95, 96, 97, 1000])
 @pytest.mark.parametrize(("batch", "most"), [(1, 1), (6, 4), (32, 5)])
-def test_the_content_of_a_batch_depends_only_on_the_stretches(total, batch, most):
+def test_a_batch_depends_only_on_the_number_of_ranges(total, batch, most):
     for stretches, processes in product(range(1, most + 1), repeat=2):
         alone = read(Sharing.of(total, batch, stretches))
         assert sorted(chain(*alone)) == list(range(total))
@@ -35,11 +35,11 @@ def test_the_content_of_a_batch_depends_only_on_the_stretches(total, batch, most
         assert [list(chain(*parts)) for parts in zip(*shared, strict=True)] == alone
 
 
-def test_one_stretch_is_the_order_of_the_section():
+def test_with_one_range_samples_keep_the_order_of_the_section():
     assert list(chain(*read(Sharing.of(95, 32)))) == list(range(95))
 
 
-def test_with_as_many_stretches_as_processes_each_reads_one_of_its_own():
+def test_with_as_many_ranges_as_processes_each_reads_its_own_range():
     found = [Sharing.of(1000, 32, 4, rank, 4).read() for rank in range(4)]
     assert all(len(stretches) == 1 for stretches in found)
     assert [s.high - s.low for (s,) in found] == [s.share for (s,) in found] == [8] * 4
@@ -47,8 +47,8 @@ def test_with_as_many_stretches_as_processes_each_reads_one_of_its_own():
     assert edges == [(0, 256), (256, 504), (504, 752), (752, 1000)]
 
 
-def test_samples_of_a_stretch_are_kept_wherever_it_is_cut():
-    stretch = Stretch(10, 33, 5, 1, 4)
+def test_the_samples_of_a_range_do_not_depend_on_the_blocks_that_are_read():
+    stretch = SampleRange(10, 33, 5, 1, 4)
     whole = np.arange(23)[stretch.kept(0, 23)]
     cuts = list(accumulate([0, 3, 9, 1, 10]))
     parts = [np.arange(a, b)[stretch.kept(a, b - a)] for a, b in pairwise(cuts)]

@@ -5,9 +5,12 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from hobble.evaluation.captured import captured, captured_clips, root_path, unbroken
+from hobble.evaluation.captured import captured, root_path, unbroken
 from hobble.evaluation.motion_measures import acceleration, in_root_frame
+from hobble.measures.chosen import captured_motion
+from hobble.measures.sample import Sample, Stratum
 from hobble.rows.clip_rows import ClipRows, save_clip_rows
+from hobble.rows.excerpts import Excerpt
 from hobble.rows.layout import GAITS, RowLayout
 
 LAYOUT = RowLayout(3, channels=(("injury", 2),))
@@ -54,7 +57,7 @@ def rows(world) -> ClipRows:
     return ClipRows("a", LAYOUT, {}, x, y, phase, {"injury": severity}, frame, 0 * frame, fits, heights, mean)
 
 
-def test_motion_round_trips(rows, world) -> None:
+def test_captured_motion_is_recovered_from_its_rows(rows, world) -> None:
     (found,) = captured(rows)
     assert len(found) == FRAMES
     yaw, root, joints = world["yaw"], world["root"][:-1], world["joints"][:-1]
@@ -69,7 +72,7 @@ def test_motion_round_trips(rows, world) -> None:
     np.testing.assert_array_equal(found.channels["injury"], rows.channels["injury"])
 
 
-def test_a_gap_separates_stretches(rows, tmp_path) -> None:
+def test_a_gap_in_the_frames_separates_two_stretches(rows, tmp_path) -> None:
     rows.frame[30:] += 2
     first, second = captured(rows)
     assert (len(first), len(second)) == (30, 20)
@@ -77,8 +80,10 @@ def test_a_gap_separates_stretches(rows, tmp_path) -> None:
     assert second.rows[0] == 30
     save_clip_rows(tmp_path / "b.npz", rows)
     save_clip_rows(tmp_path / "a.npz", rows)
-    paths = [tmp_path / "b.npz", tmp_path / "a.npz"]
-    assert [len(c) for c in captured_clips(paths)] == [30, 20, 30, 20]
+    paths = {name: tmp_path / f"{name}.npz" for name in "ba"}
+    assert [len(c) for c in captured_motion(paths, None)] == [30, 20, 30, 20]
+    part = Sample((Stratum("train", 2, 100, (Excerpt("a", 20, 15, 50),)),), 2)
+    assert [len(c) for c in captured_motion(paths, part)] == [10, 5]
 
 
 def test_no_rows_give_no_motion() -> None:

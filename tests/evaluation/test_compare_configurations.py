@@ -15,10 +15,10 @@ from hypothesis import strategies as st
 
 from hobble.core.errors import InputError
 from hobble.evaluation.compare_configurations import compare
-from hobble.evaluation.compare_tables import tables
+from hobble.evaluation.comparison_csv import tables
 from hobble.evaluation.configuration_results import read_results
+from hobble.evaluation.csv_tables import write_csv
 from hobble.evaluation.series import difference, line
-from hobble.evaluation.tables import write_csv
 from hobble.measures.responsivity.run import parameter_counts
 
 SIZES = {
@@ -122,7 +122,7 @@ def compared(tmp_path: Path, published: dict[str, Any]) -> dict[str, Any]:
     return compare(found, published)
 
 
-def test_the_counts_are_those_of_table_6_1(compared, published) -> None:
+def test_parameter_counts_equal_table_6_1(compared, published) -> None:
     """The published numbers follow from the layers."""
     for row in published["computations"]:
         counts = parameter_counts(row["sizes"])
@@ -138,7 +138,7 @@ def test_the_counts_are_those_of_table_6_1(compared, published) -> None:
     assert holden["weights_bytes"] == {"constant": 119_563_000, "linear": 23_912_600, "cubic": 9_565_040}
 
 
-def test_the_line_is_found_again(compared) -> None:
+def test_the_fit_recovers_the_line_of_the_frame_times(compared) -> None:
     fits = {(f["whose"], f["mode"], f["step"], f["computations"]): f for f in compared["milliseconds"]["fit"]}
     for k, mode in enumerate(MODES, 1):
         fit = fits["hobble", mode, "total", "true"]
@@ -153,7 +153,7 @@ def test_the_line_is_found_again(compared) -> None:
     assert theirs["points"] == 4
 
 
-def test_each_pair_on_what_both_were_measured_on(compared) -> None:
+def test_a_pair_is_compared_on_the_clips_that_both_have(compared) -> None:
     found = {(d["a"], d["b"], d["over"]): d["difference"] for d in compared["difference"]}
     # No clip is held out, and `ava` has no clip `a`.
     assert set(found) == {
@@ -169,7 +169,7 @@ def test_each_pair_on_what_both_were_measured_on(compared) -> None:
     assert times["holden", "holden-xl", "cubic"] == pytest.approx(2 * 2 * apart / 0.2)
 
 
-def test_eq_3_2_divides_by_the_deviations_of_frames_and_of_means(compared) -> None:
+def test_equation_3_2_divides_by_the_deviations_of_frames_and_of_means(compared) -> None:
     found = {(d["a"], d["b"], d["over"]): d for d in compared["difference"]}
     row = found["holden", "holden-xl", "train"]  # clips of .04 and .02, and of .03 and .02
     assert (row["sd_a"], row["sd_b"]) == (0.02, 0.02)
@@ -187,7 +187,7 @@ def test_eq_3_2_divides_by_the_deviations_of_frames_and_of_means(compared) -> No
     assert [(r["configuration"], r["published"], r["ours"]) for r in laps] == [("holden", 0.0173, None)]
 
 
-def test_a_published_figure_stands_beside_its_own_configuration_only(compared, published) -> None:
+def test_a_published_figure_is_listed_with_its_own_configuration_only(compared, published) -> None:
     of = {
         (row["configuration"], value)
         for kind in ("accuracy", "responsivity", "modes", "stages", "computations")
@@ -204,7 +204,7 @@ def test_a_published_figure_stands_beside_its_own_configuration_only(compared, p
     assert {(row["configuration"], row["ours"]) for row in predictions} == {("ferre", None)}
 
 
-def test_tables_hold_the_same_whatever_columns_each_has(compared, tmp_path) -> None:
+def test_tables_with_different_columns_survive_csv(compared, tmp_path) -> None:
     found = tables(compared)
     rows = {}
     for name, table in found.items():
@@ -241,7 +241,7 @@ def test_tables_hold_the_same_whatever_columns_each_has(compared, tmp_path) -> N
     json.dumps(compared, allow_nan=False)
 
 
-def test_published_clips_stand_beside_ours_of_the_same_name(tmp_path, published) -> None:
+def test_published_clips_are_listed_with_ours_of_the_same_name(tmp_path, published) -> None:
     clips = {"LocomotionFlat04_000": 0.03, "LocomotionFlat04_000_mirror": 0.07, "walk": 0.05}
     found = compare([read_results("a", left_behind(tmp_path, "a", clips, SIZES["holden"]))], published)
     rows = [r for r in found["against_published"] if "LocomotionFlat04" in r["measure"]]
@@ -251,7 +251,7 @@ def test_published_clips_stand_beside_ours_of_the_same_name(tmp_path, published)
     ]
 
 
-def test_published_times_and_sizes_stand_beside_what_they_are_of(compared) -> None:
+def test_published_times_and_sizes_are_listed_with_their_measure(compared) -> None:
     """The published size is compared with the database that training reads, the time with that of the
     stage.
     """
@@ -266,7 +266,7 @@ def test_published_times_and_sizes_stand_beside_what_they_are_of(compared) -> No
     assert "database" not in {measure for measure, _ in times}
 
 
-def test_one_configuration_alone(tmp_path, published) -> None:
+def test_one_configuration_alone_has_no_differences(tmp_path, published) -> None:
     found = compare(
         [read_results("holden", left_behind(tmp_path, "holden", {"a": 0.1}, SIZES["holden"]))], published
     )
@@ -286,7 +286,9 @@ NUMBER = st.floats(-1e3, 1e3)
 
 
 @given(NUMBER, st.floats(0.01, 10), NUMBER, st.floats(0.01, 10), st.floats(0.1, 10))
-def test_a_difference_has_no_unit_and_no_order(a: float, sa: float, b: float, sb: float, k: float) -> None:
+def test_a_difference_depends_neither_on_the_unit_nor_on_the_order(
+    a: float, sa: float, b: float, sb: float, k: float
+) -> None:
     found = difference(a, sa, b, sb)
     assert found == difference(b, sb, a, sa)
     assert found == pytest.approx(difference(k * a, k * sa, k * b, k * sb))
@@ -294,7 +296,7 @@ def test_a_difference_has_no_unit_and_no_order(a: float, sa: float, b: float, sb
     assert difference(a, 0, b, 0) is None
 
 
-def test_lines() -> None:
+def test_a_line_is_fitted_to_points() -> None:
     assert line([1, 1], [2, 3]) is None
     assert line([1, 2, 3], [2, 2, 2])["r2"] is None
     assert line([0, 1, 2], [1, 3, 5]) == pytest.approx({"slope": 2, "intercept": 1, "r2": 1, "points": 3})

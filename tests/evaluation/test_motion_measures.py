@@ -21,7 +21,7 @@ from hobble.evaluation.motion_measures import (
 )
 
 
-def test_slide_is_the_distance_of_the_toe_in_stance() -> None:
+def test_foot_slide_is_the_distance_that_the_toe_moves_in_stance() -> None:
     frames = 40
     contacts = np.zeros((frames, 4))
     contacts[5:15, 1] = 1.0
@@ -57,7 +57,7 @@ def test_largest_turn_finds_the_one_joint_and_frame() -> None:
     assert largest_turn(rotations[:1]) == 0
 
 
-def test_bend_and_asymmetry() -> None:
+def test_bend_and_asymmetry_of_known_poses_are_exact() -> None:
     a, b, c = np.array([[0, 2.0, 0], [0, 1.0, 0], [0, 1.0, 1.0]])
     assert bend(a, b, c) == pytest.approx(90)
     assert bend(a, b, 2 * b - a) == pytest.approx(0, abs=1e-4)
@@ -66,13 +66,13 @@ def test_bend_and_asymmetry() -> None:
     assert asymmetry(0.0, 0.0) is None
 
 
-def test_acceleration_of_a_parabola() -> None:
+def test_the_acceleration_of_a_parabola_is_constant() -> None:
     t = np.arange(5.0)
     positions = np.stack([0.5 * t**2, t, 0 * t], axis=-1)[:, None]
     np.testing.assert_allclose(acceleration(positions), 1.0)
 
 
-def test_root_frame_is_turned_and_moved() -> None:
+def test_poses_in_the_root_frame_do_not_depend_on_place_and_heading() -> None:
     yaw = np.array([0.0, 0.9])
     root = np.array([[0, 0, 0], [5.0, 0, -3]])
     body = np.array([[1.0, 2, 3], [-1, 0, 4]])
@@ -80,7 +80,7 @@ def test_root_frame_is_turned_and_moved() -> None:
     np.testing.assert_allclose(in_root_frame(world, root, yaw), [body, body], atol=1e-12)
 
 
-def test_gait_measures_of_a_known_walk(holden31: Skeleton) -> None:
+def test_cadence_stance_and_step_length_of_a_known_walk_are_exact(holden31: Skeleton) -> None:
     """A figure with a stiff right knee, an arm that swings through 40 degrees and a trunk that leans."""
     frames = 240
     t = 2 * np.pi * np.arange(frames) / 60

@@ -8,9 +8,9 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from hobble.evaluation.soak import LIMITS, Slides, grounds, soak
+from hobble.evaluation.soak import LIMITS, StanceSlides, grounds, soak
 from hobble.models.pfnn.network import Pfnn
-from hobble.models.seen import Seen
+from hobble.models.seen import SeenInTraining
 from hobble.runtime import controller, feet
 
 HIPS = 93.0  # cm above the ground, of the figures of `mean_output`
@@ -24,7 +24,7 @@ def on_its_feet(network: Pfnn) -> Pfnn:
     x[network.layout.x_direction][network.layout.samples :] = 1
     x[network.layout.x_gait].reshape(-1, network.layout.samples)[1] = 1
     x[network.layout.x_joint_position] = mean[network.layout.y_joint_position]
-    seen = Seen(x - 50, x + 50, mean - 8, mean + 8, x, mean, start_phase=0.3, fastest=9.0)
+    seen = SeenInTraining(x - 50, x + 50, mean - 8, mean + 8, x, mean, start_phase=0.3, fastest=9.0)
     return replace(network, y_mean=mean, seen=seen)
 
 
@@ -38,14 +38,17 @@ def test_hips_stay_above_the_ground_under_them(hurtable: Pfnn) -> None:
 
 
 def test_hips_without_ground_under_them_are_found(hurtable: Pfnn, monkeypatch: pytest.MonkeyPatch) -> None:
-    still = {name: getattr(feet, name) for name in ("leg_joints", "sole_heights", "carried", "place_feet")}
+    still = {
+        name: getattr(feet, name)
+        for name in ("leg_joints", "sole_heights", "carried", "knees_ahead", "place_feet")
+    }
     monkeypatch.setattr(controller, "feet", SimpleNamespace(**still, carry_body=lambda *_: None))
     found = soak(on_its_feet(hurtable), 20, 150)
     assert found["hips_lowest_cm"] < HIPS - 10
     assert found["hips_highest_cm"] > HIPS + 10
 
 
-def test_a_leg_that_snaps_is_seen(hurtable: Pfnn, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_leg_that_snaps_is_found(hurtable: Pfnn, monkeypatch: pytest.MonkeyPatch) -> None:
     whole = soak(on_its_feet(hurtable), 8, 150)
     assert whole["added_turn_degrees"] <= LIMITS["added_turn_degrees"]
     plain = feet.place_feet
@@ -54,7 +57,10 @@ def test_a_leg_that_snaps_is_seen(hurtable: Pfnn, monkeypatch: pytest.MonkeyPatc
         plain(*given)
         given[-1][3, 1] = np.roll(given[-1][3, 1], 1)  # a joint of the fourth character is turned about
 
-    still = {name: getattr(feet, name) for name in ("leg_joints", "sole_heights", "carried", "carry_body")}
+    still = {
+        name: getattr(feet, name)
+        for name in ("leg_joints", "sole_heights", "carried", "knees_ahead", "carry_body")
+    }
     turns = iter(range(10**6))
     monkeypatch.setattr(
         controller,
@@ -67,8 +73,8 @@ def test_a_leg_that_snaps_is_seen(hurtable: Pfnn, monkeypatch: pytest.MonkeyPatc
     assert not found["holds"]
 
 
-def test_slides_are_those_of_whole_stances() -> None:
-    slides = Slides(np.zeros((1, 2)), np.zeros((1, 2), int))
+def test_slides_are_measured_over_whole_stances() -> None:
+    slides = StanceSlides(np.zeros((1, 2)), np.zeros((1, 2), int))
     before = np.zeros((1, 2, 3))
     for k in range(8):
         toes = before + np.array([[0.5, 1.0, 0.0], [0.0, 0.0, 0.0]])
@@ -77,7 +83,7 @@ def test_slides_are_those_of_whole_stances() -> None:
     np.testing.assert_allclose(np.concatenate(slides.done), [2.5])  # the right foot's contact was too short
 
 
-def test_grounds_are_of_many_kinds() -> None:
+def test_random_grounds_are_flat_sloping_and_steep() -> None:
     ground = grounds(200, np.random.default_rng(1))
     x = np.linspace(-400, 400, 801)
     tall = [np.ptp(ground(x + 4e4 * c, 0 * x)) for c in range(200)]

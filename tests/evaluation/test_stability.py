@@ -13,7 +13,7 @@ from hobble.evaluation.stability import KINDS, LIMITS, stability, stretches
 from hobble.models.load import load_network
 
 
-def test_every_kind_is_asked_for() -> None:
+def test_the_script_has_every_kind_of_target() -> None:
     script = list(stretches(10.0))
     assert sum(s.frames for s in script) == 10 * 3600
     assert {s.kind for s in script} == set(KINDS)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import re
 import secrets
 import sys
 import tempfile
@@ -32,33 +33,35 @@ KINDS: dict[Callable[[Lab, Random], Throw], int] = {
     runs.touched: 1,
 }
 TEXTS_PER_ROUND = 5
-COLUMNS = (REFUSED, REMADE, UNHARMED, SKIPPED, FAULT)
+OUTCOMES = (REFUSED, REMADE, UNHARMED, SKIPPED, FAULT)
 PAGE = ROOT / "docs/faults.md"
 BEGIN, END = "<!-- what was thrown -->", "<!-- end of what was thrown -->"
 
 
 def main() -> int:
-    """Make the faults, print the results, write the table. Exit status 1 if Hobble failed at one."""
+    """Make the faults, print the results, write the list. Exit status 1 if Hobble failed at one."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0], prog="python -m tests.faults")
     parser.add_argument("--rounds", type=int, default=100)
     parser.add_argument("--seed", type=int, default=secrets.randbelow(10**6))
     parser.add_argument("--only", type=int, help="this one round of the seed")
-    parser.add_argument("--table", action="store_true", help=f"write the table into {PAGE.relative_to(ROOT)}")
-    asked = parser.parse_args()
-    print(f"seed {asked.seed}", flush=True)
+    parser.add_argument("--page", action="store_true", help=f"write the list into {PAGE.relative_to(ROOT)}")
+    arguments = parser.parse_args()
+    print(f"seed {arguments.seed}", flush=True)
     with tempfile.TemporaryDirectory(prefix="faults-") as scratch:
         Path(scratch).chmod(0o755)
         lab = Lab(Path(scratch) / "lab", fresh=True)
         lab.undisturbed(TARGET)
         print(f"{len(lab.jobs)} jobs of an undisturbed run are ready", flush=True)
-        thrown = _rounds(lab, asked.seed, range(asked.rounds) if asked.only is None else [asked.only])
-        if asked.only is None:
-            thrown += _texts(lab, Path(scratch), asked.seed, asked.rounds * TEXTS_PER_ROUND)
+        thrown = _rounds(
+            lab, arguments.seed, range(arguments.rounds) if arguments.only is None else [arguments.only]
+        )
+        if arguments.only is None:
+            thrown += _texts(lab, Path(scratch), arguments.seed, arguments.rounds * TEXTS_PER_ROUND)
             thrown += attacks.thrown(Path(scratch))
-    table = _table(thrown)
-    print(table)
-    if asked.table:
-        _write(f"make faults N={asked.rounds} SEED={asked.seed}", table)
+    listed = _list(thrown)
+    print(listed)
+    if arguments.page:
+        _write(f"make faults N={arguments.rounds} SEED={arguments.seed}", listed)
     faults = [throw for throw in thrown if throw.happened == FAULT]
     print(f"{len(thrown)} thrown, {len(faults)} faults")
     return 1 if faults else 0
@@ -99,26 +102,29 @@ def _texts(lab: Lab, folder: Path, seed: int, examples: int) -> list[Throw]:
     return thrown
 
 
-def _table(thrown: list[Throw]) -> str:
-    counts: dict[tuple[str, str], Counter[str]] = defaultdict(Counter)
+def _list(thrown: list[Throw]) -> str:
+    counts: dict[str, Counter[str]] = defaultdict(Counter)
     for throw in thrown:
-        counts[throw.what, throw.at][throw.happened] += 1
-    rows = [
-        f"| {what} | {at} | {sum(found.values())} | "
-        + " | ".join(str(found[c] or "") for c in COLUMNS)
-        + " |"
-        for (what, at), found in sorted(counts.items())
-    ]
-    head = ["| thrown | at | times | " + " | ".join(COLUMNS) + " |", "|---" * (3 + len(COLUMNS)) + "|"]
-    total = Counter(throw.happened for throw in thrown)
-    last = f"| all | | {len(thrown)} | " + " | ".join(str(total[c] or "") for c in COLUMNS) + " |"
-    return "\n".join([*head, *rows, last])
+        counts[_kind(throw.what)][throw.happened] += 1
+        counts["In all"][throw.happened] += 1
+    happened = {
+        kind: ", ".join(f"{found[c]} {c}" for c in OUTCOMES if found[c]) for kind, found in counts.items()
+    }
+    last = happened.pop("In all", "nothing")
+    return "\n".join([*(f"- {kind}: {happened[kind]}" for kind in sorted(happened)), f"- In all: {last}"])
 
 
-def _write(command: str, table: str) -> None:
+def _kind(what: str) -> str:
+    """The line of the list. Faults that differ only in number, kind of damage or leftovers share one."""
+    if what.startswith("bytes "):
+        return "damaged bytes of a file"
+    return re.sub(r" with \d+ mutations?$", " with mutations", what).split(", ")[0]
+
+
+def _write(command: str, listed: str) -> None:
     text = PAGE.read_text(encoding="utf-8")
     before, after = text.split(BEGIN)[0], text.split(END)[1]
-    PAGE.write_text(f"{before}{BEGIN}\nMade by `{command}`:\n\n{table}\n{END}{after}", encoding="utf-8")
+    PAGE.write_text(f"{before}{BEGIN}\nMade by `{command}`:\n\n{listed}\n{END}{after}", encoding="utf-8")
 
 
 if __name__ == "__main__":

@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from hobble.core.skeleton import Skeleton
-from hobble.synthetic.clip import write_clip
+from hobble.synthetic.generate_clip import write_clip
 from hobble.synthetic.options import Synthetic
 
 from .texts import base_bvh

@@ -22,7 +22,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from hobble.workflow.batches import family_of
+from hobble.workflow.clip_batches import family_of
 
 from .same import same
 

@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from hobble.config.load import Catalogue
+from hobble.config.load_configuration import Catalogue
 from hobble.core.clip import load_clip
 from hobble.core.errors import InputError
 from hobble.core.files import load_npz, read_json
@@ -22,7 +22,7 @@ from hobble.models import checks
 from hobble.models.load import load_network
 from hobble.motion.rig import load_skeleton
 from hobble.terrain.heightmaps import heightmaps, read_heights
-from hobble.terrain.options import Heightmap
+from hobble.terrain.options import HeightmapOptions
 
 from .refusals import MB, refused, write
 
@@ -74,7 +74,7 @@ def test_a_damaged_array_header_is_refused(tmp_path: Path, what: str) -> None:
     refused(lambda: read_heights(path), "a.npy: not an array file", mb=100, letters=400)
 
 
-def test_one_byte_numbers_do_not_fill_the_memory(tmp_path: Path) -> None:
+def test_arrays_of_one_byte_numbers_are_limited_in_memory(tmp_path: Path) -> None:
     """A megabyte of compressed bytes that unpacks to a gigabyte of one-byte heights or weights."""
     path = tmp_path / "a.npz"
     side = 9000
@@ -85,7 +85,7 @@ def test_one_byte_numbers_do_not_fill_the_memory(tmp_path: Path) -> None:
     refused(lambda: checks.numbers("a.npz", arrays, "W0", 3), "W0 holds 81000000 numbers")
 
 
-def test_a_layer_of_the_release_is_no_larger_than_it_may_be(tmp_path: Path) -> None:
+def test_a_layer_of_the_release_that_is_too_large_is_refused(tmp_path: Path) -> None:
     """Sparse files of many gigabytes."""
     for name in ("Xmean", "Xstd", "Ymean", "Ystd", "b0_000"):
         write(tmp_path / f"{name}.bin", bytes(4 << 16))
@@ -97,12 +97,12 @@ def test_a_layer_of_the_release_is_no_larger_than_it_may_be(tmp_path: Path) -> N
 @pytest.mark.parametrize("text", ["1e308 2\n3 4\n", "nan 2\n3 -1e9\n"])
 def test_impossible_heights_are_refused(tmp_path: Path, text: str) -> None:
     path = write(tmp_path / "a.txt", text)
-    entry = Heightmap.model_validate({"kind": "file", "path": "a.txt"})
+    entry = HeightmapOptions.model_validate({"kind": "file", "path": "a.txt"})
     refused(lambda: heightmaps([entry], [path], cell=4.0, height_scale=10.0), "a.txt: a height of")
 
 
 @pytest.mark.parametrize(("kind", "value"), [(3, (7, 8)), (2, "none"), (7, b"\xff")])
-def test_any_no_data_tag_is_handled(tmp_path: Path, kind: int, value: Any) -> None:
+def test_any_no_data_value_of_a_geotiff_is_handled(tmp_path: Path, kind: int, value: Any) -> None:
     from PIL import Image, TiffImagePlugin
 
     tags = TiffImagePlugin.ImageFileDirectory_v2()
@@ -149,7 +149,7 @@ def test_entries_that_share_bytes_are_not_read_as_often_as_they_are_listed(tmp_p
 
 
 @pytest.mark.parametrize("kind", [zipfile.ZIP_BZIP2, zipfile.ZIP_LZMA])
-def test_arrays_are_packed_as_numpy_packs_them(tmp_path: Path, kind: int) -> None:
+def test_a_file_of_arrays_has_the_layout_that_numpy_writes(tmp_path: Path, kind: int) -> None:
     path = zipped(tmp_path / "a.npz", {"heights.npy": npy((4, 4), bytes(128))}, kind)
     refused(lambda: load_npz(path), "a.npz: damaged", "compressed in a way that NumPy does not use")
 
@@ -193,7 +193,7 @@ def test_an_image_of_too_many_pixels_is_refused_before_it_is_unpacked(tmp_path: 
         refused(lambda p=path: read_heights(p), "map.png: ", mb=64)
 
 
-def test_an_image_that_says_it_is_huge_is_not_decoded(tmp_path: Path) -> None:
+def test_an_image_whose_header_claims_a_huge_size_is_not_decoded(tmp_path: Path) -> None:
     def part(kind: bytes, data: bytes) -> bytes:
         return struct.pack(">I", len(data)) + kind + data + struct.pack(">I", zlib.crc32(kind + data))
 

@@ -53,7 +53,7 @@ def test_the_longest_allowed_chain_of_joints_is_read(tmp_path: Path) -> None:
     refused(make, "a.bvh: the parts of this rig are in doubt: ", more, letters=6000)
 
 
-def test_joints_without_channels_cost_memory_too(tmp_path: Path) -> None:
+def test_joints_without_channels_count_towards_the_memory_limit(tmp_path: Path) -> None:
     joints = "".join(f"JOINT j{i}\n{{\nOFFSET 0 1 0\n}}\n" for i in range(4000))
     text = HEADER + joints + "}\nMOTION\nFrames: 20000\nFrame Time: 0.0083\n" + "1\n" * 20_000
     path = write(tmp_path / "a.bvh", text)
@@ -99,7 +99,7 @@ def test_a_frame_may_still_run_over_many_lines(tmp_path: Path) -> None:
     np.testing.assert_array_equal(bvh.read_bvh(path).values, np.arange(30.0).reshape(10, 3))
 
 
-def test_files_without_end_are_not_read(tmp_path: Path) -> None:
+def test_endless_files_are_refused(tmp_path: Path) -> None:
     large = tmp_path / "large.bvh"
     with open(large, "wb") as file:
         file.truncate(bvh.MOST_BYTES + 1)

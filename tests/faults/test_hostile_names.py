@@ -10,7 +10,7 @@ import pytest
 import yaml
 
 from hobble.channels.injury.table import write_statuses
-from hobble.config.load import Catalogue
+from hobble.config.load_configuration import Catalogue
 from hobble.core.errors import HobbleError, InputError
 from hobble.motion.rig import load_skeleton
 from hobble.workflow.project import Project
@@ -95,7 +95,7 @@ def test_a_skeleton_with_an_offset_that_is_no_number_is_refused(tmp_path: Path, 
     assert str(refusal.value).isprintable()
 
 
-def test_of_thousands_of_problems_twenty_are_listed(catalogue: Path) -> None:
+def test_at_most_twenty_of_many_problems_are_listed(catalogue: Path) -> None:
     given = {"skeleton": "holden31", "folder": "mine", **{f"key {i}": 1 for i in range(5000)}}
     write(catalogue / "datasets/mine.yaml", yaml.safe_dump(given))
     refused(
@@ -141,7 +141,7 @@ def test_a_table_writes_beside_the_clips_and_nowhere_else(tmp_path: Path) -> Non
     assert not list(tmp_path.rglob("*_injuries.txt"))
 
 
-def test_links_are_read_through_and_never_written_through(tmp_path: Path) -> None:
+def test_symbolic_links_are_followed_to_read_but_never_to_write(tmp_path: Path) -> None:
     from hobble.core.files import write_text
 
     target = write(tmp_path / "precious", "precious")

@@ -52,7 +52,7 @@ def test_no_name_reaches_a_shell(lab: Lab, tiny_bvh: str) -> None:
     assert all((lab.run / path).is_file() for path in made)
 
 
-def test_a_name_that_cannot_be_one_ends_before_the_first_job(lab: Lab, tiny_bvh: str) -> None:
+def test_an_impossible_name_is_refused_before_the_first_job(lab: Lab, tiny_bvh: str) -> None:
     (lab.run / "mocap/mine/a\ntouch pwned\n.bvh").write_text(tiny_bvh)
     status, said = run(lab, "-np", "results/datasets/mine/database/injury")
     assert status == 1
@@ -60,7 +60,7 @@ def test_a_name_that_cannot_be_one_ends_before_the_first_job(lab: Lab, tiny_bvh:
     assert "Building DAG" not in said
 
 
-def test_a_configuration_makes_no_objects(lab: Lab) -> None:
+def test_yaml_tags_in_a_configuration_make_no_objects(lab: Lab) -> None:
     text = "extends: test\nreport:\n  title: !!python/object/apply:os.system ['touch pwned']\n"
     (lab.run / "config/mine.yaml").write_text(text)
     status, said = run(lab, "-np", "results/mine/report.html")
@@ -108,7 +108,7 @@ def as_nobody(read: Callable[[], object]) -> str:
         "config/skeletons/holden31.yaml",
     ],
 )
-def test_what_decides_on_the_jobs_but_may_not_be_read_is_named(reachable: Path, closed: str) -> None:
+def test_an_unreadable_file_that_planning_needs_is_named(reachable: Path, closed: str) -> None:
     for path, text in {
         "config/datasets/mine.yaml": DATASET,
         "config/test.yaml": "dataset: mine\nchannels: [injury]\n",

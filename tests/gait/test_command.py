@@ -15,7 +15,7 @@ from hobble.gait.__main__ import main
 from hobble.gait.comparison import compare, healthy_profile
 from hobble.gait.graded import HEALTHY
 from hobble.motion.mirror import mirror_clip
-from hobble.synthetic.clip import walk
+from hobble.synthetic.generate_clip import walk
 from hobble.synthetic.recipes import WALK, Segment
 
 
@@ -53,13 +53,13 @@ def test_the_embedded_walker_is_healthy_at_any_speed(walker, speed):
     assert seen.effects["right"]["speed"] == pytest.approx(speed / 125, abs=0.03)
 
 
-def test_any_rig_and_the_other_side(walker):
+def test_a_mirrored_healthy_walk_is_healthy(walker):
     clip = walker(120)
     seen = compare(mirror_clip(clip, "mirrored"), healthy_profile([clip]))
     assert seen.answer.label == "normal"
 
 
-def test_the_command_tells_of_each_clip(walker, file, capsys):
+def test_the_command_prints_a_result_for_each_clip(walker, file, capsys):
     healthy, slow = file(walker(125)), file(walker(80))
     assert main([slow, healthy, "--healthy", healthy, "--side", "left"]) == 0
     said = capsys.readouterr().out
@@ -90,13 +90,13 @@ def test_a_healthy_clip_without_a_step_is_named_too(holden31, walker, file, caps
 
 
 @pytest.mark.parametrize("window", ["0", "-1", "nan", "x"])
-def test_a_window_that_is_no_time_is_refused(walker, file, window, capsys):
+def test_a_window_that_is_not_a_number_of_seconds_is_refused(walker, file, window, capsys):
     with pytest.raises(SystemExit):
         main([file(walker(125)), "--window", window])
     assert "--window" in capsys.readouterr().err
 
 
-def test_other_curves_than_those_known_are_refused(tmp_path, capsys):
+def test_a_file_of_walks_with_unknown_curves_is_refused(tmp_path, capsys):
     path = tmp_path / "walks.npz"
     save_npz(path, gaits=np.array(["normal"]), curves=np.array(["knee"]), scalars=np.array(["speed"]))
     assert derive_people.main([str(path), str(tmp_path / "out.npz")]) == 1

@@ -11,7 +11,7 @@ from hobble.gait.signals import CURVES
 CYCLE, LEG = 60, 81.0
 
 
-def test_landings_stances_and_steps_are_those_that_were_made(holden31, stepper):
+def test_landings_stances_and_steps_of_a_made_walk_are_found(holden31, stepper):
     made = stepper(stance_right=30, stance_left=42, ahead_right=10, ahead_left=30, left_lands=24)
     walk = measure(holden31, made.positions(holden31))
     # the ends of a clip are no landings: what the ankle did beyond is not known
@@ -78,7 +78,7 @@ def swinging(holden31, swinger):
         ("hips_height", 72 / LEG, 0),
     ],
 )
-def test_curves_have_the_means_and_ranges_that_were_made(swinging, name, mean, whole):
+def test_curves_of_a_made_walk_have_its_means_and_ranges(swinging, name, mean, whole):
     for cycle in swinging.right:
         curve = cycle.curves[CURVES.index(name)]
         assert curve.shape == (SAMPLES,)
@@ -86,13 +86,13 @@ def test_curves_have_the_means_and_ranges_that_were_made(swinging, name, mean, w
         assert curve.mean() == pytest.approx(mean, abs=1e-6)
 
 
-def test_phase_zero_is_the_landing(swinging):
+def test_phase_0_is_the_landing_of_the_foot(swinging):
     curve = swinging.right[0].curves[CURVES.index("hip_flexion_R")]
     assert np.argmax(curve) == 0
     assert np.argmin(curve) == SAMPLES // 2
 
 
-def test_place_size_and_direction_of_a_walk_do_not_matter(holden31, stepper):
+def test_cycles_do_not_depend_on_place_size_and_direction(holden31, stepper):
     positions = stepper(ahead_left=35).positions(holden31)
     turn = np.radians(130)
     rotation = np.array([[np.cos(turn), 0, np.sin(turn)], [0, 1, 0], [-np.sin(turn), 0, np.cos(turn)]])
@@ -103,7 +103,7 @@ def test_place_size_and_direction_of_a_walk_do_not_matter(holden31, stepper):
         np.testing.assert_allclose(a.curves, b.curves, atol=1e-6)
 
 
-def test_the_frame_rate_hardly_matters(holden31, stepper):
+def test_cycles_hardly_depend_on_the_frame_rate(holden31, stepper):
     positions = stepper(stance_left=42).positions(holden31)
     at = np.arange(2 * len(positions) - 1) / 2
     low, share = np.floor(at).astype(int), (at % 1)[:, None, None]
@@ -128,11 +128,11 @@ def on_a_circle(positions):
 
 
 @pytest.mark.parametrize("change", [standing, backward, on_a_circle, lambda p: p[:20], lambda p: p[:1]])
-def test_what_is_no_walk_straight_ahead_has_no_cycle(holden31, stepper, change):
+def test_only_straight_walking_has_cycles(holden31, stepper, change):
     assert len(measure(holden31, change(stepper().positions(holden31)))) == 0
 
 
-def test_a_wide_curve_is_walked_as_well(holden31, stepper):
+def test_a_wide_curve_has_cycles(holden31, stepper):
     positions = stepper().positions(holden31, cycles=8)
     radius = 90 * 360 / 15 / (2 * np.pi)  # 15 degrees a cycle
     angle, out = positions[..., 2] / radius, positions[..., 0] + radius

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from hobble.core.errors import HobbleError
-from hobble.gait.cycles import Walk, measure
-from hobble.gait.effects import effects
+from hobble.gait.cycles import WalkCycles, measure
+from hobble.gait.effect_sizes import effects
 from hobble.gait.features import features
 from hobble.gait.graded import grade
 from hobble.gait.profile import NAMES, mirrored, profile
@@ -44,7 +44,7 @@ def test_the_mirrored_clip_has_the_mirrored_profile(holden31, uneven, mirror):
     assert mirrored(mirrored(own)) == pytest.approx(own)
 
 
-def test_what_is_said_of_the_mirrored_clip_is_the_same_of_the_other_side(holden31, uneven, mirror, healthy):
+def test_effects_of_a_mirrored_clip_are_those_of_the_other_side(holden31, uneven, mirror, healthy):
     own = profile(measure(holden31, uneven))
     other = profile(measure(holden31, mirror(holden31, uneven)))
     beside = mirrored(healthy)
@@ -55,7 +55,7 @@ def test_what_is_said_of_the_mirrored_clip_is_the_same_of_the_other_side(holden3
         assert two.probabilities == pytest.approx(one.probabilities, abs=1e-6)
 
 
-def test_a_walk_beside_itself_differs_in_nothing(holden31, uneven):
+def test_a_walk_compared_with_itself_has_no_effects(holden31, uneven):
     own = profile(measure(holden31, uneven))
     assert set(features(own, own).values()) == {0.0}
     assert recognise(own, own).label == "normal"
@@ -65,7 +65,7 @@ def test_a_walk_beside_itself_differs_in_nothing(holden31, uneven):
     assert all(sizes[name] == 0.0 for name in ("stance", "lean", "lean_hurt", "pelvis_drop", "sway_forward"))
 
 
-def test_effects_are_those_that_were_made(holden31, swinger, healthy):
+def test_effects_of_a_made_limp_are_found(holden31, swinger, healthy):
     even = (3.0, 20.0)
     made = swinger(
         hip={"right": (3.0, 15.0), "left": even},
@@ -87,7 +87,7 @@ def test_effects_are_those_that_were_made(holden31, swinger, healthy):
     assert sizes["pelvis_drop"] == pytest.approx(2.0)
 
 
-def test_a_shorter_stance_and_step_are_the_hurt_legs(holden31, stepper):
+def test_a_shorter_stance_and_step_belong_to_the_hurt_leg(holden31, stepper):
     even, limp = stepper(), stepper(stance_right=30, stance_left=42, ahead_right=10)
     walk, healthy = (profile(measure(holden31, made.positions(holden31))) for made in (limp, even))
     right, left = effects(walk, healthy, "right"), effects(walk, healthy, "left")
@@ -98,16 +98,16 @@ def test_a_shorter_stance_and_step_are_the_hurt_legs(holden31, stepper):
     assert left["step_sound"] == right["step_hurt"]
 
 
-def test_no_cycle_is_refused():
+def test_a_profile_without_cycles_is_refused():
     with pytest.raises(HobbleError, match="no whole cycle"):
-        profile(Walk(60.0, (), ()))
+        profile(WalkCycles(60.0, (), ()))
 
 
 def test_names_are_unique():
     assert len(set(NAMES)) == len(NAMES) == 52
 
 
-def test_features_are_those_that_their_names_say(holden31, stepper):
+def test_each_feature_is_the_difference_that_its_name_says(holden31, stepper):
     even, limp = stepper(), stepper(stance_right=30, stance_left=42, ahead_right=10)
     told = features(*(profile(measure(holden31, made.positions(holden31))) for made in (limp, even)))
     assert told["stance L - R"] == pytest.approx(12 / 60)

@@ -12,7 +12,7 @@ from hobble.core.clip import Clip
 from hobble.core.files import load_npz
 from hobble.gait.comparison import compare, healthy_profile, measure_clip
 from hobble.gait.cycles import SCALARS
-from hobble.gait.effects import EFFECTS, effects_of_people
+from hobble.gait.effect_sizes import EFFECTS, effects_of_people
 from hobble.gait.features import features
 from hobble.gait.graded import PARTS, grade, healthy_covariance, learn_grader
 from hobble.gait.people import GAITS, NORMAL, people
@@ -47,7 +47,7 @@ def left_out():
 
 
 @pytest.mark.parametrize("which", [0, 1], ids=["linear", "graded"])
-def test_people_who_were_left_out_are_named(left_out, which):
+def test_people_left_out_of_the_training_are_recognised(left_out, which):
     right = impaired = 0.0
     for person, judges in enumerate(left_out):
         for gait, side, walk, healthy in limps(person):
@@ -59,7 +59,7 @@ def test_people_who_were_left_out_are_named(left_out, which):
     assert impaired >= 0.95 * 100
 
 
-def test_mild_limps_are_named_by_the_one_that_is_made_for_them(left_out):
+def test_mild_limps_are_recognised_by_the_graded_recogniser(left_out):
     found = np.zeros(2)
     for person, judges in enumerate(left_out):
         for *_, side, walk, healthy in limps(person, 0.5):
@@ -69,7 +69,7 @@ def test_mild_limps_are_named_by_the_one_that_is_made_for_them(left_out):
     assert found[1] >= 0.75 * 100
 
 
-def test_people_who_were_left_out_are_near_and_what_nobody_shows_is_far(left_out):
+def test_people_left_out_are_near_the_known_walks_and_impossible_walks_are_far(left_out):
     near = [
         judges[1](walk, healthy).distance
         for person, judges in enumerate(left_out)
@@ -100,7 +100,7 @@ def test_shuffled_labels_cannot_be_learnt():
     assert right < 0.4
 
 
-def test_one_persons_normal_walk_beside_anothers_is_normal():
+def test_a_normal_walk_compared_with_another_persons_is_normal():
     everyone = range(people().count)
     pairs = [
         (people().profile(NORMAL, a), people().profile(NORMAL, b))
@@ -111,7 +111,7 @@ def test_one_persons_normal_walk_beside_anothers_is_normal():
     assert np.mean([recognise(*pair).impaired for pair in pairs]) <= 0.03
 
 
-def test_probabilities_sum_to_one_and_a_side_belongs_to_a_label():
+def test_probabilities_sum_to_one_over_labels_and_their_sides():
     for judge in (recognise, grade):
         for *_, walk, healthy in limps(1):
             said = judge(walk, healthy)
@@ -120,7 +120,7 @@ def test_probabilities_sum_to_one_and_a_side_belongs_to_a_label():
             assert said.probabilities[said.label] == max(said.probabilities.values())
 
 
-def test_an_arm_that_keeps_still_and_a_trunk_that_leans_are_seen():
+def test_a_still_arm_and_a_leaning_trunk_are_recognised():
     healthy = dict(people().normal())
     still = healthy | {"range arm_forward_L": 0.15 * healthy["range arm_forward_L"]}
     assert (grade(still, healthy).label, grade(still, healthy).side) == ("guarded_arm", "left")
@@ -144,14 +144,14 @@ def test_slow_and_quick_even_walks_are_normal():
         assert grade(walk, healthy).label == NORMAL
 
 
-def test_a_joint_that_keeps_still_in_the_healthy_walk_decides_nothing():
+def test_a_joint_that_is_still_in_the_healthy_walk_is_ignored():
     healthy = dict(people().normal()) | {"range hip_abduction_L": 0.0, "range arm_forward_R": 0.0}
     walk = healthy | {"range hip_abduction_L": 0.5, "range arm_forward_R": 2.0}
     assert np.abs(list(features(walk, healthy).values())).max() < 0.6
     assert recognise(walk, healthy).label == NORMAL
 
 
-def test_effects_of_people_are_those_of_the_facts_page():
+def test_effects_of_people_equal_the_documented_ones():
     known = effects_of_people(people())
     assert set(known) == set(GAITS[1:])
     antalgic = {name: mean for name, (mean, _) in known["antalgic"].items()}
@@ -164,7 +164,7 @@ def test_effects_of_people_are_those_of_the_facts_page():
     assert antalgic["arm_hurt"] == pytest.approx(0.36, abs=0.03)
 
 
-def test_statistics_of_people_are_whole():
+def test_the_statistics_of_people_have_no_gaps():
     known = people()
     assert known.profiles.shape == (6, 10, 52)
     assert known.curve_mean.shape == known.curve_spread.shape == (6, len(CURVES), 50)
@@ -178,7 +178,7 @@ def test_statistics_of_people_are_whole():
     )
 
 
-def test_every_label_has_parts():
+def test_every_label_lists_its_parts_of_the_body():
     assert set(GAITS) < set(PARTS)
 
 
@@ -228,7 +228,7 @@ def test_a_leg_that_is_dragged_is_antalgic_on_its_side(cmu, healthy_105):
 
 
 @pytest.mark.shared
-def test_in_a_mirror_it_is_the_left_leg(cmu):
+def test_a_mirrored_limp_of_the_right_leg_is_one_of_the_left(cmu):
     def seen_in_it(name: str) -> Clip:
         return mirror_clip(cmu(name), f"{name}_mirror")
 
@@ -246,7 +246,7 @@ def test_a_healthy_walk_played_slower_or_faster_is_normal(cmu, healthy_105, pace
 
 
 @pytest.mark.shared
-def test_a_hurt_stomach_is_a_trunk_that_leans(cmu, healthy_105):
+def test_a_hurt_stomach_is_recognised_as_a_leaning_trunk(cmu, healthy_105):
     seen = compare(cmu("105_26"), healthy_105())
     assert (seen.grade.label, seen.grade.parts) == ("leaning_trunk", ("back",))
     assert seen.effects["right"]["lean"] > 8
@@ -260,7 +260,7 @@ def test_a_hurt_stomach_is_a_trunk_that_leans(cmu, healthy_105):
         ("Injured_Walk_LLL_extended_converted", "left", "shank"),
     ],
 )
-def test_the_limps_of_ferre_are_those_of_the_leg_that_was_hurt(cmu, healthy_105, name, side, part):
+def test_the_clips_of_ferre_are_limps_of_the_leg_that_was_hurt(cmu, healthy_105, name, side, part):
     """They are compared with another walker's healthy walks, because the performers' own are missing."""
     seen = compare(cmu(name), healthy_105())
     assert seen.answer.side == seen.grade.side == side

@@ -15,10 +15,10 @@ from hobble.core.clip import Clip
 from hobble.core.skeleton import Skeleton
 from hobble.labels.label import label_clip
 from hobble.labels.model import Labels
-from hobble.labels.options import Labels as LabelOptions
+from hobble.labels.options import LabelOptions
 from hobble.motion.make import make_clip
 from hobble.motion.options import ClipMotion
-from hobble.synthetic.clip import walk
+from hobble.synthetic.generate_clip import walk
 from hobble.synthetic.recipes import Segment
 
 # The tests of this folder measure walks alike; as a module of its own, since tests are no package.

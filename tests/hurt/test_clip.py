@@ -9,7 +9,7 @@ from hurt_gait import SIDES, fastest, knee, measures, slide, toe_heights
 from hobble.core import quat
 from hobble.core.errors import HobbleError
 from hobble.core.skeleton import other_side
-from hobble.hurt.clip import hurt_clip
+from hobble.hurt.hurt_clip import hurt_clip
 from hobble.labels.label import mirror_labels
 from hobble.labels.model import LabelReport
 from hobble.motion.mirror import mirror_clip
@@ -34,7 +34,7 @@ def test_severity_zero_is_the_clip_bit_for_bit(made, hurting) -> None:
     assert not same.severity.any()
 
 
-def test_what_comes_before_an_injury_stays_as_it_was(made, hurting) -> None:
+def test_frames_before_an_injury_are_unchanged(made, hurting) -> None:
     clip, labels, flat = made("straight")
     severity = hurting(len(clip), {"RightUpLeg-RightLeg": 10.0})
     severity[:600] = 0.0
@@ -45,14 +45,14 @@ def test_what_comes_before_an_injury_stays_as_it_was(made, hurting) -> None:
 
 @pytest.mark.parametrize("links", HURT, ids=lambda links: next(iter(links)))
 @pytest.mark.parametrize("name", MADE)
-def test_made_clips_stay_on_the_ground_and_whole(made, hurting, name, links) -> None:
+def test_generated_clips_keep_to_the_ground_when_hurt(made, hurting, name, links) -> None:
     _keeps_to_the_ground(made(name), hurting, links)
 
 
 @pytest.mark.shared
 @pytest.mark.parametrize("links", HURT, ids=lambda links: next(iter(links)))
 @pytest.mark.parametrize("name", CAPTURED)
-def test_captured_clips_stay_on_the_ground_and_whole(captured, hurting, name, links) -> None:
+def test_captured_clips_keep_to_the_ground_when_hurt(captured, hurting, name, links) -> None:
     _keeps_to_the_ground(captured(name), hurting, links)
 
 
@@ -97,7 +97,7 @@ def test_hurting_the_mirrored_clip_on_the_other_side_is_the_mirror_of_the_hurt_c
     assert np.degrees(quat.angle(one.rotations, two.rotations)).max() < 0.5
 
 
-def test_labels_are_the_source_s_at_the_new_times(made, hurting) -> None:
+def test_labels_are_those_of_the_source_at_the_new_times(made, hurting) -> None:
     clip, labels, flat = made("straight")
     hurt = hurt_clip(clip, labels, hurting(len(clip), {"RightUpLeg-RightLeg": 10.0}), flat=flat)
     assert len(hurt.labels) == len(hurt.clip) == len(hurt.severity) == len(hurt.when)

@@ -9,8 +9,8 @@ import pytest
 import yaml
 
 from hobble.core.errors import HobbleError
+from hobble.hurt.body_parts import part_of_link
 from hobble.hurt.options import Hurt
-from hobble.hurt.parts import part_of_link
 from hobble.hurt.schedule import severities
 from hobble.hurt.version import WHOLE
 from hobble.workflow.project import Project
@@ -28,7 +28,7 @@ def seconds_hurt(skeleton, versions, frames, options):
     return out
 
 
-def test_the_walker_s_clips_hurt_all_thirty_links(root, holden31) -> None:
+def test_hurt_versions_of_the_synthetic_clips_hurt_all_thirty_links(root, holden31) -> None:
     project = Project(root, {})
     held_out = project.catalogue.dataset("synthetic").held_out
     clips = project.clips
@@ -48,7 +48,7 @@ def test_the_walker_s_clips_hurt_all_thirty_links(root, holden31) -> None:
 
 
 @pytest.mark.shared
-def test_captured_clips_hurt_all_thirty_links(root, shared, holden31) -> None:
+def test_hurt_versions_of_the_captured_clips_hurt_all_thirty_links(root, shared, holden31) -> None:
     data = yaml.safe_load((root / "config/datasets/cmu.yaml").read_text())
     with open(shared / "mocap/clips.csv") as file:
         known = {row["file"]: int(row["frames"]) // 2 for row in csv.DictReader(file)}
@@ -79,7 +79,7 @@ def test_a_clip_s_severities_are_its_own_and_always_the_same(holden31) -> None:
     assert (one > 0).sum(axis=1).max() <= options.at_once
 
 
-def test_only_the_links_asked_for_are_hurt(holden31) -> None:
+def test_only_the_configured_links_are_hurt(holden31) -> None:
     links = ("LeftUpLeg-LeftLeg", "Neck-Neck1")
     out = severities(holden31, 6000, 60.0, Hurt(links=links, severities=(4.0,), at_once=1), "a", 0)
     hurt = {holden31.link_names[i] for i in np.flatnonzero(out.any(axis=0))}

@@ -9,7 +9,7 @@ from hurt_gait import effects, measures
 from hobble.core.skeleton import other_side
 from hobble.gait.cycles import measure
 from hobble.gait.signals import CURVES
-from hobble.hurt.clip import hurt_clip
+from hobble.hurt.hurt_clip import hurt_clip
 
 LEG = {
     "hip": "RHipJoint-RightUpLeg",
@@ -43,7 +43,9 @@ def meets_the_goals(part: str, size: dict[str, float]) -> None:
 
 @pytest.mark.parametrize("side", ["right", "left"])
 @pytest.mark.parametrize("part", [*LEG, *ARM, "back"])
-def test_a_made_walk_at_ten(made, hurting, part, side) -> None:
+def test_a_generated_walk_at_severity_10_has_effects_of_the_documented_size(
+    made, hurting, part, side
+) -> None:
     link = {**LEG, **ARM, "back": "LowerBack-Spine"}[part]
     link = "-".join(other_side(joint) for joint in link.split("-")) if side == "left" else link
     meets_the_goals(part, seen(made("straight"), hurting, link, 10.0))
@@ -51,7 +53,7 @@ def test_a_made_walk_at_ten(made, hurting, part, side) -> None:
 
 @pytest.mark.shared
 @pytest.mark.parametrize("part", [*LEG, *ARM, "back"])
-def test_a_captured_walk_at_ten(captured, hurting, part) -> None:
+def test_a_captured_walk_at_severity_10_has_effects_of_the_documented_size(captured, hurting, part) -> None:
     meets_the_goals(
         part, seen(captured("105_29"), hurting, {**LEG, **ARM, "back": "LowerBack-Spine"}[part], 10.0)
     )
@@ -92,7 +94,7 @@ def mean_curves(clip):
 
 
 @pytest.mark.parametrize("part", ["thigh", "shank", "foot"])
-def test_at_five_between_one_and_two_thirds_and_at_three_a_quarter_or_more(made, hurting, part) -> None:
+def test_severity_5_has_a_third_to_two_thirds_of_the_effect_and_3_a_quarter(made, hurting, part) -> None:
     sizes = {s: seen(made("straight"), hurting, LEG[part], float(s)) for s in (3, 5, 7, 10)}
     for name, none in (("speed", 1.0), ("stance", 0.0), ("step", 1.0)):
         change = {s: sizes[s][name] - none for s in sizes}
@@ -102,7 +104,7 @@ def test_at_five_between_one_and_two_thirds_and_at_three_a_quarter_or_more(made,
 
 
 @pytest.mark.parametrize("part", ["thigh", "shank"])
-def test_the_knee_at_five_is_between_one_and_two_thirds_of_ten(made, hurting, part) -> None:
+def test_the_knee_effect_at_5_is_a_third_to_two_thirds_of_that_at_10(made, hurting, part) -> None:
     less = {s: 1 - seen(made("straight"), hurting, LEG[part], float(s))["knee"] for s in (3, 5, 7, 10)}
     assert 1 / 3 <= less[5] / less[10] <= 0.62, less
     assert less[3] < less[5] < less[7] < less[10] - 0.1, less

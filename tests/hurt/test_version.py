@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 from hurt_gait import measures
 
-from hobble.hurt.clip import hurt_clip
 from hobble.hurt.effects import POWER
+from hobble.hurt.hurt_clip import hurt_clip
 from hobble.hurt.options import Hurt
 from hobble.hurt.version import NEAR, hurt_version
 from hobble.labels.label import mirror_labels
@@ -24,23 +24,23 @@ THIGH = "RightUpLeg-RightLeg"
 def changing(made, hurting):
     """A walk of 20 s whose thigh hurts at 10 from 5 s on and at 3 from 12 s on: the request, the result."""
     clip, labels, flat = made("straight")
-    asked = hurting(len(clip), {THIGH: 10.0})
-    asked[:300] = 0.0
-    asked[720:] *= 0.3
-    return asked, hurt_clip(clip, labels, asked, flat=flat)
+    wanted = hurting(len(clip), {THIGH: 10.0})
+    wanted[:300] = 0.0
+    wanted[720:] *= 0.3
+    return wanted, hurt_clip(clip, labels, wanted, flat=flat)
 
 
-def test_severities_are_those_asked_for_away_from_a_change(changing, holden31) -> None:
-    asked, hurt = changing
+def test_severities_far_from_a_change_are_the_requested_ones(changing, holden31) -> None:
+    wanted, hurt = changing
     column = holden31.link_names.index(THIGH)
-    when = np.clip(hurt.when.astype(int), 0, len(asked) - 1)
-    calm = np.ptp([asked[np.clip(when + d, 0, len(asked) - 1), column] for d in (-80, 0, 80)], axis=0) == 0
+    when = np.clip(hurt.when.astype(int), 0, len(wanted) - 1)
+    calm = np.ptp([wanted[np.clip(when + d, 0, len(wanted) - 1), column] for d in (-80, 0, 80)], axis=0) == 0
     assert calm.mean() > 0.6
-    np.testing.assert_allclose(hurt.severity[calm], asked[when][calm], atol=0.01)
+    np.testing.assert_allclose(hurt.severity[calm], wanted[when][calm], atol=0.01)
     assert not np.delete(hurt.severity, column, axis=1).any()
 
 
-def test_a_change_sets_in_over_a_second_with_the_motion(changing, holden31) -> None:
+def test_a_change_of_severity_sets_in_over_a_second_like_the_motion(changing, holden31) -> None:
     _, hurt = changing
     severity = hurt.severity[:, holden31.link_names.index(THIGH)]
     assert np.abs(np.diff(severity)).max() < 0.6
@@ -48,7 +48,7 @@ def test_a_change_sets_in_over_a_second_with_the_motion(changing, holden31) -> N
     assert severity[at] == pytest.approx(10 * 0.5 ** (1 / POWER), abs=0.25)
 
 
-def test_a_stretch_that_shows_a_severity_is_as_fast_as_a_clip_with_it(changing, made, hurting) -> None:
+def test_frames_with_a_severity_are_as_fast_as_a_clip_with_it_throughout(changing, made, hurting) -> None:
     _, hurt = changing
     clip, labels, flat = made("straight")
     throughout = hurt_clip(clip, labels, hurting(len(clip), {THIGH: 10.0}), flat=flat)
@@ -64,7 +64,7 @@ def test_a_stretch_that_shows_a_severity_is_as_fast_as_a_clip_with_it(changing, 
 
 
 @pytest.mark.parametrize("mirrored", [False, True])
-def test_without_severities_in_between_no_cycle_shows_one(made, mirrored) -> None:
+def test_without_in_between_no_cycle_has_a_severity_in_between(made, mirrored) -> None:
     clip, labels, _ = made("straight")
     options = Hurt(severities=(10.0,), seconds=5, at_once=1, in_between=False, longest=1)
     hurt, report = hurt_version(clip, labels, REPORT, options, name="a_hurt1", turn=0, ground="flat")

@@ -11,13 +11,13 @@ import pytest
 from hobble.core import quat
 from hobble.core.clip import Clip
 from hobble.core.skeleton import Skeleton
-from hobble.labels.options import Labels
+from hobble.labels.options import LabelOptions
 
 
 @pytest.fixture
-def options() -> Labels:
+def options() -> LabelOptions:
     """The original's margins and contacts; all else by default."""
-    return Labels(margins="drop", contacts="original")
+    return LabelOptions(margins="drop", contacts="original")
 
 
 def feet_only(skeleton: Skeleton, right: np.ndarray, left: np.ndarray, hips: np.ndarray, name: str) -> Clip:

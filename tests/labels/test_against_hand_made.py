@@ -15,10 +15,10 @@ from hobble.config.sections import Synthetic
 from hobble.core.clip import Clip
 from hobble.labels.label import label_clip
 from hobble.labels.model import Labels
-from hobble.labels.options import Labels as Options
+from hobble.labels.options import LabelOptions as Options
 from hobble.motion.make import make_clip
 from hobble.motion.options import ClipMotion
-from hobble.synthetic.clip import write_clip
+from hobble.synthetic.generate_clip import write_clip
 
 SUFFIXES = (".phase", ".gait", "_footsteps.txt", "_gait.txt")
 PFNN = ["pfnn/LocomotionFlat04_000", "pfnn/LocomotionFlat09_000"]
@@ -75,7 +75,7 @@ def matched(by_hand: Labels, automatic: Labels, first: float, last: float) -> tu
 
 @pytest.mark.shared
 @pytest.mark.parametrize("name", PFNN + FERRE)
-def test_automatic_labels_are_those_a_person_made(shared: Path, read, options, name):
+def test_automatic_labels_agree_with_hand_made_ones(shared: Path, read, options, name):
     by_hand, automatic, _ = both_ways(read, shared / "mocap" / f"{name}.bvh", options)
     assert phase_difference(by_hand, automatic) < 0.04
     assert (by_hand.gait.argmax(axis=1) == automatic.gait.argmax(axis=1)).mean() >= 0.92
@@ -88,7 +88,7 @@ def test_automatic_labels_are_those_a_person_made(shared: Path, read, options, n
 
 
 @pytest.mark.shared
-def test_gaits_agree_with_a_person_s_on_95_of_100_frames(shared: Path, read, options):
+def test_gaits_agree_with_hand_made_ones_on_95_of_100_frames(shared: Path, read, options):
     both = [both_ways(read, shared / "mocap" / f"{name}.bvh", options)[:2] for name in PFNN + FERRE]
     agree = [(hand.gait.argmax(axis=1) == automatic.gait.argmax(axis=1)) for hand, automatic in both]
     assert np.concatenate(agree).mean() > 0.95
@@ -99,7 +99,7 @@ def test_gaits_agree_with_a_person_s_on_95_of_100_frames(shared: Path, read, opt
     "name",
     ["07_01", "07_12", "08_05", "08_08", "09_12", "16_25", "105_10", "105_16", "105_25", "105_26", "03_02"],
 )
-def test_a_walk_has_a_foot_down(shared: Path, read, name):
+def test_a_walk_always_has_a_foot_on_the_ground(shared: Path, read, name):
     """Without a given gait: walks, brisk walks, limps, and a walk on rough ground."""
     clip, motion = read(shared / "mocap/cmu" / f"{name}.bvh")
     labels, _ = label_clip(clip, [], motion, None, "rocky", Options())
@@ -114,7 +114,7 @@ def test_a_walk_has_a_foot_down(shared: Path, read, name):
 
 @pytest.mark.shared
 @pytest.mark.parametrize("name", ["02_03", "09_01", "16_36", "16_45"])
-def test_a_run_flies(shared: Path, read, name):
+def test_a_run_has_both_feet_off_the_ground_in_a_quarter_of_the_frames(shared: Path, read, name):
     clip, motion = read(shared / "mocap/cmu" / f"{name}.bvh")
     labels, _ = label_clip(clip, [], motion, None, "rocky", Options())
     assert (labels.gait.argmax(axis=1) == JOG).all()
@@ -125,7 +125,7 @@ def test_a_run_flies(shared: Path, read, name):
 
 @pytest.mark.shared
 @pytest.mark.parametrize("name", ["105_16", "105_25", "105_26", "105_15", "03_04"])
-def test_limps_and_rough_ground_lose_no_step(shared: Path, read, options, name):
+def test_no_step_is_missed_in_limps_and_on_rough_ground(shared: Path, read, options, name):
     """These clips have no labels by hand: left and right steps must alternate at a human rate for as long as
     the body moves.
     """
@@ -144,7 +144,7 @@ def test_limps_and_rough_ground_lose_no_step(shared: Path, read, options, name):
     ("name", "gait"),
     [("07_12", WALK), ("08_08", WALK), ("105_03", WALK), ("105_17", WALK), ("02_03", JOG), ("09_04", JOG)],
 )
-def test_a_brisk_walk_is_a_walk_and_a_run_a_jog_though_nobody_says_so(shared, read, options, name, gait):
+def test_brisk_walks_and_runs_are_labelled_without_a_hint(shared, read, options, name, gait):
     clip, motion = read(shared / "mocap/cmu" / f"{name}.bvh")
     labels, _ = label_clip(clip, [], motion, None, "rocky", options)
     found = np.bincount(labels.gait.argmax(axis=1), minlength=6)
@@ -157,14 +157,14 @@ def test_a_brisk_walk_is_a_walk_and_a_run_a_jog_though_nobody_says_so(shared, re
     ("name", "gait"),
     [("walk_happy_001", WALK), ("walk_happy_002", WALK), ("run_sad_001", JOG), ("run_tired_001", JOG)],
 )
-def test_a_happy_walk_skips_and_a_sad_run_hardly_springs(shared, read, options, name, gait):
+def test_expressive_walks_and_runs_get_the_right_gait(shared, read, options, name, gait):
     clip, motion = read(shared / f"mocap/styles/dataset-1_{name}.bvh")
     labels, _ = label_clip(clip, [], motion, None, "rocky", options)
     assert (labels.gait.argmax(axis=1) == gait).mean() > 0.8
 
 
 @pytest.mark.shared
-def test_the_original_s_rows_come_out(shared: Path, read, options):
+def test_labels_equal_those_of_the_original_rows(shared: Path, read, options):
     """Cycles, phase, phase change, contacts and gaits of the original generator, exactly."""
     rows = np.load(shared / "reference/original_rows_LocomotionFlat09_000.npz")
     labels, _, _ = both_ways(read, shared / "mocap" / f"{PFNN[1]}.bvh", options, "flat")
@@ -183,7 +183,7 @@ def test_the_original_s_rows_come_out(shared: Path, read, options):
 
 
 @pytest.mark.shared
-def test_the_mirror_has_the_phase_of_the_release(shared: Path, read, options):
+def test_a_mirrored_clip_has_the_phase_of_the_release(shared: Path, read, options):
     from hobble.labels.label import mirror_labels
 
     stem = shared / "mocap" / PFNN[1]
@@ -198,7 +198,7 @@ def test_the_mirror_has_the_phase_of_the_release(shared: Path, read, options):
 
 
 @pytest.mark.parametrize("recipe", ["walk", "jog", "walk-jog-walk", "sidesteps"])
-def test_automatic_labels_of_made_walks_are_exact(root: Path, read, options, tmp_path, recipe):
+def test_automatic_labels_of_generated_walks_are_exact(root: Path, read, options, tmp_path, recipe):
     """The generator knows when it put each foot down."""
     skeleton = yaml.safe_load((root / "config/skeletons/holden31.yaml").read_text())
     paths = {"bvh": "c.bvh", "footsteps": "c_footsteps.txt", "gait": "c_gait.txt"}

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from hobble.labels.contacts import contacts, stance, still_joints
-from hobble.labels.options import Labels
+from hobble.labels.options import LabelOptions
 
 
 def truth(half: int, swing: int, frames: int, start: int) -> np.ndarray:
@@ -19,57 +19,57 @@ def truth(half: int, swing: int, frames: int, start: int) -> np.ndarray:
 
 
 @pytest.mark.parametrize(("half", "swing", "stride"), [(30, 24, 120.0), (20, 16, 160.0), (45, 40, 60.0)])
-def test_stances_begin_and_end_where_they_were_made(walker, half, swing, stride):
+def test_stances_of_a_made_walk_begin_and_end_at_the_right_frames(walker, half, swing, stride):
     """Swings begin and end slowly, so that their first and last frames look like a stance."""
-    found = stance(walker(half=half, swing=swing, stride=stride), Labels())
+    found = stance(walker(half=half, swing=swing, stride=stride), LabelOptions())
     expected = truth(half, swing, 600, 40)
     assert found[expected][:, 2].all()
     assert (found[:, 2] != expected).mean() < 0.1
 
 
 @pytest.mark.parametrize("size", [0.5, 0.8, 1.3])
-def test_a_child_and_a_giant_stand_as_an_adult_does(walker, size):
+def test_contacts_do_not_depend_on_body_size(walker, size):
     clip = walker()
     skeleton = replace(clip.skeleton, offsets=size * clip.skeleton.offsets)
     other = replace(clip, skeleton=skeleton, root=size * clip.root, translations=size * clip.translations)
-    assert (stance(other, Labels()) == stance(clip, Labels())).all()
+    assert (stance(other, LabelOptions()) == stance(clip, LabelOptions())).all()
 
 
 @pytest.mark.parametrize("height", [-40.0, 100.0])
-def test_no_floor_is_needed(walker, height):
+def test_contacts_do_not_depend_on_the_height_of_the_floor(walker, height):
     clip = walker()
     raised = replace(clip, root=clip.root + np.array([0.0, height, 0.0]))
-    assert (stance(raised, Labels()) == stance(clip, Labels())).all()
+    assert (stance(raised, LabelOptions()) == stance(clip, LabelOptions())).all()
 
 
-def test_a_foot_that_slides_still_stands(walker):
+def test_a_sliding_foot_keeps_its_contact(walker):
     """As on a treadmill, the foot moves half a centimetre a frame; the original's rule calls that a swing."""
     clip = walker()
     sliding = replace(clip, root=clip.root + np.outer(np.arange(len(clip)), [0.0, 0.0, 0.5]))
-    assert (stance(sliding, Labels()) == stance(clip, Labels()))[:, [0, 2]].mean() > 0.95
+    assert (stance(sliding, LabelOptions()) == stance(clip, LabelOptions()))[:, [0, 2]].mean() > 0.95
     assert not still_joints(sliding, 0.02)[100:500].any()
 
 
-def test_the_setting_picks_the_rule(walker):
+def test_the_option_contacts_selects_the_rule(walker):
     clip = walker()
-    assert (contacts(clip, Labels()) == stance(clip, Labels())).all()
-    assert (contacts(clip, Labels(contacts="original")) == still_joints(clip, 0.02)).all()
+    assert (contacts(clip, LabelOptions()) == stance(clip, LabelOptions())).all()
+    assert (contacts(clip, LabelOptions(contacts="original")) == still_joints(clip, 0.02)).all()
 
 
-def test_a_foot_held_up_does_not_stand(walker):
+def test_a_foot_held_in_the_air_has_no_contact(walker):
     clip = walker(start=700)
     heel = clip.skeleton.role("right_heel")
     translations = clip.translations.copy()
     up = 50.0 * np.clip((np.arange(len(clip)) - 100) / 30, 0, 1)
     translations[:, heel, 1] += up
-    found = stance(replace(clip, translations=translations), Labels())
+    found = stance(replace(clip, translations=translations), LabelOptions())
     assert found[:90].all()
     assert not found[150:, 2:].any()
     assert found[150:, :2].all()
 
 
 @pytest.mark.parametrize("frames", [1, 2, 3])
-def test_the_shortest_clips(walker, frames):
+def test_contacts_of_very_short_clips_have_the_right_shape(walker, frames):
     clip = walker(frames=600)
     short = replace(
         clip,
@@ -77,4 +77,4 @@ def test_the_shortest_clips(walker, frames):
         rotations=clip.rotations[:frames],
         translations=clip.translations[:frames],
     )
-    assert contacts(short, Labels()).shape == (frames, 4)
+    assert contacts(short, LabelOptions()).shape == (frames, 4)

@@ -11,7 +11,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from hobble.core.errors import InputError
-from hobble.labels.files import (
+from hobble.labels.read_files import (
     SourceTime,
     read_footsteps,
     read_gait,
@@ -31,13 +31,13 @@ def test_a_cycle_starts_at_half_the_frame_number_of_a_120_hz_file(number):
 
 
 @pytest.mark.parametrize(("fps", "number", "frame"), [(60, 31, 30), (30, 16, 30), (24, 13, 30), (50, 26, 30)])
-def test_frames_of_other_rates_keep_their_moment(fps, number, frame):
+def test_frames_of_files_at_other_rates_keep_their_time(fps, number, frame):
     assert SourceTime(500, fps).to_clip(number) == pytest.approx(frame)
     assert SourceTime(500, fps, first=number - 1).to_clip(number) == 0
 
 
 @pytest.mark.parametrize("fps", [23.976, 1 / 0.00833, 1 / 0.01667])
-def test_a_rate_that_is_not_whole_is_taken_as_it_stands(fps):
+def test_a_frame_rate_that_is_not_whole_is_not_rounded(fps):
     """Labels and frames are at the same moments even after ten minutes."""
     times = sample_times(72_000, fps, 60.0)
     time = SourceTime(72_000, fps)
@@ -73,7 +73,7 @@ def test_wrong_footsteps_are_refused_with_their_line(write, text, line, word):
     assert (caught.value.path, caught.value.line) == (path, line)
 
 
-def test_gait_keys_hold_between_equal_and_fade_between_different(write):
+def test_gait_shares_are_constant_between_equal_keys_and_fade_between_others(write):
     shares = read_gait_keys(write("a_gait.txt", "1 stand\n41 stand\n82 run\n122 crawl\n"), AT_120, 120)
     assert (shares[:21, 0] == 1).all()
     assert shares[20:41, 0] == pytest.approx(np.linspace(1, 0, 21))
@@ -82,11 +82,11 @@ def test_gait_keys_hold_between_equal_and_fade_between_different(write):
     assert shares.sum(axis=1) == pytest.approx(1)
 
 
-def test_one_gait_key_holds_throughout(write):
+def test_a_single_gait_key_holds_in_all_frames(write):
     assert (read_gait_keys(write("a_gait.txt", "1 unknown"), AT_120, 7)[:, 5] == 1).all()
 
 
-def test_keys_hold_before_the_first_and_after_the_last(write):
+def test_the_first_and_last_gait_keys_hold_to_the_ends_of_the_clip(write):
     shares = read_gait_keys(write("a_gait.txt", "50 walk\n100 jog\n"), AT_120, 120)
     assert (shares[:24, 1] == 1).all()
     assert (shares[50:, 2] == 1).all()
@@ -115,7 +115,7 @@ def test_every_second_row_of_a_phase_file_is_exact(write):
     assert (read_phase(path, AT_120, 120) == rows[::2]).all()
 
 
-def test_a_clip_that_begins_within_its_source_begins_within_its_files(write):
+def test_a_clip_cut_at_the_start_uses_the_matching_part_of_its_files(write):
     whole, late = SourceTime(240, 120.0), SourceTime(240, 120.0, first=7)
     rows = np.round(np.linspace(0, 0.9, 240), 5)
     phase = write("a.phase", "\n".join(f"{r:.5f}" for r in rows))
@@ -128,13 +128,13 @@ def test_a_clip_that_begins_within_its_source_begins_within_its_files(write):
     np.testing.assert_allclose(keys, moved)
 
 
-def test_phase_between_rows_goes_the_short_way_round(write):
+def test_phase_between_rows_is_interpolated_the_short_way_round(write):
     path = write("a.phase", "0.8\n0.9\n0.1\n0.2\n")
     phase = read_phase(path, SourceTime(4, 30.0), 7)
     assert phase == pytest.approx([0.8, 0.85, 0.9, 0.0, 0.1, 0.15, 0.2])
 
 
-def test_the_last_rows_hold_where_a_file_is_a_row_short(write):
+def test_the_last_row_of_a_file_that_is_too_short_is_repeated(write):
     path = write("a.phase", "0.1\n0.2\n0.3\n")
     assert read_phase(path, SourceTime(4, 60.0), 4) == pytest.approx([0.1, 0.2, 0.3, 0.3])
 
@@ -173,7 +173,7 @@ def test_binary_and_missing_files_are_refused(tmp_path: Path):
 
 @pytest.mark.shared
 @pytest.mark.parametrize("clip", ["pfnn/LocomotionFlat04_000", "pfnn/LocomotionFlat09_000"])
-def test_keys_give_the_gait_file_of_the_release(shared: Path, clip):
+def test_gait_keys_of_the_release_give_its_gait_file(shared: Path, clip):
     stem = shared / "mocap" / clip
     frames = len((stem.with_suffix(".gait")).read_text().splitlines())
     time = SourceTime(frames, 120.0)

@@ -8,12 +8,12 @@ import numpy as np
 import pytest
 
 from hobble.labels.footfall import SETTLING, feet_up, find_swings, foot_speeds, landings
-from hobble.labels.options import Labels
+from hobble.labels.options import LabelOptions
 from hobble.labels.phase import find_cycles, phase_of_footsteps, rows_of_landings
 
 
 def found(clip):
-    swings = find_swings(clip, Labels())
+    swings = find_swings(clip, LabelOptions())
     return swings, landings(swings, len(clip), 5)
 
 
@@ -42,7 +42,7 @@ def test_phase_of_a_made_limp_is_within_three_hundredths(walker):
     assert np.abs((phase - true + 0.5) % 1 - 0.5)[both].mean() < 0.03
 
 
-def test_who_stands_takes_no_steps(walker):
+def test_a_standing_figure_has_no_landings(walker):
     clip = walker(start=1000)
     swings, events = found(clip)
     assert swings == []
@@ -51,7 +51,7 @@ def test_who_stands_takes_no_steps(walker):
 
 
 @pytest.mark.parametrize(("pause", "bouts"), [(30, 1), (90, 2)])
-def test_only_a_long_pause_parts_two_bouts(walker, pause, bouts):
+def test_only_a_long_pause_separates_two_bouts_of_walking(walker, pause, bouts):
     clip = walker(frames=400)
     both_down = 163
     order = np.repeat(np.arange(400), np.where(np.arange(400) == both_down, pause, 1))
@@ -78,7 +78,7 @@ def test_feet_up_marks_the_frames_of_swings(walker):
 
 
 @pytest.mark.parametrize("frames", [1, 2, 3, 30])
-def test_the_shortest_clips_are_no_trouble(walker, frames):
+def test_very_short_clips_have_at_most_one_landing_and_no_cycle(walker, frames):
     clip = walker(frames=frames, start=5)
     assert len(found(clip)[1]) <= 1
     assert find_cycles(rows_of_landings(found(clip)[1]), frames, "right", "drop")[0].shape == (0, 2)

@@ -10,11 +10,11 @@ import pytest
 from hobble.labels import gait as g
 from hobble.labels.contacts import stance
 from hobble.labels.model import GAITS
-from hobble.labels.options import Labels
+from hobble.labels.options import LabelOptions
 
 
 def automatic(clip, dominant=None):
-    return g.automatic_gait(clip, stance(clip, Labels()), dominant)
+    return g.automatic_gait(clip, stance(clip, LabelOptions()), dominant)
 
 
 def clearly(gait):
@@ -22,13 +22,13 @@ def clearly(gait):
     return np.full(len(gait), -9.0)
 
 
-def test_shares_add_up_to_one(walker):
+def test_gait_shares_add_up_to_one(walker):
     shares = automatic(walker(frames=400, start=150))
     assert shares.sum(axis=1) == pytest.approx(1)
     assert ((shares >= 0) & (shares <= 1)).all()
 
 
-def test_a_walk_after_a_stand(walker):
+def test_a_walk_after_standing_is_labelled_as_both(walker):
     shares = automatic(walker(frames=500, start=200))
     assert (shares[:150].argmax(axis=1) == g.STAND).all()
     assert (shares[230:].argmax(axis=1) == g.WALK).all()
@@ -53,7 +53,7 @@ def test_a_walk_that_bounces_and_always_has_a_foot_down_is_a_walk(walker):
     assert (automatic(happy)[60:-60].argmax(axis=1) == g.WALK).all()
 
 
-def test_what_the_clip_is_said_to_show_tips_the_balance(walker):
+def test_the_stated_gait_decides_doubtful_motion(walker):
     between = bouncing(walker(half=20, swing=32, stride=160.0), 0.5)
     assert (automatic(between, "walk")[60:-60].argmax(axis=1) == g.WALK).all()
     assert (automatic(between, "jog")[60:-60].argmax(axis=1) == g.JOG).all()
@@ -73,14 +73,14 @@ def test_low_head_and_hips_are_a_crouch_and_a_bow_is_not(walker):
 
 
 @pytest.mark.parametrize("dominant", ["jump", "bump"])
-def test_a_jump_is_what_the_data_set_says_is_one(walker, dominant):
+def test_only_the_data_set_marks_jumps(walker, dominant):
     shares = automatic(walker(frames=500, start=200), dominant)
     assert (shares[:150].argmax(axis=1) == g.STAND).all()
     assert (shares[230:].argmax(axis=1) == GAITS.index(dominant)).all()
     assert shares.sum(axis=1) == pytest.approx(1)
 
 
-def test_the_likeliest_path_changes_only_for_what_it_costs():
+def test_the_likeliest_path_changes_gait_only_if_that_is_worth_the_cost():
     evidence = np.tile([0.0, -1.0], (60, 1))
     evidence[20:28, 1], evidence[40:, 1] = 1.0, 1.0
     assert g._likeliest_path(evidence, 9.0).tolist() == [0] * 40 + [1] * 20
@@ -89,7 +89,7 @@ def test_the_likeliest_path_changes_only_for_what_it_costs():
     assert len(g._likeliest_path(np.zeros((0, 4)), 1.0)) == 0
 
 
-def test_a_short_walk_into_a_jog_is_part_of_setting_off():
+def test_a_short_walk_before_a_jog_counts_as_jog():
     gait = np.array([g.STAND] * 20 + [g.WALK] * 40 + [g.JOG] * 20 + [g.WALK] * 30 + [g.CROUCH] * 5)
     out = g._without_passages(gait, clearly(gait))
     assert out.tolist() == [g.STAND] * 40 + [g.JOG] * 40 + [g.WALK] * 30 + [g.CROUCH] * 5

@@ -22,12 +22,12 @@ def apart(a: np.ndarray, b: np.ndarray) -> np.ndarray:
     return np.abs((a - b + 0.5) % 1.0 - 0.5)
 
 
-def test_orders_are_those_of_the_rows():
+def test_gaits_and_contacts_have_the_same_order_as_in_rows():
     assert model.GAITS == GAITS
     assert model.CONTACT_ROLES == CONTACTS
 
 
-def test_files_go_before_motion(walker, options, write):
+def test_hand_made_files_replace_labels_found_from_motion(walker, options, write):
     clip = walker()
     files = [write("w_footsteps.txt", FOOTSTEPS), write("w_gait.txt", "1 jog\n")]
     labels, report = label_clip(clip, files, MOTION, "walk", "rocky", options)
@@ -48,7 +48,7 @@ def test_files_go_before_motion(walker, options, write):
     assert (labels.gait.argmax(axis=1)[60:] == 1).all()
 
 
-def test_files_beside_a_cycle_that_is_repeated_are_left_out_and_said(walker, options, write):
+def test_label_files_of_a_looped_clip_are_ignored_with_a_note(walker, options, write):
     clip = walker()
     files = [write("w_footsteps.txt", FOOTSTEPS), write("w_gait.txt", "1 jog\n")]
     labels, report = label_clip(clip, files, {**MOTION, "loops": 2}, "walk", "rocky", options)
@@ -64,7 +64,7 @@ def test_files_beside_a_cycle_that_is_repeated_are_left_out_and_said(walker, opt
     np.testing.assert_array_equal(unread[0].phase, labels.phase)
 
 
-def test_a_phase_file_goes_before_footsteps_and_a_gait_file_before_keys(walker, options, write):
+def test_a_phase_file_overrides_footsteps_and_a_gait_file_overrides_keys(walker, options, write):
     clip = walker()
     phase = np.linspace(0, 20, 1200) % 1.0
     gait = np.zeros((1200, 8))
@@ -97,7 +97,7 @@ def test_left_zero_shifts_phase_and_starts_cycles_with_the_left_foot(walker, opt
     assert left.phase[100] == 0
 
 
-def test_a_mirror_is_labelled_as_if_its_own_files_said_so(walker, options, write):
+def test_a_mirrored_clip_has_the_labels_that_mirrored_files_would_give(walker, options, write):
     clip = walker()
     labels, report = label_clip(clip, [write("w_footsteps.txt", FOOTSTEPS)], MOTION, None, "flat", options)
     mirrored, other = mirror_labels(labels, report, replace(clip, name="walker_mirror"))
@@ -126,7 +126,7 @@ def test_mirroring_twice_gives_the_labels_back(walker, options, zero):
         np.testing.assert_equal(getattr(back, name), getattr(labels, name))
 
 
-def test_contacts_are_joints_that_do_not_move(walker, options):
+def test_joints_that_do_not_move_are_in_contact(walker, options):
     clip = walker(start=100, swing=24)
     labels, _ = label_clip(clip, [], MOTION, "walk", "flat", options)
     assert labels.contacts.dtype == bool
@@ -137,7 +137,7 @@ def test_contacts_are_joints_that_do_not_move(walker, options):
     assert (labels.contacts[:-1, 3] == (step < 0.02)).all()
 
 
-def test_a_clip_without_a_whole_cycle_says_so(walker, options):
+def test_a_clip_without_a_whole_cycle_gets_a_warning(walker, options):
     _, report = label_clip(walker(frames=120), [], MOTION, "walk", "flat", options)
     assert "no locomotion cycle" in report.warnings[0]
 
@@ -147,7 +147,7 @@ def test_a_wrong_file_is_named_with_its_line(walker, options, write):
         label_clip(walker(), [write("w_gait.txt", "1 walk\n9 fly\n")], MOTION, None, "flat", options)
 
 
-def test_files_come_back_as_they_were_and_the_report_draws(walker, options, tmp_path):
+def test_labels_survive_their_file_and_the_picture_is_drawn(walker, options, tmp_path):
     clip = walker()
     labels, report = label_clip(clip, [], MOTION, "walk", "flat", options)
     for name in "ab":

@@ -33,7 +33,7 @@ def test_phase_is_zero_where_the_right_foot_lands_and_a_half_where_the_left_does
     assert np.flatnonzero(known).tolist() == list(range(70, 231))
 
 
-def test_where_no_phase_is_known_it_creeps():
+def test_an_unknown_phase_advances_slowly():
     phase, known = phase_of_footsteps(STEPS, 300)
     assert not known[240:].any()
     assert np.diff(phase[231:])[1:] == pytest.approx(IDLE_RATE)
@@ -43,7 +43,7 @@ def test_where_no_phase_is_known_it_creeps():
     assert not known.any()
 
 
-def test_over_a_pause_phase_goes_on_forward_and_meets_the_next_landing():
+def test_during_a_pause_the_phase_advances_to_the_next_landing():
     steps = np.array([[10.0, 40, 0], [np.nan, np.nan, 1], [np.nan, 400.0, 0], [430.0, np.nan, 0]])
     phase, known = phase_of_footsteps(steps, 500)
     assert phase[[40, 400]] == pytest.approx(0.5)
@@ -96,7 +96,7 @@ def test_no_cycle_runs_over_a_pause():
     assert find_cycles(steps, 500, "left", "drop")[0].tolist() == [[300, 360]]
 
 
-def test_landings_become_rows_and_the_same_foot_twice_parts_them():
+def test_landings_become_rows_that_end_where_a_foot_lands_twice():
     rows = rows_of_landings([(1, 1), (5, 0), (9, 1), (13, 1), (20, 0), (np.nan, -1), (40, 0)])
     expected = [[np.nan, 1, 0], [5, 9, 0], [np.nan, np.nan, 1], [np.nan, 13, 0], [20, np.nan, 0]]
     expected += [[np.nan, np.nan, 1], [40, np.nan, 0]]
@@ -122,7 +122,7 @@ def bouts(draw):
 
 @given(bouts())
 @settings(max_examples=60, deadline=None)
-def test_phase_goes_forward_and_gives_its_footsteps_back(case):
+def test_phase_always_advances_and_gives_back_its_footsteps(case):
     steps, frames = case
     phase, known = phase_of_footsteps(steps, frames)
     assert ((phase >= 0) & (phase < 1)).all()

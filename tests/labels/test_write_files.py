@@ -7,23 +7,23 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from hobble.labels.files import SourceTime
 from hobble.labels.label import label_clip
-from hobble.labels.options import Labels
+from hobble.labels.options import LabelOptions
+from hobble.labels.read_files import SourceTime
 from hobble.labels.write_files import footsteps_text, write_label_files
 
 NAMES = ("w_footsteps.txt", "w_gait.txt", "w.phase")
 
 
 @pytest.mark.parametrize(("fps", "start"), [(60.0, 0), (120.0, 0), (30.0, 0), (120.0, 8), (100.0, 3)])
-def test_what_is_written_is_read_again(walker, tmp_path, fps, start):
+def test_written_label_files_read_back_unchanged(walker, tmp_path, fps, start):
     clip = walker(frames=700, start=150, limp=0.4)
     frames = round(len(clip) * fps / 60) + start
     motion = {"source_frames": frames, "source_fps": fps, "source_start": start}
-    before, _ = label_clip(clip, [], motion, None, "rocky", Labels())
+    before, _ = label_clip(clip, [], motion, None, "rocky", LabelOptions())
     files = [tmp_path / name for name in NAMES]
     write_label_files(*files, before, SourceTime(frames, fps, start))
-    after, report = label_clip(clip, files, motion, None, "rocky", Labels())
+    after, report = label_clip(clip, files, motion, None, "rocky", LabelOptions())
     assert (report.phase_source, report.gait_source) == ("file", "file")
     assert len(after.cycles) == len(before.cycles) > 5
     assert np.abs(after.cycles - before.cycles).max() <= np.ceil(60 / fps)
@@ -37,7 +37,7 @@ def test_what_is_written_is_read_again(walker, tmp_path, fps, start):
 def test_a_pause_ends_a_bout(walker):
     clip = walker(frames=700, start=150)
     motion = {"source_frames": 700, "source_fps": 60.0, "source_start": 0}
-    labels, _ = label_clip(clip, [], motion, None, "rocky", Labels())
+    labels, _ = label_clip(clip, [], motion, None, "rocky", LabelOptions())
     rows = np.insert(labels.footsteps, 4, [np.nan, np.nan, 1.0], axis=0)
     lines = footsteps_text(replace(labels, footsteps=rows), SourceTime(700, 60.0)).splitlines()
     assert [number for number, line in enumerate(lines) if line.endswith("*")] == [3]

@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 from hobble.core.errors import HobbleError, InputError
-from hobble.evaluation.tables import write_csv
+from hobble.evaluation.csv_tables import write_csv
 from hobble.measures.accuracy.run import (
     QUANTILES,
     Errors,
@@ -107,7 +107,7 @@ def test_the_released_network_on_the_original_rows(shared):
 
 
 @pytest.mark.parametrize(("layers", "points"), [(2, 4), (3, 4), (4, 6)])
-def test_a_batch_is_what_each_row_gives_with_its_weights_blended_first(tmp_path, layers, points):
+def test_a_batched_prediction_equals_rows_predicted_with_blended_weights(tmp_path, layers, points):
     np.savez(tmp_path / "w.npz", **make_network(layers, points))
     network = load_network(tmp_path / "w.npz")
     rng = np.random.default_rng(1)
@@ -126,7 +126,7 @@ def test_phase_shares_hit_the_control_points_and_sum_to_one():
     np.testing.assert_allclose(shares[0], shares[-1], atol=1e-12)
 
 
-def test_the_formula_on_one_joint_that_is_off_by_a_tenth():
+def test_an_error_of_a_tenth_in_one_joint_gives_the_documented_error():
     layout = RowLayout(2)
     truth, predicted = np.zeros((2, 1, layout.y_size))
     block = layout.y_joint_position
@@ -140,7 +140,7 @@ def test_the_formula_on_one_joint_that_is_off_by_a_tenth():
 
 
 @pytest.mark.parametrize("fits", [1, 10])
-def test_a_clips_figures_are_those_of_all_its_pairs(weights, fits):
+def test_the_errors_of_a_clip_cover_all_its_pairs(weights, fits):
     network = load_network(weights)
     rows = make_rows("a", 37, fits, 5)
     relative, distance = [], []
@@ -157,7 +157,7 @@ def test_a_clips_figures_are_those_of_all_its_pairs(weights, fits):
         assert got[name] == pytest.approx(np.quantile(np.concatenate(relative), share), rel=0.05)
 
 
-def test_batches_do_not_show(weights, monkeypatch):
+def test_errors_do_not_depend_on_the_batch_size(weights, monkeypatch):
     network, rows = load_network(weights), make_rows("a", 50, 10, 5)
     whole = clip_errors(network, rows, [0, 1, 2]).to_dict()
     monkeypatch.setattr(
@@ -194,11 +194,11 @@ def test_accuracy_per_clip_and_split(weights, tmp_path):
     assert result == measure(weights, clips, splits, "injured")
 
 
-def test_nothing_held_out_is_said_as_nothing():
+def test_without_held_out_clips_their_error_is_none():
     assert Errors().to_dict() == {"frames": 0, "mean": None, "sd": None, "position_error_cm": None}
 
 
-def test_only_equivalent_joints(weights, tmp_path):
+def test_equivalent_joints_leave_out_joints_of_larger_skeletons(weights, tmp_path):
     assert equivalent_joints({"maps": {"holden31": {"Foot": "LeftFoot", "Hips": "Hips"}}}) == ["Foot", "Hips"]
     assert equivalent_joints({"joints": {}}) is None
     network = load_network(weights)

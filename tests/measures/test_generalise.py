@@ -34,7 +34,9 @@ def clip_rows(name: str, skeleton: Skeleton, count: int, seed: int) -> ClipRows:
     )
 
 
-def test_one_recipe_gives_one_line_of_numbers(root: Path, holden31: Skeleton, tmp_path: Path) -> None:
+def test_the_benchmark_prints_one_line_for_each_recipe(
+    root: Path, holden31: Skeleton, tmp_path: Path
+) -> None:
     spec = importlib.util.spec_from_file_location("generalise", root / "benchmarks" / "generalise.py")
     assert spec is not None
     assert spec.loader is not None

@@ -21,12 +21,12 @@ from hobble.measures.manners.windows import (
     STEP,
     USED,
     WINDOW,
-    Figure,
-    Window,
+    MannerWindow,
+    WalkerInputs,
     captured_windows,
 )
 from hobble.models.network import Network
-from hobble.report.parts import Words
+from hobble.report.page_parts import Paragraph
 from hobble.runtime.options import Runtime
 
 FRAMES = 300
@@ -85,8 +85,8 @@ def test_windows_with_an_injury_or_half_a_mood_are_left_out(both: Network) -> No
     assert captured_windows(clip(both, "a", "sad", lean=0, value=0.5), both, "mood") == []
 
 
-def window(who: str, manner: str, *values: float) -> Window:
-    return Window(who, manner, dict(enumerate(map(float, values))), dict.fromkeys(EFFECTS, 0.0))
+def window(who: str, manner: str, *values: float) -> MannerWindow:
+    return MannerWindow(who, manner, dict(enumerate(map(float, values))), dict.fromkeys(EFFECTS, 0.0))
 
 
 def test_whole_people_are_left_out() -> None:
@@ -108,7 +108,7 @@ def test_whole_people_are_left_out() -> None:
     assert by_clip["right"] > by_person["right"] + 0.2
 
 
-def test_the_features_are_read_once_and_the_best_shrinkage_is_taken(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_features_are_tabled_once_and_the_best_shrinkage_is_chosen(monkeypatch: pytest.MonkeyPatch) -> None:
     rng = np.random.default_rng(4)
     windows = [window(f"{k}", "sad" if k % 2 else NONE, *rng.normal(k % 2, 1, 4)) for k in range(30)]
     people = {w.clip: w.clip for w in windows}
@@ -123,7 +123,7 @@ def test_the_features_are_read_once_and_the_best_shrinkage_is_taken(monkeypatch:
     assert min(one["right"] for one in alone) < best["right"]
 
 
-def test_a_manner_of_one_person_is_never_named_without_that_person() -> None:
+def test_a_manner_of_a_single_person_is_never_named_when_that_person_is_left_out() -> None:
     rng = np.random.default_rng(3)
     windows = [
         window(f"{m}{n}", m, *(place + rng.normal(0, 0.1, 2)))
@@ -144,11 +144,11 @@ def test_each_manner_is_tried_with_each_column_of_another_channel(
     mood.
     """
     real = {m: captured_windows(clip(both, f"{m}-9", m, lean=lean), both, "mood") for m, lean in LEANS}
-    asked: list[Figure] = []
+    walked: list[WalkerInputs] = []
     broken = both.channels["injury"][3]
 
-    def generated(network: Network, figures: Sequence[Figure], name: str, runtime: Runtime):
-        asked.extend(figures)
+    def generated(network: Network, figures: Sequence[WalkerInputs], name: str, runtime: Runtime):
+        walked.extend(figures)
         moods = [next(iter(f.channels["mood"]), None) for f in figures]
         lost = [broken in f.channels.get("injury", {}) for f in figures]
         return [real[None if gone else mood] for mood, gone in zip(moods, lost, strict=True)]
@@ -163,9 +163,9 @@ def test_each_manner_is_tried_with_each_column_of_another_channel(
     assert len(rows) == 3 * 25
     assert {r["column"] for r in rows if r["share"] != 1.0} == {broken}
     assert [r["share"] for r in rows if r["column"] == broken] == [1.0, 0.0, 0.0]
-    channels = [f.channels for f in asked if "injury" in f.channels]
+    channels = [f.channels for f in walked if "injury" in f.channels]
     assert {value for one in channels for value in one["injury"].values()} == {10.0}
-    assert [f.speed for f in asked if "injury" in f.channels] == pytest.approx([2.0] * 75, rel=1e-3)
+    assert [f.speed for f in walked if "injury" in f.channels] == pytest.approx([2.0] * 75, rel=1e-3)
     effect = found["effects"][2]
     assert (effect["manner"], effect["effect"]) == ("old", "trunk")
     rest = both.y_mean[both.layout.y_joint_position].reshape(-1, 3)
@@ -181,7 +181,7 @@ def test_each_manner_is_tried_with_each_column_of_another_channel(
 LEANS = ((None, 1.0), ("sad", 13.0), ("old", 31.0))
 
 
-def test_a_network_walks_all_that_is_asked(both: Network, motion: list[Captured]) -> None:
+def test_a_network_walks_in_every_manner_and_mixture(both: Network, motion: list[Captured]) -> None:
     [found] = measured(both, motion)["channels"]
     per = (USED - WINDOW) // STEP + 1
     assert [row["windows"] for row in found["generated"]] == [3 * per] * 6
@@ -191,10 +191,10 @@ def test_a_network_walks_all_that_is_asked(both: Network, motion: list[Captured]
     assert "between" in found["generated"][-1]
     shown = page.section({"applies": True, "channels": [found]}, SimpleNamespace(network={"skeleton": {}}))
     assert shown.title == "Mood"
-    assert len({part.content.name for part in shown.parts if not isinstance(part.content, Words)}) == 6
+    assert len({part.content.name for part in shown.parts if not isinstance(part.content, Paragraph)}) == 6
 
 
-def test_says_why_there_is_nothing(hurtable, both: Network, motion: list[Captured]) -> None:
+def test_missing_results_are_explained(hurtable, both: Network, motion: list[Captured]) -> None:
     assert measured(hurtable, [])["reason"] == run.REASON
     assert measured(both, motion[:6:2])["reason"] == run.TOO_FEW
     assert page.section(measured(hurtable, []), SimpleNamespace(network={"skeleton": {}})).parts == []

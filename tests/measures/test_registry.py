@@ -37,7 +37,7 @@ class Far(Joints):
 
 
 @pytest.mark.parametrize("one", MEASURES, ids=NAMES)
-def test_asks_for_what_there_is_and_has_the_parts_that_are_called(one: Measure) -> None:
+def test_each_measurement_has_known_inputs_and_the_called_functions(one: Measure) -> None:
     assert one.has("run")
     earlier = NAMES[: NAMES.index(one.name)]
     assert set(one.inputs) <= {*INPUTS, *earlier}
@@ -50,18 +50,18 @@ def test_asks_for_what_there_is_and_has_the_parts_that_are_called(one: Measure) 
             assert len(inspect.signature(getattr(module, name)).parameters) == functions[name], (part, name)
 
 
-def test_channels_bring_their_own() -> None:
+def test_measurements_of_channels_are_listed() -> None:
     brought = [one.name for one in MEASURES if one.package.startswith("hobble.channels.")]
     assert brought == ["injury", "limp", "recognition"] == [one.name for one in of_channels()]
 
 
-def test_names_are_unique() -> None:
+def test_names_of_measurements_are_unique() -> None:
     assert len(set(NAMES)) == len(NAMES)
     assert not set(NAMES) & set(INPUTS)
     assert len(modules("run")) == len(NAMES)
 
 
-def test_the_list_and_the_options_are_read_without_what_measures() -> None:
+def test_the_registry_imports_nothing_slow() -> None:
     """Descriptions are read at planning and in every job of a cluster, so their imports must be fast."""
     code = "import sys, hobble.measures.registry, hobble.config.sections; print(*sys.modules)"
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
@@ -69,7 +69,7 @@ def test_the_list_and_the_options_are_read_without_what_measures() -> None:
     assert [name for name in loaded if name in ("numpy", "numba", "torch") or name.endswith(".run")] == []
 
 
-def test_options_of_all_are_one_section() -> None:
+def test_the_options_of_all_measurements_form_one_section() -> None:
     both = joined_sections([Joints, Section, Far, Laps, Joints])
     assert both().model_dump() == {"joints": "all", "far": 4, "laps": 2}
     assert list(both.model_fields) == ["joints", "far", "laps"]

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from hobble.evaluation.tables import write_csv
+from hobble.evaluation.csv_tables import write_csv
 from hobble.measures.responsivity import run as module
 from hobble.measures.responsivity.run import lap_rows, parameter_counts, responsivity
 from hobble.runtime.controller import STEPS
@@ -40,7 +40,7 @@ def run(network, track, laps=2, seconds=10.0) -> dict[str, Any]:
     )
 
 
-def test_laps_that_are_finished(steady) -> None:
+def test_finished_laps_are_counted_and_timed(steady) -> None:
     result = run(steady, NEAR)
     assert result["laps_finished"] == 2
     assert [lap["waypoints_reached"] for lap in result["laps"]] == [3, 3]
@@ -49,24 +49,24 @@ def test_laps_that_are_finished(steady) -> None:
     assert (result["track"]["x"], result["track"]["z"]) == ([0.0, 0.3, 0.6], [0.0, 0.0, 0.0])
 
 
-def test_what_was_asked_is_what_was_taken_unless_it_was_held_back() -> None:
+def test_only_turns_that_were_limited_count_as_held_back() -> None:
     rng = np.random.default_rng(3)
     taken = rng.normal(size=(5, 4, 4))
     taken /= np.linalg.norm(taken, axis=-1, keepdims=True)
-    asked = -taken  # the same rotations
-    assert module._held_back(asked, taken) == 0
-    asked[2, 1] = asked[2, 2]
-    assert module._held_back(asked, taken) == 1
-    assert module._held_back(asked[:0], taken[:0]) == 0
+    predicted = -taken  # the same rotations
+    assert module._held_back(predicted, taken) == 0
+    predicted[2, 1] = predicted[2, 2]
+    assert module._held_back(predicted, taken) == 1
+    assert module._held_back(predicted[:0], taken[:0]) == 0
 
 
-def test_a_steady_figure_is_asked_for_what_is_drawn(steady) -> None:
+def test_the_turns_of_a_steady_figure_are_not_limited(steady) -> None:
     result = run(steady, AHEAD, laps=1)
     assert result["predicted_turn_degrees"] == pytest.approx(result["laps"][0]["predicted_turn_degrees"])
     assert result["turns_held_back"] == 0
 
 
-def test_a_character_that_cannot_turn_is_ended_by_the_clock(steady) -> None:
+def test_a_lap_that_is_never_finished_ends_after_its_time(steady) -> None:
     result = run(steady, ASIDE, seconds=8.0)
     for lap in result["laps"]:
         assert lap["frames"] == 480
@@ -124,7 +124,7 @@ def test_each_mode_runs_its_own_laps(network) -> None:
     assert without_times(some["laps"]) == without_times(modes["linear"]["laps"])
 
 
-def test_modes_beside_the_own_run_fewer_laps(network) -> None:
+def test_other_modes_run_fewer_laps(network) -> None:
     result = responsivity(
         network,
         configuration="x",
@@ -141,7 +141,7 @@ def test_modes_beside_the_own_run_fewer_laps(network) -> None:
     assert len(result["laps"]) == 3
 
 
-def test_times_of_steps_that_are_known() -> None:
+def test_known_times_of_steps_give_known_medians() -> None:
     """Two frames: steps of 1 to 6 ms, and of twice that. The whole call takes 1 ms more."""
     steps = np.arange(1.0, 7.0)
     times = np.array([[*steps, 22.0], [*(2 * steps), 43.0]]) / 1000
@@ -165,7 +165,7 @@ def test_a_lap_is_timed_step_by_step(steady) -> None:
         assert whole["sd"][step] == pytest.approx(max(expected, 0) ** 0.5, abs=1e-4)
 
 
-def test_rows_for_a_table(steady, tmp_path) -> None:
+def test_results_become_rows_of_a_table(steady, tmp_path) -> None:
     rows = lap_rows(run(steady, NEAR))
     write_csv(tmp_path / "laps.csv", rows)
     lines = (tmp_path / "laps.csv").read_text().splitlines()
@@ -180,7 +180,7 @@ def test_rows_for_a_table(steady, tmp_path) -> None:
     assert (tmp_path / "none.csv").read_text() == ""
 
 
-def test_published_counts() -> None:
+def test_published_counts_are_compared_with_ours() -> None:
     published = {
         (342, 512, 512, 311): (597_815, 335_501),
         (342, 512, 512, 512, 311): (860_471, 598_157),

@@ -15,7 +15,7 @@ from hobble.evaluation.motion_measures import in_root_frame
 from hobble.measures.given import Given
 from hobble.measures.measure import Measure
 from hobble.measures.registry import MEASURES
-from hobble.measures.rollouts.crowd import Inputs, inputs
+from hobble.measures.rollouts.roll_outs import RollOutInputs, inputs
 from hobble.measures.rollouts.run import clip_roll_outs, measure_roll_outs, roll_out_rows
 from hobble.models.network import Network
 from hobble.models.pfnn.predictor import PfnnPredictor
@@ -29,7 +29,7 @@ def hills(x: np.ndarray, z: np.ndarray) -> np.ndarray:
     return 8 * np.sin(x / 70) + 6 * np.cos(z / 50)
 
 
-def recorded(network: Network, frames: int, ground: Any) -> tuple[Inputs, np.ndarray]:
+def recorded(network: Network, frames: int, ground: Any) -> tuple[RollOutInputs, np.ndarray]:
     """The inputs of a running character in each frame, and its joints (F, J, 3) in the root frame."""
     figure = ProceduralAnimation(network, foot_locking=False)
     figure.next_pose((0.0, 2.0))
@@ -40,8 +40,8 @@ def recorded(network: Network, frames: int, ground: Any) -> tuple[Inputs, np.nda
     for f in range(frames):
         rows["phase"].append(float(state.phase[0]))
         speed = 0.0 if 25 <= f < 45 else 2.5
-        wish = (speed * np.sin(f / 40), speed * np.cos(f / 40))
-        figure.next_pose(wish, injury={"LeftUpLeg-LeftLeg": 4}, terrain=ground)
+        target = (speed * np.sin(f / 40), speed * np.cos(f / 40))
+        figure.next_pose(target, injury={"LeftUpLeg-LeftLeg": 4}, terrain=ground)
         root, yaw = controller.root[0].copy(), float(controller.yaw[0])
         local = in_root_frame(state.joint_position[0], root, np.array(yaw))
         rows["x"].append(controller.x[0].copy())
@@ -53,7 +53,7 @@ def recorded(network: Network, frames: int, ground: Any) -> tuple[Inputs, np.nda
     step = np.diff(root, axis=0, append=root[-1:])
     sin, cos = np.sin(yaw), np.cos(yaw)
     velocity = np.stack([step[:, 0] * cos - step[:, 1] * sin, step[:, 0] * sin + step[:, 1] * cos], axis=1)
-    asked = Inputs(
+    given = RollOutInputs(
         np.array(rows["x"]),
         np.array(rows["y"]),
         np.array(rows["mean"]),
@@ -62,24 +62,24 @@ def recorded(network: Network, frames: int, ground: Any) -> tuple[Inputs, np.nda
         velocity,
         np.maximum(0, 1 - np.array(rows["stand"])) ** 0.25,
     )
-    return asked, np.array(rows["local"])
+    return given, np.array(rows["local"])
 
 
 @pytest.mark.parametrize("ground", [None, hills])
-def test_a_roll_out_is_what_the_runtime_does(hurtable: Network, ground: Any) -> None:
+def test_a_roll_out_equals_the_motion_of_the_runtime(hurtable: Network, ground: Any) -> None:
     """With the runtime's inputs, joints and phase equal those of the runtime."""
     scale = hurtable.x_std.copy()  # one that feels its own velocities and its phase
     scale[hurtable.layout.x_joint_velocity] = 1.0
     hurtable = replace(hurtable, x_std=scale, y_std=np.full_like(hurtable.y_std, 0.2))
-    asked, local = recorded(hurtable, 80, ground)
+    given, local = recorded(hurtable, 80, ground)
     starts = np.array([1, 2, 17, 40, 79])
-    made, phase = roll_out(PfnnPredictor(hurtable), asked, starts, 60)
+    made, phase = roll_out(PfnnPredictor(hurtable), given, starts, 60)
     assert [len(place) for place in made] == [5] + [4] * 39 + [3] * 20
     for age, place in enumerate(made):
         np.testing.assert_allclose(place, local[starts[: len(place)] + age], atol=1e-3)
-    np.testing.assert_allclose(phase[:2], asked.phase[starts[:2] + 60], atol=1e-4)
+    np.testing.assert_allclose(phase[:2], given.phase[starts[:2] + 60], atol=1e-4)
     # The pose is its own: a start from another pose stays another for a while.
-    other = Inputs(asked.x.copy(), *list(vars(asked).values())[1:])
+    other = RollOutInputs(given.x.copy(), *list(vars(given).values())[1:])
     other.x[1, hurtable.layout.x_joint_position] += 5
     moved, _ = roll_out(PfnnPredictor(hurtable), other, starts[:1], 2)
     assert np.abs(moved[0] - local[1]).max() > 1
@@ -112,7 +112,35 @@ def clip_rows(network: Network, rows: int, seed: int, gap: int | None = None) ->
     )
 
 
-def test_every_frame_is_reached_four_times(hurtable: Network) -> None:
+def test_lengths_together_are_as_each_alone_in_fewer_predictions(
+    hurtable: Network, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A short roll-out is the beginning of a longer one from the same frame, and is not computed again."""
+    rows = clip_rows(hurtable, 240, 1, gap=90)
+    predicted: list[int] = []
+    evaluate = PfnnPredictor.evaluate
+
+    def counted(self: PfnnPredictor, z: Any, phase: Any, out: Any) -> None:
+        predicted.append(len(z))
+        evaluate(self, z, phase, out)
+
+    monkeypatch.setattr(PfnnPredictor, "evaluate", counted)
+    alone = {}
+    for length in (1, 10, 60):
+        alone |= clip_roll_outs(PfnnPredictor(hurtable), rows, range(31), (length,))
+    apart = sum(predicted)
+    predicted.clear()
+    together = clip_roll_outs(PfnnPredictor(hurtable), rows, range(31), (1, 10, 60))
+    assert {k: found.to_dict() for k, found in together.items()} == {
+        k: found.to_dict() for k, found in alone.items()
+    }
+    longest = dict.fromkeys(((n, s) for n in (90, 150) for s in range(1, n)), 1)
+    longest |= {(n, s): min(10, n - s) for n in (90, 150) for s in range(1, n, 2)}
+    longest |= {(n, s): min(60, n - s) for n in (90, 150) for s in range(1, n, 15)}
+    assert sum(predicted) == sum(longest.values()) < apart
+
+
+def test_roll_outs_start_four_times_within_each_length(hurtable: Network) -> None:
     rows = clip_rows(hurtable, 240, 1, gap=90)
     found = clip_roll_outs(PfnnPredictor(hurtable), rows, range(31), (1, 10, 20, 200))
     # Of 90 and 150 frames in a row the first of each starts none.
@@ -126,30 +154,32 @@ def test_every_frame_is_reached_four_times(hurtable: Network) -> None:
     assert found[10].moments.weight == pytest.approx(found[10].frames)
 
 
-def test_one_frame_is_half_the_prediction_and_half_the_pose_carried_on(hurtable: Network) -> None:
+def test_after_one_frame_a_pose_is_the_mean_of_prediction_and_extrapolation(hurtable: Network) -> None:
     rows = clip_rows(hurtable, 40, 2)
-    asked = inputs(rows, np.arange(40), rows.layout)
+    given = inputs(rows, np.arange(40), rows.layout)
     layout = hurtable.layout
-    np.testing.assert_array_equal(asked.x[:, layout.x_channel("injury")], rows.channels["injury"])
-    y = PfnnPredictor(hurtable).predict(asked.x, asked.phase)
-    made, _ = roll_out(PfnnPredictor(hurtable), asked, np.arange(1, 40), 1)
-    before = asked.x[1:, layout.x_joint_position].reshape(39, 31, 3).astype(float)
-    a = asked.turn[:-1, None]
-    x, z = before[..., 0] - asked.velocity[:-1, :1], before[..., 2] - asked.velocity[:-1, 1:]
+    np.testing.assert_array_equal(given.x[:, layout.x_channel("injury")], rows.channels["injury"])
+    y = PfnnPredictor(hurtable).predict(given.x, given.phase)
+    made, _ = roll_out(PfnnPredictor(hurtable), given, np.arange(1, 40), 1)
+    before = given.x[1:, layout.x_joint_position].reshape(39, 31, 3).astype(float)
+    a = given.turn[:-1, None]
+    x, z = before[..., 0] - given.velocity[:-1, :1], before[..., 2] - given.velocity[:-1, 1:]
     carried = np.stack(
         [x * np.cos(a) + z * np.sin(a), before[..., 1], z * np.cos(a) - x * np.sin(a)], axis=-1
     )
     speed = y[1:, layout.y_joint_velocity].reshape(39, 31, 3)
     guess = y[1:, layout.y_joint_position].reshape(39, 31, 3)
     np.testing.assert_allclose(made[0], (carried + speed + guess) / 2, atol=1e-4)
-    truth = asked.y[1:, layout.y_joint_position].reshape(39, 31, 3)
+    truth = given.y[1:, layout.y_joint_position].reshape(39, 31, 3)
     found = clip_roll_outs(PfnnPredictor(hurtable), rows, range(31), (1,))[1].to_dict()
     assert found["position_error_cm"] == pytest.approx(
         np.linalg.norm(truth - made[0], axis=-1).mean(), rel=1e-5
     )
 
 
-def test_splits_add_up_and_come_out_the_same(hurtable: Network, tmp_path: Path, monkeypatch) -> None:
+def test_results_of_splits_are_means_of_their_clips_and_reproducible(
+    hurtable: Network, tmp_path: Path, monkeypatch
+) -> None:
     weights = tmp_path / "weights.npz"
     save(weights, hurtable)
     clips = {}
@@ -171,7 +201,7 @@ def test_splits_add_up_and_come_out_the_same(hurtable: Network, tmp_path: Path, 
     assert rows[0]["clip"] is None
     json.dumps(result, allow_nan=False)
     # The same bits, however many poses and clips go at once.
-    monkeypatch.setattr("hobble.measures.rollouts.crowd.BATCH", 7)
+    monkeypatch.setattr("hobble.measures.rollouts.roll_outs.BATCH", 7)
     assert measure_roll_outs(weights, clips, splits, "injured", lengths=(1, 30)) == result
     monkeypatch.setattr("hobble.measures.rollouts.run.AT_ONCE", 1)
     assert measure_roll_outs(weights, clips, splits, "injured", lengths=(1, 30)) == result

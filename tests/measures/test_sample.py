@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import importlib.util
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -15,6 +16,7 @@ from hobble.measures.rollouts.page import rollout_chart
 from hobble.measures.rollouts.run import measure_roll_outs
 from hobble.measures.sample import LEAST, Sample, Stratum, drawn
 from hobble.rows.clip_rows import save_clip_rows
+from hobble.rows.excerpts import LONGEST, Excerpt, Kind, excerpts, load_excerpt
 from hobble.rows.facts import Facts, facts, load_facts, save_facts
 from hobble.rows.layout import GAITS
 
@@ -26,53 +28,74 @@ _spec.loader.exec_module(_of_accuracy)
 make_rows, make_network = _of_accuracy.make_rows, _of_accuracy.make_network
 
 
-def population(seed: int, count: int = 600) -> tuple[list[Facts], dict[str, str], dict[str, float]]:
-    """Clips of four kinds and of any length, one in twelve held out, and the mean error of each clip."""
+def population(
+    seed: int, count: int = 600, rows: tuple[int, int] = (500, 5000)
+) -> tuple[list[Facts], dict[str, str], dict[Excerpt, float]]:
+    """Clips of four kinds and of any length, one in twelve held out, and the mean error of each excerpt.
+
+    Half of the spread within a kind is that of clips, so excerpts of one clip resemble each other.
+    """
     rng = np.random.default_rng(seed)
     clips, values = [], {}
     for number in range(count):
         gait, hurt = ("walk", "jog")[rng.integers(2)], rng.random() < 0.3
-        rows = int(rng.integers(500, 5000))
-        one = Facts(f"{seed}-{number:03d}", rows, gait, float(rng.gamma(4)), ("injury",) if hurt else ())
-        clips.append(one)
-        values[one.clip] = (2 if gait == "jog" else 1) + hurt + 0.1 * one.speed + rng.normal(0, 0.3)
+        name, length, speed = f"{seed}-{number:03d}", int(rng.integers(*rows)), rng.gamma(4)
+        own = rng.normal(0, 0.2)
+        kinds = []
+        for one in excerpts(name, length):
+            kinds.append(Kind(gait, float(speed * rng.uniform(0.9, 1.1)), ("injury",) if hurt else ()))
+            values[one] = (2 if gait == "jog" else 1) + hurt + 0.1 * speed + own + rng.normal(0, 0.2)
+        clips.append(Facts(name, length, tuple(kinds)))
     return clips, {one.clip: "held_out" if i % 12 == 0 else "train" for i, one in enumerate(clips)}, values
 
 
-def estimate(sample: Sample, split: str, values: dict[str, float]) -> float:
-    rows = {name: n for s in sample.strata if s.split == split for name, n in s.drawn.items()}
-    weights = [sample.weights[name] * n for name, n in rows.items()]
-    return float(np.average([values[name] for name in rows], weights=weights))
+def estimate(sample: Sample, split: str, values: dict[Excerpt, float]) -> float:
+    own = [one for s in sample.strata if s.split == split for one in s.drawn]
+    weights = [sample.weights[one] * one.rows for one in own]
+    return float(np.average([values[one] for one in own], weights=weights))
 
 
-def test_where_there_are_few_frames_all_clips_are_measured():
+def test_with_few_frames_all_clips_are_measured():
     clips, splits, _ = population(0)
     rows = sum(one.rows for one in clips)
     assert drawn(clips, splits, rows) is None
     assert drawn(clips, splits, rows - 1) is not None
 
 
-def test_the_sample_is_as_large_as_asked_and_has_something_of_every_kind():
+def test_the_sample_has_the_requested_size_and_every_kind_of_clip():
     clips, splits, _ = population(1)
     sample = drawn(clips, splits, 300_000)
     assert sample is not None
-    by_name = {one.clip: one for one in clips}
+    of_excerpt = {excerpt: kind for one in clips for excerpt, kind in one.excerpts.items()}
     measured = dict.fromkeys(("train", "held_out"), 0)
     for stratum in sample.strata:
-        kinds = {(splits[n], by_name[n].gait, by_name[n].channels) for n in stratum.drawn}
+        kinds = {(splits[n.clip], of_excerpt[n].gait, of_excerpt[n].channels) for n in stratum.drawn}
         assert len(kinds) == 1
-        assert len(stratum.drawn) >= min(LEAST, stratum.clips)
-        measured[stratum.split] += sum(stratum.drawn.values())
+        assert len(stratum.drawn) >= min(LEAST, stratum.count)
+        measured[stratum.split] += sum(one.rows for one in stratum.drawn)
     held_out = sum(one.rows for one in clips if splits[one.clip] == "held_out")
-    assert measured["held_out"] == pytest.approx(min(150_000, held_out), rel=0.25)
-    assert measured["train"] == pytest.approx(300_000 - measured["held_out"], rel=0.25)
+    assert measured["held_out"] == pytest.approx(min(150_000, held_out), rel=0.1)
+    assert measured["train"] == pytest.approx(300_000 - measured["held_out"], rel=0.1)
     assert sum(s.rows for s in sample.strata) == sum(one.rows for one in clips)
     assert sum(stratum.split == "train" for stratum in sample.strata) == 2 * 3 * 2
 
 
-def test_one_clip_more_changes_little():
+def test_of_two_long_clips_only_excerpts_are_drawn():
+    clips, splits, _ = population(4, 24, (600_000, 600_001))
+    sample = drawn(clips, splits, 100_000)
+    assert sample is not None
+    assert sum(one.rows for one in sample.weights) == pytest.approx(100_000, rel=0.3)
+    assert max(one.rows for one in sample.weights) <= LONGEST
+    assert len({one.clip for one in sample.weights}) > 12
+    found = sample.to_dict()
+    assert found["of_excerpts"] == 24 * 500
+    assert found["excerpts"] == len(sample.weights)
+    assert found["of"] == 24
+
+
+def test_an_additional_clip_hardly_changes_the_sample():
     clips, splits, _ = population(2)
-    more = [*clips, Facts("another", 900, "walk", 3.0, ())]
+    more = [*clips, Facts("another", 900, (Kind("walk", 3.0, ()),))]
     before = drawn(clips, splits, 300_000)
     after = drawn(more, {**splits, "another": "train"}, 300_000)
     assert before is not None
@@ -82,15 +105,19 @@ def test_one_clip_more_changes_little():
 
 
 @pytest.mark.parametrize("split", ["train", "held_out"])
-def test_the_interval_holds_the_truth_nearly_as_often_as_it_says(split):
-    """The intervals hold in nearly 95 % of samples. Without strata or weights they hold far less often."""
+@pytest.mark.parametrize("long", [False, True])
+def test_the_interval_contains_the_true_mean_about_as_often_as_stated(split, long):
+    """The intervals hold in nearly 95 % of samples, although excerpts of a clip resemble each other.
+
+    Without strata or weights they hold far less often.
+    """
     inside, off = [], []
-    for seed in range(300):
-        clips, splits, values = population(seed)
+    for seed in range(80):
+        clips, splits, values = population(seed, 48, (20_000, 60_000)) if long else population(seed)
         sample = drawn(clips, splits, 200_000)
         assert sample is not None
-        own = [one for one in clips if splits[one.clip] == split]
-        truth = np.average([values[one.clip] for one in own], weights=[one.rows for one in own])
+        own = [one for one in values if splits[one.clip] == split]
+        truth = np.average([values[one] for one in own], weights=[one.rows for one in own])
         found = estimate(sample, split, values)
         inside.append(abs(found - truth) <= sample.half_width(split, values))
         off.append(found - truth)
@@ -98,15 +125,44 @@ def test_the_interval_holds_the_truth_nearly_as_often_as_it_says(split):
     assert abs(np.mean(off)) < 0.3 * np.std(off)
 
 
-def test_clips_that_are_all_drawn_leave_no_doubt():
-    stratum = Stratum("train", 3, 60, {"a": 10, "b": 20, "c": 30})
-    sample = Sample((stratum,), 3)
-    assert sample.half_width("train", {"a": 1.0, "b": 5.0, "c": 9.0}) == 0
+def whole(name: str, rows: int) -> Excerpt:
+    return Excerpt(name, 0, rows, rows)
+
+
+def test_excerpts_that_are_all_drawn_leave_no_doubt():
+    a, b, c = (whole(name, 10 * (i + 1)) for i, name in enumerate("abc"))
+    sample = Sample((Stratum("train", 3, 60, (a, b, c)),), 3)
+    assert sample.half_width("train", {a: 1.0, b: 5.0, c: 9.0}) == 0
     assert set(sample.weights.values()) == {1.0}
-    half = Sample((Stratum("train", 4, 40, {"a": 10, "b": 10}),), 4)
-    assert half.weights == {"a": 2.0, "b": 2.0}
+    a, b = whole("a", 10), whole("b", 10)
+    half = Sample((Stratum("train", 4, 40, (a, b)),), 4)
+    assert half.weights == {a: 2.0, b: 2.0}
     # Variance of the mean of 2 of 4: (1 - 2/4) * 8 / 2.
-    assert half.half_width("train", {"a": 1.0, "b": 5.0}) == pytest.approx(1.96 * 2**0.5)
+    assert half.half_width("train", {a: 1.0, b: 5.0}) == pytest.approx(1.96 * 2**0.5)
+
+
+def test_excerpts_cover_a_clip_once_and_are_read_as_they_are(tmp_path):
+    rows = make_rows("a", 2500, 2, 5)
+    rows.fits[::3] = 1
+    rows = replace(rows, heights=rows.heights[: rows.fits.sum()], mean=rows.mean[: rows.fits.sum()])
+    save_clip_rows(tmp_path / "a.npz", rows)
+    parts = excerpts("a", 2500)
+    assert [one.first for one in parts] == [0, 833, 1666]
+    fit = 0
+    for one in parts:
+        read = load_excerpt(tmp_path / "a.npz", one)
+        for name in ("x", "y", "p", "frame", "cycle", "fits"):
+            np.testing.assert_array_equal(getattr(read, name), getattr(rows, name)[one.first : one.stop])
+        np.testing.assert_array_equal(read.channels["injury"], rows.channels["injury"][one.first : one.stop])
+        after = fit + int(read.fits.sum())
+        np.testing.assert_array_equal(read.heights, rows.heights[fit:after])
+        np.testing.assert_array_equal(read.mean, rows.mean[fit:after])
+        fit = after
+    assert fit == len(rows.mean)
+    around = load_excerpt(tmp_path / "a.npz", parts[1], before=2, after=900)
+    np.testing.assert_array_equal(around.y, rows.y[831:])
+    with pytest.raises(InputError, match="other rows"):
+        load_excerpt(tmp_path / "a.npz", Excerpt("a", 2400, 200, 2600))
 
 
 @pytest.fixture
@@ -122,41 +178,59 @@ def test_accuracy_and_roll_outs_count_each_clip_for_its_kind(tmp_path, clips):
     weights = tmp_path / "w.npz"
     np.savez(weights, **make_network())
     splits = dict.fromkeys(clips, "train")
-    kinds = (
-        Stratum("train", 5, 300, {"a": 20, "b": 25, "c": 30}),
-        Stratum("train", 3, 165, {"d": 35, "e": 40}),
-    )
-    sample = Sample(kinds, 8)
-    whole = measure(weights, clips, splits, "holden")
+    a, b, c, d, e = (whole(name, 20 + 5 * i) for i, name in enumerate("abcde"))
+    sample = Sample((Stratum("train", 5, 300, (a, b, c)), Stratum("train", 3, 165, (d, e))), 8)
+    everything = measure(weights, clips, splits, "holden")
     found = measure(weights, clips, splits, "holden", sample=sample)
-    means = {clip["clip"]: clip["mean"] for clip in whole["clips"]}
+    means = {clip["clip"]: clip["mean"] for clip in everything["clips"]}
     assert [clip["clip"] for clip in found["clips"]] == list("abcde")
+    assert found["clips"] == [pytest.approx(clip) for clip in everything["clips"][:5]]
     first = np.average([means[n] for n in "abc"], weights=[20, 25, 30])
     second = np.average([means[n] for n in "de"], weights=[35, 40])
     assert found["train"]["mean"] == pytest.approx((300 * first + 165 * second) / 465)
     assert found["train"]["frames"] == 150
-    assert found["train"]["interval"]["mean"] == pytest.approx(sample.half_width("train", means))
+    width = sample.half_width("train", {one: means[one.clip] for one in sample.weights})
+    assert found["train"]["interval"]["mean"] == pytest.approx(width)
     by_clips = (5 * np.mean([means[n] for n in "abc"]) + 3 * np.mean([means[n] for n in "de"])) / 8
     assert found["train"]["mean_of_clips"] == pytest.approx(by_clips)
-    assert found["sample"] == {"clips": 5, "of": 8, "strata": 2}
-    assert "sample" not in whole
-    assert "5 of 8 clips" in page.sampled(found)
-    assert page.sampled(whole) == ""
+    assert found["sample"] == {"excerpts": 5, "of_excerpts": 8, "clips": 5, "of": 8, "strata": 2}
+    assert "sample" not in everything
+    assert "5 of 8 excerpts" in page.sampled(found)
+    assert page.sampled(everything) == ""
 
     rolled = measure_roll_outs(weights, clips, splits, "holden", lengths=(1, 4), sample=sample)
-    everything = measure_roll_outs(weights, clips, splits, "holden", lengths=(1, 4))
-    of_clip = {c["clip"]: c["position_error_cm"] for c in everything["lengths"][0]["clips"]}
+    every_roll_out = measure_roll_outs(weights, clips, splits, "holden", lengths=(1, 4))
+    entries = every_roll_out["lengths"][0]["clips"]
+    of_clip = {one: entries[i]["position_error_cm"] for i, one in enumerate(sample.weights)}
     entry = rolled["lengths"][0]["train"]
     assert entry["interval"]["position_error_cm"] == pytest.approx(sample.half_width("train", of_clip))
-    assert entry["ended"] == sum(
-        c["ended"] for c in everything["lengths"][0]["clips"] if c["clip"] in "abcde"
-    )
+    assert entry["ended"] == sum(c["ended"] for c in entries[:5])
     chart = rollout_chart(rolled)
     assert chart is not None
     assert len(chart.traces[0]["error_y"]["array"]) == 2
-    plain = rollout_chart(everything)
+    plain = rollout_chart(every_roll_out)
     assert plain is not None
     assert "error_y" not in plain.traces[0]
+
+
+def test_all_excerpts_of_a_clip_together_measure_what_the_clip_does(tmp_path):
+    """Roll-outs that begin in an excerpt go on after it, so none is cut short but at the end of the clip."""
+    weights, file = tmp_path / "w.npz", tmp_path / "a.npz"
+    np.savez(weights, **make_network())
+    save_clip_rows(file, make_rows("a", 120, 1, 3))
+    parts = [Excerpt("a", 40 * i, 40, 120) for i in range(3)]
+    sample = Sample((Stratum("train", 3, 120, tuple(parts)),), 1)
+    given = weights, {"a": file}, {"a": "train"}, "holden"
+    cut, uncut = measure(*given, sample=sample), measure(*given)
+    assert cut["clips"] == [pytest.approx(uncut["clips"][0])]
+    assert cut["train"]["mean_of_clips"] == pytest.approx(uncut["train"]["mean_of_clips"])
+    assert [(e["first_frame"], e["last_frame"]) for e in cut["excerpts"]] == [(0, 39), (40, 79), (80, 119)]
+    rolled = measure_roll_outs(*given, lengths=(1, 20), sample=sample)
+    every = measure_roll_outs(*given, lengths=(1, 20))
+    assert rolled["lengths"][0]["clips"] == [pytest.approx(every["lengths"][0]["clips"][0])]
+    # Starts in steps of 5: at 1, 6, ... in the clip, at 1, 40, 80, ... in the excerpts.
+    assert every["lengths"][1]["train"]["ended"] == 20
+    assert rolled["lengths"][1]["train"]["ended"] == 8 + 8 + 4
 
 
 def test_facts_of_a_clip_survive_their_file(tmp_path):
@@ -166,10 +240,14 @@ def test_facts_of_a_clip_survive_their_file(tmp_path):
     gait[:, GAITS.index("jog")] = 1
     rows.y[:, rows.layout.y_root_velocity] = [3, 4]
     found = facts(rows)
-    assert (found.clip, found.rows, found.gait, found.channels) == ("a", 30, "jog", ("injury",))
-    assert found.speed == pytest.approx(5)
+    assert (found.clip, found.rows) == ("a", 30)
+    assert [(kind.gait, kind.channels) for kind in found.kinds] == [("jog", ("injury",))]
+    assert found.kinds[0].speed == pytest.approx(5)
     save_facts(tmp_path / "a.json", found)
     assert load_facts(tmp_path / "a.json") == found
     (tmp_path / "a.json").write_text('{"clip": "a"}')
+    with pytest.raises(InputError, match="not the facts of a clip"):
+        load_facts(tmp_path / "a.json")
+    save_facts(tmp_path / "a.json", Facts("a", 30, ()))
     with pytest.raises(InputError, match="not the facts of a clip"):
         load_facts(tmp_path / "a.json")

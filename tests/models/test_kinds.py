@@ -63,7 +63,7 @@ def made(request: pytest.FixtureRequest, holden31: Skeleton) -> Made:
     return trainable, arrays, network_from_arrays("weights.npz", arrays)
 
 
-def asked(network: Network, rows: int = 7) -> tuple[np.ndarray, np.ndarray]:
+def random_inputs(network: Network, rows: int = 7) -> tuple[np.ndarray, np.ndarray]:
     rng = np.random.default_rng(3)
     x = network.x_mean + network.x_std * rng.normal(size=(rows, len(network.x_mean)))
     return x.astype(np.float32), np.r_[0.0, 0.5, 1.0, rng.random(rows - 3)]
@@ -76,7 +76,7 @@ def near(network: Network, y: np.ndarray, expected: np.ndarray, within: float) -
 
 def test_the_read_network_equals_the_trained_one(made: Made) -> None:
     trainable, _, network = made
-    x, phase = asked(network)
+    x, phase = random_inputs(network)
     y = trainable(torch.from_numpy(standardised(network, x)), torch.from_numpy(phase.astype(np.float32)))
     near(network, y.numpy() * network.y_std + network.y_mean, network.predict(x, phase), 2e-5)
     assert network.sizes[0] == len(network.x_mean)
@@ -84,9 +84,9 @@ def test_the_read_network_equals_the_trained_one(made: Made) -> None:
 
 
 @pytest.mark.parametrize("rows", [1, 2, 3, 4, 5, 11])
-def test_the_predictor_is_the_plain_prediction(made: Made, rows: int) -> None:
+def test_the_compiled_predictor_equals_the_plain_prediction(made: Made, rows: int) -> None:
     network = made[2]
-    x, phase = (array[:rows] for array in asked(network, max(rows, 4)))
+    x, phase = (array[:rows] for array in random_inputs(network, max(rows, 4)))
     expected = network.predict(x, phase)
     near(network, network.predictor(storage="float32").predict(x, phase), expected, 2e-5)
     out = np.zeros_like(expected)
@@ -98,12 +98,12 @@ def test_the_predictor_is_the_plain_prediction(made: Made, rows: int) -> None:
 
 
 @pytest.mark.parametrize("storage", STORAGES)
-def test_a_crowd_has_the_bits_of_single_characters(made: Made, storage: str) -> None:
+def test_a_crowd_is_bitwise_equal_to_single_characters(made: Made, storage: str) -> None:
     """For some characters the share of an expert is 0, so that the rows of a product are not all
     consecutive.
     """
     network = made[2]
-    x, phase = asked(network, 29)
+    x, phase = random_inputs(network, 29)
     x[::3] = network.x_mean + 30 * (x[::3] - network.x_mean)
     predictor = network.predictor(storage=storage)
     alone = [predictor.predict(x[i : i + 1], phase[i : i + 1])[0] for i in range(len(x))]
@@ -114,17 +114,17 @@ def test_a_crowd_has_the_bits_of_single_characters(made: Made, storage: str) -> 
 
 def test_a_network_without_phase_ignores_it(made: Made) -> None:
     network = made[2]
-    x, phase = asked(network)
+    x, phase = random_inputs(network)
     same = np.array_equal(network.predict(x, phase), network.predict(x, phase + 0.3))
     assert same == (not network.phase)
 
 
-def test_the_page_computes_the_same(made: Made, tmp_path: Path) -> None:
+def test_javascript_predicts_the_same_as_python(made: Made, tmp_path: Path) -> None:
     """The page lacks the first input, which has no weight, and has some outputs only, in another order."""
     network = made[2]
     object.__setattr__(network, "x_std", np.where(np.arange(len(network.x_std)) == 0, 0, network.x_std))
     seen, rows = np.arange(1, len(network.x_mean)), np.array([5, 0, 310, 17])
-    x, phase = asked(network)
+    x, phase = random_inputs(network)
     spec = {
         "network": {"kind": network.kind, **network.page(seen, rows)},
         "seen": seen.tolist(),
@@ -133,7 +133,9 @@ def test_the_page_computes_the_same(made: Made, tmp_path: Path) -> None:
         "yMean": packed(network.y_mean[rows]),
         "yStd": packed(network.y_std[rows]),
     }
-    (tmp_path / "asked.json").write_text(json.dumps({"spec": spec, "x": x.tolist(), "phase": phase.tolist()}))
+    (tmp_path / "inputs.json").write_text(
+        json.dumps({"spec": spec, "x": x.tolist(), "phase": phase.tolist()})
+    )
     script = Path(__file__).parents[2] / "src/hobble/models" / network.kind / "network.js"
     (tmp_path / "run.mjs").write_text(
         f'import {{ createNetwork }} from {json.dumps(str(script))};\nimport {{ readFileSync }} from "fs";\n'
@@ -142,7 +144,7 @@ def test_the_page_computes_the_same(made: Made, tmp_path: Path) -> None:
         "console.log(JSON.stringify(x.map((row, i) => Array.from(network(row, phase[i])))));\n"
     )
     done: subprocess.CompletedProcess = node(
-        [str(tmp_path / "run.mjs"), str(tmp_path / "asked.json")],
+        [str(tmp_path / "run.mjs"), str(tmp_path / "inputs.json")],
         return_completed_process=True,
         capture_output=True,
         text=True,
@@ -152,18 +154,18 @@ def test_the_page_computes_the_same(made: Made, tmp_path: Path) -> None:
     np.testing.assert_allclose(difference / network.y_std[rows], 0, atol=5e-3)
 
 
-def test_onnxruntime_computes_the_same(made: Made, tmp_path: Path) -> None:
+def test_onnxruntime_predicts_the_same_as_python(made: Made, tmp_path: Path) -> None:
     pytest.importorskip("onnx")
     runtime = pytest.importorskip("onnxruntime")
     network = made[2]
     assert "within" in network.export("onnx", tmp_path / "network.onnx", network.mode(None))
-    x, phase = asked(network)
+    x, phase = random_inputs(network)
     session = runtime.InferenceSession(tmp_path / "network.onnx", providers=["CPUExecutionProvider"])
     (y,) = session.run(["y"], {"x": x, "phase": phase.astype(np.float32)})
     near(network, y, network.predict(x, phase), 1e-4)
 
 
-def test_a_character_goes(made: Made) -> None:
+def test_a_character_moves(made: Made) -> None:
     animation = ProceduralAnimation(made[2], characters=2)
     for _ in range(3):
         pose = animation.next_pose([1.0, 0.0])

@@ -212,7 +212,7 @@ def save(path: Path, made: Content) -> None:
     np.savez(path, **{**made, "meta": told if isinstance(told, np.ndarray) else np.array(json.dumps(told))})
 
 
-def test_a_sound_file_is_read(tmp_path: Path, holden31: Skeleton) -> None:
+def test_a_valid_network_file_is_read(tmp_path: Path, holden31: Skeleton) -> None:
     save(tmp_path / "weights.npz", content(holden31))
     network = load_network(tmp_path)
     assert (network.sizes, network.gaits, network.terrain_side) == ((372, 6, 5, 311), GAITS, 25.0)
@@ -307,7 +307,7 @@ def test_entries_that_overlap_take_no_memory(tmp_path: Path, holden31: Skeleton)
         load_network(path)
 
 
-def test_the_ground_is_looked_up_where_it_was_in_training(tmp_path: Path, holden31: Skeleton) -> None:
+def test_the_ground_is_sampled_as_far_to_the_side_as_in_training(tmp_path: Path, holden31: Skeleton) -> None:
     """The runtime and the page look as far to the side as the file says, or 25 cm if it does not say."""
     for side in (40.0, None):
         made = content(holden31)
@@ -317,14 +317,14 @@ def test_the_ground_is_looked_up_where_it_was_in_training(tmp_path: Path, holden
             made["meta"]["terrain_side"] = side
         save(tmp_path / "weights.npz", made)
         network = load_network(tmp_path)
-        asked: list[np.ndarray] = []
+        places: list[np.ndarray] = []
 
-        def ground(x: np.ndarray, z: np.ndarray, asked: list[np.ndarray] = asked) -> np.ndarray:
-            asked.append(np.stack([x, z], axis=-1))
+        def ground(x: np.ndarray, z: np.ndarray, places: list[np.ndarray] = places) -> np.ndarray:
+            places.append(np.stack([x, z], axis=-1))
             return np.zeros_like(x)
 
         ProceduralAnimation(network).next_pose((0, 0.5), terrain=ground)
-        left, path, right = asked[0].reshape(-1, 3, 2).transpose(1, 0, 2)
+        left, path, right = places[0].reshape(-1, 3, 2).transpose(1, 0, 2)
         expected = side or 25.0
         np.testing.assert_allclose(np.linalg.norm(left - path, axis=-1), expected, rtol=1e-6)
         np.testing.assert_allclose(np.linalg.norm(right - path, axis=-1), expected, rtol=1e-6)

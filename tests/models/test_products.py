@@ -33,7 +33,9 @@ def factors(dtype: torch.dtype, rows: int = 33) -> list[tuple[torch.Tensor, torc
 
 @pytest.mark.parametrize("dtype", [torch.float32, torch.bfloat16])
 @pytest.mark.parametrize("way", products.WAYS)
-def test_every_way_is_the_product(way: str, dtype: torch.dtype, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_every_way_of_multiplying_gives_the_product(
+    way: str, dtype: torch.dtype, monkeypatch: pytest.MonkeyPatch
+) -> None:
     monkeypatch.setattr(products, "_chosen", lambda *_: way)
     for a, b in factors(dtype):
         exact = a.double() @ b.double().T
@@ -44,7 +46,7 @@ def test_every_way_is_the_product(way: str, dtype: torch.dtype, monkeypatch: pyt
             assert float((found.double() - exact).abs().max()) < scale * (1e-5 if a.itemsize == 4 else 0.01)
 
 
-def test_the_file_says_which_way_is_taken(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_the_choice_in_the_file_is_used(monkeypatch: pytest.MonkeyPatch) -> None:
     taken = []
     for name, way in products.WAYS.items():
         monkeypatch.setitem(
@@ -74,7 +76,7 @@ def test_batches_of_nearly_the_same_size_share_a_choice() -> None:
     assert len(json.loads(choices_file().read_text())["ways"]) == 4
 
 
-def test_a_trial_takes_nothing_from_the_generator() -> None:
+def test_a_trial_uses_no_random_numbers_of_the_training() -> None:
     cases = factors(torch.float32)
     torch.manual_seed(3)
     expected = torch.rand(4)
@@ -84,7 +86,7 @@ def test_a_trial_takes_nothing_from_the_generator() -> None:
     assert torch.equal(torch.rand(4), expected)
 
 
-def test_the_first_choice_stays() -> None:
+def test_a_choice_is_never_made_twice() -> None:
     ways = ("plain", "turned")
     assert kept("a", lambda: "turned", ways, "plain") == "turned"
     assert kept("a", lambda: "plain", ways, "plain") == "turned"
@@ -103,7 +105,7 @@ def test_a_damaged_file_is_made_again(content: str) -> None:
     assert kept("a", lambda: "plain", ("plain", "turned"), "plain") == "turned"
 
 
-def test_without_a_folder_a_fixed_way_is_taken_and_nothing_is_tried(
+def test_without_a_cache_folder_a_fixed_way_is_used_without_trial(
     cache_folder: Path, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
 ) -> None:
     (cache_folder / "file").write_text("")
@@ -113,7 +115,7 @@ def test_without_a_folder_a_fixed_way_is_taken_and_nothing_is_tried(
     assert len(caplog.records) == 1
 
 
-def test_other_settings_have_their_own_file(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_each_machine_setting_has_its_own_file_of_choices(monkeypatch: pytest.MonkeyPatch) -> None:
     assert kept("a", lambda: "turned", ("plain", "turned"), "plain") == "turned"
     monkeypatch.setenv("ONEDNN_MAX_CPU_ISA", "SSE41")
     assert kept("a", lambda: "plain", ("plain", "turned"), "plain") == "plain"
@@ -124,7 +126,7 @@ def ask(way: str, start: multiprocessing.Barrier, answers: multiprocessing.Queue
     answers.put(kept("a", lambda: way, ("0", "1", "2", "3"), "none"))
 
 
-def test_processes_that_start_together_take_the_same_way() -> None:
+def test_processes_that_start_together_make_the_same_choice() -> None:
     context = multiprocessing.get_context("spawn")
     start, answers = context.Barrier(4), context.Queue()
     processes = [context.Process(target=ask, args=(str(n), start, answers)) for n in range(4)]

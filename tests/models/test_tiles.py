@@ -38,7 +38,7 @@ def in_order(weights: np.ndarray, x: np.ndarray) -> np.ndarray:
 @pytest.mark.parametrize("dtype", ["float32", "int16"])
 @pytest.mark.parametrize("inputs", [1, 7, DEPTH + 30])
 @pytest.mark.parametrize("outputs", [3, 16, 16 * 7 + 5])
-def test_products_are_running_sums(dtype: str, inputs: int, outputs: int) -> None:
+def test_products_do_not_depend_on_the_number_of_rows(dtype: str, inputs: int, outputs: int) -> None:
     rng = np.random.default_rng(inputs + outputs)
     weights = rng.integers(-99, 99, (outputs, inputs)).astype(dtype)
     if dtype == "float32":

@@ -14,7 +14,8 @@ import numpy as np
 from hobble.core import quat
 from hobble.core.clip import Clip
 from hobble.core.skeleton import Skeleton, local_rotations
-from tests.motion.scramble import SYLLABLES, Rig, Scramble, _as_clip
+from tests.motion.rewrite import Rig, Scramble, as_clip
+from tests.motion.rig_names import SYLLABLES
 
 X = np.array([1.0, 0.0, 0.0])
 LEG, ARM = ("UpLeg", "Leg", "Foot", "ToeBase"), ("Shoulder", "Arm", "ForeArm", "Hand")
@@ -133,7 +134,7 @@ def rigged(clip: Clip, text: str, **how: Any) -> tuple[Clip, dict[str, str]]:
                 names.setdefault(joint, name)
         rig.add(name, -1 if parent == "-" else rig.names.index(parent), place, turn)
     plain = {"rest": "own", "unit": "cm", "rate": 60.0, "z_up": False, "left_handed": False, "six": False}
-    return _as_clip(rig, clip, replace(Scramble.drawn(3), **plain | how), np.random.default_rng(5)), names
+    return as_clip(rig, clip, replace(Scramble.drawn(3), **plain | how), np.random.default_rng(5)), names
 
 
 def rezeroed(clip: Clip, joints: tuple[str, ...], turn: np.ndarray) -> Clip:

@@ -25,7 +25,7 @@ def top_speed(clip):
 
 
 @pytest.mark.parametrize("fps", [24.0, 30.0, 60.0, 120.0])
-def test_a_sound_clip_comes_back_as_it_is(walker, holden31, fps):
+def test_a_clip_without_defects_is_unchanged(walker, holden31, fps):
     clip = walker(holden31, int(4 * fps), fps)
     mended = repair(clip)
     assert mended.clip is clip
@@ -92,7 +92,7 @@ def test_a_jump_at_a_seam_is_blended_and_the_path_goes_on(walk):
     assert np.diff(mended.clip.root[:, 2]).min() > 0
 
 
-def test_refusing_names_the_file_and_the_frames(walk, bvh, make):
+def test_a_refused_defect_names_file_and_frames(walk, bvh, make):
     path = bvh(with_rest_pose(walk, slice(-3, None), 0.0))
     clip, report = make(path)
     assert len(clip) == 119
@@ -119,7 +119,7 @@ def test_where_the_clip_begins_is_reported(walk, bvh, make):
         ("cmu/16_17", "Frame 475 is off", 259),
     ],
 )
-def test_known_defects_of_real_files(shared, make, file, said, frames):
+def test_known_defects_of_real_files_are_found(shared, make, file, said, frames):
     clip, report = make(shared / f"mocap/{file}.bvh", proportions="clip")
     assert any(said in sentence for sentence in report["repairs"])
     assert len(clip) == frames

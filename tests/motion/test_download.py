@@ -35,66 +35,66 @@ def fetch(server, tmp_path: Path) -> Callable[..., Path]:
     return run
 
 
-def test_a_file_arrives_whole_and_leaves_nothing_else(server, fetch):
+def test_a_downloaded_file_is_complete_and_no_partial_file_is_left(server, fetch):
     path = fetch()
     assert path.read_bytes() == CONTENT
     assert [p.name for p in path.parent.iterdir()] == ["walk.bvh"]  # no part is left
-    assert (server.asked, fetch.waits) == ([None], [])
+    assert (server.requests, fetch.waits) == ([None], [])
 
 
-def test_a_server_that_fails_twice_is_asked_a_third_time_after_longer_waits(server, fetch):
+def test_a_failed_download_is_tried_again_after_growing_waits(server, fetch):
     server.faults = [503, 500]
     assert fetch().read_bytes() == CONTENT
     assert fetch.waits == [1, 2]
 
 
-def test_a_file_cut_short_is_gone_on_with_where_it_broke_off(server, fetch):
+def test_an_interrupted_download_continues_where_it_stopped(server, fetch):
     server.faults = [70_000, 50_000]
     assert fetch().read_bytes() == CONTENT
-    assert server.asked == [None, "bytes=70000-", "bytes=120000-"]
+    assert server.requests == [None, "bytes=70000-", "bytes=120000-"]
 
 
-def test_a_later_run_goes_on_too(server, fetch):
+def test_a_later_run_continues_an_interrupted_download(server, fetch):
     server.faults = [90_000]
     with pytest.raises(InputError, match=f"cut short after 90000 of {len(CONTENT)} bytes"):
         fetch(attempts=1)
     assert fetch.part.stat().st_size == 90_000
     assert fetch().read_bytes() == CONTENT
-    assert server.asked[1:] == ["bytes=90000-"]
+    assert server.requests[1:] == ["bytes=90000-"]
 
 
-def test_a_server_without_ranges_starts_anew(server, fetch):
+def test_without_range_requests_the_download_starts_over(server, fetch):
     server.faults, server.ranges = [70_000], False
     assert fetch().read_bytes() == CONTENT
-    assert server.asked == [None, "bytes=70000-"]
+    assert server.requests == [None, "bytes=70000-"]
 
 
-def test_a_server_that_sends_another_part_is_not_believed(server, fetch):
+def test_an_answer_with_the_wrong_range_is_discarded(server, fetch):
     server.faults = [70_000, "other part"]
     assert fetch().read_bytes() == CONTENT
-    assert server.asked == [None, "bytes=70000-", None]
+    assert server.requests == [None, "bytes=70000-", None]
 
 
-def test_what_is_cut_short_without_a_length_is_told_by_its_checksum(server, fetch):
+def test_without_a_length_an_interruption_is_found_by_the_checksum(server, fetch):
     server.faults, server.announces = [70_000], False
     assert fetch().read_bytes() == CONTENT
-    assert server.asked == [None, None]
+    assert server.requests == [None, None]
 
 
 @pytest.mark.parametrize("left", [b"not how it begins", CONTENT, CONTENT + b"more"])
-def test_a_leftover_of_another_file_or_a_whole_one_does_no_harm(server, fetch, left):
+def test_a_partial_file_that_does_not_fit_is_downloaded_again(server, fetch, left):
     fetch.part.parent.mkdir()
     fetch.part.write_bytes(left)
     assert fetch().read_bytes() == CONTENT
-    assert len(server.asked) == (1 if left == CONTENT else 2)
+    assert len(server.requests) == (1 if left == CONTENT else 2)
 
 
-def test_lines_may_end_either_way(server, fetch):
+def test_checksum_lists_may_have_either_line_ending(server, fetch):
     server.content = CONTENT.replace(b"\n", b"\r\n")
     assert fetch().read_bytes() == server.content
 
 
-def test_a_wrong_checksum_is_refused_with_both_and_nothing_is_kept(server, fetch):
+def test_a_wrong_checksum_is_refused_and_the_file_is_deleted(server, fetch):
     server.content = CONTENT + b"."
     found = hashlib.sha256(server.content).hexdigest()
     with pytest.raises(InputError) as refused:
@@ -105,17 +105,17 @@ def test_a_wrong_checksum_is_refused_with_both_and_nothing_is_kept(server, fetch
         "put walk.bvh into data/mine yourself."
     )
     assert list(fetch.part.parent.iterdir()) == []
-    assert server.asked == [None, None]
+    assert server.requests == [None, None]
 
 
-def test_what_is_not_there_is_asked_for_once(server, fetch):
+def test_a_missing_file_is_requested_only_once(server, fetch):
     server.faults = [404] * 9
     with pytest.raises(InputError, match=r"cannot be downloaded: the server says 404 Not Found\. Run"):
         fetch()
-    assert (len(server.asked), fetch.waits) == (1, [])
+    assert (len(server.requests), fetch.waits) == (1, [])
 
 
-def test_a_server_that_never_answers_is_given_up(server, fetch):
+def test_a_download_without_an_answer_ends_after_all_attempts(server, fetch):
     server.faults = [500] * 9
     with pytest.raises(InputError, match="500 Internal Server Error, 5 times"):
         fetch()
@@ -139,7 +139,7 @@ def test_without_a_network_the_message_says_so(tmp_path):
         )
 
 
-def test_a_silent_server_is_not_waited_for_for_ever(tmp_path):
+def test_a_server_that_accepts_and_stays_silent_is_given_up(tmp_path):
     with socket.create_server(("127.0.0.1", 0)) as silent:
         url = f"http://127.0.0.1:{silent.getsockname()[1]}/walk.bvh"
         with pytest.raises(InputError, match=r"no answer for 0\.05 seconds"):
@@ -162,12 +162,12 @@ class Babbler(threading.Thread):
     def run(self) -> None:
         with contextlib.suppress(OSError):
             while True:
-                asked, _ = self.socket.accept()
-                with asked, contextlib.suppress(OSError):
-                    asked.recv(10_000)
-                    asked.sendall(self.begin)
+                connection, _ = self.socket.accept()
+                with connection, contextlib.suppress(OSError):
+                    connection.recv(10_000)
+                    connection.sendall(self.begin)
                     while True:
-                        asked.sendall(self.more)
+                        connection.sendall(self.more)
                         time.sleep(0.01)
 
 
@@ -176,7 +176,7 @@ class Babbler(threading.Thread):
     [(b"", b"H"), (ANSWER, b"X"), (ANSWER + b"Content-Length: 9999\r\n\r\n", b"1")],
     ids=["before it answers", "in its headers", "in the file"],
 )
-def test_a_server_that_dribbles_is_given_up_in_the_end(tmp_path, begin: bytes, more: bytes):
+def test_a_server_that_sends_too_slowly_is_given_up(tmp_path, begin: bytes, more: bytes):
     before = time.monotonic()
     with pytest.raises(InputError, match=r"cannot be downloaded: not done within 0\.3 seconds"):
         download_clip(Babbler(begin, more).url, tmp_path / "walk.bvh", SHA256, "data/mine", deadline=0.3)
@@ -185,15 +185,15 @@ def test_a_server_that_dribbles_is_given_up_in_the_end(tmp_path, begin: bytes, m
 
 
 @pytest.mark.parametrize("announces", [True, False])
-def test_of_a_file_that_is_too_large_nothing_is_kept(server, fetch, announces: bool):
+def test_a_file_that_is_too_large_is_refused_and_deleted(server, fetch, announces: bool):
     server.announces = announces
     with pytest.raises(InputError, match=r"larger than 0\.05 MB, which is the most that a clip may be"):
         fetch(most=50_000)
     assert list(fetch.part.parent.iterdir()) == []
-    assert len(server.asked) == 1
+    assert len(server.requests) == 1
 
 
-def test_what_a_server_says_cannot_steer_the_terminal(tmp_path):
+def test_control_characters_from_a_server_are_not_printed(tmp_path):
     answer = b"HTTP/1.1 404 \x1b[2J\x1b]0;owned\x07 gone" + b"x" * 1000 + b"\r\n\r\n"
     with pytest.raises(InputError) as refused:
         download_clip(Babbler(answer, b"").url, tmp_path / "walk.bvh", SHA256, "data/mine")

@@ -14,7 +14,7 @@ from hobble.motion.duplicates import likeness, load_likenesses, same_pairs, save
 from hobble.motion.mirror import mirror_clip
 
 
-def test_a_turned_a_shortened_and_a_mirrored_copy_are_found(walker, holden31):
+def test_turned_shortened_and_mirrored_copies_are_found(walker, holden31):
     clip = walker(holden31, 441, 60.0)
     elsewhere = replace(turned(clip, 1.0), root=turned(clip, 1.0).root + np.array([200.0, 0.0, 50.0]))
     short = replace(clip, rotations=clip.rotations[:440], root=clip.root[:440])
@@ -41,7 +41,7 @@ def test_a_turned_a_shortened_and_a_mirrored_copy_are_found(walker, holden31):
     }
 
 
-def test_what_clips_are_compared_by_survives_a_file(walker, holden31, tmp_path):
+def test_the_data_for_comparing_clips_survives_its_file(walker, holden31, tmp_path):
     clip = walker(holden31, 120, 60.0)
     found = [likeness(replace(clip, name=name), name) for name in "ab"]
     found.append(replace(found[0], name="c", mirrored=None))
@@ -63,7 +63,7 @@ def test_files_with_one_digest_are_the_same_file(walker, holden31):
     assert same_pairs(same) == [("x", "y", "the same file")]
 
 
-def test_one_motion_on_both_sides_is_refused_with_both_names():
+def test_a_motion_in_both_splits_is_refused_with_both_names():
     pairs = [("a", "b", "the same file"), ("c", "d", "the same motion"), ("e", "f", "the same motion")]
     splits = {"a": "held_out", "b": "train", "c": "train", "d": "train", "e": "held_out", "f": "held_out"}
     with pytest.raises(HobbleError) as caught:
@@ -75,7 +75,7 @@ def test_one_motion_on_both_sides_is_refused_with_both_names():
 
 
 @pytest.mark.shared
-def test_no_two_walks_of_the_patients_are_one_but_for_the_copies(root, shared):
+def test_no_two_patients_walks_are_equal_except_for_known_copies(root, shared):
     from hobble.motion.make import make_clip
     from hobble.motion.options import ClipMotion
 

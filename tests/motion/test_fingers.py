@@ -28,7 +28,7 @@ def hand(wrist: str, *fingers: tuple[str, float]) -> Skeleton:
         ("Hand", [("Thumb1", 9.0), ("Sword", 90.0)], None),
     ],
 )
-def test_the_finger_that_points(wrist, fingers, chosen):
+def test_the_pointing_finger_is_chosen(wrist, fingers, chosen):
     skeleton = hand(wrist, *fingers)
     found = pointing_fingers(skeleton, {"left": 1})
     assert ({"left": chosen} if chosen else {}) == {s: skeleton.joints[j] for s, j in found.items()}

@@ -7,7 +7,7 @@ import sys
 
 import pytest
 
-from hobble.motion.look import Look, look, shared_warnings, table
+from hobble.motion.look import ClipSummary, look, shared_warnings, table
 
 
 @pytest.fixture
@@ -20,7 +20,7 @@ def seen(root, folder):
     return look(folder, root / "config/skeletons/holden31.yaml", root / "config/skeletons")
 
 
-def test_a_walk_has_its_steps_and_nothing_odd(root, folder):
+def test_a_normal_walk_has_steps_and_no_warning(root, folder):
     (clip,) = seen(root, folder).clips
     assert (clip.rig, clip.fps) == ("holden31", 120)
     assert clip.cadence == pytest.approx(120, abs=15)  # two steps a second
@@ -36,7 +36,7 @@ def test_a_wrong_frame_rate_shows_in_the_cadence(root, folder, bvh, walker, hold
     )
 
 
-def test_files_that_are_there_twice_and_files_of_no_clip_are_told(root, folder):
+def test_duplicates_and_files_without_a_clip_are_reported(root, folder):
     (folder / "again.bvh").write_bytes((folder / "healthy.bvh").read_bytes())
     (folder / "helthy_injuries.txt").write_text("frames:600\n")
     text = table(seen(root, folder))
@@ -47,14 +47,14 @@ def test_files_that_are_there_twice_and_files_of_no_clip_are_told(root, folder):
     assert "Nobody stands in these clips" in text
 
 
-def test_a_refused_file_has_its_line(root, folder):
+def test_a_refused_file_is_listed_with_its_message(root, folder):
     (folder / "broken.bvh").write_text("HIERARCHY\n")
     assert "broken  REFUSED" in table(seen(root, folder))
 
 
-def test_a_warning_of_many_clips_is_told_once():
+def test_a_warning_of_many_clips_is_printed_once():
     rare, common = "1 repaired", "The same for all."
-    clips = [Look(str(i), warnings=(common, rare)) for i in range(6)]
+    clips = [ClipSummary(str(i), warnings=(common, rare)) for i in range(6)]
     short, notes = shared_warnings(clips)
     assert notes == [f"6 of 6 clips: {common}"]
     assert [clip.warnings for clip in short] == [(rare,)] * 6

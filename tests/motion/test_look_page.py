@@ -52,21 +52,21 @@ def test_a_figure_walks_on_the_spot_to_its_right(walker, holden31):
     assert shown["f"] == pytest.approx(10)
 
 
-def test_a_foot_is_down_where_one_of_four_is():
+def test_a_foot_is_down_if_any_of_its_joints_is():
     assert foot_down(np.array([[0, 0, 0, 1], [0, 0, 0, 0], [1, 1, 0, 0], [0, 0, 0, 0]])) == 0.5
 
 
-def test_of_very_many_clips_a_sample_is_read_and_every_clip_has_a_line(walker, holden31):
-    clip, asked = walker(holden31, 240, 60.0), []
+def test_with_very_many_clips_a_sample_is_drawn_and_every_clip_is_listed(walker, holden31):
+    clip, numbers = walker(holden31, 240, 60.0), []
 
     def read(n: int) -> tuple[Any, np.ndarray]:
-        asked.append(n)
+        numbers.append(n)
         return clip, np.ones((10, 4))
 
     reports, labels = many(10_000, warnings={7: ["odd"], 9_876: ["odd"]}, unsure={123: ["no idea"]})
     page = look_page("mine", reports, labels, read)
-    assert len(asked) == module.MOST_READ == page.count("<canvas")
-    assert {7, 123, 9_876} <= set(asked)
+    assert len(numbers) == module.MOST_READ == page.count("<canvas")
+    assert {7, 123, 9_876} <= set(numbers)
     assert page.count("<tr>") == 10_001
     assert "clip-04321" in page
     assert "only 600 clips were read" in page
@@ -74,14 +74,14 @@ def test_of_very_many_clips_a_sample_is_read_and_every_clip_has_a_line(walker, h
     assert len(page.encode()) < 25e6
 
 
-def test_what_is_read_is_spread_over_the_clips():
+def test_the_sample_is_spread_over_the_clips():
     reports, labels = many(10_000)
     some = chosen(reports, labels)
     assert len(set(some)) == module.MOST_READ
     assert np.diff(np.sort(some)).max() < 3 * 10_000 / module.MOST_READ
 
 
-def test_warned_clips_leave_room_for_others_and_long_clips_are_fewer():
+def test_half_of_the_sample_is_left_for_clips_without_warning():
     warned = {n: ["odd"] for n in range(5_000)}
     some = np.array(chosen(*many(10_000, warnings=warned)))
     assert (some < 5_000).sum() == module.MOST_READ // 2

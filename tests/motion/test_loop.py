@@ -36,7 +36,7 @@ def seams(clip, cycle):
 
 
 @pytest.mark.parametrize("last", [60, 61])
-def test_a_whole_cycle_goes_on_as_the_walk_does(walker, holden31, last):
+def test_a_looped_cycle_equals_the_longer_walk(walker, holden31, last):
     """One cycle is 60 frames; a 61st that repeats the first is noticed."""
     walk = walker(holden31, 301, 60.0)
     looped = loop_clip(part(walk, 0, last), 5)
@@ -55,7 +55,7 @@ def test_seams_of_a_bad_cycle_are_no_faster_than_its_motion(walker, holden31, fr
 
 
 @pytest.mark.parametrize("heading", [0.0, 90.0, -135.0])
-def test_along_any_heading(walker, holden31, heading):
+def test_a_loop_follows_any_heading(walker, holden31, heading):
     looped = loop_clip(part(walker(holden31, 120, 60.0), 0, 60), 4, heading)
     way = looped.root[180] - looped.root[0]
     assert np.degrees(np.arctan2(way[0], way[2])) == pytest.approx(heading, abs=1e-6)
@@ -76,7 +76,7 @@ def test_a_cycle_that_turns_goes_on_turning(walker, holden31):
     assert seams(looped, 60) <= 1.5 * speeds(curve).max()
 
 
-def test_too_short_for_a_cycle(walk):
+def test_a_clip_too_short_for_a_cycle_is_refused(walk):
     with pytest.raises(HobbleError, match="walk: 3 frames are too few"):
         loop_clip(part(walk, 0, 3), 4)
 
@@ -101,7 +101,7 @@ def test_injured_cycles_loop_without_a_jerk(shared, make, file):
 
 @pytest.mark.shared
 @pytest.mark.parametrize(("file", "degrees"), [("Walk_LLL", 6), ("Run_LLL", 7), ("Walk_RUL", 10)])
-def test_legs_move_as_in_the_authors_own_retargeting(shared, root, make, file, degrees):
+def test_legs_move_as_in_the_retargeting_by_the_authors(shared, root, make, file, degrees):
     """Their loops of the same motion on 31 joints; their arms hang from shrugged shoulders.
 
     Mean angle between their leg bones and ours: 4.4, 5.7 and 8.2 degrees.

@@ -14,14 +14,14 @@ from hobble.core import quat
 from hobble.core.clip import Clip
 from hobble.core.errors import InputError
 from hobble.motion.decode import frame_rate
+from hobble.motion.file_motion import load_source
 from hobble.motion.options import ClipMotion
 from hobble.motion.read import read_bvh
 from hobble.motion.resample import sample_positions, sample_rotations, sample_times
 from hobble.motion.rig import load_skeleton
-from hobble.motion.source import load_source
 
 
-def test_a_clip_on_the_skeleton_passes_through_untouched(walk, bvh, make):
+def test_a_clip_on_the_target_skeleton_is_unchanged(walk, bvh, make):
     clip, report = make(bvh(walk))
     assert report["repairs"] == []
     assert (report["unit"], report["up"], report["source_fps"], report["source_frames"]) == (
@@ -37,7 +37,7 @@ def test_a_clip_on_the_skeleton_passes_through_untouched(walk, bvh, make):
 
 
 @pytest.mark.parametrize("order", ["XYZ", "XZY", "YXZ", "YZX", "ZXY", "ZYX"])
-def test_any_rotation_order(walk, bvh, make, order):
+def test_every_rotation_order_gives_the_same_clip(walk, bvh, make, order):
     clip, _ = make(bvh(walk, order=order))
     assert quat.angle(clip.rotations, walk.rotations[::2]).max() < 1e-6
 
@@ -52,7 +52,7 @@ def test_the_unit_is_found_from_the_legs(walk, bvh, make, scaled, factor, unit):
     np.testing.assert_allclose(clip.positions, walk.positions[::2], atol=2e-3 if factor < 1 else 1e-4)
 
 
-def test_the_unit_can_be_overruled(walk, bvh, make):
+def test_the_unit_can_be_set(walk, bvh, make):
     clip, report = make(bvh(walk), unit=2.0, proportions="clip")
     assert report["unit"] == 2.0
     np.testing.assert_allclose(clip.positions, 2 * walk.positions[::2], atol=1e-3)
@@ -97,7 +97,7 @@ def facing_x(clip):
         (lambda clip: left_handed(z_up(clip)), {"up": "+Z", "handedness": "left"}),
     ],
 )
-def test_axes_are_found_said_and_put_right(walk, bvh, make, change, said):
+def test_other_axes_are_found_reported_and_converted(walk, bvh, make, change, said):
     clip, report = make(bvh(change(walk)))
     assert {key: report[key] for key in said} == said
     np.testing.assert_allclose(clip.positions, walk.positions[::2], atol=1e-4)
@@ -140,7 +140,7 @@ def turned_upright(clip):
 
 
 @pytest.mark.parametrize("rise", [0.0, 0.6])
-def test_a_rest_pose_that_lies_in_its_world_does_not_lay_the_figure_down(walk, bvh, make, rise):
+def test_a_lying_rest_pose_gives_an_upright_figure(walk, bvh, make, rise):
     """Even on stairs, or in a jump."""
     time = np.arange(len(walk)) / walk.fps
     up = np.stack([0 * time, rise * walk.root[:, 2] + 40 * np.maximum(np.sin(4 * time), 0), 0 * time], axis=1)
@@ -152,7 +152,7 @@ def test_a_rest_pose_that_lies_in_its_world_does_not_lay_the_figure_down(walk, b
     np.testing.assert_allclose(clip.positions, climbing.positions[::2], atol=1e-4)
 
 
-def test_axes_can_be_overruled(walk, bvh, make):
+def test_the_axes_can_be_set(walk, bvh, make):
     clip, report = make(bvh(walk), handedness="left", proportions="clip")
     assert report["handedness"] == "left"
     np.testing.assert_allclose(clip.positions * [-1, 1, 1], walk.positions[::2], atol=1e-4)
@@ -166,7 +166,7 @@ def raised(clip, height):
 
 @pytest.mark.parametrize("height", [-93.0, -20.0, 20.0, 120.0])
 @pytest.mark.parametrize("rig", ["holden31", "rig22"])
-def test_a_floor_that_is_not_at_zero_is_put_there_and_said(walker, bvh, make, root, height, rig):
+def test_a_floor_at_another_height_is_moved_to_0_and_reported(walker, bvh, make, root, height, rig):
     clip = walker(load_skeleton(root / f"config/skeletons/{rig}.yaml").skeleton, 121, 60.0)
     path = bvh(raised(clip, height))
     moved, report = make(path)
@@ -213,7 +213,7 @@ def test_uneven_ground_stays_where_it_is(walk, bvh, make):
     np.testing.assert_allclose(clip.root[:, 1], walk.root[::2, 1] + 40, atol=1e-6)
 
 
-def test_where_the_figure_faces_can_be_overruled(walk, bvh, make):
+def test_the_facing_direction_can_be_set(walk, bvh, make):
     path = bvh(walk)
     as_it_is, report = make(path)
     assert report["facing"] == pytest.approx(0, abs=1)
@@ -224,7 +224,7 @@ def test_where_the_figure_faces_can_be_overruled(walk, bvh, make):
     np.testing.assert_allclose(clip.positions[..., 1], as_it_is.positions[..., 1], atol=1e-9)
 
 
-def test_a_wrong_frame_time_can_be_overruled(walk, bvh, make):
+def test_the_frame_rate_can_be_set(walk, bvh, make):
     path = bvh(walk, edit=lambda s: s.replace("0.00833333", "0.06666667"))
     wrong, report = make(path)
     assert report["source_fps"] == 15.0
@@ -243,16 +243,16 @@ def test_a_wrong_frame_time_can_be_overruled(walk, bvh, make):
         ("0.01", 100), ("0.0111111", 90), ("0.066667", 15), ("8.33333e-3", 120), ("0.005", 200),
     ],
 )  # fmt: skip
-def test_frame_times_as_written_mean_standard_rates(text, fps):
+def test_rounded_frame_times_mean_standard_rates(text, fps):
     assert frame_rate(float(text), text) == pytest.approx(fps, rel=1e-5)
 
 
-def test_film_rate_stays_itself():
+def test_the_film_rate_23_976_is_not_rounded():
     assert frame_rate(0.0417083, "0.0417083") == pytest.approx(23.976, abs=1e-3)
 
 
 @pytest.mark.parametrize("rate", [24, 25, 30, 50, 90, 120])
-def test_resampling_keeps_time_and_stays_on_the_shorter_way(walk, rate):
+def test_resampling_keeps_time_and_rotates_the_shorter_way(walk, rate):
     times = sample_times(len(walk), 120, rate)
     assert len(times) == int(240 * rate / 120) + 1
     rotations = sample_rotations(walk.rotations, times)
@@ -261,7 +261,7 @@ def test_resampling_keeps_time_and_stays_on_the_shorter_way(walk, rate):
     np.testing.assert_allclose(sample_positions(walk.root, times)[-1], walk.root[round(times[-1])], atol=1e-9)
 
 
-def test_every_second_frame_is_exact(walk):
+def test_halving_the_frame_rate_keeps_frames_exactly(walk):
     times = sample_times(241, 120, 60)
     np.testing.assert_array_equal(times, np.arange(0, 241, 2))
     picked = sample_rotations(walk.rotations, times)
@@ -278,9 +278,9 @@ def test_sample_times_lie_in_the_clip(frames, source, target):
     np.testing.assert_allclose(np.diff(times), source / target, atol=1e-9)
 
 
-def test_angles_that_wrap_do_not_show(walk, bvh, make):
+def test_angles_that_wrap_at_180_degrees_give_smooth_rotations(walk, bvh, make):
     """The same angles written as 181 and -179 degrees by turns give the same rotations between the frames."""
-    spun = replace(walk, rotations=walk.rotations.copy())
+    spun = replace(walk, rotations=walk.rotations.copy(), root=walk.root * [0, 1, 0])
     spun.rotations[:, 0] = quat.mul(quat.yaw(np.linspace(0, 4 * np.pi, len(walk))), spun.rotations[:, 0])
     clip, report = make(bvh(spun, decimals=6, order="YXZ"), fps=50.0)
     step = quat.angle(clip.rotations[1:], clip.rotations[:-1])
@@ -291,7 +291,7 @@ def test_angles_that_wrap_do_not_show(walk, bvh, make):
     assert np.sum(clip.rotations[1:] * clip.rotations[:-1], axis=-1).min() > 0
 
 
-def test_a_joint_that_flips_where_it_is_is_named(walk, bvh, make):
+def test_a_joint_that_turns_suddenly_is_named(walk, bvh, make):
     flipped = replace(walk, rotations=walk.rotations.copy())
     thumb = walk.skeleton.index("LThumb")
     half = quat.from_axis_angle(np.array([0.0, 0, 1.0]), 3.0)
@@ -302,7 +302,7 @@ def test_a_joint_that_flips_where_it_is_is_named(walk, bvh, make):
     )
 
 
-def test_six_channels_that_repeat_the_offsets_are_dropped_and_said(walk, bvh, make):
+def test_position_channels_that_repeat_the_offsets_are_dropped_and_reported(walk, bvh, make):
     repeated = replace(walk, translations=np.tile(walk.skeleton.offsets, (len(walk), 1, 1)))
     clip, report = make(bvh(repeated))
     assert clip.translations is None
@@ -310,7 +310,7 @@ def test_six_channels_that_repeat_the_offsets_are_dropped_and_said(walk, bvh, ma
     np.testing.assert_allclose(clip.positions, walk.positions[::2], atol=1e-4)
 
 
-def test_six_channels_that_move_are_kept_and_said(walk, bvh, make):
+def test_position_channels_that_move_are_kept_and_reported(walk, bvh, make):
     moving = np.tile(walk.skeleton.offsets, (len(walk), 1, 1))
     moving[:, 3, 1] += np.linspace(0, 5, len(walk))
     clip, report = make(bvh(replace(walk, translations=moving)), proportions="clip")
@@ -322,7 +322,7 @@ def test_six_channels_that_move_are_kept_and_said(walk, bvh, make):
     assert "kept" in report["repairs"][1]
 
 
-def test_what_cannot_go_to_other_bones_is_dropped_and_said(walk, bvh, make, scaled):
+def test_joint_movement_that_cannot_be_retargeted_is_dropped_and_reported(walk, bvh, make, scaled):
     moving = np.tile(walk.skeleton.offsets, (len(walk), 1, 1))
     moving[:, 3, 1] += np.linspace(0, 5, len(walk))
     path = bvh(scaled(replace(walk, translations=moving), 1.1), edit=None)
@@ -331,7 +331,7 @@ def test_what_cannot_go_to_other_bones_is_dropped_and_said(walk, bvh, make, scal
     assert "dropped" in report["repairs"][-1]
 
 
-def test_a_wrong_offset_gives_way_to_channels_that_never_change(walk, bvh, make):
+def test_constant_position_channels_replace_a_wrong_offset(walk, bvh, make):
     repeated = replace(walk, translations=np.tile(walk.skeleton.offsets, (len(walk), 1, 1)))
     clip, report = make(
         bvh(repeated, edit=lambda s: s.replace("0.000000 -4.500000 13.500000", "0 -4.5 0", 1))
@@ -341,14 +341,14 @@ def test_a_wrong_offset_gives_way_to_channels_that_never_change(walk, bvh, make)
     np.testing.assert_allclose(clip.positions, walk.positions[::2], atol=1e-4)
 
 
-def test_six_channels_of_zeros_add_nothing(walk, bvh, make):
+def test_position_channels_of_zeros_change_nothing(walk, bvh, make):
     zeros = replace(walk, translations=np.zeros((len(walk), 31, 3)))
     clip, report = make(bvh(zeros))
     assert "zero and were dropped" in report["repairs"][0]
     np.testing.assert_allclose(clip.positions, walk.positions[::2], atol=1e-4)
 
 
-def test_zeros_on_some_joints_only_are_added_to_their_offsets_and_said(walk, bvh, make):
+def test_zero_positions_on_some_joints_are_added_to_their_offsets_and_reported(walk, bvh, make):
     legs = [j for j, name in enumerate(walk.skeleton.joints) if "Leg" in name or "Foot" in name]
     mixed = np.tile(walk.skeleton.offsets, (len(walk), 1, 1))
     mixed[:, legs] = 0.0
@@ -361,7 +361,7 @@ def test_zeros_on_some_joints_only_are_added_to_their_offsets_and_said(walk, bvh
         np.testing.assert_allclose(clip.positions, walk.positions[::2], atol=1e-4)
 
 
-def test_channels_that_add_motion_to_an_offset_move_the_joint_about_it(walk, bvh, make):
+def test_position_channels_around_0_are_added_to_the_offset(walk, bvh, make):
     added = np.zeros((len(walk), 31, 3))
     arm = walk.skeleton.index("LeftForeArm")
     added[:, arm, 0] = 0.3 + np.sin(np.arange(len(walk)) / 9)
@@ -374,7 +374,7 @@ def test_channels_that_add_motion_to_an_offset_move_the_joint_about_it(walk, bvh
 
 
 @pytest.mark.parametrize("proportions", ["skeleton", "clip"])
-def test_a_leg_without_length_is_refused(walk, bvh, make, proportions):
+def test_a_leg_of_length_0_is_refused(walk, bvh, make, proportions):
     path = bvh(walk, edit=lambda s: re.sub(r"(JOINT RightLeg\s*\{\s*OFFSET).*", r"\1 0 0 0", s))
     with pytest.raises(
         InputError, match=r"walk.bvh: the bone from RightUpLeg to RightLeg has no length. Check"
@@ -403,7 +403,7 @@ def carried(clip, turn, place):
 
 @pytest.mark.parametrize("moves", [False, True])
 @pytest.mark.parametrize("rig", ["holden31", "mixamo55"])
-def test_a_joint_above_the_hips_is_folded_into_them_and_said(walker, bvh, make, root, rig, moves):
+def test_a_joint_above_the_hips_is_merged_into_them_and_reported(walker, bvh, make, root, rig, moves):
     clip = walker(load_skeleton(root / f"config/skeletons/{rig}.yaml").skeleton, 121, 60.0)
     time = moves * np.linspace(0, 1, len(clip))
     turn = quat.mul(quat.yaw(2 * time), quat.from_axis_angle(np.array([1.0, 0, 0]), -np.pi / 2 + 0 * time))
@@ -432,14 +432,14 @@ def test_joints_in_another_order_are_sorted(walk, bvh, make, holden31):
     np.testing.assert_allclose(clip.positions, walk.positions[::2], atol=1e-4)
 
 
-def test_a_rig_with_another_finger_is_still_that_rig(walk, bvh, make):
+def test_a_renamed_finger_does_not_change_the_recognised_rig(walk, bvh, make):
     clip, report = make(bvh(walk, edit=lambda s: s.replace("JOINT LThumb", "JOINT LeftPalm")))
     assert report["rig"] == "holden31"
     straight, _ = make(bvh(walk, "straight"))
     np.testing.assert_allclose(clip.positions, straight.positions, atol=0.1)
 
 
-def test_joints_that_hang_elsewhere_do_not_matter(walk, bvh, make, holden31):
+def test_limbs_are_right_if_a_finger_has_another_parent(walk, bvh, make, holden31):
     parents = list(holden31.parents)
     parents[holden31.index("LThumb")] = holden31.index("LeftForeArm")
     clip, report = make(bvh(replace(walk, skeleton=replace(holden31, parents=tuple(parents)))))
@@ -450,7 +450,7 @@ def test_joints_that_hang_elsewhere_do_not_matter(walk, bvh, make, holden31):
 
 
 @pytest.mark.parametrize("declared", [240, 242])
-def test_one_frame_off_is_repaired_or_refused(walk, bvh, make, declared):
+def test_a_wrong_frame_count_is_repaired_or_refused(walk, bvh, make, declared):
     path = bvh(walk, edit=lambda s: s.replace("Frames: 241", f"Frames: {declared}"))
     clip, report = make(path)
     assert len(clip) == 121
@@ -459,7 +459,7 @@ def test_one_frame_off_is_repaired_or_refused(walk, bvh, make, declared):
         make(path, defects="refuse")
 
 
-def test_two_makings_are_equal(walk, bvh, make):
+def test_making_a_clip_twice_gives_equal_bytes(walk, bvh, make):
     path = bvh(walk)
     a, first = make(path)
     b, second = make(path)
@@ -489,7 +489,7 @@ def test_every_shared_clip_becomes_a_clip(shared, make):
         assert 80 < np.median(height) < 200, file.name
 
 
-def test_what_is_broken_can_be_left_as_it_is(walk, bvh, make):
+def test_defects_can_be_left_unrepaired(walk, bvh, make):
     broken = raised(walk, np.where(np.arange(len(walk)) >= 200, 80.0, 7.0))
     clip, report = make(bvh(broken), defects="leave")
     assert report["repairs"] == []

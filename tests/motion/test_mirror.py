@@ -24,7 +24,7 @@ def test_every_joint_is_where_its_counterpart_was(walk):
     assert not np.allclose(mirrored.positions, walk.positions, atol=1)
 
 
-def test_the_report_says_what_it_is_the_mirror_of(walk, bvh, make):
+def test_the_report_of_a_mirrored_clip_names_its_original(walk, bvh, make):
     clip, report = make(bvh(walk), facing=30.0)
     said = mirror_report(report, "walk_mirror")
     assert (said["clip"], said["mirror_of"], said["facing"]) == ("walk_mirror", "walk", -30.0)
@@ -42,7 +42,7 @@ def test_a_lopsided_rig_is_mirrored_with_its_bones(walk):
     )
 
 
-def test_twice_gives_the_original_within_a_millionth_of_a_metre(walk, tmp_path):
+def test_mirroring_twice_restores_the_clip_within_a_micrometre(walk, tmp_path):
     save_clip(tmp_path / "a.npz", walk)
     original = load_clip(tmp_path / "a.npz")
     save_clip(tmp_path / "b.npz", mirror_clip(original, "b"))
@@ -51,7 +51,7 @@ def test_twice_gives_the_original_within_a_millionth_of_a_metre(walk, tmp_path):
     assert np.abs(again.positions - original.positions).max() < 1e-4
 
 
-def test_joints_that_move_in_their_parents_are_mirrored(walk):
+def test_joint_translations_are_mirrored(walk):
     moving = np.tile(walk.skeleton.offsets, (len(walk), 1, 1))
     moving[:, 3] += [1.0, 2.0, 3.0]
     clip = replace(walk, translations=moving)
@@ -77,7 +77,7 @@ def test_every_skeleton_can_be_mirrored(root, name, walker):
 
 
 @pytest.mark.shared
-def test_the_mirrors_of_the_original_release_come_out(shared, make):
+def test_mirrored_clips_equal_those_of_the_original_release(shared, make):
     """The release mirrored rotations only, onto bones that differ by up to 1.5 cm from side to side."""
     clip, _ = make(shared / "mocap/pfnn/LocomotionFlat09_000.bvh", proportions="clip")
     theirs, _ = make(shared / "mocap/pfnn/LocomotionFlat09_000_mirror.bvh", proportions="clip")

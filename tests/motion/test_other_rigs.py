@@ -13,10 +13,10 @@ import pytest
 from hobble.core import quat
 from hobble.core.bvh import write_bvh
 from hobble.core.errors import InputError
+from hobble.motion.file_motion import load_source
 from hobble.motion.options import ClipMotion
 from hobble.motion.read import read_bvh
 from hobble.motion.rig import load_skeleton
-from hobble.motion.source import load_source
 from tests.motion.other_rigs import (
     CLOTHES,
     GAME,
@@ -114,7 +114,7 @@ def outcome(clip, tmp_path, make):
 
 @pytest.mark.shared
 @pytest.mark.parametrize("name", RIGS)
-def test_a_rig_comes_out_as_the_clip_itself(outcome, name):
+def test_a_clip_on_another_rig_is_retargeted_within_a_centimetre(outcome, name):
     rig, how = RIGS[name]
     first, (second, report), names = outcome(rig, **how)
     off = compare(first, second, names)
@@ -160,7 +160,7 @@ def test_two_figures_under_one_root_are_refused(outcome):
 
 
 @pytest.mark.shared
-def test_a_crawling_figure_is_right_or_what_is_up_is_asked_for(outcome, clip):
+def test_a_crawling_figure_is_right_or_refused_with_a_question(outcome, clip):
     crawl = crawling(clip)
     first, (second, _), names = outcome(PLAIN, crawl)
     assert compare(first, second, names).mean() < 1.0
@@ -176,7 +176,7 @@ def test_a_figure_on_four_legs_is_refused(tmp_path, make):
 
 @pytest.mark.shared
 @pytest.mark.parametrize(("down", "told"), [(0, None), (-20, "18 degrees flatter.*3.7 cm"), (-70, "nobody")])
-def test_a_zero_pose_on_tiptoe_is_told_of(clip, tmp_path, make, down, told):
+def test_a_zero_pose_on_tiptoe_gets_a_note(clip, tmp_path, make, down, told):
     turn = quat.from_axis_angle(np.array([1.0, 0, 0]), np.radians(down))
     write_bvh(tmp_path / "a.bvh", rezeroed(rigged(clip, PLAIN)[0], ("foot", "toe"), turn), decimals=8)
     unsure = " ".join(make(tmp_path / "a.bvh")[1]["unsure"])

@@ -7,7 +7,10 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from scipy.ndimage import gaussian_filter1d
 
+from hobble.core import quat
+from hobble.core.clip import Clip
 from hobble.core.errors import InputError
 
 
@@ -28,6 +31,16 @@ def root(factor: float):
     return of_values(lambda values: np.concatenate([values[:, :3] * factor, values[:, 3:]], axis=1))
 
 
+def on_a_curve(walk: Clip) -> Clip:
+    """The walk on a circle with a radius of 3 m."""
+    turn = quat.yaw(walk.root[:, 2] / 300.0)
+    rotations = walk.rotations.copy()
+    rotations[:, 0] = quat.mul(turn, rotations[:, 0])
+    centre = np.array([300.0, 0.0, 0.0])
+    out = quat.rotate(turn, walk.root * [1, 0, 0] - centre) + centre
+    return replace(walk, rotations=rotations, root=out + walk.root * [0, 1, 0])
+
+
 @pytest.mark.parametrize(
     ("factor", "said"), [(2.54, r"2\.\d+ times"), (1 / 2.54, r"0\.\d+ times"), (100, "1.. times")]
 )
@@ -38,9 +51,39 @@ def test_a_root_in_another_unit_than_the_bones_is_refused(bvh, walk, make, facto
     make(path, defects="leave")
 
 
-@pytest.mark.parametrize("factor", [0.85, 1.0, 1.2])
-def test_a_pace_that_people_have_is_accepted(bvh, walk, make, factor):
+@pytest.mark.parametrize(("factor", "said"), [(0.7, r"0\.[67]\d"), (1.3, r"1\.[234]\d")])
+def test_a_root_that_goes_a_third_too_far_is_refused(bvh, walk, make, factor, said):
+    with pytest.raises(InputError, match=f"the hips go {said} times as fast"):
+        make(bvh(walk, "other", edit=root(factor)))
+
+
+@pytest.mark.parametrize("factor", [0.95, 1.0, 1.08])
+def test_a_plausible_speed_is_accepted(bvh, walk, make, factor):
     assert make(bvh(walk, "near", edit=root(factor)))[1]["unsure"] == []
+
+
+@pytest.mark.parametrize(
+    ("order", "said"),
+    [
+        ("XYZ", "knee bends 89 degrees away"),
+        ("XZY", "the hips go 3.11 times"),
+        ("YXZ", "knee bends 89 degrees away"),
+    ],
+)
+def test_rotation_channels_in_a_wrong_order_are_refused(bvh, walk, make, order, said):
+    """Files of `bvh` are written in the order ZXY."""
+    wrong = " ".join(f"{axis}rotation" for axis in order)
+    path = bvh(on_a_curve(walk), "order", edit=lambda text: re.sub(r"[XYZ]rotation .*rotation", wrong, text))
+    with pytest.raises(InputError, match=said):
+        make(path)
+    make(path, defects="leave")
+
+
+def test_a_foot_that_stands_seldom_is_noted(bvh, walk, make):
+    rng = np.random.default_rng(1)
+    noise = gaussian_filter1d(rng.normal(size=walk.rotations.shape), 3, axis=0) * 0.03
+    made = make(bvh(replace(walk, rotations=quat.normalize(walk.rotations + noise)), "noise"))
+    assert "in which the hips go, which is less" in made[1]["unsure"][0]
 
 
 def test_walking_in_place_is_noted(bvh, walk, make):
@@ -48,7 +91,7 @@ def test_walking_in_place_is_noted(bvh, walk, make):
     assert "stay in place" in make(path)[1]["unsure"][0]
 
 
-def test_standing_says_nothing(bvh, walk, make):
+def test_a_standing_figure_gets_no_note(bvh, walk, make):
     still = replace(walk, rotations=np.repeat(walk.rotations[:1], len(walk), axis=0))
     assert make(bvh(replace(still, root=walk.root[:1] + 0 * walk.root), "stands"))[1]["unsure"] == []
 

@@ -75,7 +75,7 @@ VARIANTS = {
 
 
 @pytest.mark.parametrize("variant", VARIANTS)
-def test_reads_variants_alike(written, variant):
+def test_variants_of_the_format_are_read_alike(written, variant):
     plain = read_bvh(written(SMALL))
     other = read_bvh(written(VARIANTS[variant](SMALL)))
     assert other.names == plain.names
@@ -141,7 +141,7 @@ BROKEN = {
 
 
 @pytest.mark.parametrize("what", BROKEN)
-def test_refuses_with_file_and_line(written, what):
+def test_a_malformed_file_is_refused_with_its_line(written, what):
     change, message, line = BROKEN[what]
     path = written(change(SMALL))
     with pytest.raises(InputError) as raised:
@@ -176,7 +176,7 @@ def test_a_deep_chain_reads(written):
     assert read_bvh(written(text)).parents[-1] == deep - 1
 
 
-def test_one_frame_short_is_read_and_can_be_told(written):
+def test_a_file_with_a_frame_too_few_is_read_with_both_counts(written):
     clip = read_bvh(written(SMALL.replace("Frames: 2", "Frames: 3")))
     assert (len(clip), clip.declared) == (2, 3)
 
@@ -193,7 +193,7 @@ def test_every_shared_file_loads(shared):
 
 @settings(max_examples=200, deadline=None)
 @given(st.data())
-def test_whatever_happens_to_a_file_ends_in_a_clip_or_one_message(tmp_path_factory, data):
+def test_a_file_with_random_damage_gives_a_clip_or_one_message(tmp_path_factory, data):
     text = bytearray(SMALL.encode())
     for _ in range(data.draw(st.integers(1, 4))):
         at = data.draw(st.integers(0, len(text) - 1))

@@ -44,7 +44,7 @@ def standing(clip: Clip, role: str) -> np.ndarray:
 
 @pytest.mark.parametrize("start", NAMES)
 @pytest.mark.parametrize("end", NAMES)
-def test_standing_feet_stand_in_every_direction(walker, rigs, start, end):
+def test_standing_feet_do_not_move_whatever_the_heading(walker, rigs, start, end):
     clip = walker(rigs[start].skeleton, 120, 60.0)
     made = onto(clip, rigs[start], rigs[end])
     scale = plan(clip.skeleton, rigs[end].skeleton, joint_pairs(rigs[start], rigs[end])).scale
@@ -83,7 +83,7 @@ def test_the_same_proportions_come_out_exactly(walk, rigs):
     assert quat.angle(again.rotations, walk.rotations).max() < 1e-4
 
 
-def test_191_joints_carry_the_31_exactly(walk, rigs):
+def test_a_rig_of_191_joints_moves_like_its_31_known_ones(walk, rigs):
     """ava191 has the proportions of holden31, so the 31 joints are at the same places in both."""
     assert sorted(rigs["ava191"].maps["holden31"].values()) == sorted(walk.skeleton.joints)
     neck = quat.from_axis_angle(np.array([1.0, 0, 0]), np.full(len(walk), 0.4))
@@ -106,7 +106,7 @@ def test_joints_without_motion_follow_their_parents_rigidly(walk, rigs):
 
 
 @pytest.mark.parametrize("end", ["ava191", "mixamo55", "rig22"])
-def test_a_pose_at_run_time_drives_another_figure(walk, rigs, end):
+def test_poses_at_run_time_are_retargeted_like_clips(walk, rigs, end):
     """Retargeting frame by frame, all frames at once, and as a clip gives the same motion."""
     how = plan(walk.skeleton, rigs[end].skeleton, joint_pairs(rigs["holden31"], rigs[end]))
     positions, rotations = retarget_pose(how, walk.positions, walk.global_rotations)
@@ -129,7 +129,7 @@ def test_a_figure_whose_legs_nothing_moves_is_refused(walk, rigs):
         plan(walk.skeleton, rigs["holden31"].skeleton, pairs)
 
 
-def test_a_leg_without_length_can_neither_lead_nor_follow(walk, rigs):
+def test_a_leg_of_length_0_is_refused_in_source_and_target(walk, rigs):
     own = rigs["holden31"].skeleton
     offsets = own.offsets.copy()
     offsets[own.index("RightFoot")] = 0.0
@@ -141,7 +141,7 @@ def test_a_leg_without_length_can_neither_lead_nor_follow(walk, rigs):
             plan(source, target, pairs)
 
 
-def test_there_and_back_again(walk, rigs):
+def test_retargeting_there_and_back_restores_the_walk(walk, rigs):
     """Retargeting to the larger rig and back gives the same walk, except for the legs' proportions."""
     back = onto(onto(walk, rigs["holden31"], rigs["mixamo55"]), rigs["mixamo55"], rigs["holden31"])
     apart = np.linalg.norm(back.positions - walk.positions, axis=-1)
@@ -157,7 +157,7 @@ def test_the_path_is_scaled_by_the_legs(walk, rigs):
     np.testing.assert_allclose(made.positions, 1.5 * walk.positions, atol=1e-6)
 
 
-def test_a_splayed_rest_pose_does_not_splay_the_legs(walk, holden31):
+def test_a_rest_pose_with_splayed_legs_gives_straight_legs(walk, holden31):
     """In the rest pose of CMU's rigs the legs are apart. The retargeted legs must follow the motion and not
     that pose.
     """
@@ -194,7 +194,7 @@ def test_foreign_rigs_are_recognised_by_their_names(walker, rigs, bvh, make):
         assert -3 < lowest.min() < lowest.max() < 6
 
 
-def test_a_rig_without_fingers_is_still_that_rig(walker, rigs, bvh, make):
+def test_a_rig_without_fingers_is_recognised(walker, rigs, bvh, make):
     full = rigs["mixamo55"].skeleton
     keep = [
         i for i, n in enumerate(full.joints) if not any(f in n for f in ("Index", "Middle", "Ring", "Pinky"))
@@ -247,7 +247,7 @@ def test_feet_of_real_clips_slide_no_more_than_before_in_every_direction(shared,
 
 
 @pytest.mark.shared
-def test_a_real_walk_keeps_its_look(shared, root, rigs, options):
+def test_a_real_walk_keeps_knee_bend_lean_and_stride(shared, root, rigs, options):
     """Knee bend, trunk lean and stride over leg length stay those of the source."""
     target = rigs["holden31"]
     bvh, keys = read_bvh(shared / "mocap/cmu/02_01.bvh"), ClipMotion(**options)
@@ -271,7 +271,7 @@ def test_a_real_walk_keeps_its_look(shared, root, rigs, options):
 
 @pytest.mark.shared
 @pytest.mark.parametrize("file", ["105_10", "105_29", "105_16", "105_26", "08_03"])
-def test_knees_do_not_snap_where_legs_are_nearly_straight(shared, make, file):
+def test_nearly_straight_legs_bend_smoothly(shared, make, file):
     """With other feet, the leg is too short for the target of the ankle. The hips come down instead of
     straightening the knee.
     """

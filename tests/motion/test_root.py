@@ -45,7 +45,7 @@ def test_a_figure_facing_z_has_the_world_as_its_root(walk):
 
 @settings(max_examples=15, deadline=None)
 @given(angle=st.floats(-3.1, 3.1), shift=st.floats(-500, 500))
-def test_what_the_character_sees_of_itself_is_the_same_wherever_it_goes(walk, angle, shift):
+def test_rows_do_not_depend_on_place_and_heading(walk, angle, shift):
     clip = replace(walk, rotations=walk.rotations[:40], root=walk.root[:40])
     other = turned(clip, angle, shift)
     ours, theirs = root_frames(clip, 5), root_frames(other, 5)
@@ -63,7 +63,7 @@ def test_rotation_takes_the_facing_direction_to_z(walk):
     assert np.all(root.direction[:, 1] == 0)
 
 
-def test_turning_left_has_the_sign_of_the_facts_page(walk):
+def test_turning_left_is_positive(walk):
     """If the figure turns left by d in a frame, q[i+1] q[i]^-1 turns by -d, so the runtime applies the
     negative.
     """
@@ -72,7 +72,7 @@ def test_turning_left_has_the_sign_of_the_facts_page(walk):
     np.testing.assert_allclose(root_frames(clip, 0).turn, -0.1, atol=1e-12)
 
 
-def test_smoothing_is_the_gaussian_of_the_facts_page(walk):
+def test_the_facing_direction_is_smoothed_by_the_documented_gaussian(walk):
     from scipy.ndimage import gaussian_filter1d
 
     raw = facing(walk.skeleton, walk.positions, 0)
@@ -81,7 +81,7 @@ def test_smoothing_is_the_gaussian_of_the_facts_page(walk):
     np.testing.assert_allclose(root_frames(walk, 20).direction, smooth, atol=1e-12)
 
 
-def test_helpers_agree_with_their_formulas(walk):
+def test_conversions_to_the_root_frame_follow_their_formulas(walk):
     root = root_frames(walk, 20)
     point = walk.positions[5, 3]
     hips = walk.positions[5, 0] * [1, 0, 1]
@@ -98,7 +98,7 @@ def test_helpers_agree_with_their_formulas(walk):
 
 
 @pytest.mark.shared
-def test_rows_of_the_original_come_out(shared, make):
+def test_root_frames_equal_those_of_the_original_rows(shared, make):
     """Frame 95 is the first of the original's rows: line 1 of the footsteps begins at frame 191 at 120 Hz."""
     clip, report = make(shared / "mocap/pfnn/LocomotionFlat09_000.bvh", proportions="clip")
     assert report["repairs"] == []
@@ -139,6 +139,6 @@ def test_the_root_goes_straight_on_past_both_ends():
     np.testing.assert_array_equal(longer.turn, np.pad(root.turn, 7))
 
 
-def test_a_clip_of_one_frame_stands_before_and_after_it():
+def test_a_clip_of_one_frame_stands_still():
     root = RootFrames(np.ones((1, 2)), np.array([[0, 0, 1.0]]), quat.yaw(np.zeros(1)), np.zeros(0))
     np.testing.assert_array_equal(continued(root, 3).position, np.ones((7, 2)))

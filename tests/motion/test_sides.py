@@ -53,7 +53,7 @@ def test_a_rig_without_sides_is_refused_with_one_question(original, tmp_path, ma
 
 
 @pytest.mark.shared
-def test_handedness_answers_it(original, tmp_path, make):
+def test_handedness_tells_left_from_right(original, tmp_path, make):
     known, _ = make(original)
     path = renamed(original, tmp_path, word)
     right, report = make(path, handedness="right")
@@ -66,7 +66,7 @@ def test_handedness_answers_it(original, tmp_path, make):
 
 
 @pytest.mark.shared
-def test_small_letters_tell_sides(original, tmp_path, make):
+def test_lower_case_side_letters_are_recognised(original, tmp_path, make):
     known, _ = make(original)
     clip, report = make(renamed(original, tmp_path, asf))
     assert not any("left side from its right" in note for note in report["notes"])
@@ -86,5 +86,5 @@ def test_small_letters_tell_sides(original, tmp_path, make):
         ("leg", "leg", None),
     ],
 )
-def test_names_that_differ_in_one_letter_tell(name, other, side):
+def test_a_pair_of_names_that_differ_in_one_letter_has_sides(name, other, side):
     assert side_of_pair(name, other) == side

@@ -30,10 +30,10 @@ def between(a: int, b: int) -> np.ndarray:
         (0.85, 1.0, (1, 2)),  # a joint just below the chest is not the chest
     ],
 )
-def test_a_bone_goes_where_the_bones_of_the_target_go_that_it_replaces(start, end, points):
+def test_a_bone_turns_as_the_target_bones_that_it_replaces(start, end, points):
     assert SPINE.direction(start, end) == pytest.approx(between(*points))
 
 
-def test_shares_count_to_one_at_the_chest_and_to_two_at_the_head():
+def test_spine_shares_are_1_at_the_chest_and_2_at_the_head():
     assert spine_shares(np.array([10.0, 30.0, 5.0, 5.0]), 2) == pytest.approx([0, 0.25, 1, 1.5, 2])
     assert spine_shares(np.array([6.0, 6.0]), 0) == pytest.approx([0, 1.5, 2])

@@ -13,10 +13,10 @@ from hobble.core.clip import Clip
 from hobble.core.errors import InputError
 from hobble.core.skeleton import Skeleton, forward_kinematics, rest_positions
 from hobble.motion.decode import decode
+from hobble.motion.file_motion import load_source
 from hobble.motion.options import ClipMotion
 from hobble.motion.read import read_bvh
 from hobble.motion.rig import load_skeleton
-from hobble.motion.source import load_source
 from tests.motion.other_rigs import PLAIN, rigged
 from tests.motion.scramble import outcome
 
@@ -96,7 +96,7 @@ def test_hips_and_shoulders_are_as_level_as_in_the_file(shared, make, name):
 
 
 @pytest.mark.shared
-def test_feet_that_only_stand_unlike_are_told_of(shared, tmp_path):
+def test_feet_that_stand_at_different_angles_get_a_note(shared, tmp_path):
     """On uneven ground, with a zero pose in which nobody could stand, the tilt of the feet is a guess."""
     one = outcome(shared / "mocap/cmu/03_02.bvh", 100, tmp_path, 420)
     assert one.how.rest == "heap"
@@ -118,7 +118,7 @@ def test_a_clip_too_short_to_show_its_feet_is_refused_or_accepted(shared, tmp_pa
 
 
 @pytest.mark.shared
-def test_one_foot_that_agrees_with_the_zero_pose_is_enough(shared, tmp_path):
+def test_one_foot_that_agrees_with_the_rest_pose_decides(shared, tmp_path):
     """On uneven ground one foot never comes down. The mean of both would be 2.5 cm off."""
     one = outcome(shared / "mocap/cmu/03_02.bvh", 99, tmp_path, 900)
     assert one.how.rest == "twisted"

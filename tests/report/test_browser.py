@@ -99,7 +99,7 @@ def test_keys_and_pointer_turn_the_camera(tab: Any) -> None:
     assert len(set(seen)) == 3
 
 
-def test_what_hurts_is_told(tab: Any) -> None:
+def test_the_injured_part_is_named(tab: Any) -> None:
     show(tab, "stage")
     choose(tab, "scenario", 3)
     scrub(tab, 200)
@@ -177,7 +177,7 @@ def test_themes_recolour_page_and_charts(tab: Any) -> None:
 
 
 @pytest.mark.parametrize("width", [390, 820, 1440])
-def test_fits_its_window(tab: Any, width: int) -> None:
+def test_the_page_fits_its_window(tab: Any, width: int) -> None:
     tab.size(width, 900)
     over = (
         "[...document.querySelectorAll('main *')]"
@@ -188,7 +188,7 @@ def test_fits_its_window(tab: Any, width: int) -> None:
     tab.size(1280, 900)
 
 
-def test_a_long_name_in_a_chooser_makes_no_phone_scroll_sideways(tab: Any) -> None:
+def test_a_long_name_in_a_menu_does_not_widen_the_page(tab: Any) -> None:
     tab.size(390, 900)
     tab.run("""document.querySelectorAll('main .pair > *').forEach((one) => {
       const chooser = document.createElement('select');
@@ -226,7 +226,7 @@ AXE = """axe.run({ exclude: [[".main-svg"]] }, { resultTypes: ["violations"] }).
   violations.flatMap(({ id, nodes }) => nodes.map(({ target }) => `${id}: ${target}`)))"""
 
 
-def test_axe_finds_nothing(tab: Any, modules: Path) -> None:
+def test_axe_finds_no_accessibility_problem(tab: Any, modules: Path) -> None:
     """In a wide and in a narrow window, in light and in dark."""
     tab.run((modules / "axe-core" / "axe.min.js").read_text(encoding="utf-8") + "; 0")
     for width, theme in ((1440, "light"), (390, "dark")):
@@ -237,14 +237,14 @@ def test_axe_finds_nothing(tab: Any, modules: Path) -> None:
     tab.size(1280, 900)
 
 
-def test_the_costs_are_seen_whole(tab: Any) -> None:
+def test_the_table_of_costs_needs_no_scroll_bar(tab: Any) -> None:
     tab.size(1440, 900)
     table = "document.querySelector('#costs .table')"
     assert tab.run(f"{table}.scrollWidth - {table}.clientWidth") <= 0
     tab.size(1280, 900)
 
 
-def test_prints_every_chart_in_light(tab: Any) -> None:
+def test_every_chart_is_printed_in_light_colours(tab: Any) -> None:
     tab.run("dispatchEvent(new Event('beforeprint'))")
     assert tab.run("getComputedStyle(document.body).backgroundColor") == "rgb(252, 251, 248)"
     assert tab.run("document.querySelectorAll('details:not([open])').length") <= 3
@@ -253,14 +253,14 @@ def test_prints_every_chart_in_light(tab: Any) -> None:
     assert len(tab.send("Page.printToPDF")["data"]) > 100_000
 
 
-def test_says_nothing_and_asks_for_nothing(tab: Any) -> None:
+def test_the_page_prints_no_console_message_and_makes_no_request(tab: Any) -> None:
     """No console message and no request. Runs last, after all tests above have used the page."""
     assert tab.console == []
     assert [url for url in tab.requests if not url.startswith(("file:", "data:", "blob:", "about:"))] == []
     assert len([url for url in tab.requests if url.startswith("file:")]) == 1
 
 
-def test_sections_as_pictures(tab: Any, pictures: Path) -> None:
+def test_pictures_of_all_sections_are_saved(tab: Any, pictures: Path) -> None:
     """Saves a PNG of each section in `pictures` for people to look at, two of them at the width of a
     phone.
     """

@@ -33,7 +33,7 @@ def test_a_root_that_moves_ahead_and_turns_goes_in_a_circle() -> None:
     assert ahead[:-1, 0, ::2] == pytest.approx(place[1:, ::2], abs=1e-9)
 
 
-def test_captured_motion_comes_back(
+def test_captured_motion_is_recovered_from_the_page(
     compared: dict[str, Any], examples: ModuleType, holden31: Skeleton
 ) -> None:
     clip = compared["clips"][0]
@@ -54,7 +54,9 @@ def _drawn(made: np.ndarray, compared: dict[str, Any], skeleton: Skeleton) -> np
     return made[:, keep]
 
 
-def test_the_error_is_the_distance_of_what_is_drawn(compared: dict[str, Any], network: Network) -> None:
+def test_the_error_is_the_distance_between_the_drawn_figures(
+    compared: dict[str, Any], network: Network
+) -> None:
     """The mean over all joints, most of which are drawn, placed by their rotations."""
     clip = compared["clips"][0]
     apart = np.linalg.norm(

@@ -99,7 +99,7 @@ def tab(
     yield from tools.opened(render_compared(compared, pair, script), tmp_path_factory.mktemp("compared"))
 
 
-def test_boxes_stand_at_the_quantiles_and_published_means_beside_them(compared: dict[str, Any]) -> None:
+def test_boxes_are_at_the_quantiles_with_published_means(compared: dict[str, Any]) -> None:
     chart = of_accuracy.error_boxes(compared)
     assert chart is not None
     boxes = [t for t in chart.options["held-out clips"] if t["type"] == "box"]
@@ -132,7 +132,7 @@ def test_every_pair_is_in_the_table_and_the_map(compared: dict[str, Any]) -> Non
     assert of_means != overall[-2]
 
 
-def test_published_figures_have_ours_beside_them(compared: dict[str, Any]) -> None:
+def test_published_figures_are_shown_with_ours(compared: dict[str, Any]) -> None:
     rows = {(row[0], row[1]): row[2:4] for row in tables.published_table(compared).rows}
     assert rows["a frame, mean", "holden"][0] == "0.376 ms"
     assert rows["a frame, mean", "holden"][1].endswith(" ms")
@@ -175,7 +175,7 @@ def test_frame_times_are_medians_and_measures_have_names(
     ]
 
 
-def test_networks_that_are_too_large_together_are_left_out(
+def test_networks_too_large_for_one_page_are_left_out(
     compared: dict[str, Any], pair: dict[str, Any], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     from hobble.report import compare_page
@@ -193,7 +193,7 @@ def test_networks_that_are_too_large_together_are_left_out(
     assert 'id="play-second"' not in page
 
 
-def test_two_figures_take_the_same_wishes(tab: Any) -> None:
+def test_two_figures_get_the_same_targets(tab: Any) -> None:
     tab.run("document.getElementById('play-view').scrollIntoView({ behavior: 'instant', block: 'center' })")
     tab.run("document.getElementById('play-stage').focus({ preventScroll: true })")
     assert tab.run("Hobble.player.actors.length") == 2
@@ -220,7 +220,7 @@ def test_another_configuration_is_chosen_and_linked_to(tab: Any) -> None:
     assert "of=ava%2Cava" in tab.run("location.hash")
 
 
-def test_charts_are_drawn_and_nothing_is_said_or_asked_for(tab: Any, pictures: Path) -> None:
+def test_charts_are_drawn_without_console_messages_or_requests(tab: Any, pictures: Path) -> None:
     tab.run("Hobble.drawAll()")
     undrawn = (
         "[...document.querySelectorAll('[data-chart]')].filter((e) => !e.querySelector('.main-svg')).length"

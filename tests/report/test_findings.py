@@ -42,16 +42,18 @@ def history(losses: list[float]) -> dict[str, list[float | None]]:
     ("held_out", "kind", "words"),
     [(0.1, "warn", "2.5 times the"), (0.041, "good", "does not overfit"), (0.052, "fact", "1.30 times")],
 )
-def test_generalisation(material: Material, held_out: float, kind: str, words: str) -> None:
+def test_the_gap_to_held_out_clips_gives_the_right_hint(
+    material: Material, held_out: float, kind: str, words: str
+) -> None:
     found = heads(material, accuracy=accuracy(material, held_out))
     assert [k for head, k in found.items() if words in head] == [kind]
 
 
-def test_nothing_held_out(material: Material) -> None:
+def test_missing_held_out_clips_get_a_warning(material: Material) -> None:
     assert heads(material, accuracy=accuracy(material, None))["No clips were held out."] == "warn"
 
 
-def test_curve_that_rises_falls_or_rests(material: Material) -> None:
+def test_a_rising_falling_or_flat_curve_gives_the_right_hint(material: Material) -> None:
     rising = history([1.0, 0.5, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8])
     assert "The held-out error was lowest in pass 2 and has risen since." in heads(material, history=rising)
     falling = history([1.0, 0.9, 0.8, 0.7, 0.6, 0.5, 0.4, 0.3])
@@ -80,7 +82,7 @@ def test_only_one_hint_advises_on_more_passes(material: Material, losses: list[f
     assert said[0].startswith("More passes ")
 
 
-def test_waypoints_flips_and_links_that_do_nothing(material: Material) -> None:
+def test_missed_waypoints_flips_and_ineffective_links_are_reported(material: Material) -> None:
     missed = {**material.measured["responsivity"], "largest_turn_degrees": 175.0}
     found = heads(material, responsivity=missed)
     assert found["The character reached 113 of 114 waypoints."] == "warn"
@@ -139,11 +141,11 @@ def test_problems_come_first_and_data_comes_before_training(material: Material) 
 
 def test_a_limited_turn_is_reported(material: Material) -> None:
     lap = material.measured["responsivity"]
-    asked = {**lap, "largest_turn_degrees": 25.0, "predicted_turn_degrees": 170.0, "turns_held_back": 3}
-    assert heads(material, responsivity=asked)[
+    limited = {**lap, "largest_turn_degrees": 25.0, "predicted_turn_degrees": 170.0, "turns_held_back": 3}
+    assert heads(material, responsivity=limited)[
         "The network predicted a turn of a joint by 170 degrees in one frame."
     ]
-    figure = next(f for f in track_figures(asked) if f.label == "Largest predicted turn")
+    figure = next(f for f in track_figures(limited) if f.label == "Largest predicted turn")
     assert figure.value == "170"
     assert "which changed 3 of" in figure.note
     assert "largest turn drawn: 25.0°" in figure.note

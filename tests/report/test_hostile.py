@@ -63,7 +63,7 @@ def hostile(
     yield from tools.opened(text, folder)
 
 
-def test_nothing_of_it_runs(hostile: Any) -> None:
+def test_no_script_in_a_hostile_name_runs(hostile: Any) -> None:
     drawn = "document.querySelector('[data-chart=\"stage-bytes\"] .main-svg') !== null"
     assert hostile.until("typeof Hobble") != "undefined"
     hostile.run("Hobble.drawAll()")
@@ -85,7 +85,7 @@ def test_nothing_of_it_runs(hostile: Any) -> None:
     assert not [url for url in hostile.requests if not url.startswith(("file:", "data:", "blob:"))]
 
 
-def test_it_is_shown_as_it_is(hostile: Any) -> None:
+def test_hostile_names_are_shown_as_text(hostile: Any) -> None:
     for place in ("h1", "#data td", "#play-sliders, #injury, #walking"):
         shown = f"[...document.querySelectorAll({json.dumps(place)})].some((e) => e.textContent.includes(%s))"
         assert hostile.run(shown % json.dumps(HOSTILE)), place

@@ -20,7 +20,7 @@ def loop(length: int, shade: int) -> list[np.ndarray]:
 
 
 @pytest.mark.parametrize(("healthy", "hurt"), [(10, 10), (7, 10), (10, 7), (4, 12), (12, 4)])
-def test_both_loops_go_round(healthy, hurt):
+def test_two_loops_of_different_length_end_together(healthy, hurt):
     images = side_by_side(loop(healthy, 200), loop(hurt, 100))
     assert len(images) == hurt
     lefts = [image.getpixel((0, 39))[0] for image in images]

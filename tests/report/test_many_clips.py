@@ -74,7 +74,20 @@ def test_seconds_are_estimated_from_a_random_choice_of_clips(
     assert chart.caption.endswith("Estimated from 10 of 30 clips.")
 
 
-def test_many_remarks_are_told_by_kind(material: Material, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_seconds_are_estimated_from_random_excerpts_of_clips(
+    examples: ModuleType, holden31: Skeleton, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    paths = [tmp_path / f"walk-{i}.npz" for i in range(4)]
+    for path in paths:
+        examples.rows(path, holden31)
+    every = coverage.seconds_of_data(paths, {})
+    monkeypatch.setattr(coverage, "MOST", 3)
+    few = coverage.seconds_of_data(paths, {}, of=8)
+    np.testing.assert_allclose(few["both"], 2 * every["both"])
+    assert few["estimate"] == " Estimated from 4 of 8 clips and 75 % of their frames."
+
+
+def test_many_remarks_are_grouped_by_kind(material: Material, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(data_section, "MOST_REMARKS", 3)
     sentences = ["frames 1-3 held", "frames 20-31 held", "frames 4-5 held", "no foot down for 2.5 s"]
     motion = [{**material.motion[0], "clip": f"c{i}", "repairs": [s]} for i, s in enumerate(sentences)]

@@ -66,7 +66,7 @@ def data_of(outline: Outline) -> dict[str, Any]:
     return {e["id"].removeprefix("data-"): json.loads(s) for s, e in parts if "id" in e}
 
 
-def test_has_every_section_and_leads_to_it(outline: Outline) -> None:
+def test_the_page_has_every_section_and_links_to_it(outline: Outline) -> None:
     ids = [e["id"] for e in outline.all("section")]
     assert ids == SECTIONS
     assert [e["href"] for e in outline.all("a") if (e["href"] or "").startswith("#")][2 : 2 + len(ids)] == [
@@ -74,7 +74,7 @@ def test_has_every_section_and_leads_to_it(outline: Outline) -> None:
     ]
 
 
-def test_needs_nothing_else(page: str, outline: Outline) -> None:
+def test_the_page_loads_nothing_from_elsewhere(page: str, outline: Outline) -> None:
     assert len(page.encode()) < 20e6
     for tag, attributes in outline.elements:
         assert "src" not in attributes, tag
@@ -86,7 +86,7 @@ def test_needs_nothing_else(page: str, outline: Outline) -> None:
     assert not re.search(r"fetch\(|XMLHttpRequest|import\(|WebSocket|sendBeacon", own)
 
 
-def test_every_picture_has_its_data_and_its_words(outline: Outline) -> None:
+def test_every_chart_has_its_data_and_a_label(outline: Outline) -> None:
     charts = data_of(outline)["charts"]
     drawn = [e for e in outline.all("div") if "data-chart" in e]
     assert {e["data-chart"] for e in drawn} == set(charts)
@@ -102,12 +102,12 @@ def test_ids_are_unique_and_controls_are_labelled(outline: Outline) -> None:
     assert labels <= set(ids)
 
 
-def test_numbers_of_the_tables_are_whole_in_their_cells(page: str, material: Material) -> None:
+def test_cells_of_tables_hold_unrounded_numbers(page: str, material: Material) -> None:
     row = material.measured["accuracy"]["clips"][0]
     assert f'data-v="{row["mean"]}"' in page
 
 
-def test_same_input_same_page(
+def test_equal_inputs_give_equal_pages(
     material: Material,
     play: dict[str, Any],
     character: dict[str, Any],
@@ -141,7 +141,9 @@ def test_a_hostile_clip_name_is_only_text(
     assert data_of(hostile)["strips"][0]["clip"] == HOSTILE
 
 
-def test_a_network_that_cannot_be_hurt(examples: ModuleType, holden31: Skeleton, tmp_path: Path) -> None:
+def test_a_network_without_injuries_has_a_page(
+    examples: ModuleType, holden31: Skeleton, tmp_path: Path
+) -> None:
     text = render(gather(**examples.write_all(tmp_path, holden31, injury=False)))
     assert 'id="injury"' not in text
     assert "Injury response" not in text

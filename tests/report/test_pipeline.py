@@ -17,7 +17,7 @@ def benchmark(path: Path, seconds: float, memory: str = "120.5") -> Path:
     return path
 
 
-def test_adds_up_jobs_rules_and_bytes(tmp_path: Path) -> None:
+def test_jobs_times_and_bytes_are_added_up(tmp_path: Path) -> None:
     folder = tmp_path / "benchmarks" / "motion"
     benchmark(folder / "motion_clips" / "a.tsv", 2.0)
     benchmark(folder / "motion_clips" / "b.tsv", 3.0, memory="300.25")
@@ -40,7 +40,9 @@ def test_adds_up_jobs_rules_and_bytes(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(("seen", "took"), [(3.3, 733.6), (750.0, 750.0)])
-def test_a_resumed_training_took_all_its_calls(tmp_path: Path, seen: float, took: float) -> None:
+def test_the_time_of_a_resumed_training_covers_all_its_calls(
+    tmp_path: Path, seen: float, took: float
+) -> None:
     """Snakemake's benchmark has only the last call, which may have had nothing left to train."""
     benchmark(tmp_path / "benchmarks" / "training.tsv", seen)
     benchmark(tmp_path / "other" / "accuracy.tsv", 10.0)
@@ -61,7 +63,7 @@ def test_a_resumed_training_took_all_its_calls(tmp_path: Path, seen: float, took
     assert found["total_seconds"] == took + 10.0
 
 
-def test_clips_of_earlier_calls_and_of_other_batches(tmp_path: Path) -> None:
+def test_times_of_clips_from_earlier_calls_are_counted(tmp_path: Path) -> None:
     """The last call made one clip of two. Before a clip was added there were fewer batches."""
     folder, made = tmp_path / "benchmarks/motion", tmp_path / ".made/motion_clips"
     benchmark(folder / "motion_clips/00.tsv", 2.0)
@@ -77,7 +79,7 @@ def test_clips_of_earlier_calls_and_of_other_batches(tmp_path: Path) -> None:
     assert (motion["jobs"], motion["seconds"]) == (2, 5.5)
 
 
-def test_lists_what_is_missing(tmp_path: Path) -> None:
+def test_missing_files_are_listed(tmp_path: Path) -> None:
     nowhere = str(tmp_path / "nowhere")
     found = summarise("c", {"training": {"benchmarks": [nowhere], "files": [f"{nowhere}.npz"]}})
     assert found["missing"] == [nowhere, f"{nowhere}.npz"]
@@ -93,7 +95,7 @@ def test_repeated_benchmarks_count_each_run(tmp_path: Path) -> None:
     assert "max_rss" not in read_benchmark(path)[1]
 
 
-def test_refuses_another_table(tmp_path: Path) -> None:
+def test_a_table_that_is_no_benchmark_is_refused(tmp_path: Path) -> None:
     path = tmp_path / "a.tsv"
     path.write_text("clip\tframes\nwalk\t3\n")
     with pytest.raises(InputError, match=r"a\.tsv: not a Snakemake benchmark"):

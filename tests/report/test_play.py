@@ -55,9 +55,7 @@ def test_weights_are_kept_to_a_part_in_sixty_thousand(network: Network, characte
     )
 
 
-def test_inputs_that_weigh_nothing_are_left_out(
-    examples: ModuleType, holden31: Skeleton, tmp_path: Path
-) -> None:
+def test_inputs_without_effect_are_left_out(examples: ModuleType, holden31: Skeleton, tmp_path: Path) -> None:
     examples.weights(tmp_path / "weights.npz", holden31)
     network = load_network(tmp_path / "weights.npz")
     x_std = network.x_std.copy()
@@ -67,7 +65,7 @@ def test_inputs_that_weigh_nothing_are_left_out(
     assert sorted(set(range(network.layout.x_size)) - set(seen)) == [unseen]
 
 
-def wish(frame: int) -> dict[str, Any]:
+def target_at(frame: int) -> dict[str, Any]:
     """The target in each frame: walk ahead, turn, strafe, stop, turn on the spot, crouch; hurt in the last
     two thirds.
     """
@@ -98,10 +96,10 @@ def test_the_page_moves_as_python_does(
     animation = ProceduralAnimation(network, storage="int16", **dict(examples.RUNTIME))
     expected = []
     for frame in range(FRAMES):
-        asked = wish(frame)
-        injury = {"LeftUpLeg-LeftLeg": 7.0, "Hips-LowerBack": 3.0} if asked["hurt"] else None
+        target = target_at(frame)
+        injury = {"LeftUpLeg-LeftLeg": 7.0, "Hips-LowerBack": 3.0} if target["hurt"] else None
         pose = animation.next_pose(
-            asked["velocity"], asked["facing"], asked["gait"], injury=injury, terrain=hills
+            target["velocity"], target["facing"], target["gait"], injury=injury, terrain=hills
         )
         world, places = jointed(network.skeleton, pose.positions[None], pose.rotations[None])
         expected.append(
@@ -111,7 +109,8 @@ def test_the_page_moves_as_python_does(
     script = f"""(() => {{
       const spec = Hobble.material.playable.example, c = Hobble.character(spec), rig = Hobble.rig(spec);
       const hills = (x, z) => 14 * Math.sin(x / 170) * Math.cos(z / 140) + 8 * Math.sin((x + z) / 260);
-      return {json.dumps([wish(f) for f in range(FRAMES)])}.map(({{ velocity, facing, gait, hurt }}) => {{
+      const targets = {json.dumps([target_at(f) for f in range(FRAMES)])};
+      return targets.map(({{ velocity, facing, gait, hurt }}) => {{
         if (hurt) {{
           c.channelTargets[{links.index("LeftUpLeg-LeftLeg")}] = 7;
           c.channelTargets[{links.index("Hips-LowerBack")}] = 3;
@@ -141,7 +140,7 @@ def show(tab: Any) -> None:
     tab.run("document.getElementById('play-stage').focus({ preventScroll: true })")
 
 
-def test_the_top_of_the_page_has_a_hurt_figure_and_a_healthy_one_beside_it(tab: Any) -> None:
+def test_the_top_of_the_page_shows_a_hurt_and_a_healthy_figure(tab: Any) -> None:
     """Also after a click on another part and a turn of the dial."""
     tab.run("scrollTo(0, 0)")
     of = "(({ character }) => Array.from(character.channelValues))"
@@ -170,7 +169,7 @@ def test_the_top_of_the_page_has_a_hurt_figure_and_a_healthy_one_beside_it(tab: 
     assert "at 0 they walk alike." in tab.run(line)
 
 
-def test_the_figures_at_the_top_go_on_as_the_python_runtime_does(
+def test_the_figures_at_the_top_move_as_the_python_runtime_does(
     tab: Any, network: Network, examples: ModuleType, character: dict[str, Any], hero: dict[str, Any]
 ) -> None:
     """The page has their states at the moment when it opens. Both go on alike for half a second."""
@@ -260,7 +259,7 @@ def test_a_click_on_the_left_shin_hurts_it_and_changes_the_gait(tab: Any) -> Non
     assert tab.run(apart) > 0.01
 
 
-def test_presets_sliders_and_the_link_to_them(tab: Any) -> None:
+def test_presets_set_the_sliders_and_the_address(tab: Any) -> None:
     buttons = "[...document.querySelectorAll('#play-presets button')]"
     assert tab.run(f"{buttons}.map((b) => b.textContent)") == [
         "Hurt knee", "Sprained ankle", "Bad back", "Knee and back", "Healthy",
@@ -303,7 +302,7 @@ def test_the_page_moves_the_body_as_python_does(tab: Any, holden31: Skeleton) ->
     assert np.abs(found - mesh.posed(places, turns)).mean() < 0.03
 
 
-def test_what_is_saved_as_bvh_is_what_was_played(
+def test_the_saved_bvh_is_the_motion_that_was_played(
     tab: Any, character: dict[str, Any], examples: ModuleType, holden31: Skeleton, tmp_path: Path
 ) -> None:
     made = examples.walker(holden31, 90, 2.2)
@@ -378,7 +377,7 @@ def test_every_point_along_the_left_thigh_takes_a_click(tab: Any) -> None:
 
 
 @pytest.mark.parametrize("ground", ["constructor", "toString", "__proto__", "nowhere", "boxes"])
-def test_a_link_pasted_into_the_open_page_is_followed_and_taken_with_care(tab: Any, ground: str) -> None:
+def test_an_address_with_bad_values_is_followed_without_them(tab: Any, ground: str) -> None:
     tab.run("document.getElementById('play-ground').value = 'slope'")
     tab.run(
         f"location.hash = '#play?ground={ground}&camera=,,&hurt=LeftLeg-LeftFoot:3,x:9,Hips-LowerBack:-1'"
@@ -393,7 +392,7 @@ def test_a_link_pasted_into_the_open_page_is_followed_and_taken_with_care(tab: A
     tab.run("Hobble.player.sliders.set([]); location.hash = ''")
 
 
-def test_the_camera_comes_round_behind_at_any_rate_of_pictures(tab: Any) -> None:
+def test_the_camera_turns_behind_the_figure_at_any_frame_rate(tab: Any) -> None:
     """The path of the camera depends on the time and not on the number of frames drawn."""
     script = """((rate) => {
       const orbit = { yaw: 0 }, chase = Hobble.chase(orbit, document.createElement("canvas"));
@@ -450,7 +449,7 @@ def test_the_saved_picture_has_a_sky(tab: Any) -> None:
     assert tab.run(least) == 255
 
 
-def test_playing_says_nothing_and_asks_for_nothing(tab: Any) -> None:
+def test_playing_prints_no_console_message_and_makes_no_request(tab: Any) -> None:
     assert tab.console == []
     assert all(url.startswith(("file:", "data:", "blob:", "about:")) for url in tab.requests)
 

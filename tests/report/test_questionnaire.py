@@ -51,7 +51,7 @@ def again(tab: Any, forget: bool = False) -> None:
     assert tab.until("!!globalThis.Study")
 
 
-def test_what_hurts_is_listed_beside_the_page_and_not_in_it(made: tuple[Path, dict[str, Any]]) -> None:
+def test_injuries_are_listed_in_a_file_and_not_in_the_page(made: tuple[Path, dict[str, Any]]) -> None:
     folder, written = made
     assert json.loads((folder / "films.json").read_text()) == json.loads(json.dumps(written))
     assert [row["parts"] for row in written["films"]] == [list(film.parts) for film in SHORT]
@@ -103,7 +103,7 @@ def test_each_film_is_asked_about_once_and_the_answers_can_be_counted(
     assert all(url.startswith(("file:", "data:", "blob:", "about:")) for url in tab.requests)
 
 
-def test_orders_differ_and_a_closed_page_goes_on(tab: Any) -> None:
+def test_orders_differ_and_a_reopened_page_continues(tab: Any) -> None:
     orders = set()
     for _ in range(12):
         again(tab, forget=True)
@@ -120,7 +120,7 @@ def test_orders_differ_and_a_closed_page_goes_on(tab: Any) -> None:
     assert tab.run("Study.state.order") == order
 
 
-def test_films_in_which_nothing_can_be_seen_are_told() -> None:
+def test_films_without_a_visible_injury_get_a_warning() -> None:
     rows = [
         {"film": 1, "from_healthy_cm": 3.0, "untrained": []},
         {"film": 2, "from_healthy_cm": 0.01, "untrained": ["A-B"]},

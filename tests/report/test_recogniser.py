@@ -18,7 +18,7 @@ from hobble.gait.graded import grade, grader
 from hobble.gait.people import people
 from hobble.gait.profile import profile
 from hobble.models.network import Network
-from hobble.report.recogniser import healthy_walk, learnt, playable_with_recogniser, words
+from hobble.report.pack_recogniser import healthy_walk, learnt, playable_with_recogniser, words
 
 
 @pytest.fixture(scope="module")
@@ -54,7 +54,7 @@ def in_page(tab: Any, skeleton: Skeleton, places: Array) -> Any:
     }})()""")
 
 
-def test_cycles_and_their_numbers_are_those_of_python(
+def test_cycles_and_their_measurements_equal_those_of_python(
     tab: Any, walks: dict[str, Array], holden31: Skeleton
 ) -> None:
     measured = 0
@@ -71,7 +71,7 @@ def test_cycles_and_their_numbers_are_those_of_python(
     assert measured >= 3, "three of the walks have cycles"
 
 
-def test_answers_are_those_of_python(tab: Any) -> None:
+def test_javascript_recognises_the_same_limps_as_python(tab: Any) -> None:
     """People's impaired walks at several strengths, compared with their healthy walks."""
     known = people()
     healthy, cases = known.normal(), []
@@ -95,7 +95,7 @@ def test_answers_are_those_of_python(tab: Any) -> None:
     assert len(labels) >= 4, "the cases are called different things"
 
 
-def test_every_kind_has_words_of_its_own() -> None:
+def test_every_kind_of_limp_has_its_own_text() -> None:
     said = [words(*kind) for kind in grader().kinds]
     assert len(set(said)) == len(said)
     assert words("antalgic", "left") == "left thigh, shank or foot"
@@ -111,7 +111,7 @@ def test_a_walk_is_compared_with_the_healthy_walk_of_the_same_figure(
     assert spec["recogniser"]["healthy"]["speed_per_leg"] > 0.5
     without = {role: joint for role, joint in holden31.roles.items() if role != "left_knee"}
     assert healthy_walk(network, replace(holden31, roles=without), examples.RUNTIME) is None
-    monkeypatch.setattr("hobble.report.recogniser.SPEED", 0.0)
+    monkeypatch.setattr("hobble.report.pack_recogniser.SPEED", 0.0)
     assert healthy_walk(network, holden31, examples.RUNTIME) is None
     assert "recogniser" not in playable_with_recogniser(network, examples.RUNTIME)
 

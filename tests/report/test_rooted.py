@@ -19,21 +19,21 @@ from hobble.runtime.animation import ProceduralAnimation
 SCRIPT = """
 import { readFileSync } from "fs";
 import { createCharacter } from "./character.js";
-const { spec, wishes } = JSON.parse(readFileSync(process.argv[2]));
+const { spec, targets } = JSON.parse(readFileSync(process.argv[2]));
 const c = createCharacter(spec), flat = () => 0;
-console.log(JSON.stringify(wishes.map((wish) => {
-  c.frame(wish, null, "walk", flat);
+console.log(JSON.stringify(targets.map((target) => {
+  c.frame(target, null, "walk", flat);
   return Array.from(c.pose);
 })));
 """
 
 
-def test_it_is_drawn_toward_the_wish_as_in_python(
+def test_the_page_pulls_a_rooted_network_toward_its_target_as_python_does(
     network: Network, examples: ModuleType, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(type(network), "rooted", True)
-    # A wish to stop, so that movement is drawn against the network's own.
-    wishes = [[0.03 * f, 2.5] if f < 60 else [0.0, 0.0] for f in range(90)]
+    # A target to stop, so that movement is drawn against the network's own.
+    targets = [[0.03 * f, 2.5] if f < 60 else [0.0, 0.0] for f in range(90)]
     for script in WEB.glob("*.js"):
         shutil.copyfile(script, tmp_path / script.name)
     kinds = tmp_path / "node_modules" / "networks"
@@ -42,21 +42,21 @@ def test_it_is_drawn_toward_the_wish_as_in_python(
     (tmp_path / "package.json").write_text('{"type": "module"}')
     (kinds / "package.json").write_text('{"type": "module", "main": "index.js"}')
     (tmp_path / "run.js").write_text(SCRIPT)
-    asked = {"spec": playable(network, examples.RUNTIME), "wishes": wishes}
-    (tmp_path / "asked.json").write_text(json.dumps(asked))
+    inputs = {"spec": playable(network, examples.RUNTIME), "targets": targets}
+    (tmp_path / "inputs.json").write_text(json.dumps(inputs))
     done = node(
-        [str(tmp_path / "run.js"), str(tmp_path / "asked.json")],
+        [str(tmp_path / "run.js"), str(tmp_path / "inputs.json")],
         return_completed_process=True,
         capture_output=True,
         text=True,
     )
     assert done.returncode == 0, done.stderr
     animation = ProceduralAnimation(network, storage="int16", **dict(examples.RUNTIME))
-    poses = [animation.next_pose(wish, None, "walk").positions for wish in wishes]
+    poses = [animation.next_pose(target, None, "walk").positions for target in targets]
     found = np.reshape(json.loads(done.stdout), np.shape(poses))
     np.testing.assert_allclose(found, poses, atol=1e-3)
-    # The test would say nothing if the wish drew nothing.
+    # The test would say nothing if the target drew nothing.
     monkeypatch.setattr("hobble.runtime.trajectory.PULL", 0.0)
     animation = ProceduralAnimation(network, storage="int16", **dict(examples.RUNTIME))
-    other = [animation.next_pose(wish, None, "walk").positions for wish in wishes]
+    other = [animation.next_pose(target, None, "walk").positions for target in targets]
     assert np.abs(found - other).max() > 1.0

@@ -45,7 +45,7 @@ def network_of_8_bits(network: Network, character: dict[str, Any]) -> Pfnn:
     return replace(network, weights=type(network.weights)(kept))
 
 
-def test_a_weight_is_off_by_half_of_its_groups_factor_at_most(
+def test_a_rounded_weight_errs_by_at_most_half_a_step_of_its_group(
     network: Network, character: dict[str, Any]
 ) -> None:
     assert has_weights(character)

@@ -19,7 +19,7 @@ def unpacked(text: str, kind: str) -> np.ndarray:
     return np.frombuffer(base64.b64decode(text), kind)
 
 
-def test_positions_come_back_within_a_tenth_of_a_millimetre() -> None:
+def test_positions_are_packed_within_a_tenth_of_a_millimetre() -> None:
     rng = np.random.default_rng(0)
     world = rng.uniform(-90, 90, (7, 5, 3)) + rng.uniform(-4000, 4000, (7, 1, 3))
     packed = pack_positions(world)
@@ -44,9 +44,7 @@ def test_every_scenario_is_thinned_to_thirty_hertz(play: dict[str, Any]) -> None
     assert values[-1] == pytest.approx(249, abs=2)
 
 
-def test_bones_lie_where_rotations_put_them_and_keep_their_lengths(
-    play: dict[str, Any], holden31: Skeleton
-) -> None:
+def test_packed_rotations_give_the_bones_and_their_lengths(play: dict[str, Any], holden31: Skeleton) -> None:
     walk, count = play["scenarios"][0], play["joints"]
     keep = body(holden31).bones.tolist()
     pose = UNIT * unpacked(walk["pose"], "<i2").reshape(-1, count, 3)
@@ -77,7 +75,7 @@ def test_motion_without_rotations_is_fitted(
     assert np.median(apart) <= 0.011
 
 
-def test_what_hurts_is_named_in_words(play: dict[str, Any], holden31: Skeleton) -> None:
+def test_injuries_are_named_in_words(play: dict[str, Any], holden31: Skeleton) -> None:
     assert play["scenarios"][-1]["description"] == "Walks while the left thigh hurts more and more"
     words = spoken_links(holden31, holden31.link_names)
     assert len(set(words)) == len(words)

@@ -13,7 +13,7 @@ from hobble.channels.injury.response import page as injury_page
 from hobble.channels.injury.response import page_cases
 from hobble.core.errors import InputError
 from hobble.core.skeleton import Skeleton
-from hobble.evaluation.tables import read_numbers
+from hobble.evaluation.csv_tables import read_numbers
 from hobble.measures.accuracy import page as accuracy_page
 from hobble.measures.responsivity import lap_charts
 from hobble.measures.responsivity import page as responsivity_page
@@ -25,20 +25,20 @@ from hobble.report import (
     terrain_section,
     training_section,
 )
-from hobble.report.charts import Chart, Family
+from hobble.report.charts import Chart, ChartGroup
 from hobble.report.gather import Material, describe_network
 from hobble.report.ground_pictures import ground_pictures
-from hobble.report.parts import Pair
-from hobble.report.summary import Figure
+from hobble.report.page_parts import ChartPair
+from hobble.report.summary import KeyFigure
 from hobble.rows.clip_rows import load_clip_rows, save_clip_rows
 
 
-def test_sections_end_where_their_pass_does(material: Material) -> None:
+def test_sections_of_a_pass_are_spread_evenly_on_the_axis(material: Material) -> None:
     x = training_section.passes_axis(material)
     assert (x[0], x[9], x[10], x[-1]) == (pytest.approx(0.1), 1.0, pytest.approx(1.1), 20.0)
 
 
-def test_history_with_empty_cells_and_with_words(tmp_path: Path) -> None:
+def test_empty_cells_of_the_history_are_read_and_words_refused(tmp_path: Path) -> None:
     path = tmp_path / "history.csv"
     path.write_text("pass,held_out_mse\n1,\n2,0.5\n")
     assert read_numbers(path) == {"pass": [1.0, 2.0], "held_out_mse": [None, 0.5]}
@@ -53,13 +53,13 @@ def test_history_with_empty_cells_and_with_words(tmp_path: Path) -> None:
             read_numbers(path)
 
 
-def test_a_curve_without_held_out_clips(material: Material) -> None:
+def test_a_learning_curve_needs_no_held_out_clips(material: Material) -> None:
     nothing = {**material.history, "held_out_mse": [None] * 200}
     chart = training_section.learning_curve(replace(material, history=nothing))
     assert [trace["name"] for trace in chart.traces] == ["training"]
 
 
-def test_weights_that_are_not(tmp_path: Path) -> None:
+def test_a_file_that_holds_no_weights_is_refused(tmp_path: Path) -> None:
     path = tmp_path / "weights.npz"
     path.write_bytes(b"nothing")
     with pytest.raises(InputError, match="damaged or not an npz file"):
@@ -115,7 +115,7 @@ def test_turns_speeds_and_severities_are_counted_in_seconds(
     assert chart.traces[0]["z"][0][6] == pytest.approx(hurt, abs=0.02)
 
 
-def test_strips_carry_what_hurts(material: Material) -> None:
+def test_strips_show_the_injured_parts(material: Material) -> None:
     strips = {strip["clip"]: strip for strip in data_section.strips(material, shown_clips.shown(material))}
     assert len(strips) == 8, "a mirror says the same again"
     (row,) = strips["hurt_left_knee"]["status"]
@@ -124,7 +124,7 @@ def test_strips_carry_what_hurts(material: Material) -> None:
     assert strips["jog"]["status"] == []
 
 
-def test_stages_beside_the_published(material: Material) -> None:
+def test_stages_are_listed_with_published_values_of_the_same_configuration(material: Material) -> None:
     """A published time or size is shown only for its own configuration."""
     nothing, patches = [None, None], [1680, 606.0e6]
     known = {
@@ -145,7 +145,7 @@ def test_stages_beside_the_published(material: Material) -> None:
         }
 
 
-def test_steps_of_a_frame_in_their_order(material: Material) -> None:
+def test_the_steps_of_a_frame_are_in_their_order(material: Material) -> None:
     chart = lap_charts.lap_chart(material.found("responsivity"), material)
     assert chart is not None
     traces = next(iter(chart.options.values()))
@@ -163,8 +163,8 @@ def test_steps_of_a_frame_in_their_order(material: Material) -> None:
     assert traces[-1]["y"][0] == times["spread"]["median"]
 
 
-def test_feet_that_hardly_stood_have_no_slide(material: Material) -> None:
-    def slide(steps: int) -> Figure:
+def test_feet_with_little_contact_have_no_slide(material: Material) -> None:
+    def slide(steps: int) -> KeyFigure:
         laps = [{**lap, "steps": steps} for lap in material.measured["responsivity"]["laps"][:2]]
         found = {**material.measured["responsivity"], "laps": laps, "foot_slide_cm": 0.0}
         figures = responsivity_page.track_figures(found)
@@ -186,8 +186,8 @@ def test_links_never_hurt_in_training_are_told_from_the_others(material: Materia
     ]
     injury = {**material.measured["injury"], "responses": responses, "into_a_jog": rows}
     parts = [part.content for part in injury_page.section(injury, material).parts]
-    (curves,) = [content for content in parts if isinstance(content, Family)]
-    overview, (_, into_a_jog) = [content.charts for content in parts if isinstance(content, Pair)]
+    (curves,) = [content for content in parts if isinstance(content, ChartGroup)]
+    overview, (_, into_a_jog) = [content.charts for content in parts if isinstance(content, ChartPair)]
     never = {"right shank", "lower back"}
     for chart in overview:
         hollow = [t for t in chart.traces if t["name"].endswith(", never hurt in training")]
@@ -201,7 +201,7 @@ def test_links_never_hurt_in_training_are_told_from_the_others(material: Materia
     assert names[-1] == "never hurt in training"
 
 
-def test_ground_profiles_are_the_centre_heights_of_now(tmp_path: Path) -> None:
+def test_ground_profiles_hold_the_present_height_under_the_root(tmp_path: Path) -> None:
     heights = np.arange(6 * 3 * 36, dtype=np.float32).reshape(18, 36)
     path = tmp_path / "clip.npz"
     np.savez(
@@ -217,7 +217,7 @@ def test_ground_profiles_are_the_centre_heights_of_now(tmp_path: Path) -> None:
 def test_a_damaged_terrain_file_is_named(tmp_path: Path) -> None:
     path = tmp_path / "clip.npz"
     np.savez(path, frame=np.arange(3))
-    with pytest.raises(InputError, match=r"clip\.npz: damaged or not an npz file"):
+    with pytest.raises(InputError, match=r"clip\.npz: holds no array 'fits'"):
         terrain_section.read_fits(path)
 
 
@@ -229,7 +229,7 @@ def test_flat_clips_have_no_ground_to_show(material: Material) -> None:
     assert [p["name"] for p in pictures][:2] == ["walk_straight, cycle 2", "walk_turns, cycle 2"]
 
 
-def test_texts_reach_plotly_as_entities() -> None:
+def test_texts_are_escaped_for_plotly() -> None:
     chart = Chart("c", "t", "", [{"type": "bar", "y": ["<b>a & b"], "hovertemplate": "%{y}<extra></extra>"}])
     (trace,) = chart.spec()["traces"]
     assert trace["y"] == ["&lt;b>a &amp; b"]
@@ -242,7 +242,7 @@ def test_examples_are_seeded(examples: ModuleType, holden31: Any, tmp_path: Path
     assert (tmp_path / "a.npz").read_bytes() == (tmp_path / "b.npz").read_bytes()
 
 
-def test_confusions_are_shares_of_what_hurts_and_name_how_often_it_was_right() -> None:
+def test_confusions_are_shares_of_each_injury() -> None:
     confusion = {"knee": {"knee": 3, "back": 1}, "back": {"knee": 0, "back": 2}}
     part = {"confusion": confusion, "right": 5 / 6}
     found = {"applies": True, "classes": ["knee", "back"], "chance": 0.5, "people": 0.82}
@@ -269,7 +269,7 @@ def test_every_pair_of_injuries_is_drawn_as_it_is_measured() -> None:
     assert page_cases.second_chart([]) is None
 
 
-def test_the_runs_lie_over_the_track_and_are_red_where_they_left_it() -> None:
+def test_runs_are_drawn_over_the_track_in_red_where_they_left_it() -> None:
     track = {"x": [0.0, 10.0, 10.0], "z": [0.0, 0.0, 5.0], "gaits": ["walk", "jog", "crouch"]}
     near = {"lap": 1, "x": [0.0, 5.0], "z": [0.0, 0.1], "off_cm": [0.0, 10.0]}
     far = {"lap": 2, "x": [0.0, 5.0, 9.0], "z": [0.0, -2.0, 0.0], "off_cm": [0.0, 200.0, 3.0]}

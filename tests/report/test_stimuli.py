@@ -21,14 +21,14 @@ from hobble.models.load import load_network
 from hobble.models.network import Network
 from hobble.motion.read import read_bvh
 from hobble.report import stimuli
-from hobble.report.raster import BODY, Camera, Studio
+from hobble.report.raster import BODY, BodyRenderer, Camera
 
 UPRIGHT = np.tile(quat.IDENTITY, (19, 1))
 
 
 @pytest.fixture(scope="module")
-def studio(holden31: Skeleton) -> Studio:
-    return Studio(body(holden31), regions(holden31, holden31.link_names))
+def studio(holden31: Skeleton) -> BodyRenderer:
+    return BodyRenderer(body(holden31), regions(holden31, holden31.link_names))
 
 
 @pytest.fixture(scope="module")
@@ -39,7 +39,7 @@ def standing(holden31: Skeleton) -> np.ndarray:
     return place[body(holden31).bones] - [0, place[:, 1].min() - 2.7, 0]
 
 
-def test_thirteen_are_asked_about_and_each_preset_is_shown(network: Network) -> None:
+def test_there_are_thirteen_walks_of_the_study_and_one_for_each_preset(network: Network) -> None:
     wanted = [loop for *_, loop in stimuli.all_loops(network)]
     assert len(injury_shown.STUDY) == 13
     assert [loop.coloured for loop in wanted] == [False] * 13 + [True] * 4
@@ -48,7 +48,7 @@ def test_thirteen_are_asked_about_and_each_preset_is_shown(network: Network) -> 
     assert dict(wanted[1].values) == {"LeftUpLeg-LeftLeg": injury_shown.SEVERITY}
 
 
-def test_the_body_stands_where_the_camera_says(studio: Studio, standing: np.ndarray) -> None:
+def test_the_body_stands_where_the_camera_says(studio: BodyRenderer, standing: np.ndarray) -> None:
     camera = Camera(np.array([0.0, 82.0, 0.0]), yaw=0.0, pitch=0.1, size=200)
     picture = studio.draw(standing, UPRIGHT, camera).astype(float)
     bare = studio.draw(standing + np.array([0, 0, -5000.0]), UPRIGHT, camera).astype(float)
@@ -63,7 +63,9 @@ def test_the_body_stands_where_the_camera_says(studio: Studio, standing: np.ndar
     assert np.ptp(front / BODY) < 0.05, "grey, lighter or darker"
 
 
-def test_what_hurts_is_coloured_where_asked(studio: Studio, standing: np.ndarray, holden31: Skeleton) -> None:
+def test_the_injured_part_is_coloured_if_requested(
+    studio: BodyRenderer, standing: np.ndarray, holden31: Skeleton
+) -> None:
     camera = Camera(np.array([0.0, 82.0, 0.0]), yaw=0.0, pitch=0.1, size=200)
     severity = np.zeros(len(holden31.link_names))
     severity[holden31.link_names.index("LeftLeg-LeftFoot")] = 1
@@ -80,7 +82,7 @@ def test_what_hurts_is_coloured_where_asked(studio: Studio, standing: np.ndarray
     assert np.all(np.abs(columns - x[knee]) < 15)
 
 
-def test_the_ground_goes_round_with_the_loop() -> None:
+def test_the_ground_repeats_with_the_loop() -> None:
     from hobble.report.raster import GRID, _ground
 
     still = _ground(Camera(np.array([0.0, 82.0, 0.0]), size=80))
@@ -99,13 +101,13 @@ def test_a_walk_is_cut_where_it_repeats() -> None:
     assert gap < 1e-6
 
 
-def test_a_walk_is_no_distance_from_itself_however_cut_and_turned(holden31: Skeleton) -> None:
+def test_the_distance_of_walks_ignores_start_and_heading(holden31: Skeleton) -> None:
     time, joints = np.arange(134), len(holden31.joints)
     swing = 20 * np.sin(2 * np.pi * (time[:, None] / 67 + np.linspace(0, 1, joints)))
     place = np.stack([0 * swing, 90 + swing, 2.0 * time[:, None] + swing], axis=-1)
 
-    def loop(positions: np.ndarray, way: tuple[float, float, float]) -> stimuli.Loop:
-        return stimuli.Loop(positions, np.zeros((*positions.shape[:2], 4)), np.array(way), 0.0)
+    def loop(positions: np.ndarray, way: tuple[float, float, float]) -> stimuli.RepeatedWalk:
+        return stimuli.RepeatedWalk(positions, np.zeros((*positions.shape[:2], 4)), np.array(way), 0.0)
 
     walk = loop(place, (0, 0, 268))
     turned = loop(np.roll(place, 20, axis=0)[..., [2, 1, 0]] * [1, 1, -1] + [500, 0, 7], (268, 0, 0))
@@ -114,7 +116,7 @@ def test_a_walk_is_no_distance_from_itself_however_cut_and_turned(holden31: Skel
     assert stimuli.apart(loop(lame, (0, 0, 268)), walk) == pytest.approx(31 / joints)
 
 
-def test_stimuli_in_which_nothing_hurts_are_told() -> None:
+def test_stimuli_without_a_visible_injury_get_a_warning() -> None:
     def row(name: str, hurt: str, never: str, cm: float) -> dict:
         return {
             "name": name,
@@ -133,7 +135,9 @@ def test_stimuli_in_which_nothing_hurts_are_told() -> None:
     assert never.startswith("Never above 0 in training: B, C.")
 
 
-def test_files_of_a_loop(network: Network, examples: ModuleType, tmp_path: Path, monkeypatch) -> None:
+def test_a_loop_is_written_as_pictures_and_bvh(
+    network: Network, examples: ModuleType, tmp_path: Path, monkeypatch
+) -> None:
     monkeypatch.setattr(injury_shown, "STUDY", {"healthy": (), "left-foot": ("left foot",)})
     monkeypatch.setattr(injury_shown, "PRESETS", {"Bad back": {"lower back": 8}})
     x_mean = network.x_mean.copy()

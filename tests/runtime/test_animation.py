@@ -13,11 +13,13 @@ import pytest
 from hobble.core import quat
 from hobble.evaluation.motion_measures import foot_slide, largest_turn
 from hobble.models.load import load_network
+from hobble.models.network import Network
 from hobble.runtime import ProceduralAnimation
+from hobble.runtime.waypoints import TRACK
 from tests.runtime.walking import KNEE, hills, walk
 
 
-def test_the_row_is_that_of_the_definition(hurtable) -> None:
+def test_the_input_row_follows_its_definition(hurtable) -> None:
     """X computed in numpy from the state, column by column."""
     character = ProceduralAnimation(hurtable)
     walk(character, 90, injury={KNEE: 6.0}, terrain=hills)
@@ -58,7 +60,7 @@ def test_the_row_is_that_of_the_definition(hurtable) -> None:
     assert x[layout.x_channel("injury")].sum() == 6.0
 
 
-def test_the_pose_is_that_of_the_prediction(network) -> None:
+def test_the_pose_follows_from_the_prediction(network) -> None:
     character = ProceduralAnimation(network, foot_locking=False)
     walk(character, 50, terrain=hills)
     old = character.state.joint_position[0].copy()
@@ -81,7 +83,7 @@ def test_the_pose_is_that_of_the_prediction(network) -> None:
     assert pose.rotations.shape == (31, 4)
 
 
-def test_no_joint_turns_faster_than_a_joint_can(steady) -> None:
+def test_no_joint_turns_faster_than_the_limit(steady) -> None:
     """After a jump of the prediction by half a turn, the pose follows at 25 degrees a frame."""
     character = ProceduralAnimation(steady)
     evaluate, hand = character._predictor.evaluate, steady.skeleton.role("left_wrist")
@@ -141,7 +143,7 @@ def test_the_same_calls_give_the_same_motion(network) -> None:
     np.testing.assert_array_equal(motion, [p.positions for p in walk(first, 30)])
 
 
-def test_reset_places_the_figure(steady) -> None:
+def test_reset_puts_the_figure_at_the_given_place(steady) -> None:
     character = ProceduralAnimation(steady, position=(100, 0, -50), facing=(1, 0, 0))
     pose = character.next_pose((0, 0))
     np.testing.assert_allclose(pose.root, [100, 0, -50])
@@ -151,13 +153,13 @@ def test_reset_places_the_figure(steady) -> None:
     assert pose.positions[left, 2] < -50 < pose.positions[right, 2]
 
 
-def test_gaits(network) -> None:
+def test_the_gait_follows_from_speed_and_argument(network) -> None:
     character = ProceduralAnimation(network)
 
     def shares(velocity, gait=None) -> dict[str, float]:
         character.next_pose(velocity, gait=gait)
-        wish = dict(zip(network.gaits, character._wish_gait[0], strict=True))
-        return {name: share for name, share in wish.items() if share}
+        target = dict(zip(network.gaits, character._target_gait[0], strict=True))
+        return {name: share for name, share in target.items() if share}
 
     assert shares((0, 0.05), "jog") == {"stand": 1}
     assert shares((0, 0.05), "crouch") == {"stand": 1, "crouch": 1}
@@ -173,7 +175,7 @@ def test_gaits(network) -> None:
         character.next_pose((0, 1), gait="swim")
 
 
-def test_gait_blends_slowly_into_the_future(network) -> None:
+def test_a_new_gait_blends_slowly_into_the_future(network) -> None:
     character = ProceduralAnimation(network)
     middle = network.layout.window
     for n in range(1, 20):
@@ -196,7 +198,7 @@ def test_severities_change_at_their_rate_and_are_scaled(hurtable) -> None:
     assert healed.channels["injury"].sum() == 0
 
 
-def test_a_zero_facing_looks_where_the_character_goes(network) -> None:
+def test_with_a_zero_facing_the_character_looks_where_it_goes(network) -> None:
     crowd, one = ProceduralAnimation(network, characters=2), ProceduralAnimation(network)
     for _ in range(20):
         many = crowd.next_pose((1, 2), [(0, 0), (1, 0)])
@@ -205,7 +207,7 @@ def test_a_zero_facing_looks_where_the_character_goes(network) -> None:
     assert np.abs(many.positions[1] - single.positions).max() > 0.1
 
 
-def test_what_a_game_loads(root: Path) -> None:
+def test_the_runtime_imports_no_heavy_package(root: Path) -> None:
     """The runtime imports neither torch nor anything that only the workflow or an export needs."""
     heavy = "{'torch', 'snakemake', 'pydantic', 'onnx', 'onnxruntime', 'matplotlib', 'plotly'}"
     code = f"import sys, hobble.runtime; sys.exit({heavy} & set(sys.modules) or 0)"
@@ -216,7 +218,7 @@ def test_what_a_game_loads(root: Path) -> None:
 
 @pytest.mark.shared
 @pytest.mark.parametrize("mode", ["constant", "linear", "cubic"])
-def test_the_released_network_does_not_fall_apart(shared: Path, holden31, mode: str) -> None:
+def test_the_released_network_keeps_its_bones_together(shared: Path, holden31, mode: str) -> None:
     """A minute of walking, jogging, crouching, strafing, stopping and turning on flat ground."""
     network = load_network(shared / "reference" / "pfnn_release_network.npz", holden31)
     character = ProceduralAnimation(network, mode=mode)
@@ -245,11 +247,11 @@ def test_the_released_network_does_not_fall_apart(shared: Path, holden31, mode: 
 
 
 @pytest.mark.shared
-def test_the_released_network_keeps_its_feet_on_hills(shared: Path, holden31) -> None:
+def test_the_released_network_keeps_its_feet_on_the_ground_of_hills(shared: Path, holden31) -> None:
     """A quarter of a minute in a curve over rolling ground: soles neither sink nor float nor slide."""
     network = load_network(shared / "reference" / "pfnn_release_network.npz", holden31)
     character = ProceduralAnimation(network)
-    legs, _, soles = character._controller._legs
+    legs, _, soles, *_ = character._controller._legs
     sole = np.tile(soles, 2)
 
     def rolling(x: np.ndarray, z: np.ndarray) -> np.ndarray:
@@ -276,3 +278,24 @@ def test_a_character_starts_on_the_ground_at_any_height(steady) -> None:
         a = low.next_pose((0, 1.5)).positions
         b = high.next_pose((0, 1.5), terrain=lambda x, z: 500.0).positions
         np.testing.assert_allclose(b - a, np.broadcast_to([0, 500.0, 0], a.shape), atol=1e-3)
+
+
+def test_copies_go_on_as_their_characters_would(hurtable: Network) -> None:
+    """Copies of two characters, one of them twice, walk as three that were there from the beginning."""
+    wishes = np.array([(0.0, 2.5), (1.5, 1.0), (0.0, 2.5)])
+    link = hurtable.channels["injury"][4]
+    three, two = (ProceduralAnimation(hurtable, characters=n) for n in (3, 2))
+    for _ in range(25):
+        three.next_pose(wishes, injury={link: [0, 6, 0]})
+        two.next_pose(wishes[:2], injury={link: [0, 6]})
+    copies = two.copies(np.array([0, 1, 0]))
+    two.next_pose((3.0, 0.0))  # what the first does after the copy changes nothing
+    for _ in range(25):
+        asked, made = (c.next_pose(wishes, injury={link: [0, 6, 9]}) for c in (three, copies))
+        for name in ("positions", "rotations", "contacts", "phase", "root", "yaw"):
+            np.testing.assert_array_equal(getattr(made, name), getattr(asked, name), name)
+
+
+def test_characters_on_waypoints_are_not_copied(network: Network) -> None:
+    with pytest.raises(ValueError, match="waypoints"):
+        ProceduralAnimation(network, waypoints=TRACK).copies(np.array([0]))

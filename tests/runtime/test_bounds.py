@@ -11,12 +11,12 @@ import pytest
 from hobble.core.errors import InputError
 from hobble.core.skeleton import Skeleton
 from hobble.models.pfnn.network import Pfnn
-from hobble.models.seen import Seen
+from hobble.models.seen import SeenInTraining
 from hobble.runtime.animation import ProceduralAnimation
 from hobble.runtime.bounds import MARGIN_SHARE, SPEED_MARGIN, Bounds, clip_rows
 
 
-def walked(network: Pfnn, fastest: float = 4.0) -> Seen:
+def walked(network: Pfnn, fastest: float = 4.0) -> SeenInTraining:
     """The ranges of training data in which figures move at 1 to 2 cm a frame and never stand."""
     layout = network.layout
     x = np.zeros(layout.x_size, np.float32)
@@ -29,15 +29,17 @@ def walked(network: Pfnn, fastest: float = 4.0) -> Seen:
     x_wide, y_wide = np.full_like(x, 0.05), np.full_like(y, 0.05)
     x_wide[layout.x_position], y_wide[layout.y_position] = 30, 30
     x_wide[layout.x_joint_position], y_wide[layout.y_joint_position] = 8, 8
-    return Seen(x - x_wide, x + x_wide, y - y_wide, y + y_wide, x, y, start_phase=0.3, fastest=fastest)
+    return SeenInTraining(
+        x - x_wide, x + x_wide, y - y_wide, y + y_wide, x, y, start_phase=0.3, fastest=fastest
+    )
 
 
-def wishes(frames: int):
+def targets(frames: int):
     rng = np.random.default_rng(4)
     for k in range(frames):
         if k % 30 == 0:
-            wish = rng.uniform(-8, 8, 2) * rng.integers(2), rng.normal(size=2)
-        yield wish
+            target = rng.uniform(-8, 8, 2) * rng.integers(2), rng.normal(size=2)
+        yield target
 
 
 def run(network: Pfnn, frames: int = 600) -> tuple[np.ndarray, np.ndarray]:
@@ -45,7 +47,7 @@ def run(network: Pfnn, frames: int = 600) -> tuple[np.ndarray, np.ndarray]:
     character = ProceduralAnimation(network, foot_locking=False)
     role = network.skeleton.role
     kept = []
-    for velocity, facing in wishes(frames):
+    for velocity, facing in targets(frames):
         character.next_pose(velocity, facing, "jog")
         kept.append(character.state.joint_position[0].copy())
     positions = np.array(kept)
@@ -63,7 +65,7 @@ def test_wild_predictions_do_not_break_the_character(make_network) -> None:
     assert np.ptp(free_hips) > np.ptp(hips)
 
 
-def test_bounds_do_not_change_a_sound_network(make_network) -> None:
+def test_bounds_do_not_change_a_well_behaved_network(make_network) -> None:
     """If no value is outside the bounds, every bit stays the same."""
     network = make_network()
     seen = walked(network)
@@ -92,7 +94,7 @@ def test_a_character_starts_in_the_start_frame(make_network) -> None:
     np.testing.assert_allclose(state.joint_position[0], np.stack([z + 100, y, 50 - x], axis=1), atol=1e-4)
 
 
-def test_clip_rows() -> None:
+def test_rows_are_clipped_to_the_bounds() -> None:
     rows = np.array([[0, 5, -5], [np.nan, 1, np.inf]], np.float32)
     low, high, wild = np.full(3, -1, np.float32), np.full(3, 2, np.float32), np.zeros(2, bool)
     assert clip_rows(rows, low, high, wild)
@@ -130,13 +132,13 @@ def test_a_state_that_is_not_finite_restarts_and_warns_once(hurtable, part: str,
         assert np.isfinite(character.next_pose((0, 2.0)).positions).all()
 
 
-def test_seen_round_trip(network, holden31: Skeleton) -> None:
+def test_the_ranges_of_the_training_data_survive_their_file(network, holden31: Skeleton) -> None:
     seen, sizes = walked(network), (network.layout.x_size, network.layout.y_size)
-    back = Seen.read("x.npz", seen.arrays(), *sizes)
+    back = SeenInTraining.read("x.npz", seen.arrays(), *sizes)
     assert back is not None
     for f in fields(seen):
         np.testing.assert_array_equal(getattr(back, f.name), getattr(seen, f.name))
-    assert Seen.read("x.npz", {}, *sizes) is None
+    assert SeenInTraining.read("x.npz", {}, *sizes) is None
     for broken in (
         {"Xlow": seen.x_low[1:]},
         {"Yhigh": seen.y_high * np.nan},
@@ -145,8 +147,8 @@ def test_seen_round_trip(network, holden31: Skeleton) -> None:
         {"start_phase": np.float64(-3)},
     ):
         with pytest.raises(InputError, match=r"x\.npz"):
-            Seen.read("x.npz", {**seen.arrays(), **broken}, *sizes)
+            SeenInTraining.read("x.npz", {**seen.arrays(), **broken}, *sizes)
     whole = seen.arrays()
     del whole["start_x"]
     with pytest.raises(InputError, match="start_x"):
-        Seen.read("x.npz", whole, *sizes)
+        SeenInTraining.read("x.npz", whole, *sizes)

@@ -8,12 +8,12 @@ import pytest
 from hobble.core import quat
 from hobble.core.skeleton import forward_kinematics
 from hobble.runtime import ProceduralAnimation
-from hobble.runtime.axes import MATRICES, Axes
+from hobble.runtime.caller_axes import MATRICES, Axes
 from hobble.runtime.ground import CELL, Heightmap
 from tests.runtime.walking import hills, walk
 
 
-def test_the_ground_may_be_one_height(network) -> None:
+def test_a_number_as_terrain_is_flat_ground_at_that_height(network) -> None:
     level, flat = ProceduralAnimation(network), ProceduralAnimation(network)
     for _ in range(9):
         a, b = level.next_pose((0, 2), terrain=lambda x, z: 30.0), flat.next_pose((0, 2))
@@ -21,7 +21,7 @@ def test_the_ground_may_be_one_height(network) -> None:
     assert a.root[1] == 30.0
 
 
-def test_terrain_as_function_heightmap_and_array(network) -> None:
+def test_terrain_may_be_a_function_a_heightmap_or_an_array(network) -> None:
     cell = 4.0
     grid = (np.arange(401) - 200) * cell
     heights = hills(grid[None, :], grid[:, None])
@@ -53,23 +53,23 @@ def test_a_heightmap_is_in_the_callers_axes_and_unit(network, handed: str, up: s
         return rise * axes.scale
 
     def root(ground) -> np.ndarray:
-        wish = axes.points_out(np.array([0.5, 0, 2.0]))
-        made = walk(ProceduralAnimation(network, axes=axes), 30, target_velocity=wish, terrain=ground)
+        target = axes.points_out(np.array([0.5, 0, 2.0]))
+        made = walk(ProceduralAnimation(network, axes=axes), 30, target_velocity=target, terrain=ground)
         return made[-1].root / axes.scale
 
     def sampled(cell: float, centre: tuple[float, float] = (0, 0)) -> np.ndarray:
         along = (np.arange(401) - 200) * cell
         return terrain(along[None, :] + centre[0], along[:, None] + centre[1])
 
-    asked = root(terrain)
+    expected = root(terrain)
     cell, centre = 4.0 * axes.scale, (30 * axes.scale, -50 * axes.scale)
-    np.testing.assert_allclose(root(Heightmap(sampled(cell, centre), cell, centre)), asked, atol=0.5)
-    np.testing.assert_allclose(root(sampled(CELL * axes.scale)), asked, atol=0.5)
+    np.testing.assert_allclose(root(Heightmap(sampled(cell, centre), cell, centre)), expected, atol=0.5)
+    np.testing.assert_allclose(root(sampled(CELL * axes.scale)), expected, atol=0.5)
     level = root(np.full((8, 8), 1.0))["XYZ".index(up)]
     assert level == pytest.approx(1 / axes.scale, abs=1e-3)
 
 
-def test_heightmap_is_bilinear_and_goes_on_outside() -> None:
+def test_a_heightmap_is_bilinear_and_its_border_continues() -> None:
     ground = Heightmap(np.array([[0.0, 10.0], [20.0, 50.0]]), cell=2.0, centre=(5.0, 7.0))
     x, z = np.array([4.0, 6.0, 4.0, 6.0, 5.0, 99.0]), np.array([6.0, 6.0, 8.0, 8.0, 7.0, -99.0])
     np.testing.assert_allclose(ground(x, z), [0, 10, 20, 50, 20, 10])
@@ -77,7 +77,7 @@ def test_heightmap_is_bilinear_and_goes_on_outside() -> None:
 
 @pytest.mark.parametrize("unit", ["cm", "m"])
 @pytest.mark.parametrize(("handed", "up"), MATRICES)
-def test_the_callers_axes(network, handed: str, up: str, unit: str) -> None:
+def test_motion_in_other_axes_and_units_is_the_same_motion(network, handed: str, up: str, unit: str) -> None:
     """A walk over hills in the caller's axes equals the walk in Hobble's axes, left and right included."""
     axes = Axes(handed, up, unit)
     vertical = "XYZ".index(up)
@@ -99,9 +99,9 @@ def test_the_callers_axes(network, handed: str, up: str, unit: str) -> None:
     velocity = np.array([0.5, 0, 2.0])
     for k in range(25):
         a = native.next_pose(velocity, (1, 0, 0), terrain=hills)
-        wish = axes.points_out(velocity)
+        target = axes.points_out(velocity)
         b = theirs.next_pose(
-            wish if k % 2 else wish[level], axes.directions_out(np.array([1.0, 0, 0])), terrain=terrain
+            target if k % 2 else target[level], axes.directions_out(np.array([1.0, 0, 0])), terrain=terrain
         )
     np.testing.assert_allclose(axes.points_in(b.positions), a.positions, atol=1e-3)
     np.testing.assert_allclose(axes.points_in(b.root), a.root, atol=1e-3)
@@ -142,7 +142,7 @@ def test_an_asymmetric_pose_is_the_same_in_every_convention(
     np.testing.assert_allclose(axes.points_in(positions), placed[0], atol=1e-9)
 
 
-def test_sides_in_unity_and_unreal() -> None:
+def test_left_and_right_are_correct_in_unity_and_unreal() -> None:
     """The left hand of a character that faces ahead is on the left in each engine's axes."""
     left, up, ahead = np.eye(3)
     unity, unreal, blender = Axes("left", "Y"), Axes("left", "Z"), Axes("right", "Z")

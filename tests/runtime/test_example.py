@@ -13,7 +13,7 @@ import pytest
 from hobble.models.checks import STATISTICS
 
 
-def test_the_game_loop(
+def test_the_example_of_a_game_loop_runs(
     root: Path, tmp_path: Path, make_network, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture
 ) -> None:
     network = make_network(links=30)

@@ -60,7 +60,7 @@ def read_again(path: Path) -> dict[str, np.ndarray]:
     return out
 
 
-def test_a_clip_has_the_motion_it_was_made_of(holden31) -> None:
+def test_an_exported_clip_has_the_original_motion(holden31) -> None:
     positions, rotations = motion(holden31)
     clip = motion_clip("walk", holden31, positions, rotations)
     np.testing.assert_allclose(clip.positions, positions, atol=1e-9)
@@ -82,7 +82,7 @@ def test_toes_reach_their_predicted_positions(holden31) -> None:
     )
 
 
-def test_bones_are_found_in_a_motion(holden31) -> None:
+def test_bone_lengths_are_estimated_from_a_motion(holden31) -> None:
     positions, rotations = motion(holden31)
     found = fitted_skeleton(holden31, positions, rotations)
     np.testing.assert_allclose(found.offsets[1:], holden31.offsets[1:], atol=1e-9)
@@ -97,7 +97,7 @@ def test_bvh_round_trip(tmp_path: Path, holden31) -> None:
         np.testing.assert_allclose(back[name], positions[:, j], atol=2e-3)
 
 
-def test_scenarios_are_written(tmp_path: Path, hurtable) -> None:
+def test_every_scenario_is_written(tmp_path: Path, hurtable) -> None:
     generate(hurtable, tmp_path / "scenarios.npz", tmp_path / "bvh", Runtime())
     data = np.load(tmp_path / "scenarios.npz")
     names = [str(name) for name in data["names"]]
@@ -118,7 +118,7 @@ def test_scenarios_are_written(tmp_path: Path, hurtable) -> None:
     assert data["walk/swept"].tolist() == ["", ""]
 
 
-def test_which_link_each_scenario_hurts(hurtable, network) -> None:
+def test_each_scenario_hurts_its_link(hurtable, network) -> None:
     assert {name: link for name, (_, link) in swept(hurtable).items()} == {
         "left_knee": "LeftUpLeg-LeftLeg",
         "right_knee": "RightUpLeg-RightLeg",
@@ -138,7 +138,7 @@ def test_which_link_each_scenario_hurts(hurtable, network) -> None:
 
 
 @pytest.mark.shared
-def test_the_released_walk_as_bvh(shared: Path, tmp_path: Path, holden31) -> None:
+def test_a_walk_of_the_released_network_is_a_valid_bvh(shared: Path, tmp_path: Path, holden31) -> None:
     """The body of the released network differs from holden31: its bones are found, and joints are within 3
     cm.
     """

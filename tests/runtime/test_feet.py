@@ -22,6 +22,7 @@ from hobble.runtime.feet import (
     TOES,
     carried,
     carry_body,
+    knees_ahead,
     leg_joints,
     place_feet,
 )
@@ -51,15 +52,15 @@ def crouched(skeleton: Skeleton, thigh: float = 0.5, knee: float = 0.9) -> tuple
 
 @given(coordinate, coordinate, coordinate)
 @settings(max_examples=40, deadline=None)
-def test_reach_is_two_bone_ik(holden31: Skeleton, x: float, y: float, z: float) -> None:
+def test_reaching_with_a_leg_equals_two_bone_ik(holden31: Skeleton, x: float, y: float, z: float) -> None:
     position, rotation = crouched(holden31)
     hip, knee, heel, _ = leg_joints(holden31)[0]
     before, turned = position.copy(), rotation.copy()
     shift = np.array([x, y, z])
-    added = np.tile([1.0, 0, 0, 0], (2, 1))
+    added, leg = np.tile([1.0, 0, 0, 0], (2, 1)), leg_joints(holden31)[0]
     for _ in range(12):  # enough frames to reach any of the targets
         position, rotation = before.copy(), turned.copy()
-        bend(position, rotation, hip, knee, heel, shift, added)
+        bend(position, rotation, leg, shift, knees_ahead(holden31), added, before[leg[1:]], 0.0, 1e8)
     upper, lower = (
         np.linalg.norm(before[knee] - before[hip]),
         np.linalg.norm(before[heel] - before[knee]),
@@ -84,7 +85,7 @@ def test_the_knee_stays_on_its_side(holden31: Skeleton) -> None:
     knees = []
     for z in np.linspace(-70, 90, 321):
         position, _ = crouched(holden31)
-        reach(position, hip, knee, heel, 0.0, 0.0, z)
+        reach(position, hip, knee, heel, np.array([0.0, 0.0, z]), (0.0, 0.0, 1.0))
         knees.append(position[knee] - position[hip])
     assert np.linalg.norm(np.diff(knees, axis=0), axis=1).max() < 2
 
@@ -98,7 +99,9 @@ class Feet:
         self.lock, self.hold, self.lift = np.zeros((1, 2)), np.zeros((1, 2, 2)), np.zeros((1, 2))
         self.step, self.missed = np.zeros((1, 2)), np.zeros((1, 2))
         self.added = np.tile([1.0, 0, 0, 0], (1, 2, 2, 1))
+        self.ahead, self.fastest = knees_ahead(skeleton), 1e8
         self.base = crouched(skeleton, *bent)
+        self.shown, self.height = self.base[0][None, self.legs[:, 1:]], np.zeros(1)
 
     def __call__(
         self,
@@ -112,8 +115,9 @@ class Feet:
             ground = min(self.base[0][self.legs[0, 2], 1] - 5.0, self.base[0][self.legs[0, 3], 1] - 4.0) - 1.0
         position, rotation = self.base[0][None] + moved, self.base[1][None].copy()
         contacts = np.array([[contact, contact, other, other]], np.float32)
-        legs = self.legs, self.below, np.array([5.0, 4.0])
-        feet = (self.lock, self.hold, self.step, self.missed), self.lift, self.added
+        legs = self.legs, self.below, np.array([5.0, 4.0]), self.ahead, self.fastest
+        held = self.lock, self.hold, self.step, self.missed
+        feet = held, self.lift, self.added, self.shown, self.height, np.zeros(1)
         place_feet(contacts, np.full((1, 4), ground), locking, legs, feet, position, rotation)
         self.contacts, self.ground = contacts[0], ground
         self.rotation = rotation[0]
@@ -173,7 +177,7 @@ def test_a_held_foot_ahead_of_the_body_stays_flat(holden31: Skeleton) -> None:
     assert stretched(shown, feet.legs) > STRETCH
 
 
-def test_what_a_foot_carries(holden31: Skeleton) -> None:
+def test_a_foot_moves_the_joints_below_it(holden31: Skeleton) -> None:
     below = carried(holden31, leg_joints(holden31))
     names = [[holden31.joints[j] for j in np.flatnonzero(row == TOES)] for row in below]
     assert names == [["LeftToeBase"], ["RightToeBase"]]
@@ -239,7 +243,7 @@ def test_a_foot_waits_while_the_other_is_in_the_air(holden31: Skeleton) -> None:
     assert (both.step > 0).sum() == 1, "never both at once"
 
 
-def test_a_foot_that_steps_goes_along_when_the_network_moves_it_far(holden31: Skeleton) -> None:
+def test_a_stepping_foot_follows_large_movements_of_the_network(holden31: Skeleton) -> None:
     """A metre within a step: the shown foot is never far from the network's, and never much faster."""
     feet = Feet(holden31)
     toe = holden31.role("left_toe")
@@ -338,12 +342,77 @@ def test_no_leg_turns_too_fast_for_any_foot_target(holden31: Skeleton) -> None:
             np.linalg.norm(np.diff(position[[hip, knee, heel]], axis=0), axis=1), lengths, rtol=1e-6
         )
         straight = feet.base[0] + moved
-        reach(straight, hip, knee, heel, *rng.uniform(-30, 30, 3))
+        reach(straight, hip, knee, heel, rng.uniform(-30, 30, 3), tuple(feet.ahead))
         leg, base = straight[knee] - straight[hip], feet.base[0][knee] - feet.base[0][hip]
         plain = max(plain, float(np.arccos(leg @ base / lengths[0] ** 2)))
         last = feet.rotation
     assert furthest <= MOST_ADDED + 1e-6
     assert plain > 1.5 * MOST_ADDED, "the feet asked for should need more"
+
+
+def ahead_of_leg(position: np.ndarray, leg: np.ndarray) -> float:
+    """How far the knee is in front of the line from hip to heel, cm."""
+    hip, knee, heel, _ = position[leg]
+    share = (knee[1] - hip[1]) / (heel[1] - hip[1])
+    return float((knee - hip - share * (heel - hip))[2])
+
+
+def test_a_knee_that_passes_the_line_from_hip_to_heel_stays_in_front(holden31: Skeleton) -> None:
+    """The network's leg gets straight and bends backward, while its foot is held. The knee does not flip."""
+    feet = Feet(holden31, 0.25, 0.5)
+    hip, knee, heel, toe = feet.legs[0]
+    straight, knees = feet.base[0].copy(), []
+    line = straight[heel] - straight[hip]
+    line /= np.linalg.norm(line)
+    out = straight[knee] - straight[hip] - line * ((straight[knee] - straight[hip]) @ line)
+    out /= np.linalg.norm(out)
+    middle = straight[hip] + 0.46 * (straight[heel] - straight[hip])
+    for k, ahead in enumerate(np.linspace(4, -4, 60)):
+        feet.base[0][knee] = middle + ahead * out
+        shown = feet(np.array([0.0, 0, min(0.2 * k, 6.0)]), 1.0)
+        assert ahead_of_leg(shown, feet.legs[0]) > 1
+        knees.append(shown[knee])
+    assert np.linalg.norm(np.diff(knees, axis=0), axis=1).max() < 2
+    for _ in range(10):  # also without a foot that is held
+        free = feet(np.zeros(3), 0.0)
+    assert ahead_of_leg(free, feet.legs[0]) > 1
+    np.testing.assert_allclose(free[toe], straight[toe], atol=0.1)
+
+
+def test_knee_heel_and_toe_move_no_further_in_a_frame_than_allowed(holden31: Skeleton) -> None:
+    """The network jumps at random. When it stops, the leg gets to where it is without the limit."""
+    fastest = {}
+    for limit in (9.0, 1e8):
+        rng, feet = np.random.default_rng(4), Feet(holden31)
+        feet.fastest = limit
+        below, shown = feet.legs[0, 1:], [feet.base[0]]
+        for _ in range(300):
+            moved, contact, ground = rng.uniform(-4, 4, 3), rng.integers(2), rng.uniform(-5, 25)
+            shown.append(feet(moved, contact, ground=ground))
+        fastest[limit] = np.linalg.norm(np.diff(np.array(shown)[:, below], axis=0), axis=-1).max()
+        for _ in range(60):
+            last = feet(np.zeros(3), 0.0, ground=-50.0)
+        np.testing.assert_allclose(last, feet.base[0], atol=1e-3)
+    assert fastest[9.0] <= 9.0 + 1e-6
+    assert fastest[1e8] > 12
+
+
+def test_the_limit_counts_for_a_toe_of_a_foot_that_turns(holden31: Skeleton) -> None:
+    feet = Feet(holden31)
+    feet.fastest, toe = 9.0, feet.legs[0, 3]
+    feet.base[0][toe] += [0.0, 12.0, 0.0]
+    for height in (9.0, 12.0):
+        shown = feet(np.zeros(3), 0.0, ground=-50.0)
+        np.testing.assert_allclose(shown[toe], feet.base[0][toe] + [0.0, height - 12.0, 0.0], atol=1e-6)
+
+
+def test_the_limit_does_not_count_a_rise_of_the_whole_body(holden31: Skeleton) -> None:
+    feet = Feet(holden31)
+    feet.fastest = 5.0
+    for rise in (0.0, 30.0, 90.0):
+        feet.height = np.array([rise])
+        shown = feet(np.array([0.0, rise, 0.0]), 0.0, ground=-50.0)
+        np.testing.assert_allclose(shown, feet.base[0] + [0.0, rise, 0.0], atol=1e-9)
 
 
 def test_standing_feet_raise_and_lower_the_body(holden31: Skeleton) -> None:
@@ -360,7 +429,7 @@ def test_standing_feet_raise_and_lower_the_body(holden31: Skeleton) -> None:
         lift = np.zeros(1)
         for _ in range(80):
             position = base[None].copy()
-            both = legs, carried(holden31, legs), sole
+            both = legs, carried(holden31, legs), sole, knees_ahead(holden31), far
             carry_body(np.array([contacts], np.float32), ground, hips, (low, high), both, lift, position)
         moved = position[0] - base
         np.testing.assert_allclose(moved[:, 1], moved[0, 1], atol=1e-12)

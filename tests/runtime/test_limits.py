@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from hobble.channels.limits import UNLIMITED, Limits
+from hobble.channels.speed_limits import UNLIMITED, Limits
 from hobble.core.errors import InputError
 from hobble.models.load import load_network
 from hobble.models.network import Network
@@ -32,7 +32,7 @@ def limited(make_network) -> Network:
     return replace(network, limits={"injury": Limits(np.array([0.0, 10.0]), speeds, speeds.max(axis=(1, 2)))})
 
 
-def asked(
+def speed_and_gait(
     network: Network, velocity, hurt, gait=None, frames: int = 90, **options
 ) -> tuple[float, np.ndarray]:
     """The target speed after some seconds, and the shares of the gaits."""
@@ -40,47 +40,47 @@ def asked(
     for _ in range(frames):
         animation.next_pose(velocity, gait=gait, injury=hurt)
     middle = network.layout.window
-    return float(np.hypot(*animation.state.target_velocity[0])), animation.state.gait[0, middle]
+    return float(np.hypot(*animation.state.smoothed_velocity[0])), animation.state.gait[0, middle]
 
 
 @pytest.mark.parametrize(
     ("hurt", "speed"),
     [({}, 2.5), ({KNEE: 10}, 1.0), ({KNEE: 5}, 1.5), ({ARM: 10}, 1.8), ({KNEE: 5, ARM: 10}, 1.5)],
 )
-def test_the_wish_stops_at_what_the_worst_injury_allows(limited: Network, hurt, speed: float) -> None:
-    assert asked(limited, (0, 2.5), hurt)[0] == pytest.approx(speed, abs=1e-6)
-    assert asked(limited, (2.5, 0), hurt)[0] == pytest.approx(speed, abs=1e-6)
-    assert asked(limited, (0, 2.5), hurt, limits=False)[0] == pytest.approx(2.5, abs=1e-6)
+def test_the_target_speed_is_limited_by_the_worst_injury(limited: Network, hurt, speed: float) -> None:
+    assert speed_and_gait(limited, (0, 2.5), hurt)[0] == pytest.approx(speed, abs=1e-6)
+    assert speed_and_gait(limited, (2.5, 0), hurt)[0] == pytest.approx(speed, abs=1e-6)
+    assert speed_and_gait(limited, (0, 2.5), hurt, limits=False)[0] == pytest.approx(2.5, abs=1e-6)
 
 
-def test_a_slower_wish_is_left_alone(limited: Network) -> None:
-    assert asked(limited, (0, 0.8), {KNEE: 10})[0] == pytest.approx(0.8, abs=1e-6)
-    assert asked(limited, (0, 0.0), {KNEE: 10})[0] == 0.0
+def test_a_target_below_the_limit_is_unchanged(limited: Network) -> None:
+    assert speed_and_gait(limited, (0, 0.8), {KNEE: 10})[0] == pytest.approx(0.8, abs=1e-6)
+    assert speed_and_gait(limited, (0, 0.0), {KNEE: 10})[0] == 0.0
 
 
-def test_a_body_that_cannot_jog_walks_faster(limited: Network) -> None:
-    speed, gait = asked(limited, (0, 7.0), {KNEE: 8})
+def test_a_body_that_cannot_jog_walks_a_little_faster_instead(limited: Network) -> None:
+    speed, gait = speed_and_gait(limited, (0, 7.0), {KNEE: 8})
     assert speed == pytest.approx(1.25 * 1.2, abs=1e-6)
     assert gait[WALK] > 0.99
-    speed, gait = asked(limited, (0, 7.0), {KNEE: 3})  # 5.8 is a jog still
+    speed, gait = speed_and_gait(limited, (0, 7.0), {KNEE: 3})  # 5.8 is a jog still
     assert speed == pytest.approx(5.8, abs=1e-6)
     assert gait[JOG] > 0.99
-    assert asked(limited, (0, 7.0), {KNEE: 8}, limits=False)[1][JOG] > 0.99
+    assert speed_and_gait(limited, (0, 7.0), {KNEE: 8}, limits=False)[1][JOG] > 0.99
 
 
-def test_steering_makes_up_to_the_limit_and_not_beyond(limited: Network) -> None:
+def test_steering_does_not_exceed_the_limit(limited: Network) -> None:
     """The network always glides at 1.5, which is above the limit of 1."""
-    speed, _ = asked(limited, (0, 2.5), {KNEE: 10}, steering=2.0)
+    speed, _ = speed_and_gait(limited, (0, 2.5), {KNEE: 10}, steering=2.0)
     assert speed < 1.0
-    speed, _ = asked(limited, (0, 2.5), {}, steering=2.0)
+    speed, _ = speed_and_gait(limited, (0, 2.5), {}, steering=2.0)
     assert speed > 2.5
 
 
-def test_each_of_a_crowd_has_its_own_limit(limited: Network) -> None:
+def test_each_character_of_a_crowd_has_its_own_limit(limited: Network) -> None:
     crowd = ProceduralAnimation(limited, characters=3, steering=0.0)
     for _ in range(90):
         crowd.next_pose((0, 2.5), injury={KNEE: np.array([0.0, 5.0, 10.0])})
-    np.testing.assert_allclose(crowd.state.target_velocity[:, 1], [2.5, 1.5, 1.0], atol=1e-6)
+    np.testing.assert_allclose(crowd.state.smoothed_velocity[:, 1], [2.5, 1.5, 1.0], atol=1e-6)
 
 
 def test_a_network_file_keeps_its_limits(limited: Network, tmp_path) -> None:

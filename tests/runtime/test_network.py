@@ -65,14 +65,14 @@ def arrays(network: Network) -> dict[str, np.ndarray]:
 
 @given(st.floats(0, 1, exclude_max=True), st.integers(4, 9))
 @settings(max_examples=60, deadline=None)
-def test_spline_is_the_definition(phase: float, points: int) -> None:
+def test_spline_weights_follow_the_definition(phase: float, points: int) -> None:
     table = np.random.default_rng(points).normal(size=(points, 3))
     np.testing.assert_allclose(weights_at(table, phase)[0], spline(table, phase), atol=1e-12)
     assert catmull_rom(phase, points)[1].sum() == pytest.approx(1)
 
 
 @pytest.mark.parametrize("points", [4, 6])
-def test_cubic_mode_is_exact(make_network, points: int) -> None:
+def test_cubic_mode_equals_blending_the_weights_first(make_network, points: int) -> None:
     network = make_network(control_points=points, scale=20.0)
     x, phase = rows(network)
     np.testing.assert_allclose(
@@ -105,7 +105,7 @@ def test_modes_approach_the_spline(make_network) -> None:
 
 @given(st.floats(-2, 3))
 @settings(max_examples=50, deadline=None)
-def test_every_phase_is_within_the_table(phase: float) -> None:
+def test_no_phase_reads_outside_the_table(phase: float) -> None:
     from hobble.models.pfnn.predictor import _share
 
     for blended, points in ((1, 50), (2, 10), (4, 4)):
@@ -147,7 +147,7 @@ def test_a_column_that_never_varied_is_ignored(network: Network) -> None:
     np.testing.assert_array_equal(before, blind.predict(x, phase))
 
 
-def test_unknown_mode_and_storage(network: Network) -> None:
+def test_an_unknown_mode_or_storage_is_refused(network: Network) -> None:
     with pytest.raises(ValueError, match="constant, linear, cubic"):
         PfnnPredictor(network, "quadratic")
     with pytest.raises(ValueError, match="float32, int16"):
@@ -173,7 +173,7 @@ def test_weights_file_round_trip(tmp_path: Path, hurtable: Network, holden31) ->
             np.testing.assert_array_equal(a, b)
 
 
-def test_the_layout_of_a_file_without_meta(tmp_path: Path, hurtable: Network, holden31) -> None:
+def test_a_file_without_meta_has_the_original_layout(tmp_path: Path, hurtable: Network, holden31) -> None:
     np.savez(tmp_path / "weights.npz", **arrays(hurtable))
     back = load_network(tmp_path, holden31)
     assert back.layout == hurtable.layout
@@ -198,7 +198,9 @@ def test_hurt_links_are_those_of_training(make_network) -> None:
         (lambda a: a.update({k: v[:3] for k, v in a.items() if k[0] in "Wb"}), "3 control points"),
     ],
 )
-def test_messages_for_bad_files(tmp_path: Path, network: Network, change, message: str) -> None:
+def test_a_malformed_file_is_refused_with_a_message(
+    tmp_path: Path, network: Network, change, message: str
+) -> None:
     broken = arrays(network)
     change(broken)
     np.savez(tmp_path / "weights.npz", **broken)
@@ -207,7 +209,9 @@ def test_messages_for_bad_files(tmp_path: Path, network: Network, change, messag
     assert "weights.npz" in str(error.value)
 
 
-def test_skeleton_of_another_size(tmp_path: Path, network: Network, holden31) -> None:
+def test_a_skeleton_with_another_number_of_joints_is_refused(
+    tmp_path: Path, network: Network, holden31
+) -> None:
     np.savez(tmp_path / "weights.npz", **arrays(network))
     short = replace(holden31, joints=holden31.joints[:-1])
     with pytest.raises(InputError, match="31 joints"):
@@ -226,7 +230,7 @@ def test_release_folder_round_trip(tmp_path: Path, network: Network, holden31) -
     )
 
 
-def test_messages_for_bad_release_folders(tmp_path: Path, network: Network) -> None:
+def test_a_malformed_release_folder_is_refused_with_a_message(tmp_path: Path, network: Network) -> None:
     with pytest.raises(InputError, match=r"neither weights.npz nor Xmean.bin.* Train one"):
         load_network(tmp_path)
     with pytest.raises(InputError, match="no such file"):
@@ -243,7 +247,7 @@ def test_messages_for_bad_release_folders(tmp_path: Path, network: Network) -> N
 
 
 @pytest.mark.shared
-def test_released_network_predicts_its_rows(shared: Path) -> None:
+def test_the_released_network_predicts_its_published_rows(shared: Path) -> None:
     data = np.load(shared / "reference" / "original_rows_LocomotionFlat09_000.npz")
     network = load_network(shared / "reference" / "pfnn_release_network.npz")
     assert network.sizes == (342, 512, 512, 311)

@@ -29,7 +29,9 @@ def run(path: Path, x: np.ndarray, phase: np.ndarray) -> np.ndarray:
 
 @pytest.mark.parametrize("points", [4, 6])
 @pytest.mark.parametrize("mode", MODES)
-def test_onnxruntime_gives_the_runtimes_numbers(make_network, tmp_path: Path, mode: str, points: int) -> None:
+def test_onnxruntime_predicts_the_same_as_the_runtime(
+    make_network, tmp_path: Path, mode: str, points: int
+) -> None:
     network = make_network(control_points=points, scale=20.0)
     assert 0 <= write_checked(tmp_path / "network.onnx", network, mode) <= TOLERANCE
     rng = np.random.default_rng(3)
@@ -41,7 +43,7 @@ def test_onnxruntime_gives_the_runtimes_numbers(make_network, tmp_path: Path, mo
         np.testing.assert_allclose(y, PfnnPredictor(network, mode).predict(x, phase.astype(float)), atol=1e-4)
 
 
-def test_cubic_is_the_definition(make_network, tmp_path: Path) -> None:
+def test_cubic_mode_equals_blending_the_weights_first(make_network, tmp_path: Path) -> None:
     """Weights blended first, in double precision."""
     network = make_network(scale=20.0)
     export_onnx(tmp_path / "network.onnx", network)
@@ -66,7 +68,7 @@ def test_a_column_that_never_varied_is_ignored(network, tmp_path: Path) -> None:
     np.testing.assert_array_equal(run(tmp_path / "network.onnx", x, np.zeros(1)), before)
 
 
-def test_the_file_says_what_it_is(hurtable, tmp_path: Path) -> None:
+def test_the_file_describes_its_inputs_and_outputs(hurtable, tmp_path: Path) -> None:
     export_onnx(tmp_path / "network.onnx", hurtable, "linear")
     model = onnx.load(tmp_path / "network.onnx")
     assert [(o.domain, o.version) for o in model.opset_import] == [("", OPSET)]
@@ -91,7 +93,9 @@ def test_the_file_of_another_network_is_detected(make_network, tmp_path: Path) -
         export_onnx(tmp_path / "other.onnx", network, "quadratic")
 
 
-def test_the_command(hurtable, tmp_path: Path, root: Path, capsys: pytest.CaptureFixture) -> None:
+def test_the_command_exports_onnx(
+    hurtable, tmp_path: Path, root: Path, capsys: pytest.CaptureFixture
+) -> None:
     write_release(tmp_path / "pfnn", hurtable)
     skeleton = ["--skeleton", str(root / "config" / "skeletons" / "holden31.yaml")]
     target = tmp_path / "out" / "network.onnx"
@@ -110,7 +114,7 @@ def test_the_command(hurtable, tmp_path: Path, root: Path, capsys: pytest.Captur
 
 
 @pytest.mark.shared
-def test_the_released_network_in_onnx(shared: Path, tmp_path: Path) -> None:
+def test_the_released_network_is_exported_exactly(shared: Path, tmp_path: Path) -> None:
     data = np.load(shared / "reference" / "original_rows_LocomotionFlat09_000.npz")
     network = load_network(shared / "reference" / "pfnn_release_network.npz")
     x, phase = data["X"][::20].astype(np.float32), data["P"][::20].astype(np.float32)

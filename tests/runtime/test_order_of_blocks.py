@@ -23,7 +23,7 @@ def columns(layout: RowLayout, ordered: RowLayout) -> np.ndarray:
 
 
 @pytest.mark.parametrize("order", ORDERS)
-def test_a_row_is_composed_in_any_order(order: tuple[str, ...]) -> None:
+def test_blocks_of_columns_may_be_in_any_order(order: tuple[str, ...]) -> None:
     layout = RowLayout(3, channels=(("injury", 4),))
     ordered = replace(layout, order=order)
     rng = np.random.default_rng(2)

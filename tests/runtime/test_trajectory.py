@@ -45,15 +45,15 @@ def move(
     direction,
     gait,
     phase=None,
-    wish=(0.0, 1.0),
+    target=(0.0, 1.0),
     loss: float = 0.0,
     rooted=False,
     pull: float = 0.0,
 ) -> np.ndarray:
     phase = np.zeros(1) if phase is None else phase
     columns = trajectory.advance_columns(LAYOUT)
-    wishes = np.array([wish], float)
-    trajectory.advance(y, columns, wishes, loss, rooted, pull, (position, direction, gait), phase)
+    targets = np.array([target], float)
+    trajectory.advance(y, columns, targets, loss, rooted, pull, (position, direction, gait), phase)
     return phase
 
 
@@ -74,7 +74,7 @@ def test_yaw_velocity_is_that_of_the_world_seen_from_the_root() -> None:
     np.testing.assert_allclose(direction[0, MIDDLE], [np.sin(0.05), np.cos(0.05)], atol=1e-6)
 
 
-def test_future_samples_stand_at_their_frames_and_the_line_goes_on_past_them() -> None:
+def test_future_samples_are_at_their_frames_and_continue_in_a_line() -> None:
     position, direction, gait = path()
     y = prediction(speed=2.0)
     y[0, LAYOUT.y_position][: LAYOUT.future] = [0, 1, 4, 9, 16, 25]
@@ -87,7 +87,7 @@ def test_future_samples_stand_at_their_frames_and_the_line_goes_on_past_them() -
     np.testing.assert_allclose(np.linalg.norm(direction[0], axis=-1), 1, atol=1e-6)
 
 
-def test_a_standing_figure_is_held() -> None:
+def test_a_standing_figure_does_not_drift() -> None:
     position, direction, gait = path(stand=1.0)
     phase = move(prediction(speed=2.0, turn=0.1), position, direction, gait)
     np.testing.assert_allclose(position[0, MIDDLE], 0, atol=1e-12)
@@ -95,7 +95,7 @@ def test_a_standing_figure_is_held() -> None:
     assert phase[0] == pytest.approx(0.1 * 0.02)
 
 
-def test_a_rooted_network_is_not_held_while_standing() -> None:
+def test_a_rooted_network_may_move_while_standing() -> None:
     position, direction, gait = path(stand=1.0)
     phase = move(prediction(speed=2.0, turn=-0.1), position, direction, gait, rooted=True)
     np.testing.assert_allclose(position[0, MIDDLE], [0, 2.0], atol=1e-6)
@@ -104,25 +104,25 @@ def test_a_rooted_network_is_not_held_while_standing() -> None:
 
 
 @pytest.mark.parametrize(
-    ("wish", "moved"),
+    ("target", "moved"),
     [
-        ((0.0, 0.0), (0.375, 1.5)),  # nobody asked it to go anywhere
+        ((0.0, 0.0), (0.375, 1.5)),  # the target is to stand
         ((0.0, 3.0), (0.5, 2.0)),
         ((2.0, 2.0), (0.5, 2.0)),
-        ((0.0, -3.0), (0.5, 1.5)),  # against the wish, but not across it
+        ((0.0, -3.0), (0.5, 1.5)),  # against the target, but not across it
         ((-1.0, 0.0), (0.375, 2.0)),
     ],
 )
-def test_movement_against_the_wish_is_reduced(wish, moved) -> None:
+def test_movement_against_the_target_is_reduced(target, moved) -> None:
     position, direction, gait = path()
-    move(prediction(speed=2.0, side=0.5), position, direction, gait, wish=wish, loss=0.25)
+    move(prediction(speed=2.0, side=0.5), position, direction, gait, target=target, loss=0.25)
     np.testing.assert_allclose(position[0, MIDDLE], moved, atol=1e-6)
 
 
 @pytest.mark.parametrize(
-    ("wish", "moved"),
+    ("target", "moved"),
     [
-        ((0.0, 2.0), (0.0, 2.0)),  # as wished
+        ((0.0, 2.0), (0.0, 2.0)),  # as the target
         ((0.0, 2.1), (0.0, 2.1)),  # reached with less than the whole share
         ((0.0, 9.0), (0.0, 2.2)),  # faster
         ((0.0, 0.0), (0.0, 1.6)),  # to stop
@@ -130,14 +130,14 @@ def test_movement_against_the_wish_is_reduced(wish, moved) -> None:
         ((3.0, 4.0), (0.12 + 0.32, 2.0 + 0.16 - 0.24)),  # faster, and more to the left
     ],
 )
-def test_movement_is_pulled_toward_the_wish_by_a_share_of_itself(wish, moved) -> None:
-    """Half of the share along the wish, all of it across."""
+def test_movement_is_changed_toward_the_target_by_at_most_a_share_of_itself(target, moved) -> None:
+    """Half of the share along the target, all of it across."""
     position, direction, gait = path(stand=0.5)
-    move(prediction(speed=2.0), position, direction, gait, wish=wish, rooted=True, pull=0.2)
+    move(prediction(speed=2.0), position, direction, gait, target=target, rooted=True, pull=0.2)
     np.testing.assert_allclose(position[0, MIDDLE], moved, atol=1e-6)
 
 
-def test_no_correction_if_the_wish_is_reached() -> None:
+def test_a_reached_target_needs_no_correction() -> None:
     position, direction, gait = path(1.5, 0.4)
     before = position.copy(), direction.copy()
     ahead = direction[:, MIDDLE].copy()
@@ -147,7 +147,7 @@ def test_no_correction_if_the_wish_is_reached() -> None:
 
 
 @pytest.mark.parametrize(("strafe", "position_bias", "direction_bias"), [(0.0, 0.5, 2.0), (1.0, 1.0, 0.5)])
-def test_strafe_share_and_facing_of_the_wish(
+def test_strafing_follows_from_velocity_and_facing(
     strafe: float, position_bias: float, direction_bias: float
 ) -> None:
     position, direction, gait = path(1.0)
@@ -162,13 +162,15 @@ def test_strafe_share_and_facing_of_the_wish(
     np.testing.assert_allclose(yaw, np.pi / 2 * (1 - (1 - t) ** direction_bias), atol=1e-9)
 
 
-def test_wishes_are_taken_up_at_their_rates() -> None:
+def test_velocity_direction_and_gait_approach_the_target_at_their_rates() -> None:
     position, heading, gait = path(0.0, stand=1.0)
     velocity, direction, strafe = np.zeros((1, 2)), np.array([[0.0, 1.0]]), np.zeros(1)
     shares = np.eye(6)[[1]]
-    wish = np.array([[2.0, 0.0]]), np.array([[1.0, 0.0]]), np.ones(1), shares
+    target = np.array([[2.0, 0.0]]), np.array([[1.0, 0.0]]), np.ones(1), shares
     correction = np.zeros((1, 2))
-    trajectory.follow_wish(wish, 0.0, (velocity, direction, strafe, correction), (position, heading, gait))
+    trajectory.follow_target(
+        target, 0.0, (velocity, direction, strafe, correction), (position, heading, gait)
+    )
     np.testing.assert_allclose(velocity, [[1.8, 0]])
     np.testing.assert_allclose(np.arctan2(*direction[0]), 0.9 * np.pi / 2)
     np.testing.assert_allclose(strafe, 0.9)
@@ -177,7 +179,7 @@ def test_wishes_are_taken_up_at_their_rates() -> None:
 
 
 @pytest.mark.parametrize(
-    ("steering", "wish", "asked"),
+    ("steering", "target", "corrected"),
     [
         (0.0, (0.0, 2.0), (0.0, 2.0)),
         (1.0, (0.0, 1.5), (0.0, 1.5)),  # what is reached is not corrected
@@ -189,29 +191,29 @@ def test_wishes_are_taken_up_at_their_rates() -> None:
         (1.0, (0.0, 0.0), (0.0, 0.0)),
     ],
 )
-def test_steering_adds_the_error_to_the_wish(steering: float, wish: tuple, asked: tuple) -> None:
+def test_steering_adds_the_error_to_the_target(steering: float, target: tuple, corrected: tuple) -> None:
     """The figure glides ahead at 1.5 cm a frame."""
-    velocity, _, _ = follow(wish, (0.0, 1.0), steering)
-    np.testing.assert_allclose(velocity, 0.9 * np.array(asked), atol=1e-9)
+    velocity, _, _ = follow(target, (0.0, 1.0), steering)
+    np.testing.assert_allclose(velocity, 0.9 * np.array(corrected), atol=1e-9)
 
 
-def follow(wish, facing, steering: float, frames: int = 1, speed: float = 1.5, correction=None):
-    """Target velocity (2,) and direction (2,), and the correction (2,), of a figure that glides ahead
+def follow(target, facing, steering: float, frames: int = 1, speed: float = 1.5, correction=None):
+    """Smoothed velocity (2,) and direction (2,), and the correction (2,), of a figure that glides ahead
     whatever the target.
     """
     position, heading, gait = path(speed)
     velocity, direction = np.zeros((1, 2)), np.array([[0.0, 1.0]])
     correction = np.zeros((1, 2)) if correction is None else np.array([correction], float)
     for _ in range(frames):
-        wanted = np.array([wish]), np.array([facing]), np.zeros(1), np.eye(6)[[1]]
-        target = velocity, direction, np.zeros(1), correction
-        trajectory.follow_wish(wanted, steering, target, (position, heading, gait))
+        wanted = np.array([target]), np.array([facing]), np.zeros(1), np.eye(6)[[1]]
+        smoothed = velocity, direction, np.zeros(1), correction
+        trajectory.follow_target(wanted, steering, smoothed, (position, heading, gait))
     return velocity[0], direction[0], correction[0]
 
 
-def test_a_steady_error_is_integrated_along_and_across_the_wish() -> None:
+def test_a_steady_error_is_integrated_along_and_across_the_target() -> None:
     for frames in (1, 40, 1000):
-        asked, _, correction = follow((0.5, 1.5), (0.0, 1.0), 2.0, frames)
+        corrected, _, correction = follow((0.5, 1.5), (0.0, 1.0), 2.0, frames)
         speed = np.hypot(0.5, 1.5)
         ahead = np.array([0.5, 1.5]) / speed
         lack = np.array([0.5, 0.0])
@@ -222,11 +224,11 @@ def test_a_steady_error_is_integrated_along_and_across_the_wish() -> None:
     # Asked for from the next frame on: here all of it, and the shortfall of the moment, within the limit.
     more = speed * (correction[0] * ahead + correction[1] * np.array([ahead[1], -ahead[0]])) + 2.0 * lack
     more *= min(1.0, trajectory.STEERING_LIMIT * speed / np.linalg.norm(more))
-    np.testing.assert_allclose(asked, np.array([0.5, 1.5]) + more, atol=1e-3)
+    np.testing.assert_allclose(corrected, np.array([0.5, 1.5]) + more, atol=1e-3)
 
 
 @pytest.mark.parametrize(
-    ("wish", "steering", "expected"),
+    ("target", "steering", "expected"),
     [
         ((0.0, -1.5), 2.0, (0.3, -0.2)),  # on its way round: kept as it was
         ((0.0, 0.0), 2.0, (0.0, 0.0)),  # it is to stand: forgotten
@@ -234,18 +236,18 @@ def test_a_steady_error_is_integrated_along_and_across_the_wish() -> None:
         ((0.5, 1.5), 0.0, (0.3, -0.2)),  # the original runtime
     ],
 )
-def test_when_the_error_is_not_integrated(wish, steering: float, expected) -> None:
-    _, _, correction = follow(wish, (0.0, 1.0), steering, 30, correction=(0.3, -0.2))
+def test_when_the_error_is_not_integrated(target, steering: float, expected) -> None:
+    _, _, correction = follow(target, (0.0, 1.0), steering, 30, correction=(0.3, -0.2))
     np.testing.assert_allclose(correction, expected, atol=1e-9)
 
 
 @pytest.mark.parametrize("sign", [1, -1])
 @pytest.mark.parametrize(("degrees", "beyond"), [(0, 0), (20, 20), (60, 60), (100, 37), (140, 0), (179, 0)])
-def test_steering_asks_for_more_than_the_remaining_turn(degrees: float, beyond: float, sign: int) -> None:
+def test_steering_turns_further_than_the_remaining_angle(degrees: float, beyond: float, sign: int) -> None:
     facing = np.radians(sign * degrees)
-    wish = 1.5 * np.array([np.sin(facing), np.cos(facing)])
+    target = 1.5 * np.array([np.sin(facing), np.cos(facing)])
     for speed, extra in ((1.5, beyond), (0.0, 0)):
-        _, direction, _ = follow(wish * speed / 1.5, (np.sin(facing), np.cos(facing)), 2.0)
+        _, direction, _ = follow(target * speed / 1.5, (np.sin(facing), np.cos(facing)), 2.0)
         yaw = np.degrees(np.arctan2(*direction))
         assert yaw == pytest.approx(0.9 * sign * (degrees + extra), abs=1e-6)
 
@@ -272,8 +274,8 @@ def test_left_is_the_mirror_of_right(
         position, direction, gait = path(1.5)
         mirror = np.array([sign, 1.0])
         for _ in range(3):
-            wish = np.array([[sign * x, z]]), np.array([[np.sin(sign * facing), np.cos(facing)]])
-            smoothed = *wish, np.array([strafe]), np.zeros((1, 2))
+            target = np.array([[sign * x, z]]), np.array([[np.sin(sign * facing), np.cos(facing)]])
+            smoothed = *target, np.array([strafe]), np.zeros((1, 2))
             trajectory.blend_future(smoothed, (position, direction, gait))
             move(prediction(side=sign * side, turn=sign * turn), position, direction, gait)
         results.append((position * mirror, direction * mirror))

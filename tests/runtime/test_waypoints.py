@@ -16,14 +16,14 @@ SQUARE = (
 )
 
 
-def test_the_published_track() -> None:
+def test_the_track_is_the_published_one() -> None:
     assert [w.position for w in TRACK[:2]] == [(-3000.0, 4000.0), (-5000.0, 0.0)]
     assert [w.gait for w in TRACK] == ["walk", "walk", "jog", "jog", "crouch", "walk"]
     assert [w.speed for w in TRACK] == [2.5, 2.5, 10.5, 10.5, 2.0, 2.5]
     assert [i for i, w in enumerate(TRACK) if w.facing] == [1, 5]
 
 
-def test_a_point_that_follows_the_wish_goes_around() -> None:
+def test_a_point_that_follows_its_target_reaches_all_waypoints() -> None:
     follower = Follower(SQUARE, arrived=20.0)
     place = follower.start[0][None]
     assert follower.start[1] == 0.0
@@ -40,7 +40,7 @@ def test_a_point_that_follows_the_wish_goes_around() -> None:
     np.testing.assert_allclose(frames[4:8], expected, rtol=0.03)
 
 
-def test_distance_from_the_path_is_that_from_the_line() -> None:
+def test_the_distance_from_the_path_is_that_from_its_line() -> None:
     follower = Follower(SQUARE)
     for place, distance in (((30.0, 500.0), 30.0), ((-40.0, -30.0), 50.0), ((0.0, 10.0), 0.0)):
         follower.lead(np.array([place]))
@@ -56,7 +56,7 @@ def test_each_character_has_its_own_waypoint() -> None:
     assert velocity[0, 0] > 6.9
 
 
-def test_a_track_of_one_place() -> None:
+def test_a_track_of_one_waypoint_is_refused() -> None:
     with pytest.raises(ValueError, match="two waypoints"):
         Follower(SQUARE[:1])
 
@@ -65,13 +65,13 @@ def test_the_character_follows_waypoints(network) -> None:
     character = ProceduralAnimation(network, waypoints=SQUARE, steering=0.0)
     pose = character.next_pose()
     np.testing.assert_allclose(pose.root, 0, atol=1e-9)
-    np.testing.assert_allclose(character.state.target_velocity, [[0, 0.9 * 2.5]])
+    np.testing.assert_allclose(character.state.smoothed_velocity, [[0, 0.9 * 2.5]])
     character.follower.reached[:] = 1
     character.next_pose()
-    assert character._wish_gait[0].tolist() == [0, 0, 1, 0, 0, 0]
+    assert character._target_gait[0].tolist() == [0, 0, 1, 0, 0, 0]
     # On the way to the second it strafes, facing +Z.
-    np.testing.assert_allclose(character.state.target_direction, [[0, 1]], atol=1e-9)
+    np.testing.assert_allclose(character.state.smoothed_direction, [[0, 1]], atol=1e-9)
     assert character.state.strafe[0] > 0.5
     # A velocity of the caller's own takes precedence.
     character.next_pose((0.0, -1.0))
-    np.testing.assert_allclose(character._wish_gait[0], np.eye(6)[1])
+    np.testing.assert_allclose(character._target_gait[0], np.eye(6)[1])

@@ -16,12 +16,12 @@ from tests.runtime.walking import KNEE, hills, same, walk
 
 
 @pytest.mark.parametrize("injury", [{"LeftUpLeg-LeftLeg": 11}, {KNEE: -0.1}, {KNEE: np.nan}])
-def test_a_severity_out_of_range(hurtable, injury) -> None:
+def test_a_severity_out_of_range_is_refused(hurtable, injury) -> None:
     with pytest.raises(ValueError, match=r"the severity of LeftUpLeg-LeftLeg is .* from 0 to 10"):
         ProceduralAnimation(hurtable).next_pose((0, 1), injury=injury)
 
 
-def test_invalid_wishes_are_refused(network) -> None:
+def test_invalid_targets_are_refused(network) -> None:
     character = ProceduralAnimation(network, characters=2)
     with pytest.raises(ValueError, match="target_velocity is not a finite vector"):
         character.next_pose((0, np.nan))
@@ -55,7 +55,7 @@ def test_invalid_wishes_are_refused(network) -> None:
         ProceduralAnimation(network, waypoints=[Waypoint((0, 0), "walk", 2), Waypoint((9, 0), "jogging", 2)])
 
 
-def test_unknown_links_are_named(hurtable, network) -> None:
+def test_unknown_links_are_refused_by_name(hurtable, network) -> None:
     with pytest.raises(KeyError, match=r"^injury has no 'Tail': there are Hips-LHipJoint, "):
         ProceduralAnimation(hurtable).next_pose((0, 1), injury={"Tail": 1})
     with pytest.raises(
@@ -68,7 +68,7 @@ def test_unknown_links_are_named(hurtable, network) -> None:
         ProceduralAnimation(network).next_pose((0, 1), injury={KNEE: 1})
 
 
-def test_severities_of_another_shape(hurtable, network) -> None:
+def test_severities_of_another_shape_are_refused(hurtable, network) -> None:
     crowd = ProceduralAnimation(hurtable, characters=3)
     for injury in (np.ones((3, 30)), np.ones(30), {KNEE: [1, 2, 3]}, {KNEE: 4}, {}):
         crowd.next_pose((0, 1), injury=injury)
@@ -90,7 +90,7 @@ def test_a_network_without_skeleton_is_refused(tmp_path: Path, network) -> None:
 
 
 @pytest.mark.parametrize(
-    ("wishes", "message"),
+    ("targets", "message"),
     [
         ({"target_velocity": (1e30, 0)}, "faster than a body"),
         ({"target_velocity": (0, 31.0)}, "faster than a body"),
@@ -103,12 +103,12 @@ def test_a_network_without_skeleton_is_refused(tmp_path: Path, network) -> None:
         ({"injury": {KNEE: 10.5}}, "from 0 to"),
     ],
 )
-def test_impossible_wishes_are_refused_and_change_nothing(hurtable, wishes: dict, message: str) -> None:
+def test_impossible_targets_are_refused_and_change_nothing(hurtable, targets: dict, message: str) -> None:
     character = ProceduralAnimation(hurtable)
     walk(character, 5, injury={KNEE: 3.0})
     before = copy.deepcopy(character.state)
     with pytest.raises(ValueError, match=message):
-        character.next_pose(**{"target_velocity": (0.5, 2.0), "injury": {KNEE: 9.0}, **wishes})
+        character.next_pose(**{"target_velocity": (0.5, 2.0), "injury": {KNEE: 9.0}, **targets})
     assert same(before, character.state)
     assert np.isfinite(character.next_pose((0.5, 2.0)).positions).all()
 

@@ -11,9 +11,9 @@ from hobble.runtime import Pose, ProceduralAnimation
 KNEE = "LeftUpLeg-LeftLeg"
 
 
-def walk(character: ProceduralAnimation, frames: int, **wishes) -> list[Pose]:
-    wishes = {"target_velocity": (0.5, 2.0)} | wishes
-    return [character.next_pose(**wishes) for _ in range(frames)]
+def walk(character: ProceduralAnimation, frames: int, **targets) -> list[Pose]:
+    targets = {"target_velocity": (0.5, 2.0)} | targets
+    return [character.next_pose(**targets) for _ in range(frames)]
 
 
 def hills(x: np.ndarray, z: np.ndarray) -> np.ndarray:

@@ -16,7 +16,7 @@ import yaml
 from scipy.spatial.transform import Rotation
 
 from hobble.core.skeleton import Skeleton
-from hobble.synthetic.clip import write_clip
+from hobble.synthetic.generate_clip import write_clip
 from hobble.synthetic.options import Synthetic
 
 Array = np.ndarray

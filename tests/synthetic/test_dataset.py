@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 import yaml
 
-from hobble.synthetic.path import GAITS
+from hobble.synthetic.planned_path import GAITS
 from hobble.synthetic.recipes import GROUND, RECIPES, plan
 
 
@@ -19,7 +19,7 @@ def plans(data):
 
 
 @pytest.mark.parametrize("name", ["synthetic", "tiny"])
-def test_clips_name_recipes_that_there_are(root, name):
+def test_the_data_set_names_only_existing_recipes(root, name):
     data = yaml.safe_load((root / f"config/datasets/{name}.yaml").read_text())
     for clip, entry in data["clips"].items():
         assert entry["recipe"] in RECIPES
@@ -32,12 +32,12 @@ def test_clips_name_recipes_that_there_are(root, name):
             assert any(e["recipe"] == entry["recipe"] for e in training), f"nothing like {clip} is trained on"
 
 
-def test_every_recipe_is_walked(dataset):
+def test_the_data_set_uses_every_recipe(dataset):
     used = {e["recipe"] for e in dataset["clips"].values()}
     assert used == set(RECIPES) - {"walk-straight"}  # the latter is a tiny data set's
 
 
-def test_turns_go_left_as_much_as_right_and_every_gait_has_its_share(dataset):
+def test_left_and_right_turns_balance_and_every_gait_has_its_share(dataset):
     seconds = dict.fromkeys(GAITS, 0.0)
     left = right = 0.0
     for _, _, frames, segments in plans(dataset):

@@ -10,10 +10,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from hobble.core.errors import HobbleError
-from hobble.synthetic.clip import write_clip
-from hobble.synthetic.files import footsteps_text, gait_text
+from hobble.synthetic.generate_clip import write_clip
+from hobble.synthetic.label_files import footsteps_text, gait_text
 from hobble.synthetic.options import Synthetic
-from hobble.synthetic.path import gait_keys
+from hobble.synthetic.planned_path import gait_keys
 from hobble.synthetic.recipes import Segment
 
 RECIPES = ["walk-straight", "walk", "jog", "walk-jog-walk", "uneven", "crouch"]
@@ -42,7 +42,7 @@ def test_every_landing_of_the_motion_has_its_line(written):
             assert np.abs(clip.landings(side) - frame).min() <= 1
 
 
-def test_frames_rate_and_number_are_as_asked(written):
+def test_the_clip_has_the_requested_frames_and_rate(written):
     for fps in (60, 120):
         clip = written("any", recipe="jog", frames=300, fps=fps)
         _, frame_time, positions = clip.bvh
@@ -51,7 +51,7 @@ def test_frames_rate_and_number_are_as_asked(written):
         assert clip.footsteps.max() <= len(positions)
 
 
-def test_same_arguments_same_bytes_and_another_seed_or_name_another_walk(written, tmp_path, holden31):
+def test_equal_arguments_give_equal_bytes_and_others_another_walk(written, tmp_path, holden31):
     def write(name, seed):
         paths = {key: tmp_path / f"{name}{seed}{key}" for key in ("bvh", "footsteps", "gait")}
         write_clip(name, holden31.to_dict(), 240, "uneven", Synthetic(fps=120, seed=seed), **paths)
@@ -63,12 +63,12 @@ def test_same_arguments_same_bytes_and_another_seed_or_name_another_walk(written
     assert write("b", 1)[0] != once[0]
 
 
-def test_an_unknown_recipe_is_refused_with_what_there_is(written):
+def test_an_unknown_recipe_is_refused_with_the_known_ones(written):
     with pytest.raises(HobbleError, match=r"clip x: there is no recipe 'moonwalk'.*walk-straight"):
         written("x", recipe="moonwalk")
 
 
-def test_gait_keys_say_which_gait_and_fade_between(written):
+def test_gait_keys_name_the_gait_and_fade_between_two(written):
     clip = written("any", recipe="walk-jog-walk")
     keys = [line.split() for line in clip.text("_gait.txt").splitlines()]
     frames = [int(frame) for frame, _ in keys]
@@ -93,7 +93,7 @@ segments = st.lists(
 
 @settings(max_examples=60, deadline=None)
 @given(segments, st.integers(30, 900))
-def test_gait_keys_always_grow_and_begin_at_the_beginning(plan, frames):
+def test_gait_keys_start_at_the_first_frame_and_rise(plan, frames):
     keys = gait_keys(plan, frames, 60)
     at = [frame for frame, _ in keys]
     assert at[0] == 0
@@ -114,12 +114,12 @@ def test_footstep_lines_pair_each_right_with_the_next_left(gaps, left_first):
     assert all(n - 1 in left for n in numbers[1::2])
 
 
-def test_feet_that_land_once_or_never_make_no_line():
+def test_feet_with_fewer_than_two_landings_make_no_line():
     assert footsteps_text([], [4]) == footsteps_text([4], []) == footsteps_text([], []) == ""
     assert footsteps_text([4], [9]) == "5 10\n"
 
 
-def test_a_clip_too_short_for_a_step_says_how_many_frames_are_enough(holden31, tmp_path):
+def test_a_clip_too_short_for_a_step_is_refused_with_the_minimum(holden31, tmp_path):
     paths = {key: tmp_path / key for key in ("bvh", "footsteps", "gait")}
     options = Synthetic(frames=600, fps=120, seed=1)
     said = r"clip a: 16 frames at 60 Hz are too short for a step. Set synthetic.frames to 2250 or more"

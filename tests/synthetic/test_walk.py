@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import tracemalloc
+
 import numpy as np
 import pytest
 
 from hobble.core import quat
-from hobble.synthetic.clip import generate, walk
+from hobble.synthetic.generate_clip import generate, walk
 from hobble.synthetic.recipes import Segment
 
 SIDES = ("Left", "Right")
@@ -26,7 +28,7 @@ def brisk(clip, side):
 @pytest.mark.parametrize(
     ("joint", "published", "within"), [("hip", 40, 3.5), ("knee", 60, 3.5), ("ankle", 30, 3.5)]
 )
-def test_range_of_motion_is_that_of_people_at_1_3_metres_a_second(walking, joint, published, within):
+def test_the_ranges_of_motion_at_1_3_m_s_are_those_of_people(walking, joint, published, within):
     ranges = []
     for side in SIDES:
         angle = walking.angles(side)[joint]
@@ -36,7 +38,7 @@ def test_range_of_motion_is_that_of_people_at_1_3_metres_a_second(walking, joint
     assert np.std(ranges) < 5
 
 
-def test_stance_knee_yields_at_the_landing_and_straightens_again(walking):
+def test_the_stance_knee_bends_after_landing_and_straightens_again(walking):
     for side in SIDES:
         knee = walking.angles(side)["knee"]
         for a, b in brisk(walking, side):
@@ -45,7 +47,7 @@ def test_stance_knee_yields_at_the_landing_and_straightens_again(walking):
             assert later.min() < 15 < early.max()
 
 
-def test_jog_grows_with_speed(holden31):
+def test_a_faster_jog_has_larger_movements(holden31):
     stride, flight = [], []
     for speed in (210, 280, 350, 420):
         made = walk("m", holden31, [Segment("jog", speed, seconds=12)], 720, "flat", 60, 1)
@@ -62,7 +64,7 @@ def test_jog_grows_with_speed(holden31):
     assert flight[0] > 0.15
 
 
-def test_both_feet_are_down_for_a_fifth_of_the_cycle(walking):
+def test_both_feet_are_on_the_ground_for_a_fifth_of_the_cycle(walking):
     both = walking.down("Left") & walking.down("Right")
     shares = [both[a:b].mean() for a, b in brisk(walking, "Right")]
     assert np.mean(shares) == pytest.approx(0.20, abs=0.035)
@@ -73,7 +75,7 @@ def test_cadence_and_stride_are_those_of_people(walking):
     assert 0.95 < np.mean(seconds) < 1.15
 
 
-def test_walking_never_flies_and_jogging_does(walking, written):
+def test_only_a_jog_has_both_feet_off_the_ground(walking, written):
     assert (walking.down("Left") | walking.down("Right")).mean() > 0.999
     jog = written("jog", recipe="jog", frames=700)
     for a, b in jog.cycles("Right", slowest=220):
@@ -117,7 +119,7 @@ ALL += ["slopes", "steps", "uneven"]
 
 
 @pytest.mark.parametrize("recipe", ALL)
-def test_no_leg_is_stretched_and_nothing_jerks(written, recipe):
+def test_no_leg_is_fully_stretched_and_no_joint_jerks(written, recipe):
     clip = written("any", recipe=recipe)
     for side in SIDES:
         knee = clip.angles(side)["knee"]
@@ -160,7 +162,7 @@ def test_a_foot_that_is_down_does_not_slide(written, recipe):
 
 
 @pytest.mark.parametrize("recipe", ["crouch", "stop-and-go", "sidesteps"])
-def test_gaits_look_like_themselves(written, recipe):
+def test_each_gait_has_its_height_and_direction(written, recipe):
     clip = written("any", recipe=recipe, frames=1200)
     head, hips = clip.joint("Head")[:, 1], clip.joint("Hips")
     travel = np.diff(hips, axis=0)
@@ -213,3 +215,13 @@ def test_no_foot_goes_through_the_edge_of_a_step(holden31):
         tip = toe + 6 * ahead / np.linalg.norm(ahead, axis=1, keepdims=True)
         for point in (toe, tip):
             assert (point[:, 1] - made.ground(point[:, 0], point[:, 2])).min() > -0.5
+
+
+def test_memory_grows_with_the_length_of_a_clip_and_not_with_its_square(holden31):
+    peaks = []
+    for frames in (2000, 8000):
+        tracemalloc.start()
+        generate("long", holden31, frames, "sidesteps", 120, 1)
+        peaks.append(tracemalloc.get_traced_memory()[1])
+        tracemalloc.stop()
+    assert peaks[1] < 4.1 * peaks[0]

@@ -9,11 +9,11 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from hobble.config.sections import Database, Heightmap, Terrain
+from hobble.config.sections import DatabaseOptions, HeightmapOptions, Terrain
 from hobble.core.clip import Clip
 from hobble.core.skeleton import Skeleton
 from hobble.terrain.heightmaps import heightmaps
-from hobble.terrain.options import Sampling
+from hobble.terrain.options import HeightSampling
 from hobble.terrain.patches import Patches, draw_patches
 
 CELL = 3.937007874
@@ -37,8 +37,8 @@ def options(**changed: object) -> Terrain:
     return Terrain(heel_height=HEEL, toe_height=TOE).model_copy(update=changed)
 
 
-def database() -> Sampling:
-    return Sampling(**Database().model_dump(include=set(Sampling.model_fields)))
+def database() -> HeightSampling:
+    return HeightSampling(**DatabaseOptions().model_dump(include=set(HeightSampling.model_fields)))
 
 
 def figure(feet: np.ndarray, root: np.ndarray) -> Clip:
@@ -86,7 +86,7 @@ def walk(ground: Height, frames: int = 420, speed: float = 2.2, period: int = 64
 
 
 def some_patches(count: int = 300, kinds: tuple[str, ...] = KINDS, seed: int = 1) -> Patches:
-    entries = [Heightmap(kind=kind, seed=i) for i, kind in enumerate(kinds)]
+    entries = [HeightmapOptions(kind=kind, seed=i) for i, kind in enumerate(kinds)]
     maps = heightmaps(entries, [], cell=CELL, height_scale=3.0)
     return draw_patches(maps, count=count, cell=CELL, size=128, highest=50.0, seed=seed)
 

@@ -14,9 +14,9 @@ from hobble.core.skeleton import Skeleton
 from hobble.motion.options import ClipMotion
 from hobble.motion.root import RootFrames, root_frames
 from hobble.terrain.clip_fits import clip_fits, heights_under, sample_points, save_fits
-from hobble.terrain.ground import fit_cycle
+from hobble.terrain.cycle_ground import fit_cycle
 from hobble.terrain.heightmaps import heightmaps
-from hobble.terrain.options import Heightmap
+from hobble.terrain.options import HeightmapOptions
 from hobble.terrain.patches import Patches, draw_patches
 from hobble.terrain.soles import IS_HEEL, Feet, find_soles, heel_above_toe, held_above_other
 
@@ -30,7 +30,7 @@ GROUNDS = {
 
 @pytest.mark.parametrize("kind", ["rocky", "jumpy", "beam"])
 @pytest.mark.parametrize("name", GROUNDS)
-def test_feet_stand_on_the_ground_and_are_never_below_it(
+def test_fitted_ground_meets_the_feet_and_is_never_above_them(
     made: SimpleNamespace, patches: Patches, name: str, kind: str
 ) -> None:
     walk = made.walk(GROUNDS[name])
@@ -41,7 +41,7 @@ def test_feet_stand_on_the_ground_and_are_never_below_it(
     assert np.all(np.diff(fits.error, axis=1) >= 0)
 
 
-def test_patch_and_feet_are_level_with_each_other_on_average(made: SimpleNamespace, patches: Patches) -> None:
+def test_patch_and_feet_have_the_same_mean_height(made: SimpleNamespace, patches: Patches) -> None:
     walk = made.walk(GROUNDS["slope"])
     soles = walk.clip.positions[60:200, -4:] - np.array([0.0, 3.0, 0.0])
     contacts, path = walk.labels["contacts"][60:200], walk.clip.root[60:200, [0, 2]]
@@ -52,14 +52,16 @@ def test_patch_and_feet_are_level_with_each_other_on_average(made: SimpleNamespa
     assert np.allclose(ground.centre, soles[contacts][:, [0, 2]].mean(axis=0))
 
 
-def test_without_deepest_feet_may_be_below_the_ground(made: SimpleNamespace, patches: Patches) -> None:
+def test_without_the_option_deepest_feet_may_be_below_the_ground(
+    made: SimpleNamespace, patches: Patches
+) -> None:
     walk = made.walk(GROUNDS["steps"])
     fits = clip_fits(walk.clip, walk.labels, patches, "rocky", made.options(deepest=None), made.database())
     assert fits.foot_error[..., 0].max() < 1
     assert fits.foot_below.max() > 1
 
 
-def test_rows_are_each_cycles_frames_and_heights_those_of_the_fits(
+def test_heights_of_rows_are_those_of_the_fits_of_their_cycles(
     made: SimpleNamespace, patches: Patches
 ) -> None:
     walk = made.walk(GROUNDS["slope"])
@@ -76,7 +78,7 @@ def test_rows_are_each_cycles_frames_and_heights_those_of_the_fits(
     assert np.abs(centre - 0.2 * z[:, None])[..., near].mean() < 3
 
 
-def test_heights_are_left_then_centre_then_right_from_the_past_to_the_future() -> None:
+def test_heights_are_ordered_left_centre_right_from_past_to_future() -> None:
     """On ground whose height identifies the place, heights show where they were sampled."""
     frames = 200
     angle = np.linspace(0, 2, frames)
@@ -96,7 +98,7 @@ def test_heights_are_left_then_centre_then_right_from_the_past_to_the_future() -
             assert np.allclose(heights[row, 1, side], 7 + at[:, 1])
 
 
-def test_left_is_the_left_hand_side_of_the_figure(made: SimpleNamespace) -> None:
+def test_left_heights_are_on_the_left_of_the_figure(made: SimpleNamespace) -> None:
     walk = made.walk(GROUNDS["level"])
     left, centre, _ = sample_points(root_frames(walk.clip, 20.0), 25.0)
     heel = walk.clip.positions[:, walk.clip.skeleton.role("left_heel")][:, [0, 2]]
@@ -115,7 +117,7 @@ def test_flat_ground_is_zero_and_one_fit(made: SimpleNamespace, patches: Patches
 
 
 @pytest.mark.parametrize("bent", [True, False])
-def test_a_floor_that_is_not_flat_is_bent_only_if_asked(
+def test_an_uneven_floor_is_adapted_only_if_configured(
     made: SimpleNamespace, patches: Patches, caplog: pytest.LogCaptureFixture, bent: bool
 ) -> None:
     walk = made.walk(GROUNDS["waves"])
@@ -128,9 +130,7 @@ def test_a_floor_that_is_not_flat_is_bent_only_if_asked(
     assert ("figure: feet in contact are" in caplog.text) is not bent
 
 
-def test_a_foot_that_dips_into_a_flat_floor_makes_a_pit_and_nothing_else(
-    made: SimpleNamespace, patches: Patches
-) -> None:
+def test_a_foot_below_a_flat_floor_makes_only_a_local_pit(made: SimpleNamespace, patches: Patches) -> None:
     walk = made.walk(GROUNDS["level"])
     contacts = walk.labels["contacts"]
     frame = np.flatnonzero(~contacts[:, 1] & (np.arange(420) > 100))[5]
@@ -167,7 +167,7 @@ def test_a_heel_is_held_up_only_over_a_toe_that_stands() -> None:
     assert up.tolist() == [[True, False, False, False], [False] * 4]
 
 
-def test_flat_ground_may_lie_where_the_feet_are_as_in_the_original(
+def test_flat_ground_can_be_at_the_height_of_the_feet_as_in_the_original(
     made: SimpleNamespace, patches: Patches
 ) -> None:
     walk = made.walk(lambda x, z: np.full_like(z, 3.0))
@@ -185,7 +185,7 @@ def test_the_same_clip_gives_the_same_bytes(made: SimpleNamespace, patches: Patc
     assert (tmp_path / "a").read_bytes() == (tmp_path / "b").read_bytes()
 
 
-def test_the_file_has_what_the_database_and_a_picture_need(
+def test_the_file_holds_the_data_for_database_and_picture(
     made: SimpleNamespace, patches: Patches, tmp_path: Path
 ) -> None:
     walk = made.walk(GROUNDS["waves"])
@@ -201,7 +201,7 @@ def test_the_file_has_what_the_database_and_a_picture_need(
     assert z[0] < soles[..., 2].min() < soles[..., 2].max() < z[-1]
 
 
-def test_no_cycles_no_rows(made: SimpleNamespace, patches: Patches, tmp_path: Path) -> None:
+def test_a_clip_without_cycles_has_no_fits(made: SimpleNamespace, patches: Patches, tmp_path: Path) -> None:
     walk = made.walk(GROUNDS["waves"])
     labels = {**walk.labels, "cycles": np.zeros((0, 2), int)}
     for kind in ("flat", "rocky"):
@@ -256,7 +256,7 @@ def test_heights_of_joints_above_their_soles(made: SimpleNamespace, holden31: Sk
     assert heel_above_toe(holden31) == pytest.approx(4.5)
 
 
-def test_a_single_low_frame_lowers_the_soles_a_fault_of_capture_does_not(made: SimpleNamespace) -> None:
+def test_a_low_frame_lowers_the_soles_but_a_capture_error_does_not(made: SimpleNamespace) -> None:
     walk = made.walk(GROUNDS["level"])
     frames = np.arange(60, 360)
     for depth, expected in ((1.6, 2.5 - 0.6), (9.0, 2.5)):
@@ -271,7 +271,7 @@ def test_a_single_low_frame_lowers_the_soles_a_fault_of_capture_does_not(made: S
 def honest_over(heightmap: dict, files: list[Path], made: SimpleNamespace) -> None:
     """A walk over waves, fitted to patches of one heightmap."""
     options = made.options(patches=100)
-    maps = heightmaps([Heightmap(**heightmap)], files, cell=options.cell, height_scale=3.0)
+    maps = heightmaps([HeightmapOptions(**heightmap)], files, cell=options.cell, height_scale=3.0)
     drawn = options.model_dump(include={"cell", "size", "highest", "seed"})
     patches = draw_patches(maps, count=100, **drawn)
     walk = made.walk(GROUNDS["waves"])
@@ -281,19 +281,19 @@ def honest_over(heightmap: dict, files: list[Path], made: SimpleNamespace) -> No
     assert fits.foot_below.max() <= 1
 
 
-def test_real_landscape_is_ground_to_walk_on(made: SimpleNamespace) -> None:
+def test_real_clips_can_be_fitted_to_a_real_landscape(made: SimpleNamespace) -> None:
     honest_over({"kind": "elevation"}, [], made)
 
 
 @pytest.mark.shared
-def test_the_originals_heightmap_is_ground_to_walk_on(shared: Path, made: SimpleNamespace) -> None:
+def test_clips_can_be_fitted_to_the_heightmap_of_the_original(shared: Path, made: SimpleNamespace) -> None:
     honest_over({"kind": "file", "path": "x"}, [shared / "mocap/pfnn/hmap_001_smooth.txt"], made)
 
 
 @pytest.mark.shared
-def test_real_clips_stand_on_their_ground(shared: Path, root: Path, made: SimpleNamespace) -> None:
+def test_real_clips_stand_on_the_fitted_ground(shared: Path, root: Path, made: SimpleNamespace) -> None:
     """Uneven ground, a limp, and the original's own flat clip, whose ground stays at zero."""
-    from hobble.config.sections import Labels, Terrain
+    from hobble.config.sections import LabelOptions, Terrain
     from hobble.labels.label import label_clip
     from hobble.motion.make import make_clip
 
@@ -316,7 +316,7 @@ def test_real_clips_stand_on_their_ground(shared: Path, root: Path, made: Simple
             options=ClipMotion(),
         )
         beside = [p for s in (".phase", "_footsteps.txt") if (p := bvh.with_name(bvh.stem + s)).is_file()]
-        labels, _ = label_clip(clip, beside, report, "walk", kind, Labels())
+        labels, _ = label_clip(clip, beside, report, "walk", kind, LabelOptions())
         arrays = {"contacts": labels.contacts, "cycles": labels.cycles}
         fits = clip_fits(clip, arrays, patches, kind, terrain, made.database())
         assert len(fits.frame) > 60, file

@@ -31,7 +31,7 @@ def test_without_smoothing_the_surface_goes_through_every_point(seed: int) -> No
         assert np.allclose(surface.at(at.place), wanted, atol=1e-6)
 
 
-def test_it_is_the_regularised_system_of_the_original() -> None:
+def test_the_surface_solves_the_regularised_system_of_the_original() -> None:
     at, residual = points(1)
     spread = distances(at.place, at.place).mean()
     phi = distances(at.place, at.place) / spread
@@ -41,7 +41,7 @@ def test_it_is_the_regularised_system_of_the_original() -> None:
     assert np.allclose(fit_surfaces(at, residual, 0.1)[0].at(elsewhere), expected)
 
 
-def test_a_point_that_counts_m_times_is_m_points_at_one_place() -> None:
+def test_a_point_with_weight_m_equals_m_points_at_one_place() -> None:
     at, residual = points(2, 6)
     count = np.array([1, 2, 5, 1, 3, 8])
     many = Stances(np.repeat(at.place, count, axis=0), np.zeros(20), np.ones(20))
@@ -55,7 +55,7 @@ def test_a_point_that_counts_m_times_is_m_points_at_one_place() -> None:
 
 @settings(max_examples=20, deadline=None)
 @given(st.integers(0, 10_000))
-def test_large_residuals_are_met_and_small_ones_left_as_in_the_original(seed: int) -> None:
+def test_only_large_residuals_are_fitted_more_closely_than_in_the_original(seed: int) -> None:
     """Like feet beside a beam: heights differ by half a metre over a short distance."""
     rng = np.random.default_rng(seed)
     place = rng.uniform(-60, 60, (40, 2))
@@ -74,7 +74,7 @@ def test_points_at_one_place_give_a_flat_surface() -> None:
     assert np.all(surface.at(np.zeros((4, 2))) == 0)
 
 
-def test_stances_are_runs_of_one_joint_cut_to_length() -> None:
+def test_stances_are_runs_of_one_joint_of_limited_length() -> None:
     soles = np.zeros((20, 4, 3))
     soles[:, :, 0] = np.arange(4) * 10.0
     soles[:, :, 1] = np.arange(20)[:, None]
@@ -105,7 +105,7 @@ def test_pits_are_below_the_feet_and_change_nothing_far_away(seed: int) -> None:
     assert dig_pits(soles[:0], standing, 0.5).of(ground, where) is ground
 
 
-def test_walls_of_pits_are_steep_only_beside_other_feet() -> None:
+def test_pits_are_steep_only_beside_other_feet() -> None:
     along = np.column_stack([np.linspace(-40, 40, 801), np.zeros(801)])
     sole = np.array([[0.0, -8.0, 0.0]])
     far = Stances(np.array([[30.0, 0.0]]), np.array([3.0]), np.ones(1))

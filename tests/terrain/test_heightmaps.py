@@ -12,7 +12,7 @@ from PIL.TiffImagePlugin import ImageFileDirectory_v2
 from hobble.core.errors import InputError
 from hobble.terrain.generate import KINDS, generate
 from hobble.terrain.heightmaps import elevation, heightmaps, read_heights
-from hobble.terrain.options import Heightmap
+from hobble.terrain.options import HeightmapOptions
 
 CELL = 3.937007874
 RAMP = np.add.outer(np.arange(5.0), 10 * np.arange(4.0))
@@ -35,7 +35,7 @@ def test_beams_are_narrow_and_stand_more_than_40_cm_above_the_floor() -> None:
     assert (ground > 0).mean() < 0.2
 
 
-def test_the_elevation_model_is_true_to_scale() -> None:
+def test_the_elevation_model_has_its_real_scale() -> None:
     heights = elevation(CELL)
     assert heights.shape == (
         344,
@@ -96,13 +96,13 @@ def test_an_esri_grid_has_a_header_and_holes(tmp_path: Path) -> None:
     assert np.array_equal(read_heights(tmp_path / "map.asc"), [[1, 2, 3], [4, np.nan, 6]], equal_nan=True)
 
 
-def test_files_are_scaled_and_may_say_their_own_cell_and_scale(tmp_path: Path) -> None:
+def test_files_are_scaled_by_their_own_cell_and_height_scale(tmp_path: Path) -> None:
     write(tmp_path / "a.txt", RAMP)
     write(tmp_path / "b.txt", RAMP)
     entries = [
-        Heightmap(kind="file", path="a.txt"),
-        Heightmap(kind="hills", height_scale=0.5),
-        Heightmap(kind="file", path="b.txt", cell=10.0, height_scale=2.0),
+        HeightmapOptions(kind="file", path="a.txt"),
+        HeightmapOptions(kind="hills", height_scale=0.5),
+        HeightmapOptions(kind="file", path="b.txt", cell=10.0, height_scale=2.0),
     ]
     maps = heightmaps(entries, [tmp_path / "a.txt", tmp_path / "b.txt"], cell=CELL, height_scale=3.0)
     assert np.array_equal(maps[0].heights, 3 * RAMP)
@@ -142,8 +142,8 @@ def test_a_missing_file_and_an_npz_that_could_mean_two_arrays_are_refused(tmp_pa
 
 
 @pytest.mark.shared
-def test_the_original_heightmap(shared: Path) -> None:
+def test_the_heightmap_of_the_original_is_read(shared: Path) -> None:
     path = shared / "mocap/pfnn/hmap_001_smooth.txt"
-    (made,) = heightmaps([Heightmap(kind="file", path="x")], [path], cell=CELL, height_scale=3.0)
+    (made,) = heightmaps([HeightmapOptions(kind="file", path="x")], [path], cell=CELL, height_scale=3.0)
     assert made.heights.shape == (504, 302)
     assert np.allclose(made.heights, 3 * np.loadtxt(path))

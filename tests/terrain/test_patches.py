@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from scipy.ndimage import map_coordinates
 
 from hobble.core.errors import HobbleError, InputError
-from hobble.terrain.heightmaps import Heightmap
+from hobble.terrain.heightmaps import TerrainMap
 from hobble.terrain.patches import Patches, draw_patches, load_patches, save_patches
 
 CELL = 3.937007874
@@ -21,17 +21,17 @@ CELLS = np.stack(np.meshgrid(*[np.arange(SIZE) - SIZE // 2] * 2, indexing="ij"),
 CELLS = CELLS.astype(np.float32)
 
 
-def plane(a: float, b: float, rows: int = 260, columns: int = 300, cell: float = CELL) -> Heightmap:
-    return Heightmap("plane", np.add.outer(a * np.arange(rows), b * np.arange(columns)), cell)
+def plane(a: float, b: float, rows: int = 260, columns: int = 300, cell: float = CELL) -> TerrainMap:
+    return TerrainMap("plane", np.add.outer(a * np.arange(rows), b * np.arange(columns)), cell)
 
 
-def draw(*maps: Heightmap, count: int = 40, highest: float = 50.0, seed: int = 1) -> Patches:
+def draw(*maps: TerrainMap, count: int = 40, highest: float = 50.0, seed: int = 1) -> Patches:
     return draw_patches(maps, count=count, cell=CELL, size=SIZE, highest=highest, seed=seed)
 
 
 @settings(max_examples=15, deadline=None)
 @given(st.floats(-0.3, 0.3), st.floats(-0.3, 0.3), st.integers(0, 99))
-def test_views_of_a_plane_are_exactly_planes_through_their_middle(a: float, b: float, seed: int) -> None:
+def test_patches_of_a_plane_are_planes_of_mean_zero(a: float, b: float, seed: int) -> None:
     patches = draw(plane(a, b), count=5, seed=seed)
     points = np.random.default_rng(seed).uniform(-64, 63, (50, 2)).astype(np.float32)
     turn = patches.affine[:, :, :2].astype(float)
@@ -61,11 +61,11 @@ def test_every_patch_has_mean_zero_and_no_cell_beyond_the_limit(patches: Patches
     assert np.abs(heights).max() <= 50.001
 
 
-def test_no_view_that_passes_is_left_out() -> None:
+def test_every_valid_view_can_be_drawn() -> None:
     """On a cliff only views that pass are drawn, whatever part of the cliff they contain."""
     cliff = np.zeros((400, 400))
     cliff[200:] = 60.0
-    heights = draw(Heightmap("cliff", cliff, CELL), count=200).at(range(200), CELLS)
+    heights = draw(TerrainMap("cliff", cliff, CELL), count=200).at(range(200), CELLS)
     share = (heights > heights.min(axis=1, keepdims=True) + 30).mean(axis=1)
     spread = np.ptp(heights, axis=1)
     assert np.abs(heights).max() <= 50.001
@@ -88,7 +88,7 @@ def test_patches_are_shared_evenly_among_the_maps() -> None:
     assert np.bincount(patches.which).tolist() == [4, 4, 3]
 
 
-def test_a_map_with_wider_cells_is_seen_at_its_own_scale() -> None:
+def test_a_map_with_wider_cells_keeps_its_scale() -> None:
     wide = plane(0.2, 0.0, rows=100, columns=100, cell=4 * CELL)
     patches = draw(wide, count=5)
     slope = np.linalg.norm(patches.affine[:, 0, :2], axis=1) * 0.2
@@ -102,7 +102,7 @@ def test_no_patch_shows_a_hole() -> None:
     heights = plane(0.02, 0.02, 800, 800).heights.copy()
     heights[100:-100:150, 100:-100:150] = np.nan
     patches = draw_patches(
-        [Heightmap("holed", heights, CELL / 4)], count=40, cell=CELL, size=32, highest=50.0, seed=1
+        [TerrainMap("holed", heights, CELL / 4)], count=40, cell=CELL, size=32, highest=50.0, seed=1
     )
     points = np.random.default_rng(0).uniform(-16, 15, (40_000, 2)).astype(np.float32)
     at = np.einsum("pij,nj->pin", patches.affine, np.column_stack([points, np.ones(len(points))]))

@@ -9,14 +9,14 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from hobble.terrain.heightmaps import Heightmap
+from hobble.terrain.heightmaps import TerrainMap
 from hobble.terrain.patches import Patches, draw_patches
-from hobble.terrain.search import Footing, best_patches, patch_errors
+from hobble.terrain.search import FootPoints, best_patches, patch_errors
 
 CELL = 3.937007874
 
 
-def plain_errors(patches: Patches, footing: Footing) -> np.ndarray:
+def plain_errors(patches: Patches, footing: FootPoints) -> np.ndarray:
     """The formula of the original, in plain NumPy."""
     every = np.arange(len(patches))
 
@@ -37,7 +37,7 @@ def plain_errors(patches: Patches, footing: Footing) -> np.ndarray:
     return error
 
 
-def made_up(seed: int, jumps: bool = False, beside: int = 0) -> Footing:
+def made_up(seed: int, jumps: bool = False, beside: int = 0) -> FootPoints:
     rng = np.random.default_rng(seed)
     n_down, n_up = rng.integers(1, 200), rng.integers(1, 400)
     place = rng.uniform(-64, 63, (n_down + n_up, 2))
@@ -46,7 +46,7 @@ def made_up(seed: int, jumps: bool = False, beside: int = 0) -> Footing:
     height[n_down:] += 8
     table = np.column_stack([place, height])
     off = rng.uniform(-64, 63, (beside, 4))
-    return Footing(table[:n_down], table[n_down:], jumps, off)
+    return FootPoints(table[:n_down], table[n_down:], jumps, off)
 
 
 @pytest.mark.parametrize(("jumps", "beside"), [(False, 0), (True, 0), (False, 90), (True, 7)])
@@ -72,7 +72,7 @@ def test_the_search_finds_the_lowest_of_all(
 
 
 def test_feet_on_a_plane_have_no_error_and_feet_below_it_their_depth() -> None:
-    slope = Heightmap("plane", np.add.outer(0.2 * np.arange(200), np.zeros(200)), CELL)
+    slope = TerrainMap("plane", np.add.outer(0.2 * np.arange(200), np.zeros(200)), CELL)
     patches = draw_patches([slope], count=4, cell=CELL, size=128, highest=50.0, seed=1)
     rng = np.random.default_rng(0)
     place = rng.uniform(-60, 60, (90, 2)).astype(np.float32)
@@ -80,19 +80,19 @@ def test_feet_on_a_plane_have_no_error_and_feet_below_it_their_depth() -> None:
         height = patches.at([p], place)[0]
         height = height - height[:40].mean()
         table = np.column_stack([place, height])
-        exact = Footing(table[:40], table[40:])
-        deep = Footing(table[:40], table[40:] - np.array([0, 0, 3]))
-        high = Footing(table[:40], table[40:] + np.array([0, 0, 9]), jumps=True)
+        exact = FootPoints(table[:40], table[40:])
+        deep = FootPoints(table[:40], table[40:] - np.array([0, 0, 3]))
+        high = FootPoints(table[:40], table[40:] + np.array([0, 0, 9]), jumps=True)
         assert patch_errors(patches, exact)[p] == pytest.approx(0, abs=1e-5)
         assert patch_errors(patches, deep)[p] == pytest.approx(9, rel=1e-4)
         assert patch_errors(patches, high)[p] == pytest.approx(16, rel=1e-4)
         bent = table[:40].copy()
         bent[:, 2] += np.where(np.arange(40) % 2, 2, -2)
-        assert patch_errors(patches, Footing(bent, table[40:]))[p] == pytest.approx(0.4, rel=1e-3)
+        assert patch_errors(patches, FootPoints(bent, table[40:]))[p] == pytest.approx(0.4, rel=1e-3)
 
 
 def test_among_equal_patches_the_first_are_found() -> None:
-    flat = Heightmap("flat", np.zeros((200, 200)), CELL)
+    flat = TerrainMap("flat", np.zeros((200, 200)), CELL)
     patches = draw_patches([flat], count=20, cell=CELL, size=128, highest=50.0, seed=1)
     chosen, error = best_patches(patches, made_up(1), 10)
     assert chosen.tolist() == list(range(10))

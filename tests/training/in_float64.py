@@ -19,7 +19,7 @@ from hobble.database.reader import Database
 from hobble.models import network_options
 from hobble.models.trainable import Trainable
 from hobble.training import train as module
-from hobble.training.batches import Batch, HostRows
+from hobble.training.batches import HostRows, SampleBatch
 from hobble.training.device_rows import DeviceRows
 from hobble.training.options import Training
 from hobble.training.other_poses import OtherPoses
@@ -34,7 +34,7 @@ def widen(kind: Any) -> None:
 
     def batches(self: Any, *place: int) -> Any:
         for x, y, p, *rest in plain(self, *place):
-            yield Batch(x.double(), y.double(), p.double(), *rest)
+            yield SampleBatch(x.double(), y.double(), p.double(), *rest)
 
     kind.batches = batches
 

@@ -50,7 +50,7 @@ def built(folder: Path, clips: dict[str, Path]) -> None:
     )
 
 
-def test_it_holds_the_training_clips_and_its_error_is_of_the_held_out_ones(files, tmp_path: Path) -> None:
+def test_a_built_network_holds_the_training_clips_and_has_a_held_out_error(files, tmp_path: Path) -> None:
     built(tmp_path, files)
     network = load_network(tmp_path / "weights.npz")
     assert network.frames.shape[0] == FRAMES[0]

@@ -51,7 +51,7 @@ def first_end(errors: list[float], patience: int) -> int:
 
 
 @pytest.mark.parametrize("patience", [1, 2, 3])
-def test_it_ends_after_so_many_sections_without_a_lower_error(
+def test_training_ends_after_that_many_sections_without_a_lower_error(
     go: Callable[..., State], patience: int
 ) -> None:
     whole = held_out(go("whole"))
@@ -66,7 +66,7 @@ def test_it_ends_after_so_many_sections_without_a_lower_error(
     assert go("stopped").sections == len(whole), "without patience it goes on"
 
 
-def test_since_best_counts_from_the_lowest(go: Callable[..., State]) -> None:
+def test_sections_are_counted_since_the_lowest_error(go: Callable[..., State]) -> None:
     state = go()
     errors = held_out(state)
     assert state.since_best == len(errors) - 1 - errors.index(min(errors))
@@ -91,7 +91,7 @@ def written(folder: Path, small_database: Path, network: Settings, training: Set
     return paths
 
 
-def test_the_best_weights_are_written_and_the_last_go_on(
+def test_the_best_weights_are_written_and_training_resumes_from_the_last(
     small_database: Path, data: Database, network: Settings, training: Settings, tmp_path: Path
 ) -> None:
     best, last = (written(tmp_path, small_database, network, training, keep) for keep in ("best", "last"))

@@ -11,7 +11,7 @@ from hobble.training.optimiser import Adam
 
 
 @pytest.mark.parametrize("dtype", [torch.float32, torch.bfloat16])
-def test_the_compiled_sweep_is_the_plain_one(dtype: torch.dtype) -> None:
+def test_the_compiled_adam_equals_the_plain_one(dtype: torch.dtype) -> None:
     networks = [initialise((40, 30, 20), 4, 1) for _ in range(2)]
     generator = torch.Generator().manual_seed(1)
     adams = [Adam(network, 0.01, 0.9, 0.999, 0.1) for network in networks]

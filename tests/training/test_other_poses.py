@@ -84,7 +84,7 @@ def test_the_nearest_phase_is_taken_also_over_the_end_of_the_cycle(data: Databas
     assert float(x[:, of_pose(data)].max()) == pytest.approx(20.0, rel=0.02)
 
 
-def test_old_rows_are_forgotten(data: Database) -> None:
+def test_only_recent_rows_are_mixed_in(data: Database) -> None:
     others = OtherPoses(data, 1.0, ROWS, CPU)
     others.begin()
     others.mix(*batch(data, 10.0, 0.5))
@@ -95,7 +95,7 @@ def test_old_rows_are_forgotten(data: Database) -> None:
     assert not x[:, of_pose(data)].any()
 
 
-def test_sections_do_not_depend_on_each_other(data: Database) -> None:
+def test_mixed_poses_do_not_depend_on_earlier_sections(data: Database) -> None:
     others = OtherPoses(data, 1.0, ROWS, CPU)
     for _ in range(2):
         others.begin()
@@ -107,7 +107,7 @@ def test_sections_do_not_depend_on_each_other(data: Database) -> None:
         assert not torch.equal(second, batch(data, 2.0, 0.2, rows=50)[0])
 
 
-def test_training_mixes_poses_and_only_if_asked(
+def test_training_mixes_poses_only_if_configured(
     data: Database, network: Any, training: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     given: list[torch.Tensor] = []

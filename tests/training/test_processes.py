@@ -98,7 +98,7 @@ def furthest(one: dict[str, np.ndarray], other: dict[str, np.ndarray]) -> float:
 
 @pytest.mark.parametrize("way", WAYS)
 @pytest.mark.parametrize("processes", [2, 3])
-def test_several_processes_take_the_steps_of_one(ends: Ends, processes: int, way: tuple[bool, int]) -> None:
+def test_several_processes_train_like_one(ends: Ends, processes: int, way: tuple[bool, int]) -> None:
     """With batches of consecutive samples, and with a stretch for each process."""
     assert furthest(ends[1, 1, way], ends[processes, 1, way]) < 1e-10
     assert furthest(ends[1, processes, way], ends[processes, processes, way]) < 1e-10
@@ -130,13 +130,14 @@ def together(database: Path, network: Any, training: Recipe, tmp_path: Path) -> 
     return go
 
 
-def test_the_same_again_gives_the_same_bits(together: Callable[..., dict[str, Any]]) -> None:
-    one, again = together(2, "one"), together(2, "two")
+def test_training_twice_gives_the_same_bits(together: Callable[..., dict[str, Any]]) -> None:
+    one, again = together(2, "one", passes=2 / 3), together(2, "two", passes=2 / 3)
+    assert int(one["sections"]) == 2
     for name in ("weights", "first", "second", "best"):
         np.testing.assert_array_equal(one[name], again[name])
 
 
-def test_if_one_process_dies_another_number_can_resume(
+def test_after_a_crash_another_number_of_processes_can_resume(
     together: Callable[..., dict[str, Any]], tmp_path: Path
 ) -> None:
     import psutil
@@ -163,7 +164,7 @@ def test_if_one_process_dies_another_number_can_resume(
     assert f"after section {reached} of" in (tmp_path / "log").read_text()
 
 
-def test_the_process_with_the_broken_rows_gives_the_message(
+def test_the_message_about_broken_rows_comes_from_their_process(
     together: Callable[..., dict[str, Any]], database: Path, tmp_path: Path
 ) -> None:
     shutil.copytree(database, tmp_path / "db")
@@ -196,7 +197,7 @@ def test_a_damaged_chunk_is_named(
         together(2, data=tmp_path / "db")
 
 
-def test_machines_need_slurm(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+def test_several_machines_need_slurm(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     machines = Machines(nodes=4, gpus=8)
     monkeypatch.delenv("SLURM_JOB_ID", raising=False)
     with pytest.raises(HobbleError, match=r"training\.nodes is 4, but this is not a SLURM job"):

@@ -41,7 +41,7 @@ train(Database.open(sys.argv[1], 64), checkpoints=Path(sys.argv[2]), threads=2, 
 """
 
 
-def test_killed_at_any_moment_it_ends_at_the_same_bits(
+def test_a_training_killed_at_any_moment_ends_with_the_same_bits(
     small_database: Path, data: Database, network: Settings, training: Settings, tmp_path: Path
 ) -> None:
     settings = {"network": network, "training": training | {"passes": 15}}
@@ -78,7 +78,7 @@ def _sections(folder: Path) -> int:
     ("recipe", "written", "number"),
     [({}, False, 0), ({}, True, 5), (HURRIED, True, 1), (HURRIED, False, 3)],
 )
-def test_killed_before_or_after_any_write_it_ends_at_the_same_bits(
+def test_a_training_killed_at_any_write_ends_with_the_same_bits(
     data: Database,
     network: Settings,
     training: Settings,
@@ -120,7 +120,7 @@ def _numbers(state: State) -> dict[str, bytes]:
 
 
 @pytest.mark.parametrize("last", ["write_weights", "write_history", "save_npz"])
-def test_killed_between_the_files_at_the_end(
+def test_a_training_killed_while_writing_its_results_ends_with_the_same_bits(
     small_database: Path,
     network: Settings,
     training: Settings,
@@ -164,7 +164,25 @@ def test_more_passes_resume_and_fewer_start_again(
     assert torch.equal(to(2, "b"), to(2, "c"))
 
 
-def test_one_configuration_continues_another_as_if_it_were_one(
+def test_a_fraction_of_a_pass_is_its_first_sections(
+    data: Database, network: Settings, training: Settings, tmp_path: Path
+) -> None:
+    def to(passes: float, folder: str) -> State:
+        settings = training | {"passes": passes}
+        return train(data, network=network, training=settings, checkpoints=tmp_path / folder, threads=2)
+
+    third, whole = to(1 / 3, "a"), to(1, "b")
+    assert third.samples == data.section_pairs("train", 0, 3) < data.pairs("train")
+    assert [row[:3] for row in third.history] == [row[:3] for row in whole.history[:1]]
+    resumed = to(1, "a")
+    assert torch.equal(resumed.network.flat, whole.network.flat)
+    assert not torch.equal(third.network.flat, whole.network.flat)
+    assert torch.equal(to(4 / 3, "a").network.flat, to(4 / 3, "c").network.flat)
+    with pytest.raises(ValueError, match="whole number"):
+        training | {"passes": 0.5}
+
+
+def test_continuing_a_configuration_equals_one_longer_training(
     small_database: Path, data: Database, network: Settings, training: Settings, tmp_path: Path
 ) -> None:
     def go(name: str, passes: int, start: str | None) -> dict[str, np.ndarray]:
@@ -194,7 +212,7 @@ def test_one_configuration_continues_another_as_if_it_were_one(
     assert [f["steps"] for f in _checkpoints(tmp_path)] == [288, 144, 288]
 
 
-def test_another_start_is_another_run(
+def test_another_start_network_ignores_the_earlier_checkpoint(
     data: Database, network: Settings, training: Settings, tmp_path: Path
 ) -> None:
     """A run with its own recipe and another start does not use its earlier checkpoint."""
@@ -228,7 +246,7 @@ def test_another_start_is_another_run(
         ({"passes": 1}, "has 2 passes, but training.passes is 1"),
     ],
 )
-def test_an_unusable_start_is_refused(
+def test_an_unusable_start_network_is_refused(
     data: Database,
     network: Settings,
     training: Settings,
@@ -252,7 +270,7 @@ def _checkpoints(folder: Path) -> list[dict[str, np.ndarray]]:
     return [load_npz(folder / name / "checkpoint.npz") for name in ("holden-xt", "holden", "scratch")]
 
 
-def test_weights_are_all_that_a_runtime_needs(
+def test_the_weights_file_is_enough_for_the_runtime(
     small_database: Path, data: Database, network: Settings, training: Settings, tmp_path: Path
 ) -> None:
     files = {name: tmp_path / name for name in ("weights", "history", "checkpoint")}

@@ -11,9 +11,9 @@ import pytest
 import torch
 
 from hobble.database.reader import Database
-from hobble.measures.rollouts.crowd import Inputs
-from hobble.models.pfnn.fused import FusedStep
-from hobble.models.pfnn.step import Step
+from hobble.measures.rollouts.roll_outs import RollOutInputs
+from hobble.models.pfnn.fused import FusedPfnnStep
+from hobble.models.pfnn.step import PfnnStep
 from hobble.models.pfnn.trainable import initialise
 from hobble.training.batches import HostRows
 from hobble.training.rollout import RollOut
@@ -38,7 +38,7 @@ class Mixer:
         return x @ self.mixture
 
 
-def straight(data: Database) -> Inputs:
+def straight(data: Database) -> RollOutInputs:
     """A clip whose joints move exactly by their velocities, with a root that stands on level ground."""
     layout, rng, rows = data.layout, np.random.default_rng(2), STARTS + FRAMES
     x, y = rng.normal(0, 5, (rows, layout.x_size)), rng.normal(0, 5, (rows, layout.y_size))
@@ -49,15 +49,15 @@ def straight(data: Database) -> Inputs:
         carried = x[row, layout.x_joint_position] + y[row, layout.y_joint_velocity]
         y[row, layout.y_joint_position] = carried
     still = np.zeros(rows)
-    return Inputs(x, y, still, still, still, np.zeros((rows, 2)), still)
+    return RollOutInputs(x, y, still, still, still, np.zeros((rows, 2)), still)
 
 
-def test_poses_carry_the_errors_of_a_character(data: Database) -> None:
+def test_poses_carry_the_same_errors_as_a_roll_out(data: Database) -> None:
     """On consecutive rows, the result equals that of the evaluation's roll-out of the same clip."""
     layout, s = data.layout, data.statistics
-    asked, predictor = straight(data), Mixer(data)
+    given, predictor = straight(data), Mixer(data)
     starts = np.arange(STARTS)
-    made, _ = roll_out(predictor, asked, starts, FRAMES)  # type: ignore[arg-type]
+    made, _ = roll_out(predictor, given, starts, FRAMES)  # type: ignore[arg-type]
     carried = RollOut(data, 2 * STARTS, STARTS, CPU)
     carried.begin()
     whole = slice(FRAMES, None)  # places whose roll-out does not end meanwhile
@@ -68,13 +68,13 @@ def test_poses_carry_the_errors_of_a_character(data: Database) -> None:
         carried.add(added)
         off = added.numpy() * s.x_std
         if age:
-            truth = asked.y[at - 1][:, layout.y_joint_position]
+            truth = given.y[at - 1][:, layout.y_joint_position]
             expected = (made[age - 1].reshape(STARTS, -1) - truth)[whole]
             assert off[whole, layout.x_joint_position] == pytest.approx(expected, rel=1e-3, abs=1e-3)
             assert np.abs(expected).max() > 1
         off[:, pose] = 0
         assert np.all(off == 0)
-        error = predictor.predict(asked.x[at] + added.numpy() * s.x_std, None) - asked.y[at]
+        error = predictor.predict(given.x[at] + added.numpy() * s.x_std, None) - given.y[at]
         carried.remember(torch.from_numpy(error / s.y_std).float())
 
 
@@ -99,7 +99,7 @@ def test_each_place_restarts_after_its_frames(data: Database) -> None:
         assert set(np.sum(zero[frames : 2 * frames], axis=0)) == {1}
 
 
-def test_sections_do_not_depend_on_each_other_and_a_short_batch_is_one(data: Database) -> None:
+def test_roll_outs_do_not_depend_on_earlier_sections_or_short_batches(data: Database) -> None:
     carried = RollOut(data, 4, 6, CPU)
     carried.begin()
     carried.remember(torch.ones(6, data.layout.y_size))
@@ -147,8 +147,8 @@ def test_training_uses_the_roll_outs(
     assert number == len(given) == 8
 
 
-@pytest.mark.parametrize("kind", [Step, FusedStep])
-def test_a_step_keeps_its_errors(kind: type[Step]) -> None:
+@pytest.mark.parametrize("kind", [PfnnStep, FusedPfnnStep])
+def test_the_training_step_keeps_its_errors_for_the_roll_out(kind: type[PfnnStep]) -> None:
     network = initialise((6, 5, 4), 4, 1)
     generator = torch.Generator().manual_seed(1)
     x, y = (torch.randn(7, n, generator=generator) for n in (6, 4))

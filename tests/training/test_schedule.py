@@ -31,6 +31,13 @@ def test_a_cosine_falls_from_one_to_nothing() -> None:
     assert np.mean(shares) == pytest.approx(0.5)
 
 
+def test_a_cosine_of_half_a_pass_ends_after_half_a_pass() -> None:
+    recipe = Training(schedule="cosine", passes=0.5, sections=4)
+    shares = [learning_rate_share(recipe, passes) for passes in (0, 0.25, 0.5)]
+    assert shares == pytest.approx([1, 0.5, 0])
+    assert recipe.all_sections == 2
+
+
 def test_a_constant_rate_rises_and_stays() -> None:
     recipe = Training(warm_up=2.0, passes=10)
     shares = [learning_rate_share(recipe, passes) for passes in (0, 0.5, 1, 2, 5, 10)]
@@ -65,7 +72,7 @@ def test_each_batch_has_the_rate_of_its_place(
 
 
 @pytest.mark.parametrize("changes", [FAST, FAST | {"batch": 32, "schedule": "constant"}])
-def test_an_interrupted_training_with_a_schedule_ends_at_the_same_bits(
+def test_an_interrupted_training_with_a_schedule_ends_with_the_same_bits(
     data: Database,
     network: Settings,
     training: Settings,

@@ -47,7 +47,7 @@ def run(data: Database, network: Settings, training: Settings, tmp_path: Path) -
     return go
 
 
-def test_it_learns_and_generalises(run: Run) -> None:
+def test_a_training_lowers_the_error_on_held_out_rows(run: Run) -> None:
     state = run(passes=20, dropout=0.0, l1=0.0)
     first, last = state.history[0], state.history[-1]
     assert last[4] < 0.02 * first[4]
@@ -98,7 +98,7 @@ def test_rows_stay_with_the_host_where_there_is_no_accelerator(data: Database) -
     assert type(rows_for(data, torch.device("cpu"))) is HostRows
 
 
-def test_the_same_again_gives_the_same_bits(run: Run) -> None:
+def test_training_twice_gives_the_same_bits(run: Run) -> None:
     one, again = run("one"), run("two")
     assert torch.equal(one.network.flat, again.network.flat)
     assert torch.equal(one.adam.second, again.adam.second)
@@ -143,7 +143,9 @@ def test_without_held_out_clips_the_errors_are_left_empty(
     assert float(row["train_mse"]) > 0
 
 
-def test_a_held_out_sample_is_a_part_of_the_whole(data: Database, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_sample_of_all_held_out_rows_has_their_error(
+    data: Database, monkeypatch: pytest.MonkeyPatch
+) -> None:
     network = initialise((data.layout.x_size, 8, data.layout.y_size), 4, 1)
     held_out = HeldOut(data, torch.device("cpu"), 0)
     assert sum(len(part[0]) for part in held_out.sample) == 70
@@ -178,7 +180,7 @@ def test_a_row_that_is_not_finite_stops_training_and_is_named(
     assert np.isfinite(kept["weights"]).all()
 
 
-def test_training_resumes_after_the_broken_row_is_mended(
+def test_training_resumes_after_the_broken_row_is_repaired(
     run: Run, data: Database, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     with monkeypatch.context() as patch:
@@ -188,7 +190,7 @@ def test_training_resumes_after_the_broken_row_is_mended(
     assert torch.equal(run().network.flat, run("undisturbed").network.flat)
 
 
-def test_divergence_stops_it_and_names_the_clips(run: Run) -> None:
+def test_divergence_stops_the_training_and_names_the_clips(run: Run) -> None:
     with pytest.raises(
         HobbleError, match=r"diverged in pass 1 of 2, section \d of 3, batch \d+: .*(walk, hop|hop, walk)"
     ):
@@ -242,7 +244,7 @@ def test_bfloat16_is_chosen_where_a_device_has_it(
     assert start.step_for(network, training | {"batch": 256}) is half
 
 
-def test_the_place_of_the_rows_does_not_depend_on_free_memory(
+def test_where_rows_are_kept_does_not_depend_on_free_memory(
     data: Database, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """The order of the rows depends on where they are stored, and a run may be resumed while other programs

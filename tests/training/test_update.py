@@ -8,8 +8,8 @@ from typing import Any
 import pytest
 import torch
 
-from hobble.models.pfnn.fused import FusedStep
-from hobble.models.pfnn.step import Step
+from hobble.models.pfnn.fused import FusedPfnnStep
+from hobble.models.pfnn.step import PfnnStep
 from hobble.models.pfnn.trainable import initialise
 from hobble.training.optimiser import Adam
 from hobble.training.update import CapturedUpdate, Update, update_for
@@ -55,7 +55,7 @@ def updates() -> tuple[Update, CapturedUpdate]:
     for kind in (Update, CapturedUpdate):
         network = initialise((8, 7, 7, 5), 4, 1)
         adam = Adam(network, 0.01, 0.9, 0.999, 0.01)
-        step = Step(network, 0.3)
+        step = PfnnStep(network, 0.3)
         made.append(kind(step, adam, ROWS) if kind is CapturedUpdate else kind(step, adam))
         step.seed(3)
     plain, captured = made
@@ -65,7 +65,7 @@ def updates() -> tuple[Update, CapturedUpdate]:
 
 
 @pytest.mark.usefixtures("cuda")
-def test_a_captured_update_is_the_plain_one() -> None:
+def test_a_captured_cuda_update_equals_the_plain_one() -> None:
     """Also with a shorter batch among others, and rates that change."""
     plain, captured = updates()
     assert torch.equal(plain.adam.network.flat, captured.adam.network.flat)
@@ -89,4 +89,4 @@ def test_a_captured_update_is_the_plain_one() -> None:
 
 def test_nothing_is_captured_on_a_cpu() -> None:
     network = initialise((8, 7, 5), 4, 1)
-    assert type(update_for(FusedStep(network, 0.3), Adam(network, 0.01, 0.9, 0.999, 0.0), 32)) is Update
+    assert type(update_for(FusedPfnnStep(network, 0.3), Adam(network, 0.01, 0.9, 0.999, 0.0), 32)) is Update

@@ -15,7 +15,7 @@ from hobble.core.skeleton import Skeleton
 from hobble.database.reader import Database
 from hobble.models import model
 from hobble.models.pfnn.options import PfnnOptions
-from hobble.models.seen import Seen
+from hobble.models.seen import SeenInTraining
 from hobble.rows.layout import CONTACTS, GAITS, RowLayout
 from hobble.training.weights import write_weights
 
@@ -45,7 +45,7 @@ def test_the_file_holds_the_network_bit_for_bit(data: Database, tmp_path: Path) 
         np.testing.assert_array_equal(found[name[0].upper() + name[2:]], getattr(data.statistics, name))
 
 
-def test_the_file_says_what_its_columns_are(data: Database, tmp_path: Path) -> None:
+def test_the_weights_file_describes_its_columns(data: Database, tmp_path: Path) -> None:
     write(tmp_path / "weights.npz", data)
     meta = json.loads(str(load_npz(tmp_path / "weights.npz")["meta"]))
     assert RowLayout.from_dict(meta["layout"]) == data.layout
@@ -58,12 +58,10 @@ def test_the_file_says_what_its_columns_are(data: Database, tmp_path: Path) -> N
     assert (meta["kind"], meta["configuration"], meta["passes"]) == ("pfnn", "mine", 3)
 
 
-def test_the_file_says_what_was_seen_in_training_and_not_what_was_held_out(
-    data: Database, tmp_path: Path
-) -> None:
+def test_the_weights_file_has_the_ranges_of_the_training_rows_only(data: Database, tmp_path: Path) -> None:
     write(tmp_path / "weights.npz", data)
     arrays = load_npz(tmp_path / "weights.npz")
-    seen = Seen.read("weights.npz", arrays, data.layout.x_size, data.layout.y_size)
+    seen = SeenInTraining.read("weights.npz", arrays, data.layout.x_size, data.layout.y_size)
     assert seen is not None
     blocks = list(data.blocks("train", 0, 0, 1, 0))
     s = data.statistics
@@ -77,10 +75,10 @@ def test_the_file_says_what_was_seen_in_training_and_not_what_was_held_out(
 
 
 @pytest.mark.parametrize("memory", [64, 0])
-def test_what_was_seen_is_that_of_every_row_with_every_fit(small_database: Path, memory: int) -> None:
+def test_the_ranges_cover_every_row_with_every_fit(small_database: Path, memory: int) -> None:
     data = Database.open(small_database, memory)
     s = data.statistics
-    seen = Seen.of(data.layout, data.each_row("train"), s)
+    seen = SeenInTraining.of(data.layout, data.each_row("train"), s)
     (block,) = data.blocks("train", 0, 0, 1, 0, data.pairs("train"))
     x, y = block.x * s.x_std + s.x_mean, block.y * s.y_std + s.y_mean
     for name, values in (("x", x), ("y", y)):

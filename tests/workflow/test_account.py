@@ -64,7 +64,7 @@ def test_make_gives_snakemake_a_home_that_it_may_write(root: Path, home: str | N
     assert said.stdout.strip() == str(root / ".home")
 
 
-def test_make_leaves_a_home_alone(root: Path, tmp_path: Path) -> None:
+def test_make_does_not_change_a_writable_home(root: Path, tmp_path: Path) -> None:
     command = ["make", "--no-print-directory", "--eval", "home:; @echo $$HOME", "home"]
     given = {**os.environ, "HOME": str(tmp_path)}
     said = subprocess.run(command, cwd=root, env=given, capture_output=True, text=True, check=True)

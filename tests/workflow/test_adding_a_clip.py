@@ -41,7 +41,7 @@ def all_rows(path: Path) -> tuple[list[tuple[str, int]], np.ndarray]:
     return names, lowered[order][:, db.layout.y_root_velocity]
 
 
-def test_a_clip_more_makes_its_own_rows_its_shard_and_the_merge(clips: list[Path], workflow) -> None:
+def test_a_new_clip_runs_only_its_own_jobs_its_shard_and_the_merge(clips: list[Path], workflow) -> None:
     shards = [shard_of(clip.stem, SHARDS) for clip in clips]
     assert len(set(shards)) == 2
     folder = workflow.folder / "mocap" / "mine"

@@ -47,7 +47,7 @@ def run(given: Given, options: Options) -> Outcome:
     known = [entry["clip"] for entry in given.measured("accuracy")["clips"]]
     return Outcome({"every": options.every, "clips": rows, "known": known}, {"clips": rows}, "<hips>")
 """
-PAGE = """from hobble.report.parts import Part, Section, Words
+PAGE = """from hobble.report.page_parts import Part, Section, Words
 from hobble.report.summary import Figure, Hint
 from hobble.report.tables import Column, Table
 
@@ -65,7 +65,7 @@ def figures(found, material):
 def hints(found, material):
     yield Hint("note", "The hips were looked at.", f"In {len(found['clips'])} clips.")
 """
-COMPARISON = """from hobble.evaluation.side_by_side import SideBySide
+COMPARISON = """from hobble.evaluation.comparison_rows import SideBySide
 
 
 def compared(all_measured, published):
@@ -77,7 +77,7 @@ def tables(compared):
     return {"hips": compared["hips"]}
 """
 COMPARISON_PAGE = """from hobble.report.measured import Overview
-from hobble.report.parts import Part, Section, Words
+from hobble.report.page_parts import Part, Section, Words
 from hobble.report.tables import Column
 
 

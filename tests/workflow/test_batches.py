@@ -14,10 +14,10 @@ import pytest
 from hobble.core.errors import InputError
 from hobble.core.files import write_text
 from hobble.workflow.batch_job import make_each, pieces
-from hobble.workflow.batches import (
+from hobble.workflow.clip_batches import (
     LARGEST,
     SMALLEST,
-    Batch,
+    ClipBatch,
     batch_count,
     batch_of,
     dataset_of,
@@ -102,13 +102,13 @@ def whole(job: Job, clips: str = "abc") -> None:
         assert json.loads((found / f"{clip}.json").read_text()) == clip
 
 
-def test_few_clips_have_a_batch_each_and_thousands_about_thirty() -> None:
+def test_few_clips_have_one_batch_each_and_thousands_share_about_thirty() -> None:
     assert [batch_count(n) for n in (1, SMALLEST, SMALLEST + 1, SMALLEST * LARGEST)] == [1, 12, 12, 12]
     for clips in range(SMALLEST * LARGEST + 1, 20_000, 97):
         assert LARGEST / 2 <= clips / batch_count(clips) <= LARGEST
 
 
-def test_batches_depend_on_the_clip_alone_and_double_by_splitting() -> None:
+def test_the_batch_of_a_clip_depends_on_its_name_and_batches_split_in_two() -> None:
     names = [f"clip-{n}" for n in range(2500)]
     for name in names:
         assert batch_of(name, 24) % 12 == batch_of(name, 12)
@@ -117,8 +117,8 @@ def test_batches_depend_on_the_clip_alone_and_double_by_splitting() -> None:
     assert max(sizes) < 2 * 2500 / 96
 
 
-def test_names_of_rules_lead_back_to_the_data_set() -> None:
-    batch = Batch("cmu__ava x", 7, "07_hurt", ("a b",), True, hurt=True)
+def test_rule_names_give_their_data_set() -> None:
+    batch = ClipBatch("cmu__ava x", 7, "07_hurt", ("a b",), True, hurt=True)
     rule = batch.rule("terrain_fits")
     assert (family_of(rule), dataset_of(rule)) == ("terrain_fits", "cmu__ava x")
     assert (family_of("training"), dataset_of("training")) == ("training", "")
@@ -126,16 +126,16 @@ def test_names_of_rules_lead_back_to_the_data_set() -> None:
     assert rules_of_job(["snakemake", "results/test/report.html"]) == []
 
 
-def test_paths_of_clips_and_mirrors() -> None:
-    batch = Batch("d", 0, "a", ("a", "b_hurt2"), True)
+def test_clips_and_mirrors_have_their_paths() -> None:
+    batch = ClipBatch("d", 0, "a", ("a", "b_hurt2"), True)
     assert batch.of_names("motion/{clip}.npz") == [
         f"results/datasets/d/motion/{name}.npz" for name in ("a", "b_hurt2", "a_mirror", "b_hurt2_mirror")
     ]
     assert batch.of_originals("labels/{clip}.json")[1] == "results/datasets/d/labels/b.json"
-    assert Batch("d", 0, "a", ("a",), False).of_mirrors("motion/{clip}.npz") == []
+    assert ClipBatch("d", 0, "a", ("a",), False).of_mirrors("motion/{clip}.npz") == []
 
 
-def test_each_piece_gets_its_files() -> None:
+def test_each_clip_of_a_job_gets_its_files() -> None:
     job = SimpleNamespace(
         input=Named(one=["a", "b"], shared="s", some=["x", "y", "z"], none=[]),
         output=Named(out=["A", "B"], mirror=[]),
@@ -149,7 +149,7 @@ def test_each_piece_gets_its_files() -> None:
     assert (second.output, second.params) == ({"out": "B"}, {"clip": "b", "k": 2, "code": "c"})
 
 
-def test_nothing_is_made_twice(job: Job) -> None:
+def test_a_second_run_makes_no_clip_again(job: Job) -> None:
     assert job.run() == 0
     assert job.made == []
     whole(job)
@@ -170,7 +170,7 @@ def test_only_the_changed_clip_is_made_again(job: Job, what: str) -> None:
     assert "more" in job.outputs[1].read_text()
 
 
-def test_other_params_make_all_again(job: Job) -> None:
+def test_changed_params_make_all_clips_again(job: Job) -> None:
     job.times = 2
     assert job.run() == 0
     assert job.made == list("abc")
@@ -178,7 +178,9 @@ def test_other_params_make_all_again(job: Job) -> None:
 
 
 @pytest.mark.parametrize("word", ["torn", "bug"])
-def test_one_bad_clip_fails_alone(job: Job, word: str, capfd: pytest.CaptureFixture[str]) -> None:
+def test_one_bad_clip_does_not_stop_the_others(
+    job: Job, word: str, capfd: pytest.CaptureFixture[str]
+) -> None:
     for clip in "ab":
         (job.folder / f"{clip}.txt").write_text(f"{clip}\n{word if clip == 'a' else 'other'}\n")
     assert job.run() == 1
@@ -194,7 +196,7 @@ def test_one_bad_clip_fails_alone(job: Job, word: str, capfd: pytest.CaptureFixt
     assert job.outputs[1].read_text() == "b\nother\n"
 
 
-def test_what_is_kept_is_not_taken_if_it_is_damaged(job: Job) -> None:
+def test_a_damaged_kept_file_is_made_again(job: Job) -> None:
     """The damage is in both names of the file, and its time and size stay the same."""
     path = job.outputs[0]
     times = path.stat()
@@ -206,7 +208,7 @@ def test_what_is_kept_is_not_taken_if_it_is_damaged(job: Job) -> None:
     whole(job)
 
 
-def test_a_torn_record_costs_only_time(job: Job) -> None:
+def test_with_a_damaged_record_clips_are_made_again(job: Job) -> None:
     for record in (job.folder / "results/datasets/d/.made").rglob(".*.kept"):
         record.write_text(record.read_text()[:20])
     assert job.run() == 0

@@ -22,13 +22,13 @@ from tests.workflow.small_project import DATASET
         ("skeleton: s\nfolder: empty\n", "empty: no such folder"),
     ],
 )
-def test_a_data_set_that_cannot_work_is_reported(base: Path, text: str, message: str) -> None:
+def test_an_impossible_data_set_is_reported(base: Path, text: str, message: str) -> None:
     (base / "config/datasets/mine.yaml").write_text(text)
     with pytest.raises(HobbleError, match=message):
         Project(base, {}).configurations.splits("one")
 
 
-def test_where_all_clips_are_asked_for_no_clip_is_left(base: Path) -> None:
+def test_holding_out_all_clips_is_refused(base: Path) -> None:
     (base / "config/datasets/mine.yaml").write_text(DATASET.replace("[b]", "[a, b, c]"))
     with pytest.raises(HobbleError, match="mine: no clip is left to train on"):
         Project(base, {}).configurations.splits("hurt")
@@ -92,7 +92,7 @@ def test_wrong_names_in_clip_entries_are_reported_before_anything_runs(
         check(Project(complete, {}), ["results/one/report.html"])
 
 
-def test_one_file_on_both_sides_of_the_split_is_refused_before_anything_runs(complete: Path) -> None:
+def test_a_file_in_both_splits_is_refused_before_anything_runs(complete: Path) -> None:
     for name, text in (("a", "one motion"), ("b", "one motion"), ("c", "one m0tion")):
         (complete / f"data/mine/{name}.bvh").write_text(text)
     message = r'data set mine: b and a are the same file: the first .* Add to held_out: \["a"\]'

@@ -34,7 +34,7 @@ def test_checksums_are_in_the_results_folder_of_their_files() -> None:
         assert checksums.record_of(Path(other)) is None
 
 
-def test_every_flipped_bit_is_noticed(made: Path) -> None:
+def test_every_flipped_bit_is_detected(made: Path) -> None:
     whole = made.read_bytes()
     checksums.verify([str(made)])
     for at in range(len(whole)):
@@ -46,7 +46,7 @@ def test_every_flipped_bit_is_noticed(made: Path) -> None:
                 checksums.verify([str(made)])
 
 
-def test_damaged_checksums_are_noticed_and_missing_ones_pass(made: Path) -> None:
+def test_damaged_checksums_are_detected_and_missing_ones_accepted(made: Path) -> None:
     record = checksums.record_of(made)
     record.write_bytes(b"\xff\0")
     with pytest.raises(InputError, match="damaged"):
@@ -96,7 +96,7 @@ def test_a_job_refuses_a_damaged_input_and_writes_checksums(made: Path, capsys) 
 
 
 @pytest.mark.parametrize("how", ["rewritten", "replaced", "removed"])
-def test_an_input_that_changes_meanwhile_ends_the_job(made: Path, capsys, how: str) -> None:
+def test_an_input_that_changes_during_a_job_fails_it(made: Path, capsys, how: str) -> None:
     def work(output: Path) -> None:
         same = made.read_bytes()
         made.unlink() if how != "rewritten" else None

@@ -16,7 +16,7 @@ from hobble.workflow.targets import notes
 from tests.workflow.small_project import DATASET
 
 
-def test_files_beside_a_clip_are_found_and_no_others(base: Path) -> None:
+def test_only_the_files_beside_a_clip_are_found(base: Path) -> None:
     project = Project(base, {})
     assert [Path(f).name for f in project.clips.label_files("mine", "b")] == ["b_gait.txt"]
     assert project.clips.label_files("mine", "c") == []
@@ -25,7 +25,7 @@ def test_files_beside_a_clip_are_found_and_no_others(base: Path) -> None:
     ]
 
 
-def test_a_listed_clip_without_its_file_is_told(base: Path) -> None:
+def test_a_listed_clip_without_a_file_is_reported(base: Path) -> None:
     (base / "config/datasets/mine.yaml").write_text(DATASET + "clips: {a: , b: , gone: }\n")
     with pytest.raises(HobbleError, match=r"gone\.bvh: no such file"):
         Project(base, {}).clips.source("mine", "gone")
@@ -46,7 +46,7 @@ def test_clips_are_found_in_subfolders_and_whatever_the_case_of_their_suffix(bas
     assert project.datasets.channel_sources.files("mine", "d", "injury") == [str(below / "d_injuries.txt")]
 
 
-def test_clips_are_found_in_linked_folders_once_whatever_leads_there(base: Path) -> None:
+def test_a_clip_in_linked_folders_is_found_once(base: Path) -> None:
     """A linked collection is found once, even if one of its links leads back to it."""
     kept = base / "kept/day 1"
     kept.mkdir(parents=True)
@@ -115,7 +115,7 @@ def test_a_clip_depends_on_the_skeleton_that_it_is_retargeted_from(complete: Pat
 
 
 @pytest.mark.shared
-def test_the_plan_and_the_job_agree_on_the_rig(root: Path, shared: Path) -> None:
+def test_plan_and_job_use_the_same_rig_file(root: Path, shared: Path) -> None:
     from hobble.motion.make import load_source
     from hobble.motion.read import read_bvh
     from hobble.motion.rig import load_skeleton

@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 import yaml
 
-from hobble.workflow.batches import SMALLEST, Batch, batch_of
+from hobble.workflow.clip_batches import SMALLEST, ClipBatch, batch_of
 from hobble.workflow.demands import ENGINE_MB, WEEK_MINUTES, Demands, bvh_seconds
 from hobble.workflow.project import Project
 from hobble.workflow.resource_use import planned_jobs, with_use
@@ -66,7 +66,7 @@ def test_a_job_on_another_machine_has_the_rules_of_its_batch_only(workflow) -> N
 
 
 @pytest.mark.parametrize("name", ["slurm", "kubernetes", "s3"])
-def test_a_profile_keeps_what_the_default_one_says(root, name: str) -> None:
+def test_cluster_profiles_have_the_settings_of_the_default_one(root, name: str) -> None:
     ours, default = profile(root, name), profile(root, "default")
     del default["logger"]  # on a cluster Snakemake's full output says which job went where
     asked = default.pop("default-resources")
@@ -91,15 +91,15 @@ def test_configurations_train_side_by_side(workflow) -> None:
 
 
 @pytest.mark.workflow
-def test_a_gpu_is_asked_for_where_training_is_told_to_use_one(workflow) -> None:
+def test_a_gpu_is_requested_if_training_uses_one(workflow) -> None:
     weights = "results/test/network/weights.npz"
     told = workflow.run("-np", "--config", "training={device: cuda}", "--", weights)
     assert len(re.findall("gpu=1", told)) == 1
     assert "gpu=1" not in workflow.run("-np", weights)
 
 
-def alone(dataset: str, clip: str) -> Batch:
-    return Batch(dataset, 0, clip, (clip,), mirrored=True)
+def alone(dataset: str, clip: str) -> ClipBatch:
+    return ClipBatch(dataset, 0, clip, (clip,), mirrored=True)
 
 
 def test_requests_grow_with_motion_and_attempt(demands) -> None:
@@ -115,7 +115,7 @@ def test_requests_grow_with_motion_and_attempt(demands) -> None:
 
 
 def test_a_batch_requests_the_memory_of_its_longest_clip_and_the_time_of_all(demands) -> None:
-    both = Batch("synthetic", 0, "0", ("jog-1", "jog-2"), mirrored=True)
+    both = ClipBatch("synthetic", 0, "0", ("jog-1", "jog-2"), mirrored=True)
     each = [alone("synthetic", clip) for clip in both.clips]
     assert demands.batch_memory(both, 200) == max(demands.batch_memory(one, 200) for one in each)
     assert demands.batch_minutes(both, 6000) == pytest.approx(
@@ -123,7 +123,7 @@ def test_a_batch_requests_the_memory_of_its_longest_clip_and_the_time_of_all(dem
     )
 
 
-def test_the_length_of_a_clip_is_that_of_its_rows_not_what_its_header_promises(tmp_path) -> None:
+def test_the_length_of_a_clip_is_counted_from_its_rows(tmp_path) -> None:
     assert bvh_seconds(bvh(tmp_path / "a.bvh", 500, 2_000_000_000)) == pytest.approx(5.0)
     assert bvh_seconds(bvh(tmp_path / "b.bvh", 500, 500, "1e9")) <= 500
     assert bvh_seconds(bvh(tmp_path / "c.bvh", 0, 500)) is None

@@ -9,7 +9,7 @@ import sys
 from pathlib import Path
 
 from hobble.workflow import environment
-from hobble.workflow.environment import Line, follow
+from hobble.workflow.environment import ProgressLine, follow
 
 SAID = """Collecting torch==2.13.0
   Downloading torch-2.13.0-cp311-none-linux.whl.metadata (31 kB)
@@ -29,9 +29,9 @@ class Screen(io.StringIO):
         return True
 
 
-def test_on_a_terminal_one_line_says_what_is_fetched_and_how_far_it_is() -> None:
+def test_on_a_terminal_one_line_shows_the_package_and_progress() -> None:
     screen = Screen()
-    words = follow(SAID, Line(screen))
+    words = follow(SAID, ProgressLine(screen))
     shown = [text.partition("\x1b[K")[2] for text in screen.getvalue().split("\r")]
     assert "environment: 95 MB fetched; torch 95 of 190 MB" in shown
     assert "environment: 207 MB fetched; unpacking 2 packages, which takes a while"[:78] in shown
@@ -41,9 +41,9 @@ def test_on_a_terminal_one_line_says_what_is_fetched_and_how_far_it_is() -> None
     assert not any("Progress" in word for word in words)
 
 
-def test_in_a_file_a_line_comes_now_and_then() -> None:
+def test_in_a_file_progress_is_printed_now_and_then() -> None:
     out = io.StringIO()
-    follow(SAID * 20, Line(out))
+    follow(SAID * 20, ProgressLine(out))
     lines = out.getvalue().splitlines()
     assert len(lines) == 1 + 20  # and the unpacking at once, because pip prints nothing about it
     assert "unpacking 2 packages" in lines[-1]
@@ -60,17 +60,17 @@ def test_pips_last_lines_are_printed_if_it_fails(tmp_path: Path) -> None:
     assert "The environment could not be made" in end.stderr
 
 
-def test_it_needs_nothing_that_is_not_in_python() -> None:
+def test_it_imports_only_the_standard_library() -> None:
     """It imports only the standard library, because it runs before there is an environment."""
     imported = re.findall(r"^(?:from|import) (\w+)", Path(environment.__file__).read_text(), re.M)
     assert set(imported) <= set(sys.stdlib_module_names)
 
 
-def test_it_fetches_the_torch_that_the_project_names(root: Path) -> None:
+def test_the_torch_version_is_the_one_in_the_project_file(root: Path) -> None:
     assert f'"{environment.STEPS[0][0]}"' in (root / "pyproject.toml").read_text()
 
 
-def test_a_sound_environment_is_not_made_anew(tmp_path: Path) -> None:
+def test_a_working_environment_is_kept(tmp_path: Path) -> None:
     """venv copies the interpreter, which fails while a program runs in the environment."""
     assert environment.is_sound(Path(sys.executable))
     assert not environment.is_sound(tmp_path / "bin" / "python")

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from hobble.workflow.batches import SMALLEST, batch_of
+from hobble.workflow.clip_batches import SMALLEST, batch_of
 
 pytestmark = pytest.mark.workflow
 
@@ -87,7 +87,7 @@ def spoil(lines: list[str], how: str) -> str:
         ("binary", ()),
     ],
 )
-def test_a_bad_clip(mine, how: str, pieces: tuple[str, ...]) -> None:
+def test_a_bad_clip_is_refused_with_its_place(mine, how: str, pieces: tuple[str, ...]) -> None:
     path: Path = mine.mine / f"{mine.clip}.bvh"
     if how == "empty":
         path.write_bytes(b"")
@@ -107,14 +107,14 @@ def test_a_bad_clip(mine, how: str, pieces: tuple[str, ...]) -> None:
         ("frames:7", ("line 1", "7")),
     ],
 )
-def test_a_bad_status_file(mine, line: str, pieces: tuple[str, ...]) -> None:
+def test_a_bad_status_file_is_refused_with_its_line(mine, line: str, pieces: tuple[str, ...]) -> None:
     path: Path = mine.mine / f"{mine.clip}_injuries.txt"
     first = path.read_text().splitlines()[0]
     path.write_text(f"{line}\n" if line.startswith("frames") else f"{first}\n{line}\n")
     refused(mine, "channels/injury", path.name, *pieces)
 
 
-def test_a_data_folder_that_is_not_there(mine) -> None:
+def test_a_missing_data_folder_is_named(mine) -> None:
     text = mine.run("-n", "results/datasets/mine/motion/a.npz", "--config", "mocap=nowhere", ok=False)
     assert "nowhere/mine: no such folder" in text
     assert "mocap=FOLDER" in text
@@ -128,7 +128,7 @@ def test_a_data_folder_that_is_not_there(mine) -> None:
         ("dataset=nope", "nope.yaml: no such file. There are:"),
     ],
 )
-def test_a_bad_configuration_ends_before_the_dag(workflow, override: str, message: str) -> None:
+def test_a_bad_configuration_is_refused_before_planning(workflow, override: str, message: str) -> None:
     text = workflow.run("-np", "results/test/report.html", "--config", override, ok=False)
     assert message in text
     assert "Building DAG" not in text
@@ -149,7 +149,7 @@ def small_disk(workflow) -> Iterator[Path]:
     subprocess.run(["umount", "-l", str(results)], check=True)
 
 
-def test_a_disk_that_fills(workflow, small_disk: Path) -> None:
+def test_a_full_disk_gives_a_message_and_the_next_run_completes(workflow, small_disk: Path) -> None:
     target = "results/datasets/tiny/database/injury"
     text = workflow.run("-c2", target, "--keep-going", ok=False)
     assert "the disk is full" in text
@@ -161,7 +161,7 @@ def test_a_disk_that_fills(workflow, small_disk: Path) -> None:
     assert {p: p.read_bytes() for p in whole} == whole
 
 
-def test_one_bad_clip_of_a_batch_fails_alone(clips: list[Path], workflow) -> None:
+def test_one_bad_clip_of_a_batch_does_not_stop_the_others(clips: list[Path], workflow) -> None:
     """There are enough clips for shared batches. Only one batch, of three clips, is requested."""
     names = [f"clip-{number}" for number in range(200)]
     together = [name for name in names if batch_of(name, SMALLEST) == 5][:3]

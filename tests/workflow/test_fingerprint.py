@@ -85,7 +85,7 @@ def mark(root: Path) -> str:
     return fp.fingerprint(root / "script.py", root / "src")
 
 
-def test_the_closure_follows_imports_through_modules_but_not_into_the_frame(source: Path) -> None:
+def test_a_fingerprint_follows_imports_but_not_infrastructure(source: Path) -> None:
     found = fp.closure(source / "script.py", source / "src")
     assert {path.name for path in found} == {"__init__.py", "near.py", "far.py", "options.py"}
 
@@ -119,7 +119,7 @@ def test_the_closure_follows_imports_through_modules_but_not_into_the_frame(sour
         ("src/hobble/workflow/job.py", "x = 1", "x = 2", False),
     ],
 )
-def test_code_counts_and_text_does_not(source: Path, file: str, old: str, new: str, changes: bool) -> None:
+def test_only_code_changes_a_fingerprint(source: Path, file: str, old: str, new: str, changes: bool) -> None:
     before = mark(source)
     path = source / file
     assert old in path.read_text()
@@ -133,7 +133,7 @@ def test_infrastructure_modules_exist_and_have_a_reason(root: Path) -> None:
         assert reason
 
 
-def test_no_stage_imports_from_below(root: Path) -> None:
+def test_no_stage_imports_a_later_one(root: Path) -> None:
     order = [*DATASET_STAGES, "training", "runtime", "evaluation", "report"]
     order.insert(order.index("database"), "rows")
     order.insert(order.index("training"), "character")

@@ -41,7 +41,7 @@ def test_a_run_locks_after_another_removed_the_folder(runs: tuple[Locks, Locks])
     assert list(runs[0]._read_locks()) == [("output", "b.npz")]
 
 
-def test_a_lock_that_goes_while_another_run_reads(
+def test_a_lock_may_disappear_while_another_run_reads_it(
     runs: tuple[Locks, Locks], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     for name in ("a.npz", "b.npz"):

@@ -48,11 +48,11 @@ OTHERS = [
 
 
 @pytest.mark.parametrize("file", [*chain(*(rule.outputs for rule in RULES)), *OTHERS])
-def test_a_file_has_the_rules_that_snakemake_finds(file):
+def test_a_file_has_the_same_rules_as_without_this_module(file):
     assert NamedOutputs(RULES).match_producers(file) == OutputIndex(RULES).match_producers(file)
 
 
-def test_rules_that_name_a_file_are_not_asked(monkeypatch):
+def test_rules_with_fixed_output_names_are_looked_up_directly(monkeypatch):
     asked = []
     monkeypatch.setattr(Rule, "is_producer", lambda rule, file: asked.append(rule.name))
     index = NamedOutputs(RULES)

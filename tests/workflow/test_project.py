@@ -54,13 +54,13 @@ def test_a_hurt_version_has_the_mood_of_its_clip(base: Path) -> None:
     assert project.measurements.people("both", "accuracy") == {}
 
 
-def test_a_status_in_the_configuration_takes_the_place_of_the_file(base: Path) -> None:
+def test_a_status_in_the_data_set_replaces_the_file(base: Path) -> None:
     text = DATASET + "clips: {a: , b: , c: {channels: {injury: 'LeftArm-LeftForeArm[3]'}}}\n"
     (base / "config/datasets/mine.yaml").write_text(text)
     assert Project(base, {}).datasets.channel_sources.files("mine", "c", "injury") == []
 
 
-def test_severities_of_0_hurt_nobody(base: Path) -> None:
+def test_severities_of_0_count_as_healthy(base: Path) -> None:
     (base / "data/mine/a_injuries.txt").write_text(
         "frames:9\n1-9 LeftLeg-LeftFoot[0];LeftArm-LeftForeArm[0.0];\n"
     )
@@ -86,7 +86,7 @@ def test_severities_of_0_hurt_nobody(base: Path) -> None:
 
 
 @pytest.mark.parametrize("name", ["Walk Forward", "walk, slow (2)", "gå+走"])
-def test_a_clip_can_be_configured_whatever_its_file_is_called(base: Path, name: str) -> None:
+def test_a_clip_with_any_file_name_can_have_an_entry(base: Path, name: str) -> None:
     (base / f"data/mine/{name}.bvh").write_text("")
     text = f"{DATASET.replace('[b]', json.dumps([name]))}clips: {{a: , {json.dumps(name)}: {{gait: jog}}}}\n"
     (base / "config/datasets/mine.yaml").write_text(text)
@@ -96,7 +96,7 @@ def test_a_clip_can_be_configured_whatever_its_file_is_called(base: Path, name: 
     assert project.clips.source("mine", name) == str(base / f"data/mine/{name}.bvh")
 
 
-def test_the_walkers_frames_are_shared_out(root: Path) -> None:
+def test_the_frames_of_the_synthetic_data_set_are_divided_among_its_clips(root: Path) -> None:
     project = Project(root, {})
     total = sum(project.datasets.frames("synthetic", clip) for clip in project.clips.listed("synthetic"))
     assert abs(total - 11_412) < 20
@@ -109,7 +109,7 @@ def test_network_of_reads_the_other_configurations_files(root: Path) -> None:
     assert project.configurations.start("holden") == []
 
 
-def test_what_is_compared(complete: Path) -> None:
+def test_a_comparison_reads_the_files_of_its_configurations(complete: Path) -> None:
     base = complete
     project = Project(base, {"compare": ["one", "hurt"]})
     check(project, ["results/compare/compare.json"])
@@ -134,7 +134,9 @@ def test_what_is_compared(complete: Path) -> None:
         ({"a": "one"}, "must be a list of names"),
     ],
 )
-def test_what_cannot_be_compared(complete: Path, names: object, message: str) -> None:
+def test_configurations_that_cannot_be_compared_are_refused(
+    complete: Path, names: object, message: str
+) -> None:
     project = Project(complete, {"compare": names})
     check(project, ["results/one/report.html"])
     with pytest.raises(HobbleError, match=message):
@@ -148,7 +150,7 @@ def test_names_of_results_folders_are_reserved(base: Path, name: str) -> None:
         Project(base, {})
 
 
-def test_motion_knows_what_the_clip_s_entry_says_of_it(root):
+def test_motion_options_include_the_ground_of_the_clip(root):
     datasets = Project(root, {}).datasets
     assert datasets.motion_options("cmu", "03_01")["ground"] == "rocky"
     assert datasets.motion_options("cmu", "02_01") == {**datasets.options("cmu", "motion"), "ground": "flat"}
@@ -160,7 +162,7 @@ def test_a_mocap_that_is_not_a_folder_is_reported(base: Path, asked: object) -> 
         Project(base, {"mocap": asked})
 
 
-def test_sections_may_be_asked_for_some_of_their_keys(root: Path) -> None:
+def test_single_keys_of_a_section_can_be_requested(root: Path) -> None:
     project = Project(root, {})
     assert project.datasets.options("tiny", "database", "window", "step") == {"window": 60, "step": 10}
     with pytest.raises(KeyError):

@@ -39,7 +39,7 @@ def artefacts(folder: Path) -> dict[str, bytes]:
     return {str(p.relative_to(root)): p.read_bytes() for p in sorted(files)}
 
 
-def test_the_report_and_everything_beside_it_is_made(finished) -> None:
+def test_the_report_and_all_other_results_are_made(finished) -> None:
     results = finished.folder / "results" / "test"
     accuracy = json.loads((results / "evaluation/accuracy.json").read_text())
     assert accuracy["configuration"] == "test"
@@ -86,7 +86,7 @@ def test_more_passes_retrain_and_leave_the_database(finished) -> None:
     assert not {"database_merge", "database_clips", "motion_clips", "terrain_fits"} & set(planned)
 
 
-def test_editing_labels_reruns_from_labels_on(copied) -> None:
+def test_editing_labels_runs_labels_and_later_stages_again(copied) -> None:
     module = copied.own_source() / "labels/contacts.py"
     module.write_text(module.read_text() + "\n_EDITED = 1\n")
     planned = copied.planned(TARGET)
@@ -112,7 +112,7 @@ def test_editing_a_comment_in_the_code_reruns_nothing(copied) -> None:
     assert "Nothing to be done" in copied.run("-n", TARGET)
 
 
-def test_writing_out_a_default_reruns_nothing(copied) -> None:
+def test_writing_a_default_into_the_configuration_reruns_nothing(copied) -> None:
     copied.edit("config/datasets/tiny.yaml", "held_out:", "motion: {fps: 60.0}\nheld_out:")
     assert "Nothing to be done" in copied.run("-n", TARGET)
 
@@ -150,7 +150,7 @@ def test_a_configuration_that_continues_another_starts_at_its_end(copied) -> Non
     assert len(rows) == 1 + 3 * 10
 
 
-def test_no_job_used_more_than_its_rule_requests(finished) -> None:
+def test_no_job_uses_more_than_its_rule_requests(finished) -> None:
     jobs = list(with_use(planned_jobs(finished.run("-np", "-F", TARGET)), finished.folder))
     assert {"motion_clips", "terrain_fits", "training", "report"} <= {job.rule for job in jobs if job.used_mb}
     assert [
@@ -160,7 +160,7 @@ def test_no_job_used_more_than_its_rule_requests(finished) -> None:
     ] == []
 
 
-def test_what_leaves_the_page_is_made_by_name(copied) -> None:
+def test_every_export_is_made_by_its_own_rule(copied) -> None:
     """The exports for a game engine, for other pages and for the original's demo, each by its own rule."""
     folder = "results/test/export"
     targets = [f"{folder}/{name}" for name in ("character.glb", "web", "pfnn", "linear.onnx")]

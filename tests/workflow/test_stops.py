@@ -63,7 +63,7 @@ def same_network(one: Path, other: Path) -> bool:
     [(signal.SIGINT, True), (signal.SIGINT, False), (signal.SIGTERM, False)],
     ids=["Ctrl-C", "SIGINT", "SIGTERM"],
 )
-def test_a_signal_ends_the_jobs_at_once_and_leaves_no_lock(
+def test_a_signal_ends_all_jobs_and_leaves_no_lock(
     finished, copied, number: signal.Signals, to_all: bool
 ) -> None:
     process = started(copied, "-c2", WEIGHTS, until=without_network(copied))
@@ -91,7 +91,7 @@ def test_a_training_ends_soon_after_the_snakemake_that_was_killed(finished, copi
     assert same_network(finished.folder, copied.folder)
 
 
-def test_killed_in_the_merge_the_plain_command_goes_on(finished, copied) -> None:
+def test_after_a_kill_in_the_merge_the_same_command_continues(finished, copied) -> None:
     shutil.rmtree(copied.folder / DATABASE)
     there = copied.folder / DATABASE / "injury"
     process = started(copied, "-c2", f"{DATABASE}/injury", until=there.exists)
@@ -104,7 +104,7 @@ def test_killed_in_the_merge_the_plain_command_goes_on(finished, copied) -> None
     assert manifests[0] == manifests[1]
 
 
-def test_a_second_run_beside_a_living_one_is_refused(copied) -> None:
+def test_a_second_run_is_refused_while_the_first_runs(copied) -> None:
     process = started(copied, "-c2", WEIGHTS, until=without_network(copied))
     jobs = jobs_of(process)
     for job in jobs:

@@ -1,4 +1,4 @@
-from hobble.database.options import Merging, Rows
+from hobble.database.options import Merging, RowOptions
 
 for batch in [*batches_of_clips, *batches_of_versions]:
 
@@ -41,7 +41,7 @@ for batch in [*batches_of_clips, *batches_of_versions]:
                 batch.dataset
             ),
             options=lambda w, batch=batch: datasets.part(
-                batch.dataset, "database", Rows
+                batch.dataset, "database", RowOptions
             ),
             code=lambda w, batch=batch: package.code(
                 "database_clips",

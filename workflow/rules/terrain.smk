@@ -1,4 +1,4 @@
-from hobble.terrain.options import Drawing, Fitting, Sampling
+from hobble.terrain.options import Drawing, Fitting, HeightSampling
 
 
 rule terrain_patches:
@@ -55,7 +55,7 @@ for batch in [*batches_of_clips, *batches_of_versions]:
                 batch.dataset, "terrain", Fitting
             ),
             sampling=lambda w, batch=batch: datasets.part(
-                batch.dataset, "database", Sampling
+                batch.dataset, "database", HeightSampling
             ),
             code=lambda w: package.code("terrain_fits"),
         script:

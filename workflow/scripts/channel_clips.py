@@ -1,7 +1,7 @@
 """Creates the values of channels in each frame of clips and their mirrors from the data set's sources."""
 
 from hobble.channels import channel
-from hobble.channels.files import clip_values, save_values, write_report
+from hobble.channels.clip_values import clip_values, save_values, write_report
 from hobble.core.clip import load_clip
 from hobble.core.files import read_json
 from hobble.workflow.batch_job import make_each

@@ -6,9 +6,9 @@ import yaml
 
 from hobble.core.files import write_json
 from hobble.evaluation.compare_configurations import compare
-from hobble.evaluation.compare_tables import tables
+from hobble.evaluation.comparison_csv import tables
 from hobble.evaluation.configuration_results import read_results
-from hobble.evaluation.tables import write_tables
+from hobble.evaluation.csv_tables import write_tables
 from hobble.workflow.job import job
 
 with job(snakemake):

@@ -1,10 +1,10 @@
 """Creates the rows of clips from their motion, labels, channel values and terrain fits."""
 
-from hobble.channels.files import load_values
+from hobble.channels.clip_values import load_values
 from hobble.core.clip import load_clip
 from hobble.core.files import load_npz
-from hobble.database.options import Rows
-from hobble.rows.build import clip_rows
+from hobble.database.options import RowOptions
+from hobble.rows.build_rows import clip_rows
 from hobble.rows.clip_rows import save_clip_rows
 from hobble.rows.facts import facts, save_facts
 from hobble.workflow.batch_job import make_each
@@ -12,7 +12,7 @@ from hobble.workflow.batch_job import make_each
 
 def make(piece, log):
     """Make the rows of a clip."""
-    options = Rows.model_validate(piece.params["options"])
+    options = RowOptions.model_validate(piece.params["options"])
     channels = zip(piece.params["channels"], piece.input.get("channels", []), strict=True)
     rows = clip_rows(
         piece.name,

@@ -1,8 +1,8 @@
 """Creates hurt versions of healthy clips and their mirrors: motion, labels, severities and reports."""
 
 from hobble.channels import channel
-from hobble.channels.files import load_values, save_values
-from hobble.channels.files import write_report as write_channel_report
+from hobble.channels.clip_values import load_values, save_values
+from hobble.channels.clip_values import write_report as write_channel_report
 from hobble.core.clip import load_clip, save_clip
 from hobble.core.files import read_json, write_json
 from hobble.hurt.options import HURT_CHANNEL, Hurt

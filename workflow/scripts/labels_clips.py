@@ -4,7 +4,7 @@ from hobble.core.clip import load_clip
 from hobble.core.files import read_json
 from hobble.labels.label import label_clip, mirror_labels, write_report
 from hobble.labels.model import LabelReport, load_labels, save_labels
-from hobble.labels.options import Labels
+from hobble.labels.options import LabelOptions
 from hobble.workflow.batch_job import make_each
 
 
@@ -17,7 +17,7 @@ def make(piece, log):
         read_json(piece.input["report"]),
         piece.params["gait"],
         piece.params["ground"],
-        Labels.model_validate(piece.params["options"]),
+        LabelOptions.model_validate(piece.params["options"]),
     )
     for warning in report.warnings:
         log.info("%s: %s", report.clip, warning)

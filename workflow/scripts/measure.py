@@ -4,7 +4,7 @@ import importlib
 from pathlib import Path
 
 from hobble.core.files import write_json
-from hobble.evaluation.tables import write_tables
+from hobble.evaluation.csv_tables import write_tables
 from hobble.measures.given import Given
 from hobble.runtime.options import Runtime
 from hobble.workflow.job import job

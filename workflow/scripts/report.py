@@ -6,20 +6,20 @@ from hobble.core.files import write_text
 from hobble.models.load import load_network
 from hobble.report.captured_and_predicted import comparisons
 from hobble.report.gather import gather
+from hobble.report.pack_recogniser import playable_with_recogniser
 from hobble.report.page import render
-from hobble.report.recogniser import playable_with_recogniser
 from hobble.report.scenes import scenes
 from hobble.report.walked import opened
 from hobble.runtime.options import Runtime
 from hobble.workflow.job import job
 
 with job(snakemake):
-    given, asked = snakemake.input, snakemake.params
+    given, params = snakemake.input, snakemake.params
     material = gather(
-        name=asked.configuration,
-        dataset=asked.dataset,
-        title=asked.title,
-        splits=asked.splits,
+        name=params.configuration,
+        dataset=params.dataset,
+        title=params.title,
+        splits=params.splits,
         configuration=given.configuration,
         measured=given.measured,
         pipeline=given.pipeline,
@@ -37,6 +37,6 @@ with job(snakemake):
     runtime = Runtime.model_validate(material.resolved["configuration"]["runtime"])
     character = playable_with_recogniser(trained, runtime)
     hero = opened(trained, runtime, character, material.measured.values())
-    compared = comparisons(trained, given.rows, asked.splits)
+    compared = comparisons(trained, given.rows, params.splits)
     bundle = Path(given.bundle).read_text(encoding="utf-8")
     write_text(snakemake.output.html, render(material, play, character, compared, bundle, hero))

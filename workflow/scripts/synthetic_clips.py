@@ -3,7 +3,7 @@
 from pathlib import Path
 
 from hobble.core.untrusted import read_yaml
-from hobble.synthetic.clip import write_clip
+from hobble.synthetic.generate_clip import write_clip
 from hobble.synthetic.options import Synthetic
 from hobble.workflow.batch_job import make_each
 

@@ -7,12 +7,12 @@ import importlib
 import importlib.util
 from collections.abc import Iterable
 
-from hobble.channels.channel import Channel, Source
+from hobble.channels.channel import Channel, ClipSource
 
 __all__ = [
     "NAMES",
     "Channel",
-    "Source",
+    "ClipSource",
     "channel",
     "channel_of_old_key",
     "every",

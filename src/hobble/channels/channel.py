@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from hobble.core.section import Section
 
 
-class Rig(Protocol):
+class HasLinks(Protocol):
     """What the columns of a channel may depend on: a clip's skeleton, or a skeleton file."""
 
     @property
@@ -25,7 +25,7 @@ class Rig(Protocol):
 
 
 @dataclass(frozen=True)
-class Source:
+class ClipSource:
     """Where the values of one clip come from.
 
     clip: its name (for a mirrored clip, the original's). entry: its entry in the data set. value: the part of
@@ -49,8 +49,8 @@ class Channel(ABC):
     clip that holds values, or None. old_keys: keys of this channel in older files. Options: model of the data
     set's section `channels.<name>`. If it is None, every data set has the channel; else only those with the
     section. slows: whether values above 0 make the body slower. Then its speed limits are learnt from the
-    rows (see `hobble.channels.limits`). manner: whether a column above 0 is a manner in which a whole clip
-    walks, such as a mood. Then `hobble.measures.manners` measures whether a recogniser sees it. targets:
+    rows (see `hobble.channels.speed_limits`). manner: whether a column above 0 is a manner in which a whole
+    clip walks, such as a mood. Then `hobble.measures.manners` measures whether a recogniser sees it. targets:
     folders of results/<configuration>/ that only a configuration with this channel can have.
     """
 
@@ -67,32 +67,32 @@ class Channel(ABC):
     targets: Sequence[str] = ()
 
     @abstractmethod
-    def columns(self, rig: Rig) -> tuple[str, ...]:
+    def columns(self, rig: HasLinks) -> tuple[str, ...]:
         """Labels of the columns for a skeleton. No label appears twice."""
 
     @abstractmethod
-    def is_neutral(self, source: Source) -> bool:
+    def is_neutral(self, source: ClipSource) -> bool:
         """Whether the values are 0 in all frames. Every network may train on such a clip.
 
         Raises InputError if the source cannot be read.
         """
 
     @abstractmethod
-    def read(self, clip: Clip, source: Source, motion: Mapping[str, Any]) -> tuple[Array, list[str]]:
+    def read(self, clip: Clip, source: ClipSource, motion: Mapping[str, Any]) -> tuple[Array, list[str]]:
         """Values (F, C) float32 of a clip, one column for each label, and warnings.
 
         motion: the report of the motion stage. Raises InputError if the source cannot be read.
         """
 
-    def check(self, source: Source, rig: Rig) -> None:  # noqa: B027 - most channels check nothing
+    def check(self, source: ClipSource, rig: HasLinks) -> None:  # noqa: B027 - most channels check nothing
         """Raise InputError if the clip's entry or the options are wrong. Called before any job runs."""
 
-    def source(self, fields: Mapping[str, Any], files: Sequence[str | Path] = ()) -> Source:
-        """A source from plain data: the fields of a `Source` without `files`.
+    def source(self, fields: Mapping[str, Any], files: Sequence[str | Path] = ()) -> ClipSource:
+        """A source from plain data: the fields of a `ClipSource` without `files`.
 
         Raises pydantic.ValidationError for options that the channel does not have.
         """
-        return Source(**{**fields, "options": self.options_of(fields.get("options", {}))}, files=files)
+        return ClipSource(**{**fields, "options": self.options_of(fields.get("options", {}))}, files=files)
 
     def options_of(self, section: Mapping[str, Any]) -> Section | None:
         """The data set's section for this channel as its model; None without a section."""

@@ -18,7 +18,7 @@ from hobble.core.skeleton import Skeleton
 
 
 @dataclass(frozen=True)
-class Words:
+class ChannelWords:
     """Words of a channel on the page.
 
     rest: label of the button that sets all values to 0. step: of a slider. key: name of its values in the
@@ -54,7 +54,7 @@ class Shown:
 
 
 @dataclass(frozen=True)
-class Loop:
+class SampleWalk:
     """A walk to look at. values: column -> value. coloured: whether the values colour the body."""
 
     name: str
@@ -62,10 +62,10 @@ class Loop:
     coloured: bool = False
 
 
-def words(name: str) -> Words:
+def words(name: str) -> ChannelWords:
     """The words of a channel."""
     found = _own(name, "WORDS")
-    return found if isinstance(found, Words) else Words()
+    return found if isinstance(found, ChannelWords) else ChannelWords()
 
 
 def shown(name: str, skeleton: Skeleton, columns: Sequence[str], trained: Collection[str]) -> Shown:
@@ -86,7 +86,9 @@ def sweeps(
     return {column.replace(" ", "_"): column for column in columns if column in trained}
 
 
-def loops(name: str, skeleton: Skeleton, columns: Sequence[str], trained: Collection[str]) -> list[Loop]:
+def loops(
+    name: str, skeleton: Skeleton, columns: Sequence[str], trained: Collection[str]
+) -> list[SampleWalk]:
     """Walks to look at. All values are 0 in the first.
 
     By default there is one for each trained column, at its highest value.
@@ -94,7 +96,10 @@ def loops(name: str, skeleton: Skeleton, columns: Sequence[str], trained: Collec
     if own := _own(name, "loops"):
         return own(skeleton, columns, trained)
     used, highest = [column for column in columns if column in trained], channel(name).highest
-    return [Loop(words(name).rest.lower(), {}), *(Loop(c.replace(" ", "-"), {c: highest}) for c in used)]
+    return [
+        SampleWalk(words(name).rest.lower(), {}),
+        *(SampleWalk(c.replace(" ", "-"), {c: highest}) for c in used),
+    ]
 
 
 def speaker(skeleton: Mapping[str, Any]) -> Callable[[str], str]:

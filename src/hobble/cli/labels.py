@@ -16,10 +16,10 @@ import numpy as np
 from hobble.cli import batch
 from hobble.core.errors import InputError
 from hobble.core.section import Gait
-from hobble.labels.files import SourceTime
 from hobble.labels.label import label_clip
 from hobble.labels.model import GAITS
-from hobble.labels.options import Labels
+from hobble.labels.options import LabelOptions
+from hobble.labels.read_files import SourceTime
 from hobble.labels.write_files import write_label_files
 from hobble.motion.make import make_clip
 from hobble.motion.options import ClipMotion
@@ -70,7 +70,7 @@ def write_labels(
         skeleton_name=SKELETON,
         options=ClipMotion(source_fps=source_fps),
     )
-    labels, checked = label_clip(clip, [], report, gait, "rocky", Labels())
+    labels, checked = label_clip(clip, [], report, gait, "rocky", LabelOptions())
     time = SourceTime(report["source_frames"], report["source_fps"], report["source_start"])
     write_label_files(paths[0], paths[1], paths[2], labels, time)
     seconds = np.bincount(labels.gait.argmax(axis=1), minlength=len(GAITS)) / clip.fps

@@ -85,11 +85,11 @@ class Dataset(s.Section):
         {}, description="options of each channel that needs them"
     )
     synthetic: s.Synthetic | None = None
-    motion: s.Motion = s.Motion()
-    labels: s.Labels = s.Labels()
+    motion: s.MotionOptions = s.MotionOptions()
+    labels: s.LabelOptions = s.LabelOptions()
     hurt: s.Hurt | None = Field(None, description="hurt versions of the healthy clips, as further clips")
     terrain: s.Terrain = s.Terrain()
-    database: s.Database = s.Database()
+    database: s.DatabaseOptions = s.DatabaseOptions()
 
     @field_validator("channels")
     @classmethod
@@ -143,7 +143,7 @@ class Configuration(s.Section):
     training: s.Training = s.Training()
     runtime: s.Runtime = s.Runtime()
     evaluation: s.Evaluation = s.Evaluation()
-    report: s.Report = s.Report()
+    report: s.ReportOptions = s.ReportOptions()
 
     @model_validator(mode="before")
     @classmethod

@@ -15,34 +15,34 @@ from hobble.core.section import (
     Section,
     Share,
 )
-from hobble.database.options import Database
+from hobble.database.options import DatabaseOptions
 from hobble.evaluation.options import Evaluation
 from hobble.hurt.options import Hurt
-from hobble.labels.options import Labels
-from hobble.motion.options import Download, Motion
-from hobble.report.options import Report
+from hobble.labels.options import LabelOptions
+from hobble.motion.options import Download, MotionOptions
+from hobble.report.options import ReportOptions
 from hobble.runtime.options import Runtime
 from hobble.synthetic.options import Synthetic
-from hobble.terrain.options import Heightmap, Terrain
+from hobble.terrain.options import HeightmapOptions, Terrain
 from hobble.training.options import Training
 
 __all__ = [
     "COMPARED",
-    "Database",
+    "DatabaseOptions",
     "Download",
     "Evaluation",
     "Finite",
     "Gait",
     "Ground",
-    "Heightmap",
+    "HeightmapOptions",
     "Hurt",
     "Inside",
-    "Labels",
-    "Motion",
+    "LabelOptions",
+    "MotionOptions",
     "PhaseMode",
     "Positive",
     "PositiveFloat",
-    "Report",
+    "ReportOptions",
     "Runtime",
     "Section",
     "Share",

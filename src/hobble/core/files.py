@@ -143,9 +143,7 @@ def load_npz(path: str | Path, names: Iterable[str] | None = None) -> Arrays:
     try:
         check_regular(path)
         with zipfile.ZipFile(path) as archive:
-            if _entry_count(path, archive) != len(archive.infolist()):
-                raise zipfile.BadZipFile("its directory has lost an entry")
-            _check_sizes(path, archive)
+            check_archive(path, archive)
             there = [name.removesuffix(".npy") for name in archive.namelist()]
             wanted = there if names is None else list(names)
             return Arrays(path, [(name, _array(archive, f"{name}.npy")) for name in wanted])
@@ -155,6 +153,13 @@ def load_npz(path: str | Path, names: Iterable[str] | None = None) -> Arrays:
         raise InputError(path, f"cannot be read: {error.strerror or error}") from error
     except DAMAGE_ERRORS as error:
         raise InputError(path, f"damaged or not an npz file ({printable(error)})", fix=DELETE_IT) from error
+
+
+def check_archive(path: str | Path, archive: zipfile.ZipFile) -> None:
+    """Raise ValueError or BadZipFile if the directory of an archive is damaged or claims too much data."""
+    if _entry_count(path, archive) != len(archive.infolist()):
+        raise zipfile.BadZipFile("its directory has lost an entry")
+    _check_sizes(path, archive)
 
 
 def _entry_count(path: str | Path, archive: zipfile.ZipFile) -> int:
@@ -188,7 +193,7 @@ def _array(archive: zipfile.ZipFile, member: str) -> np.ndarray:
     if not info.compress_type and info.header_offset + info.file_size > archive.start_dir:
         raise EOFError(f"{member} does not fit into the file")
     with archive.open(info) as file:
-        _check_header(file, info.file_size)
+        check_header(file, info.file_size)
     with archive.open(info) as file:
         return np.lib.format.read_array(file, allow_pickle=False)
 
@@ -201,7 +206,7 @@ def load_npy(path: str | Path) -> np.ndarray:
     try:
         size = check_regular(path).st_size
         with open(path, "rb") as file:
-            _check_header(file, size)
+            check_header(file, size)
             file.seek(0)
             return np.lib.format.read_array(file, allow_pickle=False)
     except FileNotFoundError as error:
@@ -212,7 +217,7 @@ def load_npy(path: str | Path) -> np.ndarray:
         raise InputError(path, f"not an array file ({printable(error)})") from error
 
 
-def _check_header(file: IO[bytes], size: int) -> None:
+def check_header(file: IO[bytes], size: int) -> None:
     """Raise ValueError if an array's header is damaged or does not match the `size` bytes of the array.
 
     NumPy parses the header as Python, which raises many kinds of errors if it is damaged.

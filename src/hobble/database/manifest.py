@@ -39,7 +39,7 @@ class Manifest:
     `clip`, `split`, `rows`, `pairs`, and for a hurt version `source`, its healthy clip. shards: `clips` and
     `chunks` are in their order. chunks: per split; in a chunk, the clip of a row is a number among the clips
     of its shard. original_bytes: size of the same pairs in the original's layout. limits: channel -> speed
-    limits (`hobble.channels.limits`).
+    limits (`hobble.channels.speed_limits`).
     """
 
     folder: str

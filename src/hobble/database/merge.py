@@ -21,15 +21,15 @@ import numpy as np
 from hobble.core.errors import HobbleError, InputError
 from hobble.core.files import save_npz, sync_folder, write_error
 from hobble.database.chunks import Chunk
+from hobble.database.learn_limits import limit_learners
 from hobble.database.manifest import FILE, SCALES, SPLITS, STATISTICS, Manifest, ShardCounts
-from hobble.database.pace import paces_of
-from hobble.database.plan import Source, fit_together
+from hobble.database.plan import RowSource, fit_together
 from hobble.database.shard import CHUNK_BYTES, Shard, add, statistics_of, write_shard
 
 
 def write_database(
     path: str | Path,
-    clips: Mapping[str, Source],
+    clips: Mapping[str, RowSource],
     splits: Mapping[str, str],
     *,
     channels: Sequence[str],
@@ -105,9 +105,9 @@ def _merged(path: Path, work: Path, folders: Sequence[Path], joint_weight: float
     save_npz(
         rows / SCALES, **{name: np.stack([vars(one)[name] for one in scales]) for name in vars(statistics)}
     )
-    paces = paces_of(plan.layout, plan.skeleton)
+    learners = limit_learners(plan.layout, plan.skeleton)
     for shard in shards:
-        shard.add_paces(paces)
+        shard.add_speeds(learners)
     visits, values = max(shard.plan.visits for shard in shards), plan.layout.x_size + plan.layout.y_size + 1
     manifest = Manifest(
         folder=_folder_name(rows, chunks),
@@ -121,7 +121,7 @@ def _merged(path: Path, work: Path, folders: Sequence[Path], joint_weight: float
         chunks=chunks,
         original_bytes=4 * values * visits * sum(entry["rows"] for entry in clips),
         bytes=sum(chunk.bytes for split in SPLITS for chunk in chunks[split]),
-        limits={name: found.to_dict() for name, pace in paces.items() if (found := pace.learn())},
+        limits={name: found.to_dict() for name, learner in learners.items() if (found := learner.learn())},
     )
     _put_in_place(path, rows, manifest)
     return manifest

@@ -9,7 +9,7 @@ from pydantic import Field, model_validator
 from hobble.core.section import Positive, PositiveFloat, Section
 
 
-class Rows(Section):
+class RowOptions(Section):
     """The content of a row; read by the rule `database_clips`."""
 
     window: Annotated[int, Field(gt=0, le=3600)] = Field(
@@ -19,7 +19,7 @@ class Rows(Section):
     facing_sigma: PositiveFloat = Field(20.0, description="smoothing of the facing direction, frames")
 
     @model_validator(mode="after")
-    def _whole_steps(self) -> Rows:
+    def _whole_steps(self) -> RowOptions:
         if self.window % self.step:
             raise ValueError(f"window ({self.window}) must be a multiple of step ({self.step})")
         return self
@@ -35,7 +35,7 @@ class Merging(Section):
     seed: int = 1
 
 
-class Database(Rows, Merging):
+class DatabaseOptions(RowOptions, Merging):
     """The content of rows, their storage, and the number of shards."""
 
     shards: Annotated[int, Field(gt=0, le=1000)] = Field(

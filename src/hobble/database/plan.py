@@ -15,7 +15,7 @@ from hobble.rows.layout import RowLayout
 
 BUCKET_BYTES = 64 << 20  # of a bucket; pass 2 needs a few times as much memory
 
-Source = ClipRows | str | Path
+RowSource = ClipRows | str | Path
 
 
 @dataclass(frozen=True)
@@ -51,7 +51,7 @@ class Plan:
 
 
 def make_plan(
-    clips: Mapping[str, Source],
+    clips: Mapping[str, RowSource],
     splits: Mapping[str, str],
     channels: Sequence[str],
     item: int,

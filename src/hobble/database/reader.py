@@ -19,13 +19,13 @@ from hobble.database.manifest import STATISTICS, Manifest
 from hobble.database.precision import widen
 from hobble.database.scale import Shards
 from hobble.database.statistics import Statistics
-from hobble.database.stretches import Stretch
-from hobble.database.window import Buffers, Window, empty_buffers, load
+from hobble.database.stretches import SampleRange
+from hobble.database.window import Buffers, ChunkWindow, empty_buffers, load
 from hobble.rows.compose import compose
 from hobble.rows.layout import RowLayout
 
 Item = TypeVar("Item")
-Part = tuple[Window, np.ndarray, np.ndarray]
+Part = tuple[ChunkWindow, np.ndarray, np.ndarray]
 BLOCK_ROWS = 4096
 BLOCKS = 3  # in memory at a time: one being made, one waiting, one in use
 
@@ -43,7 +43,7 @@ class Block(NamedTuple):
     frame: np.ndarray
 
 
-class Rows(NamedTuple):
+class RawRows(NamedTuple):
     """n rows that are not composed, standardised float32: x (n, X without terrain), y (n, Y), p (n,) phase.
 
     fits: (m, columns) heights, then the mean height, of all fits of these rows. first: (n,) each row's first.
@@ -65,7 +65,7 @@ class Database:
     statistics: Statistics
     memory_mb: int
     _shards: Shards = field(repr=False)
-    _loaded: dict[str, Window] = field(default_factory=dict, repr=False)
+    _loaded: dict[str, ChunkWindow] = field(default_factory=dict, repr=False)
     _verified: set[str] = field(default_factory=set, repr=False)
 
     @classmethod
@@ -122,7 +122,7 @@ class Database:
         sections: int,
         seed: int,
         block_rows: int = BLOCK_ROWS,
-        stretch: Stretch | None = None,
+        stretch: SampleRange | None = None,
         window: int | None = None,
     ) -> Iterator[Block]:
         """One section of one pass, in shuffled order, as blocks of `block_rows` rows; the last has the rest.
@@ -139,7 +139,7 @@ class Database:
         if self.rows(split) == 0:
             return iter(())
         total = self.section_pairs(split, section, sections)
-        stretch = stretch or Stretch(0, total, total, 0, total)
+        stretch = stretch or SampleRange(0, total, total, 0, total)
         cut = stretch.start, stretch.stop
         spans = order.spans(self.rows(split), self.manifest.visits, section, sections, cut)
         window = window or self.window(split, block_rows)
@@ -150,7 +150,7 @@ class Database:
         )
         return ahead(self._composed(_own(parts, stretch), stretch.rows, block_rows))
 
-    def each_row(self, split: str) -> Iterator[Rows]:
+    def each_row(self, split: str) -> Iterator[RawRows]:
         """Every row of a split once, with all its fits, in the order of the chunks."""
         most = len(self.manifest.chunks[split])
         window = self.window(split, BLOCK_ROWS)
@@ -166,7 +166,7 @@ class Database:
                 first, count = read.first[part], read.count[part]
                 fits = widen(read.fits[first[0] : first[-1] + count[-1]]).astype(np.float32)
                 x, y = (widen(table[part]).astype(np.float32) for table in (read.x, read.y))
-                yield Rows(x, y, read.phase[part], fits, first - first[0])
+                yield RawRows(x, y, read.phase[part], fits, first - first[0])
 
     def _parts(
         self,
@@ -228,13 +228,13 @@ class Database:
             return iter(())
         return cycle([empty_buffers(self.manifest, split, window) for _ in range(2)])
 
-    def _whole(self, split: str) -> Window:
+    def _whole(self, split: str) -> ChunkWindow:
         if split not in self._loaded:
             every = range(len(self.manifest.chunks[split]))
             self._loaded[split] = self.load(split, every, empty_buffers(self.manifest, split, len(every)))
         return self._loaded[split]
 
-    def load(self, split: str, some: Sequence[int], into: Buffers) -> Window:
+    def load(self, split: str, some: Sequence[int], into: Buffers) -> ChunkWindow:
         """Read chunks of a split into the buffers `into` (`hobble.database.window.empty_buffers`)."""
         folder = self.path / self.manifest.folder
         return load(folder, self.manifest, split, some, into, self._shards, self._verified)
@@ -255,7 +255,7 @@ class Database:
                     total -= filled
                     block, filled = self._empty(min(block_rows, total)), 0
 
-    def _compose(self, window: Window, rows: np.ndarray, fit: np.ndarray, x: Array, y: Array) -> None:
+    def _compose(self, window: ChunkWindow, rows: np.ndarray, fit: np.ndarray, x: Array, y: Array) -> None:
         """Fill x and y by indexing: 2 million rows a second on one core, with 31 joints."""
         frames, ground = widen(window.x[rows]), widen(window.fits[fit])
         if window.y.dtype == y.dtype:
@@ -272,7 +272,7 @@ class Database:
         return Block(x, y, np.empty(rows, np.float32), np.empty(rows, np.int32), np.empty(rows, np.int32))
 
 
-def _own(parts: Iterator[Part], stretch: Stretch) -> Iterator[Part]:
+def _own(parts: Iterator[Part], stretch: SampleRange) -> Iterator[Part]:
     """Only the samples of a stretch that this process reads."""
     at = 0
     for window, rows, fits in parts:

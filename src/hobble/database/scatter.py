@@ -11,7 +11,7 @@ import numpy as np
 from hobble.core.quat import Array
 from hobble.database.buckets import INDEX, Buckets
 from hobble.database.manifest import SPLITS
-from hobble.database.plan import Plan, Source
+from hobble.database.plan import Plan, RowSource
 from hobble.rows.clip_rows import ClipRows, load_clip_rows
 from hobble.rows.compose import fit_columns, frame_inputs, x_columns
 from hobble.rows.layout import RowLayout
@@ -29,7 +29,7 @@ def make_buckets(folder: Path, plan: Plan) -> dict[str, Buckets]:
 
 
 def scatter(
-    buckets: Mapping[str, Buckets], clips: Mapping[str, Source], plan: Plan, seed: int
+    buckets: Mapping[str, Buckets], clips: Mapping[str, RowSource], plan: Plan, seed: int
 ) -> Iterator[tuple[dict[str, Any], ClipRows]]:
     """Put each clip into the buckets of its split, then yield its entry and its rows.
 

@@ -14,14 +14,14 @@ from pathlib import Path
 
 import numpy as np
 
-from hobble.channels.limits import Pace
+from hobble.channels.speed_limits import LimitLearner
 from hobble.core.errors import InputError
 from hobble.core.files import load_npz, read_json, save_npz, write_error, write_json
 from hobble.database.chunks import HINT, Chunk
+from hobble.database.learn_limits import add_rows, limit_learners
 from hobble.database.manifest import SPLITS
 from hobble.database.ordered import write_chunks
-from hobble.database.pace import gather, paces_of
-from hobble.database.plan import Plan, Source, make_plan
+from hobble.database.plan import Plan, RowSource, make_plan
 from hobble.database.precision import STORED
 from hobble.database.scatter import make_buckets, scatter
 from hobble.database.statistics import Moments, Statistics, clip_moments, finish, unseen_joints
@@ -33,7 +33,7 @@ Sums = tuple[Moments, Moments]  # of X and of Y
 
 def write_shard(
     folder: Path,
-    clips: Mapping[str, Source],
+    clips: Mapping[str, RowSource],
     splits: Mapping[str, str],
     *,
     channels: Sequence[str],
@@ -59,11 +59,11 @@ def write_shard(
         buckets = make_buckets(folder, plan)
         nothing = Moments.nothing(plan.layout.x_size), Moments.nothing(plan.layout.y_size)
         sums: dict[str, Sums] = dict.fromkeys(SPLITS, nothing)
-        paces = paces_of(plan.layout, plan.skeleton)
+        learners = limit_learners(plan.layout, plan.skeleton)
         for entry, clip in scatter(buckets, clips, plan, seed):
             sums[entry["split"]] = add(sums[entry["split"]], clip_moments(clip, plan.layout))
             if entry["split"] == "train":
-                gather(paces, clip, (sources or {}).get(entry["clip"]))
+                add_rows(learners, clip, (sources or {}).get(entry["clip"]))
         own = sums["train"] if sums["train"][0].weight else sums["held_out"]
         scale = statistics_of(plan, own, joint_weight)
         chunks = {
@@ -71,7 +71,7 @@ def write_shard(
         }
         for split in SPLITS:
             buckets[split].folder.rmdir()
-        _save(folder, plan, sums["train"], scale, paces)
+        _save(folder, plan, sums["train"], scale, learners)
         of_split = {split: [asdict(chunk) for chunk in found] for split, found in chunks.items()}
         write_json(folder / INDEX, {"plan": plan.to_dict(), "chunks": of_split})
     except OSError as error:
@@ -88,16 +88,18 @@ def statistics_of(plan: Plan, sums: Sums, joint_weight: float) -> Statistics:
     return finish(plan.layout, *sums, joint_weight, unseen_joints(plan.skeleton))
 
 
-def _save(folder: Path, plan: Plan, sums: Sums, scale: Statistics, paces: Mapping[str, Pace]) -> None:
+def _save(
+    folder: Path, plan: Plan, sums: Sums, scale: Statistics, learners: Mapping[str, LimitLearner]
+) -> None:
     """Save moments (weight (2,); mean and squares as x (2, X), y (2, Y)), statistics and speeds of clips."""
     x, y = ((one.mean, one.squares) for one in sums)
     save_npz(folder / MOMENTS, weight=np.array([one.weight for one in sums]), x=np.array(x), y=np.array(y))
     save_npz(folder / SCALE, **vars(scale))
-    for channel, pace in paces.items():
+    for channel, learner in learners.items():
         cycles = {
             f"{number}.{key}": values
             for number, entry in enumerate(plan.clips)
-            for key, values in pace.to_arrays(entry["clip"]).items()
+            for key, values in learner.to_arrays(entry["clip"]).items()
         }
         save_npz(folder / f"pace-{channel}.npz", **cycles)
 
@@ -132,13 +134,13 @@ class Shard:
         """The statistics by which its rows are standardised."""
         return Statistics(**load_npz(self.folder / SCALE))
 
-    def add_paces(self, paces: Mapping[str, Pace]) -> None:
+    def add_speeds(self, learners: Mapping[str, LimitLearner]) -> None:
         """Add the speeds of its training clips."""
-        for channel, pace in paces.items():
+        for channel, learner in learners.items():
             data = load_npz(self.folder / f"pace-{channel}.npz")
             cycles: dict[int, dict[str, np.ndarray]] = {}
             for key, values in data.items():
                 number, _, name = key.partition(".")
                 cycles.setdefault(int(number), {})[name] = values
             for place, arrays in sorted(cycles.items()):
-                pace.add_arrays(self.plan.clips[place]["clip"], arrays)
+                learner.add_arrays(self.plan.clips[place]["clip"], arrays)

@@ -16,7 +16,7 @@ import numpy as np
 
 
 @dataclass(frozen=True)
-class Stretch:
+class SampleRange:
     """Samples `start` to `stop` of a section; each batch gets `share` of them.
 
     low, high: this process reads samples low to high - 1 of each `share` samples; others read the rest.
@@ -65,7 +65,7 @@ class Sharing:
             whole = min(self.batch, self.total - start)
             yield whole, max(0, min(whole, self.own.stop) - self.own.start)
 
-    def read(self) -> list[Stretch]:
+    def read(self) -> list[SampleRange]:
         """The stretches that fill the process's places, in the order of the places."""
         full, rest = divmod(self.total, self.batch)
         edges = [self.batch * s // self.stretches for s in range(self.stretches + 1)]
@@ -74,7 +74,7 @@ class Sharing:
             low, high = (min(max(place, first), end) - first for place in (self.own.start, self.own.stop))
             if low < high:
                 start, stop = (full * edge + min(rest, edge) for edge in (first, end))
-                found.append(Stretch(start, stop, end - first, low, high))
+                found.append(SampleRange(start, stop, end - first, low, high))
         return found
 
 

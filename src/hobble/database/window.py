@@ -20,7 +20,7 @@ Buffers = Mapping[str, np.ndarray]
 
 
 @dataclass(frozen=True)
-class Window:
+class ChunkWindow:
     """The rows of some chunks, in memory one after another.
 
     chunks: their numbers in the split. rows: of each chunk. first: (R,) index of each row's first fit in
@@ -64,7 +64,7 @@ def load(
     into: Buffers,
     shards: Shards,
     verified: set[str],
-) -> Window:
+) -> ChunkWindow:
     """Read the chunks numbered `some` of a split, one after another, directly into the arrays `into`.
 
     folder: of the chunks. shards: what changes them to rows of the whole database. verified: files whose
@@ -82,4 +82,4 @@ def load(
         verified.add(chunk.file)
         shards.convert(split, number, parts)
         row, fit = rows.stop, fits.stop
-    return Window(some, [c.rows for c in wanted], order.starts(tables["count"]), **tables)
+    return ChunkWindow(some, [c.rows for c in wanted], order.starts(tables["count"]), **tables)

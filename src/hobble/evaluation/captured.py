@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
-from pathlib import Path
 
 import numpy as np
 
 from hobble.core.quat import Array
-from hobble.rows.clip_rows import ClipRows, load_clip_rows
+from hobble.rows.clip_rows import ClipRows
 from hobble.rows.compose import lower_joints
 from hobble.rows.layout import GAITS
 
@@ -72,12 +71,6 @@ def captured(rows: ClipRows) -> Iterator[Captured]:
             _accelerations(y[:, layout.y_joint_velocity].reshape(local.shape), turn),
             chosen,
         )
-
-
-def captured_clips(paths: Iterable[str | Path]) -> Iterator[Captured]:
-    """The unbroken stretches of all clips, in the order of clip names, with one clip in memory at a time."""
-    for path in sorted(paths, key=lambda path: Path(path).stem):
-        yield from captured(load_clip_rows(path))
 
 
 def headings(turn: Array) -> Array:

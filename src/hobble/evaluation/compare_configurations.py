@@ -2,7 +2,7 @@
 
 Gathers the results of each configuration, and calls the `comparison.py` of each measurement, which may have
 
-- `compared(all_measured, published) -> SideBySide`: what it adds to compare.json (see `side_by_side`),
+- `compared(all_measured, published) -> SideBySide`: what it adds to compare.json (see `comparison_rows`),
 - `tables(compared) -> Mapping[str, Sequence[Row]]`: the same as CSV tables, by name.
 """
 
@@ -11,14 +11,14 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from typing import Any
 
+from hobble.evaluation.comparison_rows import PublishedRow, SideBySide, published_row
 from hobble.evaluation.configuration_results import ConfigurationResults
-from hobble.evaluation.side_by_side import SideBySide, published_row
 from hobble.measures.given import Json
 from hobble.measures.registry import MEASURES
 from hobble.models import network_options
 
 
-def compare(all_measured: Sequence[ConfigurationResults], published: Json) -> dict[str, Any]:
+def compare(all_measured: Sequence[ConfigurationResults], published: Json) -> Json:
     """The content of compare.json. Its lists have entries for each configuration, in their order.
 
     `configurations`: how they differ. `training`: their histories. `stages`: time, memory and size of their
@@ -58,7 +58,7 @@ def each(function: str) -> Iterator[tuple[str, Callable[..., Any]]]:
             yield one.name, found
 
 
-def describe(measured: ConfigurationResults, found: Iterable[SideBySide]) -> dict[str, Any]:
+def describe(measured: ConfigurationResults, found: Iterable[SideBySide]) -> Json:
     """A description of a configuration: data set, network, training, and entries of the measurements."""
     model = measured.resolved["configuration"]
     hidden = network_options(model["network"]).hidden
@@ -76,7 +76,7 @@ def describe(measured: ConfigurationResults, found: Iterable[SideBySide]) -> dic
     }
 
 
-def stage_sizes(all_measured: Sequence[ConfigurationResults], published: Json) -> list[dict[str, Any]]:
+def stage_sizes(all_measured: Sequence[ConfigurationResults], published: Json) -> list[PublishedRow]:
     """Published sizes of the database and the patches, with ours."""
     found = {m.name: m for m in all_measured}
     out = []
@@ -92,7 +92,7 @@ def stage_sizes(all_measured: Sequence[ConfigurationResults], published: Json) -
     return out
 
 
-def stage_times(all_measured: Sequence[ConfigurationResults], published: Json) -> list[dict[str, Any]]:
+def stage_times(all_measured: Sequence[ConfigurationResults], published: Json) -> list[PublishedRow]:
     """Published seconds of whole stages, with ours."""
     found = {m.name: m for m in all_measured}
     out = []

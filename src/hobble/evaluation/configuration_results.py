@@ -10,8 +10,8 @@ from typing import Literal
 import yaml
 
 from hobble.core.files import read_json
+from hobble.evaluation.csv_tables import read_numbers
 from hobble.evaluation.pipeline_results import Pipeline
-from hobble.evaluation.tables import read_numbers
 from hobble.measures.given import Json
 
 

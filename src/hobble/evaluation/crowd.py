@@ -14,13 +14,14 @@ from hobble.runtime.animation import ProceduralAnimation
 from hobble.runtime.options import Runtime
 
 FPS = 60
-SPEEDS = {"walk": 2.5, "jog": 7.0}  # wished speeds, cm a frame
+SPEEDS = {"walk": 2.5, "jog": 7.0}  # target speeds, cm a frame
+VELOCITY, GAIT = "target_velocity", "gait"  # the names of targets that are no channel
 SETTLING_SHARE = 0.25  # share of a stretch, at its beginning, in which channels and gait still change
 
 
 @dataclass(frozen=True)
-class Stretch:
-    """A number of frames with constant wishes for C figures.
+class CrowdTarget:
+    """A number of frames with a constant target for each of C figures.
 
     gait: (C,) names. channels: name -> (C, columns). speed: (C,) cm a frame, or None for SPEEDS of the gait.
     """
@@ -72,33 +73,66 @@ class Walks:
         return slice(start + int(np.searchsorted(turned, turned[-1] - whole)), stop)
 
 
-def run(network: Network, script: Sequence[Stretch], runtime: Runtime) -> Walks:
-    """Run figures through `script`, from a stand, straight ahead on flat ground."""
+def run(network: Network, script: Sequence[CrowdTarget], runtime: Runtime) -> Walks:
+    """Run figures through `script`, from a stand, straight ahead on flat ground.
+
+    Figures with the same targets from the beginning on do the same, to the last bit. So one of them walks for
+    all until their targets differ.
+    """
     assert network.skeleton is not None
     count, frames = len(script[0].gait), sum(s.frames for s in script)
-    animation = ProceduralAnimation(network, characters=count, **dict(runtime))
+    animation = ProceduralAnimation(network, **dict(runtime))
+    of = np.zeros(count, int)  # the character that walks for each figure
     local = np.zeros((frames, count, len(network.skeleton.joints), 3), np.float32)
     contacts, root = np.zeros((frames, count, 4)), np.zeros((frames, count, 3))
     phase, rough = np.zeros((frames, count)), np.zeros((frames, count))
     before: list[Array] = []
     f = 0
     for stretch in script:
-        velocity = np.zeros((count, 2))
-        velocity[:, 1] = [SPEEDS[name] for name in stretch.gait] if stretch.speed is None else stretch.speed
-        shares = np.array([[float(name == gait) for name in network.gaits] for gait in stretch.gait])
+        target = _targets(network, stretch)
+        first, now = _unlike(of, *target.values())
+        if len(first) > animation.characters:
+            came_from = of[first]
+            animation, before, of = animation.copies(came_from), [p[came_from] for p in before], now
+        asked = {name: values[_first_of(of)] for name, values in target.items()}
+        velocity, shares = asked.pop(VELOCITY), asked.pop(GAIT)
         for _ in range(stretch.frames):
-            pose = animation.next_pose(velocity, gait=shares, **stretch.channels)
-            # A single figure has no leading axis.
-            positions = pose.positions.reshape(count, -1, 3)
-            root[f], phase[f], contacts[f] = pose.root, pose.phase, pose.contacts
-            local[f] = in_root_frame(positions, root[f], np.atleast_1d(pose.yaw))
+            pose = animation.next_pose(velocity, gait=shares, **asked)
+            # A single character has no leading axis.
+            positions, place = pose.positions.reshape(len(shares), -1, 3), np.atleast_2d(pose.root)
+            root[f], phase[f] = place[of], np.atleast_1d(pose.phase)[of]
+            contacts[f] = np.atleast_2d(pose.contacts)[of]
+            local[f] = in_root_frame(positions, place, np.atleast_1d(pose.yaw))[of]
             before = [*before[-2:], positions]
             if len(before) == 3:
                 bend = before[2] - 2 * before[1] + before[0]
-                rough[f - 1] = np.sqrt(np.max(np.einsum("cjk,cjk->cj", bend, bend), axis=1))
+                rough[f - 1] = np.sqrt(np.max(np.einsum("cjk,cjk->cj", bend, bend), axis=1))[of]
             f += 1
     starts = np.cumsum([0, *(s.frames for s in script)])
     return Walks(local, contacts, phase, root, rough, starts)
+
+
+def _targets(network: Network, stretch: CrowdTarget) -> dict[str, Array]:
+    """The targets of C figures in a stretch: VELOCITY (C, 2), GAIT (C, 6) shares, channel -> (C, columns)."""
+    velocity = np.zeros((len(stretch.gait), 2))
+    velocity[:, 1] = [SPEEDS[name] for name in stretch.gait] if stretch.speed is None else stretch.speed
+    shares = np.array([[float(name == gait) for name in network.gaits] for gait in stretch.gait])
+    return {VELOCITY: velocity, GAIT: shares, **stretch.channels}
+
+
+def _unlike(of: np.ndarray, *targets: Array) -> tuple[np.ndarray, np.ndarray]:
+    """Which figures now need a character of their own.
+
+    of: (C,) the character that has walked for each figure. targets: (C, n) arrays. Figures with the same
+    character and the same targets form a set. Returns the first figure of each set, and the set of each (C,).
+    """
+    _, first, now = np.unique(np.column_stack([of, *targets]), axis=0, return_index=True, return_inverse=True)
+    return first, now.reshape(-1)
+
+
+def _first_of(of: np.ndarray) -> np.ndarray:
+    """The first figure of each character. of: (C,) the character that walks for each figure."""
+    return np.unique(of, return_index=True)[1]
 
 
 def channel_values(network: Network, name: str, figures: Sequence[Mapping[str, float]]) -> dict[str, Array]:

@@ -7,7 +7,7 @@ from typing import TypedDict
 from hobble.database.sizes import Sizes
 
 
-class Total(TypedDict):
+class JobTotal(TypedDict):
     """Jobs together. seconds: the sum over them. longest: of one job. max_rss_mb: None if not measured."""
 
     jobs: int
@@ -17,19 +17,19 @@ class Total(TypedDict):
     max_rss_mb: float | None
 
 
-class OfRule(Total):
+class RuleTotal(JobTotal):
     """All jobs of a rule."""
 
     rule: str
 
 
-class OfStage(Total):
+class StageTotal(JobTotal):
     """All jobs of a stage, and the files that it wrote."""
 
     stage: str
     files: int
     bytes: int
-    rules: list[OfRule]
+    rules: list[RuleTotal]
 
 
 class Machine(TypedDict):
@@ -45,7 +45,7 @@ class Pipeline(TypedDict):
     """pipeline.json. missing: files that were not there. database: None if there is none."""
 
     configuration: str
-    stages: list[OfStage]
+    stages: list[StageTotal]
     total_seconds: float
     total_bytes: int
     database: Sizes | None

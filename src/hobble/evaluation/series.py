@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import TypedDict
 
 import numpy as np
 
@@ -17,7 +18,16 @@ def difference(mean_a: float, sd_a: float, mean_b: float, sd_b: float) -> float 
     return 2 * abs(mean_a - mean_b) / spread if spread > 0 else None
 
 
-def line(x: Sequence[float], y: Sequence[float]) -> dict[str, float | None] | None:
+class StraightLine(TypedDict):
+    """y = intercept + slope x through `points` points, and its r2; None where they do not exist."""
+
+    slope: float | None
+    intercept: float | None
+    r2: float | None
+    points: int
+
+
+def line(x: Sequence[float], y: Sequence[float]) -> StraightLine | None:
     """The least-squares line y = intercept + slope x and its r2; None for fewer than two different x.
 
     r2 is None if all y are equal.

@@ -1,10 +1,10 @@
-"""A long test of many characters with random wishes, injuries and grounds, for implausible poses."""
+"""A long test of many characters with random targets, injuries and grounds, for implausible poses."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
-from typing import Any
+from typing import TypedDict
 
 import numpy as np
 
@@ -13,17 +13,18 @@ from hobble.core.quat import Array
 from hobble.evaluation.motion_measures import SHORTEST_STANCE, STANCE
 from hobble.models.network import Network
 from hobble.runtime.animation import ProceduralAnimation
+from hobble.runtime.options import Runtime
 
 FPS = 60
 GAITS = ("walk", "jog", "crouch")
-FASTEST_WISH = 8.0  # cm a frame
+FASTEST_TARGET = 8.0  # cm a frame
 START_SPACING_CM = 4e4  # between the starts of the characters, each on its own ground
 LIMITS = {"hips_lowest_cm": 60.0, "hips_highest_cm": 110.0, "added_turn_degrees": 30.0}
 
 
 @dataclass
-class Wishes:
-    """The wishes for C characters in a frame. Each character gets new ones every 1 to 8 seconds.
+class Targets:
+    """The targets of C characters in a frame. Each character gets new ones every 1 to 8 seconds.
 
     velocity, facing: (C, 2). gait: C names. channels: name -> (C, columns). left: (C,) frames that remain.
     """
@@ -35,8 +36,8 @@ class Wishes:
     left: np.ndarray
 
     @classmethod
-    def none(cls, characters: int, channels: Mapping[str, int]) -> Wishes:
-        """Empty wishes. The first `renew` draws them for all characters."""
+    def none(cls, characters: int, channels: Mapping[str, int]) -> Targets:
+        """No targets yet. The first `renew` draws them for all characters."""
         return cls(
             np.zeros((characters, 2)),
             np.zeros((characters, 2)),
@@ -46,11 +47,11 @@ class Wishes:
         )
 
     def renew(self, rng: np.random.Generator) -> None:
-        """Draw new wishes for characters whose time is over. A third stand, half face a random direction."""
+        """Draw new targets for characters whose time is over. A third stand, half face a random direction."""
         self.left -= 1
         for c in np.flatnonzero(self.left <= 0):
             going, looking = rng.uniform(-np.pi, np.pi, 2)
-            speed = 0.0 if rng.random() < 1 / 3 else rng.uniform(0.2, FASTEST_WISH)
+            speed = 0.0 if rng.random() < 1 / 3 else rng.uniform(0.2, FASTEST_TARGET)
             self.velocity[c] = speed * np.array([np.sin(going), np.cos(going)])
             self.facing[c] = rng.integers(2) * np.array([np.sin(looking), np.cos(looking)])
             self.gait[c] = GAITS[rng.integers(len(GAITS))]
@@ -77,7 +78,7 @@ def grounds(characters: int, rng: np.random.Generator) -> Callable[[Array, Array
 
 
 @dataclass
-class Slides:
+class StanceSlides:
     """Distance that toes slide in each stance of C characters, as in `motion_measures.foot_slide`.
 
     far: (C, 2) distance in this stance, cm. frames: (C, 2) its length. done: distances of past stances.
@@ -102,10 +103,27 @@ def turns(now: Array, before: Array) -> Array:
     return np.asarray(np.degrees(2 * np.arccos(np.minimum(1.0, dot))))
 
 
+class Soak(TypedDict):
+    """The worst values over all characters and frames. See `soak`."""
+
+    frames: int
+    finite: bool
+    hips_lowest_cm: float
+    hips_highest_cm: float
+    network_turn_degrees: float
+    turn_degrees: float
+    added_turn_degrees: float
+    frames_beyond: int
+    fastest_joint_cm: float
+    slide_cm: float | None
+    stances: int
+    holds: bool
+
+
 def soak(
-    network: Network, characters: int = 200, frames: int = 5000, seed: int = 1, **options: Any
-) -> dict[str, Any]:
-    """The worst values over all characters and frames. options: of ProceduralAnimation.
+    network: Network, characters: int = 200, frames: int = 5000, seed: int = 1, runtime: Runtime | None = None
+) -> Soak:
+    """The worst values over all characters and frames.
 
     `finite`: whether all numbers are finite. `hips_lowest_cm`, `hips_highest_cm`: above the ground under
     them. `network_turn_degrees`: largest turn of a joint in a frame by the network, `turn_degrees`: by the
@@ -118,18 +136,20 @@ def soak(
     assert skeleton is not None
     starts = np.zeros((characters, 3))
     starts[:, 0] = START_SPACING_CM * np.arange(characters)
-    animation = ProceduralAnimation(network, characters=characters, position=starts, **options)
-    ground, wishes = grounds(characters, rng), Wishes.none(characters, dict(network.layout.channels))
+    animation = ProceduralAnimation(
+        network, characters=characters, position=starts, **dict(runtime or Runtime())
+    )
+    ground, targets = grounds(characters, rng), Targets.none(characters, dict(network.layout.channels))
     hips = skeleton.role("hips")
     toes = [skeleton.role("left_toe"), skeleton.role("right_toe")]
     low, high, worst = np.inf, -np.inf, dict.fromkeys(("network", "pose", "added", "speed"), 0.0)
-    slides = Slides(np.zeros((characters, 2)), np.zeros((characters, 2), int))
+    slides = StanceSlides(np.zeros((characters, 2)), np.zeros((characters, 2), int))
     old: tuple[Array, ...] | None = None
     finite, wild = True, 0
     for _ in range(frames):
-        wishes.renew(rng)
+        targets.renew(rng)
         pose = animation.next_pose(
-            wishes.velocity, wishes.facing, wishes.gait, terrain=ground, **wishes.channels
+            targets.velocity, targets.facing, targets.gait, terrain=ground, **targets.channels
         )
         finite = finite and bool(np.isfinite(pose.positions).all() and np.isfinite(pose.rotations).all())
         at = pose.positions[:, hips]
@@ -145,7 +165,7 @@ def soak(
             slides.add(now[0][:, toes], old[0][:, toes], pose.contacts[:, 1::2] >= STANCE)
         old = now
     slide = np.concatenate(slides.done)
-    out = {
+    return {
         "frames": characters * frames,
         "finite": finite,
         "hips_lowest_cm": round(low, 1),
@@ -157,11 +177,8 @@ def soak(
         "fastest_joint_cm": round(worst["speed"], 1),
         "slide_cm": round(float(slide.mean()), 3) if len(slide) else None,
         "stances": len(slide),
-    }
-    out["holds"] = (
-        finite
+        "holds": finite
         and low >= LIMITS["hips_lowest_cm"]
         and high <= LIMITS["hips_highest_cm"]
-        and worst["added"] <= LIMITS["added_turn_degrees"]
-    )
-    return out
+        and worst["added"] <= LIMITS["added_turn_degrees"],
+    }

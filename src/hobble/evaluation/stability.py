@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
-from typing import Any
+from typing import TypedDict
 
 import numpy as np
 
@@ -13,6 +13,7 @@ from hobble.evaluation.motion_measures import foot_slide, largest_turn, skating,
 from hobble.models.network import Network
 from hobble.runtime.animation import ProceduralAnimation
 from hobble.runtime.feet import leg_joints, sole_heights
+from hobble.runtime.options import Runtime
 
 FPS = 60
 # kind -> speed in cm a frame, whether to face a random direction, gait
@@ -33,8 +34,8 @@ LIMITS = {
 
 
 @dataclass(frozen=True)
-class Stretch:
-    """A constant wish for `frames` frames: velocity (2,) cm a frame, facing (2,) or None, gait."""
+class SteadyTarget:
+    """A constant target for `frames` frames: velocity (2,) cm a frame, facing (2,) or None, gait."""
 
     kind: str
     velocity: Array
@@ -43,7 +44,29 @@ class Stretch:
     frames: int
 
 
-def stretches(minutes: float, seed: int = 1) -> Iterator[Stretch]:
+class Worst(TypedDict):
+    """The worst values of some frames; None without a step or a foot near the ground. See `stability`."""
+
+    frames: int
+    finite: bool
+    hips_lowest_cm: float
+    hips_highest_cm: float
+    largest_turn_degrees: float
+    foot_slide_cm: float | None
+    steps: int
+    foot_down_share: float
+    skating_cm: float | None
+    stable: bool
+
+
+class Stability(Worst):
+    """The worst values of all frames, and of each kind of target."""
+
+    minutes: float
+    kinds: dict[str, Worst]
+
+
+def stretches(minutes: float, seed: int = 1) -> Iterator[SteadyTarget]:
     """Random stretches of 2 to 8 seconds in random directions, `minutes` in total."""
     rng = np.random.default_rng(seed)
     left = int(minutes * 60 * FPS)
@@ -53,19 +76,21 @@ def stretches(minutes: float, seed: int = 1) -> Iterator[Stretch]:
         going, looking = rng.uniform(-np.pi, np.pi, 2)
         speed, aside, gait = KINDS[kind]
         facing = np.array([np.sin(looking), np.cos(looking)]) if aside else None
-        yield Stretch(kind, speed * np.array([np.sin(going), np.cos(going)]), facing, gait, frames)
+        yield SteadyTarget(kind, speed * np.array([np.sin(going), np.cos(going)]), facing, gait, frames)
         left -= frames
 
 
-def stability(network: Network, minutes: float = 10.0, seed: int = 1, **options: Any) -> dict[str, Any]:
-    """The worst values of `minutes` on flat ground, in all and by kind. options: of ProceduralAnimation.
+def stability(
+    network: Network, minutes: float = 10.0, seed: int = 1, runtime: Runtime | None = None
+) -> Stability:
+    """The worst values of `minutes` on flat ground, in all and by kind.
 
     `finite`: whether all numbers are finite. `hips_lowest_cm`, `hips_highest_cm`: above the ground.
     `largest_turn_degrees`: of a joint in a frame, in the world. `foot_slide_cm`: mean of a step. `steps`:
     their number. `foot_down_share`: share of the frames in which a foot stands. `skating_cm`: mean of a foot
     and frame, see `motion_measures.skating`. `stable`: whether all values are within LIMITS.
     """
-    animation = ProceduralAnimation(network, **options)
+    animation = ProceduralAnimation(network, **dict(runtime or Runtime()))
     assert network.skeleton is not None
     role = network.skeleton.role
     toes = [role("left_toe"), role("right_toe")]
@@ -101,9 +126,9 @@ def stability(network: Network, minutes: float = 10.0, seed: int = 1, **options:
     }
 
 
-def _worst(parts: list[dict[str, Array]]) -> dict[str, Any]:
+def _worst(parts: list[dict[str, Array]]) -> Worst:
     one = {key: np.concatenate([part[key] for part in parts]) for key in parts[0]}
-    out: dict[str, Any] = {
+    out: Worst = {
         "frames": len(one["hips"]),
         "finite": bool(one["finite"].all() and np.isfinite(one["turn"]).all()),
         "hips_lowest_cm": round(float(one["hips"].min()), 2),
@@ -113,6 +138,7 @@ def _worst(parts: list[dict[str, Array]]) -> dict[str, Any]:
         "steps": len(one["slide"]),
         "foot_down_share": round(float(one["down"].mean()), 3),
         "skating_cm": round(float(one["skating"].mean()), 3) if len(one["skating"]) else None,
+        "stable": False,
     }
     out["stable"] = (
         out["finite"]

@@ -17,7 +17,7 @@ SHORTEST = 0.5  # cm; a bone shorter than this has no direction
 
 
 @dataclass(frozen=True)
-class Bind:
+class BindPose:
     """World positions (J, 3) in cm and rotations (J, 4) of all joints.
 
     `bones`: role -> the joint that moves that part of the body; if the skeleton has no such joint, the next
@@ -30,7 +30,7 @@ class Bind:
     at: dict[str, Array]
 
 
-def bind(skeleton: Skeleton) -> Bind:
+def bind(skeleton: Skeleton) -> BindPose:
     """The pose of a skeleton whose rest pose stands upright and faces +Z (see config/skeletons/README.md).
 
     Raises KeyError if a required role is missing: hips, head, and on both sides shoulder, hip, knee, heel and
@@ -53,7 +53,7 @@ def bind(skeleton: Skeleton) -> Bind:
             if np.linalg.norm(bone) > SHORTEST:
                 rotations[j] = quat.mul(quat.between(bone, wanted), rotations[j])
     at = {role: positions[skeleton.role(role)] for role in skeleton.roles if _known(skeleton, role)}
-    return Bind(positions, rotations, bones, _filled(at, positions, skeleton))
+    return BindPose(positions, rotations, bones, _filled(at, positions, skeleton))
 
 
 def _known(skeleton: Skeleton, role: str) -> bool:

@@ -29,7 +29,7 @@ ARRAY, ELEMENTS = 34962, 34963
 
 
 @dataclass(frozen=True)
-class Motion:
+class BodyMotion:
     """A motion of the body: root positions (F, 3) in cm, local rotations (F, J, 4), frames per second."""
 
     name: str
@@ -43,8 +43,8 @@ class _Buffer:
 
     def __init__(self) -> None:
         self.bytes = bytearray()
-        self.views: list[dict[str, Any]] = []
-        self.accessors: list[dict[str, Any]] = []
+        self.views: list[dict[str, object]] = []
+        self.accessors: list[dict[str, object]] = []
 
     def add(
         self,
@@ -59,31 +59,32 @@ class _Buffer:
         """Append an array; returns the index of its accessor."""
         data = np.ascontiguousarray(array)
         self.bytes += b"\0" * (-len(self.bytes) % 4)
-        view: dict[str, Any] = {"buffer": 0, "byteOffset": len(self.bytes), "byteLength": data.nbytes}
+        view: dict[str, object] = {"buffer": 0, "byteOffset": len(self.bytes), "byteLength": data.nbytes}
         if target:
             view["target"] = target
         self.bytes += data.astype(data.dtype.newbyteorder("<")).tobytes()
         self.views.append(view)
-        entry: dict[str, Any] = {
+        count = data.size if kind == "SCALAR" else len(data)
+        entry: dict[str, object] = {
             "bufferView": len(self.views) - 1,
             "componentType": component,
-            "count": data.size if kind == "SCALAR" else len(data),
+            "count": count,
             "type": kind,
         }
         if normalized:
             entry["normalized"] = True
         if bounds:
-            flat = data.reshape(entry["count"], -1)
+            flat = data.reshape(count, -1)
             entry["min"], entry["max"] = (getattr(flat, edge)(axis=0).tolist() for edge in ("min", "max"))
         self.accessors.append(entry)
         return len(self.accessors) - 1
 
 
-def write_glb(path: str | Path, skeleton: Skeleton, motions: Iterable[Motion] = ()) -> None:
+def write_glb(path: str | Path, skeleton: Skeleton, motions: Iterable[BodyMotion] = ()) -> None:
     """Write the body of a skeleton, standing with its soles at height 0, and its motions as animations."""
     mesh, buffer = body(skeleton), _Buffer()
     nodes = _nodes(skeleton, mesh)
-    document: dict[str, Any] = {
+    document: dict[str, object] = {
         "asset": {"version": "2.0", "generator": "Hobble"},
         "scene": 0,
         "scenes": [{"name": skeleton.name or "character", "nodes": [0, len(nodes)]}],
@@ -118,7 +119,7 @@ def write_glb(path: str | Path, skeleton: Skeleton, motions: Iterable[Motion] = 
     _write(path, document, bytes(buffer.bytes))
 
 
-def _nodes(skeleton: Skeleton, mesh: Mesh) -> list[dict[str, Any]]:
+def _nodes(skeleton: Skeleton, mesh: Mesh) -> list[dict[str, object]]:
     """The joints in the bind pose, standing on the ground."""
     known = all(skeleton.roles.get(role) in skeleton.joints for role in NEEDED)
     world = bind(skeleton).rotations if known else np.tile(quat.IDENTITY, (len(skeleton.joints), 1))
@@ -127,7 +128,7 @@ def _nodes(skeleton: Skeleton, mesh: Mesh) -> list[dict[str, Any]]:
     offsets[0] = [0.0, -mesh.corners[:, 1].min(), 0.0]
     nodes = []
     for j, name in enumerate(skeleton.joints):
-        node: dict[str, Any] = {
+        node: dict[str, object] = {
             "name": name,
             "translation": (METRES * offsets[j]).tolist(),
             "rotation": _xyzw(local[j]).tolist(),
@@ -138,7 +139,7 @@ def _nodes(skeleton: Skeleton, mesh: Mesh) -> list[dict[str, Any]]:
     return nodes
 
 
-def _primitive(mesh: Mesh, buffer: _Buffer) -> dict[str, Any]:
+def _primitive(mesh: Mesh, buffer: _Buffer) -> dict[str, object]:
     share = whole(mesh.share)
     bone = np.where(share > 0, mesh.bone, 0).astype(np.uint8)
     normals = mesh.normals.astype(np.float32)
@@ -167,12 +168,12 @@ def _undoing(mesh: Mesh) -> NDArray[np.float32]:
     return out.swapaxes(1, 2).reshape(-1, 16).astype(np.float32)
 
 
-def _animation(motion: Motion, buffer: _Buffer) -> dict[str, Any]:
+def _animation(motion: BodyMotion, buffer: _Buffer) -> dict[str, object]:
     times = (np.arange(len(motion.root)) / motion.fps).astype(np.float32)
     at = buffer.add(times, "SCALAR", FLOAT, bounds=True)
     ends = buffer.add(times[[0, -1]], "SCALAR", FLOAT, bounds=True) if len(times) > 2 else at
-    samplers: list[dict[str, Any]] = []
-    channels: list[dict[str, Any]] = []
+    samplers: list[dict[str, object]] = []
+    channels: list[dict[str, object]] = []
 
     def follow(node: int, path: str, times: int, values: Array, kind: str) -> None:
         output = buffer.add(values.astype(np.float32), kind, FLOAT)
@@ -192,7 +193,7 @@ def _xyzw(rotation: Array) -> Array:
     return rotation[..., [1, 2, 3, 0]]
 
 
-def _write(path: str | Path, document: dict[str, Any], data: bytes) -> None:
+def _write(path: str | Path, document: dict[str, object], data: bytes) -> None:
     """The .glb container: header, JSON padded with spaces, buffer padded with zeros."""
     text = json.dumps(document, separators=(",", ":")).encode()
     text += b" " * (-len(text) % 4)

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from hobble.core import quat
 from hobble.core.quat import Array
 from hobble.core.skeleton import Skeleton
-from hobble.figure.bind import SIDES, Bind, bind
+from hobble.figure.bind import SIDES, BindPose, bind
 from hobble.figure.shape import person, scale
 from hobble.figure.skin import owners, spread
 from hobble.figure.solids import Rod, Solid
@@ -111,7 +111,7 @@ def _made(text: str) -> Mesh:
     )
 
 
-def _fine(stand: Bind) -> list[Fine]:
+def _fine(stand: BindPose) -> list[Fine]:
     """The regions with finer steps: hands, face, feet."""
     size, at = scale(stand), stand.at
     out: list[Fine] = []
@@ -133,7 +133,7 @@ def _fine(stand: Bind) -> list[Fine]:
     return out
 
 
-def _reach(owner: NDArray[np.int64], stand: Bind, size: float) -> Array:
+def _reach(owner: NDArray[np.int64], stand: BindPose, size: float) -> Array:
     """The distance (V,) in cm over which the weights of two bones blend at each corner."""
     wide = np.full(len(owner), WIDE[""])
     for part, roles in (
@@ -155,7 +155,7 @@ def _shade(solids: Sequence[Solid], corners: Array, normals: Array, size: float)
     return np.clip(shade, 0, 1)
 
 
-def _sticks(skeleton: Skeleton) -> tuple[Bind, list[Solid], dict[str, int]]:
+def _sticks(skeleton: Skeleton) -> tuple[BindPose, list[Solid], dict[str, int]]:
     """A rod for every bone, at rest."""
     count = len(skeleton.joints)
     positions = np.zeros((count, 3))
@@ -163,7 +163,7 @@ def _sticks(skeleton: Skeleton) -> tuple[Bind, list[Solid], dict[str, int]]:
         if p >= 0:
             positions[j] = positions[p] + skeleton.offsets[j]
     bones = {name: j for j, name in enumerate(skeleton.joints)}
-    stand = Bind(positions, np.tile(quat.IDENTITY, (count, 1)), bones, {})
+    stand = BindPose(positions, np.tile(quat.IDENTITY, (count, 1)), bones, {})
 
     def rods() -> Iterator[Solid]:
         for j, p in enumerate(skeleton.parents):

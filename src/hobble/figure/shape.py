@@ -10,8 +10,8 @@ from collections.abc import Iterator
 import numpy as np
 
 from hobble.core.quat import Array
-from hobble.figure.bind import SIDES, Bind
-from hobble.figure.solids import Ball, Floor, Owner, Rod, Solid, Sweep
+from hobble.figure.bind import SIDES, BindPose
+from hobble.figure.solids import Ball, Floor, Owner, Rod, Solid, SweptSolid
 
 LEG_LENGTH = 81.0  # cm from hip to ankle in the body of the tables
 TOE_HEIGHT = 2.5  # cm, height of the ball of the foot above the sole
@@ -101,7 +101,7 @@ FOOT = (
 )
 
 
-def person(bind: Bind) -> Iterator[Solid]:
+def person(bind: BindPose) -> Iterator[Solid]:
     """The solids of a person, in the order in which they are added to the body or cut from it."""
     at = bind.at
     legs = [np.linalg.norm(at[f"{s}_heel"] - at[f"{s}_knee"]) for s in SIDES]
@@ -117,7 +117,7 @@ def person(bind: Bind) -> Iterator[Solid]:
     yield from _head(at, size)
 
 
-def scale(bind: Bind) -> float:
+def scale(bind: BindPose) -> float:
     """Leg length of the body, divided by LEG_LENGTH."""
     legs = [np.linalg.norm(bind.at[f"{s}_{a}"] - bind.at[f"{s}_{b}"]) for s in SIDES for a, b in
             (("heel", "knee"), ("knee", "hip"))]  # fmt: skip
@@ -159,7 +159,7 @@ def _trunk(at: dict[str, Array], size: float) -> Iterator[Solid]:
         (heights[2] + 2.0 * size, "neck"),
         (heights[3] + 1.0 * size, "head"),
     )
-    yield Sweep(0.0, owners, start, up, left, rows)
+    yield SweptSolid(0.0, owners, start, up, left, rows)
 
     def place(x: float, y: float, z: float) -> Array:
         middle = float(np.interp(level(y), known, spine))
@@ -185,7 +185,7 @@ def _unit(v: Array) -> Array:
 
 def _limb(
     places: tuple[Array, Array, Array], forward: Array, table: tuple, size: float, roles: tuple[str, str]
-) -> Sweep:
+) -> SweptSolid:
     """A sweep along two bones in a line.
 
     table: rows of position, half width, half depth, centre to the front.
@@ -199,7 +199,7 @@ def _limb(
     for t, wide, deep, front in table:
         s = t * first if t < 1 else first + (t - 1) * second
         rows.append((s, size * wide, size * deep, 0.0, size * front, 2.0))
-    return Sweep(0.0, ((-np.inf, roles[0]), (first, roles[1])), a, axis, across, rows)
+    return SweptSolid(0.0, ((-np.inf, roles[0]), (first, roles[1])), a, axis, across, rows)
 
 
 def _leg(at: dict[str, Array], side: str, size: float) -> Iterator[Solid]:
@@ -211,8 +211,8 @@ def _leg(at: dict[str, Array], side: str, size: float) -> Iterator[Solid]:
     yield Ball(3.0 * size, ((-np.inf, f"{side}_knee"),), cap, size * np.array([2.7, 3.4, 1.9]))
 
 
-def _with_blend(sweep: Sweep, blend: float) -> Sweep:
-    return Sweep(blend, sweep.owners, sweep.start, sweep.axis, sweep.across, sweep.sections)
+def _with_blend(sweep: SweptSolid, blend: float) -> SweptSolid:
+    return SweptSolid(blend, sweep.owners, sweep.start, sweep.axis, sweep.across, sweep.sections)
 
 
 def _arm(at: dict[str, Array], side: str, sign: float, size: float) -> Iterator[Solid]:
@@ -246,7 +246,7 @@ def _foot(at: dict[str, Array], side: str, sign: float, size: float) -> Iterator
     if across is not inward:
         rows = [(s, w, d, -cu, cv, n) for s, w, d, cu, cv, n in rows]
     owners = ((-np.inf, f"{side}_heel"), (length - 0.5 * size, f"{side}_toe"))
-    yield Sweep(2.5 * size, owners, start, ahead, across, rows)
+    yield SweptSolid(2.5 * size, owners, start, ahead, across, rows)
     heel_only = ((-np.inf, f"{side}_heel"),)
     middle = start + ahead * (0.6 * length)
     yield Floor(1.0 * size, heel_only, middle, up, (length + 12.0) * size, cut=True)
@@ -263,7 +263,7 @@ def _hand(at: dict[str, Array], side: str, sign: float, size: float) -> Iterator
         return wrist + size * (out * ahead + aside * thumb + deep * palm)
 
     rows = [(size * s, size * w, size * d, size * u, 0.0, 2.5) for s, w, d, u in PALM]
-    yield Sweep(1.6 * size, owner, wrist, ahead, thumb, rows)
+    yield SweptSolid(1.6 * size, owner, wrist, ahead, thumb, rows)
     for aside, begin, length, thick in FINGERS:
         knuckle, bend = place(begin, aside, 0.0), 0.0
         for part, (share, more) in enumerate(zip((0.42, 0.32, 0.26), CURL, strict=True)):

@@ -41,7 +41,7 @@ class Solid:
 
 
 @dataclass(frozen=True)
-class Sweep(Solid):
+class SweptSolid(Solid):
     """Sections across a straight line from `start` along the unit vector `axis`.
 
     sections: rows of (position along the line, half width along `across`, half depth along the third

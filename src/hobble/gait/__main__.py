@@ -8,11 +8,11 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 from hobble.core.errors import HobbleError, InputError
-from hobble.gait.comparison import Comparison, compare, healthy_profile, measure_clip
-from hobble.gait.effects import EFFECTS, effects_of_people
+from hobble.gait.comparison import WalkComparison, compare, healthy_profile, measure_clip
+from hobble.gait.effect_sizes import EFFECTS, effects_of_people
 from hobble.gait.people import GAITS, SOURCE, people
 from hobble.gait.profile import NO_CYCLE, Profile
-from hobble.gait.read import SKELETONS, read_clip
+from hobble.gait.read_clip import SKELETONS, read_clip
 from hobble.gait.recogniser import RIGHT
 
 NO_HEALTHY = "No healthy walk was given. Compared with the mean of people, a person's build counts, too."
@@ -62,14 +62,14 @@ def _healthy(paths: Sequence[str], skeletons: str) -> Profile:
     return healthy_profile(clips)
 
 
-def _compared(path: str, options: argparse.Namespace, healthy: Profile) -> Comparison:
+def _compared(path: str, options: argparse.Namespace, healthy: Profile) -> WalkComparison:
     clip = read_clip(path, options.skeletons)
     if not len(measure_clip(clip)):
         raise InputError(path, NO_CYCLE)
     return compare(clip, healthy, options.window)
 
 
-def describe(name: str, seen: Comparison, side: str | None = None) -> str:
+def describe(name: str, seen: WalkComparison, side: str | None = None) -> str:
     """The answers, and the effects next to people's, as text."""
     answer, grade = seen.answer, seen.grade
     side = side or answer.side or grade.side or RIGHT

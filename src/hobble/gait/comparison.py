@@ -6,16 +6,16 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
 from hobble.core.clip import Clip
-from hobble.gait.cycles import Walk, joined, measure
-from hobble.gait.effects import effects
+from hobble.gait.cycles import WalkCycles, joined, measure
+from hobble.gait.effect_sizes import effects
 from hobble.gait.graded import Grade, grade
 from hobble.gait.people import people
 from hobble.gait.profile import Profile, profile
-from hobble.gait.recogniser import RIGHT, SIDES, Answer, recognise, windows
+from hobble.gait.recogniser import RIGHT, SIDES, Impairment, recognise, windows
 
 
 @dataclass(frozen=True)
-class Comparison:
+class WalkComparison:
     """Measurements of a clip and the recognisers' answers.
 
     walk: its cycles. profile: its numbers. answer: the linear classifier's, for the whole clip. grade: the
@@ -23,11 +23,11 @@ class Comparison:
     window. effects: side -> sizes, as if that side were hurt.
     """
 
-    walk: Walk = field(repr=False)
+    walk: WalkCycles = field(repr=False)
     profile: Profile = field(repr=False)
-    answer: Answer
+    answer: Impairment
     grade: Grade
-    windows: Sequence[tuple[int, Answer]] = field(repr=False)
+    windows: Sequence[tuple[int, Impairment]] = field(repr=False)
     grades: Sequence[tuple[int, Grade]] = field(repr=False)
     effects: Mapping[str, Mapping[str, float]] = field(repr=False)
 
@@ -45,12 +45,12 @@ class Comparison:
         return _shares([answer for _, answer in self.grades])
 
 
-def _shares(answers: Sequence[Answer | Grade]) -> dict[str, float]:
+def _shares(answers: Sequence[Impairment | Grade]) -> dict[str, float]:
     names = [f"{a.label} {a.side}" if a.side else a.label for a in answers]
     return {name: names.count(name) / len(names) for name in dict.fromkeys(names)}
 
 
-def measure_clip(clip: Clip) -> Walk:
+def measure_clip(clip: Clip) -> WalkCycles:
     """The cycles of a clip on any skeleton with roles."""
     return measure(clip.skeleton, clip.positions, clip.fps)
 
@@ -63,16 +63,16 @@ def healthy_profile(clips: Sequence[Clip]) -> Profile:
     return profile(joined(measure_clip(clip) for clip in clips)) if clips else people().normal()
 
 
-def compare(clip: Clip, healthy: Profile, seconds: float = 4.0) -> Comparison:
+def compare(clip: Clip, healthy: Profile, seconds: float = 4.0) -> WalkComparison:
     """Compare a clip with a healthy profile, in windows of `seconds`. Raises HobbleError without a cycle."""
     return compare_walk(measure_clip(clip), len(clip), healthy, seconds)
 
 
-def compare_walk(walk: Walk, frames: int, healthy: Profile, seconds: float = 4.0) -> Comparison:
+def compare_walk(walk: WalkCycles, frames: int, healthy: Profile, seconds: float = 4.0) -> WalkComparison:
     """The same for the cycles that `measure` found in a motion of `frames` frames."""
     own = profile(walk)
     parts = [(start, profile(part)) for start, part in windows(walk, frames, seconds)]
-    return Comparison(
+    return WalkComparison(
         walk,
         own,
         recognise(own, healthy),

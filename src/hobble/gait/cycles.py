@@ -50,7 +50,7 @@ class Cycle:
 
 
 @dataclass(frozen=True)
-class Walk:
+class WalkCycles:
     """The cycles of a stretch of walking.
 
     right: cycles that begin as the right foot lands. left: those that begin as the left foot lands, mirrored,
@@ -65,17 +65,17 @@ class Walk:
         """The number of cycles of the side with fewer."""
         return min(len(self.right), len(self.left))
 
-    def within(self, start: float, end: float) -> Walk:
+    def within(self, start: float, end: float) -> WalkCycles:
         """The cycles that are completely between two frames."""
         kept = ((c for c in side if start <= c.start and c.end <= end) for side in (self.right, self.left))
-        return Walk(self.fps, *map(tuple, kept))
+        return WalkCycles(self.fps, *map(tuple, kept))
 
-    def mirrored(self) -> Walk:
+    def mirrored(self) -> WalkCycles:
         """The same walk, mirrored."""
-        return Walk(self.fps, self.left, self.right)
+        return WalkCycles(self.fps, self.left, self.right)
 
 
-def measure(skeleton: Skeleton, positions: Array, fps: float = 60.0) -> Walk:
+def measure(skeleton: Skeleton, positions: Array, fps: float = 60.0) -> WalkCycles:
     """Find and measure the cycles in which a figure walks straight ahead.
 
     positions: (F, J, 3) world, cm, Y up. Frames of standing, turning, and walking backward or
@@ -83,18 +83,18 @@ def measure(skeleton: Skeleton, positions: Array, fps: float = 60.0) -> Walk:
     shorter than a cycle has none.
     """
     if len(positions) < SHORTEST * fps:
-        return Walk(fps, (), ())
+        return WalkCycles(fps, (), ())
     seen = signals(skeleton, positions, fps)
-    return Walk(fps, tuple(_cycles(seen)), tuple(_cycles(mirrored(seen))))
+    return WalkCycles(fps, tuple(_cycles(seen)), tuple(_cycles(mirrored(seen))))
 
 
-def joined(walks: Iterable[Walk]) -> Walk:
+def joined(walks: Iterable[WalkCycles]) -> WalkCycles:
     """The cycles of several clips of one person as one walk. Their frame numbers have no meaning any more."""
     walks = tuple(walks)
     right, left = (
         tuple(itertools.chain(*side)) for side in zip(*((w.right, w.left) for w in walks), strict=True)
     )
-    return Walk(walks[0].fps, right, left)
+    return WalkCycles(walks[0].fps, right, left)
 
 
 def landings(forward: Array, fps: float) -> list[int]:

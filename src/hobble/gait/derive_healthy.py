@@ -20,11 +20,11 @@ from hobble.core.errors import HobbleError
 from hobble.core.files import save_npz
 from hobble.core.quat import Array
 from hobble.gait.comparison import healthy_profile, measure_clip
-from hobble.gait.cycles import Walk
+from hobble.gait.cycles import WalkCycles
 from hobble.gait.features import features
 from hobble.gait.graded import HEALTHY
 from hobble.gait.profile import Profile, mirrored, profile
-from hobble.gait.read import SKELETONS, read_clip
+from hobble.gait.read_clip import SKELETONS, read_clip
 from hobble.gait.recogniser import windows
 
 # performer -> reference walks, and other walks: slow, quick, on curves
@@ -55,7 +55,7 @@ def healthy_windows(
             yield name, profile(part), healthy
 
 
-def _parts(clip: Clip) -> list[Walk]:
+def _parts(clip: Clip) -> list[WalkCycles]:
     """A clip's windows. A clip that is too short for one counts whole if it has a cycle."""
     walk = measure_clip(clip)
     found = [part for _, part in windows(walk, len(clip), SECONDS)]

@@ -8,7 +8,7 @@ import numpy as np
 
 from hobble.core.errors import HobbleError
 from hobble.core.quat import Array
-from hobble.gait.cycles import SCALARS, Cycle, Walk
+from hobble.gait.cycles import SCALARS, Cycle, WalkCycles
 from hobble.gait.signals import CURVES, SIGN_CHANGES
 
 Profile = Mapping[str, float]
@@ -16,7 +16,7 @@ NO_CYCLE = "there is no whole cycle of straight walking to measure"
 NAMES = (*SCALARS, *(f"{kind} {curve}" for curve in CURVES for kind in ("range", "mean")))
 
 
-def profile(walk: Walk) -> dict[str, float]:
+def profile(walk: WalkCycles) -> dict[str, float]:
     """The numbers of NAMES: each scalar, and each curve's range and mean over the cycle.
 
     They are medians over the cycles. Cycles of the right leg and mirrored cycles of the left leg count

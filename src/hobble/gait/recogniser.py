@@ -14,7 +14,7 @@ from functools import cache
 import numpy as np
 
 from hobble.core.quat import Array
-from hobble.gait.cycles import Walk
+from hobble.gait.cycles import WalkCycles
 from hobble.gait.discriminant import Discriminant, learn
 from hobble.gait.features import features
 from hobble.gait.people import GAITS, NORMAL, People, people
@@ -27,7 +27,7 @@ SIDES = (RIGHT, LEFT)
 
 
 @dataclass(frozen=True)
-class Answer:
+class Impairment:
     """The impairment of a walk.
 
     label: one of people.GAITS. side: of the impaired leg, None if the label is normal. probabilities: of each
@@ -68,7 +68,7 @@ def classifier() -> Discriminant:
     return learn(*examples(people(), range(people().count)), shrinkage=SHRINKAGE)
 
 
-def recognise(walk: Profile, healthy: Profile, judge: Discriminant | None = None) -> Answer:
+def recognise(walk: Profile, healthy: Profile, judge: Discriminant | None = None) -> Impairment:
     """The impairment of a walk, relative to the figure's healthy walk."""
     judge = judge or classifier()
     scores = judge.scores(np.array([list(features(walk, healthy).values())]))[0]
@@ -82,10 +82,12 @@ def recognise(walk: Profile, healthy: Profile, judge: Discriminant | None = None
             sides[gait, which] = p
     label = max(labels, key=labels.__getitem__)
     side = None if label == NORMAL else max(SIDES, key=lambda s: sides[label, s])
-    return Answer(label, side, labels, sides)
+    return Impairment(label, side, labels, sides)
 
 
-def windows(walk: Walk, frames: int, seconds: float = 4.0, step: float = 1.0) -> list[tuple[int, Walk]]:
+def windows(
+    walk: WalkCycles, frames: int, seconds: float = 4.0, step: float = 1.0
+) -> list[tuple[int, WalkCycles]]:
     """(first frame, its cycles) of each window of a clip of `frames` with at least LEAST_CYCLES cycles.
 
     Windows begin every `step` seconds and last `seconds`.

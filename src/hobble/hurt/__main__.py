@@ -2,7 +2,7 @@
 
 import sys
 
-from hobble.hurt.people import FILE, derive
+from hobble.hurt.impairment_profiles import FILE, derive
 
 if __name__ == "__main__":
     if len(sys.argv) != 2 or sys.argv[1].startswith("-"):

@@ -13,7 +13,7 @@ import functools
 import numpy as np
 
 from hobble.core.quat import Array
-from hobble.hurt.people import CURVES, HARMONICS, profiles
+from hobble.hurt.impairment_profiles import CURVES, HARMONICS, profiles
 
 # Profiles and their weights. Parts that are not here have only the values of OWN.
 MIXES: dict[str, dict[str, float]] = {

@@ -10,7 +10,7 @@ from hobble.core.quat import Array
 from hobble.core.skeleton import Skeleton
 from hobble.core.smooth import gaussian
 from hobble.hurt.amounts import amounts
-from hobble.hurt.parts import LEFT, RIGHT, part_of_link
+from hobble.hurt.body_parts import LEFT, RIGHT, part_of_link
 
 HIGHEST = 10.0
 POWER = 0.75  # strength = (severity / 10) ** POWER: .41 at 3, .59 at 5, .77 at 7

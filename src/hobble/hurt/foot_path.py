@@ -9,13 +9,14 @@ import numpy as np
 from scipy.ndimage import maximum_filter1d
 
 from hobble.core import quat
+from hobble.core.curve_value import value_at
 from hobble.core.quat import Array
 from hobble.core.smooth import gaussian
+from hobble.hurt.body_parts import SIDES
 from hobble.hurt.effects import Effects
-from hobble.hurt.parts import SIDES
-from hobble.hurt.path import Path
-from hobble.hurt.sampling import smoothstep
-from hobble.hurt.source import UP, Source, Stance
+from hobble.hurt.healthy_clip import UP, HealthyClip, SourceStance
+from hobble.hurt.interpolate import smoothstep
+from hobble.hurt.shortened_path import ShortenedPath
 
 SIGN = (1.0, -1.0)  # +X is the figure's left
 # Radians of pitch over which the ratio changes from that of the heel strike to that of the push-off.
@@ -28,7 +29,7 @@ ENDS = 0.22  # share of the swing over which its lower height is blended in and 
 
 
 @dataclass(frozen=True)
-class Foot:
+class HurtFoot:
     """One foot over F source frames.
 
     ankle, ball: (F, 3) heel and toe joint. turn: (F, 4) of the foot in the world. toes: (F, 4) local, of the
@@ -41,7 +42,7 @@ class Foot:
     toes: Array = field(repr=False)
 
 
-def rolled_foot(source: Source, effects: Effects, side: int) -> Foot:
+def rolled_foot(source: HealthyClip, effects: Effects, side: int) -> HurtFoot:
     """The source's foot with less pitch: turned about its ball while the heel is up, else about its ankle."""
     clip, skeleton = source.clip, source.clip.skeleton
     heel, toe = (skeleton.role(f"{SIDES[side]}_{role}") for role in ("heel", "toe"))
@@ -63,10 +64,10 @@ def rolled_foot(source: Source, effects: Effects, side: int) -> Foot:
     ankle = ankle - UP * _not_risen(source, ball[:, 1], push, side)[:, None]
     rest = quat.normalize(gaussian(quat.continuous(clip.rotations[:, toe]), 0.5 * clip.fps))
     toes = quat.slerp(rest, clip.rotations[:, toe], share)
-    return Foot(ankle, ankle + new_along, quat.mul(tilt, turn), toes)
+    return HurtFoot(ankle, ankle + new_along, quat.mul(tilt, turn), toes)
 
 
-def _not_risen(source: Source, ball: Array, push: Array, side: int) -> Array:
+def _not_risen(source: HealthyClip, ball: Array, push: Array, side: int) -> Array:
     """(F,) cm by which a foot that does not push off is lower.
 
     A healthy foot rolls over its toes, so its ball rises before it leaves the ground. ball: (F,) its height.
@@ -93,18 +94,20 @@ def _hinge(turn: Array, along: Array, stands: np.ndarray) -> Array:
     return quat.rotate(turn, usual / max(float(np.linalg.norm(usual)), 1e-9))
 
 
-def _middle(values: Array, stance: Stance) -> Array:
+def _middle(values: Array, stance: SourceStance) -> Array:
     """Median of values (F, ...) over the middle half of a stance."""
     a, b = stance.land + 0.25 * (stance.off - stance.land), stance.land + 0.75 * (stance.off - stance.land)
     return np.median(values[int(a) : int(np.ceil(b)) + 1], axis=0)
 
 
-def places(foot: Foot, stances: list[Stance]) -> list[Array]:
+def places(foot: HurtFoot, stances: list[SourceStance]) -> list[Array]:
     """Where the ankle is in each stance, (3,) each."""
     return [_middle(foot.ankle, stance) for stance in stances]
 
 
-def move_foot(source: Source, effects: Effects, path: Path, foot: Foot, side: int) -> Foot:
+def move_foot(
+    source: HealthyClip, effects: Effects, path: ShortenedPath, foot: HurtFoot, side: int
+) -> HurtFoot:
     """The foot's path for the body's new path."""
     stances = source.stances[side]
     old = places(foot, stances)
@@ -143,7 +146,7 @@ def move_foot(source: Source, effects: Effects, path: Path, foot: Foot, side: in
         least[part] = under + up + np.minimum(own, CLEARANCE * np.sin(np.pi * u))
         ankle[part] = moved
     ankle[:, 1] += smooth_above(np.maximum(least - ankle[:, 1] - along[:, 1], 0.0), 1)
-    return Foot(ankle, ankle + along, quat.mul(yaw, foot.turn), foot.toes)
+    return HurtFoot(ankle, ankle + along, quat.mul(yaw, foot.turn), foot.toes)
 
 
 def _way(ankle: Array) -> Array:
@@ -154,17 +157,21 @@ def _way(ankle: Array) -> Array:
     return ((((level - level[0]) @ way) + SHORT**2 * time) / (way @ way + SHORT**2))[:, None]
 
 
-def _moved(place: Array, when: float, source: Source, effects: Effects, path: Path, side: int) -> Array:
+def _moved(
+    place: Array, when: float, source: HealthyClip, effects: Effects, path: ShortenedPath, side: int
+) -> Array:
     """A footprint in the new world.
 
     It moves with the body; the hurt foot lands less far ahead, both wider apart.
     """
-    frames = np.arange(len(source))
     at = min(round(when), len(source) - 1)
-    speed = np.gradient(source.path, axis=0)[at] if len(source) > 1 else np.zeros(2)
-    step = effects.sided["step"] * (1 - JOGGING * source.jog)[:, None]
-    ahead = np.interp(when, frames, step[:, side] - step[:, 1 - side]) / 2 * speed * source.cycle[at] / 2
-    width = np.interp(when, frames, effects.sided["width"].max(axis=1)) * source.leg / 2
+    # Only frames around it are read: there are thousands of footprints in a long clip.
+    near = slice(max(at - 1, 0), at + 2)
+    speed = np.gradient(source.path[near], axis=0)[at - near.start] if len(source) > 1 else np.zeros(2)
+    step = effects.sided["step"][near] * (1 - JOGGING * source.jog[near])[:, None]
+    ahead = value_at(step[:, side] - step[:, 1 - side], when - near.start)
+    ahead = ahead / 2 * speed * source.cycle[at] / 2
+    width = value_at(effects.sided["width"][near].max(axis=1), when - near.start) * source.leg / 2
     outward = quat.rotate(source.heading[at], np.array([SIGN[side] * width, 0.0, 0.0]))
     return path.moved(place, when) + np.array([ahead[0], 0.0, ahead[1]]) + outward
 

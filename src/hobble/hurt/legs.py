@@ -12,9 +12,9 @@ from hobble.core.ik import two_bone_knee
 from hobble.core.quat import Array
 from hobble.core.skeleton import Skeleton
 from hobble.core.smooth import gaussian
+from hobble.hurt.body_parts import SIDES
 from hobble.hurt.foot_path import smooth_above
-from hobble.hurt.parts import SIDES
-from hobble.hurt.sampling import at_frames, turns_at
+from hobble.hurt.interpolate import at_frames, turns_at
 
 BENT = np.radians([6.0, 18.0])  # radians of knee flexion; above them the bend shows where the knee points
 STRETCH = (0.985, 0.9985)  # leg lengths: limits of the distance hip-ankle

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from hobble.hurt.parts import LEFT, RIGHT
-from hobble.hurt.sampling import at_frames
+from hobble.hurt.body_parts import LEFT, RIGHT
+from hobble.hurt.interpolate import at_frames
 from hobble.hurt.timing import Timing
 from hobble.labels.model import Labels
 from hobble.labels.phase import dropped_frames, find_cycles, phase_of_footsteps

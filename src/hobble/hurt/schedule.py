@@ -10,8 +10,8 @@ import numpy as np
 from hobble.core.errors import HobbleError
 from hobble.core.quat import Array
 from hobble.core.skeleton import Skeleton
+from hobble.hurt.body_parts import part_of_link
 from hobble.hurt.options import Hurt
-from hobble.hurt.parts import part_of_link
 
 # Entries of each link of a part in the deck. Parts that change the motion little have 1.
 OFTEN = {"hip": 3, "thigh": 3, "shank": 3, "foot": 3, "back": 2}

@@ -8,9 +8,9 @@ import numpy as np
 from scipy.interpolate import PchipInterpolator
 
 from hobble.core.quat import Array
+from hobble.hurt.body_parts import LEFT, RIGHT
 from hobble.hurt.effects import Effects
-from hobble.hurt.parts import LEFT, RIGHT
-from hobble.hurt.source import Source
+from hobble.hurt.healthy_clip import HealthyClip
 
 LEAST_SHARE = 0.57  # the time between two events of a leg shrinks at most to this share
 JOG_STRIDE = 0.15  # a jog takes on only this share of a longer stride time, because flight cannot last longer
@@ -40,7 +40,7 @@ class Timing:
         return np.interp(when, looked, np.arange(len(looked)))
 
 
-def retime(source: Source, effects: Effects) -> Timing:
+def retime(source: HealthyClip, effects: Effects) -> Timing:
     """Slow the cadence, and shift each foot's landing and leaving within the cycle."""
     stride = 1 + effects.body["stride"] * (1 - (1 - JOG_STRIDE) * source.jog)
     begins = np.concatenate([[0.0], np.cumsum((stride[1:] + stride[:-1]) / 2)])

@@ -9,12 +9,12 @@ from dataclasses import replace
 import numpy as np
 
 from hobble.core.clip import Clip
-from hobble.hurt.clip import HurtClip, hurt_clip
+from hobble.hurt.hurt_clip import HurtClip, hurt_clip
 from hobble.hurt.options import Hurt
 from hobble.hurt.schedule import severities
-from hobble.labels.files import whole_frame
 from hobble.labels.model import LabelReport, Labels
 from hobble.labels.phase import find_cycles
+from hobble.labels.read_files import whole_frame
 
 NEAR = 0.5  # severities that differ less from a requested one count as it
 WHOLE = 6.0  # seconds: versions of shorter clips are not cut, because they might lose all cycles

@@ -10,7 +10,7 @@ from hobble.core.clip import Clip
 from hobble.core.quat import Array
 from hobble.labels.footfall import foot_positions, relative_speeds, swing_peaks
 from hobble.labels.model import CONTACT_ROLES
-from hobble.labels.options import Labels
+from hobble.labels.options import LabelOptions
 
 FEET = ((0, 1), (2, 3))  # heel and toe of the left and of the right foot, in the order of CONTACT_ROLES
 
@@ -25,7 +25,7 @@ ON_TIPTOE = 0.03  # leg lengths: a heel is in the air if it is this much higher 
 DRAWN_UP, STRETCHED = 0.55, 0.8  # heights of hips over heels, in leg lengths
 
 
-def contacts(clip: Clip, options: Labels) -> np.ndarray:
+def contacts(clip: Clip, options: LabelOptions) -> np.ndarray:
     """(F, 4) bool in the order of CONTACT_ROLES, by the rule that the section `labels` selects."""
     if options.contacts == "original":
         return still_joints(clip, options.contact_threshold)
@@ -45,7 +45,7 @@ def still_joints(clip: Clip, threshold: float) -> np.ndarray:
     return np.concatenate([still, still[-1:]])
 
 
-def stance(clip: Clip, options: Labels) -> np.ndarray:
+def stance(clip: Clip, options: LabelOptions) -> np.ndarray:
     """(F, 4) bool: whether a joint is slow and near the height of its stance.
 
     Between two swings a foot has one stance. Its height is the lowest of the joint's slow frames there, so

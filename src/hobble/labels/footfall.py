@@ -16,7 +16,7 @@ from hobble.core.clip import Clip
 from hobble.core.quat import Array
 from hobble.core.smooth import median_of_three
 from hobble.labels.model import CONTACT_ROLES
-from hobble.labels.options import Labels
+from hobble.labels.options import LabelOptions
 
 RIGHT, LEFT = 0, 1
 END_OF_BOUT = (np.nan, -1)
@@ -61,7 +61,7 @@ def foot_speeds(clip: Clip) -> Array:
     return np.concatenate([speed, speed[-1:]])
 
 
-def find_swings(clip: Clip, options: Labels) -> list[Swing]:
+def find_swings(clip: Clip, options: LabelOptions) -> list[Swing]:
     """The swings of both feet, in the order of their ends.
 
     options: `heel_speed` and `toe_speed` are the unit speeds. A foot that never rests between two swings is
@@ -77,7 +77,7 @@ def find_swings(clip: Clip, options: Labels) -> list[Swing]:
     return _one_swing_a_step(real)
 
 
-def relative_speeds(clip: Clip, options: Labels) -> Array:
+def relative_speeds(clip: Clip, options: LabelOptions) -> Array:
     """(F, 2) the slower of heel and toe of the left and of the right foot, in their unit speeds."""
     speed = foot_speeds(clip)
     units = 2 * np.array([options.heel_speed, options.toe_speed] * 2)

@@ -12,14 +12,13 @@ import numpy as np
 from hobble.core.clip import Clip
 from hobble.core.files import write_json
 from hobble.core.quat import Array
-from hobble.labels import files as label_files
+from hobble.labels import read_files as label_files
 from hobble.labels.contacts import contacts, stance
-from hobble.labels.files import SourceTime
 from hobble.labels.footfall import Swing, find_swings, landings
 from hobble.labels.gait import automatic_gait, overwrite_crouch
 from hobble.labels.label_picture import label_picture
 from hobble.labels.model import GAITS, LabelReport, Labels
-from hobble.labels.options import Labels as Options
+from hobble.labels.options import LabelOptions as Options
 from hobble.labels.phase import (
     MARGINS,
     dropped_frames,
@@ -29,6 +28,7 @@ from hobble.labels.phase import (
     phase_of_footsteps,
     rows_of_landings,
 )
+from hobble.labels.read_files import SourceTime
 
 
 def label_clip(

@@ -9,7 +9,7 @@ from pydantic import Field
 from hobble.core.section import Positive, PositiveFloat, Section
 
 
-class Labels(Section):
+class LabelOptions(Section):
     """Contacts, phase and gait. Speeds are in the unit of the facts page: centimetres a frame at 120 Hz."""
 
     files: bool = Field(True, description="use hand-made label files beside the clip")

@@ -11,7 +11,7 @@ import itertools
 import numpy as np
 
 from hobble.core.quat import Array
-from hobble.labels.files import whole_frame
+from hobble.labels.read_files import whole_frame
 
 BREAK = (np.nan, np.nan, 1.0)
 IDLE_RATE = 0.0017  # cycles a frame, a tenth of the usual rate, as at run time for a standing character

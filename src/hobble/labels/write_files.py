@@ -1,6 +1,6 @@
 """Writes automatic labels as files that people can correct: `_footsteps.txt`, `_gait.txt`, `.phase`.
 
-Frames count from 1 in the rate of the clip's own file. `hobble.labels.files` reads them.
+Frames count from 1 in the rate of the clip's own file. `hobble.labels.read_files` reads them.
 """
 
 from __future__ import annotations
@@ -11,8 +11,8 @@ from pathlib import Path
 import numpy as np
 
 from hobble.core.files import write_text
-from hobble.labels.files import SourceTime
 from hobble.labels.model import GAITS, Labels
+from hobble.labels.read_files import SourceTime
 
 HALF_FADE = 15  # frames at 60 Hz on each side of a change of gait in which the labels fade
 

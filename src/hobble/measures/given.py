@@ -15,7 +15,7 @@ from hobble.core.untrusted import read_yaml
 from hobble.runtime.options import Runtime
 
 Json = Mapping[str, Any]  # what a JSON file holds
-Row = Mapping[str, Any]  # of a CSV table: column -> number, text or None
+Row = Mapping[str, object]  # of a CSV table: column -> number, text or None
 
 
 @dataclass(frozen=True)
@@ -48,12 +48,12 @@ class Given:
         return self.file("weights")
 
     @property
-    def skeleton(self) -> dict[str, Any]:
+    def skeleton(self) -> Json:
         """The data set's skeleton, as config/skeletons/<name>.yaml holds it."""
         return read_yaml(self.file("skeleton")) or {}
 
     @property
-    def published(self) -> dict[str, Any]:
+    def published(self) -> Json:
         """The published figures."""
         return yaml.safe_load(self.file("published").read_text(encoding="utf-8"))
 

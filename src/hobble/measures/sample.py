@@ -1,9 +1,14 @@
-"""A stratified sample of the clips of a large data set, with weights and confidence intervals.
+"""A stratified sample of a large data set, with weights and confidence intervals.
 
-The clips are put into strata by split, gait, speed (the slow, middle and fast third of a gait) and channel.
-Of each stratum some are drawn, in proportion to its rows; each split gets half of the rows that are to be
-measured, since the held-out clips are few. A clip drawn counts for all rows of its stratum (Cochran,
+What is drawn are excerpts of clips (`hobble.rows.excerpts`), so that a long clip is not measured as a whole.
+They are put into strata by split, gait, speed (the slow, middle and fast third of a gait) and channel. Of
+each stratum some are drawn, in proportion to its rows; each split gets half of the rows that are to be
+measured, since the held-out clips are few. An excerpt drawn counts for all rows of its stratum (Cochran,
 Sampling Techniques, 1977, chapters 5 and 6: stratified sampling, ratio estimates).
+
+The excerpts of a stratum are drawn one by one, whichever clips they are from. So the confidence interval
+holds although excerpts of one clip resemble each other. It says how far the mean of the sample may be from
+the mean over all rows of these clips. How much other clips would differ, it does not say.
 """
 
 from __future__ import annotations
@@ -16,110 +21,125 @@ from typing import Any
 
 import numpy as np
 
+from hobble.measures.results import SampleSize
+from hobble.rows.excerpts import Excerpt, Kind
 from hobble.rows.facts import Facts
 
-LEAST = 2  # clips drawn from a stratum, because the variance needs at least two
+LEAST = 2  # excerpts drawn from a stratum, because the variance needs at least two
 SPEEDS = 3  # strata of a gait by speed
 SURE = 1.96  # standard errors on each side of a 95 % confidence interval
 
 
 @dataclass(frozen=True)
 class Stratum:
-    """Similar clips. clips, rows: their number and total rows. drawn: clip in the sample -> its rows."""
+    """Similar excerpts. count, rows: their number and total rows. drawn: those in the sample."""
 
     split: str
-    clips: int
+    count: int
     rows: int
-    drawn: Mapping[str, int] = field(repr=False)
+    drawn: tuple[Excerpt, ...] = field(repr=False)
 
     @property
     def weight(self) -> float:
         """The number of rows that each measured row represents."""
-        return self.rows / max(sum(self.drawn.values()), 1)
+        return self.rows / max(sum(one.rows for one in self.drawn), 1)
 
 
 @dataclass(frozen=True)
 class Sample:
-    """The clips to measure, by stratum. of: number of all clips."""
+    """The excerpts to measure, by stratum. clips: number of all clips."""
 
     strata: tuple[Stratum, ...]
-    of: int
+    clips: int
 
     @property
-    def weights(self) -> dict[str, float]:
-        """Clip in the sample -> number of rows that each of its rows represents, sorted by name."""
-        return dict(sorted((name, stratum.weight) for stratum in self.strata for name in stratum.drawn))
+    def weights(self) -> dict[Excerpt, float]:
+        """Excerpt in the sample -> number of rows that each of its rows represents, by clip and place."""
+        return dict(sorted((one, stratum.weight) for stratum in self.strata for one in stratum.drawn))
 
     @property
-    def clip_weights(self) -> dict[str, float]:
-        """Clip in the sample -> number of clips that it represents."""
-        return {name: s.clips / len(s.drawn) for s in self.strata for name in s.drawn}
+    def clip_weights(self) -> dict[Excerpt, float]:
+        """Excerpt in the sample -> number of clips that it represents."""
+        return {
+            one: one.rows / one.of * stratum.count / len(stratum.drawn)
+            for stratum in self.strata
+            for one in stratum.drawn
+        }
 
-    def half_width(self, split: str, values: Mapping[str, float]) -> float:
+    def half_width(self, split: str, values: Mapping[Excerpt, float]) -> float:
         """Half the width of the 95 % confidence interval of the mean over a split's rows.
 
-        values: clip in the sample -> its mean.
+        values: excerpt in the sample -> its mean.
         """
         strata = [stratum for stratum in self.strata if stratum.split == split and stratum.rows]
         total = sum(stratum.rows for stratum in strata)
         variance = sum((stratum.rows / total) ** 2 * _variance(stratum, values) for stratum in strata)
         return SURE * math.sqrt(variance)
 
-    def to_dict(self) -> dict[str, int]:
+    def to_dict(self) -> SampleSize:
         """Plain data for a measurement's JSON."""
-        drawn = sum(len(stratum.drawn) for stratum in self.strata)
-        return {"clips": drawn, "of": self.of, "strata": len(self.strata)}
+        drawn = [one for stratum in self.strata for one in stratum.drawn]
+        return {
+            "excerpts": len(drawn),
+            "of_excerpts": sum(stratum.count for stratum in self.strata),
+            "clips": len({one.clip for one in drawn}),
+            "of": self.clips,
+            "strata": len(self.strata),
+        }
 
 
-def _variance(stratum: Stratum, values: Mapping[str, float]) -> float:
-    """Variance of the mean over a stratum's rows, for a ratio estimate from the sampled clips."""
+def _variance(stratum: Stratum, values: Mapping[Excerpt, float]) -> float:
+    """Variance of the mean over a stratum's rows, for a ratio estimate from the sampled excerpts."""
     n = len(stratum.drawn)
-    if n == stratum.clips or n < LEAST:
+    if n == stratum.count or n < LEAST:
         return 0.0
-    rows = np.array(list(stratum.drawn.values()), float)
-    mean = np.array([values[name] for name in stratum.drawn])
+    rows = np.array([one.rows for one in stratum.drawn], float)
+    mean = np.array([values[one] for one in stratum.drawn])
     off = rows / rows.mean() * (mean - np.average(mean, weights=rows))
-    return float((1 - n / stratum.clips) * (off**2).sum() / (n - 1) / n)
+    return float((1 - n / stratum.count) * (off**2).sum() / (n - 1) / n)
 
 
 def drawn(facts: Iterable[Facts], splits: Mapping[str, str], frames: int) -> Sample | None:
-    """A sample of clips with about `frames` rows; None if all clips together have no more.
+    """A sample of about `frames` rows; None if all clips together have no more.
 
     The same clips give the same sample, and one more clip changes it only a little.
     """
     clips = [one for one in facts if one.rows]
     if sum(one.rows for one in clips) <= frames:
         return None
+    every = {excerpt: kind for one in clips for excerpt, kind in one.excerpts.items()}
+    of_split = dict.fromkeys(splits.values(), 0)
+    for one in clips:
+        of_split[splits[one.clip]] += one.rows
     strata = []
-    for members in _kinds(clips, splits).values():
+    for members in _strata(every, splits).values():
         split = splits[members[0].clip]
         rows = sum(one.rows for one in members)
-        of_split = sum(one.rows for one in clips if splits[one.clip] == split)
-        wanted = frames * _share(clips, splits, split, frames) * rows / of_split
+        wanted = frames * _share(of_split, split, frames) * rows / of_split[split]
         strata.append(Stratum(split, len(members), rows, _first(members, wanted)))
     return Sample(tuple(strata), len(clips))
 
 
-def _share(clips: Sequence[Facts], splits: Mapping[str, str], split: str, frames: int) -> float:
-    """Share of the measured rows for one split: half, or more if the other split has too few rows."""
-    rows = dict.fromkeys(splits.values(), 0)
-    for one in clips:
-        rows[splits[one.clip]] += one.rows
-    others = sum(n for name, n in rows.items() if name != split)
+def _share(of_split: Mapping[str, int], split: str, frames: int) -> float:
+    """Share of the measured rows for one split: half, or more if the other split has too few rows.
+
+    of_split: split -> rows.
+    """
+    others = sum(rows for name, rows in of_split.items() if name != split)
     return max(0.5, 1 - others / frames) if others else 1.0
 
 
-def _kinds(clips: Iterable[Facts], splits: Mapping[str, str]) -> dict[tuple[Any, ...], list[Facts]]:
-    """Stratum -> its clips."""
+def _strata(every: Mapping[Excerpt, Kind], splits: Mapping[str, str]) -> dict[tuple[Any, ...], list[Excerpt]]:
+    """Stratum -> its excerpts."""
     by_gait: dict[str, list[float]] = {}
-    for one in clips:
-        by_gait.setdefault(one.gait, []).append(one.speed)
+    for kind in every.values():
+        by_gait.setdefault(kind.gait, []).append(kind.speed)
     edges = {g: np.quantile(s, np.arange(1, SPEEDS) / SPEEDS) for g, s in by_gait.items()}
-    kinds: dict[tuple[Any, ...], list[Facts]] = {}
-    for one in sorted(clips, key=lambda one: one.clip):
-        speed = int(np.searchsorted(edges[one.gait], one.speed))
-        kinds.setdefault((splits[one.clip], one.gait, speed, one.channels), []).append(one)
-    return kinds
+    strata: dict[tuple[Any, ...], list[Excerpt]] = {}
+    for one, kind in sorted(every.items(), key=lambda item: item[0]):
+        speed = int(np.searchsorted(edges[kind.gait], kind.speed))
+        strata.setdefault((splits[one.clip], kind.gait, speed, kind.channels), []).append(one)
+    return strata
 
 
 def shuffle_key(name: str) -> bytes:
@@ -127,11 +147,17 @@ def shuffle_key(name: str) -> bytes:
     return hashlib.sha256(name.encode()).digest()
 
 
-def _first(members: Sequence[Facts], rows: float) -> dict[str, int]:
-    """A random choice of `LEAST` clips of a stratum, and more until they have `rows` rows."""
-    out: dict[str, int] = {}
-    for one in sorted(members, key=lambda one: shuffle_key(one.clip)):
-        if len(out) >= LEAST and sum(out.values()) >= rows:
+def _first(members: Sequence[Excerpt], rows: float) -> tuple[Excerpt, ...]:
+    """A random choice of `LEAST` excerpts of a stratum, and more until they have `rows` rows."""
+    out: list[Excerpt] = []
+    found = 0
+    for one in sorted(members, key=_random_place):
+        if len(out) >= LEAST and found >= rows:
             break
-        out[one.clip] = one.rows
-    return out
+        out.append(one)
+        found += one.rows
+    return tuple(out)
+
+
+def _random_place(one: Excerpt) -> bytes:
+    return shuffle_key(one.clip if one.whole else f"{one.clip} {one.first}")

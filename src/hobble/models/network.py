@@ -11,11 +11,11 @@ from typing import Any, ClassVar, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from hobble.channels.limits import Limits
+from hobble.channels.speed_limits import Limits
 from hobble.core.errors import HobbleError
 from hobble.core.quat import Array
 from hobble.core.skeleton import Skeleton
-from hobble.models.seen import Seen
+from hobble.models.seen import SeenInTraining
 from hobble.rows.layout import GAITS, RowLayout
 
 TERRAIN_SIDE = 25.0  # cm from the path to the side heights, if the file does not say
@@ -74,7 +74,7 @@ class Network(ABC):
     terrain_side: float = TERRAIN_SIDE
     limits: Mapping[str, Limits] = field(default_factory=dict, repr=False)
     meta: Mapping[str, Any] = field(default_factory=dict, repr=False)
-    seen: Seen | None = field(default=None, repr=False)
+    seen: SeenInTraining | None = field(default=None, repr=False)
 
     def trained(self, channel: str) -> tuple[str, ...]:
         """Labels of a channel's columns that were above 0 in training, by the means of the inputs.

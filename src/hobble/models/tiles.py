@@ -47,13 +47,14 @@ def in_panels(weights: Array) -> Array:
     return np.ascontiguousarray(np.swapaxes(padded.reshape(*lead, panels, WIDTH, inputs), -1, -2))
 
 
-def _write_tile(  # type: ignore[no-untyped-def]
-    builder, rows, panels, weights, x, y, y_at, first, step, depth, x_at, x_step
-):
+def _write_tile(builder, shape, weights_from, inputs_from, sums_at):  # type: ignore[no-untyped-def]
     """Write the loop of `_tile` in LLVM IR with vectors of WIDTH numbers, on every processor.
 
-    This keeps the sums in registers, which compilers do not achieve from plain loops.
+    This keeps the sums in registers, which compilers do not achieve from plain loops. shape: numbers of rows
+    and panels. weights_from, inputs_from, sums_at: the tuples of `_tile` as values, arrays as pointers.
     """
+    (rows, panels), (weights, first, step) = shape, weights_from
+    (x, x_at, x_step, depth), (y, y_at) = inputs_from, sums_at
     index, vector = ir.IntType(64), ir.VectorType(ir.FloatType(), WIDTH)
     fused = cgutils.get_or_insert_function(
         builder.module, ir.FunctionType(vector, [vector] * 3), f"llvm.fmuladd.v{WIDTH}f32"
@@ -129,28 +130,36 @@ def _spread(builder, one, vector):  # type: ignore[no-untyped-def]
     return builder.shuffle_vector(first, nothing, ir.Constant(ir.VectorType(lane, WIDTH), [0] * WIDTH))
 
 
-def _typed_tile(typing, rows, panels, weights, first, step, depth, x, x_at, x_step, y, y_at):  # type: ignore[no-untyped-def]
-    """Add the products of `depth` inputs with `panels` panels of weights to `rows` rows of y.
+def _typed_tile(typing, rows, panels, weights_from, inputs_from, sums_at):  # type: ignore[no-untyped-def]
+    """Add the products of some inputs with `panels` panels of weights to `rows` rows of sums.
 
-    weights, x, y: (n,) arrays. first: index of the first panel's weights for these inputs; step: distance to
-    the next panel's. x_at: index of the first row's inputs; x_step: distance to the next row's. y_at: (rows,)
-    index of each row's sums for the first panel. rows, panels: compile-time constants.
+    rows, panels: compile-time constants. The others are tuples of (n,) arrays and indices:
+    weights_from: weights; index of the first panel's weights for these inputs; distance to the next panel's.
+    inputs_from: inputs; index of the first row's; distance to the next row's; their number in each row.
+    sums_at: sums; (rows,) index of each row's sums for the first panel.
     """
     if not (isinstance(rows, types.IntegerLiteral) and isinstance(panels, types.IntegerLiteral)):
         return None
-    m, p = rows.literal_value, panels.literal_value
-    signature = types.void(
-        rows, panels, weights, types.intp, types.intp, types.intp, x, types.intp, types.intp, y, y_at
-    )
+    shape = rows.literal_value, panels.literal_value
+    signature = types.void(rows, panels, weights_from, inputs_from, sums_at)
 
     def generate(context, builder, signature, args):  # type: ignore[no-untyped-def]
-        arrays = [
-            context.make_array(signature.args[i])(context, builder, args[i]).data for i in (2, 6, 9, 10)
+        tuples = [
+            [
+                _pointer(context, builder, *part)
+                for part in zip(kind, cgutils.unpack_tuple(builder, arg), strict=True)
+            ]
+            for kind, arg in zip(signature.args[2:], args[2:], strict=True)
         ]
-        _write_tile(builder, m, p, *arrays, *(args[i] for i in (3, 4, 5, 7, 8)))
+        _write_tile(builder, shape, *tuples)
         return context.get_dummy_value()
 
     return signature, generate
+
+
+def _pointer(context, builder, kind, value):  # type: ignore[no-untyped-def]
+    """The pointer to an array's numbers. Other values stay as they are."""
+    return context.make_array(kind)(context, builder, value).data if isinstance(kind, types.Array) else value
 
 
 _tile: Any = intrinsic(_typed_tile)
@@ -195,44 +204,40 @@ def multiply(
                 count = rows * (n + 1) // tiles - row
                 for r in range(count):
                     at[r] = y_at[row + r] + panel * WIDTH
-                _chosen_tile(
-                    count, together, weights, first, inputs * WIDTH, depth, x, row * inputs + k, inputs, y, at
-                )
+                rows_from = x, row * inputs + k, inputs, depth
+                _chosen_tile(count, together, (weights, first, inputs * WIDTH), rows_from, (y, at))
             panel += together
 
 
 @njit(forceinline=True, cache=False)
-def _chosen_tile(
-    rows: int, panels: int, weights: Any, first: int, step: int, depth: int, x: Any, x_at: int, x_step: int,
-    y: Any, at: Any,
-) -> None:  # fmt: skip
+def _chosen_tile(rows: int, panels: int, weights_from: Any, inputs_from: Any, sums_at: Any) -> None:
     """Call `_tile` with `rows` and `panels` as compile-time constants."""
     if rows == 1:
         if panels == PANELS_FOR_1_ROW:
-            _tile(1, PANELS_FOR_1_ROW, weights, first, step, depth, x, x_at, x_step, y, at)
+            _tile(1, PANELS_FOR_1_ROW, weights_from, inputs_from, sums_at)
         else:
-            _tile(1, 1, weights, first, step, depth, x, x_at, x_step, y, at)
+            _tile(1, 1, weights_from, inputs_from, sums_at)
     elif rows == 2:
         if panels == PANELS_FOR_3_ROWS:
-            _tile(2, PANELS_FOR_3_ROWS, weights, first, step, depth, x, x_at, x_step, y, at)
+            _tile(2, PANELS_FOR_3_ROWS, weights_from, inputs_from, sums_at)
         else:
-            _tile(2, 1, weights, first, step, depth, x, x_at, x_step, y, at)
+            _tile(2, 1, weights_from, inputs_from, sums_at)
     elif rows == 3:
         if panels == PANELS_FOR_3_ROWS:
-            _tile(3, PANELS_FOR_3_ROWS, weights, first, step, depth, x, x_at, x_step, y, at)
+            _tile(3, PANELS_FOR_3_ROWS, weights_from, inputs_from, sums_at)
         else:
-            _tile(3, 1, weights, first, step, depth, x, x_at, x_step, y, at)
+            _tile(3, 1, weights_from, inputs_from, sums_at)
     elif rows == 4:
         if panels == PANELS_FOR_6_ROWS:
-            _tile(4, PANELS_FOR_6_ROWS, weights, first, step, depth, x, x_at, x_step, y, at)
+            _tile(4, PANELS_FOR_6_ROWS, weights_from, inputs_from, sums_at)
         else:
-            _tile(4, 1, weights, first, step, depth, x, x_at, x_step, y, at)
+            _tile(4, 1, weights_from, inputs_from, sums_at)
     elif rows == 5:
         if panels == PANELS_FOR_6_ROWS:
-            _tile(5, PANELS_FOR_6_ROWS, weights, first, step, depth, x, x_at, x_step, y, at)
+            _tile(5, PANELS_FOR_6_ROWS, weights_from, inputs_from, sums_at)
         else:
-            _tile(5, 1, weights, first, step, depth, x, x_at, x_step, y, at)
+            _tile(5, 1, weights_from, inputs_from, sums_at)
     elif panels == PANELS_FOR_6_ROWS:
-        _tile(6, PANELS_FOR_6_ROWS, weights, first, step, depth, x, x_at, x_step, y, at)
+        _tile(6, PANELS_FOR_6_ROWS, weights_from, inputs_from, sums_at)
     else:
-        _tile(6, 1, weights, first, step, depth, x, x_at, x_step, y, at)
+        _tile(6, 1, weights_from, inputs_from, sums_at)

@@ -16,16 +16,18 @@ from torch import Tensor
 ALL_ROWS = slice(None)
 
 
-class Step(Protocol):
+class TrainingStep(Protocol):
     """The gradient of the mean squared error on one batch.
 
     gradients: of the last call, one for each layer, with the layer's numbers in the same order. error: of the
-    last call, (B, Y), prediction minus y. generator: for dropout on CUDA.
+    last call, (B, Y), prediction minus y. generator: for dropout on CUDA. input_mask: which of the masks is
+    that of all inputs.
     """
 
     gradients: list[Tensor]
     error: Tensor
     generator: torch.Generator
+    input_mask: int
 
     def __call__(self, x: Tensor, y: Tensor, p: Tensor, masks: list[Tensor]) -> Tensor:
         """Find `gradients` for x (B, X), y (B, Y), p (B,). Returns the mean squared error, a scalar."""
@@ -73,8 +75,8 @@ class Trainable(ABC):
         """Standardised outputs (B, Y) of standardised inputs (B, X) at phases (B,), without dropout."""
 
     @abstractmethod
-    def step(self, dropout: float, half: bool) -> Step:
-        """The fastest `Step` on the network's device. half: round the factors of the products to bfloat16."""
+    def step(self, dropout: float, half: bool) -> TrainingStep:
+        """The fastest step on this device. half: round the factors of the products to bfloat16."""
 
     @abstractmethod
     def arrays(self) -> dict[str, np.ndarray]:

@@ -10,11 +10,11 @@ from hobble.core.errors import HobbleError
 from hobble.core.files import write_text
 from hobble.motion.doubt import Doubt
 from hobble.motion.draft import draft, guessed
+from hobble.motion.file_motion import raw_clip, rig_of
 from hobble.motion.find_body import find_body
 from hobble.motion.look import look, table
 from hobble.motion.options import ClipMotion
 from hobble.motion.read import read_bvh
-from hobble.motion.source import raw_clip, rig_of
 
 SKELETONS = Path("config/skeletons")
 

@@ -24,7 +24,7 @@ DIRECTIONS = {
 
 
 @dataclass(frozen=True)
-class Axes:
+class RigAxes:
     """Axes that were found or given. facing: of the rest pose ("+Z", "oblique")."""
 
     up: str
@@ -79,19 +79,19 @@ def rest_frame(skeleton: Skeleton) -> Array:
 
 
 @dataclass(frozen=True)
-class Straight:
+class UprightClip:
     """A clip with right-handed coordinates and Y up, and its axes before.
 
     notes: a sentence if motion and rest pose disagree on what is up. unsure: the same if it is in doubt.
     """
 
     clip: Clip
-    axes: Axes
+    axes: RigAxes
     notes: list[str]
     unsure: list[str]
 
 
-def straighten(clip: Clip, up: str, handedness: str, standing: bool = True) -> Straight:
+def straighten(clip: Clip, up: str, handedness: str, standing: bool = True) -> UprightClip:
     """The clip with right-handed coordinates, Y up, and a rest pose that faces +Z if whole axes allow it.
 
     up: "auto", "Y" or "Z". handedness: "auto", "right" or "left". standing: whether a person can stand in the
@@ -111,8 +111,8 @@ def straighten(clip: Clip, up: str, handedness: str, standing: bool = True) -> S
     rest = rest_frame(clip.skeleton)
     facing, near = nearest_axis(quat.rotate(rest, np.array([0.0, 0.0, 1.0])))
     turn = quat.inv(rest) if near > 1 - 1e-9 else quat.IDENTITY
-    axes = Axes(name, handedness, facing if near > 1 - 1e-9 else "oblique")
-    return Straight(_turned(clip, world, turn), axes, notes, unsure)
+    axes = RigAxes(name, handedness, facing if near > 1 - 1e-9 else "oblique")
+    return UprightClip(_turned(clip, world, turn), axes, notes, unsure)
 
 
 def _up_of(clip: Clip, standing: bool) -> tuple[str, list[str], list[str]]:

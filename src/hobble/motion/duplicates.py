@@ -21,7 +21,7 @@ FLIP = np.array([-1.0, 1.0, 1.0])
 
 
 @dataclass(frozen=True)
-class Likeness:
+class ClipDigest:
     """The data by which clips are compared.
 
     sha256: of the file. poses: (12, J, 3) cm, frames evenly over the clip, relative to the ground below the
@@ -36,7 +36,7 @@ class Likeness:
     mirrored: Array | None = field(default=None, repr=False)
 
 
-def likeness(clip: Clip, sha256: str) -> Likeness:
+def likeness(clip: Clip, sha256: str) -> ClipDigest:
     """The data by which a clip is compared with others."""
     at = np.linspace(0, len(clip) - 1, POSES).round().astype(int)
     moved = None if clip.translations is None else clip.translations[at]
@@ -49,10 +49,10 @@ def likeness(clip: Clip, sha256: str) -> Likeness:
         mirrored = poses[:, clip.skeleton.mirror_joints] * FLIP
     except HobbleError:
         mirrored = None
-    return Likeness(clip.name, sha256, len(clip) / clip.fps, poses, mirrored)
+    return ClipDigest(clip.name, sha256, len(clip) / clip.fps, poses, mirrored)
 
 
-def save_likenesses(path: Path, clips: Sequence[Likeness]) -> None:
+def save_likenesses(path: Path, clips: Sequence[ClipDigest]) -> None:
     """Write them to one file."""
     arrays = {
         f"{number}.{name}": np.array(value)
@@ -63,11 +63,11 @@ def save_likenesses(path: Path, clips: Sequence[Likeness]) -> None:
     save_npz(path, count=np.array(len(clips)), **arrays)
 
 
-def load_likenesses(path: Path) -> list[Likeness]:
+def load_likenesses(path: Path) -> list[ClipDigest]:
     """The inverse of `save_likenesses`."""
     data = load_npz(path)
     return [
-        Likeness(
+        ClipDigest(
             str(data[f"{number}.name"]),
             str(data[f"{number}.sha256"]),
             float(data[f"{number}.seconds"]),
@@ -78,7 +78,7 @@ def load_likenesses(path: Path) -> list[Likeness]:
     ]
 
 
-def same_pairs(clips: Sequence[Likeness]) -> list[tuple[str, str, str]]:
+def same_pairs(clips: Sequence[ClipDigest]) -> list[tuple[str, str, str]]:
     """Pairs of duplicates: name, name, and "the same file", "the same motion" or "mirrors"."""
     out = []
     order = sorted(clips, key=lambda clip: clip.seconds)
@@ -91,7 +91,7 @@ def same_pairs(clips: Sequence[Likeness]) -> list[tuple[str, str, str]]:
     return sorted(out)
 
 
-def _same(a: Likeness, b: Likeness) -> str:
+def _same(a: ClipDigest, b: ClipDigest) -> str:
     if a.sha256 == b.sha256:
         return "the same file"
     if a.poses.shape != b.poses.shape:

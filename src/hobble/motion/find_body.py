@@ -16,26 +16,26 @@ from hobble.motion.doubt import Doubt, TwoFigures
 from hobble.motion.find_head import find_head
 from hobble.motion.find_limbs import clavicle, find_limbs, joints_of, toe
 from hobble.motion.find_sides import left_arm, left_leg
-from hobble.motion.moving_rig import Rig
+from hobble.motion.moving_rig import MovingRig
 from hobble.motion.names import part_of
 from hobble.motion.tree import above, common, path
 
 
 @dataclass(frozen=True)
-class Found:
+class FoundBody:
     """The body of a rig. sided: whether names distinguish left and right."""
 
     body: Body
     sided: bool
 
 
-def find_body(names: Sequence[str], parents: Sequence[int], positions: Array) -> Found:
+def find_body(names: Sequence[str], parents: Sequence[int], positions: Array) -> FoundBody:
     """Find the parts of a body.
 
     positions: (F, J, 3) in the world, any unit, any axes. Raises Doubt if the rig and the motion do not
     determine the parts.
     """
-    rig = Rig(tuple(names), tuple(parents), positions)
+    rig = MovingRig(tuple(names), tuple(parents), positions)
     pairs = rig.pairs()
     if len(pairs) < 2:
         raise Doubt("its joints do not contain two equal legs and two equal arms")
@@ -62,7 +62,7 @@ def find_body(names: Sequence[str], parents: Sequence[int], positions: Array) ->
     )
     if other := _second(names, parents, positions, hips):
         raise TwoFigures(f"it holds two figures, {names[hips]} and {names[other]}")
-    return Found(body, sided)
+    return FoundBody(body, sided)
 
 
 def _second(names: Sequence[str], parents: Sequence[int], positions: Array, hips: int) -> int | None:

@@ -5,13 +5,13 @@ from __future__ import annotations
 import numpy as np
 
 from hobble.motion.doubt import Doubt
-from hobble.motion.moving_rig import Pair, Rig
+from hobble.motion.moving_rig import LimbPair, MovingRig
 from hobble.motion.names import is_end, part_of, side_of
 from hobble.motion.orient import unit
 from hobble.motion.tree import above, path
 
 
-def find_head(rig: Rig, legs: Pair, arms: Pair) -> tuple[int, tuple[int, ...]]:
+def find_head(rig: MovingRig, legs: LimbPair, arms: LimbPair) -> tuple[int, tuple[int, ...]]:
     """The head, and the joints between it and the chest."""
     limbs = set(sum(legs.chains, ())) | set(sum(arms.chains, ()))
     named = [
@@ -25,7 +25,7 @@ def find_head(rig: Rig, legs: Pair, arms: Pair) -> tuple[int, tuple[int, ...]]:
     return head, tuple(j for j in way if j not in spine)
 
 
-def _highest(rig: Rig, legs: Pair, arms: Pair, limbs: set[int]) -> int:
+def _highest(rig: MovingRig, legs: LimbPair, arms: LimbPair, limbs: set[int]) -> int:
     """The end of the chain that goes furthest from the trunk.
 
     Joints that only mark the head's end do not count.

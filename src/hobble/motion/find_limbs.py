@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from hobble.motion.doubt import Doubt
-from hobble.motion.moving_rig import Pair, Rig
+from hobble.motion.moving_rig import LimbPair, MovingRig
 from hobble.motion.names import is_control, limb_parts, part_of
 from hobble.motion.orient import unit
 
@@ -23,7 +23,7 @@ WORDS = {
 LIMBS = {"leg": ("thigh", "shank", "foot"), "arm": ("upperarm", "forearm", "hand")}
 
 
-def find_limbs(rig: Rig, pairs: list[Pair]) -> tuple[Pair, Pair]:
+def find_limbs(rig: MovingRig, pairs: list[LimbPair]) -> tuple[LimbPair, LimbPair]:
     """The pair of legs and the pair of arms of the likeliest body."""
     known = {}
     for i, pair in enumerate(pairs):
@@ -51,14 +51,14 @@ def find_limbs(rig: Rig, pairs: list[Pair]) -> tuple[Pair, Pair]:
     return pairs[i], pairs[k]
 
 
-def _away(rig: Rig, legs: Pair, middle: tuple[int, int, int], arms: Pair) -> float:
+def _away(rig: MovingRig, legs: LimbPair, middle: tuple[int, int, int], arms: LimbPair) -> float:
     """Mean cosine between the directions to the feet and to the arms' root; -1 for a standing body."""
     trunk = rig.at[:, arms.hub] - rig.at[:, legs.hub]
     feet = sum(rig.at[:, chain[middle[2]]] for chain in legs.chains) / 2 - rig.at[:, legs.hub]
     return float(np.mean(np.sum(unit(trunk) * unit(feet), axis=-1)))
 
 
-def _long(rig: Rig, pair: Pair, middle: tuple[int, int, int]) -> float:
+def _long(rig: MovingRig, pair: LimbPair, middle: tuple[int, int, int]) -> float:
     a, b, c = middle
     return (
         rig.chord(pair.chains[0][a], pair.chains[0][b])[0]
@@ -66,13 +66,13 @@ def _long(rig: Rig, pair: Pair, middle: tuple[int, int, int]) -> float:
     )
 
 
-def _swing(rig: Rig, pair: Pair, middle: tuple[int, int, int]) -> float:
+def _swing(rig: MovingRig, pair: LimbPair, middle: tuple[int, int, int]) -> float:
     """How much the limbs bend and stretch, 0 to 1. Hair, skirts and wings often keep one angle."""
     turns = [np.ptp(np.percentile(rig.bend(chain, *middle), [3, 97])) for chain in pair.chains]
     return float(np.minimum(np.mean(turns) / SWING, 1.0))
 
 
-def _named(rig: Rig, pair: Pair, kind: str) -> float:
+def _named(rig: MovingRig, pair: LimbPair, kind: str) -> float:
     """How strongly names suggest a kind of limb, -1 to 1. Joints that control others count against it."""
     names = [rig.names[j] for chain in pair.chains for j in chain]
     parts = [part_of(name) for name in names]
@@ -81,7 +81,7 @@ def _named(rig: Rig, pair: Pair, kind: str) -> float:
     return (sum(p in WORDS[kind] for p in parts) - against) / len(parts)
 
 
-def segments(rig: Rig, pair: Pair, kind: str) -> tuple[int, int, int] | None:
+def segments(rig: MovingRig, pair: LimbPair, kind: str) -> tuple[int, int, int] | None:
     """Indices in the chains of hip, knee and ankle, or of shoulder, elbow and wrist.
 
     Names count if they give all three and the bones have the proportions of a body. Otherwise the two
@@ -111,19 +111,19 @@ def segments(rig: Rig, pair: Pair, kind: str) -> tuple[int, int, int] | None:
     return where
 
 
-def _fits(rig: Rig, chain: Sequence[int], places: Sequence[int], kind: str) -> bool:
+def _fits(rig: MovingRig, chain: Sequence[int], places: Sequence[int], kind: str) -> bool:
     i, j, k = (chain[p] for p in places)
     upper, lower = rig.chord(i, j)[0], rig.chord(j, k)[0]
     low, high = RATIOS[kind]
     return min(upper, lower) > 0.03 * rig.size and low <= lower / max(upper, 1e-9) <= high
 
 
-def _moves(rig: Rig, pair: Pair, i: int, j: int) -> bool:
+def _moves(rig: MovingRig, pair: LimbPair, i: int, j: int) -> bool:
     """Whether the distance between two joints of a chain changes, so that they are not one bone."""
     return any(rig.chord(chain[i], chain[j])[1] > RIGID for chain in pair.chains)
 
 
-def _apart(rig: Rig, pair: Pair, i: int, j: int, kind: str) -> bool:
+def _apart(rig: MovingRig, pair: LimbPair, i: int, j: int, kind: str) -> bool:
     """Whether the limbs begin apart, like shoulders and hips and unlike collarbones."""
     at = [
         np.median(np.linalg.norm(rig.at[:, a] - rig.at[:, b], axis=-1))
@@ -132,7 +132,7 @@ def _apart(rig: Rig, pair: Pair, i: int, j: int, kind: str) -> bool:
     return bool(at[0] >= APART[kind] * at[1])
 
 
-def _bends(rig: Rig, pair: Pair, i: int, j: int, k: int) -> bool:
+def _bends(rig: MovingRig, pair: LimbPair, i: int, j: int, k: int) -> bool:
     """Whether the limb bends there, by at least six degrees on either side."""
     for chain in pair.chains:
         angle = rig.bend(chain, i, j, k)
@@ -141,7 +141,7 @@ def _bends(rig: Rig, pair: Pair, i: int, j: int, k: int) -> bool:
     return False
 
 
-def joints_of(rig: Rig, pair: Pair, kind: str, k: int) -> tuple[int, int, int]:
+def joints_of(rig: MovingRig, pair: LimbPair, kind: str, k: int) -> tuple[int, int, int]:
     """Hip, knee and ankle, or shoulder, elbow and wrist, of the chain k of a pair. It must have them."""
     places = segments(rig, pair, kind)
     assert places is not None
@@ -149,7 +149,7 @@ def joints_of(rig: Rig, pair: Pair, kind: str, k: int) -> tuple[int, int, int]:
     return pair.chains[k][a], pair.chains[k][b], pair.chains[k][c]
 
 
-def toe(rig: Rig, pair: Pair, k: int, heel: int) -> int | None:
+def toe(rig: MovingRig, pair: LimbPair, k: int, heel: int) -> int | None:
     """The ball of the foot: the first joint a foot's length away from the ankle, or None."""
     chain = pair.chains[k]
     leg = pair.length
@@ -165,7 +165,7 @@ def toe(rig: Rig, pair: Pair, k: int, heel: int) -> int | None:
     return next((j for j in toes if rig.chord(heel, j)[0] > 0.03 * leg), None)
 
 
-def clavicle(rig: Rig, pair: Pair, k: int, shoulder: int) -> int | None:
+def clavicle(rig: MovingRig, pair: LimbPair, k: int, shoulder: int) -> int | None:
     """The joint between chest and shoulder that moves the shoulder, or None."""
     chain = pair.chains[k]
     before = chain[: chain.index(shoulder)]

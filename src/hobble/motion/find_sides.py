@@ -7,13 +7,13 @@ import numpy as np
 from hobble.core.quat import Array
 from hobble.motion.doubt import Doubt
 from hobble.motion.find_limbs import toe
-from hobble.motion.moving_rig import Pair, Rig
+from hobble.motion.moving_rig import LimbPair, MovingRig
 from hobble.motion.names import side_of, side_of_pair
 from hobble.motion.orient import unit
 
 
 def left_leg(
-    rig: Rig, pair: Pair, leg: list[tuple[int, int, int]], legs: list, arm: list, head: int
+    rig: MovingRig, pair: LimbPair, leg: list[tuple[int, int, int]], legs: list, arm: list, head: int
 ) -> tuple[int, bool]:
     """Which of the two legs is the left one, and whether names say so."""
     named = _named_sides(rig, pair)
@@ -28,7 +28,7 @@ def left_leg(
     return (0 if turn > 0 else 1), False
 
 
-def _named_sides(rig: Rig, pair: Pair) -> tuple[int, int]:
+def _named_sides(rig: MovingRig, pair: LimbPair) -> tuple[int, int]:
     """For both chains how many more joints have left than right names."""
     votes = []
     for chain, across in (pair.chains, pair.chains[::-1]):
@@ -39,7 +39,7 @@ def _named_sides(rig: Rig, pair: Pair) -> tuple[int, int]:
     return votes[0], votes[1]
 
 
-def _ahead(rig: Rig, pair: Pair, leg: list[tuple[int, int, int]]) -> Array:
+def _ahead(rig: MovingRig, pair: LimbPair, leg: list[tuple[int, int, int]]) -> Array:
     """(S, 3) direction of the feet and, with less weight, of the knees."""
     out = np.zeros((len(rig.at), 3))
     for k, (hip, knee, heel) in enumerate(leg):
@@ -54,7 +54,11 @@ def _ahead(rig: Rig, pair: Pair, leg: list[tuple[int, int, int]]) -> Array:
 
 
 def left_arm(
-    rig: Rig, leg: list[tuple[int, int, int]], left: int, arm: list[tuple[int, int, int]], pair: Pair
+    rig: MovingRig,
+    leg: list[tuple[int, int, int]],
+    left: int,
+    arm: list[tuple[int, int, int]],
+    pair: LimbPair,
 ) -> int:
     """Which of the two arms is the left one, on the side of the left leg."""
     across = rig.at[:, leg[left][0]] - rig.at[:, leg[1 - left][0]]

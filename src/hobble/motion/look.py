@@ -20,7 +20,7 @@ from hobble.core.clip_files import find_clips, only_file, unused_file_notes
 from hobble.core.errors import HobbleError, InputError
 from hobble.core.quat import Array
 from hobble.motion.check import worst
-from hobble.motion.duplicates import Likeness, likeness, same_pairs
+from hobble.motion.duplicates import ClipDigest, likeness, same_pairs
 from hobble.motion.make import make_clip
 from hobble.motion.options import ClipMotion
 from hobble.motion.rig import leg_length
@@ -35,7 +35,7 @@ ENOUGH = {"mirrors of each other": "hold both out or neither"}
 
 
 @dataclass(frozen=True)
-class Look:
+class ClipSummary:
     """The summary of one clip.
 
     stands: seconds in which nobody moves. steps: how often the ankles pass each other. like: for finding
@@ -54,18 +54,18 @@ class Look:
     stands: float = 0.0
     off: tuple[str, float] | None = None
     warnings: tuple[str, ...] = ()
-    like: Likeness | None = field(default=None, repr=False)
+    like: ClipDigest | None = field(default=None, repr=False)
 
 
 @dataclass(frozen=True)
-class Folder:
+class FolderSummary:
     """The clips of a folder, and notes on what they have in common or lack."""
 
-    clips: tuple[Look, ...]
+    clips: tuple[ClipSummary, ...]
     notes: tuple[str, ...]
 
 
-def look(folder: Path, skeleton: Path, maps: Path, options: ClipMotion | None = None) -> Folder:
+def look(folder: Path, skeleton: Path, maps: Path, options: ClipMotion | None = None) -> FolderSummary:
     """Summarise each clip of a folder, or one file. Raises HobbleError if there are none.
 
     options: how the files are read, as in a data set.
@@ -76,10 +76,10 @@ def look(folder: Path, skeleton: Path, maps: Path, options: ClipMotion | None = 
     clips = tuple(_one(file, skeleton, maps, options or ClipMotion()) for file in files)
     orphans = () if folder.is_file() else tuple(unused_file_notes(folder, [file.stem for file in files]))
     short, common = shared_warnings(clips)
-    return Folder(tuple(short), (*common, *same_notes(clips), *standing_notes(clips), *orphans))
+    return FolderSummary(tuple(short), (*common, *same_notes(clips), *standing_notes(clips), *orphans))
 
 
-def shared_warnings(clips: Sequence[Look]) -> tuple[list[Look], list[str]]:
+def shared_warnings(clips: Sequence[ClipSummary]) -> tuple[list[ClipSummary], list[str]]:
     """Moves a sentence that at least MANY clips have from their lines to the notes on the folder."""
     count = Counter(warning for clip in clips for warning in clip.warnings if warning.endswith("."))
     common = {warning: times for warning, times in count.items() if times >= MANY}
@@ -87,17 +87,17 @@ def shared_warnings(clips: Sequence[Look]) -> tuple[list[Look], list[str]]:
     return short, [f"{times} of {len(clips)} clips: {warning}" for warning, times in common.items()]
 
 
-def _one(file: Path, skeleton: Path, maps: Path, options: ClipMotion) -> Look:
+def _one(file: Path, skeleton: Path, maps: Path, options: ClipMotion) -> ClipSummary:
     try:
         clip, report = make_clip(file, skeleton, maps, file.stem, skeleton.stem, options)
     except HobbleError as error:
-        return Look(file.stem, refused=str(error).split("\n")[0])
+        return ClipSummary(file.stem, refused=str(error).split("\n")[0])
     return seen(clip, report)
 
 
-def reported(report: Mapping[str, Any]) -> Look:
+def reported(report: Mapping[str, Any]) -> ClipSummary:
     """What the report of a clip says (`motion/<clip>.json`), without reading the clip."""
-    return Look(
+    return ClipSummary(
         report["clip"],
         rig=report["rig"],
         fps=report["source_fps"],
@@ -107,7 +107,7 @@ def reported(report: Mapping[str, Any]) -> Look:
     )
 
 
-def seen(clip: Clip, report: Mapping[str, Any]) -> Look:
+def seen(clip: Clip, report: Mapping[str, Any]) -> ClipSummary:
     """The summary of a clip. report: its `motion/<clip>.json`."""
     hips = clip.positions[:, clip.skeleton.role("hips")]
     path = np.linalg.norm(np.diff(hips[:, [0, 2]], axis=0), axis=-1)
@@ -180,13 +180,13 @@ def rate_warnings(steps: int, moving: float, way: float, clip: Clip, report: Map
     ]
 
 
-def same_notes(clips: Sequence[Look]) -> list[str]:
+def same_notes(clips: Sequence[ClipSummary]) -> list[str]:
     """Sentences on duplicates."""
     pairs = same_pairs([clip.like for clip in clips if clip.like is not None])
     return [f"{a} and {b} are {what}: {ENOUGH.get(what, 'one of them is enough')}." for a, b, what in pairs]
 
 
-def standing_notes(clips: Sequence[Look]) -> list[str]:
+def standing_notes(clips: Sequence[ClipSummary]) -> list[str]:
     """A sentence if nobody stands in any clip, with the consequence."""
     if not clips or any(clip.stands > 0 or clip.refused for clip in clips):
         return []
@@ -196,7 +196,7 @@ def standing_notes(clips: Sequence[Look]) -> list[str]:
     ]
 
 
-def table(folder: Folder) -> str:
+def table(folder: FolderSummary) -> str:
     """The folder as text: a line for each clip, then the notes."""
     wide = max(4, *(len(clip.name) for clip in folder.clips))
     names = f"{'rig':10} {'fps':>5} {'s':>6} {'hips':>5} {'cm/s':>5} {'steps':>5} {'/min':>4} {'stands':>6}"

@@ -15,7 +15,7 @@ import numpy as np
 
 from hobble.core.clip import Clip
 from hobble.core.quat import Array
-from hobble.motion.look import Look, reported, same_notes, seen, shared_warnings, standing_notes
+from hobble.motion.look import ClipSummary, reported, same_notes, seen, shared_warnings, standing_notes
 from hobble.motion.root import facing
 
 FRAMES, SECONDS = 40, 4.0  # of the picture, from the middle of the clip
@@ -86,7 +86,7 @@ def foot_down(contacts: Array) -> float:
 class _Line:
     """A line of the page. figure, down: None if the clip was not read."""
 
-    look: Look
+    look: ClipSummary
     labels: Mapping[str, Any]
     figure: dict[str, Any] | None = None
     down: float | None = None

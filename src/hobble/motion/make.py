@@ -14,7 +14,8 @@ from hobble.core.quat import Array
 from hobble.core.skeleton import Skeleton
 from hobble.motion.axes import turned
 from hobble.motion.body import body_by_roles
-from hobble.motion.check import check, compare
+from hobble.motion.check import check, check_knees, compare
+from hobble.motion.file_motion import FOUND, FileMotion, load_source
 from hobble.motion.loop import loop_clip
 from hobble.motion.options import ClipMotion
 from hobble.motion.pace import check_pace
@@ -23,8 +24,8 @@ from hobble.motion.resample import sample_positions, sample_rotations, sample_ti
 from hobble.motion.retarget import plan, retarget_clip
 from hobble.motion.rig import load_skeleton
 from hobble.motion.root import facing
-from hobble.motion.source import FOUND, Source, load_source
 from hobble.motion.stance import upright
+from hobble.motion.tilt import check_tilt
 
 SAME = 1e-3  # cm: offsets that differ less from the skeleton's are equal
 
@@ -57,7 +58,10 @@ def make_clip(
     fitted = fit_skeleton(resampled, source, target.skeleton, options.proportions)
     if fitted.figures is not None:
         check(file.path, fitted.figures, source.match.rig)
-    in_place = check_pace(file.path, fitted.clip, options.defects == "leave")
+    leave = options.defects == "leave"
+    check_knees(file.path, fitted.clip, leave or options.handedness != "auto")
+    doubtful_pace = check_pace(file.path, fitted.clip, leave)
+    check_tilt(file.path, fitted.clip, leave or options.up != "auto")
     made, repairs, loops = fitted.clip, source.repairs + fitted.repairs, options.loops
     if loops > 1:
         made = loop_clip(made, loops, options.heading)
@@ -72,7 +76,7 @@ def make_clip(
         "cycle_frames": len(made) // loops,
         "scale": fitted.scale,
         "retarget": fitted.figures,
-        "unsure": fitted.unsure + ([in_place] if in_place else []),
+        "unsure": fitted.unsure + ([doubtful_pace] if doubtful_pace else []),
     }
     return made, _report(file, source, made) | extra | {"repairs": repairs, "notes": source.notes}
 
@@ -142,7 +146,7 @@ class Fitted:
     unsure: list[str] = field(default_factory=list)
 
 
-def fit_skeleton(clip: Clip, source: Source, target: Skeleton, proportions: str) -> Fitted:
+def fit_skeleton(clip: Clip, source: FileMotion, target: Skeleton, proportions: str) -> Fitted:
     """The clip's motion on the target skeleton, or on its joints with the clip's own bone lengths.
 
     clip: the source's, at another frame rate.
@@ -176,7 +180,7 @@ def _reordered(clip: Clip, order: Array, target: Skeleton) -> Clip:
     return Clip(clip.name, skeleton, clip.fps, clip.rotations[:, order], clip.root, translations)
 
 
-def _report(file: Bvh, source: Source, made: Clip) -> dict[str, Any]:
+def _report(file: Bvh, source: FileMotion, made: Clip) -> dict[str, Any]:
     return {
         "clip": made.name,
         "source": file.path.name,

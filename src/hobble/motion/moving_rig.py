@@ -20,7 +20,7 @@ LEAST = 0.1  # least length of a limb, relative to the size of the body, which w
 
 
 @dataclass(frozen=True)
-class Pair:
+class LimbPair:
     """Two equal chains of joints below one joint, from the trunk outward, `sides` (a, b)."""
 
     hub: int
@@ -29,7 +29,7 @@ class Pair:
 
 
 @dataclass(frozen=True)
-class Rig:
+class MovingRig:
     """Joints and where they are: positions (F, J, 3) in the world, any unit, any axes."""
 
     names: tuple[str, ...]
@@ -92,7 +92,7 @@ class Rig:
                 return False
         return True
 
-    def pairs(self) -> list[Pair]:
+    def pairs(self) -> list[LimbPair]:
         """All pairs of chains that can be legs or arms."""
         out = []
         for hub, below in enumerate(self.children):
@@ -103,7 +103,7 @@ class Rig:
                     length, one, other = self.match(a, b)
                     length -= float(min(self.lengths[a], self.lengths[b]))
                     if length > LEAST * self.size and len(one) >= FEWEST:
-                        out.append(Pair(hub, (one, other), length))
+                        out.append(LimbPair(hub, (one, other), length))
         return out
 
     def chord(self, a: int, b: int) -> tuple[float, float]:

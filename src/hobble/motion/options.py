@@ -51,7 +51,7 @@ class Download(Section):
         return self
 
 
-class Motion(Section):
+class MotionOptions(Section):
     """How BVH files are read and checked.
 
     With `auto` a value is found from the rig; other values override it.
@@ -88,7 +88,7 @@ class Motion(Section):
     )
 
 
-class ClipMotion(Motion):
+class ClipMotion(MotionOptions):
     """The section for one clip. Values of the clip's entry in the data set override the section."""
 
     ground: Ground = Field("flat", description="the clip's ground; a flat floor is moved to height 0")

@@ -40,7 +40,7 @@ class Target:
 
 
 @dataclass(frozen=True)
-class Match:
+class RigMatch:
     """Which known skeleton a clip's rig is, and how it maps to the target.
 
     rig: name of the skeleton file. roles: role -> the clip's joint. same: the clip is on the target itself.
@@ -114,7 +114,7 @@ def find_hips(names: Sequence[str], target: Target, folder: str | Path) -> int:
     return names.index(hips) if hips in names else 0
 
 
-def match_rig(rig: Skeleton, target: Target, folder: str | Path) -> Match | None:
+def match_rig(rig: Skeleton, target: Target, folder: str | Path) -> RigMatch | None:
     """Find which known skeleton a clip's rig is, and how it maps to the target.
 
     rig: the clip's joints. folder: the folder of the skeleton files, for their maps. Returns None if no
@@ -124,14 +124,14 @@ def match_rig(rig: Skeleton, target: Target, folder: str | Path) -> Match | None
         roles = target.skeleton.roles
         alike = rest_alike(replace(rig, roles=roles), target.skeleton)
         same = {name: name for name in target.skeleton.joints}
-        return Match(target.skeleton.name, roles, alike, same, alike)
+        return RigMatch(target.skeleton.name, roles, alike, same, alike)
     known = nearest(rig.joints, target, folder)
     if _share(rig, known.skeleton) < KNOWN or _unfit(rig, known.skeleton):
         return None
     roles = _roles(rig, known.skeleton)
     sources = {a: b for a, b in joint_pairs(known, target).items() if b in rig.joints}
     alike = rest_alike(replace(rig, roles=roles), known.skeleton)
-    return Match(known.skeleton.name, roles, False, sources, alike)
+    return RigMatch(known.skeleton.name, roles, False, sources, alike)
 
 
 def rest_alike(rig: Skeleton, known: Skeleton) -> bool:

@@ -9,12 +9,13 @@ from typing import Any
 import numpy as np
 
 from hobble.core import quat
+from hobble.core.array_parts import ArrayParts
 from hobble.core.quat import Array
 from hobble.evaluation.captured import headings, root_path, rotate_by_yaw, unbroken
 from hobble.figure.mesh import body, key
 from hobble.models.network import Network
 from hobble.report.scenes import FPS, UNIT, packed_motion
-from hobble.rows.clip_rows import ClipRows, expanded, load_clip_rows
+from hobble.rows.clip_rows import ClipRows, load_clip_rows, pairs
 
 CLIPS = 6  # shown at least, if there are that many; up to MOST held-out clips are shown
 MOST = 16  # clips shown at most; one takes up to 230 kB
@@ -36,29 +37,30 @@ def comparisons(network: Network, paths: Iterable[str | Path], splits: Mapping[s
     held_out = sum(splits.get(Path(path).stem) == "held_out" for path in order)
     # Spread over the names: neighbours are often takes of the same motion.
     for path in order[: max(CLIPS, held_out)][:: max(1, -(-held_out // MOST))]:
-        rows = load_clip_rows(path)
+        rows = load_clip_rows(path, longest_stretch(path))
         if rows.layout.joints == network.layout.joints and len(rows):
             clips.append(_compared(network, rows, splits.get(rows.clip, "train"), keep))
     found = {"fps": FPS, "unit": UNIT, "joints": len(keep), "body": key(network.skeleton), "clips": clips}
     return found if clips else {}
 
 
+def longest_stretch(path: str | Path) -> tuple[int, int]:
+    """First row of a clip's longest unbroken stretch, and the one after its last; at most LONGEST frames."""
+    stretches = unbroken(ArrayParts(path).whole("frame"))
+    if not stretches:
+        return 0, 0
+    longest = max(stretches, key=len)[:LONGEST]
+    return int(longest[0]), int(longest[-1]) + 1
+
+
 def _compared(network: Network, rows: ClipRows, split: str, keep: list[int]) -> dict[str, Any]:
-    chosen = max(unbroken(rows.frame), key=len)[:LONGEST]
+    (chosen,) = unbroken(rows.frame)
     layout, figure = network.layout, network.skeleton
     assert figure is not None
     pose = slice(layout.y_joint_position.start, layout.y_joint_rotation.stop)
-    truth, guess = np.zeros((2, len(rows), pose.stop - pose.start))
-    seen = np.zeros(len(rows), bool)
-    for pairs in expanded(rows, network.layout):
-        row, first = np.unique(pairs.row, return_index=True)
-        wanted = np.isin(row, chosen) & ~seen[row]
-        row, first = row[wanted], first[wanted]
-        if len(row):
-            made = network.predict(pairs.x[first], pairs.p[first])
-            truth[row], guess[row] = pairs.y[first][:, pose], made[:, pose]
-            seen[row] = True
-    parts = [v[chosen].reshape(len(chosen), 3, -1, 3) for v in (truth, guess)]
+    asked = pairs(rows, layout, chosen, rows.first_fit[chosen])
+    truth, guess = (y[:, pose].astype(float) for y in (asked.y, network.predict(asked.x, asked.p)))
+    parts = [v.reshape(len(chosen), 3, -1, 3) for v in (truth, guess)]
     error = np.linalg.norm(parts[0][:, 0] - parts[1][:, 0], axis=-1).mean(axis=1)
     lift = rows.mean[rows.first_fit[chosen]][:, None]
     y = rows.y[chosen].astype(float)

@@ -43,7 +43,7 @@ class Chart:
 
 
 @dataclass(frozen=True)
-class Family:
+class ChartGroup:
     """Small charts that share a title and a caption, and a menu of their options if `choose` is not empty."""
 
     name: str

@@ -45,7 +45,7 @@ def configuration_table(compared: Compared) -> Table:
         Overview(60, Column("data set"), of("dataset")),
         Overview(80, Column.count("layers"), of("hidden_layers")),
         Overview(90, Column.count("units"), of("units")),
-        Overview(100, Column.count("passes"), of("passes")),
+        Overview(100, Column.number("passes"), of("passes")),
     ]
     columns.sort(key=lambda column: column.at)
     rows = [[name, *(column.values.get(name) for column in columns)] for name in entries]

@@ -13,13 +13,16 @@ import numpy as np
 from hobble.channels import channel
 from hobble.core.quat import Array
 from hobble.core.skeleton import Skeleton
+from hobble.measures.sample import shuffle_key
 from hobble.report.charts import Chart, Trace, axis
-from hobble.rows.clip_rows import load_clip_rows
+from hobble.rows.clip_rows import row_count
+from hobble.rows.excerpts import Excerpt, excerpts, load_excerpt
 
 FPS = 60.0
 SPEEDS = np.arange(0, 6.01, 0.2)  # metres a second
 TURNS = np.arange(-220, 221, 20.0)  # degrees a second, positive to the left
 LEVELS = np.arange(1, 11)  # tenths of the highest value of a channel
+MOST = 3000  # excerpts of clips whose frames are counted
 SPLITS = (("train", "training", "@muted"), ("held_out", "held out", "@accent"))
 
 
@@ -33,12 +36,13 @@ def seconds_of_data(
     `channels`: channel -> column -> seconds at each tenth of the highest value. `estimate`: a sentence about
     the choice.
     """
-    each = max(of or 0, len(paths)) / max(len(paths), 1) / FPS
+    chosen, share = _chosen(paths)
+    each = max(of or 0, len(paths)) / max(len(paths), 1) / share / FPS
     turns = {split: np.zeros(len(TURNS) - 1) for split, *_ in SPLITS}
     both = np.zeros((len(TURNS) - 1, len(SPEEDS) - 1))
     channels: dict[str, dict[str, Array]] = {}
-    for path in paths:
-        rows = load_clip_rows(path)
+    for path, excerpt in chosen:
+        rows = load_excerpt(path, excerpt)
         once = np.unique(rows.frame, return_index=True)[1]
         y, layout = np.asarray(rows.y[once], float), rows.layout
         speed = np.linalg.norm(y[:, layout.y_root_velocity], axis=1) * FPS / 100
@@ -55,8 +59,18 @@ def seconds_of_data(
                 if values.any():
                     found = np.histogram(10 * values / one.highest, np.arange(0.5, 11))[0] * each
                     seconds[column] = seconds.get(column, 0) + found
-    estimate = f" Estimated from {len(paths):,} of {of:,} clips." if of and of > len(paths) else ""
+    part = [f"{len(paths):,} of {of:,} clips"] if of and of > len(paths) else []
+    part += [f"{100 * share:.0f} % of their frames"] if share < 1 else []
+    estimate = f" Estimated from {' and '.join(part)}." if part else ""
     return {"turns": turns, "both": both, "channels": channels, "estimate": estimate}
+
+
+def _chosen(paths: Sequence[str | Path]) -> tuple[list[tuple[str | Path, Excerpt]], float]:
+    """What to read of the files: all, or at most MOST excerpts drawn at random. And its share of all rows."""
+    every = [(path, one) for path in paths for one in excerpts(Path(path).stem, row_count(path))]
+    some = sorted(every, key=lambda pair: shuffle_key(f"{pair[1].clip} {pair[1].first}"))[:MOST]
+    rows = sum(one.rows for _, one in every)
+    return (every, 1.0) if len(every) <= MOST else (some, sum(one.rows for _, one in some) / rows)
 
 
 def turn_chart(found: Mapping[str, Any]) -> Chart | None:

@@ -12,7 +12,7 @@ from hobble.report import measured
 from hobble.report.coverage import TURNS
 from hobble.report.formats import duration, number, size
 from hobble.report.gather import Material
-from hobble.report.summary import Figure, Hint, placed
+from hobble.report.summary import Hint, KeyFigure, placed
 
 TURNING = 40.0  # degrees a second; slower turning is the sway of a straight walk
 LITTLE_TURNING = 0.01  # share of the time
@@ -36,13 +36,13 @@ def lead(material: Material) -> str:
         if network["sizes"]
         else f"A character driven by {network['described']}, built"
     )
-    text += f" for {passes} passes" if passes and network["sizes"] else ""
+    text += f" for {passes:g} passes" if passes and network["sizes"] else ""
     text += f" on {len(clips) - kept} clips of {material.dataset}"
     text += f" and tested on {kept} held-out clips" if kept else ""
     return f"{text}. All clips together have {frames:,} frames at 60\u00a0Hz."
 
 
-def key_figures(material: Material) -> list[Figure]:
+def key_figures(material: Material) -> list[KeyFigure]:
     """The numbers at the top of the page, most important first."""
     figures = measured.figures(material)
     seconds = sum(report.get("seconds", 0) for report in material.motion)
@@ -50,16 +50,16 @@ def key_figures(material: Material) -> list[Figure]:
         kept = sum(material.split(report["clip"]) == "held_out" for report in material.motion)
         note = f"{len(material.motion)} clips, {kept} of them held out"
         value, _, unit = duration(seconds).partition(" ")
-        figures.append(Figure("Motion data", value, unit, note, 30))
+        figures.append(KeyFigure("Motion data", value, unit, note, 30))
     network = material.network
     note = f"parameters per phase; layers of {'–'.join(map(str, network['sizes']))}"
     note = f"{note if network['sizes'] else 'numbers in its tables'}; {size(network['bytes'])} on disk"
-    figures.append(Figure("Network", number(network["parameters"] / 1e6, 3), "M", note, 40))
+    figures.append(KeyFigure("Network", number(network["parameters"] / 1e6, 3), "M", note, 40))
     total = material.pipeline.get("total_seconds")
     if total:
         value, _, unit = duration(total).partition(" ")
         note = f"from clips to measurements, all jobs; {size(material.pipeline.get('total_bytes'))} written"
-        figures.append(Figure("Whole pipeline", value, unit, note, 50))
+        figures.append(KeyFigure("Whole pipeline", value, unit, note, 50))
     return sorted(figures, key=lambda figure: figure.at)
 
 
@@ -155,8 +155,7 @@ def _repairs(material: Material) -> Iterator[Hint]:
     if repaired or warned:
         yield Hint(
             "note",
-            f"Check {len(repaired | warned)} clips: {len(repaired)} were repaired, {len(warned)} have "
-            "warnings.",
+            f"Check {len(repaired | warned)} clips. Repaired: {len(repaired)}. With warnings: {len(warned)}.",
             "They are listed under Data. The network also learns the errors in a clip.",
         )
 

@@ -9,8 +9,8 @@ from typing import Any
 
 from hobble.core.files import read_json
 from hobble.core.untrusted import read_yaml
+from hobble.evaluation.csv_tables import read_numbers
 from hobble.evaluation.pipeline_results import Pipeline
-from hobble.evaluation.tables import read_numbers
 from hobble.measures.given import Json
 from hobble.models.load import load_network
 

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from hobble.core.files import load_npz
+from hobble.core.array_parts import ArrayParts
 from hobble.core.quat import Array
 from hobble.core.skeleton import Skeleton
 from hobble.figure.fit import fitted_rotations
@@ -34,10 +34,10 @@ def ground_pictures(paths: Iterable[str | Path], skeleton: Mapping[str, Any]) ->
     for path in paths:
         if len(pictures) == MOST:
             break
-        data = load_npz(path)
-        count = int(data.get("pictures", 0))
+        file = ArrayParts(path)
+        count = int(file.whole("pictures")) if "pictures" in file else 0
         for k in range(min(count, MOST - len(pictures))):
-            part = {key: data[f"picture{k}_{key}"] for key in PARTS}
+            part = {key: file.whole(f"picture{k}_{key}") for key in PARTS}
             if part["pose"].shape[1] == len(figure.joints):
                 name = f"{Path(path).stem}, cycle {int(part['cycle']) + 1}"
                 turns = fitted_rotations(figure, np.asarray(part["pose"], float))[:, keep]

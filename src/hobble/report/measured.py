@@ -25,8 +25,8 @@ from typing import Any
 from hobble.measures.given import Json
 from hobble.measures.registry import MEASURES
 from hobble.report.gather import Material
-from hobble.report.parts import Section, joined
-from hobble.report.summary import Figure, Hint
+from hobble.report.page_parts import PageSection, joined
+from hobble.report.summary import Hint, KeyFigure
 from hobble.report.tables import Column
 from hobble.report.verdicts import Verdict
 
@@ -43,12 +43,12 @@ class Overview:
     values: Mapping[str, Any] = field(repr=False)
 
 
-def sections(material: Material) -> list[Section]:
+def sections(material: Material) -> list[PageSection]:
     """The sections of the report that show measurements."""
     return joined(show(material.found(name), material) for name, show in _each("page", "section"))
 
 
-def figures(material: Material) -> list[Figure]:
+def figures(material: Material) -> list[KeyFigure]:
     """Figures for the top of the report."""
     return [f for name, show in _each("page", "figures") for f in show(material.found(name), material)]
 
@@ -58,7 +58,7 @@ def hints(material: Material) -> list[Hint]:
     return [h for name, show in _each("page", "hints") for h in show(material.found(name), material)]
 
 
-def compared_sections(compared: Json) -> list[Section]:
+def compared_sections(compared: Json) -> list[PageSection]:
     """The sections of the comparison page that show measurements."""
     return joined(show(compared) for _, show in _each("comparison_page", "section"))
 

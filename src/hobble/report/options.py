@@ -5,7 +5,7 @@ from __future__ import annotations
 from hobble.core.section import Section
 
 
-class Report(Section):
+class ReportOptions(Section):
     """The page."""
 
     title: str | None = None

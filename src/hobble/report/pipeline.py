@@ -11,8 +11,8 @@ from hobble.core.errors import InputError
 from hobble.database.manifest import FILE as MANIFEST
 from hobble.database.manifest import Manifest
 from hobble.database.sizes import Sizes, sizes
-from hobble.evaluation.pipeline_results import OfStage, Pipeline, Total
-from hobble.evaluation.tables import read_numbers
+from hobble.evaluation.csv_tables import read_numbers
+from hobble.evaluation.pipeline_results import JobTotal, Pipeline, StageTotal
 from hobble.report.provenance import machine, versions
 from hobble.workflow.kept import recorded_seconds
 
@@ -31,7 +31,7 @@ def summarise(configuration: str, stages: Mapping[str, Mapping[str, Iterable[str
     database), `missing`, `machine`, `versions`. Raises InputError for a malformed benchmark or history.
     """
     missing: list[str] = []
-    entries: list[OfStage] = []
+    entries: list[StageTotal] = []
     for stage, paths in stages.items():
         made = {Path(folder).name: recorded_seconds(Path(folder)) for folder in paths.get("made", ())}
         jobs = _jobs(paths.get("benchmarks", ()), missing, made, set(paths.get("batches", ())))
@@ -151,7 +151,7 @@ def _database(paths: Iterable[str]) -> Sizes | None:
     return None
 
 
-def _total(rows: list[dict[str, float]]) -> Total:
+def _total(rows: list[dict[str, float]]) -> JobTotal:
     seconds = [row.get("s", 0.0) for row in rows]
     memory = [row["max_rss"] for row in rows if "max_rss" in row]
     return {

@@ -60,7 +60,7 @@ class Camera:
         return np.stack([half + zoom * across / deep, half - zoom * up / deep, deep], axis=1)
 
 
-class Studio:
+class BodyRenderer:
     """Draws one body in any pose. regions: for each bone, the indices of the columns that colour it."""
 
     def __init__(self, body: Mesh, regions: Sequence[Sequence[int]] = ()) -> None:

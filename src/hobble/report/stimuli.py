@@ -12,8 +12,7 @@ from numpy.typing import NDArray
 from PIL import Image
 
 from hobble.channels import channel
-from hobble.channels.shown import Loop as Wanted
-from hobble.channels.shown import loops, shown
+from hobble.channels.shown import SampleWalk, loops, shown
 from hobble.core import quat
 from hobble.core.errors import HobbleError
 from hobble.core.files import write_json
@@ -21,7 +20,7 @@ from hobble.core.quat import Array
 from hobble.core.skeleton import Skeleton
 from hobble.figure.mesh import body
 from hobble.models.network import Network
-from hobble.report.raster import GRID, Camera, Studio
+from hobble.report.raster import GRID, BodyRenderer, Camera
 from hobble.runtime.animation import ProceduralAnimation
 from hobble.runtime.export import export_bvh, fitted_skeleton, jointed
 from hobble.runtime.options import Runtime
@@ -36,7 +35,7 @@ VISIBLE = 0.1  # cm; a loop that is nearer to the neutral one looks the same
 
 
 @dataclass(frozen=True)
-class Loop:
+class RepeatedWalk:
     """A walk that can be repeated.
 
     positions (F, J, 3), cm; rotations (F, J, 4); travel (3,): translation of one round, cm; gap: mean
@@ -69,7 +68,7 @@ def write_stimuli(
     plain, rows = walk(network, {}, runtime), []
     for name, one, wanted in all_loops(network):
         columns, trained = network.channels[one], trained_columns(network, one)
-        studio = Studio(body(skeleton), shown(one, skeleton, columns, trained).regions)
+        studio = BodyRenderer(body(skeleton), shown(one, skeleton, columns, trained).regions)
         loop = walk(network, {one: dict(wanted.values)}, runtime) if wanted.values else plain
         own = skeleton
         if "skeleton" not in network.meta:
@@ -97,10 +96,10 @@ def write_stimuli(
     return rows
 
 
-def all_loops(network: Network) -> list[tuple[str, str, Wanted]]:
+def all_loops(network: Network) -> list[tuple[str, str, SampleWalk]]:
     """(name, channel, walk) of each loop. The neutral walk is listed once."""
     assert network.skeleton is not None
-    out: list[tuple[str, str, Wanted]] = []
+    out: list[tuple[str, str, SampleWalk]] = []
     for one, columns in network.channels.items():
         for loop in loops(one, network.skeleton, columns, network.trained(one)):
             if not out or out[0][1] == one:
@@ -116,7 +115,7 @@ def trained_columns(network: Network, name: str) -> set[str]:
     return {column for column, mean in zip(network.channels[name], means, strict=True) if mean > 0}
 
 
-def apart(loop: Loop, other: Loop) -> float:
+def apart(loop: RepeatedWalk, other: RepeatedWalk) -> float:
     """Mean distance (cm, over joints and poses) from each pose of `loop` to the nearest pose of `other`.
 
     Both are moved to the origin and turned the same way. 0 for the same walk, even if it starts elsewhere.
@@ -143,7 +142,7 @@ def doubts(rows: Sequence[Mapping[str, Any]]) -> list[str]:
     return out
 
 
-def walk(network: Network, values: Mapping[str, Mapping[str, float]], runtime: Runtime) -> Loop:
+def walk(network: Network, values: Mapping[str, Mapping[str, float]], runtime: Runtime) -> RepeatedWalk:
     """A loop of the character walking straight on, cut between the two most similar poses."""
     animation = ProceduralAnimation(network, **dict(runtime))
     ahead = np.array([0.0, SPEED])
@@ -160,7 +159,7 @@ def walk(network: Network, values: Mapping[str, Mapping[str, float]], runtime: R
         here, before = last - BLEND + k, first - BLEND + k
         kept[here - first] = (1 - share) * positions[here] + share * (positions[before] + travel)
         turned[here - first] = _mixed(rotations[here], rotations[before], share)
-    return Loop(kept, turned, travel, gap)
+    return RepeatedWalk(kept, turned, travel, gap)
 
 
 def cut(positions: Array) -> tuple[int, int, float]:
@@ -182,7 +181,7 @@ def cut(positions: Array) -> tuple[int, int, float]:
 
 
 def frames(
-    studio: Studio, skeleton: Skeleton, loop: Loop, values: Array | None, size: int
+    studio: BodyRenderer, skeleton: Skeleton, loop: RepeatedWalk, values: Array | None, size: int
 ) -> list[NDArray[np.uint8]]:
     """The pictures of a loop.
 
@@ -216,7 +215,7 @@ def save_loop(path: Path, pictures: list[NDArray[np.uint8]]) -> None:
     )
 
 
-def _ahead(loop: Loop) -> Array:
+def _ahead(loop: RepeatedWalk) -> Array:
     """Positions (F, J, 3) of a loop, with the root over the origin and the direction of travel along z."""
     yaw = np.arctan2(loop.travel[0], loop.travel[2])
     turn = np.array([[np.cos(yaw), 0, -np.sin(yaw)], [0, 1, 0], [np.sin(yaw), 0, np.cos(yaw)]])

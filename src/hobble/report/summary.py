@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 
 
 @dataclass(frozen=True)
-class Figure:
+class KeyFigure:
     """A key figure. note: the smaller text under it. at: figures are sorted by it."""
 
     label: str

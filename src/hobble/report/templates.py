@@ -9,9 +9,9 @@ from typing import Any
 from jinja2 import Environment, FileSystemLoader, StrictUndefined, Template, select_autoescape
 from markupsafe import Markup
 
-from hobble.report.charts import Chart, Family
+from hobble.report.charts import Chart, ChartGroup
 from hobble.report.formats import duration, number, size
-from hobble.report.parts import Pair, Section
+from hobble.report.page_parts import ChartPair, PageSection
 
 FOLDER = Path(__file__).parent
 
@@ -33,9 +33,9 @@ def specs(shown: Any) -> dict[str, Any]:
     """Chart name -> specification for the scripts, for all charts in nested sections and collections."""
     if isinstance(shown, Chart):
         return {shown.name: shown.spec()}
-    if isinstance(shown, Family | Pair):
+    if isinstance(shown, ChartGroup | ChartPair):
         return specs(shown.charts)
-    if isinstance(shown, Section):
+    if isinstance(shown, PageSection):
         return specs([part.content for part in shown.parts])
     if isinstance(shown, Mapping):
         return specs(list(shown.values()))

@@ -9,8 +9,8 @@ from typing import Any
 
 import numpy as np
 
+from hobble.core.array_parts import ArrayParts
 from hobble.core.errors import InputError
-from hobble.core.files import load_npz
 from hobble.core.quat import Array
 from hobble.report.charts import Chart, Trace, axis, line
 from hobble.report.tables import Column, Table
@@ -21,7 +21,7 @@ STRIDE = 3  # frames between two points of a profile
 
 
 @dataclass(frozen=True)
-class Fits:
+class ShownFits:
     """The fits of one clip.
 
     foot_error: (C, 10, 2) mean and largest distance of a standing foot from its ground, cm. error: (C, 10)
@@ -41,17 +41,18 @@ class Fits:
         return self.profile.shape[1] < 2
 
 
-def read_fits(path: str | Path) -> Fits:
+def read_fits(path: str | Path) -> ShownFits:
     """Read `terrain/clips/<clip>.npz`. Raises InputError if an array is missing or lengths disagree."""
     try:
-        data = load_npz(path, ("fits", "frame", "heights", "foot_error", "error"))
-        fits, frame, heights = data["fits"], data["frame"], data["heights"]
-        present = heights.shape[1] // 3 + heights.shape[1] // 6
+        file = ArrayParts(path)
+        fits, frame = file.whole("fits"), file.rows("frame", 0, LONGEST)
         least = int(fits.min()) if len(fits) else 1
-        first = np.concatenate([[0], np.cumsum(fits)[:-1]]).astype(int) if len(fits) else np.zeros(0, int)
-        rows = first[:, None] + np.arange(least)
-        profile = heights[:, present][rows[:LONGEST:STRIDE]] if len(fits) else np.zeros((0, 1))
-        return Fits(Path(path).stem, data["foot_error"], data["error"], frame[:LONGEST:STRIDE], profile)
+        first = (np.cumsum(fits) - fits)[:LONGEST:STRIDE]
+        heights = file.rows("heights", 0, int(first[-1]) + least if len(fits) else 0)
+        present = heights.shape[1] // 3 + heights.shape[1] // 6
+        profile = heights[:, present][first[:, None] + np.arange(least)] if len(fits) else np.zeros((0, 1))
+        errors = file.whole("foot_error"), file.whole("error")
+        return ShownFits(Path(path).stem, *errors, frame[::STRIDE], profile)
     except (ValueError, IndexError) as error:
         raise InputError(
             path, f"not the terrain of a clip ({error})", fix="Delete the file; the workflow makes it again."
@@ -66,7 +67,7 @@ def section(paths: Iterable[str | Path]) -> dict[str, Any]:
     return {"charts": [profiles(found), distances(found)], "table": fit_table(found)}
 
 
-def profiles(found: list[Fits]) -> Chart:
+def profiles(found: list[ShownFits]) -> Chart:
     """Height of the ground under the root along each clip, for all its fits."""
     options: dict[str, list[Trace]] = {}
     for fit in found[:MOST_CLIPS]:
@@ -100,7 +101,7 @@ def profiles(found: list[Fits]) -> Chart:
     )
 
 
-def distances(found: list[Fits]) -> Chart:
+def distances(found: list[ShownFits]) -> Chart:
     """Distance of feet in contact from the fitted ground, for each clip."""
     traces: list[Trace] = [
         {
@@ -117,8 +118,8 @@ def distances(found: list[Fits]) -> Chart:
     return Chart(
         "terrain-feet",
         "Distance of the feet from the ground",
-        "Mean distance of a foot in contact from the fitted ground, after the residual correction. Each box "
-        "covers the cycles and fits of a clip. Less than a centimetre is invisible.",
+        "Mean distance of a foot in contact from the fitted ground, which was corrected to meet the feet. "
+        "Each box covers the cycles and fits of a clip. Less than a centimetre is invisible.",
         traces,
         {
             "xaxis": axis("cm", rangemode="tozero"),
@@ -129,7 +130,7 @@ def distances(found: list[Fits]) -> Chart:
     )
 
 
-def fit_table(found: list[Fits]) -> Table:
+def fit_table(found: list[ShownFits]) -> Table:
     """A row for each clip that is not on flat ground."""
     columns = [
         Column("clip"),

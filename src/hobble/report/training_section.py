@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 
-from hobble.report.charts import Chart, Family, axis, line, log_axis
+from hobble.report.charts import Chart, ChartGroup, axis, line, log_axis
 from hobble.report.formats import number
 from hobble.report.gather import Material
 from hobble.report.tables import Column, Table
@@ -44,7 +44,7 @@ def learning_curve(material: Material) -> Chart:
     )
 
 
-def block_curves(material: Material) -> Family | None:
+def block_curves(material: Material) -> ChartGroup | None:
     """The held-out error of each block of Y: small charts with the same scale, largest error first."""
     x, history = passes_axis(material), material.history
     whole = [v for v in history.get("held_out_mse", ()) if v is not None]
@@ -67,7 +67,7 @@ def block_curves(material: Material) -> Family | None:
             "showlegend": False,
         }
         charts.append(Chart(f"block-{i}", f"{name}, {number(last[name])}", "", traces, layout, height=190))
-    return Family(
+    return ChartGroup(
         "block-curves",
         "Held-out error of each part of the output",
         "The last value of the error is in each title, and the largest comes first. Grey is the error of the "

@@ -31,8 +31,8 @@ ARRAYS = {
 SMALL = {
     "height": "root_height",
     "phase": "phase",
-    "velocity": "target_velocity",
-    "direction": "target_direction",
+    "velocity": "smoothed_velocity",
+    "direction": "smoothed_direction",
     "strafe": "strafe",
     "correction": "correction",
     "lock": "foot_lock",
@@ -42,6 +42,7 @@ SMALL = {
     "lift": "foot_lift",
     "raised": "body_lift",
     "added": "foot_added",
+    "shown": "leg_shown",
     "placed": "placed",
 }
 

@@ -10,6 +10,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from hobble.core.array_parts import ArrayParts
 from hobble.core.errors import InputError
 from hobble.core.files import load_npz, save_npz
 from hobble.core.quat import Array
@@ -162,9 +163,12 @@ def outline(source: ClipRows | str | Path) -> Outline:
         raise InputError(source, f"not a file of rows ({error})", fix=DELETE_IT) from error
 
 
-def load_clip_rows(path: str | Path) -> ClipRows:
-    """Read what `save_clip_rows` wrote. Raises InputError if the file is damaged or inconsistent."""
-    data: dict[str, Any] = load_npz(path)
+def load_clip_rows(path: str | Path, part: tuple[int, int] | None = None) -> ClipRows:
+    """Read what `save_clip_rows` wrote. Raises InputError if the file is damaged or inconsistent.
+
+    part: first row and the one after the last, to read only these, without a check of the file's checksums.
+    """
+    data: dict[str, Any] = load_npz(path) if part is None else _part(ArrayParts(path), *part)
     try:
         data["clip"] = str(data["clip"])
         data["layout"] = RowLayout.from_dict(json.loads(str(data["layout"])))
@@ -177,3 +181,18 @@ def load_clip_rows(path: str | Path) -> ClipRows:
         raise InputError(path, f"not a file of rows ({error})", fix=DELETE_IT) from error
     rows.check(path)
     return rows
+
+
+def row_count(path: str | Path) -> int:
+    """Number of rows in a file of rows, without reading them."""
+    return ArrayParts(path).shape("p")[0]
+
+
+def _part(file: ArrayParts, first: int, stop: int) -> dict[str, Any]:
+    """The arrays of rows `first` to `stop`."""
+    of_fits = ("heights", "mean")
+    whole = {name: file.whole(name) for name in ("clip", "layout", "skeleton", "visits")}
+    rows = {name: file.rows(name, first, stop) for name in file.names if name not in (*whole, *of_fits)}
+    skipped = int(file.rows("fits", 0, first).sum())
+    fits = skipped, skipped + int(rows["fits"].sum())
+    return {**whole, **rows, **{name: file.rows(name, *fits) for name in of_fits}}

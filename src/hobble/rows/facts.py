@@ -1,43 +1,37 @@
-"""A summary of the rows of a clip, so that clips can be chosen without reading their rows."""
+"""A summary of the rows of a clip, so that excerpts of clips can be chosen without reading their rows."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import Any
-
-import numpy as np
 
 from hobble.core.errors import InputError
 from hobble.core.files import read_json, write_json
 from hobble.rows.clip_rows import DELETE_IT, ClipRows
-from hobble.rows.compose import body_layout
-from hobble.rows.layout import GAITS
+from hobble.rows.excerpts import Excerpt, Kind, excerpts, kind
 
 
 @dataclass(frozen=True)
 class Facts:
-    """rows: their number. gait: the one with the largest share. speed: of the root, mean over the rows, cm a
-    frame. channels: names of those with a value above 0 in some row."""
+    """rows: number of rows of the clip. kinds: what is in each of its excerpts, in the order of
+    `hobble.rows.excerpts.excerpts`."""
 
     clip: str
     rows: int
-    gait: str
-    speed: float
-    channels: tuple[str, ...]
+    kinds: tuple[Kind, ...] = field(repr=False)
+
+    @property
+    def excerpts(self) -> dict[Excerpt, Kind]:
+        """Excerpt -> what is in it."""
+        return dict(zip(excerpts(self.clip, self.rows), self.kinds, strict=True))
 
 
 def facts(rows: ClipRows) -> Facts:
     """The summary of the rows of one clip."""
-    layout = rows.layout
-    channels = tuple(name for name, values in rows.channels.items() if np.any(values != 0))
-    if not len(rows):
-        return Facts(rows.clip, 0, GAITS[0], 0.0, channels)
-    shares = rows.x[:, body_layout(layout).x_gait].reshape(len(rows), len(GAITS), layout.samples)
-    gait = GAITS[int(shares[:, :, layout.samples // 2].mean(axis=0).argmax())]
-    speed = np.hypot(*rows.y[:, layout.y_root_velocity].astype(float).T).mean()
-    return Facts(rows.clip, len(rows), gait, float(speed), channels)
+    parts = excerpts(rows.clip, len(rows))
+    return Facts(rows.clip, len(rows), tuple(kind(rows, part.first, part.stop) for part in parts))
 
 
 def save_facts(path: str | Path, found: Facts) -> None:
@@ -49,6 +43,9 @@ def load_facts(path: str | Path) -> Facts:
     """Read a summary. Raises InputError if the file holds something else."""
     values: Mapping[str, Any] = read_json(Path(path))
     try:
-        return Facts(**{**values, "channels": tuple(values["channels"])})
-    except (KeyError, TypeError) as error:
+        kinds = tuple(Kind(**{**one, "channels": tuple(one["channels"])}) for one in values["kinds"])
+        found = Facts(str(values["clip"]), int(values["rows"]), kinds)
+        found.excerpts  # noqa: B018 - fails unless each has its entry
+    except (KeyError, TypeError, ValueError) as error:
         raise InputError(path, f"not the facts of a clip ({error})", fix=DELETE_IT) from error
+    return found

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import copy
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -16,17 +17,17 @@ from hobble.core.quat import Array
 from hobble.core.skeleton import Skeleton
 from hobble.models.load import load_network
 from hobble.models.network import Network
-from hobble.runtime.axes import Axes
+from hobble.runtime.caller_axes import Axes
 from hobble.runtime.channel_values import ChannelValues, UnknownName
 from hobble.runtime.character import Character, Snapshot, start
 from hobble.runtime.controller import Controller, ControllerOptions
 from hobble.runtime.ground import as_ground
 from hobble.runtime.limits import JOG_FROM, SpeedLimiter
-from hobble.runtime.trajectory import STILL, facing_wish
+from hobble.runtime.trajectory import STILL, target_facing
 from hobble.runtime.waypoints import Follower, Waypoint
 
 # Limits of the input, well above what is real: sprinters reach 21 cm a frame, mountains 9 km.
-FASTEST_WISH = 30.0  # cm a frame, 18 m/s
+FASTEST = 30.0  # largest target velocity, cm a frame; 18 m/s
 FARTHEST = 1e7  # cm from the origin, 100 km: beyond it, positions are too imprecise for a step
 TURN_IN_PLACE = np.radians(20)  # a standing character steps around if it has to turn further than this
 
@@ -120,8 +121,8 @@ class ProceduralAnimation:
         rates: channel -> largest change of its values per second; default: the channel's own rate.
         scales: channel -> divisor of its values.
         foot_locking: hold feet in contact where they landed.
-        steering: gain of the correction when the wished velocity is not reached; 0 as in the original.
-        limits: limit the wished speed to what the injured body can do.
+        steering: gain of the correction when the target velocity is not reached; 0 as in the original.
+        limits: limit the target speed to what the injured body can do.
         axes: the caller's axes and unit. position, facing: see `reset`.
 
         Raises InputError for a file that is not a usable network, ValueError for an option out of range,
@@ -153,10 +154,29 @@ class ProceduralAnimation:
         else:
             ahead = self._level("facing", facing, self.axes.directions_in)
             yaws = np.arctan2(ahead[:, 0], ahead[:, 1])
-        self.state: Character = start(self.network, count, np.array(places, float), yaws)
-        self._controller = Controller(self._predictor, self.state, **self._of_controller)
-        self._wish_gait = np.zeros((count, len(self._gaits)))
-        self._wish_strafe, self._wish_look = np.zeros(count), np.zeros((count, 2))
+        self._control(start(self.network, count, np.array(places, float), yaws))
+
+    def copies(self, of: np.ndarray) -> ProceduralAnimation:
+        """A new animation, whose character i goes on as this one's character of[i] would. of: (C',) indices.
+
+        What is done with one of the two later does not change the other. Raises ValueError if the characters
+        follow waypoints.
+        """
+        if self.follower is not None:
+            raise ValueError("characters that follow waypoints cannot be copied")
+        out = copy.copy(self)
+        out.characters = len(of)
+        out._control(self.state.copies(of))
+        out._controller.take_pose(self._controller, of)
+        return out
+
+    def _control(self, state: Character) -> None:
+        """Go on from `state`."""
+        count = self.characters
+        self.state = state
+        self._controller = Controller(self._predictor, state, **self._of_controller)
+        self._target_gait = np.zeros((count, len(self._gaits)))
+        self._target_strafe, self._target_look = np.zeros(count), np.zeros((count, 2))
         self._nowhere = np.zeros((count, 2))
         self._limiter = SpeedLimiter(self.network, self._channel_values.columns, count)
 
@@ -213,10 +233,10 @@ class ProceduralAnimation:
         of range (velocity above 18 m/s, gait share above 1, ground above 100 km), for values that are not
         finite and for wrong shapes. After any error, also in the terrain function, the state is unchanged.
         """
-        velocity, ahead, gait = self._wish(target_velocity, facing, gait)
-        strafe, direction = self._wish_strafe, self._wish_look
+        velocity, ahead, gait = self._target(target_velocity, facing, gait)
+        strafe, direction = self._target_strafe, self._target_look
         ahead = self._nowhere if ahead is None else ahead
-        facing_wish(velocity, ahead, self.state.target_direction, strafe, direction)
+        target_facing(velocity, ahead, self.state.smoothed_direction, strafe, direction)
         shares = self._gait(velocity, direction, gait)
         if terrain is not self._terrain[0]:
             self._terrain = (terrain, as_ground(terrain, self.axes))
@@ -239,28 +259,28 @@ class ProceduralAnimation:
             raise
         return self._pose()
 
-    def _wish(self, velocity: Any, facing: Any, gait: Any) -> tuple[Array, Array | None, Any]:
+    def _target(self, velocity: Any, facing: Any, gait: Any) -> tuple[Array, Array | None, Any]:
         if velocity is not None:
             ahead = None if facing is None else self._level("facing", facing, self.axes.directions_in)
-            wish = self._level("target_velocity", velocity, self.axes.points_in)
-            if (fastest := np.hypot(wish[:, 0], wish[:, 1]).max()) > FASTEST_WISH:
+            target = self._level("target_velocity", velocity, self.axes.points_in)
+            if (fastest := np.hypot(target[:, 0], target[:, 1]).max()) > FASTEST:
                 raise ValueError(
                     f"target_velocity is {fastest:.4g} cm a frame, faster than a body can move: "
-                    f"{FASTEST_WISH:g} cm a frame at most ({FASTEST_WISH * 0.6:g} m/s at 60 frames a second)"
+                    f"{FASTEST:g} cm a frame at most ({FASTEST * 0.6:g} m/s at 60 frames a second)"
                 )
-            return wish, ahead, gait
+            return target, ahead, gait
         if self.follower is None:
             ahead = None if facing is None else self._level("facing", facing, self.axes.directions_in)
             return np.zeros((self.characters, 2)), ahead, gait
         middle = self.network.layout.window
-        wish, heading = self.follower.lead(self.state.position[:, middle])
-        ahead = wish
+        target, heading = self.follower.lead(self.state.position[:, middle])
+        ahead = target
         if any(waypoint.facing is not None for waypoint in heading):
-            ahead = wish.copy()
+            ahead = target.copy()
             for c, waypoint in enumerate(heading):
                 if waypoint.facing is not None:
                     ahead[c] = waypoint.facing
-        return wish, ahead, [w.gait for w in heading] if gait is None else gait
+        return target, ahead, [w.gait for w in heading] if gait is None else gait
 
     def _level(self, what: str, vector: Any, convert: Any) -> Array:
         """The caller's vectors as Hobble's x, z (C, 2). Two components are taken as ground coordinates."""
@@ -286,7 +306,7 @@ class ProceduralAnimation:
 
     def _gait(self, velocity: Array, direction: Array, gait: Any) -> Array:
         """Shares (C, 6) of the gaits, from the caller's gait, speed and facing."""
-        shares = self._wish_gait
+        shares = self._target_gait
         speed = np.hypot(velocity[:, 0], velocity[:, 1])
         given = np.asarray(gait)
         if given.dtype.kind in "biuf":

@@ -10,6 +10,8 @@ from hobble.core import quat
 from hobble.core.quat import Array
 from hobble.models.network import Network
 
+SHOWN = ("knee", "heel", "toe")  # the joints of `leg_shown`
+
 
 @dataclass
 class Character:
@@ -19,9 +21,10 @@ class Character:
     ground: (C, samples, 3) heights at left, path, right; root_height: (C,) mean of the heights on the path.
     joint_position, joint_velocity: (C, J, 3); joint_rotation: (C, J, 4) world. This is the network's copy.
     phase: (C,). channel_values, channel_targets: (C, K) present and wanted values of all channels' columns.
-    target_velocity, target_direction: (C, 2); strafe: (C,); correction: (C, 2): see `trajectory.follow_wish`.
+    smoothed_velocity, smoothed_direction: (C, 2); strafe: (C,); correction: (C, 2): see
+    `trajectory.follow_target`.
     foot_lock (C, 2), foot_hold (C, 2, 2), foot_step (C, 2), foot_missed (C, 2): see `foot_lock`.
-    foot_lift (C, 2), foot_added (C, 2, 2, 4), body_lift (C,): see `feet`.
+    foot_lift (C, 2), foot_added (C, 2, 2, 4), leg_shown (C, 2, 3, 3), body_lift (C,): see `feet`.
     placed: (C,) whether the joints have been lifted to the ground at the start.
     memory: (C, M) the network's own state of the character, see `Network.memory`.
     """
@@ -37,8 +40,8 @@ class Character:
     phase: Array
     channel_values: Array
     channel_targets: Array
-    target_velocity: Array
-    target_direction: Array
+    smoothed_velocity: Array
+    smoothed_direction: Array
     strafe: Array
     correction: Array
     foot_lock: Array
@@ -47,9 +50,14 @@ class Character:
     foot_missed: Array
     foot_lift: Array
     foot_added: Array
+    leg_shown: Array
     body_lift: Array
     placed: np.ndarray
     memory: Array
+
+    def copies(self, of: np.ndarray) -> Character:
+        """A new state, whose character i is a copy of this one's character of[i]. of: (C',) indices."""
+        return Character(**{field.name: getattr(self, field.name)[of] for field in fields(self)})
 
 
 class Snapshot:
@@ -80,6 +88,8 @@ def start(network: Network, characters: int, position: Array, yaw: Array) -> Cha
     joints = now[layout.y_joint_position].reshape(-1, 3)
     placed = _turned(joints, sin, cos)
     placed[..., ::2] += position[:, None]
+    assert network.skeleton is not None
+    legs = [[network.skeleton.role(f"{side}_{part}") for part in SHOWN] for side in ("left", "right")]
     moving = np.zeros_like(joints) if seen is None else now[layout.y_joint_velocity].reshape(-1, 3)
     turns = now[layout.y_joint_rotation].reshape(-1, 3)
     facing = np.concatenate([sin, cos], axis=1)
@@ -95,8 +105,8 @@ def start(network: Network, characters: int, position: Array, yaw: Array) -> Cha
         phase=np.full(count, 0.0 if seen is None else seen.start_phase),
         channel_values=np.zeros((count, columns)),
         channel_targets=np.zeros((count, columns)),
-        target_velocity=np.zeros((count, 2)),
-        target_direction=facing.copy(),
+        smoothed_velocity=np.zeros((count, 2)),
+        smoothed_direction=facing.copy(),
         strafe=np.zeros(count),
         correction=np.zeros((count, 2)),
         foot_lock=np.zeros((count, 2)),
@@ -105,6 +115,7 @@ def start(network: Network, characters: int, position: Array, yaw: Array) -> Cha
         foot_missed=np.zeros((count, 2)),
         foot_lift=np.zeros((count, 2)),
         foot_added=np.tile([1.0, 0.0, 0.0, 0.0], (count, 2, 2, 1)),
+        leg_shown=placed[:, legs].copy(),
         body_lift=np.zeros(count),
         placed=np.zeros(count, bool),
         memory=np.zeros((count, network.memory)),

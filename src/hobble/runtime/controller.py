@@ -1,6 +1,6 @@
 """One frame of a character in six timed steps: prepare, input, insert, predict, output, update.
 
-- prepare: smooth the caller's wish into targets, bend the future trajectory toward them, look up the ground;
+- prepare: smooth the caller's target, bend the future trajectory toward it, look up the ground;
 - input: write trajectory, gait, ground, last pose and channel values into a row X, in the root frame;
 - insert: standardise the row;
 - predict: evaluate the network at the present phase, which gives Y;
@@ -33,21 +33,25 @@ STEPS = ("prepare", "input", "insert", "predict", "output", "update")
 FPS = 60
 HIGHEST = 1e7  # cm, 100 km: largest height of the ground above or below 0; beyond it, heights are imprecise
 # Radians a frame (1500 degrees a second). No joint of a walking or running person turns as fast. A prediction
-# can: if clips have rotations half a turn apart, as in hands, their mean may be any rotation, and a new wish
-# changes the next pose at once.
+# can: if clips have rotations half a turn apart, as in hands, their mean may be any rotation, and a new
+# target changes the next pose at once.
 FASTEST_TURN = np.radians(25)
+# cm a frame by which the body rises with the mean height of the path. When a new wish turns the path around
+# on a hill, that height may change by 20 cm at once, while the ground under the feet stays.
+MOST_CLIMB = 5.0
 
 # Parts of the state that have to be finite. The others are checked at the call or computed in each frame.
 CHECKED = (
     *("position", "direction", "gait", "joint_position", "joint_velocity", "joint_rotation", "phase"),
     *(
         "channel_values",
-        "target_velocity",
-        "target_direction",
+        "smoothed_velocity",
+        "smoothed_direction",
         "correction",
         "foot_hold",
         "foot_lift",
         "foot_added",
+        "leg_shown",
     ),
     *("body_lift", "memory"),
 )
@@ -76,7 +80,7 @@ class Controller:
     """Runs the characters of one network. `seconds` (6,) holds the time of each of STEPS in the last frame.
 
     rates: channel -> largest change of its values per second; foot_locking: hold feet in contact where they
-    landed; steering: see `trajectory.follow_wish`; side: cm from the path to the side heights.
+    landed; steering: see `trajectory.follow_target`; side: cm from the path to the side heights.
     """
 
     def __init__(
@@ -118,32 +122,46 @@ class Controller:
         self._y_joints = layout.y_joint_position.start
         assert network.skeleton is not None
         legs = feet.leg_joints(network.skeleton)
-        self._legs = (legs, feet.carried(network.skeleton, legs), feet.sole_heights(network, legs))
+        self._legs = (
+            legs,
+            feet.carried(network.skeleton, legs),
+            feet.sole_heights(network, legs),
+            feet.knees_ahead(network.skeleton),
+            self.bounds.fastest,
+        )
         self._hips = network.skeleton.role("hips")
         self._standing = np.append(legs[:, 2:].reshape(-1), self._hips)
         self._under = np.zeros((count, len(self._standing)))
         self._warned = False
         self._group(character)
 
+    def take_pose(self, other: Controller, of: np.ndarray) -> None:
+        """Character i gets the pose in which `other` drew its character of[i]. of: (C,) indices."""
+        for name in ("root", "yaw", "pose_position", "pose_rotation"):
+            getattr(self, name)[:] = getattr(other, name)[of]
+
     def _group(self, c: Character) -> None:
         """Group the arrays for the compiled functions. They only change in place, so this is done once."""
         self._path = (c.position, c.direction, c.gait)
-        self._target = (c.target_velocity, c.target_direction, c.strafe, c.correction)
+        self._smoothed = (c.smoothed_velocity, c.smoothed_direction, c.strafe, c.correction)
         self._channels = (c.channel_values, c.channel_targets, self._channel_steps)
         self._joints = (c.joint_position, c.joint_velocity, c.joint_rotation)
         self._drawn = (self.root, self.yaw, self.pose_position, self.pose_rotation)
-        self._feet = ((c.foot_lock, c.foot_hold, c.foot_step, c.foot_missed), c.foot_lift, c.foot_added)
+        self._feet = (
+            (c.foot_lock, c.foot_hold, c.foot_step, c.foot_missed),
+            *(c.foot_lift, c.foot_added, c.leg_shown, c.root_height, c.body_lift),
+        )
         self._contacts = self.y[:, self.layout.y_contacts]
         self._checked = tuple(getattr(c, name).reshape(len(c.phase), -1) for name in CHECKED)
 
-    def frame(self, wish: trajectory.Wish, ground: Ground | None) -> None:
+    def frame(self, target: trajectory.Target, ground: Ground | None) -> None:
         """Run one frame. ground returns heights (N,) at x, z (N,)."""
         clock = perf_counter
         t0 = clock()
         c = self.character
         if find_unsound(self._checked, self._unsound):
             self._restore("the state")
-        self._prepare(wish, ground)
+        self._prepare(target, ground)
         t1 = clock()
         self._input()
         clip_rows(self.x, self.bounds.x_low, self.bounds.x_high, self._unsound)
@@ -156,7 +174,7 @@ class Controller:
         t4 = clock()
         self._output(ground)
         t5 = clock()
-        self._update(wish[0])
+        self._update(target[0])
         t6 = clock()
         self.seconds[:] = (t1 - t0, t2 - t1, t3 - t2, t4 - t3, t5 - t4, t6 - t5)
 
@@ -179,10 +197,10 @@ class Controller:
             )
         self._warned = True
 
-    def _prepare(self, wish: trajectory.Wish, ground: Ground | None) -> None:
+    def _prepare(self, target: trajectory.Target, ground: Ground | None) -> None:
         c = self.character
         trajectory.prepare(
-            wish, self.steering, self._target, self._path, self._channels, self.layout.step, self.side,
+            target, self.steering, self._smoothed, self._path, self._channels, self.layout.step, self.side,
             self._points,
         )  # fmt: skip
         if ground is None:
@@ -207,8 +225,9 @@ class Controller:
     def _output(self, ground: Ground | None) -> None:
         c = self.character
         _take_output(
-            self.y, self._y_joints, self._path, c.root_height, self._joints, self.bounds.fastest, self._drawn
-        )
+            self.y, self._y_joints, self._path, (c.root_height, c.body_lift), self._joints,
+            self.bounds.fastest, self._drawn,
+        )  # fmt: skip
         if ground is not None:
             at = np.ascontiguousarray(self.pose_position[:, self._standing]).reshape(-1, 3)
             self._under[:] = _heights(ground, at[:, 0], at[:, 2]).reshape(self._under.shape)
@@ -226,7 +245,7 @@ class Controller:
     def _update(self, velocity: Array) -> None:
         rooted = self.predictor.network.rooted
         steered = self.steering > 0
-        loss = trajectory.UNWISHED_LOSS if steered and not rooted else 0.0
+        loss = trajectory.BACKWARD_LOSS if steered and not rooted else 0.0
         pull = trajectory.PULL if steered and rooted else 0.0
         trajectory.advance(
             self.y, self._y_columns, velocity, loss, rooted, pull, self._path, self.character.phase
@@ -301,23 +320,32 @@ def _fill_input(
 
 @njit
 def _take_output(
-    y: Any, first: int, path: trajectory.Trajectory, height: Any, pose: Joints, fastest: float, drawn: Drawn
+    y: Any,
+    first: int,
+    path: trajectory.Trajectory,
+    heights: tuple[Any, Any],
+    pose: Joints,
+    fastest: float,
+    drawn: Drawn,
 ) -> None:
     """Turn the prediction y (C, Y), whose joints begin in column `first`, into the world poses of `pose` and
     `drawn`.
 
-    A joint's position is the mean of the predicted one and the old one plus velocity. No joint moves further
+    heights: (C,) of the ground under the root, and the lift of the body, see `feet.carry_body`. A joint's
+    position is the mean of the predicted one and the old one plus velocity. No joint moves further
     than `fastest` (not counting the change of the ground's height), and no joint turns by more than
     FASTEST_TURN from the last frame.
     """
     position, direction, _ = path
     joints, velocities, rotations = pose
     root, yaw, pose_position, pose_rotation = drawn
+    height, lift = heights
     slowest = np.cos(FASTEST_TURN / 2)
     middle, count = position.shape[1] // 2, joints.shape[1]
     for c in range(y.shape[0]):
         sin, cos = direction[c, middle, 0], direction[c, middle, 1]
         climbed = height[c] - root[c, 1]
+        lift[c] += min(max(climbed, -MOST_CLIMB), MOST_CLIMB) - climbed
         root[c, 0], root[c, 1], root[c, 2] = position[c, middle, 0], height[c], position[c, middle, 1]
         yaw[c] = np.arctan2(sin, cos)
         half_cos, half_sin = np.cos(yaw[c] / 2), np.sin(yaw[c] / 2)

@@ -7,10 +7,10 @@ from typing import Any
 import numpy as np
 
 from hobble.core.compiled import njit
-from hobble.core.skeleton import Skeleton
+from hobble.core.skeleton import Skeleton, rest_positions
 from hobble.models.network import Network
 from hobble.runtime.foot_lock import Hold, hold_foot, note_missed, step_rise
-from hobble.runtime.leg_reach import MOST_ADDED, bend, turn, turned
+from hobble.runtime.leg_reach import MOST_ADDED, bend, hold_back, turn, turned
 
 HEIGHT_MIX = 0.5  # share of the remaining foot lift that is applied each frame
 # cm a frame by which the foot lift may change. A network may predict contact with a foot at knee height.
@@ -30,11 +30,13 @@ FOOT, TOES = 1, 2  # the joints of a foot, see `carried`
 
 # Groups of arrays for compiled functions, which unpack them by name.
 #
-# joints (2, 4), see `leg_joints`; carried (2, J), see `carried`; sole (2,), see `sole_heights`.
-Legs = tuple[Any, Any, Any]
+# joints (2, 4), see `leg_joints`; carried (2, J), see `carried`; sole (2,), see `sole_heights`; ahead (3,),
+# see `knees_ahead`; fastest: cm a frame that foot placement may move a joint.
+Legs = tuple[Any, Any, Any, Any, float]
 # The state of the feet between frames: the hold of each foot; lift (C, 2), smoothed rise of the heel; added
-# (C, 2, 2, 4), see `bend`.
-Feet = tuple[Hold, Any, Any]
+# (C, 2, 2, 4), see `bend`; shown (C, 2, 3, 3), knee, heel and toe as they were drawn. The heights in `shown`
+# are above root_height (C,) + body_lift (C,), because the whole body may rise in a frame.
+Feet = tuple[Hold, Any, Any, Any, Any, Any]
 
 
 def leg_joints(skeleton: Skeleton) -> np.ndarray:
@@ -52,6 +54,14 @@ def sole_heights(network: Network, legs: np.ndarray) -> np.ndarray:
     layout = network.layout
     height = network.y_mean[layout.y_joint_position].reshape(-1, 3)[:, 1]
     return np.minimum(SOLE, 0.6 * height[legs[:, 2:]].mean(axis=0).astype(float))
+
+
+def knees_ahead(skeleton: Skeleton) -> np.ndarray:
+    """(3,) the direction in which the figure of the rest pose looks, to which straight knees bend."""
+    rest, legs = rest_positions(skeleton), leg_joints(skeleton)
+    left, down = rest[legs[0, 0]] - rest[legs[1, 0]], (rest[legs[:, 2]] - rest[legs[:, 0]]).sum(axis=0)
+    ahead = np.cross(down, left)
+    return np.asarray(ahead / np.linalg.norm(ahead), float)
 
 
 @njit
@@ -116,6 +126,21 @@ def carry_foot(
 
 
 @njit
+def hold_toes_back(position: Any, below: Any, toe: int, shown: Any, base: float, fastest: float) -> None:
+    """`hold_back` for the toe, with the joints `below` (J,) it. A foot may turn faster than a leg."""
+    x, y, z = position[toe, 0], position[toe, 1], position[toe, 2]
+    if hold_back(position[toe], shown, base, fastest):
+        x, y, z = position[toe, 0] - x, position[toe, 1] - y, position[toe, 2] - z
+        for j in range(position.shape[0]):
+            if below[j] == TOES and j != toe:
+                position[j, 0], position[j, 1], position[j, 2] = (
+                    position[j, 0] + x,
+                    position[j, 1] + y,
+                    position[j, 2] + z,
+                )
+
+
+@njit
 def sole_depth(position: Any, heel: int, toe: int, ground_heel: float, ground_toe: float, sole: Any) -> float:
     """How deep a foot of a pose (J, 3) is in the ground, cm; negative if it is above."""
     heel_depth = ground_heel + sole[0] - position[heel, 1]
@@ -144,7 +169,7 @@ def carry_body(
     hips: the joint. hips_range: lowest and highest, cm above the ground. lift: (C,) cm by which the body is
     raised, kept between frames.
     """
-    joints, _, sole = legs
+    joints, _, sole, _, _ = legs
     for c in range(position.shape[0]):
         wanted, weight = 0.0, 0.0
         for f in range(2):
@@ -171,15 +196,18 @@ def place_feet(
     `foot_lock`. ground: (C, 4 or more) heights under them. locking: whether feet are held at all.
     position: (C, J, 3); rotation: (C, J, 4) of the pose.
     """
-    joints, below, sole = legs
-    held, lift, added = feet
+    joints, below, sole, ahead, fastest = legs
+    held, lift, added, shown, root_height, body_lift = feet
     lock, _, step, _ = held
     shift, by = np.zeros(3), np.zeros(4)
     for c in range(position.shape[0]):
+        base = root_height[c] + body_lift[c]
         for f in range(2):
             hip, knee, heel, toe = joints[f, 0], joints[f, 1], joints[f, 2], joints[f, 3]
             x, z = position[c, toe, 0], position[c, toe, 2]
-            shift[0], shift[2] = hold_foot(c, f, x, z, contacts[c, 2 * f + 1], locking, held)
+            shift[0], shift[2] = hold_foot(
+                c, f, x, z, contacts[c, 2 * f + 1], locking, shown[c, f, 2], fastest, held
+            )
             # Lift a foot out of the ground; lower a held foot that floats; raise a foot that steps.
             deep = sole_depth(position[c], heel, toe, ground[c, 2 * f], ground[c, 2 * f + 1], sole)
             rise = max(deep, 0.0)
@@ -196,9 +224,14 @@ def place_feet(
             else:
                 by[0], by[1], by[2], by[3] = 1.0, 0.0, 0.0, 0.0
             x, up, z = position[c, heel, 0], position[c, heel, 1], position[c, heel, 2]
-            bend(position[c], rotation[c], hip, knee, heel, shift, added[c, f])
+            bend(position[c], rotation[c], joints[f], shift, ahead, added[c, f], shown[c, f], base, fastest)
             carry_foot(position[c], rotation[c], below[f], heel, toe, x, up, z, by)
+            hold_toes_back(position[c], below[f], toe, shown[c, f, 2], base, fastest)
             note_missed(c, f, position[c, toe, 0], position[c, toe, 2], held)
+            for i in range(3):
+                j = joints[f, i + 1]
+                shown[c, f, i, 0], shown[c, f, i, 2] = position[c, j, 0], position[c, j, 2]
+                shown[c, f, i, 1] = position[c, j, 1] - base
 
 
 def carried(skeleton: Skeleton, legs: np.ndarray) -> np.ndarray:

@@ -34,10 +34,14 @@ Hold = tuple[Any, Any, Any, Any]
 
 
 @njit
-def hold_foot(c: int, f: int, x: float, z: float, contact: float, locking: bool, of: Hold) -> Any:
+def hold_foot(
+    c: int, f: int, x: float, z: float, contact: float, locking: bool, shown: Any, fastest: float, of: Hold
+) -> Any:
     """Advance the hold of foot `f` of character `c`. Returns how far (x, z) to move the network's toe, cm.
 
-    x, z: the network's toe. contact: of the toe, predicted. locking: whether feet are held at all.
+    x, z: the network's toe. contact: of the toe, predicted. locking: whether feet are held at all. shown:
+    (3,) where the toe was in the last frame. fastest: cm that it may move in this one. The network's own toe
+    does not move further in a frame, so a foot that is behind gets there.
     """
     lock, hold, step, missed = of
     away_x, away_z = hold[c, f, 0] - x, hold[c, f, 1] - z
@@ -58,7 +62,7 @@ def hold_foot(c: int, f: int, x: float, z: float, contact: float, locking: bool,
             lock[c, f] = max(0.0, lock[c, f] - RELEASE)
         elif lock[c, f] < 1.0:
             # Hold the foot where it is shown now, so that renewed contact does not pull it back.
-            away_x, away_z = lock[c, f] * away_x, lock[c, f] * away_z
+            away_x, away_z = within(lock[c, f] * away_x, lock[c, f] * away_z, x, z, shown, fastest)
             hold[c, f, 0], hold[c, f, 1] = x + away_x, z + away_z
             lock[c, f] = 1.0
         else:
@@ -67,7 +71,17 @@ def hold_foot(c: int, f: int, x: float, z: float, contact: float, locking: bool,
                 step[c, f] = 1.0 / STEP_FRAMES
     if step[c, f] > 0.0:
         lock[c, f] = 1.0 - step[c, f] * step[c, f] * (3.0 - 2.0 * step[c, f])
-    return lock[c, f] * away_x, lock[c, f] * away_z
+    return within(lock[c, f] * away_x, lock[c, f] * away_z, x, z, shown, fastest)
+
+
+@njit
+def within(by_x: float, by_z: float, x: float, z: float, shown: Any, fastest: float) -> Any:
+    """`by_x`, `by_z`, changed so that the toe at x, z is moved to `fastest` at most from `shown` (3,)."""
+    to_x, to_z = x + by_x - shown[0], z + by_z - shown[2]
+    far = np.sqrt(to_x * to_x + to_z * to_z)
+    if far <= fastest:
+        return by_x, by_z
+    return shown[0] + to_x * fastest / far - x, shown[2] + to_z * fastest / far - z
 
 
 @njit

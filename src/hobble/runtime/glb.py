@@ -12,7 +12,7 @@ from hobble.core.files import load_npz
 from hobble.core.quat import Array
 from hobble.core.skeleton import Skeleton, local_rotations
 from hobble.figure.fit import fitted_rotations
-from hobble.figure.gltf import Motion, write_glb
+from hobble.figure.gltf import BodyMotion, write_glb
 from hobble.models.network import Network
 from hobble.runtime.export import fitted_skeleton, jointed
 
@@ -44,9 +44,9 @@ def _motion(data: Mapping[str, Array], name: str, skeleton: Skeleton) -> tuple[A
     return positions, np.asarray(rotations, float)[::stride]
 
 
-def _motions(data: Mapping[str, Array], skeleton: Skeleton) -> Iterator[Motion]:
+def _motions(data: Mapping[str, Array], skeleton: Skeleton) -> Iterator[BodyMotion]:
     stride = max(1, round(float(data["fps"]) / FPS))
     for name in map(str, data["names"]):
         world, places = jointed(skeleton, *_motion(data, name, skeleton))
         local = local_rotations(skeleton, world)
-        yield Motion(name, places[:, 0], local, float(data["fps"]) / stride)
+        yield BodyMotion(name, places[:, 0], local, float(data["fps"]) / stride)

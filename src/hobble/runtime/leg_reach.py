@@ -12,6 +12,10 @@ from hobble.core.compiled import njit
 # 2,000 needs more; then the foot arrives some frames later. Without the limit, legs snapped by up to 148
 # degrees.
 MOST_ADDED = float(np.radians(28))
+# cm that a knee points forward from the line between hip and heel, at least. In all captured clips it is 1.6
+# or more. A network's knee may move through that line, because positions are predicted joint by joint. A leg
+# that bends where the network's bends would then flip its knee from front to back.
+KNEE_AHEAD = 3.0
 
 # Vectors below are written out by component: array expressions take seconds to compile and allocate memory.
 
@@ -67,12 +71,16 @@ def turn(by: Any, rotation: Any) -> None:
 
 
 @njit
-def reach(position: Any, hip: int, knee: int, heel: int, sx: float, sy: float, sz: float) -> None:
-    """Move the heel of a pose, positions (J, 3), by (sx, sy, sz), by bending the knee.
+def reach(
+    position: Any, hip: int, knee: int, heel: int, shift: Any, ahead: tuple[float, float, float]
+) -> None:
+    """Move the heel of a pose, positions (J, 3), by `shift` (3,), by bending the knee.
 
-    Bone lengths stay, and the knee keeps bending to the same side. A target out of reach is approached up to
-    99.9% of full stretch (law of cosines, as `hobble.core.ik.two_bone_knee`).
+    ahead: the direction in which a straight knee bends. Bone lengths stay, and the knee keeps bending to the
+    same side, but by KNEE_AHEAD forward at least. A target out of reach is approached up to 99.9% of full
+    stretch (law of cosines, as `hobble.core.ik.two_bone_knee`). A pose that needs none of this stays.
     """
+    sx, sy, sz = shift[0], shift[1], shift[2]
     hx, hy, hz = position[hip, 0], position[hip, 1], position[hip, 2]
     tx, ty, tz = position[knee, 0] - hx, position[knee, 1] - hy, position[knee, 2] - hz
     lx, ly, lz = position[heel, 0] - hx - tx, position[heel, 1] - hy - ty, position[heel, 2] - hz - tz
@@ -87,9 +95,16 @@ def reach(position: Any, hip: int, knee: int, heel: int, sx: float, sy: float, s
     distance = min(max(distance, abs(upper - lower) * 1.001 + 1e-6), (upper + lower) * 0.999)
     cosine = (upper * upper + distance * distance - lower * lower) / (2 * upper * distance)
     cosine = min(max(cosine, -1.0), 1.0)
-    # Turn the old bend direction with the leg. One from the new leg alone may bend the knee backwards.
     along = tx * ax + ty * ay + tz * az
     ox, oy, oz = tx - along * ax, ty - along * ay, tz - along * az
+    along = ahead[0] * ax + ahead[1] * ay + ahead[2] * az
+    fx, fy, fz = ahead[0] - along * ax, ahead[1] - along * ay, ahead[2] - along * az
+    size = max(np.sqrt(fx * fx + fy * fy + fz * fz), 1e-6)
+    more = max(KNEE_AHEAD - (ox * fx + oy * fy + oz * fz) / size, 0.0)
+    if more == 0.0 and abs(sx) + abs(sy) + abs(sz) < 1e-9:
+        return
+    ox, oy, oz = ox + more * fx / size, oy + more * fy / size, oz + more * fz / size
+    # Turn the old bend direction with the leg. One from the new leg alone may bend the knee backwards.
     factor = (ox * wx + oy * wy + oz * wz) / max(1 + ax * wx + ay * wy + az * wz, 1e-6)
     ox, oy, oz = ox - factor * (ax + wx), oy - factor * (ay + wy), oz - factor * (az + wz)
     size = np.sqrt(ox * ox + oy * oy + oz * oz)
@@ -105,19 +120,46 @@ def reach(position: Any, hip: int, knee: int, heel: int, sx: float, sy: float, s
 
 
 @njit
-def bend(position: Any, rotation: Any, hip: int, knee: int, heel: int, shift: Any, added: Any) -> None:
+def hold_back(at: Any, shown: Any, base: float, fastest: float) -> bool:
+    """Move the point `at` (3,) to where it is `fastest` from `shown` (3,) if it is further.
+
+    base: added to the height of `shown`. Returns whether the point was moved.
+    """
+    x, y, z = at[0] - shown[0], at[1] - shown[1] - base, at[2] - shown[2]
+    far = np.sqrt(x * x + y * y + z * z)
+    if far <= fastest:
+        return False
+    share = 1.0 - fastest / far
+    at[0], at[1], at[2] = at[0] - share * x, at[1] - share * y, at[2] - share * z
+    return True
+
+
+@njit
+def bend(
+    position: Any,
+    rotation: Any,
+    leg: Any,
+    shift: Any,
+    ahead: Any,
+    added: Any,
+    shown: Any,
+    base: float,
+    fastest: float,
+) -> None:
     """`reach` by `shift` (3,), where thigh and shank turn at most MOST_ADDED beyond the network's own turn.
 
-    added: (2, 4) rotations added to the network's thigh and shank in the last frame; updated to this frame's.
-    If a joint would have to turn further, the heel does not reach its target in this frame.
+    leg: (4,) hip, knee, heel and toe. ahead: (3,) the direction in which a straight knee bends in the rest
+    pose. added: (2, 4) rotations added to the network's thigh and shank in the last frame; updated to this
+    frame's. shown: (2 or more, 3) knee and heel in the last frame, above `base`. Knee and heel move `fastest`
+    cm at most, so that the heel may not reach its target in this frame.
     """
+    hip, knee, heel = leg[0], leg[1], leg[2]
     hx, hy, hz = position[hip, 0], position[hip, 1], position[hip, 2]
     kx, ky, kz = position[knee, 0], position[knee, 1], position[knee, 2]
     tx, ty, tz = kx - hx, ky - hy, kz - hz
     lx, ly, lz = position[heel, 0] - kx, position[heel, 1] - ky, position[heel, 2] - kz
-    if abs(shift[0]) + abs(shift[1]) + abs(shift[2]) > 1e-9:
-        reach(position, hip, knee, heel, shift[0], shift[1], shift[2])
-        kx, ky, kz = position[knee, 0], position[knee, 1], position[knee, 2]
+    reach(position, hip, knee, heel, shift, turned(rotation[hip], ahead[0], ahead[1], ahead[2]))
+    kx, ky, kz = position[knee, 0], position[knee, 1], position[knee, 2]
     w, x, y, z = between(tx, ty, tz, kx - hx, ky - hy, kz - hz)
     late = approach(added[0], w, x, y, z)
     w, x, y, z = between(lx, ly, lz, position[heel, 0] - kx, position[heel, 1] - ky, position[heel, 2] - kz)
@@ -128,5 +170,13 @@ def bend(position: Any, rotation: Any, hip: int, knee: int, heel: int, shift: An
         position[knee, 0], position[knee, 1], position[knee, 2] = kx, ky, kz
         x, y, z = turned(added[1], lx, ly, lz)
         position[heel, 0], position[heel, 1], position[heel, 2] = kx + x, ky + y, kz + z
+    late = hold_back(position[knee], shown[0], base, fastest)
+    late |= hold_back(position[heel], shown[1], base, fastest)
+    if late:
+        kx, ky, kz = position[knee, 0], position[knee, 1], position[knee, 2]
+        sx, sy, sz = position[heel, 0] - kx, position[heel, 1] - ky, position[heel, 2] - kz
+        kx, ky, kz = kx - hx, ky - hy, kz - hz
+        added[0, 0], added[0, 1], added[0, 2], added[0, 3] = between(tx, ty, tz, kx, ky, kz)
+        added[1, 0], added[1, 1], added[1, 2], added[1, 3] = between(lx, ly, lz, sx, sy, sz)
     turn(added[0], rotation[hip])
     turn(added[1], rotation[knee])

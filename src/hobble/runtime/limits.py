@@ -1,4 +1,4 @@
-"""Limit the wished speed and gait to what a body with these injuries can do."""
+"""Limit the target speed and gait to what a body with these injuries can do."""
 
 from __future__ import annotations
 
@@ -6,17 +6,17 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from hobble.channels.limits import together
+from hobble.channels.speed_limits import together
 from hobble.core.quat import Array
 from hobble.models.network import Network
 
 JOG_FROM = 5.0  # cm a frame: half way between walking at 2.5 and jogging at 7.5
 LAME_BELOW = 4.5  # cm a frame: a body that cannot jog at this speed walks instead
-HURRY_FACTOR = 1.25  # such a body may walk at this multiple of its walking limit if a jog is wished
+HURRY_FACTOR = 1.25  # such a body may walk at this multiple of its walking limit if the target is a jog
 
 
 class SpeedLimiter:
-    """Limits the wishes of C characters. columns: channel -> its columns among the channel values."""
+    """Limits the targets of C characters. columns: channel -> its columns among the channel values."""
 
     def __init__(self, network: Network, columns: Mapping[str, slice], characters: int) -> None:
         self._tables = [(columns[name], limits) for name, limits in network.limits.items()]

@@ -21,7 +21,7 @@ class Runtime(Section):
     )
     scales: dict[str, PositiveFloat] = Field({}, description="channel: divisor of its values")
     foot_locking: bool = True
-    limits: bool = Field(True, description="limit the wished speed to what the injured body can do")
+    limits: bool = Field(True, description="limit the target speed to what the injured body can do")
     steering: Annotated[float, Field(ge=0)] = Field(
         2.0,
         description="gain of the correction of a velocity that is not reached; 0 is the original runtime",

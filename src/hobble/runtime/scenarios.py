@@ -18,26 +18,26 @@ from hobble.runtime.animation import ProceduralAnimation
 from hobble.runtime.export import export_bvh, fitted_skeleton
 from hobble.runtime.options import Runtime
 
-Wish = tuple[Array, Array | None, str]  # velocity, facing, gait
+Target = tuple[Array, Array | None, str]  # velocity, facing, gait
 
 
 @dataclass(frozen=True)
 class Scenario:
-    """wish(frame) gives velocity (2,) in cm a frame, facing (2,) or None, and gait, for `frames` frames.
+    """target(frame) gives velocity (2,) in cm a frame, facing (2,) or None, and gait, for `frames` frames.
 
     swept: channel and column whose value rises from 0 to its highest during the walk, or None.
     """
 
     name: str
     frames: int
-    wish: Callable[[int], Wish] = field(repr=False)
+    target: Callable[[int], Target] = field(repr=False)
     swept: tuple[str, str] | None = None
 
 
 @dataclass(frozen=True)
 class Track:
     """The motion of a scenario: positions (F, J, 3), rotations (F, J, 4), contacts (F, 4), phase (F,),
-    target (F, 2) wished velocity, root (F, 3), gait (F,) names, swept_values (F,) of the swept column."""
+    target (F, 2) velocity, root (F, 3), gait (F,) names, swept_values (F,) of the swept column."""
 
     scenario: Scenario
     positions: Array
@@ -89,7 +89,7 @@ def run_scenario(network: Network, scenario: Scenario, options: Runtime) -> Trac
     animation = ProceduralAnimation(network, **dict(options))
     poses, targets, gaits, values = [], [], [], np.zeros(scenario.frames, np.float32)
     for f in range(scenario.frames):
-        velocity, facing, gait = scenario.wish(f)
+        velocity, facing, gait = scenario.target(f)
         channels = {}
         if scenario.swept:
             name, column = scenario.swept

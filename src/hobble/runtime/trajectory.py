@@ -17,21 +17,21 @@ from hobble.rows.layout import RowLayout
 
 phase_change, moving_share = register_jitable(rule.phase_change), register_jitable(rule.moving)
 
-# Largest correction of the wish, as a multiple of it. With 1, a network trained on few starts stands for
+# Largest correction of the target, as a multiple of it. With 1, a network trained on few starts stands for
 # seconds before it walks.
 STEERING_LIMIT = 2.0
-TARGET_MIX = 0.9  # share of the remaining difference to the wish that is applied each frame
+TARGET_MIX = 0.9  # share of the remaining difference to the target that is applied each frame
 GAIT_MIX = 0.1
 CORRECTION_RATE = 0.01  # integral gain a frame: a steady error is corrected within a second or two
-CORRECTION_WITHIN = 0.8  # share of the wish; with a larger error the character is still turning or starting
-MOST_CORRECTION = 1.0  # largest integral correction, as a share of the wish
+CORRECTION_WITHIN = 0.8  # share of the target; with a larger error the character is still turning or starting
+MOST_CORRECTION = 1.0  # largest integral correction, as a share of the target
 FURTHEST_TURN = np.radians(137)  # largest turn to ask for; a larger one may come out the other way round
-# With `Network.rooted`: largest change of a frame's movement across the wish, as a share of the movement.
+# With `Network.rooted`: largest change of a frame's movement across the target, as a share of the movement.
 PULL = 0.2
-PULL_AHEAD = 0.5  # the same along the wish, as a share of PULL; a faster character takes corners wider
-UNWISHED_LOSS = 0.5  # share of movement against the wish that is removed; removing all would drag the feet
+PULL_AHEAD = 0.5  # the same along the target, as a share of PULL; a faster character takes corners wider
+BACKWARD_LOSS = 0.5  # share of movement against the target that is removed; removing all would drag the feet
 STRAFE_FROM = np.radians(45)  # angle between facing and velocity from which the strafe share is 1
-STILL = 0.1  # cm a frame: a slower wish means standing
+STILL = 0.1  # cm a frame: a slower target means standing
 
 
 # Groups of arrays for compiled functions, which unpack them by name. They are plain tuples, because a named
@@ -41,10 +41,10 @@ STILL = 0.1  # cm a frame: a slower wish means standing
 # is the present frame.
 Trajectory = tuple[Any, Any, Any]
 # What the caller wants: velocity, direction (C, 2); strafe (C,) share; gait (C, 6) shares.
-Wish = tuple[Any, Any, Any, Any]
-# The smoothed wish: velocity, direction (C, 2); strafe (C,); correction (C, 2) of a steady error of the
-# velocity, see `_ask_velocity`.
 Target = tuple[Any, Any, Any, Any]
+# The smoothed target: velocity, direction (C, 2); strafe (C,); correction (C, 2) of a steady error of the
+# velocity, see `_ask_velocity`.
+Smoothed = tuple[Any, Any, Any, Any]
 # values, targets (C, K) of all channels' columns; steps (K,), largest change of a value in a frame.
 Channels = tuple[Any, Any, Any]
 
@@ -56,11 +56,11 @@ def wrap(angle: float) -> float:
 
 
 @njit
-def facing_wish(velocity: Any, ahead: Any, direction: Any, strafe: Any, look: Any) -> None:
-    """Write the share of strafing into `strafe` (C,) and the wished facing into `look` (C, 2).
+def target_facing(velocity: Any, ahead: Any, direction: Any, strafe: Any, look: Any) -> None:
+    """Write the share of strafing into `strafe` (C,) and the target facing into `look` (C, 2).
 
-    velocity: (C, 2) wished. ahead: (C, 2) direction to look in; zero looks where the character goes, or keeps
-    `direction` (C, 2) if it stands.
+    velocity: (C, 2) the target. ahead: (C, 2) direction to look in; zero looks where the character goes, or
+    keeps `direction` (C, 2) if it stands.
     """
     for c in range(velocity.shape[0]):
         x, z = velocity[c, 0], velocity[c, 1]
@@ -76,19 +76,19 @@ def facing_wish(velocity: Any, ahead: Any, direction: Any, strafe: Any, look: An
 
 
 @njit
-def follow_wish(wish: Wish, steering: float, target: Target, path: Trajectory) -> None:
-    """Move `target` toward the caller's wish; the gait of the present frame blends slowly.
+def follow_target(target: Target, steering: float, smoothed: Smoothed, path: Trajectory) -> None:
+    """Move `smoothed` toward the caller's target; the gait of the present frame blends slowly.
 
-    `_ask_velocity` and `_ask_turn` correct the wish; with `steering` 0 there is no correction, as in the
+    `_ask_velocity` and `_ask_turn` correct the target; with `steering` 0 there is no correction, as in the
     original runtime.
     """
-    wish_velocity, wish_direction, wish_strafe, wish_gait = wish
-    velocity, direction, strafe, correction = target
+    target_velocity, target_direction, target_strafe, target_gait = target
+    velocity, direction, strafe, correction = smoothed
     position, heading, gait = path
     middle = gait.shape[1] // 2
     for c in range(velocity.shape[0]):
-        x, z = wish_velocity[c, 0], wish_velocity[c, 1]
-        goal = np.arctan2(wish_direction[c, 0], wish_direction[c, 1])
+        x, z = target_velocity[c, 0], target_velocity[c, 1]
+        goal = np.arctan2(target_direction[c, 0], target_direction[c, 1])
         if steering > 0.0:
             if x * x + z * z >= STILL * STILL:
                 facing = np.arctan2(heading[c, middle, 0], heading[c, middle, 1])
@@ -99,19 +99,19 @@ def follow_wish(wish: Wish, steering: float, target: Target, path: Trajectory) -
         now = np.arctan2(direction[c, 0], direction[c, 1])
         now += TARGET_MIX * wrap(goal - now)
         direction[c, 0], direction[c, 1] = np.sin(now), np.cos(now)
-        strafe[c] += TARGET_MIX * (wish_strafe[c] - strafe[c])
+        strafe[c] += TARGET_MIX * (target_strafe[c] - strafe[c])
         for k in range(gait.shape[2]):
-            gait[c, middle, k] += GAIT_MIX * (wish_gait[c, k] - gait[c, middle, k])
+            gait[c, middle, k] += GAIT_MIX * (target_gait[c, k] - gait[c, middle, k])
 
 
 @njit
 def _ask_velocity(steering: float, x: float, z: float, position: Any, correction: Any) -> tuple[float, float]:
     """The velocity to ask the network for, so that the character reaches (x, z).
 
-    A network tends to keep its past velocity. So the error (wish minus mean velocity over the last half of
-    the past window) is added to the wish, times `steering`, up to STEERING_LIMIT times the wish. A steady
-    error, such as weaker strafing to one side, is integrated in `correction` (2,): along the wish, and across
-    it to the left, as shares of the wish.
+    A network tends to keep its past velocity. So the error (target minus mean velocity over the last half of
+    the past window) is added to the target, times `steering`, up to STEERING_LIMIT times the target. A steady
+    error, such as weaker strafing to one side, is integrated in `correction` (2,): along the target, and
+    across it to the left, as shares of the target.
     """
     middle = position.shape[0] // 2
     span = middle // 2
@@ -143,13 +143,13 @@ def _ask_turn(gain: float, turn: float) -> float:
 
 
 @njit
-def blend_future(target: Target, path: Trajectory) -> None:
+def blend_future(smoothed: Smoothed, path: Trajectory) -> None:
     """Bend the predicted future toward the target velocity and facing; the bend grows with time.
 
     At t in 0..1 of the future, the share of the target is 1 - (1 - t)^b, with b = .5 for the position (1 when
     strafing) and 2 for the direction (.5 when strafing).
     """
-    velocity, facing, strafe, _ = target
+    velocity, facing, strafe, _ = smoothed
     position, direction, gait = path
     length = position.shape[1]
     middle = length // 2
@@ -198,22 +198,22 @@ def stand_on(ground: Any, height: Any) -> None:
 
 @njit
 def prepare(
-    wish: Wish,
-    steering: float,
     target: Target,
+    steering: float,
+    smoothed: Smoothed,
     path: Trajectory,
     channels: Channels,
     step: int,
     side: float,
     points: Any,
 ) -> None:
-    """`follow_wish`, `blend_future` and `sample_points` in one call.
+    """`follow_target`, `blend_future` and `sample_points` in one call.
 
     Also moves the channel values toward their targets. All are in this file because numba renews cached code
     only when its own file changes, not when a callee's does.
     """
-    follow_wish(wish, steering, target, path)
-    blend_future(target, path)
+    follow_target(target, steering, smoothed, path)
+    blend_future(smoothed, path)
     sample_points(path, step, side, points)
     values, targets, steps = channels
     for c in range(values.shape[0]):
@@ -223,17 +223,17 @@ def prepare(
 
 
 @njit
-def _pull(share: float, wish_x: float, wish_z: float, x: float, z: float) -> tuple[float, float]:
-    """What to add to a movement (x, z) so that it comes nearer to the wish.
+def _pull(share: float, target_x: float, target_z: float, x: float, z: float) -> tuple[float, float]:
+    """What to add to a movement (x, z) so that it comes nearer to the target.
 
-    Across the wish by at most `share` times the movement's length, and along it by PULL_AHEAD of that. If the
-    two shared one limit, a clip that is too slow would use all of it, and the character would leave its path
-    sideways.
+    Across the target by at most `share` times the movement's length, and along it by PULL_AHEAD of that. If
+    the two shared one limit, a clip that is too slow would use all of it, and the character would leave its
+    path sideways.
     """
     most = share * np.sqrt(x * x + z * z)
-    size = np.sqrt(wish_x * wish_x + wish_z * wish_z)
-    ahead_x, ahead_z = (wish_x / size, wish_z / size) if size >= STILL else (0.0, 0.0)
-    lack_x, lack_z = wish_x - x, wish_z - z
+    size = np.sqrt(target_x * target_x + target_z * target_z)
+    ahead_x, ahead_z = (target_x / size, target_z / size) if size >= STILL else (0.0, 0.0)
+    lack_x, lack_z = target_x - x, target_z - z
     along = lack_x * ahead_x + lack_z * ahead_z
     lack_x, lack_z = lack_x - along * ahead_x, lack_z - along * ahead_z
     along = min(max(along, -PULL_AHEAD * most), PULL_AHEAD * most)
@@ -243,16 +243,16 @@ def _pull(share: float, wish_x: float, wish_z: float, x: float, z: float) -> tup
 
 @njit
 def advance(
-    y: Any, at: Any, wish: Any, loss: float, rooted: bool, pull: float, path: Trajectory, phase: Any
+    y: Any, at: Any, target: Any, loss: float, rooted: bool, pull: float, path: Trajectory, phase: Any
 ) -> None:
     """Advance one frame: shift the past, move and turn the root, take the predicted future and phase change.
 
     y: (C, outputs) prediction. at: columns of y (root velocity, turn, phase change, position, direction),
     then the number of future samples and the step.
     rooted: as `Network.rooted`, the movement belongs to the pose. Otherwise it is scaled by (1 - stand)^.25.
-    loss: the share that is removed of movement against the wished velocity `wish` (C, 2), or of all movement
-    if the wish is to turn on the spot; 0 is the original runtime.
-    pull: how far the movement is changed toward the wish, at most, as a share of its own length (after the
+    loss: the share that is removed of movement against the velocity `target` (C, 2), or of all movement
+    if the target is to turn on the spot; 0 is the original runtime.
+    pull: how far the movement is changed toward the target, at most, as a share of its own length (after the
     adjustment of Holden et al. 2020), because clips have only some directions and speeds.
     The predicted yaw velocity is that of the world seen from the root, so the root turns by its negative.
     """
@@ -272,13 +272,13 @@ def advance(
         sin, cos = np.sin(yaw), np.cos(yaw)
         vx, vz = y[c, at[0]], y[c, at[0] + 1]
         x, z = moving * (vx * cos + vz * sin), moving * (vz * cos - vx * sin)
-        speed = wish[c, 0] * wish[c, 0] + wish[c, 1] * wish[c, 1]
+        speed = target[c, 0] * target[c, 0] + target[c, 1] * target[c, 1]
         if speed < STILL * STILL:
             x, z = (1.0 - loss) * x, (1.0 - loss) * z
         else:
-            against = loss * min(0.0, x * wish[c, 0] + z * wish[c, 1]) / speed
-            x, z = x - against * wish[c, 0], z - against * wish[c, 1]
-        more_x, more_z = _pull(pull, wish[c, 0], wish[c, 1], x, z)
+            against = loss * min(0.0, x * target[c, 0] + z * target[c, 1]) / speed
+            x, z = x - against * target[c, 0], z - against * target[c, 1]
+        more_x, more_z = _pull(pull, target[c, 0], target[c, 1], x, z)
         position[c, middle, 0] += x + more_x
         position[c, middle, 1] += z + more_z
         yaw -= moving * y[c, at[1]]

@@ -9,9 +9,10 @@ import numpy as np
 from scipy.ndimage import maximum_filter1d
 
 from hobble.core import quat
+from hobble.core.curve_value import value_at
 from hobble.core.quat import Array
-from hobble.synthetic.footsteps import FOOT, Stance
-from hobble.synthetic.ground import Ground
+from hobble.synthetic.footsteps import FOOT, PlannedStance
+from hobble.synthetic.planned_ground import Ground
 from hobble.synthetic.style import Style
 
 X_AXIS = np.array([1.0, 0.0, 0.0])
@@ -26,7 +27,7 @@ SOLE_HEIGHT = 2.0  # cm: a moving joint of the foot stays this and the clearance
 
 
 @dataclass(frozen=True)
-class Foot:
+class FootPoses:
     """One foot over F frames in the world: ankle (F, 3), foot (F, 4), toes (F, 4)."""
 
     ankle: Array
@@ -34,12 +35,13 @@ class Foot:
     toes: Array
 
 
-def move_foot(steps: list[Stance], style: Style, side: int, ground: Ground) -> Foot:
+def move_foot(steps: list[PlannedStance], style: Style, side: int, ground: Ground) -> FootPoses:
     """The path of one foot through its stances. Frames before the first and after the last one stay 0."""
     frames = len(style.duty)
     turns = np.tile(quat.IDENTITY, (frames, 1))
-    foot = Foot(np.zeros((frames, 3)), turns, turns.copy())
-    rolls = [_Roll.of(step, style, side) for step in steps]
+    foot = FootPoses(np.zeros((frames, 3)), turns, turns.copy())
+    rest = np.radians(style.rest_pitch)
+    rolls = [_Roll.of(step, style, side, rest) for step in steps]
     for i, (here, there) in enumerate(pairwise(rolls)):
         rests = not there.step.swings
         leave = there.step.land if rests else here.step.leave
@@ -57,9 +59,12 @@ def _frames(start: float, end: float) -> np.ndarray:
 
 @dataclass(frozen=True)
 class _Roll:
-    """A stance and the foot's pitch in it: down from its landing, flat, then up over the toe."""
+    """A stance and the foot's pitch in it: down from its landing, flat, then up over the toe.
 
-    step: Stance
+    rest: (F,) radians, the pitch of a standing foot; one array for all stances.
+    """
+
+    step: PlannedStance
     land: float
     off: float
     rest: Array
@@ -68,20 +73,19 @@ class _Roll:
     power: float
 
     @classmethod
-    def of(cls, step: Stance, style: Style, side: int) -> _Roll:
-        t = np.arange(len(style.duty), dtype=float)
-        land = np.interp(step.land, t, style.land_pitch[:, side])
-        off = np.interp(step.leave, t, style.off_pitch[:, side])
-        flat = np.interp(step.land, t, style.flat)
-        heel_off = np.interp((step.land + step.leave) / 2, t, style.heel_off[:, side])
+    def of(cls, step: PlannedStance, style: Style, side: int, rest: Array) -> _Roll:
+        land = value_at(style.land_pitch[:, side], step.land)
+        off = value_at(style.off_pitch[:, side], step.leave)
+        flat = value_at(style.flat, step.land)
+        heel_off = value_at(style.heel_off[:, side], (step.land + step.leave) / 2)
         return cls(
             step,
-            np.radians(land),
-            np.radians(off),
-            np.radians(style.rest_pitch),
+            float(np.radians(land)),
+            float(np.radians(off)),
+            rest,
             float(flat),
             float(heel_off),
-            float(np.interp(step.leave, t, style.roll)),
+            float(value_at(style.roll, step.leave)),
         )
 
     def pitch(self, t: Array | float, lands: bool = True, leaves: bool = True) -> Array:
@@ -89,7 +93,7 @@ class _Roll:
         u = (np.asarray(t, float) - self.step.land) / (self.step.leave - self.step.land)
         down = u / self.flat
         rise = np.clip((u - self.heel_off) / (1 - self.heel_off), 0, None)
-        rest = np.interp(t, np.arange(len(self.rest)), self.rest)
+        rest = value_at(self.rest, t)
         landing = (self.land - rest) * (1 - _ease(down)) if lands else 0.0
         return np.asarray(rest + landing + ((self.off - rest) * rise**self.power if leaves else 0.0))
 
@@ -110,13 +114,13 @@ class _Roll:
         return self.step.ankle + quat.rotate(self.step.turn, FOOT) - quat.rotate(turned, FOOT)
 
 
-def _stand(foot: Foot, t: np.ndarray, roll: _Roll, pitch: Array) -> None:
+def _stand(foot: FootPoses, t: np.ndarray, roll: _Roll, pitch: Array) -> None:
     foot.ankle[t] = roll.ankle(pitch)
     foot.foot[t] = quat.mul(roll.step.turn, quat.from_axis_angle(X_AXIS, -pitch))
     foot.toes[t] = quat.mul(roll.step.turn, quat.from_axis_angle(X_AXIS, -np.maximum(pitch, 0)))
 
 
-def _swing(foot: Foot, here: _Roll, there: _Roll, style: Style, side: int, ground: Ground) -> None:
+def _swing(foot: FootPoses, here: _Roll, there: _Roll, style: Style, side: int, ground: Ground) -> None:
     start, end = here.step.leave, there.step.land
     t = _frames(start, end)
     if not len(t):

@@ -7,9 +7,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from hobble.core import quat
+from hobble.core.curve_value import value_at
 from hobble.core.quat import Array
-from hobble.synthetic.ground import Ground
-from hobble.synthetic.path import Path
+from hobble.synthetic.planned_ground import Ground
+from hobble.synthetic.planned_path import PlannedPath
 from hobble.synthetic.style import LEFT, RIGHT, SIGN, Style
 
 ANKLE_HEIGHT = 7.0  # cm, of the ankle joint above the sole; the toe joint is 4.5 cm lower
@@ -23,7 +24,7 @@ SHIFTS = sorted(np.arange(-20.0, 21.0, 2.0), key=abs)  # cm by which a foot may 
 
 
 @dataclass(frozen=True)
-class Stance:
+class PlannedStance:
     """A foot on the ground from frame `land` to frame `leave` (with fractions, of the padded path).
 
     ankle: (3,) of the flat foot. turn: (4,) its world rotation. swings: whether it was lifted to get here.
@@ -49,42 +50,42 @@ def landings(phase: Array, side: int) -> Array:
 
 
 def stances(
-    path: Path, style: Style, phase: Array, ground: Ground, rng: np.random.Generator
-) -> tuple[list[Stance], list[Stance]]:
+    path: PlannedPath, style: Style, phase: Array, ground: Ground, rng: np.random.Generator
+) -> tuple[list[PlannedStance], list[PlannedStance]]:
     """All stances of the left and of the right foot along the path, in the order of their landings."""
-    frames = np.arange(len(path), dtype=float)
+    frames, speed = np.arange(len(path), dtype=float), path.speed
+    leaving = [phase - style.duty[:, side] for side in (LEFT, RIGHT)]
     events = [(land, side) for side in (LEFT, RIGHT) for land in landings(phase, side)[:-1]]
-    out: tuple[list[Stance], list[Stance]] = ([], [])
+    out: tuple[list[PlannedStance], list[PlannedStance]] = ([], [])
     for land, side in sorted(events):
-        here = np.interp(land, frames, phase)
+        here = value_at(phase, land)
         # How long a foot stands depends on the speed at the time of leaving, so a foot leaves sooner if the
         # walker has become faster.
-        leave = np.interp(here, phase - style.duty[:, side], frames)
-        middle = np.interp((here + np.interp(leave, frames, phase)) / 2, phase, frames)
+        leave = np.interp(here, leaving[side], frames)
+        middle = np.interp((here + value_at(phase, leave)) / 2, phase, frames)
         before, other = (out[s][-1] if out[s] else None for s in (side, 1 - side))
         ankle, turn = _footprint(path, style, ground, side, middle, other, rng)
-        standing = np.interp(middle, frames, path.speed) < STILL
+        standing = value_at(speed, middle) < STILL
         if before and standing and _close(before, ankle, turn):
-            out[side].append(Stance(land, leave, before.ankle, before.turn, swings=False))
+            out[side].append(PlannedStance(land, leave, before.ankle, before.turn, swings=False))
         else:
-            out[side].append(Stance(land, leave, ankle, turn))
+            out[side].append(PlannedStance(land, leave, ankle, turn))
     return out
 
 
 def _footprint(
-    path: Path,
+    path: PlannedPath,
     style: Style,
     ground: Ground,
     side: int,
     middle: float,
-    other: Stance | None,
+    other: PlannedStance | None,
     rng: np.random.Generator,
 ) -> tuple[Array, Array]:
     """The place of a foot: under the body in mid-stance, but never across the other foot."""
-    frames = np.arange(len(path), dtype=float)
 
     def value(curve: Array) -> float:
-        return float(np.interp(middle, frames, curve))
+        return float(value_at(curve, middle))
 
     moving = 1 - value(path.gait[:, 0])
     facing = value(path.facing)
@@ -119,6 +120,6 @@ def _planted(ground: Ground, place: Array, yaw: float) -> tuple[Array, Array]:
     return np.array([x, heel + ANKLE_HEIGHT, z]), turn
 
 
-def _close(old: Stance, ankle: Array, turn: Array) -> bool:
+def _close(old: PlannedStance, ankle: Array, turn: Array) -> bool:
     moved = np.linalg.norm(ankle - old.ankle)
     return bool(moved < STAY[0] and quat.angle(old.turn, turn) < STAY[1])

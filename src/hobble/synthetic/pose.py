@@ -9,9 +9,9 @@ from hobble.core import quat
 from hobble.core.ik import two_bone_knee
 from hobble.core.quat import Array
 from hobble.core.skeleton import Skeleton, local_rotations
-from hobble.synthetic.foot_motion import Foot, smooth_above
-from hobble.synthetic.ground import Ground, flat
-from hobble.synthetic.path import Path
+from hobble.synthetic.foot_motion import FootPoses, smooth_above
+from hobble.synthetic.planned_ground import Ground, flat
+from hobble.synthetic.planned_path import PlannedPath
 from hobble.synthetic.style import LEFT, RIGHT, SIGN, Style
 
 X, Y, Z = np.eye(3)
@@ -29,10 +29,10 @@ def _turn(axis: Array, degrees: Array) -> Array:
 
 def pose(
     skeleton: Skeleton,
-    path: Path,
+    path: PlannedPath,
     style: Style,
     phase: Array,
-    feet: tuple[Foot, Foot],
+    feet: tuple[FootPoses, FootPoses],
     ground: Ground,
     rng: np.random.Generator,
 ) -> tuple[Array, Array]:
@@ -80,10 +80,10 @@ def _chest(style: Style, phase: Array, yaw: Array, noise: Array) -> Array:
 
 def _root(
     skeleton: Skeleton,
-    path: Path,
+    path: PlannedPath,
     style: Style,
     phase: Array,
-    feet: tuple[Foot, Foot],
+    feet: tuple[FootPoses, FootPoses],
     ground: Ground,
     hips: Array,
     noise: Array,
@@ -106,7 +106,9 @@ def _root(
     return root - np.stack([0 * x, down, 0 * x], axis=1)
 
 
-def _too_high(skeleton: Skeleton, root: Array, hips: Array, foot: Foot, side: str, stretch: float) -> Array:
+def _too_high(
+    skeleton: Skeleton, root: Array, hips: Array, foot: FootPoses, side: str, stretch: float
+) -> Array:
     """(F,) cm by which the distance hip-ankle exceeds this share of the leg length."""
     joint = root + quat.rotate(hips, skeleton.offsets[skeleton.index(f"{side}UpLeg")])
     upper, lower = leg_lengths(skeleton, side)
@@ -123,7 +125,9 @@ def leg_lengths(skeleton: Skeleton, side: str) -> tuple[float, float]:
     return upper, lower
 
 
-def _trunk(skeleton: Skeleton, world: Array, path: Path, hips: Array, chest: Array, noise: Array) -> None:
+def _trunk(
+    skeleton: Skeleton, world: Array, path: PlannedPath, hips: Array, chest: Array, noise: Array
+) -> None:
     ahead = np.radians(4) * np.clip(np.gradient(path.facing) * path.fps, -2, 2)
     look = quat.mul(
         quat.yaw(path.facing + ahead), quat.mul(_turn(Y, 1.5 * noise[:, 5]), _turn(X, 2.0 + noise[:, 0]))
@@ -136,7 +140,7 @@ def _trunk(skeleton: Skeleton, world: Array, path: Path, hips: Array, chest: Arr
         world[:, skeleton.index(name)] = quat.slerp(chest, look, np.full(len(path), share))
 
 
-def _leg(skeleton: Skeleton, world: Array, root: Array, foot: Foot, side: int) -> None:
+def _leg(skeleton: Skeleton, world: Array, root: Array, foot: FootPoses, side: int) -> None:
     """Two-bone inverse kinematics. The knee points between the directions of pelvis and foot."""
     name = ("Left", "Right")[side]
     hips = world[:, 0]
@@ -160,7 +164,7 @@ def _bone(up: Array, side_axis: Array) -> Array:
     return quat.from_matrix(np.stack([x, y, np.cross(x, y)], axis=-1))
 
 
-def _arm(skeleton: Skeleton, world: Array, path: Path, style: Style, phase: Array, side: int) -> None:
+def _arm(skeleton: Skeleton, world: Array, path: PlannedPath, style: Style, phase: Array, side: int) -> None:
     """An arm hangs, swings opposite to the leg of its side, and bends more as it moves forward."""
     name, sign = ("Left", "Right")[side], SIGN[side]
     chest = world[:, skeleton.index("Spine1")]

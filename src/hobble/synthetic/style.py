@@ -11,7 +11,7 @@ from dataclasses import dataclass, fields
 import numpy as np
 
 from hobble.core.quat import Array
-from hobble.synthetic.path import GAITS, Path
+from hobble.synthetic.planned_path import GAITS, PlannedPath
 
 LEFT, RIGHT = 0, 1
 
@@ -103,7 +103,7 @@ class Style:
         return Style(**{f.name: values.get(f.name, getattr(self, f.name)) for f in fields(self)})
 
 
-def healthy_style(path: Path) -> Style:
+def healthy_style(path: PlannedPath) -> Style:
     """The healthy style along a path: each gait's values at the current speed, mixed by gait share."""
     speed = path.speed / 100
     values = {}
@@ -129,7 +129,7 @@ def _frequencies(speed: Array) -> Array:
     return np.stack([stand, walk, jog, crouch], axis=1)
 
 
-def _directed(style: Style, path: Path) -> Style:
+def _directed(style: Style, path: PlannedPath) -> Style:
     """Changes backward and sideways steps: toe first, little roll, wider, quicker, less arm swing."""
     speed = np.maximum(path.speed, 1e-6)
     moving = np.clip(path.speed / 30, 0, 1)

@@ -15,8 +15,8 @@ from hobble.core.errors import InputError
 from hobble.core.files import save_npz
 from hobble.core.quat import Array
 from hobble.motion.root import RootFrames, continued, root_frames
-from hobble.terrain.ground import Ground, fit_cycle, flat_ground
-from hobble.terrain.options import Fitting, Sampling
+from hobble.terrain.cycle_ground import Ground, fit_cycle, flat_ground
+from hobble.terrain.options import Fitting, HeightSampling
 from hobble.terrain.patches import Patches
 from hobble.terrain.picture import Picture, picture_cycles, picture_of
 from hobble.terrain.soles import Feet, Mask, find_soles, held_above_other
@@ -55,7 +55,7 @@ def clip_fits(
     patches: Patches,
     ground: str,
     options: Fitting,
-    sampling: Sampling,
+    sampling: HeightSampling,
 ) -> ClipFits:
     """Fit the ground under every cycle of a clip.
 

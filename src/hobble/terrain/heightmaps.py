@@ -36,7 +36,7 @@ GDAL_NODATA = 42113  # the TIFF tag with the value that means "no data", as text
 
 
 @dataclass(frozen=True)
-class Heightmap:
+class TerrainMap:
     """Heights (rows, columns), cm, nan in holes. cell: width of a cell, cm."""
 
     name: str
@@ -45,8 +45,12 @@ class Heightmap:
 
 
 def heightmaps(
-    entries: Sequence[options.Heightmap], files: Sequence[str | Path], *, cell: float, height_scale: float
-) -> list[Heightmap]:
+    entries: Sequence[options.HeightmapOptions],
+    files: Sequence[str | Path],
+    *,
+    cell: float,
+    height_scale: float,
+) -> list[TerrainMap]:
     """The heightmaps that a data set lists.
 
     entries: may have their own `cell` and `height_scale`. files: the files of the entries of kind `file`, in
@@ -67,13 +71,13 @@ def heightmaps(
                     f"a height of {highest:.4g} cm; {MAX_HEIGHT:g} at most",
                     fix="Set height_scale of this map, or say in the file what stands for no data.",
                 )
-            out.append(Heightmap(str(path), heights, width))
+            out.append(TerrainMap(str(path), heights, width))
         elif entry.kind == "elevation":
-            out.append(Heightmap("elevation", elevation(width) * (scale or 1.0), width))
+            out.append(TerrainMap("elevation", elevation(width) * (scale or 1.0), width))
         else:
             name = f"{entry.kind} (seed {entry.seed})"
             heights = generate(entry.kind, entry.seed, width) * (scale or 1.0)
-            out.append(Heightmap(name, heights, width))
+            out.append(TerrainMap(name, heights, width))
     return out
 
 

@@ -9,7 +9,7 @@ from pydantic import Field, model_validator
 from hobble.core.section import Finite, Inside, Positive, PositiveFloat, Section
 
 
-class Heightmap(Section):
+class HeightmapOptions(Section):
     """One source of ground: generated, matplotlib's real elevation model, or a file."""
 
     kind: Literal["fractal", "hills", "stairs", "slope", "boxes", "beams", "elevation", "file"]
@@ -21,7 +21,7 @@ class Heightmap(Section):
     )
 
     @model_validator(mode="after")
-    def _path_for_files(self) -> Heightmap:
+    def _path_for_files(self) -> HeightmapOptions:
         if (self.kind == "file") != (self.path is not None):
             raise ValueError("`path` is required for `kind: file` and not allowed for other kinds")
         return self
@@ -30,9 +30,9 @@ class Heightmap(Section):
 class Drawing(Section):
     """How patches are drawn from heightmaps, for the rule `terrain_patches`."""
 
-    heightmaps: tuple[Heightmap, ...] = Field(
+    heightmaps: tuple[HeightmapOptions, ...] = Field(
         default_factory=lambda: tuple(
-            Heightmap(kind=kind, seed=i)
+            HeightmapOptions(kind=kind, seed=i)
             for i, kind in enumerate(("fractal", "fractal", "hills", "stairs", "slope", "boxes", "beams"))
         )
     )
@@ -98,7 +98,7 @@ class Terrain(Drawing, Fitting):
         return self
 
 
-class Sampling(Section):
+class HeightSampling(Section):
     """The keys of the section `database` that decide at which points rows need ground heights."""
 
     window: Positive

@@ -15,7 +15,7 @@ import numpy as np
 from hobble.core.errors import HobbleError, InputError
 from hobble.core.files import load_npz, save_npz
 from hobble.core.quat import Array
-from hobble.terrain.heightmaps import Heightmap
+from hobble.terrain.heightmaps import TerrainMap
 
 VIEWS_PER_DRAW = 1_000
 HOLE_HEIGHT = 1e9
@@ -70,7 +70,7 @@ class Patches:
 
 
 def draw_patches(
-    maps: Sequence[Heightmap], *, count: int, cell: float, size: int, highest: float, seed: int
+    maps: Sequence[TerrainMap], *, count: int, cell: float, size: int, highest: float, seed: int
 ) -> Patches:
     """Draw `count` patches of `size` x `size` cells, `cell` cm wide, equally many from each map.
 
@@ -100,7 +100,7 @@ def draw_patches(
 
 
 def _draw_from(
-    heightmap: Heightmap, share: int, cell: float, size: int, highest: float, rng: np.random.Generator
+    heightmap: TerrainMap, share: int, cell: float, size: int, highest: float, rng: np.random.Generator
 ) -> tuple[Array, Array]:
     """`share` views (share, 2, 3) of one map that pass, and their mean heights (share,)."""
     from hobble.terrain.kernels import view_extents
@@ -144,7 +144,7 @@ def load_patches(path: str | Path) -> Patches:
         ) from error
 
 
-def _with_holes_marked(heightmap: Heightmap, cell: float) -> Array:
+def _with_holes_marked(heightmap: TerrainMap, cell: float) -> Array:
     """Heights in which holes (nan) and the cells around them are HOLE_HEIGHT, so that no view of them passes.
 
     The cells around a hole count because a coarse patch could skip the hole itself.
@@ -163,7 +163,7 @@ def _starts(shapes: np.ndarray) -> np.ndarray:
     return np.cumsum(sizes) - sizes
 
 
-def _views(rng: np.random.Generator, heightmap: Heightmap, cell: float, size: int) -> Array:
+def _views(rng: np.random.Generator, heightmap: TerrainMap, cell: float, size: int) -> Array:
     """At most VIEWS_PER_DRAW random views (N, 2, 3) that lie inside the map."""
     scale = cell / heightmap.cell
     half = size // 2

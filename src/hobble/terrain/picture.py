@@ -8,7 +8,7 @@ import numpy as np
 
 from hobble.core.clip import Clip
 from hobble.core.quat import Array
-from hobble.terrain.ground import Ground
+from hobble.terrain.cycle_ground import Ground
 from hobble.terrain.soles import Feet, Mask
 
 GRID_POINTS = 24

@@ -19,7 +19,7 @@ GOLDEN_RATIO = 0.6180339887498949
 
 
 @dataclass(frozen=True)
-class Footing:
+class FootPoints:
     """The points that the ground under a cycle has to fit.
 
     u, v are cells from the middle of the patch, along x and z. down, up: (N, 3) u, v and height of soles in
@@ -34,7 +34,7 @@ class Footing:
     beam_sides: Array = field(default_factory=lambda: np.zeros((0, 4), np.float32), repr=False)
 
 
-def best_patches(patches: Patches, footing: Footing, count: int) -> tuple[np.ndarray, Array]:
+def best_patches(patches: Patches, footing: FootPoints, count: int) -> tuple[np.ndarray, Array]:
     """Indices (count,) of the patches with the lowest errors, best first, and these errors (count,), cm²."""
     found: tuple[np.ndarray, Array] = search_views(  # type: ignore[call-arg]
         *patches.arrays[:-1], _columns(footing), footing.jumps, count
@@ -42,7 +42,7 @@ def best_patches(patches: Patches, footing: Footing, count: int) -> tuple[np.nda
     return found
 
 
-def patch_errors(patches: Patches, footing: Footing) -> Array:
+def patch_errors(patches: Patches, footing: FootPoints) -> Array:
     """The errors (P,) of all patches, cm²; `best_patches` finds the lowest."""
     errors: Array = view_errors(  # type: ignore[call-arg]
         *patches.arrays[:-1], _columns(footing), footing.jumps
@@ -50,7 +50,7 @@ def patch_errors(patches: Patches, footing: Footing) -> Array:
     return errors
 
 
-def _columns(footing: Footing) -> tuple[tuple[Array, ...], ...]:
+def _columns(footing: FootPoints) -> tuple[tuple[Array, ...], ...]:
     """Columns of four tables: in contact; the first FIRST_POINTS in the air; the rest; beside a beam."""
     spread = (np.arange(len(footing.up)) * GOLDEN_RATIO) % 1.0  # so that the first points cover all frames
     order = np.argsort(spread, kind="stable")

@@ -11,7 +11,7 @@ from torch import Tensor
 
 from hobble.core.errors import HobbleError
 from hobble.database.reader import Database
-from hobble.database.stretches import Sharing, Stretch
+from hobble.database.stretches import SampleRange, Sharing
 from hobble.training.processes import ALONE, Processes
 
 TRAIN = "train"
@@ -22,7 +22,7 @@ MOST_NAMED = 8  # clips in a message
 Piece = tuple[Tensor, Tensor, Tensor, np.ndarray, np.ndarray]  # the first five of a batch
 
 
-class Batch(NamedTuple):
+class SampleBatch(NamedTuple):
     """n samples on the training's device: x (n, X), y (n, Y), p (n,); clip and frame (n,) as in a `Block`.
 
     These are the samples of one process, maybe none. total: number of samples over all processes.
@@ -36,7 +36,7 @@ class Batch(NamedTuple):
     total: int
 
 
-class Rows:
+class TrainingRows:
     """The training rows of a database, as one process reads them.
 
     processes: those that share a batch; stretches: parts of a section from which each batch is taken.
@@ -58,10 +58,12 @@ class Rows:
         return self.processes.sharing(total, size, self.stretches)
 
 
-class HostRows(Rows):
+class HostRows(TrainingRows):
     """Rows that are read and composed on the host, then copied to `device`."""
 
-    def batches(self, pass_index: int, section: int, sections: int, seed: int, size: int) -> Iterator[Batch]:
+    def batches(
+        self, pass_index: int, section: int, sections: int, seed: int, size: int
+    ) -> Iterator[SampleBatch]:
         """This process's rows of the section's consecutive batches of `size`.
 
         The last batch may be shorter and is trained like the others (a loss is a mean over its rows). So a
@@ -78,9 +80,9 @@ class HostRows(Rows):
             # A short batch fills its first places only, so later stretches may have no samples for it.
             pieces = [piece for one in read if (piece := next(one, None)) is not None]
             piece = pieces[0] if len(pieces) == 1 else _joined(pieces, self._nothing)
-            yield Batch(*piece, total)
+            yield SampleBatch(*piece, total)
 
-    def _pieces(self, place: tuple[int, int, int, int], stretch: Stretch, window: int) -> Iterator[Piece]:
+    def _pieces(self, place: tuple[int, int, int, int], stretch: SampleRange, window: int) -> Iterator[Piece]:
         """The samples of one stretch, batch by batch."""
         size = stretch.high - stretch.low
         rows = self.database.block_rows(size)
@@ -103,7 +105,7 @@ def _joined(pieces: Sequence[Piece], nothing: Piece) -> Piece:
     return torch.cat(x), torch.cat(y), torch.cat(p), np.concatenate(clip), np.concatenate(frame)
 
 
-class Watch:
+class LossWatch:
     """Adds up the losses of a section, and stops the training if it diverges.
 
     where: the pass and section, for messages. clips: names by index. processes: all stop together, with the
@@ -113,10 +115,10 @@ class Watch:
     def __init__(self, where: str, clips: tuple[str, ...], processes: Processes = ALONE) -> None:
         self.where, self.clips, self.processes = where, clips, processes
         self.seen, self.samples, self._batches, self._total, self._new = 0, 0, 0, 0.0, 0
-        self._waiting: list[tuple[Tensor, Batch]] = []
-        self._worst: tuple[float, int, Batch] | None = None
+        self._waiting: list[tuple[Tensor, SampleBatch]] = []
+        self._worst: tuple[float, int, SampleBatch] | None = None
 
-    def add(self, loss: Tensor, batch: Batch) -> None:
+    def add(self, loss: Tensor, batch: SampleBatch) -> None:
         """Note a batch and its loss over all processes, a scalar on any device."""
         self._waiting.append((loss, batch))
         self.seen += batch.total
@@ -147,11 +149,11 @@ class Watch:
         self._waiting.clear()
         self._new = 0
 
-    def _message(self, what: str, number: int, batch: Batch) -> str:
+    def _message(self, what: str, number: int, batch: SampleBatch) -> str:
         text = f"training diverged in {self.where}, batch {number}: {what}"
         return self.processes.most_certain(*self._explained(text, batch))
 
-    def _explained(self, text: str, batch: Batch) -> tuple[str, bool]:
+    def _explained(self, text: str, batch: SampleBatch) -> tuple[str, bool]:
         """The message with the rows or clips of the batch, and whether the rows are the cause."""
         x, y, p = (part.isfinite().cpu().numpy() for part in batch[:3])
         bad = ~(x.all(1) & y.all(1) & p)

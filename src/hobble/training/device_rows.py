@@ -11,17 +11,17 @@ from torch import Tensor
 from hobble.database import order
 from hobble.database.manifest import Manifest
 from hobble.database.reader import Database
-from hobble.database.stretches import Sharing, Stretch
+from hobble.database.stretches import SampleRange, Sharing
 from hobble.database.window import empty_buffers
 from hobble.rows.compose import compose, fit_columns, x_columns
-from hobble.training.batches import TRAIN, Batch, HostRows, Rows
+from hobble.training.batches import TRAIN, HostRows, SampleBatch, TrainingRows
 from hobble.training.processes import ALONE, Processes
 
 ROWS_AT_ONCE = 4096  # rows composed at a time: few kernel launches, 10 MB
 MEMORY_SHARE = 0.6  # of the device's memory for rows; the rest is for the network and its buffers
 
 
-class DeviceRows(Rows):
+class DeviceRows(TrainingRows):
     """All rows on the device, uploaded chunk by chunk to save host memory.
 
     The batches equal those of the database's reader when it holds all rows in memory. The host computes only
@@ -67,7 +67,9 @@ class DeviceRows(Rows):
             self.count[rows], self.clip[rows], self.frame[rows] = read.count, read.clip, read.frame
             row, fit = rows.stop, fits.stop
 
-    def batches(self, pass_index: int, section: int, sections: int, seed: int, size: int) -> Iterator[Batch]:
+    def batches(
+        self, pass_index: int, section: int, sections: int, seed: int, size: int
+    ) -> Iterator[SampleBatch]:
         """As `hobble.training.batches.HostRows.batches`."""
         sharing = self.sharing(section, sections, size)
         rows, fits = self._read(sharing, (pass_index, section, sections, seed))
@@ -81,9 +83,9 @@ class DeviceRows(Rows):
             clip, frame = self.clip[of_host], self.frame[of_host]
             for start in range(0, len(p), own):
                 part = slice(start, start + own)
-                yield Batch(x[part], y[part], p[part], clip[part], frame[part], next(sizes)[0])
+                yield SampleBatch(x[part], y[part], p[part], clip[part], frame[part], next(sizes)[0])
         for total, _ in sizes:  # the last batch is too short to have rows for this process
-            yield Batch(x[:0], y[:0], p[:0], clip[:0], frame[:0], total)
+            yield SampleBatch(x[:0], y[:0], p[:0], clip[:0], frame[:0], total)
 
     def _read(self, sharing: Sharing, place: tuple[int, int, int, int]) -> tuple[np.ndarray, np.ndarray]:
         """Numbers of the rows and fits that this process reads in a section, batch by batch."""
@@ -101,7 +103,7 @@ class DeviceRows(Rows):
         return rows[turn], fits[turn]
 
     def _places(
-        self, pass_index: int, section: int, sections: int, seed: int, stretch: Stretch
+        self, pass_index: int, section: int, sections: int, seed: int, stretch: SampleRange
     ) -> Iterator[tuple[np.ndarray, np.ndarray]]:
         """Rows and fits of a stretch in order, one layer at a time. All chunks are one group."""
         visits, cut = self.database.manifest.visits, (stretch.start, stretch.stop)

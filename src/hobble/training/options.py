@@ -2,17 +2,31 @@
 
 from __future__ import annotations
 
+import math
 from typing import Annotated, Literal
 
-from pydantic import Field, model_validator
+from pydantic import AfterValidator, Field, PlainSerializer, model_validator
 
 from hobble.core.section import Positive, PositiveFloat, Section, Share
 
 
-class Recipe(Section):
-    """How a network is trained. A pass is every (frame, fit) pair once, in `sections` sections."""
+def _int_if_whole(number: float) -> float:
+    """3 for 3.0, so that both are the same recipe."""
+    return int(number) if number == int(number) else number
 
-    passes: Positive = 20
+
+# As it is: pydantic would write 3 as 3.0.
+AsItIs = PlainSerializer(lambda number: number, return_type=int | float)
+Passes = Annotated[float, Field(gt=0, le=1_000_000), AfterValidator(_int_if_whole), AsItIs]
+
+
+class Recipe(Section):
+    """How a network is trained. A pass is every (frame, fit) pair once, in `sections` sections.
+
+    Each section is another random part of the pairs. So a fraction of a pass sees a random part of the data.
+    """
+
+    passes: Passes = Field(20, description="passes over the data; a fraction ends after some sections")
     sections: Positive = 10
     batch: Positive = Field(32, description="samples of a step, over all processes")
     learning_rate: PositiveFloat = 1e-4
@@ -41,6 +55,12 @@ class Recipe(Section):
         description="share of the samples of clips with hurt versions whose input pose is moved along the "
         "line to that of another version of the clip",
     )
+    other_paces: Annotated[float, Field(ge=1, le=2)] = Field(
+        1.0,
+        description="for such channels, too: largest factor by which a sample is played slower or "
+        "faster, along a smoother path; 1: none",
+    )
+    keep_channels: bool = Field(False, description="dropout never drops the inputs of channels")
     keep: Literal["last", "best"] = Field(
         "last",
         description="weights to write: those at the end, as in the original, or those with the lowest "
@@ -72,9 +92,19 @@ class Recipe(Section):
     def _can_go_on(self) -> Recipe:
         if self.continues and self.schedule != "constant":
             raise ValueError("`continues` needs `schedule: constant`; another schedule ends at a rate of 0")
+        if not math.isclose(self.passes * self.sections, self.all_sections, rel_tol=1e-9):
+            raise ValueError(
+                f"`passes` ({self.passes:g}) times `sections` ({self.sections}) must be a whole number: "
+                "training ends after a section"
+            )
         if self.stretches and self.stretches > self.batch:
             raise ValueError(f"`stretches` ({self.stretches}) is above `batch` ({self.batch})")
         return self
+
+    @property
+    def all_sections(self) -> int:
+        """Number of sections of all passes, at least one."""
+        return max(1, round(self.passes * self.sections))
 
 
 class Machines(Section):

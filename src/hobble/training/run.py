@@ -78,7 +78,7 @@ def run(
     named = zip(["held out, every row", *blocks], errors, strict=True)
     log.info("%s", ", ".join(f"{name} {error:.4f}" for name, error in named))
     facts = {
-        "passes": state.sections // training.sections,
+        "passes": passes_of(state.sections, training.sections),
         "samples": state.samples,
         "steps": state.adam.steps,
         "terrain_side": terrain_side,
@@ -90,3 +90,12 @@ def run(
     write_weights(weights, state.network, data, configuration, facts)
     write_history(history, blocks, state.history)
     save_npz(checkpoint, **kept)
+
+
+def passes_of(sections: int, each: int) -> float:
+    """The passes of so many sections, `each` of which are a pass; an integer if it is whole.
+
+    >>> passes_of(40, 4), passes_of(1, 4)
+    (10, 0.25)
+    """
+    return sections // each if sections % each == 0 else round(sections / each, 6)

@@ -19,7 +19,7 @@ from hobble.database.reader import Database
 from hobble.models import model
 from hobble.models.model import Trained
 from hobble.models.options import Options
-from hobble.models.trainable import Step, Trainable
+from hobble.models.trainable import Trainable, TrainingStep
 from hobble.training.checkpoint import State, unpack
 from hobble.training.optimiser import Adam
 from hobble.training.options import Machines, Training
@@ -122,14 +122,14 @@ def _restored(
     """Restore `state` from the own checkpoint or the start, if there is one; and the path of its own."""
     state.recipe = run_name(recipe, begun)
     own = checkpoints / state.recipe / "checkpoint.npz"
-    goal = training.passes * training.sections
+    goal = training.all_sections
     if own.exists():
         data = load_npz(own)
         if int(data.get("sections", 0)) <= goal:
             unpack(data, state, own)
             log.info("resuming from %s, after section %d of %d", own, state.sections, goal)
             return state, own
-        log.warning("%s is past %d passes; starting again", own, training.passes)
+        log.warning("%s is past %g passes; starting again", own, training.passes)
     if start is not None and begun is not None:
         unpack(begun, state, start)
         _check_start(state, training, start)
@@ -148,11 +148,11 @@ def _check_start(state: State, training: Training, path: Path) -> None:
             f"was trained with {sections} sections a pass, but training.sections is {training.sections}",
             fix=f"Set training.sections to {sections}, or remove training.continues.",
         )
-    passes = state.sections // sections
-    if passes > training.passes:
+    if state.sections > training.all_sections:
+        passes = f"{state.sections / sections:g}"
         raise InputError(
             path,
-            f"has {passes} passes, but training.passes is {training.passes}",
+            f"has {passes} passes, but training.passes is {training.passes:g}",
             fix=f"Set training.passes to more than {passes}, or remove training.continues.",
         )
 
@@ -180,8 +180,8 @@ def device(wanted: str, processes: Processes = ALONE) -> torch.device:
     return torch.device("cuda") if processes.alone else torch.device("cuda", processes.local)
 
 
-def step_for(network: Trainable, training: Training) -> Step:
-    """The `Step` for the device, the precision and the batch size.
+def step_for(network: Trainable, training: Training) -> TrainingStep:
+    """The `TrainingStep` for the device, the precision and the batch size.
 
     Sums are always float32. TF32, which rounds factors to 11 bits, is set for the whole process.
     """

@@ -12,12 +12,13 @@ from tqdm import tqdm
 from hobble.core.errors import HobbleError
 from hobble.database.reader import Database
 from hobble.models.options import Options
-from hobble.training.batches import TRAIN, Watch
+from hobble.training.batches import TRAIN, LossWatch
 from hobble.training.checkpoint import Saver, State, pack
 from hobble.training.device_rows import rows_for
 from hobble.training.held_out import SPLIT, HeldOut
 from hobble.training.history import duration
 from hobble.training.options import Training
+from hobble.training.other_paces import OtherPaces
 from hobble.training.other_poses import OtherPoses
 from hobble.training.processes import ALONE, Processes
 from hobble.training.rollout import RollOut
@@ -66,35 +67,42 @@ def train(
         _run(state, database, training, processes, None)
         return state
     with Saver(path) as saver:
-        _run(state, database, training, processes, Record(state, database, training, saver))
+        _run(state, database, training, processes, TrainingRecorder(state, database, training, saver))
     return state
 
 
 def _run(
-    state: State, database: Database, training: Training, processes: Processes, record: Record | None
+    state: State,
+    database: Database,
+    training: Training,
+    processes: Processes,
+    record: TrainingRecorder | None,
 ) -> None:
-    passes, sections, seed = training.passes, training.sections, training.seed
+    sections, seed = training.sections, training.seed
     device, batch_size = state.network.flat.device, training.batch
     step = step_for(state.network, training)
-    update = update_for(step, state.adam, batch_size, processes)
+    update = update_for(step, state.adam, batch_size, processes, _kept(database, training))
     rows = rows_for(database, device, processes, training.stretches)
     places = processes.places(batch_size)
     others = OtherPoses(database, training.other_poses, len(places), device, places.start)
     versions = VersionPoses(database, training.version_poses, len(places), device, places.start)
+    paces = OtherPaces(database, training.other_paces, len(places), device, places.start)
     roll_out = RollOut(database, training.rollout, len(places), device, places.start)
     pairs = database.pairs(TRAIN)
-    for turn in range(state.sections, passes * sections):
+    for turn in range(state.sections, training.all_sections):
         if training.patience and processes.numbers_of_first(state.since_best)[0] >= training.patience:
             log.info("no lower held-out error for %d sections: training ends", training.patience)
             break
         pass_index, section = divmod(turn, sections)
-        where = f"pass {pass_index + 1} of {passes}, section {section + 1} of {sections}"
-        watch = Watch(where, database.clips, processes)
+        where = f"pass {pass_index + 1} of {training.passes:g}, section {section + 1} of {sections}"
+        watch = LossWatch(where, database.clips, processes)
         step.seed(section_seed(seed, turn))
         others.begin()
         versions.begin()
+        paces.begin()
         roll_out.begin()
         for batch in rows.batches(pass_index, section, sections, seed, batch_size):
+            paces.play(batch.x, batch.y)
             others.mix(batch.x, batch.p)
             versions.mix(batch.x, batch.p, batch.clip)
             roll_out.add(batch.x)
@@ -112,19 +120,25 @@ def _run(
         record.close()
 
 
+def _kept(database: Database, training: Training) -> list[slice]:
+    """The blocks of inputs that dropout keeps."""
+    layout = database.layout
+    return [layout.x_channel(name) for name, _ in layout.channels] if training.keep_channels else []
+
+
 def section_seed(seed: int, turn: int) -> int:
     """The seed of dropout in section `turn`, counted from the start of the training."""
     return int(np.random.SeedSequence([seed, 1, turn]).generate_state(1, np.uint64)[0] >> 1)
 
 
-class Record:
+class TrainingRecorder:
     """Records a training: held-out errors, history, checkpoints, progress bar, and one log line a section."""
 
     def __init__(self, state: State, database: Database, training: Training, saver: Saver) -> None:
         self.state, self.saver = state, saver
         pairs = database.pairs(TRAIN)
         self.held_out = HeldOut(database, state.network.flat.device, pairs // training.sections)
-        self.goal, self.first, self.before = training.passes * pairs, state.samples, state.seconds
+        self.goal, self.first, self.before = round(training.passes * pairs), state.samples, state.seconds
         self.began = time.perf_counter()
         self.bar = tqdm(
             total=self.goal, initial=state.samples, unit=" samples", unit_scale=True, disable=None

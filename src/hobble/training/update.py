@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import torch
 from torch import Tensor
 
-from hobble.models.trainable import Step
+from hobble.models.trainable import ALL_ROWS, TrainingStep
 from hobble.training.optimiser import Adam
 from hobble.training.processes import ALONE, Processes
 
@@ -14,17 +16,28 @@ WARM_UP = 3  # runs before the capture, in which libraries choose algorithms and
 
 
 class Update:
-    """Draws the dropout masks of a batch, finds the gradient and takes a step."""
+    """Draws the dropout masks of a batch, finds the gradient and takes a step.
 
-    def __init__(self, step: Step, adam: Adam) -> None:
-        self.step, self.adam = step, adam
+    kept: blocks of inputs that are never dropped. Without its channels a row of a hurt body would look like
+    one of a body between healthy and hurt, and a network would trust its channels less.
+    """
+
+    def __init__(self, step: TrainingStep, adam: Adam, kept: Sequence[slice] = ()) -> None:
+        self.step, self.adam, self.kept = step, adam, kept
+
+    def masks(self, rows: int, own: slice = ALL_ROWS) -> list[Tensor]:
+        """The masks of a batch of `rows` rows, of its rows `own`."""
+        masks = self.step.masks(rows, own)
+        for block in self.kept:
+            masks[self.step.input_mask][:, block] = 1.0
+        return masks
 
     def __call__(self, x: Tensor, y: Tensor, p: Tensor, share: float, total: int | None = None) -> Tensor:
         """Train on x (B, X), y (B, Y), p (B,). Returns the loss, a scalar tensor.
 
         share: factor of the learning rate. total: rows of the batch over all processes, if there are several.
         """
-        loss = self.step(x, y, p, self.step.masks(len(x)))
+        loss = self.step(x, y, p, self.masks(len(x)))
         self.adam.step(self.step.gradients, share)
         return loss
 
@@ -36,8 +49,10 @@ class SharedUpdate(Update):
     share of the rows, and the sum over the processes is that of the whole batch. One message holds both.
     """
 
-    def __init__(self, step: Step, adam: Adam, processes: Processes, batch: int) -> None:
-        super().__init__(step, adam)
+    def __init__(
+        self, step: TrainingStep, adam: Adam, processes: Processes, batch: int, kept: Sequence[slice] = ()
+    ) -> None:
+        super().__init__(step, adam, kept)
         self.processes, self.own = processes, processes.places(batch)
         self.sent = torch.empty(len(adam.network.flat) + 1, dtype=adam.network.flat.dtype)
         self.sent = self.sent.to(adam.network.flat.device)
@@ -46,7 +61,7 @@ class SharedUpdate(Update):
     def __call__(self, x: Tensor, y: Tensor, p: Tensor, share: float, total: int | None = None) -> Tensor:
         """As in `Update`; the loss is that of the whole batch."""
         total = total or len(p)
-        masks = self.step.masks(total, slice(self.own.start, self.own.stop))
+        masks = self.masks(total, slice(self.own.start, self.own.stop))
         if len(p):
             loss = self.step(x, y, p, masks)
             for sent, gradient in zip(self.gradients, self.step.gradients, strict=True):
@@ -69,8 +84,8 @@ class CapturedUpdate(Update):
     is registered with the graph, so it advances and can be seeded as usual.
     """
 
-    def __init__(self, step: Step, adam: Adam, rows: int) -> None:
-        super().__init__(step, adam)
+    def __init__(self, step: TrainingStep, adam: Adam, rows: int, kept: Sequence[slice] = ()) -> None:
+        super().__init__(step, adam, kept)
         flat, columns = adam.network.flat, (adam.network.inputs, adam.network.outputs)
         self.x, self.y = (torch.zeros(rows, size, device=flat.device) for size in columns)
         self.p = torch.zeros(rows, device=flat.device)
@@ -91,7 +106,7 @@ class CapturedUpdate(Update):
             tensor.copy_(value)
 
     def _once(self) -> Tensor:
-        loss = self.step(self.x, self.y, self.p, self.step.masks(len(self.p)))
+        loss = self.step(self.x, self.y, self.p, self.masks(len(self.p)))
         self.adam.move(self.step.gradients, self.numbers)
         return loss
 
@@ -109,10 +124,12 @@ class CapturedUpdate(Update):
         return self.loss.clone()
 
 
-def update_for(step: Step, adam: Adam, rows: int, processes: Processes = ALONE) -> Update:
+def update_for(
+    step: TrainingStep, adam: Adam, rows: int, processes: Processes = ALONE, kept: Sequence[slice] = ()
+) -> Update:
     """The update to use: captured on CUDA for small batches of one process, where it is faster."""
     if not processes.alone:
-        return SharedUpdate(step, adam, processes, rows)
+        return SharedUpdate(step, adam, processes, rows, kept)
     if adam.network.flat.device.type == "cuda" and rows <= CAPTURED_UP_TO:
-        return CapturedUpdate(step, adam, rows)
-    return Update(step, adam)
+        return CapturedUpdate(step, adam, rows, kept)
+    return Update(step, adam, kept)

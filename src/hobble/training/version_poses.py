@@ -11,7 +11,7 @@ from torch import Tensor
 from hobble.core.quat import Array
 from hobble.database.precision import widen
 from hobble.database.reader import Database
-from hobble.database.window import Window, empty_buffers
+from hobble.database.window import ChunkWindow, empty_buffers
 from hobble.rows.compose import lower_joints, without_terrain
 
 SPLIT = "train"
@@ -122,7 +122,7 @@ def _table(database: Database, own: Array) -> tuple[Array, Array, Array]:
 
 
 def _of_chunk(
-    window: Window, own: Array, pose: np.ndarray, way: np.ndarray, database: Database, every: int
+    window: ChunkWindow, own: Array, pose: np.ndarray, way: np.ndarray, database: Database, every: int
 ) -> tuple[Array, Array, Array]:
     """The rows of one chunk, not sorted. Each is above its first ground."""
     key = own[window.clip] + window.phase

@@ -16,16 +16,16 @@ from typing import Any
 
 from hobble.core.errors import InputError
 from hobble.workflow import checksums
-from hobble.workflow.batches import family_of
-from hobble.workflow.job import Report, checked, reporting
-from hobble.workflow.kept import Kept, fingerprint
+from hobble.workflow.clip_batches import family_of
+from hobble.workflow.job import JobLog, checked, reporting
+from hobble.workflow.kept import KeptFiles, fingerprint
 
 # Errors that would also stop every further clip.
 DISK_ERRORS = (errno.ENOSPC, errno.EDQUOT, errno.EROFS)
 
 
 @dataclass(frozen=True)
-class Piece:
+class JobPiece:
     """A piece of the work of a job: usually a clip and its mirror.
 
     name: the clip. params: those of the rule and those of this clip. input: name -> file, or a list of files
@@ -46,7 +46,7 @@ class Piece:
         return [file for some in found for file in some]
 
 
-def pieces(snakemake: Any) -> list[Piece]:
+def pieces(snakemake: Any) -> list[JobPiece]:
     """The pieces of a job.
 
     params.per_clip: for each piece its own params, with the name as `clip`. params.files_per_clip, optional:
@@ -62,7 +62,7 @@ def pieces(snakemake: Any) -> list[Piece]:
     }
     outputs = {name: _distributed(_as_list(files), len(per_clip)) for name, files in snakemake.output.items()}
     return [
-        Piece(
+        JobPiece(
             own["clip"],
             {**common, **own},
             {name: files[n] for name, files in inputs.items() if files},
@@ -72,7 +72,7 @@ def pieces(snakemake: Any) -> list[Piece]:
     ]
 
 
-def make_each(snakemake: Any, make: Callable[[Piece, logging.Logger], None]) -> None:
+def make_each(snakemake: Any, make: Callable[[JobPiece, logging.Logger], None]) -> None:
     """Call `make` for each piece of a job, unless its files are kept from an earlier try and undamaged.
 
     If a piece fails, its error is reported and the others are made, unless the disk is full. Then the process
@@ -80,7 +80,7 @@ def make_each(snakemake: Any, make: Callable[[Piece, logging.Logger], None]) -> 
     """
     with reporting(snakemake) as report:
         checksums.forget(snakemake.output)
-        kept, digests = Kept(family_of(snakemake.rule)), _Digests()
+        kept, digests = KeptFiles(family_of(snakemake.rule)), _Digests()
         all_pieces = pieces(snakemake)
         taken = failed = 0
         for piece in all_pieces:
@@ -100,7 +100,11 @@ def make_each(snakemake: Any, make: Callable[[Piece, logging.Logger], None]) -> 
 
 
 def _made(
-    piece: Piece, make: Callable[[Piece, logging.Logger], None], kept: Kept, digests: _Digests, report: Report
+    piece: JobPiece,
+    make: Callable[[JobPiece, logging.Logger], None],
+    kept: KeptFiles,
+    digests: _Digests,
+    report: JobLog,
 ) -> bool:
     """Make a piece or take what is kept of it. Returns whether it was kept."""
     outputs, began = list(piece.output.values()), time.monotonic()

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
 from hobble.channels import NAMES, channel
-from hobble.config.load import Catalogue
+from hobble.config.load_configuration import Catalogue
 from hobble.core.errors import HobbleError, InputError
 
 if TYPE_CHECKING:

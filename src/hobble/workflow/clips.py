@@ -10,7 +10,7 @@ from collections.abc import Iterable
 from pathlib import Path
 from urllib.parse import quote
 
-from hobble.config.load import Catalogue
+from hobble.config.load_configuration import Catalogue
 from hobble.config.models import ClipEntry
 from hobble.core.clip_files import (
     CLIP_NAME_RULE,

@@ -11,7 +11,7 @@ from hobble.workflow.measurements import NAMES, result_file
 COMPARE = "compare"  # the folder under results/, and the key of --config
 
 
-class Comparison:
+class ComparedConfigurations:
     """The configurations that `--config compare='[holden,injured]'` names.
 
     value: the value from the command line, not yet checked.

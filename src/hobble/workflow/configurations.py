@@ -6,7 +6,7 @@ import hashlib
 import json
 from typing import Any
 
-from hobble.config.load import Catalogue
+from hobble.config.load_configuration import Catalogue
 from hobble.models import model
 from hobble.models.model import Built
 from hobble.workflow.channel_sources import database_folder

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from hobble.workflow.batches import Batches
+from hobble.workflow.clip_batches import Batches
 from hobble.workflow.clips import DATASETS
 from hobble.workflow.configurations import Configurations
 from hobble.workflow.kept import FOLDER

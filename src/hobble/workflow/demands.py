@@ -19,7 +19,7 @@ from hobble.models import model
 from hobble.models.model import Trained
 from hobble.rows.layout import RowLayout
 from hobble.training.options import Machines
-from hobble.workflow.batches import Batch
+from hobble.workflow.clip_batches import ClipBatch
 from hobble.workflow.clips import original
 from hobble.workflow.project import Project
 
@@ -34,6 +34,7 @@ VISITS_PER_PASS = 10  # how often a pass of training uses a row
 HEADER_BYTES = 1 << 20  # the motion of a BVH file begins within this many bytes
 SHARD_MB = 10  # of a shard's job, for a thousand frames of its longest clip
 ROW_BYTES = 24  # of a shard's job, for each of its rows: the place in the order
+EXCERPT_THOUSANDS = 2.0  # of frames that a measurement of a sample reads at once
 WEEK_MINUTES = 7 * 24 * 60  # longest time that a job requests
 
 
@@ -43,11 +44,11 @@ class Demands:
     def __init__(self, project: Project) -> None:
         self.project = project
 
-    def batch_memory(self, batch: Batch, rate: float, attempt: int = 1) -> int:
+    def batch_memory(self, batch: ClipBatch, rate: float, attempt: int = 1) -> int:
         """MB for a job of a batch, whose longest clip takes `rate` MB for a thousand frames of 31 joints."""
         return _megabytes(rate * max(self._thousands_of(batch)), attempt)
 
-    def batch_minutes(self, batch: Batch, rate: float, attempt: int = 1, least: int = 1) -> int:
+    def batch_minutes(self, batch: ClipBatch, rate: float, attempt: int = 1, least: int = 1) -> int:
         """Minutes (at least `least`) for a job of a batch that takes `rate` seconds for 1,000 frames."""
         return _minutes(sum(rate * some + CLIP_SECONDS for some in self._thousands_of(batch)), attempt, least)
 
@@ -77,6 +78,8 @@ class Demands:
     def measure_memory(self, configuration: str, name: str, attempt: int = 1) -> int:
         """MB for the measurement `name`."""
         cost = measure(name).cost
+        if self._measured_share(configuration, name) < 1:
+            return _megabytes(cost.memory_mb + cost.memory_each * EXCERPT_THOUSANDS, attempt)
         more = math.ceil(MEMORY_MARGIN * cost.memory_mb * attempt)
         return more + self.evaluation_memory(configuration, cost.memory_each, attempt)
 
@@ -161,7 +164,7 @@ class Demands:
         """Thousands of frames of a clip, scaled by the number of joints / 31."""
         return self._frames(dataset, original(clip)) / 1e3 * self._joints(dataset) / MEASURED_JOINTS
 
-    def _thousands_of(self, batch: Batch) -> list[float]:
+    def _thousands_of(self, batch: ClipBatch) -> list[float]:
         return [self.thousands(batch.dataset, clip) for clip in batch.clips]
 
     def parameters(self, configuration: str) -> float:

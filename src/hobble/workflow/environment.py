@@ -24,7 +24,7 @@ PROGRESS_LINE = re.compile(r"Progress (\d+) of (\d+)")
 BYTES = {"kB": 1e3, "MB": 1e6, "GB": 1e9}
 
 
-class Line:
+class ProgressLine:
     """The line of progress. On a terminal it is overwritten, in a file there is a new line now and then."""
 
     def __init__(self, stream: TextIO) -> None:
@@ -63,7 +63,7 @@ class Line:
             self.stream.write("\r\x1b[K")
 
 
-def follow(lines: Iterable[str], line: Line) -> list[str]:
+def follow(lines: Iterable[str], line: ProgressLine) -> list[str]:
     """Show pip's output as progress. Returns its last lines, for an error message."""
     words: list[str] = []
     for text in lines:
@@ -74,7 +74,7 @@ def follow(lines: Iterable[str], line: Line) -> list[str]:
     return words
 
 
-def install(python: Path, arguments: list[str], line: Line) -> None:
+def install(python: Path, arguments: list[str], line: ProgressLine) -> None:
     """Run pip install. If it fails, exit with its last lines."""
     command = [str(python), "-m", "pip", "install", "--disable-pip-version-check", *arguments]
     with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True) as pip:
@@ -101,7 +101,7 @@ def main(folder: Path) -> None:
     print(f"Making the environment in {folder}: PyTorch, Snakemake, SciPy and their dependencies.")
     print(f"This downloads packages and takes {DISK_SPACE} of disk, and a few minutes with a fast network.")
     began = time.monotonic()
-    python, line = folder / "bin" / "python", Line(sys.stdout)
+    python, line = folder / "bin" / "python", ProgressLine(sys.stdout)
     # venv copies the interpreter anew, which fails while one of its programs runs.
     if not is_sound(python):
         venv.create(folder, with_pip=True)

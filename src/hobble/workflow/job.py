@@ -12,7 +12,7 @@ from typing import Any
 
 from hobble.core.errors import HobbleError
 from hobble.workflow import checksums
-from hobble.workflow.batches import family_of
+from hobble.workflow.clip_batches import family_of
 from hobble.workflow.lifetime import ends_with_run
 from hobble.workflow.usage import peak_memory_mb
 
@@ -43,13 +43,13 @@ def checked(inputs: Any, outputs: Any) -> Iterator[None]:
 
 
 @contextlib.contextmanager
-def reporting(snakemake: Any) -> Iterator[Report]:
+def reporting(snakemake: Any) -> Iterator[JobLog]:
     """Run a script with logging and clear errors, until its run ends.
 
     Everything is logged to the rule's log file; warnings and errors also go to the terminal. Every exception
     ends the process with status 1.
     """
-    report = Report(str(snakemake.log[0]), family_of(snakemake.rule))
+    report = JobLog(str(snakemake.log[0]), family_of(snakemake.rule))
     try:
         with ends_with_run():
             yield report
@@ -61,7 +61,7 @@ def reporting(snakemake: Any) -> Iterator[Report]:
         logging.shutdown()
 
 
-class Report:
+class JobLog:
     """A job's log file and its messages on the terminal, which begin with the name of its rule."""
 
     def __init__(self, path: str, rule: str) -> None:

@@ -33,7 +33,7 @@ def fingerprint(params: Mapping[str, Any], inputs: Iterable[tuple[str, str]], ou
     return hashlib.sha256(json.dumps(dependencies, sort_keys=True).encode()).hexdigest()
 
 
-class Kept:
+class KeptFiles:
     """What jobs of one rule have made. rule: without data set and number, such as motion_clips."""
 
     def __init__(self, rule: str) -> None:

@@ -6,12 +6,12 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-from hobble.config.load import Catalogue
+from hobble.config.load_configuration import Catalogue
 from hobble.config.sections import COMPARED
 from hobble.core.errors import HobbleError
-from hobble.workflow.batches import Batches
+from hobble.workflow.clip_batches import Batches
 from hobble.workflow.clips import Clips
-from hobble.workflow.comparison import COMPARE, Comparison
+from hobble.workflow.comparison import COMPARE, ComparedConfigurations
 from hobble.workflow.configurations import Configurations
 from hobble.workflow.datasets import Datasets
 from hobble.workflow.measurements import Measurements
@@ -41,7 +41,7 @@ class Project:
         self.batches = Batches(self.clips)
         self.datasets = Datasets(self.catalogue, self.clips)
         self.configurations = Configurations(self.catalogue, self.datasets)
-        self.comparison = Comparison(self.configurations, config.get(COMPARE, list(COMPARED)))
+        self.comparison = ComparedConfigurations(self.configurations, config.get(COMPARE, list(COMPARED)))
         self.package = Package(base)
         self.measurements = Measurements(self.configurations, self.clips, self.package)
 

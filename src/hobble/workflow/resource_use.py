@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from hobble.report.pipeline import read_benchmark
-from hobble.workflow.batches import family_of
+from hobble.workflow.clip_batches import family_of
 from hobble.workflow.demands import ENGINE_MB
 
 JOB_BLOCK = re.compile(r"^ *(?:local)?rule ([^\n]+):\n((?: +\w+: .*\n)+)", re.M)

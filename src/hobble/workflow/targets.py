@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, get_args
 from hobble.channels import every
 from hobble.config.sections import PhaseMode
 from hobble.core.errors import HobbleError, InputError
-from hobble.workflow.batches import dataset_of, rules_of_job
+from hobble.workflow.clip_batches import dataset_of, rules_of_job
 from hobble.workflow.comparison import COMPARE
 from hobble.workflow.copies import refuse_copies
 from hobble.workflow.project import Project

@@ -14,7 +14,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, TextIO
 
-from hobble.workflow.batches import MARK, dataset_of, family_of
+from hobble.workflow.clip_batches import MARK, dataset_of, family_of
 
 PROGRESS_SECONDS = 10.0  # between lines of progress in a file
 WIDTH = 100  # columns of the line of progress on a terminal

@@ -7,9 +7,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from hobble.channels import Source, channel
+from hobble.channels import ClipSource, channel
+from hobble.channels.clip_values import clip_values
 from hobble.channels.diagnosis.channel import read_table
-from hobble.channels.files import clip_values
 from hobble.core.clip import Clip
 from hobble.core.errors import InputError
 from hobble.core.skeleton import Skeleton
@@ -33,7 +33,7 @@ def table(tmp_path: Path) -> Path:
         ("One_1", "joint problem", [1, 0, 0], False),
     ],
 )
-def test_what_a_walker_has_holds_all_through_a_clip(
+def test_a_diagnosis_holds_in_every_frame_of_a_clip(
     holden31: Skeleton, table: Path, clip: str, value: str | None, expected: list[float], warns: bool
 ) -> None:
     fields = {"clip": clip, "value": value, "options": {"table": table.name}}
@@ -58,20 +58,20 @@ def test_what_a_walker_has_holds_all_through_a_clip(
         ),
     ],
 )
-def test_a_table_that_cannot_be_understood_is_refused(tmp_path: Path, text: str, message: str) -> None:
+def test_a_malformed_table_of_diagnoses_is_refused(tmp_path: Path, text: str, message: str) -> None:
     path = tmp_path / "who.csv"
     path.write_text(text)
     with pytest.raises(InputError, match=message):
         read_table(str(path))
 
 
-def test_an_entry_that_is_no_diagnosis_is_refused(holden31: Skeleton) -> None:
+def test_an_unknown_diagnosis_in_a_clip_entry_is_refused(holden31: Skeleton) -> None:
     with pytest.raises(InputError, match=r"walk\.channels\.diagnosis: cannot be 'flu'"):
-        channel("diagnosis").check(Source("walk", value="flu"), holden31)
+        channel("diagnosis").check(ClipSource("walk", value="flu"), holden31)
 
 
 @pytest.mark.shared
-def test_the_table_of_the_patients(shared: Path) -> None:
+def test_the_table_of_the_patients_gives_each_clip_a_known_diagnosis(shared: Path) -> None:
     found = read_table(str(shared / "mocap" / "patients.csv"))
     counts = {said: list(found.values()).count(said) for said in sorted(set(found.values()))}
     assert counts == {"healthy": 10, "joint problem": 2, "muscle weakness": 20, "neurological defect": 16}

@@ -13,10 +13,10 @@ import pytest
 from hobble.channels import channel
 from hobble.channels.injury.limp import page, together
 from hobble.channels.injury.limp import run as module
-from hobble.channels.injury.limp.captured import VERSION, HurtSeconds, Limp, healthy_of
+from hobble.channels.injury.limp.captured_limps import VERSION, HurtSeconds, Limp, healthy_of
+from hobble.channels.injury.limp.crowd_walks import FigureWalk
 from hobble.channels.injury.limp.run import SEVERITIES, distance, hurt_side, limp
-from hobble.channels.injury.limp.walks import FigureWalk
-from hobble.gait.cycles import SCALARS, Cycle, Walk
+from hobble.gait.cycles import SCALARS, Cycle, WalkCycles
 from hobble.gait.people import NORMAL, people
 from hobble.gait.profile import profile
 from hobble.gait.signals import CURVES, SIGN_CHANGES
@@ -52,7 +52,7 @@ def walking(limp: dict[str, float], speed: float) -> FigureWalk:
     curves = np.array([mixed(lambda gait, n=n: known.curve(gait, n)[0]) for n in CURVES])
     scalars = {n: float(mixed(lambda gait, n=n: known.scalar(gait, n)[0])) for n in SCALARS}
     cycles = [Cycle(start, start + 70, scalars, curves) for start in range(0, FRAMES - 70, 70)]
-    walk = Walk(60.0, tuple(cycles), tuple(map(mirrored, cycles)))
+    walk = WalkCycles(60.0, tuple(cycles), tuple(map(mirrored, cycles)))
     walk = walk.mirrored() if "left" in limp else walk
     return FigureWalk(walk, profile(walk), speed, FRAMES)
 
@@ -86,7 +86,7 @@ def measured(hurtable, holden31, monkeypatch):
     return run
 
 
-def test_effects_have_their_sizes_and_sides_are_alike(measured) -> None:
+def test_effects_grow_with_severity_and_are_alike_on_both_sides(measured) -> None:
     found = measured(lambda s: 0.1 * s)
     rows = [row for row in found["sizes"] if row["gait"] == "walk"]
     assert [row["severity"] for row in rows] == 2 * list(SEVERITIES)
@@ -106,14 +106,14 @@ def test_effects_have_their_sizes_and_sides_are_alike(measured) -> None:
     json.dumps(found, allow_nan=False)
 
 
-def test_severities_that_do_nothing_are_nobodys_limp(measured) -> None:
+def test_severities_without_effect_are_not_recognised_as_a_limp(measured) -> None:
     found = measured(lambda s: 0.0)
     assert all(row["called"] == "normal" for row in found["sizes"] if row["gait"] == "walk")
     assert [row["named"] for row in found["named"]] == [0, 0, 0, 0]
     assert [row["impaired"] for row in found["named"]] == [0, 0, 0, 0]
 
 
-def test_a_change_of_two_percent_is_steady_and_still_small(measured) -> None:
+def test_a_change_of_two_percent_correlates_fully_but_is_not_recognised(measured) -> None:
     """The rank correlation of an effect, and its size at 10."""
     found = measured(lambda s: 0.002 * s)
     knee = next(row for row in found["trends"] if row["gait"] == "walk" and row["effect"] == "knee_hurt")
@@ -122,13 +122,13 @@ def test_a_change_of_two_percent_is_steady_and_still_small(measured) -> None:
     assert found["named"][-1]["named"] == 0
 
 
-def test_a_limp_of_the_other_leg_is_seen(measured) -> None:
+def test_a_limp_of_the_wrong_leg_is_detected(measured) -> None:
     last = measured(lambda s: 0.1 * s, other_side=True)["named"][-1]
     assert last["named"] == 0
     assert last["wrong_side"] == 1
 
 
-def test_a_limp_is_measured_beside_the_walk_of_the_same_mood(
+def test_a_limp_is_compared_with_the_healthy_walk_of_the_same_mood(
     hurtable, holden31, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """Sad: half as fast, the same limp. Old: no limp. Tired: no whole cycle."""
@@ -171,7 +171,7 @@ def clip(name: str, hurt: dict[str, float], limp: dict[str, float]) -> Limp:
     return Limp(name, hurt, walking(limp, 2.0).walk, 2.0)
 
 
-def test_the_exam_is_passed_by_the_right_leg_alone(measured) -> None:
+def test_a_held_out_limp_is_nearer_only_if_the_same_leg_is_hurt(measured) -> None:
     every = (
         clip("7_1", {}, {}),
         clip("7_2", {RIGHT_KNEE: 8.0}, {"right": 0.8}),
@@ -186,7 +186,7 @@ def test_the_exam_is_passed_by_the_right_leg_alone(measured) -> None:
     assert not measured(lambda s: 0.0, False, every, splits)["held_out_limps"][0]["nearer"]
 
 
-def test_a_clip_is_set_beside_its_own_performer() -> None:
+def test_a_captured_limp_is_compared_with_its_own_performer() -> None:
     own, other = clip("7_1", {}, {}), clip("8_1", {}, {"left": 0.3})
     hurt = clip("7_2", {RIGHT_KNEE: 8.0}, {"right": 0.8})
     healthy, whose = healthy_of(hurt, [other, own, hurt])
@@ -196,6 +196,6 @@ def test_a_clip_is_set_beside_its_own_performer() -> None:
     assert distance(healthy, healthy, healthy, healthy) == 0
 
 
-def test_what_a_generator_made_is_known_by_its_name() -> None:
+def test_generated_hurt_clips_are_recognised_by_their_names() -> None:
     names = ("walk_hurt1", "walk_hurt3_mirror", "walk", "hurt1", "walk_hurt", "walk_mirror")
     assert [VERSION.search(name) is not None for name in names] == [True, True, False, False, False, False]

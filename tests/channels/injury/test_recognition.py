@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from hobble.channels.injury.recognition import run as module
-from hobble.channels.injury.recognition.run import HEALTHY, Window, recognition, rows, walking_windows
+from hobble.channels.injury.recognition.run import HEALTHY, InjuryWindow, recognition, rows, walking_windows
 from hobble.core import quat
 from hobble.core.skeleton import Skeleton, forward_kinematics
 from hobble.evaluation.captured import Captured
@@ -74,7 +74,7 @@ def judged(network, motion, splits=SPLITS) -> dict[str, Any]:
     return recognition(network, motion, splits, configuration="x", runtime=RUNTIME, people=0.82)
 
 
-def test_two_clouds_are_told_apart_along_the_line_that_parts_them() -> None:
+def test_two_classes_are_separated_along_fishers_direction() -> None:
     """Fisher's direction is the inverse covariance times the difference of the means."""
     rng = np.random.default_rng(3)
     # That of both classes, which count the same however many there are of each.
@@ -94,7 +94,7 @@ def test_two_clouds_are_told_apart_along_the_line_that_parts_them() -> None:
     assert found.names(np.array([[-1.0, 1.0], [2.0, -2.0]])) == ["a", "b"]
 
 
-def test_units_do_not_matter_and_what_never_varies_does_no_harm() -> None:
+def test_neither_the_unit_of_a_feature_nor_a_constant_one_changes_the_names() -> None:
     rng = np.random.default_rng(4)
     values = np.concatenate([rng.normal(0, 1, (40, 3)), rng.normal(1, 1, (40, 3))])
     labels = ["a"] * 40 + ["b"] * 40
@@ -106,7 +106,7 @@ def test_units_do_not_matter_and_what_never_varies_does_no_harm() -> None:
         learn(values, ["a"] * 80)
 
 
-def test_features_see_what_the_figure_does(holden31: Skeleton) -> None:
+def test_features_measure_knee_and_elbow_bend_on_each_side(holden31: Skeleton) -> None:
     contacts, root = np.ones((120, 4)), np.zeros((120, 3))
     well = features(holden31, figure(holden31, 120, 0, 0, 1), contacts, root)
     stiff = features(holden31, figure(holden31, 120, 0.5, 0, 1), contacts, root)
@@ -120,7 +120,7 @@ def test_features_see_what_the_figure_does(holden31: Skeleton) -> None:
     assert well["thigh_left_sd"] == pytest.approx(np.degrees(0.4 / np.sqrt(2)), rel=0.1)
 
 
-def test_captured_motion_names_its_own_kind(hurtable, motion) -> None:
+def test_captured_windows_are_named_after_the_link_that_hurts(hurtable, motion) -> None:
     found = judged(hurtable, motion)
     assert found["applies"]
     assert found["people"] == 0.82
@@ -141,7 +141,7 @@ def test_captured_motion_names_its_own_kind(hurtable, motion) -> None:
     assert judged(hurtable, motion) == found
 
 
-def test_windows_are_of_one_hurt_walking_ahead(hurtable) -> None:
+def test_windows_hold_straight_walking_with_one_injury(hurtable) -> None:
     good = clip(hurtable, "a", KNEE, 5.0, 1, frames=400)
     windows = walking_windows(good, hurtable)
     # Four parts of 100 frames; windows of 60 begin every 15 frames and stay in their part.
@@ -162,24 +162,26 @@ def test_windows_are_of_one_hurt_walking_ahead(hurtable) -> None:
     assert module.WINDOW == 60
 
 
-def test_without_side_a_leg_is_not_told_from_the_other(holden31: Skeleton) -> None:
+def test_without_sides_both_legs_are_one_class(holden31: Skeleton) -> None:
     parts = module.sides_of(holden31)
     assert parts("LeftUpLeg-LeftLeg") == parts("RightUpLeg-RightLeg") == ("thigh",)
     assert parts("RightLeg-RightFoot and LeftForeArm-LeftHand") == ("forearm", "shank")
     assert parts(HEALTHY) == () != parts("LowerBack-Spine")
     hurt = ["LeftLeg-LeftFoot", "LeftLeg-LeftFoot", "RightUpLeg-RightLeg", HEALTHY]
     named = ["RightLeg-RightFoot", "LeftLeg-LeftFoot", "LeftLeg-LeftFoot", HEALTHY]
-    windows = [Window("a", link, 5.0, {}, 0) for link in hurt]
+    windows = [InjuryWindow("a", link, 5.0, {}, 0) for link in hurt]
     found = module._confusion(sorted(set(named)), windows, named, parts)
     assert found["right"] == 0.5
     assert found["right_without_side"] == 0.75
 
 
-def test_what_is_judged_was_not_learnt() -> None:
+def test_cross_validation_never_learns_from_the_windows_it_names() -> None:
     """If windows differ only in their labels, the names are guesses."""
     rng = np.random.default_rng(6)
     windows = [
-        Window("a", f"{n % 2}", 5.0, {f"{d}": float(v) for d, v in enumerate(rng.normal(size=60))}, n // 10)
+        InjuryWindow(
+            "a", f"{n % 2}", 5.0, {f"{d}": float(v) for d, v in enumerate(rng.normal(size=60))}, n // 10
+        )
         for n in range(40)
     ]
     found = module._cross_validated(windows, lambda name: (name,))
@@ -189,7 +191,7 @@ def test_what_is_judged_was_not_learnt() -> None:
     assert leaked == [w.hurt for w in windows]
 
 
-def test_what_cannot_be_tried_says_why(network, hurtable, motion) -> None:
+def test_too_little_data_is_reported_with_its_reason(network, hurtable, motion) -> None:
     assert judged(network, motion)["reason"] == module.REASON
     assert judged(hurtable, motion[:2])["reason"] == module.TOO_FEW
     assert rows(judged(network, motion)) == []

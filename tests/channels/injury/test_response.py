@@ -12,12 +12,12 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.stats import spearmanr
 
+from hobble.channels.injury.crowd_severities import severities
 from hobble.channels.injury.response.cases import divided_severities, into_a_jog, second_injuries
 from hobble.channels.injury.response.run import GAITS, injury_response, largest_accelerations
 from hobble.channels.injury.response.sweep import SEVERITIES, sweeps
-from hobble.channels.injury.walks import severities
 from hobble.evaluation.captured import Captured
-from hobble.evaluation.crowd import SPEEDS, Stretch, run
+from hobble.evaluation.crowd import SPEEDS, CrowdTarget, run
 from hobble.evaluation.pose_distance import mean_cycle, settling
 from hobble.evaluation.spearman import spearman
 from hobble.runtime.options import Runtime
@@ -54,7 +54,7 @@ def response(network, **options: Any) -> dict[str, Any]:
     return injury_response(network, **options)
 
 
-def test_a_network_without_severities(network) -> None:
+def test_a_network_without_the_injury_channel_has_no_response(network) -> None:
     result = response(network)
     assert result == {
         "configuration": "x",
@@ -63,7 +63,7 @@ def test_a_network_without_severities(network) -> None:
     }
 
 
-def test_a_response_that_is_known(hurtable) -> None:
+def test_the_response_of_a_network_with_a_known_slowdown_is_exact(hurtable) -> None:
     """Speed falls by .05 cm a frame and the head by .4 cm for each unit of severity.
 
     Predicted joint velocities stay, so every joint also runs ahead of the slower root: half of the mismatch,
@@ -96,7 +96,7 @@ def test_a_response_that_is_known(hurtable) -> None:
     json.dumps(result, allow_nan=False)
 
 
-def test_a_link_that_is_not_felt_changes_nothing(hurtable) -> None:
+def test_a_link_that_the_network_ignores_changes_nothing(hurtable) -> None:
     result = response(slowing(hurtable), links=["Neck1-Head"], seconds=2.0)
     found = result["responses"][0]
     assert found["from_healthy_cm"] == pytest.approx(0, abs=1e-6)
@@ -123,7 +123,7 @@ def test_every_link_is_swept_and_those_never_hurt_are_marked(hurtable) -> None:
     assert set(result["summary"]) == set(result["summary_untrained"]) == set(GAITS)
 
 
-def test_the_same_numbers_each_time(hurtable) -> None:
+def test_two_measurements_give_the_same_numbers(hurtable) -> None:
     assert response(hurtable, seconds=0.5) == response(hurtable, seconds=0.5)
 
 
@@ -144,7 +144,7 @@ def test_a_second_injury_adds_to_the_first(hurtable) -> None:
     assert deaf[1]["share"] == pytest.approx(1, rel=0.03)
 
 
-def test_an_injury_is_kept_from_walking_into_jogging(hurtable) -> None:
+def test_an_injury_lasts_from_a_walk_into_a_jog(hurtable) -> None:
     found = into_a_jog(slowing(hurtable), [KNEE, "Neck1-Head"], 2.0, RUNTIME)
     rows = {(r["link"], r["severity"]): r for r in found}
     assert list(rows) == [(None, 0.0), (KNEE, 5.0), (KNEE, 10.0), ("Neck1-Head", 5.0), ("Neck1-Head", 10.0)]
@@ -154,7 +154,7 @@ def test_an_injury_is_kept_from_walking_into_jogging(hurtable) -> None:
     assert rows[None, 0.0]["jog_from_healthy_cm"] == 0
 
 
-def test_each_gait_is_held_against_its_own_healthy_one(hurtable) -> None:
+def test_each_gait_is_compared_with_the_healthy_figure_of_the_same_gait(hurtable) -> None:
     """The network's jog differs from its walk."""
     healthy, *hurt = into_a_jog(hurtable, [KNEE], 1.0, RUNTIME)
     assert healthy["walk_from_healthy_cm"] == healthy["jog_from_healthy_cm"] == 0
@@ -179,7 +179,7 @@ def test_falling_severity_is_measured_on_its_own(hurtable) -> None:
     assert found["after_healing_cm"] == pytest.approx(rows[20]["from_healthy"] - rows[0]["from_healthy"])
 
 
-def test_divided_severities_are_smaller_ones(hurtable) -> None:
+def test_a_divided_severity_has_the_effect_of_the_quotient(hurtable) -> None:
     found = divided_severities(slowing(hurtable), [KNEE], 2.0, RUNTIME)
     away = {(r["scale"], r["severity"]): r["from_healthy_cm"] for r in found}
     assert {scale for scale, _ in away} == {1, 2, 5}
@@ -188,13 +188,13 @@ def test_divided_severities_are_smaller_ones(hurtable) -> None:
     assert away[5, 10] == pytest.approx(0.2 * away[1, 10], rel=0.03)
 
 
-def test_figures_of_a_crowd_do_not_mind_each_other(hurtable) -> None:
+def test_a_figure_of_a_crowd_walks_as_it_does_alone(hurtable) -> None:
     """A character walks in a crowd as it does alone."""
     hurt = severities(hurtable, [{}, {KNEE: 4.0}, {KNEE: 10.0}])
-    together = run(hurtable, [Stretch(30, ["walk", "jog", "walk"], hurt)], RUNTIME)
+    together = run(hurtable, [CrowdTarget(30, ["walk", "jog", "walk"], hurt)], RUNTIME)
     for figure, gait in enumerate(("walk", "jog", "walk")):
         own = {name: each[figure : figure + 1] for name, each in hurt.items()}
-        alone = run(hurtable, [Stretch(30, [gait], own)], RUNTIME)
+        alone = run(hurtable, [CrowdTarget(30, [gait], own)], RUNTIME)
         np.testing.assert_allclose(together.local[:, figure], alone.local[:, 0], atol=2e-3)
         np.testing.assert_allclose(together.root[:, figure], alone.root[:, 0], atol=2e-3)
     assert SPEEDS["jog"] > SPEEDS["walk"]
@@ -202,7 +202,7 @@ def test_figures_of_a_crowd_do_not_mind_each_other(hurtable) -> None:
 
 def test_whole_cycles_are_measured(hurtable) -> None:
     unhurt = severities(hurtable, [{}])
-    walks = run(hurtable, [Stretch(n, ["walk"], unhurt) for n in (20, 400, 10)], RUNTIME)
+    walks = run(hurtable, [CrowdTarget(n, ["walk"], unhurt) for n in (20, 400, 10)], RUNTIME)
     phase = np.zeros((430, 1))
     phase[:, 0] = np.mod(0.013 * np.arange(430), 1)
     known = replace(walks, phase=phase)
@@ -248,7 +248,7 @@ def test_largest_accelerations_are_of_the_gait_and_the_hurt_link(hurtable) -> No
     assert of["jog", "Neck1-Head"] == (6.0, "gait")
 
 
-def test_settling_of_an_exponential() -> None:
+def test_the_settling_time_of_an_exponential_is_exact() -> None:
     distance = 5 * (1 - np.exp(-np.arange(600) / 60))
     # A mean over w frames lags by half of them; within a tenth after ln 10 seconds.
     assert settling(distance, 0.0, 1) == pytest.approx(np.log(10), abs=0.05)
@@ -256,7 +256,7 @@ def test_settling_of_an_exponential() -> None:
     assert settling(0 * distance, 0.05, 30) is None
 
 
-def test_a_cycle_bridges_what_was_not_seen() -> None:
+def test_a_mean_cycle_fills_phases_without_frames() -> None:
     phase = np.array([0.0, 0.5, 0.98])
     local = np.arange(3.0)[:, None, None] * np.ones((3, 2, 3))
     cycle = mean_cycle(local, phase)[:, 0, 0]
@@ -266,7 +266,7 @@ def test_a_cycle_bridges_what_was_not_seen() -> None:
     assert cycle[1] == 0
 
 
-def test_gaits_side_by_side_give_the_rows_of_each_alone(hurtable) -> None:
+def test_gaits_measured_together_give_the_rows_of_each_alone(hurtable) -> None:
     links = [KNEE, "Neck1-Head"]
     together = list(sweeps(hurtable, links, GAITS, 0.2, RUNTIME))
     assert [sweep.gait for sweep in together] == list(GAITS)
@@ -278,7 +278,7 @@ def test_gaits_side_by_side_give_the_rows_of_each_alone(hurtable) -> None:
             assert sweep.response(figure, rows) == alone.response(figure, rows)
 
 
-def test_all_walk_healthy_before_the_onset(hurtable) -> None:
+def test_no_figure_is_hurt_before_the_onset(hurtable) -> None:
     links = [KNEE, "Neck1-Head", "LowerBack-Spine"]
     (sweep,) = sweeps(hurtable, links, ["walk"], 0.5, RUNTIME)
     for walks in (sweep.walks, sweep.at_once):
@@ -290,7 +290,7 @@ def test_all_walk_healthy_before_the_onset(hurtable) -> None:
 
 @given(st.lists(st.one_of(st.none(), st.integers(-3, 3).map(float)), min_size=11, max_size=11))
 @settings(max_examples=40, deadline=None)
-def test_spearman_is_scipys(values: list[float | None]) -> None:
+def test_the_rank_correlation_equals_scipys(values: list[float | None]) -> None:
     known = [i for i, v in enumerate(values) if v is not None]
     found = spearman(SEVERITIES, values)
     if len(known) < 3 or len({values[i] for i in known}) < 2:

@@ -11,8 +11,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from hobble.channels import Source
-from hobble.channels.files import load_values, save_values, write_report
+from hobble.channels import ClipSource
+from hobble.channels.clip_values import load_values, save_values, write_report
 from hobble.channels.injury.channel import CHANNEL
 from hobble.channels.injury.severity import (
     clip_severity,
@@ -21,7 +21,7 @@ from hobble.channels.injury.severity import (
     severity_matrix,
     source_rows,
 )
-from hobble.channels.injury.status import Spell, Status, read_status
+from hobble.channels.injury.status import InjurySpell, Status, read_status
 from hobble.core.clip import Clip
 from hobble.core.errors import InputError
 from hobble.core.skeleton import Skeleton
@@ -46,25 +46,25 @@ def column(holden31: Skeleton, link: str) -> int:
 
 
 def test_ranges_are_one_based_and_inclusive():
-    out = severity_matrix(Status(10, (Spell(3, 5, ((THIGH, 7.0),)),)), (ARM, THIGH))
+    out = severity_matrix(Status(10, (InjurySpell(3, 5, ((THIGH, 7.0),)),)), (ARM, THIGH))
     assert out[:, 0].tolist() == [0] * 10
     assert out[:, 1].tolist() == [0, 0, 7, 7, 7, 0, 0, 0, 0, 0]
 
 
-def test_the_later_line_counts_from_its_first_frame_on_for_its_links_alone():
-    first = Spell(1, 8, ((THIGH, 3.0), (ARM, 2.0)), 2)
-    later = Spell(5, 9, ((THIGH, 9.0),), 3)
+def test_a_later_line_replaces_an_earlier_one_in_its_frames_and_links():
+    first = InjurySpell(1, 8, ((THIGH, 3.0), (ARM, 2.0)), 2)
+    later = InjurySpell(5, 9, ((THIGH, 9.0),), 3)
     out = severity_matrix(Status(10, (first, later)), (THIGH, ARM))
     assert out[:, 0].tolist() == [3, 3, 3, 3, 9, 9, 9, 9, 9, 0]
     assert out[:, 1].tolist() == [2] * 8 + [0, 0]
 
 
-def test_odd_ranges_are_told_with_their_lines():
+def test_odd_frame_ranges_are_reported_with_their_lines():
     spells = (
-        Spell(0, 12, ((THIGH, 3.0),), 2),
-        Spell(5, 6, ((THIGH, 4.0), (ARM, 1.0)), 3),
-        Spell(11, 14, ((ARM, 4.0),), 4),
-        Spell(1, 10, ((ARM, 1.0),), 5),
+        InjurySpell(0, 12, ((THIGH, 3.0),), 2),
+        InjurySpell(5, 6, ((THIGH, 4.0), (ARM, 1.0)), 3),
+        InjurySpell(11, 14, ((ARM, 4.0),), 4),
+        InjurySpell(1, 10, ((ARM, 1.0),), 5),
     )
     said = odd_ranges(Status(10, spells), "walk_injuries.txt")
     assert [s.split(": ")[0] for s in said] == [
@@ -94,7 +94,7 @@ def test_odd_ranges_are_told_with_their_lines():
         (24.0, 0, [0, 0, 0, 1]),
     ],
 )
-def test_each_frame_has_the_source_frame_that_shows_then(fps, start, expected):
+def test_each_frame_maps_to_the_source_frame_of_the_same_time(fps, start, expected):
     assert source_rows(4, 100, motion(100, fps, start)).tolist() == expected
 
 
@@ -106,7 +106,7 @@ def test_after_ten_minutes_each_frame_still_has_the_source_frame_of_its_moment(f
     np.testing.assert_array_equal(rows, np.floor(times + 1e-6))
 
 
-def test_source_rows_stay_in_the_file():
+def test_source_rows_never_lie_past_the_end_of_the_file():
     assert source_rows(5, 4, motion(4, 60.0)).tolist() == [0, 1, 2, 3, 3]
 
 
@@ -133,7 +133,7 @@ def test_one_frame_more_or_less_is_a_warning_and_two_are_refused(clip, tmp_path)
         clip_severity(clip, path, None, motion())
 
 
-def test_the_status_of_a_data_set_holds_all_the_while(clip):
+def test_a_status_in_the_data_set_holds_in_all_frames(clip):
     severity, _ = clip_severity(clip, None, f"{THIGH}[4];{ARM}[8.5]", motion())
     assert (severity[:, column(clip.skeleton, THIGH)] == 4).all()
     assert (severity[:, column(clip.skeleton, ARM)] == 8.5).all()
@@ -145,19 +145,19 @@ def test_a_wrong_status_of_a_data_set_names_the_clip(clip):
         clip_severity(clip, None, "LeftUpLeg-LeftArm[4]", motion())
 
 
-def test_on_a_skeleton_without_links_a_clip_is_hurt_and_has_no_column(clip):
+def test_on_a_skeleton_without_links_a_hurt_clip_has_no_columns(clip):
     """A data set on a skeleton without links may list hurt clips. Its networks are not trained on them."""
     figure = replace(clip, skeleton=replace(clip.skeleton, links=()))
     severity, warnings = clip_severity(figure, None, f"{THIGH}[4]", motion())
     assert (severity.shape, warnings) == ((300, 0), [])
-    said = Source("walk", {}, f"{THIGH}[4]")
+    said = ClipSource("walk", {}, f"{THIGH}[4]")
     CHANNEL.check(said, figure.skeleton)
     assert not CHANNEL.is_neutral(said)
     with pytest.raises(InputError, match="no such link"):
-        CHANNEL.check(Source("walk", {}, "Thigh[4]"), clip.skeleton)
+        CHANNEL.check(ClipSource("walk", {}, "Thigh[4]"), clip.skeleton)
 
 
-def test_a_healthy_clip_is_all_zero(clip):
+def test_the_severities_of_a_healthy_clip_are_0(clip):
     severity, warnings = clip_severity(clip, None, None, motion())
     assert severity.shape == (300, 30)
     assert not severity.any()
@@ -182,7 +182,7 @@ def test_mirroring_twice_gives_the_same_back(holden31, link, value):
     assert (once[:, holden31.link_names.index(other)] == np.float32(value)).all()
 
 
-def test_files_keep_columns_and_report_says_what_hurts(clip, tmp_path):
+def test_saved_values_keep_their_columns_and_the_report_lists_the_injuries(clip, tmp_path):
     severity, _ = clip_severity(clip, None, f"{THIGH}[4]", motion())
     severity[:60] = 0
     severity[90:120] = severity[90:120] / 2
@@ -201,13 +201,13 @@ def test_files_keep_columns_and_report_says_what_hurts(clip, tmp_path):
 
 @pytest.mark.shared
 @pytest.mark.parametrize("name", ["Run_LLL", "Walk_LLL", "Walk_RUL"])
-def test_the_matrices_of_ferre_come_out_as_his(shared: Path, holden31, name):
+def test_severities_equal_the_published_matrices_of_ferre(shared: Path, holden31, name):
     stem = shared / "mocap/ferre" / f"Injured_{name}_extended_converted_injuries"
     status = read_status(stem.with_suffix(".txt"), holden31.link_names)
     assert (severity_matrix(status, holden31.link_names) == np.loadtxt(stem)).all()
     assert len(odd_ranges(status, stem)) == 1
 
 
-def test_source_rows_of_a_loop_begin_anew_with_each_cycle():
+def test_source_rows_of_a_looped_clip_start_over_with_each_cycle():
     looped = motion(3, 60.0) | {"loops": 2, "cycle_frames": 3}
     assert source_rows(6, 3, looped).tolist() == [0, 1, 2, 0, 1, 2]

@@ -8,7 +8,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from hobble.channels.injury.status import Spell, Status, format_status, read_status, write_status
+from hobble.channels.injury.status import InjurySpell, Status, format_status, read_status, write_status
 from hobble.core.errors import InputError
 
 LINKS = ("Hips-LHipJoint", "LeftUpLeg-LeftLeg", "RightUpLeg-RightLeg", "LeftShoulder-LeftArm")
@@ -24,14 +24,14 @@ def status_file(tmp_path: Path):
     return write
 
 
-def test_reads_what_the_facts_page_shows(status_file):
+def test_the_documented_example_is_read(status_file):
     path = status_file(
         "frames:2500\n1-225 RightUpLeg-RightLeg[10];\n"
         "500-2000 LeftShoulder-LeftArm[5];LeftUpLeg-LeftLeg[10];\n"
     )
     status = read_status(path, LINKS)
     assert status.frames == 2500
-    assert status.spells[0] == Spell(1, 225, (("RightUpLeg-RightLeg", 10.0),), 2)
+    assert status.spells[0] == InjurySpell(1, 225, (("RightUpLeg-RightLeg", 10.0),), 2)
     assert status.spells[1].links == (("LeftShoulder-LeftArm", 5.0), ("LeftUpLeg-LeftLeg", 10.0))
     assert status.spells[1].line == 3
 
@@ -43,7 +43,7 @@ def test_reads_what_the_facts_page_shows(status_file):
         "FRAMES:10\n1-5 LeftUpLeg-LeftLeg[2.5]",
     ],
 )
-def test_forgives_what_editors_and_people_add(status_file, text):
+def test_extra_spaces_case_and_line_ends_are_accepted(status_file, text):
     assert read_status(status_file(text), LINKS).spells[0].links == (("LeftUpLeg-LeftLeg", 2.5),)
 
 
@@ -66,7 +66,7 @@ def test_forgives_what_editors_and_people_add(status_file, text):
         ("frames:10\n1-x LeftUpLeg-LeftLeg[3];\n", 2, "does not read as"),
     ],
 )
-def test_refuses_with_file_and_line(status_file, text, line, word):
+def test_a_malformed_status_file_is_refused_with_its_line(status_file, text, line, word):
     path = status_file(text)
     with pytest.raises(InputError) as caught:
         read_status(path, LINKS)
@@ -90,7 +90,7 @@ def test_a_binary_and_a_missing_file_are_refused(tmp_path):
 
 severities = st.integers(0, 100).map(lambda n: n / 10)
 spells = st.builds(
-    lambda first, length, links: Spell(first, first + length, tuple(links.items())),
+    lambda first, length, links: InjurySpell(first, first + length, tuple(links.items())),
     st.integers(0, 500),
     st.integers(0, 500),
     st.dictionaries(st.sampled_from(LINKS), severities, min_size=1),
@@ -99,7 +99,7 @@ spells = st.builds(
 
 @given(st.builds(Status, st.integers(1, 1000), st.lists(spells, max_size=4).map(tuple)))
 @settings(max_examples=40, deadline=None)
-def test_writing_and_reading_lose_nothing(tmp_path_factory, status):
+def test_a_written_status_reads_back_unchanged(tmp_path_factory, status):
     path = tmp_path_factory.mktemp("status") / "clip_injuries.txt"
     write_status(path, status)
     assert path.read_text() == format_status(status)

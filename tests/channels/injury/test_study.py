@@ -11,9 +11,9 @@ from typing import Any
 
 import pytest
 
-from hobble.channels.injury.study.answers import Answer, Study, read_answers, read_study
-from hobble.channels.injury.study.films import FILMS, FPS, GAIT, ONE, PARTS, SEVERAL, wish
-from hobble.channels.injury.study.tables import NUMERALS, tables
+from hobble.channels.injury.study.answer_tables import NUMERALS, tables
+from hobble.channels.injury.study.answers import FilmAnswer, Study, read_answers, read_study
+from hobble.channels.injury.study.films import FILMS, FPS, GAIT, ONE, PARTS, SEVERAL, hurts_and_gait
 from hobble.cli.__main__ import main
 from hobble.core.errors import InputError
 
@@ -41,7 +41,7 @@ def write(folder: Path, name: str, says: Callable[[Any], tuple[list[str], int]],
     return path
 
 
-def test_the_thirteen_are_those_of_the_study() -> None:
+def test_the_thirteen_films_have_the_kinds_of_the_study() -> None:
     assert Counter(film.kind for film in FILMS) == {ONE: 4, SEVERAL: 5, GAIT: 4}
     assert [film.number for film in FILMS] == list(range(1, 14))
     assert len({(film.parts, film.gaits) for film in FILMS}) == 13
@@ -54,12 +54,12 @@ def test_the_thirteen_are_those_of_the_study() -> None:
 
 
 @pytest.mark.parametrize("film", FILMS)
-def test_each_begins_healthy_hurts_and_changes_its_gait_while_it_hurts(film) -> None:
-    told = [wish(film, f) for f in range(round(film.seconds * FPS))]
-    hurts = [hurt for hurt, _ in told]
+def test_each_film_starts_healthy_and_changes_gait_only_while_hurt(film) -> None:
+    states = [hurts_and_gait(film, f) for f in range(round(film.seconds * FPS))]
+    hurts = [hurt for hurt, _ in states]
     assert hurts.index(True) == 3 * FPS
     assert all(hurts[3 * FPS :])
-    gaits = [gait for _, gait in told]
+    gaits = [gait for _, gait in states]
     assert (gaits[0], gaits[-1]) == film.gaits
     assert len(set(gaits[: 5 * FPS])) == 1, "two seconds hurt before the gait changes"
 
@@ -77,7 +77,7 @@ def back(film) -> tuple[list[str], int]:
     return ["lower back"], 1
 
 
-def test_tables_of_people_whose_answers_are_known(folder: Path, study: Study) -> None:
+def test_known_answers_give_known_tables(folder: Path, study: Study) -> None:
     """Of three people one names all parts, one confuses the sides, and one always says the back."""
     people = [read_answers(write(folder, says.__name__, says), study) for says in (right, mirrored, back)]
     made = tables(study, people)
@@ -106,12 +106,12 @@ def test_tables_of_people_whose_answers_are_known(folder: Path, study: Study) ->
     assert everything["fluid_sd"] == pytest.approx((4 * 26 / 38) ** 0.5, abs=1e-5)
 
 
-def test_a_part_of_the_parts_is_seen_in_part(study: Study) -> None:
+def test_naming_one_of_three_hurt_parts_counts_a_third(study: Study) -> None:
     """In film 9 three parts hurt, and one of two people ticks one of them. In film 1 both tick one part too
     many.
     """
-    first = [Answer(f.number, f.parts[:1] if f.number == 9 else f.parts, 4) for f in FILMS]
-    second = [Answer(f.number, () if f.number == 9 else f.parts, 2) for f in FILMS]
+    first = [FilmAnswer(f.number, f.parts[:1] if f.number == 9 else f.parts, 4) for f in FILMS]
+    second = [FilmAnswer(f.number, () if f.number == 9 else f.parts, 2) for f in FILMS]
     rows = {row["film"]: row for row in tables(study, [first, second])["XVI"][:13]}
     assert rows["9"]["seen"] == pytest.approx(1 / 6, abs=1e-5)
     assert rows["9"]["exact"] == 0
@@ -152,7 +152,7 @@ def test_the_command_writes_fourteen_tables(folder: Path, capsys: pytest.Capture
         (lambda d: [d], "is not an object of keys"),
     ],
 )
-def test_a_file_that_cannot_be_counted_says_where_it_is_wrong(
+def test_a_malformed_file_of_answers_is_refused_with_its_place(
     folder: Path, study: Study, change: Callable[[Any], Any], message: str
 ) -> None:
     path = write(folder, "someone", right)

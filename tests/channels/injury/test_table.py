@@ -28,7 +28,7 @@ def table(folder: Path, text: str) -> Path:
     return path
 
 
-def test_writes_a_file_beside_each_clip_it_names(folder):
+def test_a_status_file_is_written_beside_each_clip_of_the_table(folder):
     rows = (
         "walk,LeftUpLeg-LeftLeg,7,,\nwalk, LowerBack-Spine ,3,,\n"
         "walk,LowerBack-Spine,4.5,400,\nrun,LowerBack-Spine,2,5,50\n"
@@ -55,21 +55,21 @@ def test_writes_a_file_beside_each_clip_it_names(folder):
         ("walk,LowerBack-Spine,3,1,2,3\n", "5 values"),
     ],
 )
-def test_refuses_a_row_with_its_line_and_writes_nothing(folder, row, word):
+def test_a_bad_row_is_refused_with_its_line_and_nothing_is_written(folder, row, word):
     with pytest.raises(InputError, match=word) as caught:
         write_statuses(table(folder, "run,LowerBack-Spine,1,,\n" + row), folder, LINKS)
     assert caught.value.line == 3
     assert not list(folder.glob("*_injuries.txt"))
 
 
-def test_refuses_other_columns(tmp_path):
+def test_a_table_with_other_columns_is_refused(tmp_path):
     (tmp_path / "table.csv").write_text("clip,link\nwalk,LowerBack-Spine\n")
     with pytest.raises(InputError, match="line 1: has columns clip, link, not"):
         read_table(tmp_path / "table.csv", LINKS)
 
 
 @pytest.mark.parametrize("end", ["\n", "\r\n", "\r"])
-def test_lines_end_as_on_any_machine(folder, end):
+def test_line_numbers_are_right_with_any_line_ending(folder, end):
     path = folder / "table.csv"
     path.write_bytes(
         (HEADER + "walk,LowerBack-Spine,3,2,4\nrun,LowerBack-Spine,1,,\n").replace("\n", end).encode()
@@ -81,7 +81,7 @@ def test_lines_end_as_on_any_machine(folder, end):
     ("text", "line"),
     [("walk,LowerBack-Spine,3,,\n" + "x" * 200_000 + ",,,,\n", 3), ('walk,"' + "x\n" * 99_999, None)],
 )
-def test_what_is_no_csv_is_refused_in_one_message(folder, root, capsys, text, line):
+def test_a_file_that_is_not_csv_is_refused_with_one_message(folder, root, capsys, text, line):
     with pytest.raises(InputError, match=r"not CSV: field larger.*Look for a quotation mark") as caught:
         read_table(table(folder, text), LINKS)
     assert caught.value.line == line or line is None
@@ -99,7 +99,7 @@ def test_what_is_no_csv_is_refused_in_one_message(folder, root, capsys, text, li
     assert len(capsys.readouterr().err) < 300 + len(str(folder))
 
 
-def test_statuses_need_no_files(folder):
+def test_statuses_are_made_from_rows_without_reading_clips(folder):
     rows = read_table(table(folder, "walk,LowerBack-Spine,3,2,4\n"), LINKS)
     assert statuses(rows, {"walk": 10})["walk"].spells[0].links == (("LowerBack-Spine", 3.0),)
 
@@ -118,7 +118,7 @@ def test_clips_in_subfolders_and_in_capitals_are_found(folder):
     assert path.is_file()
 
 
-def test_the_command_line(folder, root, capsys):
+def test_the_command_writes_status_files_and_reports_an_unknown_link(folder, root, capsys):
     skeleton = str(root / "config/skeletons/holden31.yaml")
     path = table(folder, "walk,RightFoot-RightToeBase,5,,\n")
     assert main([str(path), str(folder), "--skeleton", skeleton]) == 0

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 from pydantic import ValidationError
 
-from hobble.channels import Source, channel
-from hobble.channels.files import clip_values
+from hobble.channels import ClipSource, channel
+from hobble.channels.clip_values import clip_values
 from hobble.channels.mood import CHANNEL
 from hobble.core.clip import Clip
 from hobble.core.errors import InputError
@@ -16,8 +16,8 @@ from hobble.core.skeleton import Skeleton
 PATTERNS = {"patterns": {"*_sad_*": {"sad": 1.0}, "*_tired_*": {"tired": 0.5, "old": 0.25}, "*_normal_*": {}}}
 
 
-def source(clip: str, value: object = None) -> Source:
-    return Source(clip, value=value, options=CHANNEL.options_of(PATTERNS))
+def source(clip: str, value: object = None) -> ClipSource:
+    return ClipSource(clip, value=value, options=CHANNEL.options_of(PATTERNS))
 
 
 @pytest.fixture
@@ -35,26 +35,26 @@ def clip(holden31: Skeleton) -> Clip:
         ("walk_sad_1", {"angry": 0.75}, [0, 0, 0, 0, 0.75]),
     ],
 )
-def test_a_clip_is_in_the_same_mood_all_through(clip: Clip, name: str, value: object, expected: list) -> None:
+def test_a_mood_holds_in_every_frame_of_a_clip(clip: Clip, name: str, value: object, expected: list) -> None:
     values, warnings = clip_values("mood", clip, source(name, value), {})
     np.testing.assert_array_equal(values, np.tile(np.float32(expected), (7, 1)))
     assert warnings == []
     assert channel("mood").is_neutral(source(name, value)) is not any(expected)
 
 
-def test_a_name_that_no_pattern_fits_is_told(clip: Clip) -> None:
+def test_a_clip_that_fits_no_pattern_gets_a_warning_and_is_neutral(clip: Clip) -> None:
     values, warnings = clip_values("mood", clip, source("jump"), {})
     assert not values.any()
     assert warnings == ["no pattern of channels.mood fits jump; it counts as neutral."]
 
 
 @pytest.mark.parametrize("value", ["sad", {"glad": 1}, {"sad": 2}, {"sad": "much"}])
-def test_an_entry_that_is_no_mood_is_refused(holden31: Skeleton, value: object) -> None:
+def test_an_unknown_mood_in_a_clip_entry_is_refused(holden31: Skeleton, value: object) -> None:
     with pytest.raises(InputError, match=r"walk\.channels\.mood: cannot be .*sad"):
         channel("mood").check(source("walk", value), holden31)
 
 
-def test_a_misspelt_option_does_not_reach_a_clip() -> None:
+def test_a_misspelt_option_of_the_mood_channel_is_refused() -> None:
     with pytest.raises(ValidationError, match="pattern"):
         CHANNEL.source({"clip": "walk_tired_1", "options": {"pattern": {"*": {"sad": 1}}}})
     with pytest.raises(ValidationError, match="bored"):

@@ -9,7 +9,7 @@ from hobble.models.mann.forward import GATE_INPUTS, gate_columns, softmax
 from hobble.rows.layout import GAITS, RowLayout
 
 
-def test_the_gate_sees_feet_gait_and_the_wished_velocity(holden31: Skeleton) -> None:
+def test_the_gate_reads_feet_gait_and_target_velocity(holden31: Skeleton) -> None:
     """The columns are found by writing a number where each of them should be."""
     layout = RowLayout(len(holden31.joints), channels=(("injury", 30),))
     x = np.zeros(layout.x_size)

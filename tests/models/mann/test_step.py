@@ -5,13 +5,13 @@ from __future__ import annotations
 import pytest
 import torch
 
-from hobble.models.mann.fused import FusedStep
-from hobble.models.mann.step import Step
+from hobble.models.mann.fused import FusedMannStep
+from hobble.models.mann.step import MannStep
 from hobble.models.mann.trainable import TrainableMann, initialise
 
 from .definition import output
 
-STEPS = [Step, FusedStep]
+STEPS = [MannStep, FusedMannStep]
 # Sizes of an expert, of the gate, the columns that it sees, rows.
 SHAPES = [
     ((6, 5, 4), (3, 4, 2), (5, 0, 2), 1),
@@ -49,9 +49,9 @@ def test_loss_and_gradient_are_those_of_the_definition(kind, sizes, gate, column
         assert torch.allclose(gradient.view(layer.shape), layer.grad, rtol=1e-9, atol=1e-13)
 
 
-def test_without_dropout_the_step_goes_through_the_network() -> None:
+def test_without_dropout_the_error_is_that_of_the_network() -> None:
     network, x, y, p = problem(*SHAPES[1])
-    step = FusedStep(network, 0.0)
+    step = FusedMannStep(network, 0.0)
     step(x.clone(), y, p, step.masks(len(x)))
     assert torch.allclose(step.error, network(x, p) - y, rtol=1e-10, atol=1e-12)
 
@@ -59,7 +59,7 @@ def test_without_dropout_the_step_goes_through_the_network() -> None:
 @pytest.mark.parametrize("kind", STEPS)
 def test_bfloat16_factors_give_the_gradient_to_their_precision(kind) -> None:
     network, x, y, p = problem((30, 24, 24, 20), (6, 8, 8, 8), tuple(range(6)), 40, torch.float32, 0.1)
-    half, whole = kind(network, 0.3, half=True), Step(network, 0.3)
+    half, whole = kind(network, 0.3, half=True), MannStep(network, 0.3)
     masks = [mask.clone() for mask in half.masks(len(x))]
     loss, exact = half(x.clone(), y, p, masks), whole(x.clone(), y, p, masks)
     assert float(loss) == pytest.approx(float(exact), rel=1e-2)
@@ -70,7 +70,7 @@ def test_bfloat16_factors_give_the_gradient_to_their_precision(kind) -> None:
 
 def test_batches_of_other_sizes_share_the_buffers() -> None:
     network, x, y, p = problem(*SHAPES[1])
-    step, plain = FusedStep(network, 0.0), Step(network, 0.0)
+    step, plain = FusedMannStep(network, 0.0), MannStep(network, 0.0)
     for rows in (33, 7, 33, 1):
         masks = step.masks(rows)
         step(x[:rows].clone(), y[:rows], p[:rows], masks)
@@ -79,7 +79,7 @@ def test_batches_of_other_sizes_share_the_buffers() -> None:
             assert torch.allclose(one, other, rtol=1e-9, atol=1e-13)
 
 
-def test_a_fresh_network_fills_its_bounds_and_blends_its_experts_alike() -> None:
+def test_initial_weights_fill_their_bounds_and_experts_have_equal_shares() -> None:
     network: TrainableMann = initialise((40, 30, 20), (5, 8, 4), (0, 1, 2, 3, 4), 1)
     for layer, (a, b) in zip(network.layers, ((5, 8), (8, 4), (40, 30), (30, 20)), strict=True):
         bound = (6 / (a * b)) ** 0.5

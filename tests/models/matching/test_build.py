@@ -12,8 +12,8 @@ from hobble.core.errors import InputError
 from hobble.core.skeleton import Skeleton
 from hobble.models import model
 from hobble.models.matching.build import in_runs, on_mean_ground
-from hobble.models.matching.features import groups
 from hobble.models.matching.options import MatchingOptions
+from hobble.models.matching.search_features import groups
 from hobble.rows.clip_rows import pairs, save_clip_rows
 from hobble.rows.layout import RowLayout
 
@@ -36,7 +36,7 @@ def test_a_gap_between_cycles_ends_a_run(holden31: Skeleton) -> None:
     np.testing.assert_array_equal(remaining, [*range(CUT, -1, -1), *range(len(rows) - CUT - 2, -1, -1)])
 
 
-def test_a_clip_without_rows_gives_none(holden31: Skeleton) -> None:
+def test_a_clip_without_rows_gives_no_frames(holden31: Skeleton) -> None:
     rows = clip(holden31, 0)
     cut = {n: getattr(rows, n)[:0] for n in ("x", "y", "p", "frame", "cycle", "fits", "heights", "mean")}
     rows = replace(rows, **cut, channels={"injury": rows.channels["injury"][:0]})
@@ -63,7 +63,7 @@ def test_tables_hold_the_clips_in_order(holden31: Skeleton, tmp_path: Path) -> N
     assert set(network.starts) == {*range(1, FRAMES[0] - 20), *range(FRAMES[0] + 1, sum(FRAMES) - 20)}
 
 
-def test_the_features_are_the_columns_of_their_names(holden31: Skeleton) -> None:
+def test_features_are_the_columns_that_their_names_say(holden31: Skeleton) -> None:
     layout, options = layout_of(holden31), MatchingOptions()
     found = {name: columns for name, columns, _ in groups(layout, holden31, options)}
     # A third, two thirds and the whole of the window ahead: frames 20, 40 and the last sample, 50.

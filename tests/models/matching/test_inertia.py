@@ -48,12 +48,12 @@ def played(frames: np.ndarray, rows: list[int]) -> np.ndarray:
     return np.array(shown)
 
 
-def test_a_run_is_shown_as_it_is() -> None:
+def test_without_a_transition_the_frames_are_played_unchanged() -> None:
     frames = two_runs(np.random.default_rng(1))
     np.testing.assert_allclose(played(frames, list(range(5, 50))), frames[5:50], atol=1e-6)
 
 
-def test_a_transition_goes_on_without_a_step_and_ends_in_the_new_run() -> None:
+def test_a_transition_is_continuous_and_ends_in_the_new_run() -> None:
     frames = two_runs(np.random.default_rng(2))
     shown = played(frames, [*range(1, 20), *range(70, 115)])
     position, velocity = shown[:, : 3 * J], shown[:, 3 * J : 6 * J]
@@ -63,7 +63,7 @@ def test_a_transition_goes_on_without_a_step_and_ends_in_the_new_run() -> None:
     np.testing.assert_allclose(shown[-1], frames[114], atol=0.02)
 
 
-def test_the_step_halves_in_a_halflife_once_the_spring_is_let_go() -> None:
+def test_an_offset_decays_like_a_critically_damped_spring() -> None:
     """x = (x0 + (v0 + d x0) t) e^(-d t), with d = 2 ln 2 / halflife."""
     frames = two_runs(np.random.default_rng(3))
     shown = played(frames, [*range(1, 20), *range(70, 100)])
@@ -89,7 +89,7 @@ def test_rotations_go_the_shorter_way_and_keep_turning() -> None:
     )
 
 
-def test_transitions_on_transitions_add_up() -> None:
+def test_offsets_of_overlapping_transitions_add_up() -> None:
     frames = two_runs(np.random.default_rng(5))
     there_and_back = played(frames, [*range(1, 20), 70, *range(21, 30)])
     assert np.abs(there_and_back[20:24, : 3 * J] - frames[21:25, : 3 * J]).max() > 0.01
@@ -98,7 +98,7 @@ def test_transitions_on_transitions_add_up() -> None:
 
 
 @pytest.mark.parametrize("off", [0.3, -0.3])
-def test_the_phase_is_pulled_to_that_of_the_clips(off: float) -> None:
+def test_the_phase_moves_to_that_of_the_clips(off: float) -> None:
     frames = two_runs(np.random.default_rng(6))
     memory, phases = np.zeros((1, memory_size(J))), (0.02 * np.arange(120) % 1).astype(np.float32)
     phase = np.array([off % 1.0])

@@ -39,7 +39,7 @@ def x_of(network: Matching, row: int) -> np.ndarray:
     return x[None].astype(np.float32)
 
 
-def test_a_frame_of_the_clips_finds_itself(made: Made) -> None:
+def test_a_query_from_a_frame_of_the_clips_finds_that_frame(made: Made) -> None:
     _, _, network = made
     rows = network.starts[::7]
     x = np.concatenate([x_of(network, row) for row in rows])
@@ -126,7 +126,7 @@ def test_a_crowd_equals_single_characters(made: Made) -> None:
             np.testing.assert_array_equal(y[c], expected[0])
 
 
-def test_integers_halve_the_frames_and_are_near(made: Made) -> None:
+def test_int16_storage_hardly_changes_the_prediction(made: Made) -> None:
     _, _, network = made
     x, _ = sequence(network)
     exact, near = (
@@ -138,7 +138,7 @@ def test_integers_halve_the_frames_and_are_near(made: Made) -> None:
         network.predictor(storage="float8")
 
 
-def test_the_page_finds_the_same_frames_as_python(made: Made, tmp_path: Path) -> None:
+def test_javascript_finds_the_same_frames_as_python(made: Made, tmp_path: Path) -> None:
     """Over searches and transitions. The page lacks the first input, which has no weight, and some
     outputs.
     """
@@ -158,7 +158,9 @@ def test_the_page_finds_the_same_frames_as_python(made: Made, tmp_path: Path) ->
         "yMean": packed(network.y_mean[rows]),
         "yStd": packed(network.y_std[rows]),
     }
-    (tmp_path / "asked.json").write_text(json.dumps({"spec": spec, "x": x.tolist(), "phase": phase.tolist()}))
+    (tmp_path / "inputs.json").write_text(
+        json.dumps({"spec": spec, "x": x.tolist(), "phase": phase.tolist()})
+    )
     script = Path(__file__).parents[3] / "src/hobble/models/matching/network.js"
     (tmp_path / "run.mjs").write_text(
         f'import {{ createNetwork }} from {json.dumps(str(script))};\nimport {{ readFileSync }} from "fs";\n'
@@ -168,7 +170,7 @@ def test_the_page_finds_the_same_frames_as_python(made: Made, tmp_path: Path) ->
         "console.log(JSON.stringify(made));\n"
     )
     done: subprocess.CompletedProcess = node(
-        [str(tmp_path / "run.mjs"), str(tmp_path / "asked.json")],
+        [str(tmp_path / "run.mjs"), str(tmp_path / "inputs.json")],
         return_completed_process=True,
         capture_output=True,
         text=True,
@@ -194,7 +196,7 @@ def test_a_page_of_many_rows_has_the_first_part_of_each_run(made: Made) -> None:
     assert short.starts.max() < 80 - 20
 
 
-def test_a_character_goes(made: Made) -> None:
+def test_a_character_moves(made: Made) -> None:
     animation = ProceduralAnimation(made[2], characters=2)
     for _ in range(12):
         pose = animation.next_pose([1.0, 0.0], injury={"LeftUpLeg-LeftLeg": 3.0})

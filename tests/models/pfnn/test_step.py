@@ -5,14 +5,14 @@ from __future__ import annotations
 import pytest
 import torch
 
-from hobble.models.pfnn.fused import FusedStep
-from hobble.models.pfnn.step import Step
+from hobble.models.pfnn.fused import FusedPfnnStep
+from hobble.models.pfnn.step import PfnnStep
 from hobble.models.pfnn.trainable import initialise
 from hobble.training.optimiser import Adam
 
 from . import definition
 
-STEPS = [Step, FusedStep]
+STEPS = [PfnnStep, FusedPfnnStep]
 SHAPES = [((6, 5, 4), 4, 1), ((6, 5, 5, 3), 4, 33), ((7, 4, 4, 4, 3), 6, 8)]
 
 
@@ -29,7 +29,7 @@ def problem(sizes: tuple[int, ...], k: int, rows: int, dtype: torch.dtype = torc
 @pytest.mark.parametrize("kind", STEPS)
 @pytest.mark.parametrize(("sizes", "k", "rows"), SHAPES)
 def test_loss_and_gradient_are_those_of_the_definition(
-    kind: type[Step], sizes: tuple[int, ...], k: int, rows: int
+    kind: type[PfnnStep], sizes: tuple[int, ...], k: int, rows: int
 ) -> None:
     network, x, y, p = problem(sizes, k, rows)
     step = kind(network, 0.3)
@@ -47,7 +47,7 @@ def test_loss_and_gradient_are_those_of_the_definition(
 
 
 @pytest.mark.parametrize("kind", STEPS)
-def test_a_training_is_that_of_the_definition(kind: type[Step]) -> None:
+def test_ten_training_steps_equal_those_of_autograd_and_torch_adam(kind: type[PfnnStep]) -> None:
     """Ten steps with dropout, the L1 term and Adam, against autograd and PyTorch's own Adam."""
     network, x, y, p = problem((6, 5, 5, 3), 4, 12)
     layers = definition.parameters(network)
@@ -66,10 +66,10 @@ def test_a_training_is_that_of_the_definition(kind: type[Step]) -> None:
 
 
 @pytest.mark.parametrize("kind", STEPS)
-def test_float32_is_that_to_its_precision(kind: type[Step]) -> None:
+def test_the_gradient_in_float32_equals_that_in_float64_to_its_precision(kind: type[PfnnStep]) -> None:
     network, x, y, p = problem((30, 24, 24, 20), 4, 40, torch.float32)
     exact = network.to("cpu", torch.float64)
-    step, reference = kind(network, 0.3), Step(exact, 0.3)
+    step, reference = kind(network, 0.3), PfnnStep(exact, 0.3)
     masks = step.masks(len(x))
     loss = step(x, y, p, masks)
     reference(x.double(), y.double(), p.double(), [mask.double() for mask in masks])
@@ -79,10 +79,10 @@ def test_float32_is_that_to_its_precision(kind: type[Step]) -> None:
 
 
 @pytest.mark.parametrize("kind", STEPS)
-def test_bfloat16_factors_give_the_gradient_to_their_precision(kind: type[Step]) -> None:
+def test_bfloat16_factors_give_the_gradient_to_their_precision(kind: type[PfnnStep]) -> None:
     network, x, y, p = problem((30, 24, 24, 20), 4, 40, torch.float32)
     network.flat.mul_(0.2)
-    half, whole = kind(network, 0.3, half=True), Step(network, 0.3)
+    half, whole = kind(network, 0.3, half=True), PfnnStep(network, 0.3)
     masks = half.masks(len(x))
     loss, exact = half(x, y, p, masks), whole(x, y, p, masks)
     assert loss.dtype == torch.float32
@@ -104,7 +104,7 @@ def test_both_steps_round_to_bfloat16_alike() -> None:
 
 @pytest.mark.parametrize("kind", STEPS)
 @pytest.mark.parametrize("dropout", [0.0, 0.3])
-def test_masks_keep_their_share_and_scale_it_up(kind: type[Step], dropout: float) -> None:
+def test_dropout_keeps_its_share_and_scales_it_up(kind: type[PfnnStep], dropout: float) -> None:
     network = initialise((300, 200, 10), 4, 1)
     step = kind(network, dropout)
     step.seed(9)
@@ -127,7 +127,7 @@ def test_masks_keep_their_share_and_scale_it_up(kind: type[Step], dropout: float
 
 def test_batches_of_other_sizes_share_the_buffers() -> None:
     network, x, y, p = problem((6, 5, 5, 3), 4, 33)
-    step, plain = FusedStep(network, 0.0), Step(network, 0.0)
+    step, plain = FusedPfnnStep(network, 0.0), PfnnStep(network, 0.0)
     for rows in (33, 7, 33, 1):
         masks = step.masks(rows)
         assert float(step(x[:rows], y[:rows], p[:rows], masks)) == pytest.approx(

@@ -10,7 +10,7 @@ import torch
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from hobble.models.pfnn.fused import FusedStep
+from hobble.models.pfnn.fused import FusedPfnnStep
 from hobble.models.pfnn.trainable import TrainablePfnn, coefficients, initialise, parameters
 
 from .definition import output, spline
@@ -28,17 +28,17 @@ def test_the_spline_is_catmull_rom(p: float, k: int) -> None:
 
 
 @pytest.mark.parametrize("k", [4, 5])
-def test_the_spline_goes_through_its_control_points_and_around(k: int) -> None:
+def test_the_spline_passes_its_control_points_and_is_cyclic(k: int) -> None:
     knots = torch.arange(k, dtype=torch.float64) / k
     assert torch.equal(coefficients(knots, k), torch.eye(k, dtype=torch.float64))
     assert torch.allclose(coefficients(knots + 1, k), coefficients(knots, k))
     assert torch.equal(coefficients(torch.ones(1, dtype=torch.float64), k)[0], torch.eye(k)[0].double())
 
 
-def test_compiled_coefficients_are_the_same() -> None:
+def test_compiled_spline_coefficients_equal_the_plain_ones() -> None:
     network = initialise((3, 4, 2), 5, 1)
     p = torch.tensor([0.0, 0.2, 0.37, 0.999, 1.0])
-    assert torch.allclose(FusedStep(network, 0.3).coefficients(p), coefficients(p, 5), atol=1e-6)
+    assert torch.allclose(FusedPfnnStep(network, 0.3).coefficients(p), coefficients(p, 5), atol=1e-6)
 
 
 @pytest.mark.parametrize(
@@ -49,7 +49,7 @@ def test_compiled_coefficients_are_the_same() -> None:
         ((1302, 512, 512, 1751), 1_828_055),
     ],
 )
-def test_as_many_parameters_as_the_published_networks(sizes: tuple[int, ...], count: int) -> None:
+def test_parameter_counts_equal_those_of_the_published_networks(sizes: tuple[int, ...], count: int) -> None:
     assert parameters(sizes, 4) == 4 * count
 
 
@@ -66,7 +66,7 @@ def test_initial_weights_fill_their_bounds_and_biases_are_zero() -> None:
         assert float(weights.std()) == pytest.approx(bound / 3**0.5, rel=0.05)
 
 
-def test_a_seed_is_a_network() -> None:
+def test_equal_seeds_give_equal_networks() -> None:
     one, same, other = (initialise((5, 4, 3), 4, seed).flat for seed in (1, 1, 2))
     assert torch.equal(one, same)
     assert not torch.equal(one, other)
@@ -82,7 +82,7 @@ def test_blended_outputs_are_those_of_blended_weights() -> None:
 
 
 @pytest.mark.shared
-def test_it_runs_the_released_network(shared: Path) -> None:
+def test_the_network_in_training_reproduces_the_released_one(shared: Path) -> None:
     """Y_release was computed with the weights of phase bin floor(50 P), at most 49."""
     weights = np.load(shared / "reference" / "pfnn_release_network.npz")
     rows = np.load(shared / "reference" / "original_rows_LocomotionFlat09_000.npz")

@@ -47,7 +47,7 @@ class Step:
 
     def __init__(self, network):
         self.network, self.gradients, self.error = network, [], torch.empty(0)
-        self.generator = torch.Generator()
+        self.generator, self.input_mask = torch.Generator(), 0
 
     def __call__(self, x, y, p, masks):
         self.error = self.network(x, p) - y

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 from pydantic import Field
 
-from hobble.channels.channel import Channel, Rig, Source
+from hobble.channels.channel import Channel, ClipSource, HasLinks
 from hobble.core.errors import InputError
 from hobble.core.section import Inside, Section
 from hobble.core.untrusted import MAX_TEXT_BYTES, printable, read_bytes
@@ -26,7 +26,7 @@ HEALTHY = "healthy"
 COLUMNS = ("file", "diagnosis")  # columns that the table needs; others are ignored
 
 
-class Table(Section):
+class DiagnosisTable(Section):
     """The section `channels.diagnosis` of a data set."""
 
     table: Inside = Field(
@@ -44,27 +44,27 @@ class Diagnosis(Channel):
     rate = 1.0
     slows = True
     manner = True
-    Options = Table
+    Options = DiagnosisTable
 
-    def columns(self, rig: Rig) -> tuple[str, ...]:
+    def columns(self, rig: HasLinks) -> tuple[str, ...]:
         """The diagnoses."""
         return DIAGNOSES
 
     def tables(self, options: Section | None) -> tuple[str, ...]:
         """The table that the data set names."""
-        return (options.table,) if isinstance(options, Table) else ()
+        return (options.table,) if isinstance(options, DiagnosisTable) else ()
 
-    def is_neutral(self, source: Source) -> bool:
+    def is_neutral(self, source: ClipSource) -> bool:
         """Whether the person is healthy or the diagnosis is unknown."""
         return _of(source) in (HEALTHY, None)
 
-    def check(self, source: Source, rig: Rig) -> None:
+    def check(self, source: ClipSource, rig: HasLinks) -> None:
         """Raise InputError if the clip's entry is not a known diagnosis."""
         if source.value is not None and source.value not in (*DIAGNOSES, HEALTHY):
             where = f"{source.clip}.channels.{self.name}"
             raise InputError(where, f"cannot be {source.value!r:.80}", fix=f"Write one of {_known()}.")
 
-    def read(self, clip: Clip, source: Source, motion: Mapping[str, Any]) -> tuple[Array, list[str]]:
+    def read(self, clip: Clip, source: ClipSource, motion: Mapping[str, Any]) -> tuple[Array, list[str]]:
         """1 for the person's diagnosis in every frame, and a warning if the table lacks the clip."""
         import numpy as np
 
@@ -74,7 +74,7 @@ class Diagnosis(Channel):
         return np.tile(np.array(row, np.float32), (len(clip), 1)), warnings
 
 
-def _of(source: Source) -> str | None:
+def _of(source: ClipSource) -> str | None:
     """The diagnosis of a clip's person, or HEALTHY. None if neither the entry nor the table has it."""
     if source.value is not None:
         return str(source.value)

@@ -6,7 +6,7 @@ import re
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
-from hobble.channels.channel import Channel, Rig, Source
+from hobble.channels.channel import Channel, ClipSource, HasLinks
 from hobble.core.untrusted import MAX_TEXT_BYTES, read_bytes
 
 if TYPE_CHECKING:
@@ -36,17 +36,17 @@ class Injury(Channel):
     slows = True
     targets = ("questionnaire",)
 
-    def columns(self, rig: Rig) -> tuple[str, ...]:
+    def columns(self, rig: HasLinks) -> tuple[str, ...]:
         """The links: "LeftUpLeg-LeftLeg"."""
         return tuple(f"{a}-{b}" for a, b in rig.links)
 
-    def is_neutral(self, source: Source) -> bool:
+    def is_neutral(self, source: ClipSource) -> bool:
         """Whether no status has a severity above 0."""
         if source.value is not None:
             return not hurts(str(source.value))
         return not any(hurts(read_bytes(file, MAX_TEXT_BYTES).decode("latin-1")) for file in source.files)
 
-    def check(self, source: Source, rig: Rig) -> None:
+    def check(self, source: ClipSource, rig: HasLinks) -> None:
         """Raise InputError if the entry's status breaks the grammar of status files.
 
         A skeleton without links has no columns. Then the status only marks the clip as hurt, so that it is
@@ -63,7 +63,7 @@ class Injury(Channel):
         if links := self.columns(rig):
             parse_links(source.value, links, where)
 
-    def read(self, clip: Clip, source: Source, motion: Mapping[str, Any]) -> tuple[Array, list[str]]:
+    def read(self, clip: Clip, source: ClipSource, motion: Mapping[str, Any]) -> tuple[Array, list[str]]:
         """See `clip_severity`."""
         from hobble.channels.injury.severity import clip_severity
 

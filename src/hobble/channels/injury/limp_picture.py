@@ -9,14 +9,14 @@ import numpy as np
 from numpy.typing import NDArray
 from PIL import Image, ImageDraw, ImageFont
 
+from hobble.channels.injury.crowd_severities import hurt_links, links
 from hobble.channels.injury.shown import body_parts
-from hobble.channels.injury.walks import hurt_links, links
 from hobble.core.errors import HobbleError
 from hobble.core.files import atomic_path
 from hobble.figure.mesh import body
 from hobble.figure.pack import regions
 from hobble.models.network import Network
-from hobble.report.raster import Studio
+from hobble.report.raster import BodyRenderer
 from hobble.report.stimuli import STRIDE, frames, walk
 from hobble.runtime.options import Runtime
 
@@ -40,7 +40,7 @@ def write_limp_picture(network: Network, path: str | Path, runtime: Runtime) -> 
         raise HobbleError("this network has no injury channel. Use a configuration with `channels: [injury]`")
     parts = body_parts(network.skeleton, known, hurt_links(network))
     hurt = {known[parts[label]]: value for label, value in INJURIES.items()}
-    studio = Studio(body(network.skeleton), regions(network.skeleton, known))
+    studio = BodyRenderer(body(network.skeleton), regions(network.skeleton, known))
     halves = []
     for injury in ({}, hurt):
         share = np.array([injury.get(link, 0.0) for link in known]) / 10

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from hobble.channels.injury.status import Spell, Status, parse_links, read_status
+from hobble.channels.injury.status import InjurySpell, Status, parse_links, read_status
 from hobble.core.clip import Clip
 from hobble.core.errors import InputError
 from hobble.core.quat import Array
@@ -46,7 +46,7 @@ def odd_ranges(status: Status, path: str | Path) -> list[str]:
     return notes
 
 
-def _overlaps(spells: Sequence[Spell]) -> dict[int, list[Spell]]:
+def _overlaps(spells: Sequence[InjurySpell]) -> dict[int, list[InjurySpell]]:
     """For each spell the earlier spells that share frames with it, in order."""
     found: dict[int, list[int]] = {}
     going: list[int] = []
@@ -58,7 +58,7 @@ def _overlaps(spells: Sequence[Spell]) -> dict[int, list[Spell]]:
     return {i: [spells[j] for j in sorted(others)] for i, others in found.items()}
 
 
-def _contested(earlier: Spell, later: Spell) -> str:
+def _contested(earlier: InjurySpell, later: InjurySpell) -> str:
     """The links for which two overlapping spells give different severities, separated by commas."""
     earlier_values = dict(earlier.links)
     return ", ".join(link for link, severity in later.links if earlier_values.get(link, severity) != severity)
@@ -80,7 +80,7 @@ def clip_severity(
         return np.zeros((len(clip), 0), np.float32), []
     if status is not None:
         where = f"status of {clip.name} in the data set's configuration"
-        everywhere = Spell(1, len(clip), parse_links(status, links, where))
+        everywhere = InjurySpell(1, len(clip), parse_links(status, links, where))
         return severity_matrix(Status(len(clip), (everywhere,)), links), []
     if status_file is None:
         return np.zeros((len(clip), len(links)), np.float32), []

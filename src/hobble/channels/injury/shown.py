@@ -5,11 +5,11 @@ from __future__ import annotations
 from collections.abc import Collection, Sequence
 from itertools import pairwise
 
-from hobble.channels.shown import Loop, Shown, Words
+from hobble.channels.shown import ChannelWords, SampleWalk, Shown
 from hobble.core.skeleton import Skeleton
 from hobble.figure.pack import link_ends, regions
 
-WORDS = Words(
+WORDS = ChannelWords(
     rest="Healthy",
     step=1,
     key="hurt",
@@ -89,13 +89,16 @@ def shown(skeleton: Skeleton, links: Sequence[str], trained: Collection[str]) ->
     return Shown(tuple(spoken_links(skeleton, links)), felt, presets, regions(skeleton, links))
 
 
-def loops(skeleton: Skeleton, links: Sequence[str], trained: Collection[str]) -> list[Loop]:
+def loops(skeleton: Skeleton, links: Sequence[str], trained: Collection[str]) -> list[SampleWalk]:
     """The thirteen walks of the study, and the coloured presets."""
     parts = {label: links[i] for label, i in body_parts(skeleton, links, trained).items()}
-    out = [Loop(name, {parts[label]: SEVERITY for label in labels}, False) for name, labels in STUDY.items()]
+    out = [
+        SampleWalk(name, {parts[label]: SEVERITY for label in labels}, False)
+        for name, labels in STUDY.items()
+    ]
     for title, values in PRESETS.items():
         hurt = {parts[label]: float(value) for label, value in values.items()}
-        out.append(Loop(f"preset-{title.lower().replace(' ', '-')}", hurt, True))
+        out.append(SampleWalk(f"preset-{title.lower().replace(' ', '-')}", hurt, True))
     return out
 
 

@@ -29,7 +29,7 @@ LINK = re.compile(r"\s*(.+?)\s*\[\s*([^\]]*?)\s*\]\s*")
 
 
 @dataclass(frozen=True)
-class Spell:
+class InjurySpell:
     """Links that hurt from frame `first` to `last`, both counted from 1 and included.
 
     links: (link, severity) pairs. line: its line in the file, if it comes from one.
@@ -46,7 +46,7 @@ class Status:
     """What hurts in a clip. frames: of its file. If spells overlap, the later one counts."""
 
     frames: int
-    spells: tuple[Spell, ...] = ()
+    spells: tuple[InjurySpell, ...] = ()
 
 
 def read_status(path: str | Path, links: Sequence[str]) -> Status:
@@ -57,7 +57,7 @@ def read_status(path: str | Path, links: Sequence[str]) -> Status:
     """
     path = Path(path)
     frames: int | None = None
-    spells: list[Spell] = []
+    spells: list[InjurySpell] = []
     for number, line in enumerate(read_text(path).splitlines(), 1):
         line = line.strip()
         if not line:
@@ -118,7 +118,7 @@ def _frame_count(path: Path, number: int, line: str) -> int:
     return int(match[1])
 
 
-def _spell(path: Path, number: int, line: str, links: Sequence[str]) -> Spell:
+def _spell(path: Path, number: int, line: str, links: Sequence[str]) -> InjurySpell:
     match = RANGE.fullmatch(line)
     if match is None:
         raise InputError(
@@ -129,7 +129,7 @@ def _spell(path: Path, number: int, line: str, links: Sequence[str]) -> Spell:
     first, last = int(match[1]), int(match[2])
     if last < first:
         raise InputError(path, f"the range {first}-{last} runs backwards", line=number)
-    return Spell(first, last, parse_links(match[3], links, path, number), number)
+    return InjurySpell(first, last, parse_links(match[3], links, path, number), number)
 
 
 def check_link(path: str | Path, line: int | None, name: str, links: Sequence[str]) -> None:

@@ -17,7 +17,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from hobble.channels.injury.status import Spell, Status, check_link, check_severity, write_status
+from hobble.channels.injury.status import InjurySpell, Status, check_link, check_severity, write_status
 from hobble.core.clip_files import find_clips, only_file
 from hobble.core.errors import InputError
 from hobble.core.untrusted import read_text, read_yaml
@@ -27,7 +27,7 @@ COLUMNS = ("clip", "link", "severity", "from", "to")
 
 
 @dataclass(frozen=True)
-class Row:
+class TableRow:
     """One line of the table. `first` and `last` are None if the table leaves them empty."""
 
     clip: str
@@ -47,7 +47,7 @@ def skeleton_links(path: Path) -> list[str]:
     return [f"{a}-{b}" for a, b in links]
 
 
-def read_table(path: str | Path, links: Sequence[str]) -> list[Row]:
+def read_table(path: str | Path, links: Sequence[str]) -> list[TableRow]:
     """Read a table.
 
     Raises InputError with the line for bad CSV, and for anything that a status file must not hold.
@@ -69,7 +69,7 @@ def read_table(path: str | Path, links: Sequence[str]) -> list[Row]:
 
 
 def statuses(
-    rows: Sequence[Row], frames: Mapping[str, int], path: str | Path = "the table"
+    rows: Sequence[TableRow], frames: Mapping[str, int], path: str | Path = "the table"
 ) -> dict[str, Status]:
     """The status of each clip in the rows. frames: clip -> number of frames of its file.
 
@@ -89,7 +89,7 @@ def statuses(
             )
         spells.setdefault(row.clip, {}).setdefault((first, last), []).append((row.link, row.severity))
     return {
-        clip: Status(frames[clip], tuple(Spell(*span, tuple(links)) for span, links in lines.items()))
+        clip: Status(frames[clip], tuple(InjurySpell(*span, tuple(links)) for span, links in lines.items()))
         for clip, lines in spells.items()
     }
 
@@ -124,12 +124,12 @@ def write_statuses(table: str | Path, folder: str | Path, links: Sequence[str]) 
     return written
 
 
-def _row(path: Path, line: int, values: Mapping[str, str | None], links: Sequence[str]) -> Row:
+def _row(path: Path, line: int, values: Mapping[str, str | None], links: Sequence[str]) -> TableRow:
     if "more" in values or None in values.values():
         raise InputError(path, f"a line has {len(COLUMNS)} values: {', '.join(COLUMNS)}", line=line)
     text = {key: (value or "").strip() for key, value in values.items()}
     check_link(path, line, text["link"], links)
-    return Row(
+    return TableRow(
         text["clip"],
         text["link"],
         check_severity(path, line, text["link"], text["severity"]),

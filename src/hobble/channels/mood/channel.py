@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal, get_args
 
 from pydantic import Field
 
-from hobble.channels.channel import Channel, Rig, Source
+from hobble.channels.channel import Channel, ClipSource, HasLinks
 from hobble.core.section import Section
 
 if TYPE_CHECKING:
@@ -39,15 +39,15 @@ class Mood(Channel):
     manner = True
     Options = Patterns
 
-    def columns(self, rig: Rig) -> tuple[str, ...]:
+    def columns(self, rig: HasLinks) -> tuple[str, ...]:
         """The moods."""
         return get_args(Name)
 
-    def is_neutral(self, source: Source) -> bool:
+    def is_neutral(self, source: ClipSource) -> bool:
         """Whether the clip's entry or pattern has no mood above 0."""
         return not any(_moods(source).values())
 
-    def check(self, source: Source, rig: Rig) -> None:
+    def check(self, source: ClipSource, rig: HasLinks) -> None:
         """Raise InputError if the clip's entry has unknown moods or values outside 0..1."""
         from hobble.core.errors import InputError
 
@@ -59,7 +59,7 @@ class Mood(Channel):
             fix = f"Use {', '.join(self.columns(rig))} with numbers from 0 to 1, as in {{sad: .5}}."
             raise InputError(f"{source.clip}.channels.{self.name}", f"cannot be {given!r:.80}", fix=fix)
 
-    def read(self, clip: Clip, source: Source, motion: Mapping[str, Any]) -> tuple[Array, list[str]]:
+    def read(self, clip: Clip, source: ClipSource, motion: Mapping[str, Any]) -> tuple[Array, list[str]]:
         """The same values in all frames, and a warning if no pattern fits."""
         import numpy as np
 
@@ -72,11 +72,11 @@ class Mood(Channel):
         return np.tile(np.array(row, np.float32), (len(clip), 1)), warnings
 
 
-def _patterns(source: Source) -> Mapping[str, Mapping[Name, float]]:
+def _patterns(source: ClipSource) -> Mapping[str, Mapping[Name, float]]:
     return source.options.patterns if isinstance(source.options, Patterns) else {}
 
 
-def _moods(source: Source) -> Mapping[Any, float]:
+def _moods(source: ClipSource) -> Mapping[Any, float]:
     if source.value is not None:
         return source.value
     for pattern, moods in _patterns(source).items():

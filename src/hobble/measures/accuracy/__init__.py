@@ -2,10 +2,10 @@
 
 from hobble.measures.joints import Joints
 from hobble.measures.measure import Cost, Measure
-from hobble.measures.sampling import Sampling
+from hobble.measures.sample_options import SampleOptions
 
 
-class Options(Joints, Sampling):
+class Options(Joints, SampleOptions):
     """Its keys of the section `evaluation`."""
 
 

@@ -4,14 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from itertools import combinations
-from typing import Any
 
 import numpy as np
 
+from hobble.evaluation.comparison_rows import DifferenceOf, PublishedRow, SideBySide, pair, published_row
 from hobble.evaluation.configuration_results import ConfigurationResults
-from hobble.evaluation.side_by_side import SideBySide, pair, published_row
 from hobble.measures.accuracy.run import SPLITS, clip_rows
-from hobble.measures.given import Json
+from hobble.measures.given import Json, Row
 
 NAME = "accuracy"
 
@@ -26,9 +25,9 @@ def compared(all_measured: Sequence[ConfigurationResults], published: Json) -> S
     )
 
 
-def tables(compared: Json) -> dict[str, list[dict[str, Any]]]:
+def tables(compared: Json) -> dict[str, list[Row]]:
     """Every clip of every configuration."""
-    rows = [
+    rows: list[Row] = [
         {"configuration": entry["configuration"], **row}
         for entry in compared[NAME]
         for row in clip_rows(entry)
@@ -36,9 +35,9 @@ def tables(compared: Json) -> dict[str, list[dict[str, Any]]]:
     return {NAME: rows}
 
 
-def accuracy_differences(all_measured: Sequence[ConfigurationResults]) -> list[dict[str, Any]]:
+def accuracy_differences(all_measured: Sequence[ConfigurationResults]) -> list[DifferenceOf]:
     """Eq. 3.2 of each pair: over each split, and for each clip that both were measured on."""
-    out = []
+    out: list[DifferenceOf] = []
     for a, b in combinations(all_measured, 2):
         ours, theirs = ({**_of_splits(m), **_clips(m)} for m in (a, b))
         for over in ours:
@@ -47,7 +46,7 @@ def accuracy_differences(all_measured: Sequence[ConfigurationResults]) -> list[d
     return out
 
 
-def _of_splits(measured: ConfigurationResults) -> dict[str, Any]:
+def _of_splits(measured: ConfigurationResults) -> dict[str, Json]:
     """Split -> its errors over all frames, and the `means` of its clips."""
     found = measured.found(NAME)
     return {split: {**found[split], "means": clip_means(found, split)} for split in SPLITS}
@@ -58,7 +57,7 @@ def clip_means(found: Json, split: str) -> list[float]:
     return [c["mean"] for c in found["clips"] if c["split"] == split and c["mean"] is not None]
 
 
-def _splits(all_measured: Sequence[ConfigurationResults], published: Json) -> list[dict[str, Any]]:
+def _splits(all_measured: Sequence[ConfigurationResults], published: Json) -> list[PublishedRow]:
     found = {m.name: m for m in all_measured}
     out = []
     for row in published["accuracy"]:
@@ -76,7 +75,7 @@ def _splits(all_measured: Sequence[ConfigurationResults], published: Json) -> li
     return out
 
 
-def _published_clips(all_measured: Sequence[ConfigurationResults], published: Json) -> list[dict[str, Any]]:
+def _published_clips(all_measured: Sequence[ConfigurationResults], published: Json) -> list[PublishedRow]:
     """Published errors of single clips, next to our clips of the same names."""
     out = []
     for row in published["clips"]:
@@ -90,5 +89,5 @@ def _published_clips(all_measured: Sequence[ConfigurationResults], published: Js
     return out
 
 
-def _clips(measured: ConfigurationResults) -> dict[str, Any]:
+def _clips(measured: ConfigurationResults) -> dict[str, Json]:
     return {entry["clip"]: entry for entry in measured.found(NAME)["clips"]}

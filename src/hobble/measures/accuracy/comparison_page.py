@@ -10,7 +10,7 @@ from hobble.measures.accuracy.page import quantiles
 from hobble.report.charts import Chart, Trace, axis
 from hobble.report.compare_tables import difference_table
 from hobble.report.measured import Overview
-from hobble.report.parts import Part, Section
+from hobble.report.page_parts import PageSection, SectionPart
 from hobble.report.side_by_side import SPLITS, Compared, colours, dots, names
 from hobble.report.tables import Column
 
@@ -18,15 +18,15 @@ from hobble.report.tables import Column
 KINDS = {"difference_of_means": "sd of the means of clips", "difference": "sd of single frames"}
 
 
-def section(compared: Compared) -> Section:
+def section(compared: Compared) -> PageSection:
     """The spread of the errors, differences between configurations, and errors of single clips."""
-    return Section(
+    return PageSection(
         "accuracy",
         [
-            Part(10, error_boxes(compared)),
-            Part(30, difference_map(compared)),
-            Part(40, difference_table(compared)),
-            Part(50, clip_dots(compared), tall=True),
+            SectionPart(10, error_boxes(compared)),
+            SectionPart(30, difference_map(compared)),
+            SectionPart(40, difference_table(compared)),
+            SectionPart(50, clip_dots(compared), tall=True),
         ],
         title="Accuracy",
         at=10,

@@ -7,13 +7,14 @@ from typing import Any
 
 import numpy as np
 
+from hobble.measures.chosen import sampled_words
 from hobble.measures.given import Json
 from hobble.report.charts import Chart, axis, mark
 from hobble.report.formats import duration, number
 from hobble.report.gather import Material
-from hobble.report.parts import Fragment, Part, Section, Words
+from hobble.report.page_parts import PageSection, Paragraph, SectionPart, TemplatePart
 from hobble.report.published import cited
-from hobble.report.summary import Figure, Hint, placed
+from hobble.report.summary import Hint, KeyFigure, placed
 from hobble.report.tables import Column, Table
 
 INTRODUCTION = (
@@ -180,20 +181,20 @@ def published_table(found: Json, material: Material) -> Table:
     return Table(f"{material.name}-published", columns, rows, "Comparison with published results")
 
 
-def section(found: Json, material: Material) -> Section:
+def section(found: Json, material: Material) -> PageSection:
     """The charts and tables, and the view of captured and predicted motion. Empty if it was not measured."""
     if not found.get("clips"):
-        return Section("accuracy", [])
-    return Section(
+        return PageSection("accuracy", [])
+    return PageSection(
         "accuracy",
         [
-            Part(0, Words(INTRODUCTION + sampled(found))),
-            Part(9, Words(caveat(material))),
-            Part(10, published_table(found, material), open=True, short=True),
-            Part(20, clip_bars(found, material), tall=True),
-            Part(30, clip_boxes(found), tall=True),
-            Part(60, accuracy_table(found, material.name)),
-            Part(90, Fragment("captured.html.j2")),
+            SectionPart(0, Paragraph(INTRODUCTION + sampled(found))),
+            SectionPart(9, Paragraph(caveat(material))),
+            SectionPart(10, published_table(found, material), open=True, short=True),
+            SectionPart(20, clip_bars(found, material), tall=True),
+            SectionPart(30, clip_boxes(found), tall=True),
+            SectionPart(60, accuracy_table(found, material.name)),
+            SectionPart(90, TemplatePart("captured.html.j2")),
         ],
         title="Accuracy",
         at=10,
@@ -212,9 +213,8 @@ def caveat(material: Material) -> str:
 
 
 def sampled(found: Json) -> str:
-    """A sentence on which clips were measured; empty if all of them were."""
-    sample = found.get("sample")
-    if not sample:
+    """A sentence on what was measured; empty if all clips were."""
+    if not found.get("sample"):
         return ""
     widths = [
         f"{NAMES[split]} {100 * found[split]['mean']:.2f} ± {100 * found[split]['interval']['mean']:.2f} %"
@@ -222,13 +222,12 @@ def sampled(found: Json) -> str:
         if (found.get(split) or {}).get("interval")
     ]
     return (
-        f" Measured on a sample of {sample['clips']:,} of {sample['of']:,} clips, stratified by gait, speed, "
-        "channel and split and weighted to represent all clips. 95 % confidence intervals: "
-        f"{', '.join(widths)}."
+        f" Measured on {sampled_words(found)}, and weighted to represent all of them. 95 % confidence "
+        f"intervals, of the means over all frames of these clips: {', '.join(widths)}."
     )
 
 
-def figures(found: Json, material: Material) -> Iterator[Figure]:
+def figures(found: Json, material: Material) -> Iterator[KeyFigure]:
     """The error of each split."""
     for at, split, label in (
         (10, "held_out", "Error on held-out clips"),
@@ -241,7 +240,7 @@ def figures(found: Json, material: Material) -> Iterator[Figure]:
             theirs = material.published_entry("accuracy") if split == "held_out" else None
             if theirs:
                 note += f"; published for {theirs['label']}: {100 * theirs['mean']:.2f} %, on other clips"
-            yield Figure(label, f"{100 * part['mean']:.2f}", "%", note, at)
+            yield KeyFigure(label, f"{100 * part['mean']:.2f}", "%", note, at)
 
 
 def _centimetres(error: float, split: str, material: Material) -> str:

@@ -11,7 +11,7 @@ import logging
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Any
+from typing import Literal
 
 import numpy as np
 
@@ -19,18 +19,22 @@ from hobble.core.errors import HobbleError, InputError
 from hobble.core.quat import Array
 from hobble.database.statistics import Moments
 from hobble.measures.accuracy import Options
-from hobble.measures.given import Given, Outcome
+from hobble.measures.accuracy.results import Accuracy, ErrorsOf, ErrorsOfClip, ErrorsOfExcerpt, ErrorsOfSplit
+from hobble.measures.chosen import chosen, sample_of
+from hobble.measures.given import Given, Json, Outcome, Row
 from hobble.measures.joints import Joints
-from hobble.measures.sample import Sample, drawn
+from hobble.measures.results import SPLITS
+from hobble.measures.sample import Sample
 from hobble.models.load import load_network
 from hobble.models.network import Network
-from hobble.rows.clip_rows import ClipRows, expanded, load_clip_rows
-from hobble.rows.facts import load_facts
+from hobble.rows.clip_rows import ClipRows, expanded
+from hobble.rows.excerpts import Excerpt
 from hobble.rows.layout import RowLayout
 
 LEAST = 1e-3  # cm; a joint nearer to the root has no meaningful relative error
-SPLITS = ("train", "held_out")
 REFERENCE = "holden31"
+# What has a confidence interval.
+MEASURED: tuple[Literal["mean"], Literal["position_error_cm"]] = ("mean", "position_error_cm")
 QUANTILES = {"p05": 0.05, "p25": 0.25, "p50": 0.5, "p75": 0.75, "p95": 0.95}
 COLUMNS = ("clip", "split", "frames", "mean", "sd", "position_error_cm", *QUANTILES)
 # Bins of the relative error, each 2 % wide. Quantiles come from them, so that no single errors are stored.
@@ -61,7 +65,7 @@ class Errors:
         below = np.concatenate([[0.0], np.cumsum(self.histogram)])
         return float(np.interp(share * below[-1], below, EDGES))
 
-    def to_dict(self) -> dict[str, Any]:
+    def to_dict(self) -> ErrorsOf:
         """Plain data, with quantiles of the relative error; None values if there was no frame."""
         if not self.frames:
             return {"frames": 0, "mean": None, "sd": None, "position_error_cm": None}
@@ -71,7 +75,11 @@ class Errors:
             "mean": float(mean[0]),
             "sd": float(sd[0]),
             "position_error_cm": float(mean[1]),
-            **{name: self.quantile(share) for name, share in QUANTILES.items()},
+            "p05": self.quantile(QUANTILES["p05"]),
+            "p25": self.quantile(QUANTILES["p25"]),
+            "p50": self.quantile(QUANTILES["p50"]),
+            "p75": self.quantile(QUANTILES["p75"]),
+            "p95": self.quantile(QUANTILES["p95"]),
         }
 
 
@@ -108,50 +116,73 @@ def measure(
     configuration: str,
     equivalents: Sequence[str] | None = None,
     sample: Sample | None = None,
-) -> dict[str, Any]:
+) -> Accuracy:
     """accuracy.json: `train` and `held_out` over their frames, and `clips`, one entry a clip in name order.
 
     clips: name -> file of rows. equivalents: names of the joints to measure; all by default. sample: the
-    clips to measure in place of all; the result then has `sample` with their number, and confidence
-    intervals. `mean_of_clips` is the mean over clips, as in the published tables. Raises InputError where
-    rows and network differ.
+    excerpts to measure in place of all clips; the result then has `sample` with their number, confidence
+    intervals, and the excerpts with their frames. `mean_of_clips` is the mean over clips, as in the published
+    tables. Raises InputError where rows and network differ.
     """
     network = load_network(weights)
     joints = joint_indices(network, equivalents)
-    entries = []
-    totals = dict.fromkeys(SPLITS, Errors())
-    for name, weight in (sample.weights if sample else dict.fromkeys(sorted(clips), 1.0)).items():
-        rows = load_clip_rows(clips[name])
-        check_layout(clips[name], rows, network)
-        errors = clip_errors(network, rows, joints)
-        totals[splits[name]] += errors.weighing(weight)
-        entries.append({"clip": name, "split": splits[name], **errors.to_dict()})
-        log.info("%s: %s", name, entries[-1])
-    result: dict[str, Any] = {"configuration": configuration, "joints": len(joints), "clips": entries}
+    of_clip: dict[str, Errors] = {}
+    excerpts: dict[Excerpt, ErrorsOfExcerpt] = {}
+    totals: dict[str, Errors] = dict.fromkeys(SPLITS, Errors())
+    for one in chosen(clips, sample):
+        read = one.load()
+        check_layout(one.path, read.rows, network)
+        errors = clip_errors(network, read.rows, joints)
+        split = splits[one.clip]
+        totals[split] += errors.weighing(one.weight)
+        of_clip[one.clip] = of_clip.get(one.clip, Errors()) + errors.weighing(one.weight)
+        found = errors.to_dict()
+        if one.excerpt is not None:
+            first, last = read.frames
+            place = {"clip": one.clip, "split": split, "first_frame": first, "last_frame": last}
+            excerpts[one.excerpt] = ErrorsOfExcerpt(**place, **found)  # type: ignore[typeddict-item]
+        log.info("%s: %s", one.excerpt or one.clip, found)
+    entries: list[ErrorsOfClip] = [
+        {"clip": name, "split": splits[name], **errors.to_dict()} for name, errors in of_clip.items()
+    ]
+    train, held_out = (_of_split(split, totals[split], entries) for split in SPLITS)
+    result: Accuracy = {
+        "configuration": configuration,
+        "joints": len(joints),
+        "clips": entries,
+        "train": train,
+        "held_out": held_out,
+    }
+    return result if sample is None else _with_intervals(result, sample, excerpts)
+
+
+def _of_split(split: str, errors: Errors, entries: Sequence[ErrorsOfClip]) -> ErrorsOfSplit:
+    means = [e["mean"] for e in entries if e["split"] == split and e["mean"] is not None]
+    mean = float(np.mean(means)) if means else None
+    return {**errors.to_dict(), "clips": len(means), "mean_of_clips": mean}
+
+
+def _with_intervals(
+    result: Accuracy, sample: Sample, excerpts: Mapping[Excerpt, ErrorsOfExcerpt]
+) -> Accuracy:
+    """The result with the sample, and half the width of the 95 % confidence interval of each split.
+
+    excerpts: the errors of each excerpt that was measured.
+    """
     for split in SPLITS:
-        means = [e["mean"] for e in entries if e["split"] == split and e["frames"]]
-        result[split] = {**totals[split].to_dict(), "clips": len(means)}
-        result[split]["mean_of_clips"] = float(np.mean(means)) if means else None
-    return result if sample is None else with_sample(result, sample)
+        own = {one: entry for one, entry in excerpts.items() if entry["split"] == split}
+        weights = [sample.clip_weights[one] for one in own]
+        # Every excerpt of a sample has rows, so no value is None.
+        means, distances = ({one: entry[key] or 0.0 for one, entry in own.items()} for key in MEASURED)
+        found = result[split]
+        if own:
+            found["mean_of_clips"] = float(np.average(list(means.values()), weights=weights))
+        pairs = zip(MEASURED, (means, distances), strict=True) if own else ()
+        found["interval"] = {key: sample.half_width(split, values) for key, values in pairs}
+    return {**result, "sample": sample.to_dict(), "excerpts": list(excerpts.values())}
 
 
-def with_sample(result: dict[str, Any], sample: Sample) -> dict[str, Any]:
-    """The result with the sample, and half the width of the 95 % confidence interval of each split."""
-    for split in SPLITS:
-        clips = [clip for clip in result["clips"] if clip["split"] == split]
-        weights = [sample.clip_weights[clip["clip"]] for clip in clips]
-        if clips:
-            means = [clip["mean"] for clip in clips]
-            result[split]["mean_of_clips"] = float(np.average(means, weights=weights))
-        result[split]["interval"] = {
-            key: sample.half_width(split, {clip["clip"]: clip[key] for clip in clips})
-            for key in ("mean", "position_error_cm")
-            if clips
-        }
-    return {**result, "sample": sample.to_dict()}
-
-
-def equivalent_joints(skeleton: Mapping[str, Any], of: str = REFERENCE) -> list[str] | None:
+def equivalent_joints(skeleton: Json, of: str = REFERENCE) -> list[str] | None:
     """Names of the joints that have a counterpart on the skeleton `of`; None (all) without such a map.
 
     skeleton: as config/skeletons/<name>.yaml holds it.
@@ -185,15 +216,16 @@ def check_layout(where: str | Path, rows: ClipRows, network: Network) -> None:
         raise InputError(where, f"its rows ({rows.layout}) are not those the network has learnt ({layout})")
 
 
-def clip_rows(result: Mapping[str, Any]) -> list[dict[str, Any]]:
+def clip_rows(result: Accuracy) -> list[Row]:
     """The entries of the clips as table rows with equal keys."""
     return [{key: clip.get(key) for key in COLUMNS} for clip in result["clips"]]
 
 
 def run(given: Given, options: Options) -> Outcome:
-    """accuracy.json, and its `clips` as a table."""
-    sample = drawn(map(load_facts, given.facts), given.splits, options.sample_frames)
+    """accuracy.json, and its clips and excerpts as tables."""
+    sample = sample_of(given, options)
     result = measure(
         given.weights, given.clips, given.splits, given.configuration, chosen_joints(given, options), sample
     )
-    return Outcome(result, {"clips": clip_rows(result)})
+    excerpts = {"excerpts": result.pop("excerpts")} if sample else {}
+    return Outcome(result, {"clips": clip_rows(result), **excerpts})

@@ -9,7 +9,7 @@ import numpy as np
 from hobble.core.quat import Array
 from hobble.gait.discriminant import learn
 from hobble.measures.manners.results import LeftOut
-from hobble.measures.manners.windows import NONE, Window, table
+from hobble.measures.manners.windows import NONE, MannerWindow, table
 
 # Shrinkages of the covariance towards its diagonal. The one that names most windows of left-out people right
 # is used. With fewer clips a larger one is better: .6 recognises 69 % of moods and 51 % of diagnoses, .02
@@ -18,7 +18,7 @@ SHRINKAGES = (0.02, 0.1, 0.3, 0.6)
 
 
 def left_out(
-    windows: Sequence[Window], people: Mapping[str, str], shrinkages: Sequence[float] = SHRINKAGES
+    windows: Sequence[MannerWindow], people: Mapping[str, str], shrinkages: Sequence[float] = SHRINKAGES
 ) -> LeftOut:
     """Recognise the windows of each person (or clip, with its mirror) after learning from all others.
 

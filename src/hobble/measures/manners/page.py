@@ -6,12 +6,13 @@ from collections.abc import Callable
 from typing import Literal
 
 from hobble.channels.shown import speaker
+from hobble.measures.chosen import captured_sampled
 from hobble.measures.given import Json
-from hobble.measures.manners.results import OfChannel
+from hobble.measures.manners.results import ChannelResult
 from hobble.measures.manners.windows import EFFECTS, NONE
 from hobble.report.charts import Chart
 from hobble.report.gather import Material
-from hobble.report.parts import Part, Section, Words
+from hobble.report.page_parts import PageSection, Paragraph, SectionPart
 
 UNITS = {"speed": "m/s", "stride": "cm", "trunk": "° forward", "arms": "° of swing", "head": "° forward"}
 AMOUNTS: tuple[tuple[Literal["captured", "generated", "generated_at_half"], str, str], ...] = (
@@ -21,22 +22,25 @@ AMOUNTS: tuple[tuple[Literal["captured", "generated", "generated_at_half"], str,
 )
 
 
-def section(found: Json, material: Material) -> Section:
+def section(found: Json, material: Material) -> PageSection:
     """For each channel how often its manners are recognised and how much they change the walk.
 
     Empty for a network without such a channel.
     """
     if not found.get("applies"):
-        return Section("manners", [])
+        return PageSection("manners", [])
     parts, say = [], speaker(material.network["skeleton"])
     for i, one in enumerate(found["channels"]):
         charts = [together_chart(one, say), *(effect_chart(one, effect) for effect in EFFECTS)]
-        parts += [Part(10 * i, Words(summary(one))), *(Part(10 * i + 1 + k, c) for k, c in enumerate(charts))]
+        parts += [
+            SectionPart(10 * i, Paragraph(summary(one) + captured_sampled(found))),
+            *(SectionPart(10 * i + 1 + k, c) for k, c in enumerate(charts)),
+        ]
     title = " and ".join(one["title"] for one in found["channels"])
-    return Section("manners", parts, title=title, at=21)
+    return PageSection("manners", parts, title=title, at=21)
 
 
-def summary(found: OfChannel) -> str:
+def summary(found: ChannelResult) -> str:
     """What the classifier recognises, in generated walks and in captured ones of others."""
     captured = found["captured"]
     text = (
@@ -51,7 +55,7 @@ def summary(found: OfChannel) -> str:
     return text
 
 
-def together_chart(found: OfChannel, say: Callable[[str], str] = str) -> Chart | None:
+def together_chart(found: ChannelResult, say: Callable[[str], str] = str) -> Chart | None:
     """The share of windows in which each manner is named while a column of another channel is highest."""
     rows = found["together"]
     if not rows:
@@ -81,15 +85,15 @@ def together_chart(found: OfChannel, say: Callable[[str], str] = str) -> Chart |
     }
     words = (
         f"The share of windows in which the classifier names the right {found['title'].lower()} while the "
-        "value at the left is at its highest: none in a pale field, all in a dark one. It is "
-        f'{_percent(manner / whole)} over all columns but "{NONE}".'
+        "value at the left is at its highest: none in a pale field, all in a dark one. "
+        f'Without the column "{NONE}" it is {_percent(manner / whole)} on average.'
     )
     return Chart(
         f"{found['channel']}-together", "Two at once", words, [trace], layout, 120 + 20 * len(columns)
     )
 
 
-def effect_chart(found: OfChannel, effect: str) -> Chart:
+def effect_chart(found: ChannelResult, effect: str) -> Chart:
     """One effect of all manners, captured and generated."""
     rows = [row for row in found["effects"] if row["effect"] == effect]
     traces = [

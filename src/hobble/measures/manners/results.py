@@ -17,7 +17,7 @@ class LeftOut(TypedDict):
     presence_right: float | None
 
 
-class Named(TypedDict):
+class NamedWindows(TypedDict):
     """The names of the windows of one figure.
 
     value: 0, .5 or 1; None for two manners. named: manner -> windows that got this name. between: of two
@@ -32,7 +32,7 @@ class Named(TypedDict):
     between: NotRequired[float]
 
 
-class Together(TypedDict):
+class CombinedResult(TypedDict):
     """The names of the windows of a manner while `column` of the channel `other` is at its highest."""
 
     channel: str
@@ -55,7 +55,7 @@ class Effect(TypedDict):
     generated_at_half: float
 
 
-class OfChannel(TypedDict):
+class ChannelResult(TypedDict):
     """The result for one channel. speed_asked: m/s. right_at_1: share of the windows of manners at 1."""
 
     channel: str
@@ -63,9 +63,9 @@ class OfChannel(TypedDict):
     manners: list[str]
     speed_asked: float
     captured: LeftOut
-    generated: list[Named]
+    generated: list[NamedWindows]
     right_at_1: float | None
-    together: list[Together]
+    together: list[CombinedResult]
     effects: list[Effect]
 
 
@@ -74,4 +74,4 @@ class Manners(TypedDict):
 
     applies: bool
     reason: NotRequired[str]
-    channels: NotRequired[list[OfChannel]]
+    channels: NotRequired[list[ChannelResult]]

@@ -13,23 +13,24 @@ import numpy as np
 
 from hobble.channels import channel
 from hobble.core.quat import Array
-from hobble.core.section import Section
-from hobble.evaluation.captured import Captured, captured_clips
+from hobble.evaluation.captured import Captured
 from hobble.evaluation.crowd import FPS
 from hobble.gait.discriminant import Discriminant, learn
+from hobble.measures.chosen import captured_motion, sample_of, with_sample
 from hobble.measures.given import Given, Outcome, Row
 from hobble.measures.manners.left_out import left_out, share
-from hobble.measures.manners.results import Effect, Manners, Named, OfChannel, Together
+from hobble.measures.manners.results import ChannelResult, CombinedResult, Effect, Manners, NamedWindows
 from hobble.measures.manners.windows import (
     EFFECTS,
     NONE,
-    Figure,
-    Window,
+    MannerWindow,
+    WalkerInputs,
     captured_windows,
     generated,
     mean_effect,
     table,
 )
+from hobble.measures.sample_options import SampleOptions
 from hobble.models.load import load_network
 from hobble.models.network import Network
 from hobble.runtime.options import Runtime
@@ -56,7 +57,7 @@ def manners(
     names = [name for name in network.channels if channel(name).manner]
     if not names or network.skeleton is None:
         return {"applies": False, "reason": REASON}
-    windows: dict[str, list[Window]] = {name: [] for name in names}
+    windows: dict[str, list[MannerWindow]] = {name: [] for name in names}
     for clip in motion:
         for name, some in windows.items():
             some += captured_windows(clip, network, name)
@@ -68,11 +69,11 @@ def manners(
 def of_channel(
     network: Network,
     name: str,
-    windows: Sequence[Window],
+    windows: Sequence[MannerWindow],
     splits: Mapping[str, str],
     people: Mapping[str, str],
     runtime: Runtime,
-) -> OfChannel | None:
+) -> ChannelResult | None:
     """The result for one channel; None with walks of fewer than two manners.
 
     captured: see `left_out`. generated: for each manner and value the share of `windows` recognised with what
@@ -90,7 +91,7 @@ def of_channel(
     speed = float(np.median([w.values["speed"] for w in known if w.manner == NONE] or [ASKED])) / FPS
     single = [{}, *({manner: value} for value in (HALF, FULL) for manner in seen)]
     given = [*single, *(dict.fromkeys(pair, FULL) for pair in combinations(seen, 2))]
-    figures = [Figure({name: values}, speed * pace) for values in given for pace in PACES]
+    figures = [WalkerInputs({name: values}, speed * pace) for values in given for pace in PACES]
     walks = generated(network, figures, name, runtime)
     per = len(PACES)
     each = [[w for walk in walks[i : i + per] for w in walk] for i in range(0, len(walks), per)]
@@ -115,7 +116,7 @@ def of_channel(
 
 def together(
     network: Network, name: str, judge: Discriminant, seen: Sequence[str], speed: float, runtime: Runtime
-) -> list[Together]:
+) -> list[CombinedResult]:
     """How often each manner at 1 is named while a column of another channel is at its highest value.
 
     It has a row for each manner (or NONE) and each column that was above 0 in training.
@@ -127,11 +128,11 @@ def together(
     if not cases:
         return []
     figures = [
-        Figure({name: {} if m == NONE else {m: FULL}, other: {column: channel(other).highest}}, speed)
+        WalkerInputs({name: {} if m == NONE else {m: FULL}, other: {column: channel(other).highest}}, speed)
         for m, other, column in cases
     ]
     walks = generated(network, figures, name, runtime)
-    rows: list[Together] = []
+    rows: list[CombinedResult] = []
     for (manner, other, column), some in zip(cases, walks, strict=True):
         names = judge.names(table(some))
         rows.append(
@@ -148,9 +149,10 @@ def together(
     return rows
 
 
-def run(given: Given, options: Section) -> Outcome:
+def run(given: Given, options: SampleOptions) -> Outcome:
     """manners.json, the effects and the figures with values of two channels as tables."""
-    motion = captured_clips(given.clips.values())
+    sample = sample_of(given, options)
+    motion = captured_motion(given.clips, sample)
     result = manners(load_network(given.weights), motion, given.splits, given.people, given.runtime)
     found = result.get("channels", [])
     tables: dict[str, list[Row]] = {
@@ -160,10 +162,10 @@ def run(given: Given, options: Section) -> Outcome:
         ],
     }
     says = "; ".join(f"{one['channel']} named right: {one['right_at_1']}" for one in found)
-    return Outcome(result, tables, says or result.get("reason", ""))
+    return Outcome(with_sample(result, sample), tables, says or result.get("reason", ""))
 
 
-def _named(judge: Discriminant, values: Mapping[str, float], windows: Sequence[Window]) -> Named:
+def _named(judge: Discriminant, values: Mapping[str, float], windows: Sequence[MannerWindow]) -> NamedWindows:
     names = judge.names(table(windows))
     wanted = set(values) or {NONE}
     return {
@@ -183,10 +185,10 @@ def _effect(
     name: str,
     manner: str,
     effect: str,
-    known: Sequence[Window],
-    plain: Sequence[Window],
-    half: Sequence[Window],
-    full: Sequence[Window],
+    known: Sequence[MannerWindow],
+    plain: Sequence[MannerWindow],
+    half: Sequence[MannerWindow],
+    full: Sequence[MannerWindow],
 ) -> Effect:
     """One effect. Windows: captured ones, and generated ones without a manner, with it at .5 and at 1."""
     neutral = [w for w in known if w.manner == NONE]
@@ -208,7 +210,7 @@ def _between(both: Array, first: Array, second: Array) -> float:
     return round(float((both - first) @ way / max(float(way @ way), 1e-9)), 4)
 
 
-def _mean(windows: Sequence[Window]) -> Array:
+def _mean(windows: Sequence[MannerWindow]) -> Array:
     return np.asarray(table(windows).mean(axis=0))
 
 

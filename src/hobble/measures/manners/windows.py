@@ -11,7 +11,7 @@ from hobble.channels import channel
 from hobble.core.quat import Array
 from hobble.core.skeleton import Skeleton
 from hobble.evaluation.captured import Captured
-from hobble.evaluation.crowd import FPS, Stretch, channel_values
+from hobble.evaluation.crowd import FPS, CrowdTarget, channel_values
 from hobble.evaluation.crowd import run as run_walks
 from hobble.evaluation.gait_features import features
 from hobble.models.network import Network
@@ -28,7 +28,7 @@ EFFECTS = ("speed", "stride", "trunk", "arms", "head")
 
 
 @dataclass(frozen=True)
-class Window:
+class MannerWindow:
     """A stretch of straight walking. manner: a column of the channel, or NONE. values: its features.
 
     effects: speed (m/s), stride (cm), trunk and head (degrees forward), arms (degrees of swing, standard
@@ -42,14 +42,14 @@ class Window:
 
 
 @dataclass(frozen=True)
-class Figure:
+class WalkerInputs:
     """The inputs of a generated figure: channel -> column -> value, and a speed in cm a frame."""
 
     channels: Mapping[str, Mapping[str, float]]
     speed: float
 
 
-def captured_windows(clip: Captured, network: Network, name: str) -> list[Window]:
+def captured_windows(clip: Captured, network: Network, name: str) -> list[MannerWindow]:
     """The windows of a captured stretch that walks straight in one manner at its highest value, or in none.
 
     name: the channel. Windows with values of another channel are left out.
@@ -73,14 +73,16 @@ def captured_windows(clip: Captured, network: Network, name: str) -> list[Window
     return out
 
 
-def generated(network: Network, figures: Sequence[Figure], name: str, runtime: Runtime) -> list[list[Window]]:
+def generated(
+    network: Network, figures: Sequence[WalkerInputs], name: str, runtime: Runtime
+) -> list[list[MannerWindow]]:
     """The windows of each figure's straight walk. name: the channel whose columns are the manners."""
     assert network.skeleton is not None
     channels: dict[str, Array] = {}
     for each in network.channels:
         channels |= channel_values(network, each, [figure.channels.get(each, {}) for figure in figures])
     speeds = [figure.speed for figure in figures]
-    script = Stretch(WARM_UP + USED, ["walk"] * len(figures), channels, speeds)
+    script = CrowdTarget(WARM_UP + USED, ["walk"] * len(figures), channels, speeds)
     walks = run_walks(network, [script], runtime)
     out = []
     for i, figure in enumerate(figures):
@@ -91,17 +93,19 @@ def generated(network: Network, figures: Sequence[Figure], name: str, runtime: R
     return out
 
 
-def table(windows: Sequence[Window]) -> Array:
+def table(windows: Sequence[MannerWindow]) -> Array:
     """(n, D) features."""
     return np.array([list(w.values.values()) for w in windows])
 
 
-def mean_effect(windows: Iterable[Window], effect: str) -> float:
+def mean_effect(windows: Iterable[MannerWindow], effect: str) -> float:
     """The mean of one of EFFECTS."""
     return float(np.mean([w.effects[effect] for w in windows]))
 
 
-def _window(skeleton: Skeleton, clip: str, manner: str, local: Array, contacts: Array, root: Array) -> Window:
+def _window(
+    skeleton: Skeleton, clip: str, manner: str, local: Array, contacts: Array, root: Array
+) -> MannerWindow:
     values = features(skeleton, local, contacts, root)
     head, neck = (local[:, skeleton.role(part)].astype(float) for part in ("head", "neck"))
     up = (head - neck).mean(axis=0)
@@ -112,4 +116,4 @@ def _window(skeleton: Skeleton, clip: str, manner: str, local: Array, contacts: 
         "arms": (values["upper_arm_left_sd"] + values["upper_arm_right_sd"]) / 2,
         "head": float(np.degrees(np.arctan2(up[2], up[1]))),
     }
-    return Window(clip, manner, {**values, "head": effects["head"]}, effects)
+    return MannerWindow(clip, manner, {**values, "head": effects["head"]}, effects)

@@ -4,19 +4,44 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from itertools import combinations
-from typing import Any
+from typing import TypedDict
 
 import numpy as np
 
-from hobble.evaluation.compare_tables import flat
+from hobble.evaluation.comparison_csv import flat
+from hobble.evaluation.comparison_rows import DifferenceOf, PublishedRow, SideBySide, pair, published_row
 from hobble.evaluation.configuration_results import ConfigurationResults
-from hobble.evaluation.series import line
-from hobble.evaluation.side_by_side import SideBySide, pair, published_row
-from hobble.measures.given import Json
+from hobble.evaluation.series import StraightLine, line
+from hobble.measures.given import Json, Row
 
 NAME = "responsivity"
 STEPS = ("prepare", "input", "insert", "predict", "output", "update", "total")
 COUNTS = ("true", "table_6_1", "table_6_1_as_printed")
+
+
+class Sizes(TypedDict):
+    """The computations that Table 6.1 counts, None without layers, and the bytes that each mode keeps.
+
+    exact: the mode without loss.
+    """
+
+    computations: dict[str, int | None]
+    weights_bytes: dict[str, int]
+    exact: str
+
+
+class TimeLine(StraightLine):
+    """A line of milliseconds over computations through the points `x`, `y`; None without such a line.
+
+    For the other keys see `fits`.
+    """
+
+    whose: str
+    mode: str | None
+    step: str
+    computations: str
+    x: list[int]
+    y: list[float]
 
 
 def compared(all_measured: Sequence[ConfigurationResults], published: Json) -> SideBySide:
@@ -34,7 +59,7 @@ def compared(all_measured: Sequence[ConfigurationResults], published: Json) -> S
     )
 
 
-def tables(compared: Json) -> dict[str, list[dict[str, Any]]]:
+def tables(compared: Json) -> dict[str, Sequence[Row]]:
     """Every lap, and the lines of time over size."""
     fit = compared["milliseconds"]["fit"]
     return {
@@ -43,13 +68,13 @@ def tables(compared: Json) -> dict[str, list[dict[str, Any]]]:
     }
 
 
-def by_mode(measured: ConfigurationResults) -> list[dict[str, Any]]:
+def by_mode(measured: ConfigurationResults) -> list[Json]:
     """The responsivity of each phase mode that was run."""
     found = measured.found(NAME)
     return [{**entry, "configuration": measured.name} for entry in found.get("modes", [found])]
 
 
-def _sizes(measured: ConfigurationResults) -> dict[str, Any]:
+def _sizes(measured: ConfigurationResults) -> Sizes:
     """Computations as Table 6.1 counts them, None without layers, and bytes that each mode keeps in memory.
 
     exact: the mode without loss.
@@ -63,9 +88,9 @@ def _sizes(measured: ConfigurationResults) -> dict[str, Any]:
     }
 
 
-def time_differences(all_measured: Sequence[ConfigurationResults]) -> list[dict[str, Any]]:
+def time_differences(all_measured: Sequence[ConfigurationResults]) -> list[DifferenceOf]:
     """Eq. 3.2 of the frame times of each pair, in the modes that both were run in."""
-    out = []
+    out: list[DifferenceOf] = []
     for a, b in combinations(all_measured, 2):
         theirs = {entry["mode"]: entry for entry in by_mode(b)}
         for entry in by_mode(a):
@@ -82,7 +107,7 @@ def time_differences(all_measured: Sequence[ConfigurationResults]) -> list[dict[
     return out
 
 
-def fits(all_measured: Sequence[ConfigurationResults], published: Mapping[str, Any]) -> list[dict[str, Any]]:
+def fits(all_measured: Sequence[ConfigurationResults], published: Json) -> list[TimeLine]:
     """Lines of milliseconds a frame over computations: of ours for each mode and step, and as published.
 
     `computations` says which of the counts, `step` what of a frame: the mean of `total`, as published, or of
@@ -113,13 +138,12 @@ def fits(all_measured: Sequence[ConfigurationResults], published: Mapping[str, A
     return out
 
 
-def _time(milliseconds: Mapping[str, Any], step: str) -> float:
+def _time(milliseconds: Json, step: str) -> float:
     return (milliseconds["spread"] if step == "median" else milliseconds)[step]
 
 
-def _fit(
-    whose: str, mode: str | None, step: str, counts: str, points: list[tuple[int, float]]
-) -> dict[str, Any]:
+def _fit(whose: str, mode: str | None, step: str, counts: str, points: list[tuple[int, float]]) -> TimeLine:
+    none: StraightLine = {"slope": None, "intercept": None, "r2": None, "points": len(points)}
     found = line([x for x, _ in points], [y for _, y in points])
     return {
         "whose": whose,
@@ -128,7 +152,7 @@ def _fit(
         "computations": counts,
         "x": [x for x, _ in points],
         "y": [y for _, y in points],
-        **(found or {"slope": None, "intercept": None, "r2": None, "points": len(points)}),
+        **(found or none),
     }
 
 
@@ -137,10 +161,11 @@ def lap_means(entry: Json) -> list[float]:
     return [lap["milliseconds"]["total"] for lap in entry["laps"]]
 
 
-def _published_sizes(about: Mapping[str, Json], published: Json) -> list[dict[str, Any]]:
+def _published_sizes(about: Mapping[str, Sizes], published: Json) -> list[PublishedRow]:
     out = []
     for row in published["computations"]:
-        counts = about.get(row["configuration"], {}).get("computations") or {}
+        sizes = about.get(row["configuration"])
+        counts = sizes["computations"] if sizes else {}
         printed = {**row, "table": "6.1"}
         out.append(
             published_row("computations of Table 6.1", printed, row["table_6_1"], counts.get(COUNTS[2]))
@@ -148,12 +173,13 @@ def _published_sizes(about: Mapping[str, Json], published: Json) -> list[dict[st
         out.append(published_row("parameters of a phase", row, row["parameters"], counts.get("true")))
     for row in published["stages"]:
         if row["stage"] == "training" and "bytes" in row:
-            ours = about.get(row["configuration"], {}).get("weights_bytes", {}).get("constant")
+            sizes = about.get(row["configuration"])
+            ours = sizes["weights_bytes"].get("constant") if sizes else None
             out.append(published_row("weights of 50 phases", row, row["bytes"], ours, "bytes"))
     return out
 
 
-def _published_times(all_measured: Sequence[ConfigurationResults], published: Json) -> list[dict[str, Any]]:
+def _published_times(all_measured: Sequence[ConfigurationResults], published: Json) -> list[PublishedRow]:
     found = {m.name: m for m in all_measured}
     out = []
     for row in published["responsivity"]:
@@ -173,9 +199,9 @@ def _published_times(all_measured: Sequence[ConfigurationResults], published: Js
     return out
 
 
-def _laps(entry: Mapping[str, Any]) -> list[dict[str, Any]]:
+def _laps(entry: Json) -> list[Row]:
     head = {"configuration": entry["configuration"], "mode": entry["mode"]}
-    rows = []
+    rows: list[Row] = []
     for lap in entry["laps"]:
         times = lap["milliseconds"]
         row = {key: value for key, value in lap.items() if key != "milliseconds"}

@@ -8,16 +8,16 @@ from typing import Any
 from hobble.report.charts import Chart, Trace, axis, line
 from hobble.report.formats import number, size
 from hobble.report.measured import Overview
-from hobble.report.parts import Part, Section
+from hobble.report.page_parts import PageSection, SectionPart
 from hobble.report.side_by_side import Compared, colours, dots, names
 from hobble.report.tables import Column
 from hobble.report.verdicts import Verdict, best
 
 
-def section(compared: Compared) -> Section:
+def section(compared: Compared) -> PageSection:
     """Times of the laps, and time over the size of the network."""
-    parts = [Part(10, lap_lines(compared)), Part(20, fit_chart(compared))]
-    return Section("speed", parts, title="Speed and response", at=30, nav="Speed")
+    parts = [SectionPart(10, lap_lines(compared)), SectionPart(20, fit_chart(compared))]
+    return PageSection("speed", parts, title="Speed and response", at=30, nav="Speed")
 
 
 def columns(compared: Compared) -> Iterator[Overview]:

@@ -17,9 +17,9 @@ from hobble.measures.responsivity.lap_charts import (
 )
 from hobble.report.formats import number
 from hobble.report.gather import Material
-from hobble.report.parts import Numbers, Part, Section, Words
+from hobble.report.page_parts import KeyFigures, PageSection, Paragraph, SectionPart
 from hobble.report.published import cited
-from hobble.report.summary import Figure, Hint, placed
+from hobble.report.summary import Hint, KeyFigure, placed
 from hobble.report.tables import Column, Table
 from hobble.runtime.controller import FASTEST_TURN
 
@@ -28,18 +28,18 @@ FRAME_BUDGET_MS = 1000 / 60
 TRACK = "The character is steered around a track of six waypoints: it walks, side-steps, jogs and crouches."
 
 
-def section(found: Json, material: Material) -> Section:
+def section(found: Json, material: Material) -> PageSection:
     """The track, the times of the laps, and the published times."""
     followed = track_figures(found)
-    return Section(
+    return PageSection(
         "speed",
         [
-            Part(0, Words(TRACK) if followed else None),
-            Part(10, Numbers(followed) if followed else None),
-            Part(15, track_chart(found)),
-            Part(20, lap_chart(found, material)),
-            Part(30, speed_published(found, material), open=True, short=True),
-            Part(60, lap_table(found, material.name)),
+            SectionPart(0, Paragraph(TRACK) if followed else None),
+            SectionPart(10, KeyFigures(followed) if followed else None),
+            SectionPart(15, track_chart(found)),
+            SectionPart(20, lap_chart(found, material)),
+            SectionPart(30, speed_published(found, material), open=True, short=True),
+            SectionPart(60, lap_table(found, material.name)),
         ],
         title="Speed and response",
         at=30,
@@ -47,7 +47,7 @@ def section(found: Json, material: Material) -> Section:
     )
 
 
-def figures(found: Json, material: Material) -> Iterator[Figure]:
+def figures(found: Json, material: Material) -> Iterator[KeyFigure]:
     """The time of a frame."""
     milliseconds = frame_milliseconds(found)
     if milliseconds is not None:
@@ -55,7 +55,7 @@ def figures(found: Json, material: Material) -> Iterator[Figure]:
         note = f"median; one core can run {number(FRAME_BUDGET_MS / milliseconds, 3)} characters at 60 Hz"
         if theirs:
             note += f"; mean {number(frame_mean(found), 2)} ms, published mean {theirs['milliseconds']} ms"
-        yield Figure("Time per frame", number(milliseconds, 2), "ms", note, 20)
+        yield KeyFigure("Time per frame", number(milliseconds, 2), "ms", note, 20)
 
 
 def hints(found: Json, material: Material) -> Iterator[Hint]:
@@ -88,7 +88,7 @@ def _few(steps: int | None) -> bool:
     return steps is not None and steps < FEWEST_STEPS
 
 
-def track_figures(found: Json) -> list[Figure]:
+def track_figures(found: Json) -> list[KeyFigure]:
     """A few numbers on how the character followed the track."""
     if not isinstance(found.get("laps"), list):
         return []
@@ -99,29 +99,29 @@ def track_figures(found: Json) -> list[Figure]:
     measured = f"mean slide of the toe during a stance, over {steps:,} steps"
     laps = f"{found.get('laps_finished')} of {len(found['laps'])} laps finished"
     return [
-        Figure("Waypoints reached", reached, "", laps),
-        Figure(
+        KeyFigure("Waypoints reached", reached, "", laps),
+        KeyFigure(
             "Largest distance from the path",
             number(found.get("path_overshoot_cm")),
             "cm",
             "usually the largest is at a turn",
         ),
-        Figure("Foot slide", number(slide), "cm" if slide is not None else "", measured),
+        KeyFigure("Foot slide", number(slide), "cm" if slide is not None else "", measured),
         _turn(found),
-        Figure("Slow frames", number(spread.get("p99")), "ms", "1 % of the frames are slower"),
+        KeyFigure("Slow frames", number(spread.get("p99")), "ms", "1 % of the frames are slower"),
     ]
 
 
-def _turn(found: Json) -> Figure:
+def _turn(found: Json) -> KeyFigure:
     """The largest turn of a joint in one frame: as predicted, and as drawn after the runtime's limit."""
     drawn, predicted = (number(found.get(key)) for key in ("largest_turn_degrees", "predicted_turn_degrees"))
     allowed = f"the runtime limits it to {np.degrees(FASTEST_TURN):.0f}°"
     if found.get("predicted_turn_degrees") is None:
-        return Figure("Largest turn of a joint", drawn, "°", f"in one frame, as drawn; {allowed}")
+        return KeyFigure("Largest turn of a joint", drawn, "°", f"in one frame, as drawn; {allowed}")
     frames = sum(lap.get("frames") or 0 for lap in found["laps"])
     held = f"{found['turns_held_back']:,} of {frames:,} frames"
     note = f"of a joint in one frame; {allowed}, which changed {held}; largest turn drawn: {drawn}°"
-    return Figure("Largest predicted turn", predicted, "°", note)
+    return KeyFigure("Largest predicted turn", predicted, "°", note)
 
 
 def speed_published(found: Json, material: Material) -> Table | None:

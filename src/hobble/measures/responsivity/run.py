@@ -2,17 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from itertools import pairwise
 from time import perf_counter
-from typing import Any
 
 import numpy as np
 
 from hobble.core.quat import Array
 from hobble.evaluation.motion_measures import foot_slide, largest_turn
-from hobble.measures.given import Given, Outcome
+from hobble.measures.given import Given, Outcome, Row
 from hobble.measures.responsivity import Options
+from hobble.measures.responsivity.results import Lap, Milliseconds, OfMode, Responsivity, Run, Steps
 from hobble.models.load import load_network
 from hobble.models.network import Network
 from hobble.runtime.animation import ProceduralAnimation, world_rotations
@@ -35,7 +35,7 @@ def responsivity(
     laps_other_modes: int | None = None,
     modes: Sequence[str] | None = None,
     track: Sequence[Waypoint] = TRACK,
-) -> dict[str, Any]:
+) -> Responsivity:
     """Run the track of Segerstedt 2021, `laps` laps in the runtime's own mode and fewer in other `modes`.
 
     laps_other_modes: laps in those; by default, and at most, `laps`. modes: by default all that the network
@@ -61,7 +61,6 @@ def responsivity(
         )
         for mode in dict.fromkeys((*map(network.mode, network.modes if modes is None else modes), own))
     }
-    runs = {mode: entry.pop("runs") for mode, entry in found.items()}
     return {
         "configuration": configuration,
         "track": {
@@ -73,21 +72,21 @@ def responsivity(
             "x": [waypoint.position[0] / 100 for waypoint in track],
             "z": [waypoint.position[1] / 100 for waypoint in track],
         },
-        "runs": runs[own],
+        "runs": found[own][1],
         "parameters": parameter_counts(network.sizes) if network.sizes else None,
         "stored": {mode: network.stored(mode) for mode in network.modes},
         "bytes_each": np.dtype(network.storage).itemsize,
         "exact": network.mode(None),
         "laps_other_modes": fewer,
-        **found[own],
-        "modes": list(found.values()),
+        **found[own][0],
+        "modes": [entry for entry, _ in found.values()],
     }
 
 
 def _laps(
     network: Network, runtime: Runtime, track: Sequence[Waypoint], laps: int, lap_seconds: float
-) -> dict[str, Any]:
-    """All laps of one mode."""
+) -> tuple[OfMode, list[Run]]:
+    """All laps of one mode, and the paths of the first ones."""
     animation = ProceduralAnimation(network, waypoints=track, **dict(runtime))
     for _ in range(WARM_UP):
         animation.next_pose()
@@ -100,7 +99,7 @@ def _laps(
         runs.append(run)
         if not lap["finished"]:
             animation.reset()
-    return {
+    entry: OfMode = {
         "mode": runtime.mode,
         "laps": results,
         "laps_finished": sum(lap["finished"] for lap in results),
@@ -113,8 +112,8 @@ def _laps(
         "predicted_turn_degrees": max(lap["predicted_turn_degrees"] for lap in results),
         "turns_held_back": sum(lap["turns_held_back"] for lap in results),
         "milliseconds": _milliseconds(np.concatenate(times)),
-        "runs": runs[:RUNS],
     }
+    return entry, runs[:RUNS]
 
 
 def parameter_counts(sizes: Sequence[int]) -> dict[str, int]:
@@ -134,10 +133,10 @@ def parameter_counts(sizes: Sequence[int]) -> dict[str, int]:
     }
 
 
-def lap_rows(result: Mapping[str, Any]) -> list[dict[str, Any]]:
+def lap_rows(result: Responsivity) -> list[Row]:
     """The laps of every mode as flat rows for a CSV file; the times are the last columns, with the
     standard deviation of each step."""
-    rows = []
+    rows: list[Row] = []
     for entry in result["modes"]:
         for lap in entry["laps"]:
             row = {"mode": entry["mode"]} | {k: v for k, v in lap.items() if k != "milliseconds"}
@@ -163,9 +162,7 @@ def run(given: Given, options: Options) -> Outcome:
     return Outcome(result, {"laps": lap_rows(result)}, "; ".join(says))
 
 
-def _lap(
-    animation: ProceduralAnimation, number: int, longest: int
-) -> tuple[dict[str, Any], Array, dict[str, Any]]:
+def _lap(animation: ProceduralAnimation, number: int, longest: int) -> tuple[Lap, Array, Run]:
     """One lap, its times (F, steps + 1) in seconds, the whole call last, and the run: see `_run`."""
     follower, skeleton = animation.follower, animation.skeleton
     assert follower is not None
@@ -192,7 +189,7 @@ def _lap(
     slide = foot_slide(np.array(positions), np.array(contacts))
     seconds = np.array(times)
     predicted = world_rotations(np.array(turned), np.array(yaws))
-    lap = {
+    lap: Lap = {
         "lap": number,
         "finished": bool(follower.reached[0] >= goal),
         "frames": len(times),
@@ -210,7 +207,7 @@ def _lap(
     return lap, seconds, _run(number, np.array(places), np.array(off))
 
 
-def _run(number: int, places: Array, off: Array) -> dict[str, Any]:
+def _run(number: int, places: Array, off: Array) -> Run:
     """Where a lap led: `x`, `z`, m, and `off_cm` from the line between waypoints, every EVERY frames.
 
     places: (F, 2), cm; off: (F,), cm, the largest since the last one that is kept.
@@ -231,20 +228,32 @@ def _held_back(predicted: Array, taken: Array) -> int:
     return int((~same).any(axis=1).sum()) if len(predicted) else 0
 
 
-def _milliseconds(seconds: Array) -> dict[str, Any]:
+def _milliseconds(seconds: Array) -> Milliseconds:
     ms = 1000 * seconds
     total = ms[:, : len(STEPS)].sum(axis=1)
-    steps = {step: round(float(ms[:, i].mean()), 6) for i, step in enumerate(STEPS)}
     return {
-        **steps,
+        **_of_steps(ms.mean(axis=0)),
         "total": round(float(total.mean()), 6),
-        "sd": {step: round(float(ms[:, i].std()), 6) for i, step in enumerate(STEPS)},
+        "sd": _of_steps(ms.std(axis=0)),
         "spread": {
             "sd": round(float(total.std()), 6),
             "median": round(float(np.median(total)), 6),
             "p99": round(float(np.percentile(total, 99)), 6),
             "whole_call": round(float(ms[:, -1].mean()), 6),
         },
+    }
+
+
+def _of_steps(values: Array) -> Steps:
+    """values: (steps or more,), in the order of STEPS."""
+    prepare, given, insert, predict, output, update = (round(float(v), 6) for v in values[: len(STEPS)])
+    return {
+        "prepare": prepare,
+        "input": given,
+        "insert": insert,
+        "predict": predict,
+        "output": output,
+        "update": update,
     }
 
 

@@ -9,7 +9,7 @@ from pydantic import AfterValidator, Field
 from hobble.core.section import Positive
 from hobble.measures.joints import Joints
 from hobble.measures.measure import Cost, Measure
-from hobble.measures.sampling import Sampling
+from hobble.measures.sample_options import SampleOptions
 
 
 def _some(lengths: tuple[int, ...]) -> tuple[int, ...]:
@@ -19,7 +19,7 @@ def _some(lengths: tuple[int, ...]) -> tuple[int, ...]:
     return lengths
 
 
-class Options(Joints, Sampling):
+class Options(Joints, SampleOptions):
     """Its keys of the section `evaluation`."""
 
     rollouts: Annotated[tuple[Positive, ...], AfterValidator(_some)] = Field(

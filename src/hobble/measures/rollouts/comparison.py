@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any
 
+from hobble.evaluation.comparison_rows import SideBySide
 from hobble.evaluation.configuration_results import ConfigurationResults
-from hobble.evaluation.side_by_side import SideBySide
 from hobble.measures.accuracy.run import SPLITS
-from hobble.measures.given import Json
+from hobble.measures.given import Json, Row
 
 NAME = "rollouts"
 
@@ -24,9 +23,9 @@ def compared(all_measured: Sequence[ConfigurationResults], published: Json) -> S
     )
 
 
-def tables(compared: Json) -> dict[str, list[dict[str, Any]]]:
+def tables(compared: Json) -> dict[str, list[Row]]:
     """Every configuration, length and split."""
-    rows = [
+    rows: list[Row] = [
         {"configuration": entry["configuration"], "length": entry["length"], "split": split, **entry[split]}
         for entry in compared[NAME]
         for split in SPLITS

@@ -7,16 +7,16 @@ from functools import partial
 
 from hobble.report.charts import Chart, Trace, axis, line, log_axis
 from hobble.report.formats import number
-from hobble.report.parts import Part, Section
+from hobble.report.page_parts import PageSection, SectionPart
 from hobble.report.side_by_side import SPLITS, Compared, colours
 from hobble.report.verdicts import Verdict, best
 
 SECOND = 60  # frames
 
 
-def section(compared: Compared) -> Section:
+def section(compared: Compared) -> PageSection:
     """The chart, which is added to the section on accuracy."""
-    return Section("accuracy", [Part(20, rollout_chart(compared))])
+    return PageSection("accuracy", [SectionPart(20, rollout_chart(compared))])
 
 
 def verdicts(compared: Compared) -> Iterator[Verdict]:

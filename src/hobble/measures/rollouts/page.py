@@ -5,26 +5,22 @@ from __future__ import annotations
 from typing import Any
 
 from hobble.measures.accuracy.page import COLOURS, NAMES
+from hobble.measures.chosen import sampled_words
 from hobble.measures.given import Json
 from hobble.report.charts import Chart, axis, line, log_axis
 from hobble.report.gather import Material
-from hobble.report.parts import Part, Section
+from hobble.report.page_parts import PageSection, SectionPart
 
 
-def section(found: Json, material: Material) -> Section:
+def section(found: Json, material: Material) -> PageSection:
     """The chart, which is added to the section on accuracy."""
-    return Section("accuracy", [Part(50, rollout_chart(found))])
+    return PageSection("accuracy", [SectionPart(50, rollout_chart(found))])
 
 
 def sampled(found: Json) -> str:
-    """A sentence on which clips were measured; empty if all of them were."""
-    sample = found.get("sample")
-    if not sample:
-        return ""
-    return (
-        f" Measured on a sample of {sample['clips']:,} of {sample['of']:,} clips, stratified by gait, speed, "
-        "channel and split. Whiskers are 95 % confidence intervals."
-    )
+    """A sentence on what was measured; empty if all clips were."""
+    words = sampled_words(found)
+    return f" Measured on {words}. Whiskers are 95 % confidence intervals." if words else ""
 
 
 def _whiskers(found: Json, split: str) -> dict[str, Any]:

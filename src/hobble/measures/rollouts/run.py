@@ -12,7 +12,6 @@ import logging
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
@@ -20,20 +19,22 @@ from hobble.core.quat import Array
 from hobble.database.statistics import Moments
 from hobble.evaluation.captured import unbroken
 from hobble.measures.accuracy.run import (
-    SPLITS,
     check_layout,
     chosen_joints,
     joint_indices,
     relative_and_distance,
 )
-from hobble.measures.given import Given, Outcome
+from hobble.measures.chosen import Chosen, Loaded, chosen, sample_of
+from hobble.measures.given import Given, Outcome, Row
+from hobble.measures.results import SPLITS
 from hobble.measures.rollouts import Options
-from hobble.measures.rollouts.crowd import Crowd, RollOuts, inputs
-from hobble.measures.sample import Sample, drawn
+from hobble.measures.rollouts.results import ErrorsOf, RollOutsFound
+from hobble.measures.rollouts.roll_outs import Crowd, RollOuts, inputs
+from hobble.measures.sample import Sample
 from hobble.models.load import load_network
 from hobble.models.network import Network, Predictor
-from hobble.rows.clip_rows import ClipRows, load_clip_rows
-from hobble.rows.facts import load_facts
+from hobble.rows.clip_rows import ClipRows
+from hobble.rows.excerpts import Excerpt
 from hobble.rows.layout import RowLayout
 
 LENGTHS = (1, 10, 60, 300)  # frames
@@ -72,7 +73,7 @@ class RollOutErrors:
             return self
         return RollOutErrors(self.frames, self.starts, self.moments * weight, self.last * weight, self.ended)
 
-    def to_dict(self, phase: bool = True) -> dict[str, Any]:
+    def to_dict(self, phase: bool = True) -> ErrorsOf:
         """Plain data, with None if there were no frames, or if no roll-out reached its full length.
 
         phase: whether the network uses the phase. If not, the phase error has no meaning and is None.
@@ -97,18 +98,20 @@ def clip_roll_outs(
     No roll-out begins at the first frame of a stretch, because the movement of the root to it is unknown.
     Each frame is in OVERLAP roll-outs of a length, or in one if they are one frame long.
     """
-    return _errors(predictor, [_groups(rows, predictor.network.layout, lengths)], joints, lengths)[0]
+    groups = _groups(Loaded(rows, 0, len(rows)), predictor.network.layout, lengths)
+    return _errors(predictor, [groups], joints, lengths)[0]
 
 
-def _groups(rows: ClipRows, layout: RowLayout, lengths: Sequence[int]) -> list[RollOuts]:
-    """The roll-outs of a clip."""
+def _groups(read: Loaded, layout: RowLayout, lengths: Sequence[int]) -> list[RollOuts]:
+    """The roll-outs that begin in the chosen rows. They may end after them."""
     out = []
-    for chosen in unbroken(rows.frame):
-        asked = inputs(rows, chosen, layout)
+    for stretch in unbroken(read.rows.frame):
+        first, stop = np.searchsorted(stretch, (read.first, read.stop))
+        given = inputs(read.rows, stretch, layout)
         for length in lengths:
-            starts = np.arange(1, len(chosen), max(1, length // OVERLAP))
+            starts = np.arange(max(1, first), stop, max(1, length // OVERLAP))
             if len(starts):
-                out.append(RollOuts(asked, starts, length))
+                out.append(RollOuts(given, starts, length))
     return out
 
 
@@ -125,10 +128,10 @@ def _errors(
     truth = crowd.y[:, layout.y_joint_position].reshape(len(crowd.y), -1, 3)[:, joints]
     moments = [Moments.nothing(2) for _ in owners]
     last: list[Array] = [np.zeros((0, len(joints), 2)) for _ in owners]
-    for age, (at, place, bounds) in enumerate(crowd.frames()):
+    for age, (at, place, places) in enumerate(crowd.frames()):
         errors = relative_and_distance(truth[at].astype(float), place[:, joints])
-        for g in np.flatnonzero(np.diff(bounds)):
-            own = errors[bounds[g] : bounds[g + 1]]
+        for g, of_group in places.items():
+            own = errors[of_group]
             weights = np.full(own[..., 0].size, 1 / len(joints))
             moments[g] = moments[g] + Moments.of(own.reshape(-1, 2), weights)
             if age == owners[g][1].length - 1:
@@ -140,12 +143,12 @@ def _errors(
 
 def _of_group(group: RollOuts, moments: Moments, end: Array, phase: Array) -> RollOutErrors:
     """The errors of a group. end: (n', joints, 2) in the last frame; phase: (n,) after it."""
-    frames = int(np.minimum(group.length, len(group.asked.x) - group.starts).sum())
+    frames = int(np.minimum(group.length, len(group.given.x) - group.starts).sum())
     # The phase is already that of the next frame, so that one has to be in the stretch too.
-    ended = int(np.searchsorted(group.starts, len(group.asked.x) - group.length))
+    ended = int(np.searchsorted(group.starts, len(group.given.x) - group.length))
     if not ended:
         return RollOutErrors(frames, len(group.starts), moments)
-    truth = group.asked.phase[group.starts[:ended] + group.length]
+    truth = group.given.phase[group.starts[:ended] + group.length]
     off = np.abs(np.mod(phase[:ended] - truth + 0.5, 1.0) - 0.5)
     last = np.stack([end[:ended, :, 1].mean(axis=1), off], axis=1)
     return RollOutErrors(frames, len(group.starts), moments, Moments.of(last), ended)
@@ -160,52 +163,62 @@ def measure_roll_outs(
     lengths: Sequence[int] = LENGTHS,
     mode: str = "cubic",
     sample: Sample | None = None,
-) -> dict[str, Any]:
+) -> RollOutsFound:
     """The content of rollouts.json: for each of `lengths`, the splits and the clips in name order.
 
-    clips: name -> file of rows. equivalents: names of the joints to measure. mode:
-    how the phase is looked up. sample: measure only these clips; the result then has their number in `sample`
-    and 95 % confidence intervals in `interval`. Raises InputError if rows and network have different layouts.
+    clips: name -> file of rows. equivalents: names of the joints to measure. mode: how the phase is looked
+    up. sample: measure only the roll-outs that begin in these excerpts; the result then has their number in
+    `sample` and 95 % confidence intervals in `interval`. Raises InputError if rows and network have different
+    layouts.
     """
     network = load_network(weights)
     predictor = network.predictor(mode)
     joints = joint_indices(network, equivalents)
+    total: dict[int, dict[str, RollOutErrors]]
     total = {length: dict.fromkeys(SPLITS, RollOutErrors()) for length in lengths}
-    entries: dict[int, list[dict[str, Any]]] = {length: [] for length in lengths}
-    chosen = sample.weights if sample else dict.fromkeys(sorted(clips), 1.0)
-    for some in _together(chosen, clips, network, lengths):
-        for name, errors in zip(some, _errors(predictor, list(some.values()), joints, lengths), strict=True):
+    of_clip: dict[int, dict[str, RollOutErrors]] = {length: {} for length in lengths}
+    excerpts: dict[int, dict[Excerpt, float | None]] = {length: {} for length in lengths}
+    for some in _together(chosen(clips, sample), network, lengths):
+        for one, errors in zip(some, _errors(predictor, list(some.values()), joints, lengths), strict=True):
             for length, found in errors.items():
-                total[length][splits[name]] += found.weighing(chosen[name])
-                entries[length].append({"clip": name, "split": splits[name], **found.to_dict(network.phase)})
-            log.info("%s: %s", name, entries[lengths[-1]][-1])
-    result: dict[str, Any] = {
+                weighed, known = found.weighing(one.weight), of_clip[length]
+                total[length][splits[one.clip]] += weighed
+                known[one.clip] = known.get(one.clip, RollOutErrors()) + weighed
+                if one.excerpt is not None:
+                    excerpts[length][one.excerpt] = found.to_dict()["position_error_cm"]
+            log.info("%s: %s", one.excerpt or one.clip, errors[lengths[-1]].to_dict(network.phase))
+    result: RollOutsFound = {
         "configuration": configuration,
         "joints": len(joints),
         "mode": mode,
         "lengths": [
             {
                 "length": length,
-                **{split: total[length][split].to_dict(network.phase) for split in SPLITS},
-                "clips": entries[length],
+                "train": total[length]["train"].to_dict(network.phase),
+                "held_out": total[length]["held_out"].to_dict(network.phase),
+                "clips": [
+                    {"clip": name, "split": splits[name], **found.to_dict(network.phase)}
+                    for name, found in of_clip[length].items()
+                ],
             }
             for length in lengths
         ],
     }
-    return result if sample is None else _with_sample(result, sample)
+    return result if sample is None else _with_intervals(result, sample, excerpts, splits)
 
 
 def _together(
-    names: Iterable[str], clips: Mapping[str, str | Path], network: Network, lengths: Sequence[int]
-) -> Iterator[dict[str, list[RollOuts]]]:
-    """The roll-outs of clips by name, as many clips at a time as have AT_ONCE frames together."""
-    some: dict[str, list[RollOuts]] = {}
+    every: Iterable[Chosen], network: Network, lengths: Sequence[int]
+) -> Iterator[dict[Chosen, list[RollOuts]]]:
+    """The roll-outs of clips or excerpts, as many at a time as have AT_ONCE frames together."""
+    some: dict[Chosen, list[RollOuts]] = {}
     frames = 0
-    for name in names:
-        rows = load_clip_rows(clips[name])
-        check_layout(clips[name], rows, network)
-        some[name] = _groups(rows, network.layout, lengths)
-        frames += len(rows)
+    for one in every:
+        # Two cycles share a frame, so that some frames have two rows.
+        read = one.load(before=2, after=2 * max(lengths))
+        check_layout(one.path, read.rows, network)
+        some[one] = _groups(read, network.layout, lengths)
+        frames += len(read.rows)
         if frames >= AT_ONCE:
             yield some
             some, frames = {}, 0
@@ -213,27 +226,33 @@ def _together(
         yield some
 
 
-def _with_sample(result: dict[str, Any], sample: Sample) -> dict[str, Any]:
+def _with_intervals(
+    result: RollOutsFound,
+    sample: Sample,
+    excerpts: Mapping[int, Mapping[Excerpt, float | None]],
+    splits: Mapping[str, str],
+) -> RollOutsFound:
     """The result with what was drawn, and the half widths of the 95 % intervals of each split and length.
 
-    A clip too short for any roll-out counts as the others of its split.
+    excerpts: length -> position error of each excerpt. One too short for any roll-out counts as the others of
+    its split.
     """
     for entry in result["lengths"]:
         for split in SPLITS:
             usual = entry[split]["position_error_cm"]
-            values = {
-                clip["clip"]: usual if clip["position_error_cm"] is None else clip["position_error_cm"]
-                for clip in entry["clips"]
-                if clip["split"] == split
-            }
             if usual is not None:
+                values = {
+                    one: usual if error is None else error
+                    for one, error in excerpts[entry["length"]].items()
+                    if splits[one.clip] == split
+                }
                 entry[split]["interval"] = {"position_error_cm": sample.half_width(split, values)}
     return {**result, "sample": sample.to_dict()}
 
 
-def roll_out_rows(result: Mapping[str, Any]) -> list[dict[str, Any]]:
+def roll_out_rows(result: RollOutsFound) -> list[Row]:
     """The clips' entries, and those of the splits with an empty `clip`, as flat rows."""
-    rows = []
+    rows: list[Row] = []
     for entry in result["lengths"]:
         for split in SPLITS:
             rows.append({"length": entry["length"], "clip": None, "split": split, **entry[split]})
@@ -243,7 +262,6 @@ def roll_out_rows(result: Mapping[str, Any]) -> list[dict[str, Any]]:
 
 def run(given: Given, options: Options) -> Outcome:
     """rollouts.json, and its rows as a table."""
-    sample = drawn(map(load_facts, given.facts), given.splits, options.sample_frames)
     result = measure_roll_outs(
         given.weights,
         given.clips,
@@ -252,6 +270,6 @@ def run(given: Given, options: Options) -> Outcome:
         chosen_joints(given, options),
         options.rollouts,
         given.runtime.mode,
-        sample,
+        sample_of(given, options),
     )
     return Outcome(result, {"lengths": roll_out_rows(result)})

@@ -1,7 +1,7 @@
 """The mode-adaptive network in plain numpy: start reading here (Zhang, Starke, Komura, Saito 2018).
 
 Each layer has K sets of weights, the experts. A small gating network gets the velocities of the feet, the
-gait and the wished velocity, and computes the shares in which the experts are blended. The phase is not used:
+gait and the target velocity, and computes the shares in which the experts are blended. The phase is not used:
 
     c = softmax(V2 elu(V1 elu(V0 x' + d0) + d1) + d2)        x': the columns of x that it sees
     h1 = elu(sum_k c_k (W0_k x + b0_k))    ...    y = sum_k c_k (W2_k h2 + b2_k)
@@ -29,7 +29,7 @@ def gate_columns(layout: RowLayout, skeleton: Skeleton) -> tuple[int, ...]:
     """The columns of X that the gating network gets.
 
     These are the velocities of heels and toes, the gait now and at the end of the trajectory, and the end of
-    the trajectory, which depends on the wished velocity.
+    the trajectory, which depends on the target velocity.
     """
     samples, now, last = layout.samples, layout.samples // 2, layout.samples - 1
     feet = [3 * skeleton.role(role) + axis for role in FEET for axis in range(3)]

@@ -10,14 +10,14 @@ from torch import Tensor
 from hobble.core.compiled import njit
 from hobble.models.fused_base import FusedBase
 from hobble.models.kernels import as_numpy, to_bfloat16, to_float32, use_threads
-from hobble.models.mann.step import Step
+from hobble.models.mann.step import MannStep
 
 
-class FusedStep(FusedBase, Step):
-    """As `Step`, but several times faster outside the products, with buffers reused for every batch."""
+class FusedMannStep(FusedBase, MannStep):
+    """As `MannStep`, but several times faster outside the products, with buffers reused for every batch."""
 
     def prepared(self, number: int, x: Tensor, mask: Tensor) -> tuple[Tensor, Tensor]:
-        """As in `Step`, in one sweep."""
+        """As in `MannStep`, in one sweep."""
         inputs = self.buffer(f"inputs {number}", len(x), x.shape[1] + 1, self.factors.dtype)
         slope = self.buffer(f"slope {number}", *x.shape)
         use_threads(x.numel())
@@ -25,14 +25,14 @@ class FusedStep(FusedBase, Step):
         return inputs, slope
 
     def blended(self, number: int, outputs: Tensor, c: Tensor) -> Tensor:
-        """As in `Step`, in one sweep."""
+        """As in `MannStep`, in one sweep."""
         h = self.buffer(f"h {number}", len(c), outputs.shape[1] // c.shape[1])
         use_threads(outputs.numel())
         _blend(as_numpy(outputs), c.numpy(), h.numpy())
         return h
 
     def spread(self, number: int, d: Tensor, outputs: Tensor, c: Tensor, dc: Tensor) -> Tensor:
-        """As in `Step`, in one sweep."""
+        """As in `MannStep`, in one sweep."""
         da = self.buffer(f"da {number}", len(c), outputs.shape[1], self.factors.dtype)
         use_threads(outputs.numel())
         _spread(d.numpy(), as_numpy(outputs), c.numpy(), as_numpy(da), dc.numpy())

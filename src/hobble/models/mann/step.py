@@ -21,12 +21,12 @@ from hobble.models.trainable import ALL_ROWS
 Kept = tuple[Tensor, Tensor]
 
 
-class Step:
+class MannStep:
     """The gradient of the mean squared error of a network under dropout, in PyTorch, on any device.
 
     network: the network in training, read at every call. dropout: share of units dropped before each layer of
     the gate and of the experts, inputs included. half: round the factors of the experts' products to
-    bfloat16. gradients, error: as in `hobble.models.trainable.Step`.
+    bfloat16. gradients, error: as in `hobble.models.trainable.TrainingStep`.
     """
 
     def __init__(self, network: TrainableMann, dropout: float, half: bool = False) -> None:
@@ -38,7 +38,7 @@ class Step:
         self.gradients: list[Tensor] = []
         self.error = torch.empty(0, network.sizes[-1], device=network.flat.device)
         self.columns = torch.tensor(network.columns, device=network.flat.device)
-        self.gates = len(network.gate_sizes) - 1
+        self.gates = self.input_mask = len(network.gate_sizes) - 1
         self.widths = (*network.gate_sizes[:-1], *network.sizes[:-1])
 
     def __call__(self, x: Tensor, y: Tensor, p: Tensor, masks: list[Tensor]) -> Tensor:

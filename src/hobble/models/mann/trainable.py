@@ -12,7 +12,7 @@ import torch
 from torch import Tensor
 
 from hobble.models.products import product
-from hobble.models.trainable import Step, Trainable, uniform_start
+from hobble.models.trainable import Trainable, TrainingStep, uniform_start
 
 
 @dataclass(frozen=True)
@@ -63,12 +63,12 @@ class TrainableMann(Trainable):
             x = torch.bmm(shares[:, None, :], x.view(len(x), self.experts, -1))[:, 0]
         return x
 
-    def step(self, dropout: float, half: bool) -> Step:
+    def step(self, dropout: float, half: bool) -> TrainingStep:
         """Compiled loops on a CPU, PyTorch elsewhere."""
         from hobble.models.mann import fused, step
 
         on_cpu = self.flat.device.type == "cpu"
-        return (fused.FusedStep if on_cpu else step.Step)(self, dropout, half)
+        return (fused.FusedMannStep if on_cpu else step.MannStep)(self, dropout, half)
 
     def arrays(self) -> dict[str, np.ndarray]:
         """`V0` (out, in), `d0` (out,), ... of the gate; `W0` (K, out, in), `b0` (K, out), ...; `gate`."""

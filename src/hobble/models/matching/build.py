@@ -13,8 +13,8 @@ from numpy.typing import NDArray
 from hobble.core.errors import InputError
 from hobble.core.quat import Array
 from hobble.core.skeleton import Skeleton
-from hobble.models.matching.features import columns_and_weights
 from hobble.models.matching.options import MatchingOptions
+from hobble.models.matching.search_features import columns_and_weights
 from hobble.rows.clip_rows import ClipRows, load_clip_rows
 from hobble.rows.compose import compose, frame_inputs
 from hobble.rows.layout import RowLayout

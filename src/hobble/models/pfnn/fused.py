@@ -10,11 +10,11 @@ from torch import Tensor
 from hobble.core.compiled import njit
 from hobble.models.fused_base import FusedBase
 from hobble.models.kernels import as_numpy, to_bfloat16, to_float32, use_threads
-from hobble.models.pfnn.step import Step
+from hobble.models.pfnn.step import PfnnStep
 
 
-class FusedStep(FusedBase, Step):
-    """As `Step`, but several times faster outside the products, with buffers reused for every batch."""
+class FusedPfnnStep(FusedBase, PfnnStep):
+    """As `PfnnStep`, but several times faster outside the products, with buffers reused for every batch."""
 
     def coefficients(self, p: Tensor) -> Tensor:
         """Spline coefficients (B, K) of phases (B,)."""
@@ -23,7 +23,7 @@ class FusedStep(FusedBase, Step):
         return c
 
     def expanded(self, number: int, x: Tensor, c: Tensor, mask: Tensor) -> tuple[Tensor, Tensor]:
-        """As in `Step`, in one sweep."""
+        """As in `PfnnStep`, in one sweep."""
         e = self.buffer(f"e {number}", len(x), c.shape[1] * (x.shape[1] + 1), self.factors.dtype)
         slope = self.buffer(f"slope {number}", *x.shape)
         use_threads(e.numel())
@@ -31,7 +31,7 @@ class FusedStep(FusedBase, Step):
         return e, slope
 
     def contracted(self, number: int, de: Tensor, c: Tensor, slope: Tensor) -> Tensor:
-        """As in `Step`, in one sweep."""
+        """As in `PfnnStep`, in one sweep."""
         d = self.buffer(f"d {number}", *slope.shape)
         use_threads(de.numel())
         _contract(as_numpy(de), c.numpy(), slope.numpy(), d.numpy())

@@ -19,7 +19,7 @@ from hobble.models.products import product
 from hobble.models.trainable import ALL_ROWS
 
 
-class Step:
+class PfnnStep:
     """The gradient of the mean squared error of a network under dropout, in PyTorch, on any device.
 
     network: the network in training, read at every call.
@@ -38,6 +38,7 @@ class Step:
         self.gradients: list[Tensor] = []
         self.error = torch.empty(0, network.sizes[-1], device=network.flat.device)
         self.widths = network.sizes[:-1]
+        self.input_mask = 0
 
     def __call__(self, x: Tensor, y: Tensor, p: Tensor, masks: list[Tensor]) -> Tensor:
         """Find `gradients` for x (B, X), y (B, Y), p (B,); returns the mean squared error, a scalar tensor.

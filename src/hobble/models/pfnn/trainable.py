@@ -12,7 +12,7 @@ from torch import Tensor
 
 from hobble.models.pfnn.network import formula
 from hobble.models.products import product
-from hobble.models.trainable import Step, Trainable, uniform_start
+from hobble.models.trainable import Trainable, TrainingStep, uniform_start
 
 
 @dataclass(frozen=True)
@@ -52,12 +52,12 @@ class TrainablePfnn(Trainable):
             x = product(expand(x, c), layer.flatten(1))
         return x
 
-    def step(self, dropout: float, half: bool) -> Step:
+    def step(self, dropout: float, half: bool) -> TrainingStep:
         """Compiled loops on a CPU, PyTorch elsewhere."""
         from hobble.models.pfnn import fused, step
 
         on_cpu = self.flat.device.type == "cpu"
-        return (fused.FusedStep if on_cpu else step.Step)(self, dropout, half)
+        return (fused.FusedPfnnStep if on_cpu else step.PfnnStep)(self, dropout, half)
 
     def arrays(self) -> dict[str, np.ndarray]:
         """`W0` (K, out, in), `b0` (K, out), ..."""

@@ -10,11 +10,11 @@ import numpy as np
 import torch
 from torch import Tensor
 
-from hobble.models.pfnn.fused import FusedStep
-from hobble.models.pfnn.step import Step as BlendedStep
+from hobble.models.pfnn.fused import FusedPfnnStep
+from hobble.models.pfnn.step import PfnnStep as BlendedStep
 from hobble.models.plain.network import PHASE_COLUMNS
 from hobble.models.products import product
-from hobble.models.trainable import ALL_ROWS, Step, Trainable, uniform_start
+from hobble.models.trainable import ALL_ROWS, Trainable, TrainingStep, uniform_start
 
 
 @dataclass(frozen=True)
@@ -55,7 +55,7 @@ class TrainablePlain(Trainable):
             x = product(torch.cat([x, torch.ones_like(x[:, :1])], dim=1), layer.flatten(1))
         return x
 
-    def step(self, dropout: float, half: bool) -> Step:
+    def step(self, dropout: float, half: bool) -> TrainingStep:
         """Compiled loops on a CPU, PyTorch elsewhere."""
         step: Any = FusedPlainStep if self.flat.device.type == "cpu" else PlainStep
         return step(self, dropout, half)
@@ -87,11 +87,11 @@ class _WithPhase:
     """Appends sine and cosine of the phase to the inputs of a step with one set of weights."""
 
     def __call__(self, x: Tensor, y: Tensor, p: Tensor, masks: list[Tensor]) -> Tensor:
-        """As in `Step`."""
+        """As in `TrainingStep`."""
         return super().__call__(with_phase(x, p), y, p, masks)  # type: ignore[misc]
 
     def masks(self, rows: int, own: slice = ALL_ROWS) -> list[Tensor]:
-        """As in `Step`, but the phase is never dropped, as it never is in `pfnn`."""
+        """As in `TrainingStep`, but the phase is never dropped, as it never is in `pfnn`."""
         masks: list[Tensor] = super().masks(rows, own)  # type: ignore[misc]
         masks[0][:, -PHASE_COLUMNS:] = 1
         return masks
@@ -105,7 +105,7 @@ class PlainStep(_WithPhase, BlendedStep):  # type: ignore[misc]
     """The plain network's step in PyTorch, on any device."""
 
 
-class FusedPlainStep(_WithPhase, FusedStep):  # type: ignore[misc]
+class FusedPlainStep(_WithPhase, FusedPfnnStep):  # type: ignore[misc]
     """The plain network's step in compiled loops on a CPU."""
 
 

@@ -27,7 +27,7 @@ export const createCharacter = (spec, place = [0, 0], heading = 0) => {
     gait: filled(T * G, 0), ground: filled(S * 3, 0), height: 0, phase: 0, joints: filled(3 * J, 0),
     velocities: filled(3 * J, 0), pose: filled(3 * J, 0), rotations: filled(4 * J, 0), turns: filled(4 * J, 0), channelValues: filled(L, 0), channelTargets: filled(L, 0),
     velocity: [0, 0], direction: [sin(heading), cos(heading)], strafe: 0, correction: [0, 0], lock: [0, 0],
-    hold: [[0, 0], [0, 0]], step: [0, 0], missed: [0, 0], lift: [0, 0], raised: 0, placed: false, added: [0, 1].map(() => [[1, 0, 0, 0], [1, 0, 0, 0]]), contacts: [0, 0, 0, 0], root: [place[0], 0, place[1]],
+    hold: [[0, 0], [0, 0]], step: [0, 0], missed: [0, 0], lift: [0, 0], raised: 0, placed: false, added: [0, 1].map(() => [[1, 0, 0, 0], [1, 0, 0, 0]]), shown: [], contacts: [0, 0, 0, 0], root: [place[0], 0, place[1]],
     memory: filled(spec.network.memory ?? 0, 0),
   };
   const feet = createFeet(spec, c);
@@ -61,6 +61,7 @@ export const createCharacter = (spec, place = [0, 0], heading = 0) => {
   c.gait.set(at("gait"));
   c.phase = spec.start.phase;
   c.pose.set(c.joints);
+  c.shown = spec.legs.map(([, ...below]) => below.map((j) => Array.from(c.joints.subarray(3 * j, 3 * j + 3))));
   const rotations = at("joint_rotation"), facing0 = [cos(heading / 2), 0, sin(heading / 2), 0];
   for (let j = 0; j < J; j++) c.rotations.set(multiply(facing0, at4(rotations, j)), 4 * j);
   settle();
@@ -225,6 +226,7 @@ export const createCharacter = (spec, place = [0, 0], heading = 0) => {
   const output = (y, ground) => {
     const si = c.dx[M], co = c.dz[M];
     const climbed = c.height - c.root[1];
+    c.raised += min(max(climbed, -k.mostClimb), k.mostClimb) - climbed;
     c.root = [c.px[M], c.height, c.pz[M]];
     for (let j = 0; j < 3 * J; j += 3) {
       const p = Y.joint_position + j, v = Y.joint_velocity + j;
@@ -308,6 +310,7 @@ export const createCharacter = (spec, place = [0, 0], heading = 0) => {
     for (let t = 0; t < T; t++) { c.px[t] += by[0]; c.pz[t] += by[1]; }
     for (const points of [c.joints, c.pose]) for (let j = 0; j < 3 * J; j += 3) { points[j] += by[0]; points[j + 2] += by[1]; }
     for (const hold of c.hold) { hold[0] += by[0]; hold[1] += by[1]; }
+    for (const point of c.shown.flat()) { point[0] += by[0]; point[2] += by[1]; }
     c.root = [c.root[0] + by[0], c.root[1], c.root[2] + by[1]];
   };
   c.frame = (velocity, ahead, gait, ground) => {

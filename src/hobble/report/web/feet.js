@@ -41,8 +41,13 @@ export const createFeet = (spec, c) => {
     }
     const by = c.lock[f] > 0 ? raiseHeel(joint(hip), joint(knee), joint(heel), point, shift) : [1, 0, 0, 0];
     const before = Array.from(joint(heel));
-    bend(joint(hip), joint(knee), joint(heel), shift, hip, knee, c.added[f]);
+    bend(joint(hip), joint(knee), joint(heel), shift, hip, knee, c.added[f], c.shown[f]);
     carryFoot(f, before, by);
+    holdToesBack(f);
+    c.shown[f] = [knee, heel, toe].map((j) => { // above the body's own height, because the whole body may rise in a frame
+      const [x, y, z] = joint(j);
+      return [x, y - c.height - c.raised, z];
+    });
     c.missed[f] = c.lock[f] === 1 ? hypot(c.hold[f][0] - point[0], c.hold[f][1] - point[2]) : 0;
   };
   // Hold a foot from its landing until the network lifts it, or until it has to step. Returns how far [x, z] to move it.
@@ -62,13 +67,32 @@ export const createFeet = (spec, c) => {
       const alone = c.lock[1 - f] !== 1; // the other foot is in the air
       if (c.contacts[2 * f + 1] < k.lockAt) c.lock[f] = max(0, c.lock[f] - k.release);
       else if (c.lock[f] < 1) {
-        away = away.map((v) => v * c.lock[f]);
+        away = within(away.map((v) => v * c.lock[f]), point, c.shown[f][2]);
         c.hold[f] = [point[0] + away[0], point[2] + away[1]];
         c.lock[f] = 1;
       } else if (far >= (alone ? k.tooFarAlone : k.tooFar) || c.missed[f] > (alone ? k.missedAlone : k.missed)) c.step[f] = 1 / k.stepFrames;
     }
     if (c.step[f] > 0) c.lock[f] = 1 - c.step[f] * c.step[f] * (3 - 2 * c.step[f]);
-    return away.map((v) => c.lock[f] * v);
+    return within(away.map((v) => c.lock[f] * v), point, c.shown[f][2]);
+  };
+  // The movement [x, z] of a toe, changed so that it gets no further than spec.bounds.fastest from where it was shown.
+  const within = (by, point, shown) => {
+    const to = [point[0] + by[0] - shown[0], point[2] + by[1] - shown[2]], share = spec.bounds.fastest / hypot(...to);
+    return share >= 1 ? by : [shown[0] + share * to[0] - point[0], shown[2] + share * to[1] - point[2]];
+  };
+  // Moves a point to where it is spec.bounds.fastest from where it was shown, if it is further. Returns whether it did.
+  const holdBack = (point, shown) => {
+    const to = [point[0] - shown[0], point[1] - shown[1] - c.height - c.raised, point[2] - shown[2]];
+    const share = 1 - spec.bounds.fastest / hypot(...to);
+    if (!(share > 0)) return false;
+    for (let i = 0; i < 3; i++) point[i] -= share * to[i];
+    return true;
+  };
+  const holdToesBack = (f) => {
+    const toe = spec.legs[f][3], before = Array.from(joint(toe));
+    if (!holdBack(joint(toe), c.shown[f][2])) return;
+    const moved = minus(joint(toe), before);
+    for (const j of spec.toes[f]) if (j !== toe) for (let i = 0; i < 3; i++) c.pose[3 * j + i] += moved[i];
   };
   // If the leg of a held foot would stretch too far, its heel rises. Returns the turn of the foot about its toe.
   const raiseHeel = (hip, knee, heel, toe, shift) => {
@@ -112,10 +136,10 @@ export const createFeet = (spec, c) => {
     for (let i = 0; i < 4; i++) held[i] = keep * held[i] + take * to[i];
     return late;
   };
-  // Like `reach`, but adds at most mostAdded to the network's own turn of thigh and shank.
-  const bend = (hip, knee, heel, shift, h, n, added) => {
+  // Like `reach`, but adds at most mostAdded to the network's own turn of thigh and shank. `shown`: knee and heel in the last frame.
+  const bend = (hip, knee, heel, shift, h, n, added, shown) => {
     const thigh = minus(knee, hip), shank = minus(heel, knee);
-    if (abs(shift[0]) + abs(shift[1]) + abs(shift[2]) > 1e-9) reach(hip, knee, heel, shift);
+    reach(hip, knee, heel, shift, rotate(at4(c.turns, h), spec.ahead));
     const late = [[thigh, minus(knee, hip)], [shank, minus(heel, knee)]].map(([a, b], i) => approach(added[i], between(a, b)));
     if (late[0] || late[1]) {
       const [t, s] = [rotate(added[0], thigh), rotate(added[1], shank)];
@@ -124,10 +148,16 @@ export const createFeet = (spec, c) => {
         heel[i] = knee[i] + s[i];
       }
     }
+    const held = [holdBack(knee, shown[0]), holdBack(heel, shown[1])];
+    if (held[0] || held[1]) {
+      added[0] = between(thigh, minus(knee, hip));
+      added[1] = between(shank, minus(heel, knee));
+    }
     c.turns.set(multiply(added[0], at4(c.turns, h)), 4 * h);
     c.turns.set(multiply(added[1], at4(c.turns, n)), 4 * n);
   };
-  const reach = (hip, knee, heel, shift) => {
+  // Moves the heel by `shift`. `ahead`: the direction in which a straight knee bends.
+  const reach = (hip, knee, heel, shift, ahead) => {
     const thigh = minus(knee, hip), shank = minus(heel, knee);
     const upper = hypot(...thigh), lower = hypot(...shank);
     const leg = thigh.map((v, i) => v + shank[i]), before = hypot(...leg);
@@ -136,8 +166,12 @@ export const createFeet = (spec, c) => {
     const was = leg.map((v) => v / before), way = aim.map((v) => v / distance);
     const length = min(max(distance, abs(upper - lower) * 1.001 + 1e-6), (upper + lower) * .999);
     const cosine = min(max((upper * upper + length * length - lower * lower) / (2 * upper * length), -1), 1);
-    // Turn the direction in which the knee bends with the leg.
-    const along = dot(thigh, was), side = thigh.map((v, i) => v - along * was[i]);
+    // The knee points forward by kneeAhead at least. Its direction turns with the leg.
+    const along = dot(thigh, was), front = dot(ahead, was), forward = ahead.map((v, i) => v - front * was[i]), long = max(hypot(...forward), 1e-6);
+    let side = thigh.map((v, i) => v - along * was[i]);
+    const more = max(k.kneeAhead - dot(side, forward) / long, 0);
+    if (more === 0 && abs(shift[0]) + abs(shift[1]) + abs(shift[2]) < 1e-9) return;
+    side = side.map((v, i) => v + more * forward[i] / long);
     const turn = dot(side, way) / max(1 + dot(was, way), 1e-6);
     const out = side.map((v, i) => v - turn * (was[i] + way[i])), size = hypot(...out);
     if (size < 1e-6) return;

@@ -41,7 +41,7 @@ const cholesky = (matrix, D) => {
   return low;
 };
 
-// learnt: from `hobble.report.recogniser`. Returns a function (walk, healthy) => {label, side, strength, distance, probabilities, sides}.
+// learnt: from `hobble.report.pack_recogniser`. Returns a function (walk, healthy) => {label, side, strength, distance, probabilities, sides}.
 export const createGrader = (learnt) => {
   const D = learnt.features.length, healthy = new Float64Array(bytes(learnt.healthySpread)), densities = [];
   const numbers = (text) => new Float64Array(bytes(text));

@@ -12,8 +12,8 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
+from hobble.channels.injury.study.answer_tables import scores, tables, write_tables
 from hobble.channels.injury.study.answers import read_answers, read_study
-from hobble.channels.injury.study.tables import scores, tables, write_tables
 from hobble.core.untrusted import read_yaml
 from hobble.report.gather import PUBLISHED
 

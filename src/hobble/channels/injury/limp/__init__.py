@@ -6,12 +6,13 @@ from __future__ import annotations
 
 from pydantic import Field
 
-from hobble.core.section import PositiveFloat, Section
+from hobble.core.section import PositiveFloat
 from hobble.measures.measure import Cost, Measure
+from hobble.measures.sample_options import SampleOptions
 from hobble.runtime.options import Runtime
 
 
-class Options(Section):
+class Options(SampleOptions):
     """The keys of this measurement in the section `evaluation`."""
 
     limp_seconds: PositiveFloat = Field(8.0, description="length of each walk whose limp is measured")
@@ -20,7 +21,7 @@ class Options(Section):
 MEASURE = Measure(
     name="limp",
     package=__name__,
-    inputs=("weights", "clips"),
+    inputs=("weights", "clips", "facts"),
     options=Options,
     runtime=tuple(Runtime.model_fields),
     cost=Cost(memory_mb=600, memory_each=14, seconds_each=0.1, minutes=20),

@@ -7,11 +7,12 @@ from typing import Any
 
 from hobble.channels.injury.response.page import in_words
 from hobble.channels.shown import speaker
+from hobble.measures.chosen import captured_sampled
 from hobble.measures.given import Json
 from hobble.report.charts import Chart, Trace, axis, line
 from hobble.report.formats import number
 from hobble.report.gather import Material
-from hobble.report.parts import Part, Section, Words
+from hobble.report.page_parts import PageSection, Paragraph, SectionPart
 from hobble.report.tables import Column, Table
 
 SHOWN = ("speed", "stance", "step_hurt", "knee_hurt", "hip_hurt", "lean", "pelvis_drop", "arm_hurt")
@@ -27,19 +28,19 @@ IMPAIRMENTS = {
 }
 
 
-def section(found: Json, material: Material) -> Section:
+def section(found: Json, material: Material) -> PageSection:
     """Charts of sizes, tables, the comparison with held-out captured limps, and where the training data came
     from.
     """
     if not found.get("applies"):
-        return Section("injury", [])
+        return PageSection("injury", [])
     name, say, found = material.name, speaker(material.network["skeleton"]), in_words(found, material)
-    return Section(
+    return PageSection(
         "injury",
         [
-            Part(1, Words(provenance(found["hurt_seconds"], say))),
-            Part(2, size_chart(found)),
-            Part(
+            SectionPart(1, Paragraph(provenance(found["hurt_seconds"], say) + captured_sampled(found))),
+            SectionPart(2, size_chart(found)),
+            SectionPart(
                 3,
                 Table(
                     f"{name}-limp-named",
@@ -47,11 +48,11 @@ def section(found: Json, material: Material) -> Section:
                     "Is the limp of a hurt leg recognised?",
                 ),
             ),
-            Part(5, together_table(name, found["named_together"])),
-            Part(4, held_out_table(name, found["held_out_limps"], say)),
-            Part(80, size_table(name, found["sizes"])),
-            Part(81, captured_table(name, found["captured"], say)),
-            Part(82, second_table(name, found["second"])),
+            SectionPart(5, together_table(name, found["named_together"])),
+            SectionPart(4, held_out_table(name, found["held_out_limps"], say)),
+            SectionPart(80, size_table(name, found["sizes"])),
+            SectionPart(81, captured_table(name, found["captured"], say)),
+            SectionPart(82, second_table(name, found["second"])),
         ],
     )
 
@@ -175,7 +176,7 @@ def together_table(name: str, rows: Sequence[Mapping[str, Any]]) -> Table | None
         Column.number("wrong side"),
     ]
     keys = ("column", "walks", "speed_share", "impaired", "named", "wrong_side")
-    title = "Is the limp of a hurt leg (severity 10) recognised together with another value?"
+    title = "Is the limp of a hurt leg (severity 10) recognised if another channel is high too?"
     return Table(f"{name}-limp-together", columns, [[row.get(key) for key in keys] for row in rows], title)
 
 

@@ -12,22 +12,23 @@ from typing import Any
 
 import numpy as np
 
+from hobble.channels.injury.crowd_severities import hurt_links
+from hobble.channels.injury.crowd_severities import links as links_of
 from hobble.channels.injury.limp import Options
-from hobble.channels.injury.limp.captured import HurtSeconds, Limp, healthy_of, limps
+from hobble.channels.injury.limp.captured_limps import HurtSeconds, Limp, healthy_of, limps
+from hobble.channels.injury.limp.crowd_walks import FigureWalk, walk_figures
 from hobble.channels.injury.limp.together import limps_together, named_together
-from hobble.channels.injury.limp.walks import FigureWalk, walk_figures
-from hobble.channels.injury.walks import hurt_links
-from hobble.channels.injury.walks import links as links_of
 from hobble.core.errors import HobbleError
 from hobble.core.skeleton import Skeleton
 from hobble.evaluation.spearman import spearman
 from hobble.gait.comparison import compare_walk
-from hobble.gait.effects import EFFECTS, effects, effects_of_people
+from hobble.gait.effect_sizes import EFFECTS, effects, effects_of_people
 from hobble.gait.features import features
 from hobble.gait.people import people
 from hobble.gait.profile import Profile, profile
 from hobble.gait.recogniser import RIGHT, SIDES, examples
-from hobble.hurt.parts import part_of_link
+from hobble.hurt.body_parts import part_of_link
+from hobble.measures.chosen import chosen, sample_of, with_sample
 from hobble.measures.given import Given, Outcome
 from hobble.models.load import load_network
 from hobble.models.network import Network
@@ -284,8 +285,9 @@ def run(given: Given, options: Options) -> Outcome:
     if network.skeleton is None:
         raise HobbleError(f"{given.weights} has no skeleton")
     # Without severities there is nothing to measure.
-    files = given.clips.values() if links_of(network) else ()
-    every, hurt_seconds = limps(files, given.splits, links_of(network), network.skeleton)
+    sample = sample_of(given, options)
+    read = chosen(given.clips, sample) if links_of(network) else ()
+    every, hurt_seconds = limps(read, given.splits, links_of(network), network.skeleton)
     result = limp(
         network,
         every,
@@ -298,4 +300,4 @@ def run(given: Given, options: Options) -> Outcome:
     tables = {name: result.get(name, []) for name in ("sizes", "trends", "named", "second", "together")}
     at_10 = next((row for row in result.get("named", []) if row["severity"] == SEVERITIES[-1]), None)
     says = f"legs at 10: called impaired in {at_10['impaired']} of windows" if at_10 else result["reason"]
-    return Outcome(result, tables, says)
+    return Outcome(with_sample(result, sample), tables, says)

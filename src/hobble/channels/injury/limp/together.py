@@ -8,8 +8,8 @@ from typing import Any
 import numpy as np
 
 from hobble.channels import channel
-from hobble.channels.injury.limp.walks import FigureWalk, walk_figures
-from hobble.channels.injury.walks import INJURY
+from hobble.channels.injury.crowd_severities import INJURY
+from hobble.channels.injury.limp.crowd_walks import FigureWalk, walk_figures
 from hobble.models.network import Network
 from hobble.runtime.options import Runtime
 

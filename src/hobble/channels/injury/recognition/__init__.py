@@ -1,12 +1,14 @@
 """Measures whether a classifier of captured clips recognises the hurt part of generated walks."""
 
 from hobble.measures.measure import Cost, Measure
+from hobble.measures.sample_options import SampleOptions
 from hobble.runtime.options import Runtime
 
 MEASURE = Measure(
     name="recognition",
     package=__name__,
-    inputs=("weights", "clips", "published"),
+    inputs=("weights", "clips", "facts", "published"),
+    options=SampleOptions,
     runtime=tuple(Runtime.model_fields),
     cost=Cost(memory_each=18, seconds_each=0.2, minutes=30),
 )

@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any
 
 from hobble.channels.injury.recognition.run import rows
+from hobble.evaluation.comparison_rows import PublishedRow, SideBySide, published_row
 from hobble.evaluation.configuration_results import ConfigurationResults
-from hobble.evaluation.side_by_side import SideBySide, published_row
-from hobble.measures.given import Json
+from hobble.measures.given import Json, Row
 
 NAME = "recognition"
 
@@ -21,13 +20,13 @@ def compared(all_measured: Sequence[ConfigurationResults], published: Json) -> S
     )
 
 
-def tables(compared: Json) -> dict[str, list[dict[str, Any]]]:
+def tables(compared: Json) -> dict[str, list[Row]]:
     """The confusion tables of all configurations."""
     found = [(entry["configuration"], row) for entry in compared[NAME] for row in rows(entry)]
     return {NAME: [{"configuration": name, **row} for name, row in found]}
 
 
-def _against_people(measured: ConfigurationResults, people: Json) -> list[dict[str, Any]]:
+def _against_people(measured: ConfigurationResults, people: Json) -> list[PublishedRow]:
     found = measured.found(NAME)
     if not found["applies"]:
         return []

@@ -2,15 +2,16 @@
 
 from __future__ import annotations
 
+from hobble.measures.chosen import captured_sampled
 from hobble.measures.given import Json
 from hobble.report.charts import Chart, Trace
 from hobble.report.gather import Material
-from hobble.report.parts import Part, Section
+from hobble.report.page_parts import PageSection, SectionPart
 
 
-def section(found: Json, material: Material) -> Section:
+def section(found: Json, material: Material) -> PageSection:
     """The chart, which is added to the section on the response to injury."""
-    return Section("injury", [Part(30, recognition_chart(found))])
+    return PageSection("injury", [SectionPart(30, recognition_chart(found))])
 
 
 def recognition_chart(found: Json) -> Chart | None:
@@ -64,7 +65,7 @@ def recognition_chart(found: Json) -> Chart | None:
         "Is the hurt part recognised?",
         "A classifier trained on captured clips says which part hurts. Rows: the part that hurts. Columns: "
         "the answer of the classifier. The diagonal is right. A random guess is right "
-        f"{100 * (found.get('chance') or 0):.0f} % of the time.{note}",
+        f"{100 * (found.get('chance') or 0):.0f} % of the time.{note}{captured_sampled(found)}",
         layout={
             "xaxis": {"type": "category", "tickangle": -50, "automargin": True},
             "yaxis": {"type": "category", "autorange": "reversed", "automargin": True},

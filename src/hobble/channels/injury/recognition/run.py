@@ -8,25 +8,27 @@ figures (Ferre 2019).
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import product
-from typing import Any
+from typing import cast
 
 import numpy as np
 
-from hobble.channels.injury.limp.captured import VERSION
-from hobble.channels.injury.walks import links as links_of
-from hobble.channels.injury.walks import severities
+from hobble.channels.injury.crowd_severities import links as links_of
+from hobble.channels.injury.crowd_severities import severities
+from hobble.channels.injury.limp.captured_limps import VERSION
+from hobble.channels.injury.recognition.results import Judged, Recognition
 from hobble.core.quat import Array
-from hobble.core.section import Section
 from hobble.core.skeleton import Skeleton
-from hobble.evaluation.captured import Captured, captured_clips
-from hobble.evaluation.crowd import FPS, Stretch
+from hobble.evaluation.captured import Captured
+from hobble.evaluation.crowd import FPS, CrowdTarget
 from hobble.evaluation.crowd import run as run_walks
 from hobble.evaluation.gait_features import features
 from hobble.gait.discriminant import Discriminant, learn
-from hobble.hurt.parts import part_of_link
-from hobble.measures.given import Given, Outcome
+from hobble.hurt.body_parts import part_of_link
+from hobble.measures.chosen import captured_motion, sample_of, with_sample
+from hobble.measures.given import Given, Outcome, Row
+from hobble.measures.sample_options import SampleOptions
 from hobble.models.load import load_network
 from hobble.models.network import Network
 from hobble.runtime.options import Runtime
@@ -47,7 +49,7 @@ TOO_FEW = "fewer than two parts hurt in the captured clips, or no clip walks"
 
 
 @dataclass(frozen=True)
-class Window:
+class InjuryWindow:
     """A stretch of walking: its clip, the link that hurts (or HEALTHY), its highest severity, features and
     fold.
     """
@@ -67,7 +69,7 @@ def recognition(
     configuration: str,
     runtime: Runtime,
     people: float,
-) -> dict[str, Any]:
+) -> Recognition:
     """How well a classifier of captured clips recognises generated walks: the content of recognition.json.
 
     motion: the captured clips. splits: clip -> "train" or "held_out". people: the published share.
@@ -79,19 +81,20 @@ def recognition(
     counts of hurt -> recognised. If the network or the clips do not allow the measurement, `applies` is false
     and `reason` says why.
     """
-    head: dict[str, Any] = {"configuration": configuration, "people": people}
+    refused: Recognition = {"configuration": configuration, "people": people, "applies": False}
     if not links_of(network) or network.skeleton is None:
-        return {**head, "applies": False, "reason": REASON}
+        return {**refused, "reason": REASON}
     windows = [w for clip in motion for w in walking_windows(clip, network)]
     known = [w for w in windows if splits[w.clip] == "train"]
     classes = sorted({w.hurt for w in known})
     if len(classes) < 2:
-        return {**head, "applies": False, "reason": TOO_FEW}
+        return {**refused, "reason": TOO_FEW}
     judge = learn(table(known), [w.hurt for w in known])
     sided = sides_of(network.skeleton)
     walks = generated(network, [c for c in classes if c != HEALTHY], HEALTHY in classes, runtime)
     return {
-        **head,
+        "configuration": configuration,
+        "people": people,
         "applies": True,
         "classes": classes,
         "features": list(known[0].values),
@@ -104,7 +107,7 @@ def recognition(
     }
 
 
-def walking_windows(clip: Captured, network: Network) -> list[Window]:
+def walking_windows(clip: Captured, network: Network) -> list[InjuryWindow]:
     """The windows of a captured stretch that walk straight ahead with constant severities."""
     assert network.skeleton is not None
     walk = clip.gait[:, network.gaits.index("walk")]
@@ -122,17 +125,21 @@ def walking_windows(clip: Captured, network: Network) -> list[Window]:
             names = [links_of(network)[i] for i in np.flatnonzero(hurts[first])]
             values = _values(network.skeleton, clip.local, clip.contacts, clip.root, span)
             severity = float(clip.channels[INJURY][span].max())
-            out.append(Window(clip.clip, " and ".join(names) or HEALTHY, severity, values, part))
+            out.append(InjuryWindow(clip.clip, " and ".join(names) or HEALTHY, severity, values, part))
     return out
 
 
-def generated(network: Network, classes: Sequence[str], healthy: bool, runtime: Runtime) -> list[Window]:
+def generated(
+    network: Network, classes: Sequence[str], healthy: bool, runtime: Runtime
+) -> list[InjuryWindow]:
     """Windows of generated walks, each class at each severity and speed."""
     assert network.skeleton is not None
     cases = [(name, s, v) for name, s, v in product(classes, GENERATED, SPEEDS)]
     cases += [(HEALTHY, 0.0, v) for v in SPEEDS] if healthy else []
     hurt = [{} if name == HEALTHY else dict.fromkeys(name.split(" and "), s) for name, s, _ in cases]
-    script = Stretch(WARM_UP + USED, ["walk"] * len(cases), severities(network, hurt), [v for *_, v in cases])
+    script = CrowdTarget(
+        WARM_UP + USED, ["walk"] * len(cases), severities(network, hurt), [v for *_, v in cases]
+    )
     walks = run_walks(network, [script], runtime)
     out = []
     for i, (name, severity, speed) in enumerate(cases):
@@ -141,7 +148,7 @@ def generated(network: Network, classes: Sequence[str], healthy: bool, runtime: 
             values = _values(
                 network.skeleton, walks.local[:, i], walks.contacts[:, i], walks.root[:, i], span
             )
-            out.append(Window(f"{name} {severity:g} {speed:g}", name, severity, values, 0))
+            out.append(InjuryWindow(f"{name} {severity:g} {speed:g}", name, severity, values, 0))
     return out
 
 
@@ -160,16 +167,21 @@ def sides_of(skeleton: Skeleton) -> Plain:
     return parts
 
 
-def table(windows: Sequence[Window]) -> Array:
+def table(windows: Sequence[InjuryWindow]) -> Array:
     """(n, D) features."""
     return np.array([list(w.values.values()) for w in windows])
 
 
-def rows(result: Mapping[str, Any]) -> list[dict[str, Any]]:
+def rows(result: Recognition) -> list[Row]:
     """The confusion tables as flat rows: kind of motion, what hurts, what was recognised, count."""
     if not result["applies"]:
         return []
-    tables = {**result["captured"], "generated": result["generated"]}
+    captured = result["captured"]
+    tables: dict[str, Judged] = {
+        "cross_validated": captured["cross_validated"],
+        "held_out": captured["held_out"],
+        "generated": result["generated"],
+    }
     return [
         {"motion": of, "hurt": hurt, "named": named, "windows": count}
         for of, found in tables.items()
@@ -178,29 +190,31 @@ def rows(result: Mapping[str, Any]) -> list[dict[str, Any]]:
     ]
 
 
-def run(given: Given, options: Section) -> Outcome:
+def run(given: Given, options: SampleOptions) -> Outcome:
     """recognition.json, and all its confusion tables as one table."""
     # Generated hurt versions are left out: the classifier would learn the generator's table of injuries.
-    files = [file for clip, file in given.clips.items() if not VERSION.search(clip)]
+    clips = {clip: file for clip, file in given.clips.items() if not VERSION.search(clip)}
+    facts = [file for file in given.facts if file.stem in clips]
+    sample = sample_of(replace(given, facts=facts), options)
     result = recognition(
         load_network(given.weights),
-        captured_clips(files),
+        captured_motion(clips, sample),
         given.splits,
         configuration=given.configuration,
         runtime=given.runtime,
         people=given.published["recognition"]["share"],
     )
     right = f"named right: {result['generated']['right']} of generated windows" if result["applies"] else ""
-    return Outcome(result, {"confusion": rows(result)}, right or result["reason"])
+    return Outcome(with_sample(result, sample), {"confusion": rows(result)}, right or result["reason"])
 
 
 def _values(skeleton: Skeleton, local: Array, contacts: Array, root: Array, span: slice) -> dict[str, float]:
     return features(skeleton, local[span], contacts[span], root[span])
 
 
-def _cross_validated(windows: Sequence[Window], sided: Plain) -> dict[str, Any]:
+def _cross_validated(windows: Sequence[InjuryWindow], sided: Plain) -> Judged:
     """The classes of windows, each quarter judged by a classifier that learnt from the other three."""
-    judged: list[Window] = []
+    judged: list[InjuryWindow] = []
     named: list[str] = []
     for part in range(FOLDS):
         rest = [w for w in windows if w.part != part]
@@ -211,11 +225,11 @@ def _cross_validated(windows: Sequence[Window], sided: Plain) -> dict[str, Any]:
     return _confusion(sorted({w.hurt for w in windows}), judged, named, sided)
 
 
-def _judged(judge: Discriminant, windows: Sequence[Window], sided: Plain) -> dict[str, Any]:
+def _judged(judge: Discriminant, windows: Sequence[InjuryWindow], sided: Plain) -> Judged:
     return _confusion(judge.classes, windows, judge.names(table(windows)) if windows else [], sided)
 
 
-def _by_walk(judge: Discriminant, windows: Sequence[Window], sided: Plain) -> dict[str, Any]:
+def _by_walk(judge: Discriminant, windows: Sequence[InjuryWindow], sided: Plain) -> Judged:
     """One answer for each walk, from all its windows together."""
     scores = judge.scores(table(windows))
     walks, named = [], []
@@ -228,18 +242,18 @@ def _by_walk(judge: Discriminant, windows: Sequence[Window], sided: Plain) -> di
 
 def _confusion(
     classes: Sequence[str],
-    windows: Sequence[Window],
+    windows: Sequence[InjuryWindow],
     named: Sequence[str],
     sided: Plain,
     what: str = "windows",
-) -> dict[str, Any]:
+) -> Judged:
     """Counts of hurt -> recognised: a row for each class that hurts, a column for each known class."""
     counts = {h: dict.fromkeys(classes, 0) for h in sorted({w.hurt for w in windows})}
     right: dict[float, list[bool]] = {}
     for w, name in zip(windows, named, strict=True):
         counts[w.hurt][name] += 1
         right.setdefault(w.severity, []).append(w.hurt == name)
-    return {
+    found = {
         what: len(windows),
         "right": _share([r for some in right.values() for r in some]),
         "right_without_side": _share(
@@ -250,6 +264,7 @@ def _confusion(
         ],
         "confusion": counts,
     }
+    return cast(Judged, found)
 
 
 def _share(right: Sequence[bool]) -> float | None:

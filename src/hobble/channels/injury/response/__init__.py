@@ -4,12 +4,13 @@ from __future__ import annotations
 
 from pydantic import Field
 
-from hobble.core.section import PositiveFloat, Section
+from hobble.core.section import PositiveFloat
 from hobble.measures.measure import Cost, Measure
+from hobble.measures.sample_options import SampleOptions
 from hobble.runtime.options import Runtime
 
 
-class Options(Section):
+class Options(SampleOptions):
     """The keys of this measurement in the section `evaluation`."""
 
     seconds: PositiveFloat = Field(4.0, description="time at each severity of the injury sweeps")
@@ -18,7 +19,7 @@ class Options(Section):
 MEASURE = Measure(
     name="injury",
     package=__name__,
-    inputs=("weights", "clips"),
+    inputs=("weights", "clips", "facts"),
     options=Options,
     runtime=tuple(Runtime.model_fields),
     cost=Cost(memory_each=14, seconds_each=0.2, minutes=60),

@@ -4,19 +4,19 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from itertools import product
-from typing import Any
 
 import numpy as np
 
+from hobble.channels.injury.crowd_severities import severities
+from hobble.channels.injury.response.results import Divided, IntoAJog, SecondInjury
 from hobble.channels.injury.response.sweep import WALK_IN
-from hobble.channels.injury.walks import severities
 from hobble.core.quat import Array
 from hobble.core.skeleton import Skeleton
-from hobble.evaluation.crowd import FPS, Stretch, Walks, run
+from hobble.evaluation.crowd import FPS, CrowdTarget, Walks, run
 from hobble.evaluation.motion_measures import gait_measures
 from hobble.evaluation.pose_distance import distance_to_cycle, mean_cycle
 from hobble.evaluation.spearman import spearman
-from hobble.hurt.parts import part_of_link
+from hobble.hurt.body_parts import part_of_link
 from hobble.models.network import Network
 from hobble.runtime.options import Runtime
 
@@ -51,7 +51,7 @@ def _speed(network: Network, walks: Walks, stretch: int, figure: int) -> float:
 
 def second_injuries(
     network: Network, links: Sequence[str], seconds: float, runtime: Runtime
-) -> list[dict[str, Any]]:
+) -> list[SecondInjury]:
     """Every link hurt more and more, in addition to a first one at severity 7, while walking.
 
     The first is one link of each part of the body (`one_of_each_part`), because all 30 would take longer than
@@ -70,20 +70,19 @@ def second_injuries(
         return severities(network, each)
 
     healthy = severities(network, [{}] * len(pairs))
-    script = [Stretch(_frames(WALK_IN, seconds), gait, healthy)]
-    script += [Stretch(_frames(1, seconds), gait, hurt(s)) for s in SECOND]
+    script = [CrowdTarget(_frames(WALK_IN, seconds), gait, healthy)]
+    script += [CrowdTarget(_frames(1, seconds), gait, hurt(s)) for s in SECOND]
     walks = run(network, script, runtime)
     last = len(SECOND)
-    alone = {b: i for i, (a, b) in enumerate(pairs) if a is None}
-    out = []
+    alone = {b: _alone(walks, last, i) for i, (a, b) in enumerate(pairs) if a is None}
+    out: list[SecondInjury] = []
     for i, (first, second) in enumerate(pairs):
         if first is None:
             continue
-        base, of_second = _cycle(walks, 1, i), _cycle(walks, last, alone[second])
+        of_second, own, normal = alone[second]
+        base = _cycle(walks, 1, i)
         away = [_from(walks, 1 + k, i, base) for k in range(last)]
-        j = alone[second]
-        normal = _from(walks, last, j, _cycle(walks, 1, j)) - _from(walks, 1, j, _cycle(walks, 1, j))
-        both = _from(walks, last, i, of_second) - _from(walks, last, j, of_second)
+        both = _from(walks, last, i, of_second) - own
         out.append(
             {
                 "first": first,
@@ -97,6 +96,17 @@ def second_injuries(
     return out
 
 
+def _alone(walks: Walks, last: int, figure: int) -> tuple[Array, float, float]:
+    """What one injury does to a figure that is healthy in stretch 1 and hurt in stretch `last`.
+
+    The mean cycle in `last`; the distance of the walk from that cycle, cm; the effect: how much further the
+    hurt walk is from the healthy cycle than the healthy walk is, cm.
+    """
+    healthy, cycle = _cycle(walks, 1, figure), _cycle(walks, last, figure)
+    effect = _from(walks, last, figure, healthy) - _from(walks, 1, figure, healthy)
+    return cycle, _from(walks, last, figure, cycle), effect
+
+
 def one_of_each_part(skeleton: Skeleton, links: Sequence[str]) -> list[str]:
     """The first of `links` in each part of the body, on either side."""
     pairs = dict(zip(skeleton.link_names, skeleton.links, strict=True))
@@ -106,9 +116,7 @@ def one_of_each_part(skeleton: Skeleton, links: Sequence[str]) -> list[str]:
     return list(first.values())
 
 
-def into_a_jog(
-    network: Network, links: Sequence[str], seconds: float, runtime: Runtime
-) -> list[dict[str, Any]]:
+def into_a_jog(network: Network, links: Sequence[str], seconds: float, runtime: Runtime) -> list[IntoAJog]:
     """From walking to jogging with each link at severities 0, 5 and 10.
 
     `kept`: distance of the jog from the healthy jog, as a share of the distance of the walk from the healthy
@@ -122,13 +130,17 @@ def into_a_jog(
     walk, jog = ["walk"] * len(figures), ["jog"] * len(figures)
     walks = run(
         network,
-        [Stretch(frames, walk, hurt), Stretch(frames, walk, hurt), Stretch(2 * frames, jog, hurt)],
+        [
+            CrowdTarget(frames, walk, hurt),
+            CrowdTarget(frames, walk, hurt),
+            CrowdTarget(2 * frames, jog, hurt),
+        ],
         runtime,
     )
     healthy = {stretch: _cycle(walks, stretch, 0) for stretch in (1, 2)}
     own = {stretch: _from(walks, stretch, 0, healthy[stretch]) for stretch in (1, 2)}
     at = int(walks.starts[2])
-    out = []
+    out: list[IntoAJog] = []
     for i, (link, severity) in enumerate(figures):
         walking, jogging = (_from(walks, s, i, healthy[s]) - own[s] for s in (1, 2))
         speed = _speed(network, walks, 2, i)
@@ -152,15 +164,15 @@ def into_a_jog(
 
 def divided_severities(
     network: Network, links: Sequence[str], seconds: float, runtime: Runtime
-) -> list[dict[str, Any]]:
+) -> list[Divided]:
     """The walk with severities divided by 1, 2 and 5: how much of each link's effect remains."""
     gait = ["walk"] * len(links)
-    script = [Stretch(_frames(WALK_IN, seconds), gait, severities(network, [{}] * len(links)))]
+    script = [CrowdTarget(_frames(WALK_IN, seconds), gait, severities(network, [{}] * len(links)))]
     script += [
-        Stretch(_frames(1, seconds), gait, severities(network, [{link: s} for link in links]))
+        CrowdTarget(_frames(1, seconds), gait, severities(network, [{link: s} for link in links]))
         for s in DIVIDED
     ]
-    out = []
+    out: list[Divided] = []
     for scale in SCALES:
         walks = run(network, script, runtime.model_copy(update={"scales": {"injury": scale}}))
         for i, link in enumerate(links):

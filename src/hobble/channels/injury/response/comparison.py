@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Any
 
+from hobble.evaluation.comparison_rows import SideBySide
 from hobble.evaluation.configuration_results import ConfigurationResults
-from hobble.evaluation.side_by_side import SideBySide
 from hobble.measures.given import Json
 
 NAME = "injury"

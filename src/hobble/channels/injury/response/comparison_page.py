@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from hobble.report.parts import Part, Section, Words
+from hobble.report.page_parts import PageSection, Paragraph, SectionPart
 from hobble.report.side_by_side import Compared
 from hobble.report.tables import Column, Table
 
@@ -29,12 +29,12 @@ INJURY = {
 }
 
 
-def section(compared: Compared) -> Section:
+def section(compared: Compared) -> PageSection:
     """A table of means, if any configuration can be hurt."""
     table = injury_table(compared)
-    words = Words(INTRODUCTION) if table else None
-    parts = [Part(0, words), Part(10, table, open=True, short=True)]
-    return Section("injury", parts, title="Injury response", at=20)
+    words = Paragraph(INTRODUCTION) if table else None
+    parts = [SectionPart(0, words), SectionPart(10, table, open=True, short=True)]
+    return PageSection("injury", parts, title="Injury response", at=20)
 
 
 def injury_table(compared: Compared) -> Table | None:

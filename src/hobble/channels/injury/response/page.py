@@ -9,9 +9,9 @@ from hobble.channels.injury.response import page_cases as cases
 from hobble.channels.injury.response.hints import injury_hints
 from hobble.channels.shown import speaker
 from hobble.measures.given import Json
-from hobble.report.charts import Chart, Family, Trace, axis, line
+from hobble.report.charts import Chart, ChartGroup, Trace, axis, line
 from hobble.report.gather import Material
-from hobble.report.parts import Pair, Part, Section
+from hobble.report.page_parts import ChartPair, PageSection, SectionPart
 from hobble.report.summary import Hint, placed
 from hobble.report.tables import Column, Table
 
@@ -55,10 +55,10 @@ PANELS: tuple[tuple[str, str, str, tuple[tuple[str, str, str], ...], float, bool
 )
 
 
-def section(found: Json, material: Material) -> Section:
+def section(found: Json, material: Material) -> PageSection:
     """Charts and tables. Empty for a network without severities."""
     parts = _parts(in_words(found, material), material.name) if found.get("applies") else []
-    return Section("injury", parts, title="Injury response", at=20)
+    return PageSection("injury", parts, title="Injury response", at=20)
 
 
 def hints(found: Json, material: Material) -> Iterator[Hint]:
@@ -80,25 +80,25 @@ def in_words(found: Json, material: Material) -> dict[str, Any]:
     return {key: named(value) for key, value in found.items()}
 
 
-def _parts(found: Json, name: str) -> list[Part]:
+def _parts(found: Json, name: str) -> list[SectionPart]:
     rows, responses, second = (found.get(key) or [] for key in ("rows", "responses", "second"))
     untrained = {r["link"] for r in responses if not r.get("trained", True)}
     return [
-        Part(0, Pair(overview(responses))),
-        Part(10, response_table(name, responses)),
-        Part(20, curves(rows, found.get("falling") or (), untrained) if rows else None),
-        Part(40, cases.second_chart(second)),
-        Part(50, cases.second_table(name, second)),
-        Part(
+        SectionPart(0, ChartPair(overview(responses))),
+        SectionPart(10, response_table(name, responses)),
+        SectionPart(20, curves(rows, found.get("falling") or (), untrained) if rows else None),
+        SectionPart(40, cases.second_chart(second)),
+        SectionPart(50, cases.second_table(name, second)),
+        SectionPart(
             60,
-            Pair(
+            ChartPair(
                 [
                     cases.divided_chart(found.get("divided") or ()),
                     cases.jog_chart(found.get("into_a_jog") or (), untrained),
                 ]
             ),
         ),
-        Part(70, sweep_table(name, rows)),
+        SectionPart(70, sweep_table(name, rows)),
     ]
 
 
@@ -106,7 +106,7 @@ def curves(
     rows: Sequence[Mapping[str, Any]],
     back: Sequence[Mapping[str, Any]] = (),
     untrained: Collection[str] = (),
-) -> Family:
+) -> ChartGroup:
     """A small chart for each measure over severity, for a chosen gait and link.
 
     Dotted: falling severity. Links in `untrained` come last and are marked.
@@ -158,7 +158,7 @@ def curves(
                 option_layouts=ranges,
             )
         )
-    return Family(
+    return ChartGroup(
         "sweeps",
         "One link at rising severity",
         "Each point is a separate walk, healthy for the first quarter and measured over the last half. "
@@ -198,7 +198,7 @@ def overview(responses: Sequence[Mapping[str, Any]]) -> list[Chart]:
             2.0,
             "Distance from the healthy walk at the same phase, mean over joints. Hollow dots are links that "
             "were never hurt in training. They have no effect, so they show how much healthy walks differ. A "
-            "filled dot at the same distance means that this link has no effect either.",
+            "filled dot as far left as the hollow ones means that this link has no effect either.",
         ),
         (
             "injury-speed",

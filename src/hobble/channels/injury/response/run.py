@@ -2,19 +2,21 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Sequence
 from typing import Any
 
 import numpy as np
 
+from hobble.channels.injury.crowd_severities import hurt_links
+from hobble.channels.injury.crowd_severities import links as links_of
 from hobble.channels.injury.response import Options
 from hobble.channels.injury.response.cases import divided_severities, into_a_jog, second_injuries
+from hobble.channels.injury.response.results import InjuryResponse, LinkResponse, Summary, SweepRow
 from hobble.channels.injury.response.sweep import SEVERITIES, sweeps
-from hobble.channels.injury.walks import hurt_links
-from hobble.channels.injury.walks import links as links_of
-from hobble.evaluation.captured import Captured, captured_clips
+from hobble.evaluation.captured import Captured
 from hobble.evaluation.crowd import SPEEDS
-from hobble.measures.given import Given, Outcome
+from hobble.measures.chosen import captured_motion, sample_of, with_sample
+from hobble.measures.given import Given, Outcome, Row
 from hobble.models.load import load_network
 from hobble.models.network import Network
 from hobble.runtime.options import Runtime
@@ -22,16 +24,6 @@ from hobble.runtime.options import Runtime
 INJURY = "injury"  # the channel
 GAITS = tuple(SPEEDS)
 NO_SEVERITIES = "this network has no severity inputs"
-SUMMARY = (
-    "from_healthy_cm",
-    "after_healing_cm",
-    "hysteresis_cm",
-    "speed_share",
-    "settle_seconds",
-    "heal_seconds",
-    "acceleration_share",
-    "clip_acceleration_share",
-)
 
 
 def injury_response(
@@ -42,7 +34,7 @@ def injury_response(
     runtime: Runtime,
     seconds: float,
     links: Sequence[str] | None = None,
-) -> dict[str, Any]:
+) -> InjuryResponse:
     """The content of injury.json: a sweep of each of `links` (default: all).
 
     motion: the captured clips, whose largest accelerations are compared with the character's. seconds: time
@@ -56,9 +48,9 @@ def injury_response(
     links = list(links or links_of(network))
     trained = [link for link in links if link in hurt_links(network)]
     largest = largest_accelerations(motion, network)
-    rows: list[dict[str, Any]] = []
-    falling: list[dict[str, Any]] = []
-    responses = []
+    rows: list[SweepRow] = []
+    falling: list[SweepRow] = []
+    responses: list[LinkResponse] = []
     for sweep in sweeps(network, links, GAITS, seconds, runtime):
         gait = sweep.gait
         for figure, link in enumerate(links):
@@ -121,9 +113,9 @@ def largest_accelerations(
     return out
 
 
-def _summary(responses: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
+def _summary(responses: Sequence[LinkResponse]) -> dict[str, Summary]:
     """Means over links, by gait; {} without links."""
-    out = {}
+    out: dict[str, Summary] = {}
     for gait in GAITS:
         some = [r for r in responses if r["gait"] == gait]
         if some:
@@ -131,7 +123,14 @@ def _summary(responses: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
                 "spearman_from_healthy": _mean([r["spearman"]["from_healthy"] for r in some]),
                 "spearman_speed": _mean([r["spearman"]["speed"] for r in some]),
                 "spearman_falling_from_healthy": _mean([r["spearman_falling"]["from_healthy"] for r in some]),
-                **{key: _mean([r[key] for r in some]) for key in SUMMARY},
+                "from_healthy_cm": _mean([r["from_healthy_cm"] for r in some]),
+                "after_healing_cm": _mean([r["after_healing_cm"] for r in some]),
+                "hysteresis_cm": _mean([r["hysteresis_cm"] for r in some]),
+                "speed_share": _mean([r["speed_share"] for r in some]),
+                "settle_seconds": _mean([r["settle_seconds"] for r in some]),
+                "heal_seconds": _mean([r["heal_seconds"] for r in some]),
+                "acceleration_share": _mean([r["acceleration_share"] for r in some]),
+                "clip_acceleration_share": _mean([r["clip_acceleration_share"] for r in some]),
             }
     return out
 
@@ -143,13 +142,18 @@ def _mean(values: Sequence[float | None]) -> float | None:
 
 def run(given: Given, options: Options) -> Outcome:
     """injury.json, and its sweeps as tables."""
+    sample = sample_of(given, options)
     result = injury_response(
         load_network(given.weights),
-        captured_clips(given.clips.values()),
+        captured_motion(given.clips, sample),
         configuration=given.configuration,
         runtime=given.runtime,
         seconds=options.seconds,
     )
-    tables = {name: result.get(name, []) for name in ("second", "into_a_jog", "divided")}
-    tables["sweep"] = [*result.get("rows", []), *result.get("falling", [])]
-    return Outcome(result, tables, str(result.get("summary", result.get("reason"))))
+    tables: dict[str, Sequence[Row]] = {
+        "second": result.get("second", []),
+        "into_a_jog": result.get("into_a_jog", []),
+        "divided": result.get("divided", []),
+        "sweep": [*result.get("rows", []), *result.get("falling", [])],
+    }
+    return Outcome(with_sample(result, sample), tables, str(result.get("summary", result.get("reason"))))

@@ -8,13 +8,14 @@ walk follows.
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from typing import Any
+from typing import cast
 
 import numpy as np
 
-from hobble.channels.injury.walks import severities
+from hobble.channels.injury.crowd_severities import severities
+from hobble.channels.injury.response.results import Response, SweepRow
 from hobble.core.skeleton import Skeleton
-from hobble.evaluation.crowd import FPS, Stretch, Walks, run
+from hobble.evaluation.crowd import FPS, CrowdTarget, Walks, run
 from hobble.evaluation.motion_measures import gait_measures
 from hobble.evaluation.pose_distance import distance_to_cycle, mean_cycle, period, settling
 from hobble.evaluation.spearman import spearman
@@ -29,7 +30,7 @@ HURT = 2  # stretches for which a figure is hurt at once, and then healed
 NAMES = ("gait", "link", "direction", "severity")
 
 
-class Sweep:
+class SeveritySweep:
     """The walks of one gait, a figure for each of `links`.
 
     steps: the severities. walks: the figures' way through them, after a stretch in which they begin to walk.
@@ -43,7 +44,7 @@ class Sweep:
         self.steps = STEPS
         self.walks, self.at_once = walks, at_once
 
-    def rows(self, figure: int) -> list[dict[str, Any]]:
+    def rows(self, figure: int) -> list[SweepRow]:
         """One row for each step.
 
         It has the gait's measures, the distances of the pose from the healthy and the fully hurt walk (cm,
@@ -56,7 +57,7 @@ class Sweep:
         rows = []
         for step, (span, severity) in enumerate(zip(spans, self.steps, strict=True)):
             local, phase = walks.local[span, figure], walks.phase[span, figure]
-            row: dict[str, Any] = {
+            row: dict[str, float | str | None] = {
                 "gait": self.gait,
                 "link": self.links[figure],
                 "direction": "rising" if step <= worst else "falling",
@@ -69,10 +70,11 @@ class Sweep:
             same = cycles[step if step <= worst else 2 * worst - step]
             row["from_rising"] = float(np.mean(distance_to_cycle(local, phase, same)))
             row["largest_acceleration"] = float(walks.acceleration[span, figure].max())
-            rows.append({k: round(v, 5) if isinstance(v, float) else v for k, v in row.items()})
+            rounded = {k: round(v, 5) if isinstance(v, float) else v for k, v in row.items()}
+            rows.append(cast(SweepRow, rounded))
         return rows
 
-    def response(self, figure: int, rows: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
+    def response(self, figure: int, rows: Sequence[SweepRow]) -> Response:
         """How the measures respond to severity.
 
         Spearman's rho for rising and falling severity (None if a measure is constant). At severity 10:
@@ -84,12 +86,16 @@ class Sweep:
         worst = len(SEVERITIES) - 1
         rising, falling = rows[: worst + 1], rows[worst:]
         names = [k for k in rows[0] if k not in (*NAMES, "from_rising")]
+        numbers = cast(Sequence[Mapping[str, float | None]], rows)
+        measures = {name: [row[name] for row in numbers] for name in names}
         own = rows[0]["from_healthy"]
         largest = float(self.walks.acceleration[int(self.walks.starts[1]) :, figure].max())
         hurt, healed = self._settling(figure)
         return {
-            "spearman": {n: spearman(SEVERITIES, [row[n] for row in rising]) for n in names},
-            "spearman_falling": {n: spearman(SEVERITIES[::-1], [row[n] for row in falling]) for n in names},
+            "spearman": {n: spearman(SEVERITIES, values[: worst + 1]) for n, values in measures.items()},
+            "spearman_falling": {
+                n: spearman(SEVERITIES[::-1], values[worst:]) for n, values in measures.items()
+            },
             "from_healthy_cm": round(rising[-1]["from_healthy"] - own, 5),
             "after_healing_cm": round(rows[-1]["from_healthy"] - own, 5),
             "hysteresis_cm": round(max(row["from_rising"] for row in falling[1:]) - own, 5),
@@ -118,17 +124,17 @@ class Sweep:
 
 def sweeps(
     network: Network, links: Sequence[str], gaits: Sequence[str], seconds: float, runtime: Runtime
-) -> Iterator[Sweep]:
+) -> Iterator[SeveritySweep]:
     """The sweep of each gait, `seconds` at each severity. The figures of all gaits go in one crowd."""
     assert network.skeleton is not None
     names = [gait for gait in gaits for _ in links]
 
-    def stretch(share: float, severity: float) -> Stretch:
+    def stretch(share: float, severity: float) -> CrowdTarget:
         hurt = severities(network, [{link: severity} for link in links] * len(gaits))
-        return Stretch(max(4, round(share * seconds * FPS)), names, hurt)
+        return CrowdTarget(max(4, round(share * seconds * FPS)), names, hurt)
 
     walks = run(network, [stretch(WALK_IN, 0), *(stretch(1, s) for s in STEPS)], runtime)
     at_once = run(network, [stretch(WALK_IN, 0), stretch(1, 0), stretch(HURT, 10), stretch(HURT, 0)], runtime)
     for number, gait in enumerate(gaits):
         own = slice(number * len(links), (number + 1) * len(links))
-        yield Sweep(network.skeleton, links, gait, walks.of(own), at_once.of(own))
+        yield SeveritySweep(network.skeleton, links, gait, walks.of(own), at_once.of(own))

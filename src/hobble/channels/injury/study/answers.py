@@ -36,7 +36,7 @@ class Study:
 
 
 @dataclass(frozen=True)
-class Answer:
+class FilmAnswer:
     """One person's answer to one film."""
 
     film: int
@@ -55,7 +55,7 @@ def read_study(path: str | Path) -> Study:
         raise InputError(path, f"is no list of films: {printable(repr(error))}", fix=fix) from None
 
 
-def read_answers(path: str | Path, study: Study) -> list[Answer]:
+def read_answers(path: str | Path, study: Study) -> list[FilmAnswer]:
     """One person's answers, in the order in which the films were shown.
 
     Raises InputError with the answer's number for another study's file, a film that is missing or answered
@@ -80,7 +80,7 @@ def read_answers(path: str | Path, study: Study) -> list[Answer]:
     return answers
 
 
-def _answer(path: str | Path, number: int, row: Any, study: Study) -> Answer:
+def _answer(path: str | Path, number: int, row: Any, study: Study) -> FilmAnswer:
     where = f"answer {number}"
     if not isinstance(row, dict):
         raise InputError(path, f"{where} is no answer: {printable(row, 40)}")
@@ -92,7 +92,7 @@ def _answer(path: str | Path, number: int, row: Any, study: Study) -> Answer:
         raise InputError(path, f"{where}: no such part: {given}", fix=f"There are {', '.join(study.parts)}.")
     if not isinstance(fluid, int) or isinstance(fluid, bool) or fluid not in FLUID:
         raise InputError(path, f"{where}: `fluid` is {printable(fluid, 40)}, but it is a number from 1 to 5")
-    return Answer(film, tuple(dict.fromkeys(parts)), fluid)
+    return FilmAnswer(film, tuple(dict.fromkeys(parts)), fluid)
 
 
 def _object(path: str | Path, data: Any) -> dict[str, Any]:

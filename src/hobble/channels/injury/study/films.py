@@ -14,10 +14,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from hobble.channels.injury.crowd_severities import INJURY, hurt_links
+from hobble.channels.injury.crowd_severities import links as links_of
 from hobble.channels.injury.shown import OTHERS, links_between
 from hobble.channels.injury.shown import PARTS as SLIDERS
-from hobble.channels.injury.walks import INJURY, hurt_links
-from hobble.channels.injury.walks import links as links_of
 from hobble.core.errors import HobbleError
 from hobble.core.quat import Array
 from hobble.models.network import Network
@@ -115,7 +115,7 @@ def act(network: Network, film: Film, runtime: Runtime) -> FilmMotion:
     return FilmMotion(*hurt, float(apart))
 
 
-def wish(film: Film, frame: int) -> tuple[bool, str]:
+def hurts_and_gait(film: Film, frame: int) -> tuple[bool, str]:
     """Whether it hurts at a frame of a film, and which gait is asked for."""
     hurts = frame >= HEALTHY * FPS
     changed = frame >= (HEALTHY + HURT) * FPS - CHANGED * FPS / 2
@@ -129,7 +129,7 @@ def _walked(
     before, frames = round(WARM_UP * FPS), round(film.seconds * FPS)
     positions, rotations = [], []
     for frame in range(-before, frames):
-        hurts, gait = wish(film, frame)
+        hurts, gait = hurts_and_gait(film, frame)
         pose = animation.next_pose(
             np.array([0.0, SPEEDS[gait]]), None, gait, **{INJURY: severities if hurts else {}}
         )

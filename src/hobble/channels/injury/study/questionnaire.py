@@ -14,15 +14,15 @@ import numpy as np
 from numpy.typing import NDArray
 from PIL import Image
 
+from hobble.channels.injury.crowd_severities import hurt_links
 from hobble.channels.injury.study.films import FILMS, FPS, PARTS, SEVERITY, Film, FilmMotion, act, part_links
-from hobble.channels.injury.walks import hurt_links
 from hobble.core.files import write_json, write_text
 from hobble.core.skeleton import Skeleton
 from hobble.core.smooth import gaussian
 from hobble.figure.mesh import body
 from hobble.models.network import Network
 from hobble.report.formats import embedded
-from hobble.report.raster import Camera, Studio
+from hobble.report.raster import BodyRenderer, Camera
 from hobble.report.stimuli import VISIBLE
 from hobble.report.templates import questionnaire_script, style, template
 from hobble.runtime.export import jointed
@@ -52,7 +52,7 @@ def write_questionnaire(
         part_links(network, film.parts)
     assert network.skeleton is not None
     folder.mkdir(parents=True, exist_ok=True)
-    studio, rows, shown = Studio(body(network.skeleton)), [], []
+    studio, rows, shown = BodyRenderer(body(network.skeleton)), [], []
     for film in films:
         motion = act(network, film, runtime)
         data = encoded(pictures(studio, network.skeleton, motion, size))
@@ -99,7 +99,9 @@ def doubts(solution: dict[str, Any]) -> list[str]:
     return out + ([f"Never hurt in training: {', '.join(never)}."] if never else [])
 
 
-def pictures(studio: Studio, skeleton: Skeleton, motion: FilmMotion, size: int) -> list[NDArray[np.uint8]]:
+def pictures(
+    studio: BodyRenderer, skeleton: Skeleton, motion: FilmMotion, size: int
+) -> list[NDArray[np.uint8]]:
     """The pictures (size, size, 3) of a film, without colours for injuries. The camera follows smoothly."""
     keep = body(skeleton).bones
     world, places = jointed(skeleton, motion.positions, motion.rotations)

@@ -7,53 +7,53 @@ from dataclasses import dataclass, field, replace
 
 from markupsafe import Markup
 
-from hobble.report.charts import Chart, Family
-from hobble.report.summary import Figure
+from hobble.report.charts import Chart, ChartGroup
+from hobble.report.summary import KeyFigure
 from hobble.report.tables import Table
 
 
 @dataclass(frozen=True)
-class Words:
+class Paragraph:
     """A paragraph. Only text from the code may be Markup; everything else is escaped."""
 
     text: str | Markup
 
 
 @dataclass(frozen=True)
-class Numbers:
+class KeyFigures:
     """A row of figures."""
 
-    figures: Sequence[Figure]
+    figures: Sequence[KeyFigure]
 
 
 @dataclass(frozen=True)
-class Pair:
+class ChartPair:
     """Charts side by side, if the window is wide enough."""
 
     charts: Sequence[Chart | None]
 
 
 @dataclass(frozen=True)
-class Fragment:
+class TemplatePart:
     """A template in the report's folder, for parts that a script of the page draws."""
 
     template: str
 
 
-Content = Chart | Family | Table | Words | Numbers | Pair | Fragment
+Content = Chart | ChartGroup | Table | Paragraph | KeyFigures | ChartPair | TemplatePart
 KINDS: dict[type, str] = {
     Chart: "chart",
-    Family: "family",
+    ChartGroup: "family",
     Table: "table",
-    Words: "words",
-    Numbers: "numbers",
-    Pair: "pair",
-    Fragment: "fragment",
+    Paragraph: "words",
+    KeyFigures: "numbers",
+    ChartPair: "pair",
+    TemplatePart: "fragment",
 }
 
 
 @dataclass(frozen=True)
-class Part:
+class SectionPart:
     """One part of a section. at: its place, from 0 (top) to 100 (end).
 
     content: None if there is nothing to show. tall: a chart with a row for each clip. open: a table that is
@@ -73,7 +73,7 @@ class Part:
 
 
 @dataclass(frozen=True)
-class Section:
+class PageSection:
     """A section of a page. Sections with the same `name` are joined into one (`joined`).
 
     title: its heading; one of the joined sections gives it. at: sections are sorted by it. nav: a shorter
@@ -81,19 +81,19 @@ class Section:
     """
 
     name: str
-    parts: Sequence[Part] = field(repr=False)
+    parts: Sequence[SectionPart] = field(repr=False)
     title: str = ""
     at: int = 50
     nav: str = ""
     long: bool = False
 
 
-def joined(sections: Iterable[Section]) -> list[Section]:
+def joined(sections: Iterable[PageSection]) -> list[PageSection]:
     """Sections in order. Sections of the same name become one with all their parts; empty ones are left out.
 
     Title and place come from the first section that has a title.
     """
-    by_name: dict[str, list[Section]] = {}
+    by_name: dict[str, list[PageSection]] = {}
     for section in sections:
         by_name.setdefault(section.name, []).append(section)
     out = []
@@ -108,6 +108,6 @@ def joined(sections: Iterable[Section]) -> list[Section]:
 
 def _shows(content: Content | None) -> bool:
     """Whether there is anything to show."""
-    if isinstance(content, Pair):
+    if isinstance(content, ChartPair):
         return any(chart is not None for chart in content.charts)
     return content is not None

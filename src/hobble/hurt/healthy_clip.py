@@ -11,10 +11,10 @@ from hobble.core import quat
 from hobble.core.clip import Clip
 from hobble.core.quat import Array
 from hobble.core.smooth import gaussian
-from hobble.hurt.parts import LEFT, RIGHT, SIDES
+from hobble.hurt.body_parts import LEFT, RIGHT, SIDES
 from hobble.labels.footfall import find_swings
 from hobble.labels.model import GAITS, Labels
-from hobble.labels.options import Labels as LabelOptions
+from hobble.labels.options import LabelOptions
 from hobble.labels.phase import phase_of_footsteps
 
 UP = np.array([0.0, 1.0, 0.0])
@@ -26,7 +26,7 @@ FACING = 0.2
 
 
 @dataclass(frozen=True)
-class Stance:
+class SourceStance:
     """A foot on the ground from source frame `land` to `off`."""
 
     land: float
@@ -39,7 +39,7 @@ class Stance:
 
 
 @dataclass(frozen=True)
-class Source:
+class HealthyClip:
     """A healthy clip of F frames and its measurements. Pairs are left and right.
 
     stances: of each foot in order, at least one. up: (F, 2) whether a foot swings. swing: (F, 2) from 0 to 1
@@ -51,7 +51,7 @@ class Source:
 
     clip: Clip
     labels: Labels
-    stances: tuple[list[Stance], list[Stance]] = field(repr=False)
+    stances: tuple[list[SourceStance], list[SourceStance]] = field(repr=False)
     up: np.ndarray = field(repr=False)
     swing: Array = field(repr=False)
     phase: Array = field(repr=False)
@@ -66,7 +66,7 @@ class Source:
         return len(self.clip)
 
 
-def read_source(clip: Clip, labels: Labels) -> Source:
+def read_source(clip: Clip, labels: Labels) -> HealthyClip:
     """Measure a healthy clip. labels: as `hobble.labels` makes them."""
     frames, skeleton = len(clip), clip.skeleton
     options = LabelOptions()
@@ -84,13 +84,13 @@ def read_source(clip: Clip, labels: Labels) -> Source:
             swing[start:end, side] = np.sin(np.pi * u) ** 2
         ends = [0, *(x for pair in own for x in pair), frames - 1]
         stances.append(
-            [Stance(float(a), float(max(a, b))) for a, b in zip(ends[::2], ends[1::2], strict=True)]
+            [SourceStance(float(a), float(max(a, b))) for a, b in zip(ends[::2], ends[1::2], strict=True)]
         )
     phase, known = phase_of_footsteps(labels.footsteps, frames)
     step = np.diff(phase, prepend=phase[:1])
     phase = phase[0] + np.cumsum(np.where(step < -0.5, step + 1.0, step)) if frames else phase
     legs = [_length(clip, side) for side in SIDES]
-    return Source(
+    return HealthyClip(
         clip,
         labels,
         (stances[LEFT], stances[RIGHT]),
@@ -120,7 +120,7 @@ def _length(clip: Clip, side: str) -> float:
     return float(sum(np.linalg.norm(offsets[clip.skeleton.role(f"{side}_{b}")]) for b in ("knee", "heel")))
 
 
-def _cycles(stances: tuple[list[Stance], list[Stance]], frames: int, fps: float) -> Array:
+def _cycles(stances: tuple[list[SourceStance], list[SourceStance]], frames: int, fps: float) -> Array:
     """(frames,) frames from a foot's landing to its next, around each frame. Landings of both feet count."""
     middles, lengths = [], []
     for own in stances:

@@ -1,7 +1,8 @@
 """Roll-outs: a network continues from its own poses, with the path and the other inputs of a clip.
 
 Roll-outs of many stretches and lengths go at once, because a network predicts many poses faster than one. The
-prediction of each has the same bits in any crowd.
+prediction of each has the same bits in any crowd. A short roll-out is the beginning of a longer one from the
+same frame, so only the longest from each frame is computed.
 """
 
 from __future__ import annotations
@@ -22,7 +23,7 @@ BATCH = 256  # poses predicted at once; with more, their inputs do not fit the c
 
 
 @dataclass(frozen=True)
-class Inputs:
+class RollOutInputs:
     """The inputs and targets of F consecutive frames of a clip, on one terrain fit.
 
     x: (F, X) with the captured joints; y: (F, Y) targets; both in raw units, with heights minus `mean` (F,).
@@ -39,13 +40,13 @@ class Inputs:
     moving: Array
 
 
-def inputs(rows: ClipRows, chosen: np.ndarray, layout: RowLayout) -> Inputs:
+def inputs(rows: ClipRows, chosen: np.ndarray, layout: RowLayout) -> RollOutInputs:
     """The inputs of the rows `chosen` (F,), on the first fit of each, in the network's `layout`."""
     fit = rows.first_fit[chosen]
     x, y, *_ = pairs(rows, layout, chosen, fit)
     gait = x[:, layout.x_gait].reshape(len(x), len(GAITS), layout.samples)
     stand = gait[:, GAITS.index("stand"), layout.samples // 2]
-    return Inputs(
+    return RollOutInputs(
         x,
         y,
         rows.mean[fit].astype(np.float32),
@@ -60,55 +61,70 @@ def inputs(rows: ClipRows, chosen: np.ndarray, layout: RowLayout) -> Inputs:
 class RollOuts:
     """Roll-outs over `length` frames of a stretch, from its frames `starts` (n,), which rise."""
 
-    asked: Inputs
+    given: RollOutInputs
     starts: np.ndarray
     length: int
 
 
 class Crowd:
-    """All roll-outs of some groups, frame by frame. Iterate over `frames` once, then read `phases`."""
+    """All roll-outs of some groups, frame by frame. Iterate over `frames` once, then read `phases`.
+
+    First frame, end and the rest are those of the R longest roll-outs from each frame. of: for each group,
+    which of the R are its roll-outs (n,).
+    """
 
     def __init__(self, predictor: Predictor, groups: Sequence[RollOuts]) -> None:
         self.predictor, self.groups = predictor, groups
-        stretches = list({id(group.asked): group.asked for group in groups}.values())
-        begins = np.cumsum([0, *(len(asked.x) for asked in stretches)])
-        begin = {id(asked): int(at) for asked, at in zip(stretches, begins[:-1], strict=True)}
+        stretches = list({id(group.given): group.given for group in groups}.values())
+        begins = np.cumsum([0, *(len(given.x) for given in stretches)])
+        begin = {id(given): int(at) for given, at in zip(stretches, begins[:-1], strict=True)}
         self.x, self.y, self.mean, phase, self.turn, self.velocity, self.moving = (
-            np.concatenate([getattr(asked, name) for asked in stretches])
+            np.concatenate([getattr(given, name) for given in stretches])
             for name in ("x", "y", "mean", "phase", "turn", "velocity", "moving")
         )
-        self.first = np.concatenate([begin[id(group.asked)] + group.starts for group in groups])
-        self.stop = np.concatenate(
-            [
-                begin[id(group.asked)] + np.minimum(group.starts + group.length, len(group.asked.x))
-                for group in groups
-            ]
-        )
-        self.bounds = np.cumsum([0, *(len(group.starts) for group in groups)])
+        firsts = [begin[id(group.given)] + group.starts for group in groups]
+        stops = [
+            begin[id(group.given)] + np.minimum(group.starts + group.length, len(group.given.x))
+            for group in groups
+        ]
+        self.first, each = np.unique(np.concatenate(firsts), return_inverse=True)
+        self.of = np.split(each, np.cumsum([len(first) for first in firsts])[:-1])
+        self.stop = np.zeros_like(self.first)
+        np.maximum.at(self.stop, each, np.concatenate(stops))
         self.phase = phase[self.first]
+        self._phases = [self.phase[of] for of in self.of]
         layout = predictor.network.layout
         joints = (len(self.first), layout.joints, 3)
         self.place = self.x[self.first][:, layout.x_joint_position].reshape(joints).astype(float)
         self.speed = np.zeros(joints)
         self.memory = np.zeros((len(self.first), predictor.network.memory))
 
-    def frames(self) -> Iterator[tuple[np.ndarray, Array, np.ndarray]]:
-        """For each age, of the roll-outs not yet over: frames (n,), joints (n, J, 3), bounds (groups + 1,).
+    def frames(self) -> Iterator[tuple[np.ndarray, Array, dict[int, np.ndarray]]]:
+        """For each age, of the roll-outs not yet over: frames (n,), joints (n, J, 3), and places by group.
 
         frames: indices into `y`. Joints are in the root frame of that frame, with heights minus its mean.
-        Those of group g lie between bounds[g] and bounds[g + 1]. They are its first roll-outs, because later
-        ones end earlier.
+        Places say which of the n are those of a group, and only groups with a roll-out at this age have any.
+        They are its first roll-outs, because later ones end earlier.
         """
+        place = np.full(len(self.first), -1)
         for age in range(max((group.length for group in self.groups), default=0)):
             alive = np.flatnonzero(self.first + age < self.stop)
             if not len(alive):
                 return
             at = self.first[alive] + age
-            yield at, self._advanced(alive, at, age > 0), np.searchsorted(alive, self.bounds)
+            place[:] = -1
+            place[alive] = np.arange(len(alive))
+            joints = self._advanced(alive, at, age > 0)
+            places = {}
+            for g, (group, of) in enumerate(zip(self.groups, self.of, strict=True)):
+                if age < group.length and len(own := place[of][place[of] >= 0]):
+                    places[g] = own
+                    self._phases[g] = self.phase[of]
+            yield at, joints, places
 
     def phases(self) -> list[Array]:
         """(n,) phase of each roll-out after its last frame, for each group."""
-        return np.split(self.phase, self.bounds[1:-1])
+        return self._phases
 
     def _advanced(self, alive: np.ndarray, at: np.ndarray, own: bool) -> Array:
         """The joints of the roll-outs `alive` (n,) at frames `at` (n,), which become their state.

@@ -5,19 +5,20 @@ from __future__ import annotations
 import re
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
-from pathlib import Path
+from itertools import groupby
 
 import numpy as np
 
-from hobble.channels.injury.walks import INJURY
+from hobble.channels.injury.crowd_severities import INJURY
 from hobble.core.quat import Array
 from hobble.core.skeleton import Skeleton
 from hobble.evaluation.captured import captured, rotate_by_yaw
 from hobble.evaluation.crowd import FPS
-from hobble.gait.cycles import Walk, joined, measure
+from hobble.gait.cycles import WalkCycles, joined, measure
 from hobble.gait.people import people
 from hobble.gait.profile import Profile, profile
-from hobble.rows.clip_rows import ClipRows, load_clip_rows
+from hobble.measures.chosen import Chosen
+from hobble.rows.clip_rows import ClipRows
 
 VERSION = re.compile(r"_hurt[1-9](_mirror)?$")  # end of the name of a generated hurt version
 MIRROR = "_mirror"
@@ -30,7 +31,7 @@ class Limp:
 
     clip: str
     hurt: Mapping[str, float]
-    walk: Walk = field(repr=False)
+    walk: WalkCycles = field(repr=False)
     speed: float
 
     @property
@@ -53,22 +54,32 @@ class HurtSeconds:
 
 
 def limps(
-    files: Iterable[Path], splits: Mapping[str, str], links: Sequence[str], skeleton: Skeleton
+    read: Iterable[Chosen], splits: Mapping[str, str], links: Sequence[str], skeleton: Skeleton
 ) -> tuple[list[Limp], HurtSeconds]:
-    """The walks of all captured clips, and the seconds for which each link hurts in the training clips."""
+    """The walks of all captured clips, and the seconds for which each link hurts in the training clips.
+
+    read: what is read of the clips, sorted by clip. Of a sample, the seconds are estimates.
+    """
     found, hurt_seconds = [], HurtSeconds()
-    for file in sorted(files, key=lambda file: Path(file).stem):
-        rows = load_clip_rows(file)
-        severity = rows.channels.get(INJURY, np.zeros((len(rows), 0)))
-        is_made = VERSION.search(rows.clip) is not None
-        if splits.get(rows.clip) == "train":
-            kept = hurt_seconds.made if is_made else hurt_seconds.captured
-            for link, column in zip(links, severity.T, strict=False):
-                if column.any():
-                    kept[link] = round(kept.get(link, 0.0) + float(np.sum(column > 0)) / FPS, 2)
-        if not is_made:
-            found += _walked(rows, links, skeleton)
+    for clip, some in groupby(read, key=lambda one: one.clip):
+        is_made = VERSION.search(clip) is not None
+        seen: list[ClipRows] = []
+        for one in some:
+            rows = one.load().rows
+            if splits.get(clip) == "train":
+                kept = hurt_seconds.made if is_made else hurt_seconds.captured
+                _add_seconds(kept, links, rows.channels.get(INJURY), one.weight)
+            if not is_made:
+                seen.append(rows)
+        found += _walked(clip, seen, links, skeleton)
     return found, hurt_seconds
+
+
+def _add_seconds(kept: dict[str, float], links: Sequence[str], severity: Array | None, weight: float) -> None:
+    """Add the seconds for which each link hurts. severity: (R, links). weight: that of each row."""
+    for link, column in zip(links, () if severity is None else severity.T, strict=False):
+        if column.any():
+            kept[link] = round(kept.get(link, 0.0) + float(np.sum(column > 0)) * weight / FPS, 2)
 
 
 def healthy_of(limp: Limp, every: Sequence[Limp]) -> tuple[Profile, str]:
@@ -83,24 +94,31 @@ def healthy_of(limp: Limp, every: Sequence[Limp]) -> tuple[Profile, str]:
     return people().normal(), "people"
 
 
-def _walked(rows: ClipRows, links: Sequence[str], skeleton: Skeleton) -> list[Limp]:
-    """The walking of a clip with constant severities; an empty list if there is no whole cycle of it."""
-    severity = rows.channels.get(INJURY, np.zeros((len(rows), len(links))))
-    if not len(rows) or np.ptp(severity, axis=0).any():
+def _walked(clip: str, seen: Sequence[ClipRows], links: Sequence[str], skeleton: Skeleton) -> list[Limp]:
+    """The walking of a clip with constant severities; an empty list if there is no whole cycle of it.
+
+    seen: the clip's rows, or excerpts of them.
+    """
+    seen = [rows for rows in seen if len(rows)]
+    if not seen:
+        return []
+    severity = np.concatenate([rows.channels.get(INJURY, np.zeros((len(rows), len(links)))) for rows in seen])
+    if np.ptp(severity, axis=0).any():
         return []
     walks, speeds = [], []
-    turn = rows.y[:, rows.layout.y_turn][:, 0].astype(float)
-    for part in captured(rows):
-        if part.gait.mean(axis=0).argmax() != 1:
-            continue
-        yaw = np.concatenate([[0.0], -np.cumsum(turn[part.rows])[:-1]])
-        walks.append(measure(skeleton, _placed(part.local, part.root, yaw), FPS))
-        speeds.append(np.hypot(part.velocity[:, 0], part.velocity[:, 1]).mean())
-    walk = joined(walks) if walks else Walk(FPS, (), ())
+    for rows in seen:
+        turn = rows.y[:, rows.layout.y_turn][:, 0].astype(float)
+        for part in captured(rows):
+            if part.gait.mean(axis=0).argmax() != 1:
+                continue
+            yaw = np.concatenate([[0.0], -np.cumsum(turn[part.rows])[:-1]])
+            walks.append(measure(skeleton, _placed(part.local, part.root, yaw), FPS))
+            speeds.append(np.hypot(part.velocity[:, 0], part.velocity[:, 1]).mean())
+    walk = joined(walks) if walks else WalkCycles(FPS, (), ())
     if not len(walk):
         return []
     hurt = {link: float(value) for link, value in zip(links, severity[0], strict=True) if value > 0}
-    return [Limp(rows.clip, hurt, walk, float(np.mean(speeds)))]
+    return [Limp(clip, hurt, walk, float(np.mean(speeds)))]
 
 
 def _placed(local: Array, root: Array, yaw: Array) -> Array:

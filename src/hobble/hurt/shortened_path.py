@@ -6,16 +6,17 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from hobble.core.curve_value import value_at
 from hobble.core.quat import Array
 from hobble.core.smooth import gaussian
 from hobble.hurt.effects import Effects
-from hobble.hurt.source import Source
+from hobble.hurt.healthy_clip import HealthyClip
 
 SLOPE = 0.3  # seconds: sigma of the Gaussian over the heights of the ground under the feet
 
 
 @dataclass(frozen=True)
-class Path:
+class ShortenedPath:
     """Old and new horizontal path (F, 2) and height of the ground (F,) at each source frame.
 
     Flat ground stays at 0. On other ground, rises shrink like the path, so that slopes stay.
@@ -28,21 +29,21 @@ class Path:
 
     def moved(self, point: Array, when: float) -> Array:
         """(3,) a point of source frame `when`, moved to the new world."""
-        frames = np.arange(len(self.old))
-        shift = [np.interp(when, frames, self.new[:, i] - self.old[:, i]) for i in (0, 1)]
-        return point + np.array(
-            [shift[0], np.interp(when, frames, self.new_ground - self.old_ground), shift[1]]
-        )
+        first = min(int(when), len(self.old) - 1)
+        near = slice(first, first + 2)  # reading all frames for each footprint would take long
+        moved = self.new[near] - self.old[near]
+        curves = moved[:, 0], self.new_ground[near] - self.old_ground[near], moved[:, 1]
+        return point + np.array([value_at(curve, when - first) for curve in curves])
 
 
-def shorten(source: Source, effects: Effects, slower: Array, ground: Array | None) -> Path:
+def shorten(source: HealthyClip, effects: Effects, slower: Array, ground: Array | None) -> ShortenedPath:
     """The path at the speed of `effects`.
 
     slower: (F,) factor of the stride time. ground: (F,) height of the ground below the body, None if flat.
     """
     share = effects.ratio("speed") * slower
     flat = np.zeros(len(source))
-    return Path(
+    return ShortenedPath(
         source.path,
         _shrunk(source.path, share[:, None]),
         flat if ground is None else ground,
@@ -50,7 +51,7 @@ def shorten(source: Source, effects: Effects, slower: Array, ground: Array | Non
     )
 
 
-def ground_below(source: Source, heights: list[list[tuple[float, float]]]) -> Array:
+def ground_below(source: HealthyClip, heights: list[list[tuple[float, float]]]) -> Array:
     """(F,) cm: the ground below the body, from the standing feet.
 
     heights: (middle, height) of each foot's stances. They are relative to each foot's median, so that legs of

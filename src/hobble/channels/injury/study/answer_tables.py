@@ -12,17 +12,17 @@ from typing import Any
 
 import numpy as np
 
-from hobble.channels.injury.study.answers import Answer, ShownFilm, Study
+from hobble.channels.injury.study.answers import FilmAnswer, ShownFilm, Study
 from hobble.channels.injury.study.films import without_side
 from hobble.core.files import write_text
-from hobble.evaluation.tables import write_csv
+from hobble.evaluation.csv_tables import write_csv
 
 NUMERALS = ("III", "IV", "V", "VI", "VII", "VIII", "IX", "X", "XI", "XII", "XIII", "XIV", "XV", "XVI")
 ALL = "all"
 Rows = list[dict[str, Any]]
 
 
-def tables(study: Study, people: Sequence[Sequence[Answer]]) -> dict[str, Rows]:
+def tables(study: Study, people: Sequence[Sequence[FilmAnswer]]) -> dict[str, Rows]:
     """Numeral -> rows. people: each person's answers. The last table is of all films together."""
     of = {film.number: [a for some in people for a in some if a.film == film.number] for film in study.films}
     named = [*NUMERALS, *(f"XVI+{i}" for i in range(1, len(study.films)))]
@@ -31,7 +31,7 @@ def tables(study: Study, people: Sequence[Sequence[Answer]]) -> dict[str, Rows]:
     return out
 
 
-def film_rows(study: Study, film: ShownFilm, answers: Sequence[Answer]) -> Rows:
+def film_rows(study: Study, film: ShownFilm, answers: Sequence[FilmAnswer]) -> Rows:
     """For each part how many people ticked it in one film: `people` and their `share`. hurts: whether it
     hurt.
     """
@@ -46,7 +46,7 @@ def film_rows(study: Study, film: ShownFilm, answers: Sequence[Answer]) -> Rows:
     ]
 
 
-def summary_rows(study: Study, of: Mapping[int, Sequence[Answer]]) -> Rows:
+def summary_rows(study: Study, of: Mapping[int, Sequence[FilmAnswer]]) -> Rows:
     """A row of `scores` for each film, for each kind of film, and for all."""
     rows = [
         {"film": str(film.number), "kind": film.kind, "parts": ", ".join(film.parts)}
@@ -59,7 +59,7 @@ def summary_rows(study: Study, of: Mapping[int, Sequence[Answer]]) -> Rows:
     return rows
 
 
-def scores(answers: Sequence[tuple[ShownFilm, Answer]]) -> dict[str, Any]:
+def scores(answers: Sequence[tuple[ShownFilm, FilmAnswer]]) -> dict[str, Any]:
     """How well people answered. answers: pairs of a film and an answer.
 
     seen: share of the hurt parts that were ticked. seen_without_side: the same if left and right are not

@@ -9,10 +9,10 @@ from hobble.core.ik import aim
 from hobble.core.quat import Array
 from hobble.core.skeleton import Skeleton
 from hobble.core.smooth import gaussian
+from hobble.hurt.body_parts import LEFT, RIGHT, SIDES, ancestors
 from hobble.hurt.effects import Effects
-from hobble.hurt.parts import LEFT, RIGHT, SIDES, ancestors
-from hobble.hurt.people import HARMONICS
-from hobble.hurt.source import Source
+from hobble.hurt.healthy_clip import HealthyClip
+from hobble.hurt.impairment_profiles import HARMONICS
 
 X, Y, Z = np.eye(3)
 PELVIS = 0.35  # the pelvis tilts by this share of the trunk's lean
@@ -31,7 +31,7 @@ GUARDS = {
 HAND = 0.75  # strength of `carry` for a hurt hand
 
 
-def change_body(source: Source, effects: Effects) -> Array:
+def change_body(source: HealthyClip, effects: Effects) -> Array:
     """World rotations (F, J, 4) of the source's frames, changed. Those of the legs are still the source's."""
     skeleton = source.clip.skeleton
     local = _stiffened(source, effects)
@@ -57,7 +57,7 @@ def _world(skeleton: Skeleton, local: Array) -> Array:
     return world
 
 
-def _stiffened(source: Source, effects: Effects) -> Array:
+def _stiffened(source: HealthyClip, effects: Effects) -> Array:
     """Local rotations with less movement of pelvis, back, neck and arms around their mean posture."""
     skeleton, local = source.clip.skeleton, source.clip.rotations.copy()
     back = _between(skeleton, "chest", "hips")
@@ -96,7 +96,7 @@ def _shares(skeleton: Skeleton) -> list[tuple[str, float]]:
     return out
 
 
-def _turns(source: Source, effects: Effects) -> tuple[Array, Array, Array]:
+def _turns(source: HealthyClip, effects: Effects) -> tuple[Array, Array, Array]:
     """(F, 4) each: world rotations to add to pelvis, chest and head."""
     phase, going = source.phase, np.clip(source.walking, 0.0, 1.0)
     rows = [np.ones(len(source))]
@@ -114,7 +114,7 @@ def _turns(source: Source, effects: Effects) -> tuple[Array, Array, Array]:
     return pelvis, chest, head
 
 
-def _lean(source: Source, turn: Array, roll: Array, forward: Array) -> Array:
+def _lean(source: HealthyClip, turn: Array, roll: Array, forward: Array) -> Array:
     """(F, 4) world rotation by degrees to the left, left side up, and forward, in the heading's frame."""
     yaw, roll_, pitch = (
         quat.from_axis_angle(axis, np.radians(angle)) for axis, angle in ((Y, turn), (Z, roll), (X, forward))
@@ -123,7 +123,7 @@ def _lean(source: Source, turn: Array, roll: Array, forward: Array) -> Array:
     return quat.mul(source.heading, quat.mul(own, quat.inv(source.heading)))
 
 
-def _guard(source: Source, effects: Effects, world: Array, side: int) -> None:
+def _guard(source: HealthyClip, effects: Effects, world: Array, side: int) -> None:
     """Hold a hurt arm with a bent elbow, against the body or in front of the chest. Changes `world`."""
     skeleton = source.clip.skeleton
     weights = {name: np.clip(effects.sided[name][:, side], 0.0, 1.0) for name in GUARDS}

@@ -22,7 +22,7 @@ MARK = "__"  # between the parts of the name of a batch's rule
 
 
 @dataclass(frozen=True)
-class Batch:
+class ClipBatch:
     """Some clips of a data set that one job makes after another, or the hurt versions of these clips.
 
     number: from 0. label: the batch's name in logs: the clip's, if every clip has a batch of its own.
@@ -92,23 +92,24 @@ class Batches:
         self.clips = clips
 
     @functools.cache  # noqa: B019 - one project lives as long as the process
-    def of(self, dataset: str) -> tuple[Batch, ...]:
+    def of(self, dataset: str) -> tuple[ClipBatch, ...]:
         """The batches of the clips that a data set lists or that are in its folder."""
         listed = list(self.clips.listed(dataset))
         mirrored = self.clips.catalogue.dataset(dataset).mirror
         count = batch_count(len(listed))
         if count == len(listed):
-            return tuple(Batch(dataset, n, clip, (clip,), mirrored) for n, clip in enumerate(listed))
+            return tuple(ClipBatch(dataset, n, clip, (clip,), mirrored) for n, clip in enumerate(listed))
         chosen = defaultdict(list)
         for clip in listed:
             chosen[batch_of(clip, count)].append(clip)
         width = len(str(count - 1))
         return tuple(
-            Batch(dataset, n, f"{n:0{width}}", tuple(clips), mirrored) for n, clips in sorted(chosen.items())
+            ClipBatch(dataset, n, f"{n:0{width}}", tuple(clips), mirrored)
+            for n, clips in sorted(chosen.items())
         )
 
     @functools.cache  # noqa: B019
-    def hurt_of(self, dataset: str) -> tuple[Batch, ...]:
+    def hurt_of(self, dataset: str) -> tuple[ClipBatch, ...]:
         """For each batch that has hurt versions, the batch of these."""
         versions = defaultdict(list)
         for version in self.clips.hurt_versions(dataset):
@@ -118,19 +119,19 @@ class Batches:
             hurt = tuple(version for clip in batch.clips for version in versions[clip])
             if hurt:
                 label = f"{batch.label}_hurt"
-                found.append(Batch(dataset, batch.number, label, hurt, batch.mirrored, hurt=True))
+                found.append(ClipBatch(dataset, batch.number, label, hurt, batch.mirrored, hurt=True))
         return tuple(found)
 
-    def all_of(self, dataset: str) -> tuple[Batch, ...]:
+    def all_of(self, dataset: str) -> tuple[ClipBatch, ...]:
         """The batches of clips and those of hurt versions."""
         return (*self.of(dataset), *self.hurt_of(dataset))
 
     def needed(
         self,
-        of: Callable[[str], Iterable[Batch]],
+        of: Callable[[str], Iterable[ClipBatch]],
         datasets: Iterable[str],
         arguments: Sequence[str],
-    ) -> list[Batch]:
+    ) -> list[ClipBatch]:
         """The batches of these data sets that a run needs. of: data set -> its batches. arguments: of the
         command line.
 

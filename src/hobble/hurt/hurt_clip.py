@@ -12,16 +12,16 @@ from hobble.core.errors import HobbleError
 from hobble.core.quat import Array
 from hobble.core.skeleton import local_rotations
 from hobble.core.smooth import gaussian
-from hobble.hurt.body import change_body
+from hobble.hurt.body_parts import LEFT, RIGHT, SIDES
 from hobble.hurt.effects import HIGHEST, Effects, effects
-from hobble.hurt.foot_path import Foot, move_foot, places, rolled_foot
+from hobble.hurt.foot_path import HurtFoot, move_foot, places, rolled_foot
+from hobble.hurt.healthy_clip import HealthyClip, read_source
+from hobble.hurt.interpolate import at_frames, turns_at
 from hobble.hurt.legs import Leg, hips_height, knee_flexion, place_leg, reach_of, read_leg
-from hobble.hurt.parts import LEFT, RIGHT, SIDES
-from hobble.hurt.path import Path, ground_below, shorten
 from hobble.hurt.relabel import relabel
-from hobble.hurt.sampling import at_frames, turns_at
-from hobble.hurt.source import Source, read_source
+from hobble.hurt.shortened_path import ShortenedPath, ground_below, shorten
 from hobble.hurt.timing import Timing, retime
+from hobble.hurt.upper_body import change_body
 from hobble.labels.model import Labels
 
 # Radians. In people's recordings the sound knee is bent by 8 to 10 degrees while a stiff leg swings.
@@ -85,7 +85,7 @@ def hurt_clip(
     return HurtClip(out, changes.shown[which], relabel(labels, timing, zero, margins), timing.body)
 
 
-def _ground(source: Source, feet: list[Foot]) -> Array:
+def _ground(source: HealthyClip, feet: list[HurtFoot]) -> Array:
     heights = []
     for side in (LEFT, RIGHT):
         stances = source.stances[side]
@@ -96,7 +96,12 @@ def _ground(source: Source, feet: list[Foot]) -> Array:
 
 
 def _assembled(
-    source: Source, changes: Effects, timing: Timing, path: Path, feet: list[Foot], name: str
+    source: HealthyClip,
+    changes: Effects,
+    timing: Timing,
+    path: ShortenedPath,
+    feet: list[HurtFoot],
+    name: str,
 ) -> Clip:
     """Body, hips and legs at the new frames."""
     clip, skeleton = source.clip, source.clip.skeleton
@@ -126,7 +131,7 @@ def _assembled(
     return Clip(name, skeleton, clip.fps, local_rotations(skeleton, world), root)
 
 
-def _from_root(source: Source, world: Array, side: int) -> Array:
+def _from_root(source: HealthyClip, world: Array, side: int) -> Array:
     """(N, 3) position of a hip joint relative to the root joint."""
     skeleton = source.clip.skeleton
     joint, out = skeleton.role(f"{SIDES[side]}_hip"), np.zeros((len(world), 3))
@@ -136,7 +141,7 @@ def _from_root(source: Source, world: Array, side: int) -> Array:
     return out
 
 
-def _reach(leg: Leg, changes: Effects, source: Source, timing: Timing, side: int) -> Array:
+def _reach(leg: Leg, changes: Effects, source: HealthyClip, timing: Timing, side: int) -> Array:
     """(N,) cm from hip to ankle of a standing leg.
 
     Its knee bends more if it is spared, and less while a stiff leg swings, which lifts the hips.

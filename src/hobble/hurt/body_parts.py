@@ -14,7 +14,7 @@ ARM = (("shoulder", "shoulder"), ("elbow", "upper arm"), ("wrist", "forearm"))
 
 
 @dataclass(frozen=True)
-class Part:
+class BodyPart:
     """A part of the body: pelvis, hip, thigh, shank, foot, back, neck, shoulder, upper arm, forearm or hand.
 
     side: LEFT, RIGHT, or None on the midline.
@@ -24,7 +24,7 @@ class Part:
     side: int | None
 
 
-def part_of_link(skeleton: Skeleton, link: tuple[str, str]) -> Part:
+def part_of_link(skeleton: Skeleton, link: tuple[str, str]) -> BodyPart:
     """The part of the body of a link (parent joint, child joint)."""
     child = skeleton.index(link[1])
     for side, word in enumerate(SIDES):
@@ -34,15 +34,15 @@ def part_of_link(skeleton: Skeleton, link: tuple[str, str]) -> Part:
                 joint = skeleton.role(f"{word}_{role}")
                 if child in _chain(skeleton, joint, root):
                     near = role == "hip" and child != joint
-                    return Part("pelvis" if near else name, side)
+                    return BodyPart("pelvis" if near else name, side)
                 root = joint
             if root in ancestors(skeleton, child):
-                return Part(last, side)
+                return BodyPart(last, side)
     if child in _chain(skeleton, skeleton.role("chest"), skeleton.role("hips")):
-        return Part("back", None)
+        return BodyPart("back", None)
     if skeleton.role("chest") in ancestors(skeleton, child):
-        return Part("neck", None)
-    return Part("back", None)
+        return BodyPart("neck", None)
+    return BodyPart("back", None)
 
 
 def ancestors(skeleton: Skeleton, joint: int) -> list[int]:

@@ -14,12 +14,12 @@ from hobble.core.clip import Clip
 from hobble.core.errors import HobbleError
 from hobble.core.files import write_text
 from hobble.core.skeleton import Skeleton
-from hobble.synthetic import files
+from hobble.synthetic import label_files
 from hobble.synthetic.foot_motion import move_foot
 from hobble.synthetic.footsteps import landings, phase_curve, stances
-from hobble.synthetic.ground import Ground, make_ground
 from hobble.synthetic.options import Synthetic
-from hobble.synthetic.path import gait_keys, walk_path
+from hobble.synthetic.planned_ground import Ground, make_ground
+from hobble.synthetic.planned_path import gait_keys, walk_path
 from hobble.synthetic.pose import pose
 from hobble.synthetic.recipes import GROUND, Segment, generator, plan
 from hobble.synthetic.style import LEFT, RIGHT, healthy_style
@@ -28,7 +28,7 @@ SHORTEST = 60  # frames at 60 Hz: least length of a clip, so that a foot lands i
 
 
 @dataclass(frozen=True)
-class Walk:
+class GeneratedWalk:
     """A generated clip and its labels. Frames count from 0 at the clip's rate.
 
     right, left: frames in which a foot lands. gait: (frame, label) keys. ground: the kind of ground.
@@ -41,7 +41,9 @@ class Walk:
     ground: Ground
 
 
-def generate(clip: str, skeleton: Skeleton, frames: int, recipe: str | None, fps: float, seed: int) -> Walk:
+def generate(
+    clip: str, skeleton: Skeleton, frames: int, recipe: str | None, fps: float, seed: int
+) -> GeneratedWalk:
     """Walk a recipe for `frames` frames at 60 Hz, written at `fps`. Equal arguments give equal motion.
 
     Raises HobbleError for an unknown recipe.
@@ -54,7 +56,7 @@ def generate(clip: str, skeleton: Skeleton, frames: int, recipe: str | None, fps
 
 def walk(
     clip: str, skeleton: Skeleton, segments: list[Segment], total: int, ground: str, fps: float, seed: int
-) -> Walk:
+) -> GeneratedWalk:
     """Walk a plan for `total` frames at `fps`, on a kind of ground of `make_ground`."""
     path = walk_path(segments, total, fps)
     style = healthy_style(path)
@@ -67,7 +69,7 @@ def walk(
     rotations, root = pose(skeleton, path, style, phase, feet, terrain, rng)
     part = slice(path.first, path.first + total)
     motion = Clip(clip, skeleton, fps, rotations[part], root[part])
-    return Walk(motion, right, left, gait_keys(segments, total, fps), terrain)
+    return GeneratedWalk(motion, right, left, gait_keys(segments, total, fps), terrain)
 
 
 def _frames(at: np.ndarray, first: int, total: int) -> list[int]:
@@ -99,5 +101,5 @@ def write_clip(
     rig = Skeleton.from_dict(skeleton)
     walk = generate(clip, rig, frames, recipe, options.fps, options.seed)
     write_bvh(bvh, walk.clip)
-    write_text(footsteps, files.footsteps_text(walk.right, walk.left))
-    write_text(gait, files.gait_text(walk.gait))
+    write_text(footsteps, label_files.footsteps_text(walk.right, walk.left))
+    write_text(gait, label_files.gait_text(walk.gait))

@@ -1,4 +1,4 @@
-"""The option that limits a measurement to a sample of clips (`hobble.measures.sample`)."""
+"""The option that limits a measurement to a sample of the clips' frames (`hobble.measures.sample`)."""
 
 from __future__ import annotations
 
@@ -7,11 +7,11 @@ from pydantic import Field
 from hobble.core.section import Section
 
 
-class Sampling(Section):
+class SampleOptions(Section):
     """An option of all measurements of clips."""
 
     sample_frames: int = Field(
-        5_000_000,
+        500_000,
         gt=0,
         description="most frames to measure; a larger data set is sampled by gait, speed, channel and split",
     )

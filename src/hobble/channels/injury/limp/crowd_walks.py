@@ -7,10 +7,10 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from hobble.channels.injury.walks import severities
+from hobble.channels.injury.crowd_severities import severities
 from hobble.core.quat import Array
 from hobble.evaluation.crowd import FPS, channel_values
-from hobble.gait.cycles import Walk, measure
+from hobble.gait.cycles import WalkCycles, measure
 from hobble.gait.profile import Profile, profile
 from hobble.models.network import Network
 from hobble.runtime.animation import ProceduralAnimation
@@ -26,7 +26,7 @@ class FigureWalk:
     frame.
     """
 
-    walk: Walk = field(repr=False)
+    walk: WalkCycles = field(repr=False)
     profile: Profile | None = field(repr=False)
     speed: float
     frames: int

@@ -118,7 +118,7 @@ class _Cycles:
     others: np.ndarray
 
 
-class Pace:
+class LimitLearner:
     """Gathers the cycles of clips, one clip at a time, and learns the limits of a channel from them.
 
     highest: of the channel's values. across: (L,) for each label the label on the other side of the body.

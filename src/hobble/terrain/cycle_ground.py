@@ -81,7 +81,7 @@ def fit_cycle(
     the ground, cm; None for no limit.
     """
     from hobble.terrain.search import (  # loads compiled code, which flat clips don't need
-        Footing,
+        FootPoints,
         best_patches,
     )
 
@@ -90,7 +90,7 @@ def fit_cycle(
     cells = patches.cells(where.reshape(-1, 2), centre).reshape(where.shape)
     table = np.concatenate([cells, (height - level)[..., None]], axis=-1)
     beam_sides = beam_side_points(patches, path, sides, centre) if kind == "beam" else np.zeros((0, 4))
-    footing = Footing(table[contacts], table[~contacts], kind == "jumpy", beam_sides)
+    footing = FootPoints(table[contacts], table[~contacts], kind == "jumpy", beam_sides)
     chosen, error = best_patches(patches, footing, fits)
     patch_level = patches.at(chosen, cells[contacts]).mean(axis=1, dtype=float)
     plain = Ground(patches, chosen, error, centre, level - patch_level)

@@ -13,20 +13,20 @@ import numpy as np
 from hobble.core.clip import Clip
 from hobble.core.errors import InputError
 from hobble.core.skeleton import Skeleton, rest_positions
-from hobble.motion.axes import Axes, straighten
+from hobble.motion.axes import RigAxes, straighten
 from hobble.motion.body import SIDES, Body, body_by_roles, pairs, with_fingers
 from hobble.motion.decode import Decoded, check_angles, decode, frame_rate
 from hobble.motion.defects import Repaired, flips, repair
 from hobble.motion.doubt import Doubt, TwoFigures, check_height
 from hobble.motion.draft import refusal
-from hobble.motion.find_body import Found, find_body
+from hobble.motion.find_body import FoundBody, find_body
 from hobble.motion.floor import on_floor
 from hobble.motion.four_legs import on_four_legs
 from hobble.motion.hips_root import below_hips, decode_below
 from hobble.motion.options import ClipMotion
 from hobble.motion.read import Bvh
 from hobble.motion.rig import (
-    Match,
+    RigMatch,
     Target,
     clean_names,
     find_hips,
@@ -44,7 +44,7 @@ FOUND = "found"  # name in reports of a rig without a skeleton file
 
 
 @dataclass(frozen=True)
-class Source:
+class FileMotion:
     """A file's motion at its own frame rate, on its own rig, or on the parts of its body.
 
     stance: where its rest pose comes from, in words. moving: whether joints below the hips move in their
@@ -52,10 +52,10 @@ class Source:
     """
 
     clip: Clip
-    match: Match
+    match: RigMatch
     unit: float
     unit_name: str
-    axes: Axes
+    axes: RigAxes
     first_frame: int
     repairs: list[str]
     notes: list[str]
@@ -65,7 +65,7 @@ class Source:
     unsure: list[str] = field(default_factory=list)
 
 
-def load_source(file: Bvh, target: Target, maps: str | Path, options: ClipMotion) -> Source:
+def load_source(file: Bvh, target: Target, maps: str | Path, options: ClipMotion) -> FileMotion:
     """A file's motion, checked and, if allowed, repaired.
 
     maps: the folder of the skeleton files. A rig with a skeleton file and an equal rest pose is taken as that
@@ -81,7 +81,7 @@ def load_source(file: Bvh, target: Target, maps: str | Path, options: ClipMotion
     return _unknown(file, target, known, repairs, options)
 
 
-def _known(file: Bvh, hips: int, match: Match, repairs: list[str], options: ClipMotion) -> Source:
+def _known(file: Bvh, hips: int, match: RigMatch, repairs: list[str], options: ClipMotion) -> FileMotion:
     """The source of a file whose rig has a skeleton file."""
     rig = replace(rig_of(below_hips(file, hips)), roles=match.roles)
     unit, unit_name = _unit(file.path, leg_length(rig), options.unit)
@@ -91,25 +91,26 @@ def _known(file: Bvh, hips: int, match: Match, repairs: list[str], options: Clip
         raise _boneless(file, bone)
     straight = straighten(clip, options.up, options.handedness)
     moving = decoded.translations is not None
-    source = _mended(
-        file,
+    source = FileMotion(
         straight.clip,
         match,
-        (unit, unit_name),
+        unit,
+        unit_name,
         straight.axes,
-        repairs + decoded.repairs,
-        decoded.notes + straight.notes,
-        "its zero pose",
-        moving,
-        False,
-        options,
+        first_frame=0,
+        repairs=repairs + decoded.repairs,
+        notes=decoded.notes + straight.notes,
+        stance="its zero pose",
+        moving=moving,
+        straightened=False,
+        unsure=straight.unsure,
     )
-    return replace(source, unsure=straight.unsure)
+    return _repaired(file, source, options)
 
 
 def _unknown(
-    file: Bvh, target: Target, known: Match | None, repairs: list[str], options: ClipMotion
-) -> Source:
+    file: Bvh, target: Target, known: RigMatch | None, repairs: list[str], options: ClipMotion
+) -> FileMotion:
     """The source of a file on any other rig. Its parts and a standing rest pose are found."""
     rig = rig_of(file)
     decoded = _decoded(file)
@@ -140,33 +141,33 @@ def _unknown(
     wanted = [rig.index(joint) for joint in named.values()]
     standing_clip = upright(straight.clip, body, target.skeleton, wanted)
     check_height(file.path, standing_clip.height_error, standing_clip.notes, options.accept_doubt)
-    match = Match(
+    match = RigMatch(
         known.rig if known else FOUND,
         standing_clip.clip.skeleton.roles,
         False,
         named or pairs(standing_clip.clip.skeleton, standing_clip.body, target.skeleton, theirs),
     )
     notes = decoded.notes + straight.notes + ([] if known else _said(found, options.handedness))
-    moving = _moving(decoded, body, unit)
-    source = _mended(
-        file,
+    source = FileMotion(
         standing_clip.clip,
         match,
-        (unit, unit_name),
+        unit,
+        unit_name,
         axes,
-        repairs + decoded.repairs,
-        notes,
-        standing_clip.rest,
-        moving,
-        True,
-        options,
+        first_frame=0,
+        repairs=repairs + decoded.repairs,
+        notes=notes,
+        stance=standing_clip.rest,
+        moving=_moving(decoded, body, unit),
+        straightened=True,
+        unsure=straight.unsure + standing_clip.notes,
     )
-    return replace(source, unsure=straight.unsure + standing_clip.notes)
+    return _repaired(file, source, options)
 
 
-def _found(file: Bvh, rig: Skeleton, raw: Clip, known: Match | None, options: ClipMotion) -> Found:
+def _found(file: Bvh, rig: Skeleton, raw: Clip, known: RigMatch | None, options: ClipMotion) -> FoundBody:
     if known is not None:
-        return Found(body_by_roles(replace(rig, roles=known.roles)), True)
+        return FoundBody(body_by_roles(replace(rig, roles=known.roles)), True)
     try:
         found = find_body(rig.joints, rig.parents, raw.positions)
     except TwoFigures as error:
@@ -190,7 +191,7 @@ def _swapped(limbs: Mapping[str, Limb]) -> dict[str, Limb]:
     return {a: limbs[b] for a, b in (SIDES, SIDES[::-1])}
 
 
-def _said(found: Found, handedness: str) -> list[str]:
+def _said(found: FoundBody, handedness: str) -> list[str]:
     """Sentences on what was found, and on what names did not say."""
     out = ["No skeleton file describes this rig: its parts were found from structure, motion and names."]
     if not found.sided:
@@ -198,30 +199,21 @@ def _said(found: Found, handedness: str) -> list[str]:
     return out
 
 
-def _mended(
-    file: Bvh,
-    clip: Clip,
-    match: Match,
-    unit: tuple[float, str],
-    axes: Axes,
-    repairs: list[str],
-    notes: list[str],
-    stance: str,
-    moving: bool,
-    straightened: bool,
-    options: ClipMotion,
-) -> Source:
-    """The source with broken frames repaired and its floor at height zero."""
+def _repaired(file: Bvh, source: FileMotion, options: ClipMotion) -> FileMotion:
+    """The motion with broken frames repaired and its floor at height zero."""
     leave = options.defects == "leave"
-    repaired = Repaired(clip, 0, []) if leave else repair(clip)
+    repaired = Repaired(source.clip, 0, []) if leave else repair(source.clip)
     flat = options.ground == "flat" and not leave
     clip, moved, uneven = on_floor(repaired.clip) if flat else (repaired.clip, [], [])
-    mended = repaired.sentences + moved
-    if mended and options.defects == "refuse":
-        raise InputError(file.path, mended[0], fix="Set motion.defects: repair to repair it this way.")
-    notes = notes + uneven + flips(clip, repaired.first)
-    return Source(
-        clip, match, *unit, axes, repaired.first, repairs + mended, notes, stance, moving, straightened
+    repairs = repaired.sentences + moved
+    if repairs and options.defects == "refuse":
+        raise InputError(file.path, repairs[0], fix="Set motion.defects: repair to repair it this way.")
+    return replace(
+        source,
+        clip=clip,
+        first_frame=repaired.first,
+        repairs=source.repairs + repairs,
+        notes=source.notes + uneven + flips(clip, repaired.first),
     )
 
 

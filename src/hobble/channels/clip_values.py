@@ -8,14 +8,16 @@ from typing import Any
 
 import numpy as np
 
-from hobble.channels import Source, channel
+from hobble.channels import ClipSource, channel
 from hobble.core.clip import Clip
 from hobble.core.errors import InputError
 from hobble.core.files import load_npz, save_npz, write_json
 from hobble.core.quat import Array
 
 
-def clip_values(name: str, clip: Clip, source: Source, motion: Mapping[str, Any]) -> tuple[Array, list[str]]:
+def clip_values(
+    name: str, clip: Clip, source: ClipSource, motion: Mapping[str, Any]
+) -> tuple[Array, list[str]]:
     """Values (F, C) float32 of channel `name` for a clip, and warnings.
 
     motion: the report of the motion stage. Raises InputError if the values cannot be read, are not finite or

@@ -9,7 +9,7 @@ import numpy as np
 
 from hobble.channels import channel
 from hobble.channels.channel import Channel
-from hobble.channels.limits import Pace
+from hobble.channels.speed_limits import LimitLearner
 from hobble.core.errors import HobbleError
 from hobble.core.skeleton import Skeleton
 from hobble.rows.clip_rows import ClipRows
@@ -17,14 +17,15 @@ from hobble.rows.compose import body_layout
 from hobble.rows.layout import GAITS, RowLayout
 
 
-def paces_of(layout: RowLayout, skeleton: Mapping[str, Any]) -> dict[str, Pace]:
-    """A `Pace` for each channel of the layout that slows a body. It learns the speed limits."""
+def limit_learners(layout: RowLayout, skeleton: Mapping[str, Any]) -> dict[str, LimitLearner]:
+    """A `LimitLearner` for each channel of the layout that slows a body. It learns the speed limits."""
     slowing = [(one, columns) for name, columns in layout.channels if (one := channel(name)).slows]
     if not slowing:
         return {}
     rig = Skeleton.from_dict(skeleton)
     return {
-        one.name: Pace(one.highest, _other_side(one, columns, rig), len(GAITS)) for one, columns in slowing
+        one.name: LimitLearner(one.highest, _other_side(one, columns, rig), len(GAITS))
+        for one, columns in slowing
     }
 
 
@@ -37,16 +38,16 @@ def _other_side(one: Channel, columns: int, rig: Skeleton) -> np.ndarray:
         return own.astype(int)
 
 
-def gather(paces: Mapping[str, Pace], rows: ClipRows, source: str | None) -> None:
+def add_rows(learners: Mapping[str, LimitLearner], rows: ClipRows, source: str | None) -> None:
     """Add the rows of a clip. source: its healthy clip if it is a hurt version, else None."""
-    if not paces or not len(rows):
+    if not learners or not len(rows):
         return
     layout = rows.layout
     shares = rows.x[:, body_layout(layout).x_gait].reshape(len(rows), len(GAITS), layout.samples)
     told = {name: rows.channels[name].any(axis=1) for name, _ in layout.channels}
-    for name, pace in paces.items():
+    for name, learner in learners.items():
         others = [on for other, on in told.items() if other != name]
-        pace.add(
+        learner.add(
             rows.clip,
             gait=shares[:, :, layout.samples // 2],
             velocity=rows.y[:, layout.y_root_velocity],

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Any
+from typing import TypedDict
 
 import numpy as np
 
@@ -28,31 +28,65 @@ class SideBySide:
     milliseconds: Mapping[str, Sequence[Row]] = field(default_factory=dict, repr=False)
 
 
-def pair(a: Json, b: Json) -> dict[str, Any]:
+class Difference(TypedDict):
+    """Two series and their difference by eq. 3.2. See `pair`."""
+
+    mean_a: float
+    sd_a: float
+    mean_b: float
+    sd_b: float
+    difference: float | None
+    sd_of_means_a: float | None
+    sd_of_means_b: float | None
+    difference_of_means: float | None
+
+
+class DifferenceOf(Difference):
+    """The difference of configurations `a` and `b`, `over` some clips, or laps of one mode."""
+
+    a: str
+    b: str
+    over: str
+
+
+class PublishedRow(TypedDict):
+    """A published figure beside ours. See `published_row`."""
+
+    measure: str
+    configuration: str
+    unit: str
+    published: float
+    ours: float | None
+    source: str
+    table: str | None
+    other_figure: float | None
+
+
+def pair(a: Json, b: Json) -> Difference:
     """Means and standard deviations of two series, and their difference by eq. 3.2 of Segerstedt 2021.
 
     `difference` divides by the deviations over single frames. `difference_of_means` divides by those over the
     means of clips or laps (`means` of a and b), as published. It is None if a or b has fewer than two means.
     """
-    out = {
+    means = [np.asarray(one.get("means", ()), float) for one in (a, b)]
+    sds = [float(some.std()) if len(some) > 1 else None for some in means]
+    of_means = None
+    if sds[0] is not None and sds[1] is not None:
+        one, other = (float(some.mean()) for some in means)
+        of_means = difference(one, sds[0], other, sds[1])
+    return {
         "mean_a": a["mean"],
         "sd_a": a["sd"],
         "mean_b": b["mean"],
         "sd_b": b["sd"],
         "difference": difference(a["mean"], a["sd"], b["mean"], b["sd"]),
+        "sd_of_means_a": sds[0],
+        "sd_of_means_b": sds[1],
+        "difference_of_means": of_means,
     }
-    means = [np.asarray(one.get("means", ()), float) for one in (a, b)]
-    sds = [float(some.std()) if len(some) > 1 else None for some in means]
-    out |= {"sd_of_means_a": sds[0], "sd_of_means_b": sds[1], "difference_of_means": None}
-    if sds[0] is not None and sds[1] is not None:
-        one, other = (float(some.mean()) for some in means)
-        out["difference_of_means"] = difference(one, sds[0], other, sds[1])
-    return out
 
 
-def published_row(
-    measure: str, row: Json, theirs: float, ours: float | None, unit: str = ""
-) -> dict[str, Any]:
+def published_row(measure: str, row: Json, theirs: float, ours: float | None, unit: str = "") -> PublishedRow:
     """A published figure (`theirs`) with ours, which is None if it was not measured.
 
     row: has `configuration` and `source`, and may have the `table` in which it was printed and

@@ -16,7 +16,7 @@ BLEND = 0.30  # seconds: sigma of the change between segments, which takes about
 
 
 @dataclass(frozen=True)
-class Path:
+class PlannedPath:
     """F frames at `fps`. The clip is frames `first` to F - `first`; the padding lets steps begin and end.
 
     position: (F, 2) x and z in cm. facing: (F,) radians, positive to the left. velocity: (F, 2) cm/s to the
@@ -39,7 +39,7 @@ class Path:
         return np.linalg.norm(self.velocity, axis=1)
 
 
-def walk_path(segments: Sequence[Segment], frames: int, fps: float) -> Path:
+def walk_path(segments: Sequence[Segment], frames: int, fps: float) -> PlannedPath:
     """Integrate the plan."""
     first = margin(fps)
     total = frames + 2 * first
@@ -60,7 +60,7 @@ def walk_path(segments: Sequence[Segment], frames: int, fps: float) -> Path:
         [velocity[:, 0] * cos + velocity[:, 1] * sin, velocity[:, 1] * cos - velocity[:, 0] * sin], 1
     )
     position = np.cumsum(step, axis=0) / fps
-    return Path(
+    return PlannedPath(
         fps,
         first,
         position - position[first],

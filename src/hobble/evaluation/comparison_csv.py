@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import Any
 
 from hobble.evaluation.compare_configurations import each
 from hobble.measures.given import Json, Row
@@ -29,9 +28,9 @@ def tables(compared: Json) -> dict[str, Sequence[Row]]:
     }
 
 
-def flat(row: Mapping[str, Any]) -> dict[str, Any]:
+def flat(row: Row) -> Row:
     """A row in which each inner mapping is replaced by keys `key_inner`."""
-    out: dict[str, Any] = {}
+    out: dict[str, object] = {}
     for key, value in row.items():
         if isinstance(value, Mapping):
             out |= {f"{key}_{inner}": v for inner, v in value.items()}
@@ -40,8 +39,8 @@ def flat(row: Mapping[str, Any]) -> dict[str, Any]:
     return out
 
 
-def _training(compared: Mapping[str, Any]) -> list[dict[str, Any]]:
-    rows = []
+def _training(compared: Json) -> list[Row]:
+    rows: list[Row] = []
     names = list(dict.fromkeys(key for entry in compared["training"] for key in entry))
     for entry in compared["training"]:
         for i in range(len(entry.get("pass", ()))):

@@ -1,0 +1,140 @@
+"""The types of injury.json."""
+
+from __future__ import annotations
+
+from typing import NotRequired, TypedDict
+
+Number = float | None  # None if it cannot be measured
+
+
+class SweepRow(TypedDict):
+    """The walk of one link at one severity: the measures of `gait_measures`, and distances of the pose, cm.
+
+    direction: "rising" or "falling". from_healthy, from_worst, from_rising: from the healthy walk, from that
+    at severity 10, and from that at the same severity while it rose. largest_acceleration: of a joint.
+    """
+
+    gait: str
+    link: str
+    direction: str
+    severity: float
+    speed: float
+    stance_left: float
+    stance_right: float
+    stance_asymmetry: Number
+    step_left: Number
+    step_right: Number
+    step_asymmetry: Number
+    knee_left: float
+    arm_left: float
+    knee_right: float
+    arm_right: float
+    lean_forward: float
+    lean_left: float
+    hip_height: float
+    from_healthy: float
+    from_worst: float
+    from_rising: float
+    largest_acceleration: float
+
+
+class Response(TypedDict):
+    """How one link's walk responds to severity. See `Sweep.response`."""
+
+    spearman: dict[str, Number]
+    spearman_falling: dict[str, Number]
+    from_healthy_cm: float
+    after_healing_cm: float
+    hysteresis_cm: float
+    speed_share: Number
+    settle_seconds: Number
+    heal_seconds: Number
+    largest_acceleration: float
+    acceleration_share: float
+
+
+class LinkResponse(Response):
+    """The response of one link in one gait.
+
+    trained: whether it was hurt in training. clip_acceleration: largest of a joint in captured motion, cm per
+    frame squared; `clip_acceleration_of` says in which: "link" or "gait".
+    """
+
+    gait: str
+    link: str
+    trained: bool
+    clip_acceleration: Number
+    clip_acceleration_of: str | None
+    clip_acceleration_share: Number
+
+
+class Summary(TypedDict):
+    """Means of the responses of several links in one gait."""
+
+    spearman_from_healthy: Number
+    spearman_speed: Number
+    spearman_falling_from_healthy: Number
+    from_healthy_cm: Number
+    after_healing_cm: Number
+    hysteresis_cm: Number
+    speed_share: Number
+    settle_seconds: Number
+    heal_seconds: Number
+    acceleration_share: Number
+    clip_acceleration_share: Number
+
+
+class SecondInjury(TypedDict):
+    """A second injury at severity 10 in addition to a first one. See `second_injuries`."""
+
+    first: str
+    second: str
+    from_first_cm: float
+    share: Number
+    from_second_cm: float
+    spearman: Number
+
+
+class IntoAJog(TypedDict):
+    """The change from walking to jogging. See `into_a_jog`. Speeds in cm/s."""
+
+    link: str | None
+    severity: float
+    walk_speed: float
+    jog_speed: float
+    reach_seconds: Number
+    walk_from_healthy_cm: float
+    jog_from_healthy_cm: float
+    kept: Number
+    largest_acceleration: float
+
+
+class Divided(TypedDict):
+    """The walk with severities divided by `scale`."""
+
+    scale: float
+    link: str
+    severity: float
+    from_healthy_cm: float
+    speed_share: float
+
+
+class InjuryResponse(TypedDict):
+    """injury.json. It has only the first two keys and `reason` if `applies` is false."""
+
+    configuration: str
+    applies: bool
+    reason: NotRequired[str]
+    mode: NotRequired[str]
+    seconds: NotRequired[float]
+    severities: NotRequired[list[float]]
+    links: NotRequired[list[str]]
+    trained: NotRequired[list[str]]
+    rows: NotRequired[list[SweepRow]]
+    falling: NotRequired[list[SweepRow]]
+    responses: NotRequired[list[LinkResponse]]
+    second: NotRequired[list[SecondInjury]]
+    into_a_jog: NotRequired[list[IntoAJog]]
+    divided: NotRequired[list[Divided]]
+    summary: NotRequired[dict[str, Summary]]
+    summary_untrained: NotRequired[dict[str, Summary]]

@@ -1,0 +1,25 @@
+"""The value of a curve between its frames."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from hobble.core.quat import Array
+
+
+def value_at(curve: Array, when: Array | float) -> Array:
+    """Linear interpolation of a curve (F,) at times in frames, as by `np.interp(when, np.arange(F), curve)`.
+
+    That would read the whole curve at every call, so calls for each step of a long clip would take time in
+    proportion to the square of its length.
+
+    >>> float(value_at(np.array([0.0, 10.0, 40.0]), 1.5))
+    25.0
+    """
+    times = np.asarray(when, float)
+    if not times.size:
+        return np.zeros(times.shape)
+    last = len(curve) - 1
+    first = min(max(int(times.min()), 0), last)
+    part = curve[first : min(max(int(times.max()), 0), last) + 2]
+    return np.asarray(np.interp(times, np.arange(first, first + len(part)), part))

@@ -1,0 +1,62 @@
+"""The types of accuracy.json."""
+
+from __future__ import annotations
+
+from typing import NotRequired, TypedDict
+
+from hobble.measures.results import SampleSize
+
+
+class ErrorsOf(TypedDict):
+    """Relative error and position error over `frames` frames. mean, sd, p05 to p95: of the relative error.
+
+    All but `frames` are None, or the quantiles are missing, if there was no frame.
+    """
+
+    frames: int
+    mean: float | None
+    sd: float | None
+    position_error_cm: float | None
+    p05: NotRequired[float]
+    p25: NotRequired[float]
+    p50: NotRequired[float]
+    p75: NotRequired[float]
+    p95: NotRequired[float]
+
+
+class ErrorsOfClip(ErrorsOf):
+    """The errors of one clip. split: "train" or "held_out"."""
+
+    clip: str
+    split: str
+
+
+class ErrorsOfExcerpt(ErrorsOfClip):
+    """The errors of an excerpt of a clip, with the frames of its first and last row."""
+
+    first_frame: int
+    last_frame: int
+
+
+class ErrorsOfSplit(ErrorsOf):
+    """The errors of all clips of a split.
+
+    clips: their number. mean_of_clips: the mean of their mean relative errors. interval: half widths of the
+    95 % confidence intervals of `mean` and `position_error_cm`, if only a sample was measured.
+    """
+
+    clips: int
+    mean_of_clips: float | None
+    interval: NotRequired[dict[str, float]]
+
+
+class Accuracy(TypedDict):
+    """accuracy.json. joints: how many were measured. excerpts: those of a sample; only in their table."""
+
+    configuration: str
+    joints: int
+    clips: list[ErrorsOfClip]
+    train: ErrorsOfSplit
+    held_out: ErrorsOfSplit
+    sample: NotRequired[SampleSize]
+    excerpts: NotRequired[list[ErrorsOfExcerpt]]

@@ -1,0 +1,95 @@
+"""The rows that a measurement reads: whole clips, or the excerpts of a sample."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+from hobble.evaluation.captured import Captured, captured
+from hobble.measures.given import Given, Json
+from hobble.measures.sample import Sample, drawn
+from hobble.measures.sample_options import SampleOptions
+from hobble.rows.clip_rows import ClipRows, load_clip_rows
+from hobble.rows.excerpts import LONGEST, Excerpt, load_excerpt
+from hobble.rows.facts import load_facts
+
+
+@dataclass(frozen=True)
+class Chosen:
+    """Rows of a clip: all of them, or those of `excerpt`. weight: the number of rows that each represents."""
+
+    clip: str
+    path: Path
+    weight: float = 1.0
+    excerpt: Excerpt | None = None
+
+    def load(self, before: int = 0, after: int = 0) -> Loaded:
+        """Read the rows, and up to so many of the same clip before and after them."""
+        if self.excerpt is None:
+            rows = load_clip_rows(self.path)
+            return Loaded(rows, 0, len(rows))
+        rows = load_excerpt(self.path, self.excerpt, before, after)
+        first = min(before, self.excerpt.first)
+        return Loaded(rows, first, first + self.excerpt.rows)
+
+
+@dataclass(frozen=True)
+class Loaded:
+    """Rows of a clip, of which those from `first` to `stop` were chosen. The others are around them."""
+
+    rows: ClipRows = field(repr=False)
+    first: int
+    stop: int
+
+    @property
+    def frames(self) -> list[int]:
+        """The first and last frame of the chosen rows, of which there is at least one."""
+        return [int(self.rows.frame[at]) for at in (self.first, self.stop - 1)]
+
+
+def chosen(clips: Mapping[str, str | Path], sample: Sample | None) -> Iterator[Chosen]:
+    """What to measure, sorted by clip and place. clips: name -> file of rows. sample: None for all clips."""
+    if sample is None:
+        for name in sorted(clips):
+            yield Chosen(name, Path(clips[name]))
+    else:
+        for one, weight in sample.weights.items():
+            yield Chosen(one.clip, Path(clips[one.clip]), weight, one)
+
+
+def captured_motion(clips: Mapping[str, str | Path], sample: Sample | None) -> Iterator[Captured]:
+    """The unbroken stretches of all clips, or of the excerpts of a sample, with one in memory at a time."""
+    for one in chosen(clips, sample):
+        yield from captured(one.load().rows)
+
+
+def sample_of(given: Given, options: SampleOptions) -> Sample | None:
+    """The excerpts to measure; None for all clips."""
+    return drawn(map(load_facts, given.facts), given.splits, options.sample_frames)
+
+
+def with_sample(result: Json, sample: Sample | None) -> Json:
+    """The result, with what was drawn if it was measured on a sample."""
+    return result if sample is None else {**result, "sample": sample.to_dict()}
+
+
+def captured_sampled(found: Mapping[str, Any]) -> str:
+    """A sentence that only a sample of the captured motion was read; empty if all of it was."""
+    words = sampled_words(found)
+    return f" Of the clips, {words}, were read." if words else ""
+
+
+def sampled_words(found: Mapping[str, Any]) -> str:
+    """Which part of the clips was measured, in words; empty if all of them were.
+
+    found: a measurement's JSON.
+    """
+    sample = found.get("sample")
+    if not sample:
+        return ""
+    return (
+        f"{sample['excerpts']:,} of {sample['of_excerpts']:,} excerpts of at most {LONGEST // 60} s, from "
+        f"{sample['clips']:,} of {sample['of']:,} clips, drawn by gait, speed, channel and split"
+    )

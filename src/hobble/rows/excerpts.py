@@ -1,0 +1,85 @@
+"""Excerpts of a clip: the units in which a large data set is sampled, so that a long clip need not be read.
+
+A clip is cut into excerpts of equal length, of at most LONGEST rows. A shorter clip is one excerpt.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from itertools import pairwise
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+
+from hobble.core.errors import InputError
+from hobble.rows.clip_rows import DELETE_IT, ClipRows, load_clip_rows
+from hobble.rows.compose import body_layout
+from hobble.rows.layout import GAITS
+
+LONGEST = 1200  # rows, 20 seconds: several steps, and many of them in an hour
+
+
+class Excerpt(NamedTuple):
+    """`rows` rows of a clip that has `of` rows, from row `first` on."""
+
+    clip: str
+    first: int
+    rows: int
+    of: int
+
+    @property
+    def whole(self) -> bool:
+        """Whether it is the whole clip."""
+        return self.rows == self.of
+
+    @property
+    def stop(self) -> int:
+        """The first row after it."""
+        return self.first + self.rows
+
+
+@dataclass(frozen=True)
+class Kind:
+    """What is in an excerpt. gait: the one with the largest share. speed: of the root, mean over the rows, cm
+    a frame. channels: names of those with a value above 0 in some row."""
+
+    gait: str
+    speed: float
+    channels: tuple[str, ...]
+
+
+def excerpts(clip: str, rows: int, longest: int = LONGEST) -> list[Excerpt]:
+    """A clip of `rows` rows in excerpts whose lengths differ by at most one row.
+
+    >>> [(one.first, one.rows) for one in excerpts("walk", 2500)]
+    [(0, 833), (833, 833), (1666, 834)]
+    >>> excerpts("empty", 0)
+    []
+    """
+    count = -(-rows // longest)
+    edges = [rows * i // count for i in range(count + 1)] if count else []
+    return [Excerpt(clip, a, b - a, rows) for a, b in pairwise(edges)]
+
+
+def kind(rows: ClipRows, first: int, stop: int) -> Kind:
+    """What is in the rows `first` to `stop`, at least one."""
+    layout, part = rows.layout, slice(first, stop)
+    channels = tuple(name for name, values in rows.channels.items() if np.any(values[part] != 0))
+    shares = rows.x[part, body_layout(layout).x_gait].reshape(stop - first, len(GAITS), layout.samples)
+    gait = GAITS[int(shares[:, :, layout.samples // 2].mean(axis=0).argmax())]
+    speed = np.hypot(*rows.y[part, layout.y_root_velocity].astype(float).T).mean()
+    return Kind(gait, float(speed), channels)
+
+
+def load_excerpt(path: str | Path, one: Excerpt, before: int = 0, after: int = 0) -> ClipRows:
+    """The rows of an excerpt, and up to so many rows of the same clip before and after it.
+
+    Reads no more of the file than that. Raises InputError if the file is damaged, or if the clip has another
+    number of rows.
+    """
+    first, stop = max(0, one.first - before), min(one.of, one.stop + after)
+    rows = load_clip_rows(path, None if stop - first == one.of else (first, stop))
+    if len(rows) != stop - first:
+        raise InputError(path, f"has other rows than its summary says ({one.of})", fix=DELETE_IT)
+    return rows

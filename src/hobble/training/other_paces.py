@@ -1,0 +1,135 @@
+"""Rows played at other paces along smooth paths, so that neither the speed nor the path says who walks."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import torch
+from torch import Tensor
+
+from hobble.core.quat import Array
+from hobble.database.reader import Database
+
+RISE = 0.5  # largest change of the pace from the middle of the window to its end, as a share of the pace
+# Multiples of these irrational numbers, less their whole part, are spread evenly over 0..1: for the pace, its
+# change, and how smooth the path is.
+STEPS_OF_PLACE = (math.sqrt(3) - 1, math.sqrt(7) - 2, math.sqrt(11) - 3)
+STEPS_OF_BATCH = (math.sqrt(13) - 3, math.sqrt(17) - 4, math.sqrt(19) - 4)
+
+
+class OtherPaces:
+    """Plays each row's motion slower or faster, and moves its path towards a smooth one. X and Y both change.
+
+    If few people walk, each at one speed, the speed in the input shows who it is. So does the sway of the
+    path in each step. A running character has another speed and a straighter path, so a network takes it for
+    somebody else, and the walk changes with the speed. With these rows anybody walks at any speed.
+
+    The time t of the window becomes r t (1 + a t / T) for a window of T frames to each side. r is spread
+    evenly (in its logarithm) between 1 / factor and factor, and 2 a between -RISE and RISE. Trajectory, gait
+    and ground are interpolated at the new times, and paths go on straight past their ends. Velocities, turn
+    and change of phase are multiplied by r. Then the path moves towards the parabola nearest to it, by a part
+    of the way between 0 and 1, again spread evenly over places and batches.
+
+    factor: 1 changes nothing, not even the path. batch: largest number of this process's rows in a batch.
+    first: the place of its first row in the whole batch.
+    """
+
+    def __init__(
+        self, database: Database, factor: float, batch: int, device: torch.device, first: int = 0
+    ) -> None:
+        layout, statistics = database.layout, database.statistics
+        self.layout, self.most = layout, math.log(factor)
+        self.x_std, self.x_mean, self.y_std, self.y_mean = (
+            torch.from_numpy(part).to(device, torch.float32)
+            for part in (statistics.x_std, statistics.x_mean, statistics.y_std, statistics.y_mean)
+        )
+        blocks = [layout.x_channel(name) for name, _ in layout.channels]
+        self.told = [torch.arange(block.start, block.stop, device=device) for block in blocks]
+        time = np.arange(layout.samples) / (layout.samples // 2) - 1.0
+        self.smooth_position, self.smooth_direction = (
+            torch.from_numpy(_nearest(np.stack([time**k for k in powers], axis=1))).to(device, torch.float32)
+            for powers in ((1, 2), (0, 1, 2))
+        )
+        places = first + torch.arange(batch, device=device).double()
+        self.spread = torch.stack([places * step for step in STEPS_OF_PLACE])
+        self.steps = torch.tensor(STEPS_OF_BATCH, device=device, dtype=torch.float64)[:, None]
+        self.batches = 0
+
+    def begin(self) -> None:
+        """Start again, so that a section does not depend on the previous one."""
+        self.batches = 0
+
+    def play(self, x: Tensor, y: Tensor) -> None:
+        """Change standardised inputs x (B, X) and outputs y (B, Y) in place."""
+        if not self.most or not len(x):
+            return
+        even = torch.remainder(self.spread[:, : len(x)] + self.batches * self.steps, 1.0)
+        self.batches += 1
+        pace, rise, part = even.to(x.dtype)[:, :, None]
+        pace, rise = torch.exp((2 * pace - 1) * self.most), (2 * rise - 1) * RISE / 2
+        told = [x[:, columns] for columns in self.told]
+        # The divisor of a column that never varies is far too large to multiply by and divide again.
+        raw_x, raw_y = x * self.x_std + self.x_mean, y * self.y_std + self.y_mean
+        self._play_window(raw_x, raw_y, pace, rise)
+        self._play_frame(raw_x, raw_y, pace)
+        self._smooth(raw_x, part)
+        x.copy_((raw_x - self.x_mean) / self.x_std)
+        y.copy_((raw_y - self.y_mean) / self.y_std)
+        for columns, values in zip(self.told, told, strict=True):
+            x[:, columns] = values
+
+    def _play_window(self, x: Tensor, y: Tensor, pace: Tensor, rise: Tensor) -> None:
+        """Trajectory, gait and ground at the new times. Heights stay relative to the mean of the centre."""
+        layout, n = self.layout, self.layout.samples
+        blocks = [(layout.x_position, False), (layout.x_direction, True), (layout.x_gait, True)]
+        for block, ends in [*blocks, (layout.x_terrain, True)]:
+            x[:, block] = _at(x[:, block], n, layout.future, pace, rise, ends)
+        for block, ends in ((layout.y_position, False), (layout.y_direction, True)):
+            y[:, block] = _at(y[:, block], layout.future, layout.future, pace, rise, ends)
+        ground = x[:, layout.x_terrain]
+        mean = ground[:, n : 2 * n].mean(dim=1, keepdim=True)
+        ground -= mean
+        x[:, layout.x_joint_position][:, 1::3] -= mean
+        y[:, layout.y_joint_position][:, 1::3] -= mean
+
+    def _play_frame(self, x: Tensor, y: Tensor, pace: Tensor) -> None:
+        """Less or more happens in a frame, and the previous pose is nearer to this one or farther."""
+        layout = self.layout
+        before, now = x[:, layout.x_joint_position], y[:, layout.y_joint_position]
+        before += (1 - pace) * (now - before)
+        x[:, layout.x_joint_velocity] *= pace
+        for block in (layout.y_root_velocity, layout.y_turn, layout.y_phase_change, layout.y_joint_velocity):
+            y[:, block] *= pace
+
+    def _smooth(self, x: Tensor, part: Tensor) -> None:
+        """Move the path in x by `part` (B, 1) of the way to the nearest parabola."""
+        layout = self.layout
+        for block, nearest in (
+            (layout.x_position, self.smooth_position),
+            (layout.x_direction, self.smooth_direction),
+        ):
+            own = x[:, block].unflatten(1, (2, layout.samples))
+            x[:, block] = torch.lerp(own, own @ nearest.T, part[:, :, None]).flatten(1)
+
+
+def _nearest(powers: Array) -> Array:
+    """(n, n) the matrix that makes of n values the nearest ones that are sums of the columns of (n, k)."""
+    return powers @ np.linalg.pinv(powers)
+
+
+def _at(values: Tensor, samples: int, half: int, pace: Tensor, rise: Tensor, ends: bool) -> Tensor:
+    """values (B, C samples) at the new times. pace, rise: (B, 1).
+
+    half: samples in half of the window; the values are those of the whole window or of its second half. ends:
+    past the ends of the window the last value holds; else it goes on straight.
+    """
+    table, middle = values.unflatten(1, (-1, samples)), samples - half
+    time = torch.arange(samples, device=values.device) - middle
+    place = middle + pace * time * (1 + rise * time / half)
+    if ends:
+        place = place.clamp(0, samples - 1)
+    below = place.floor().clamp(0, samples - 2)
+    at = below.long()[:, None].expand(-1, table.shape[1], -1)
+    share = (place - below)[:, None].to(values.dtype)
+    return torch.lerp(table.gather(2, at), table.gather(2, at + 1), share).flatten(1)
