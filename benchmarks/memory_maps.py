@@ -22,9 +22,10 @@ import database as of_files
 import numpy as np
 from database import BATCH, PROGRAM_MB, cold, made_up, status
 
+from hobble.core.processors import processor
 from hobble.database import chunks, order, reader, window
 from hobble.database.merge import write_database
-from hobble.database.reader import Block, Database, ahead
+from hobble.database.reader import Block, Database, read_ahead
 from hobble.database.window import empty_buffers
 
 TABLES = ("x", "y", "fits", "count", "clip", "frame", "phase")
@@ -70,7 +71,9 @@ class Mapped:
             self.parts((seed, 0, layer), start, stop, window)
             for layer, start, stop in order.spans(rows, visits, section, SECTIONS)
         )
-        return ahead(self.db._composed(parts, self.db.section_pairs("train", section, SECTIONS), block_rows))
+        return read_ahead(
+            self.db._composed(parts, self.db.section_pairs("train", section, SECTIONS), block_rows)
+        )
 
     def parts(self, of: tuple[int, int, int], start: int, stop: int, window: int) -> Iterator[tuple]:
         """Rows and fits of the places start to stop of a layer, as indices into the whole tables."""
@@ -174,6 +177,7 @@ def measure(folder: Path, memory_mb: int, rounds: int) -> None:
 
 def main() -> None:
     args = of_files.arguments(__doc__.splitlines()[0], rounds=5).parse_args()
+    print(processor())
     if args.task:
         globals()[f"task_{args.task}"](args.folder, args.argument)
         return

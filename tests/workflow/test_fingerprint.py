@@ -129,7 +129,7 @@ def test_only_code_changes_a_fingerprint(source: Path, file: str, old: str, new:
 
 def test_infrastructure_modules_exist_and_have_a_reason(root: Path) -> None:
     for name, reason in fp.INFRASTRUCTURE.items():
-        assert list(fp._found(name, root / "src"))[1:], name
+        assert list(fp._files_of_module(name, root / "src"))[1:], name
         assert reason
 
 
@@ -139,8 +139,8 @@ def test_no_stage_imports_a_later_one(root: Path) -> None:
     order.insert(order.index("training"), "character")
     order.insert(order.index("channels"), "gait")  # how a walk is measured; no rule is its own
     # A channel's folder also holds how it is shown and measured, which comes after all stages.
-    told = [f"hobble.channels.{name}" for name in NAMES]
-    of_stage = fp.closure(root / "workflow/scripts/channel_clips.py", root / "src", told)
+    channels = [f"hobble.channels.{name}" for name in NAMES]
+    of_stage = fp.closure(root / "workflow/scripts/channel_clips.py", root / "src", channels)
     assert any("injury" in module.parts for module in of_stage)
     for rank, stage in enumerate(order):
         for module in (root / "src/hobble" / stage).rglob("*.py"):

@@ -68,7 +68,7 @@ def body(skeleton: Skeleton) -> Mesh:
 
     It depends on joints, offsets and roles only, and is made once for each.
     """
-    return _made(_text(skeleton))
+    return _mesh_of(_text(skeleton))
 
 
 def key(skeleton: Skeleton) -> str:
@@ -82,7 +82,7 @@ def _text(skeleton: Skeleton) -> str:
 
 
 @functools.lru_cache(maxsize=8)
-def _made(text: str) -> Mesh:
+def _mesh_of(text: str) -> Mesh:
     skeleton = Skeleton.from_dict({"name": "body", **json.loads(text)})
     known = all(skeleton.roles.get(role) in skeleton.joints for role in NEEDED)
     if known:

@@ -24,7 +24,7 @@ from hobble.motion.flat_feet import doubt, height_error, rest_tilt
 from hobble.motion.from_motion import bends, from_motion
 from hobble.motion.from_rest import TRUSTED, add_rest, from_rest, zero_doubt
 from hobble.motion.no_neck import lean_doubt
-from hobble.motion.orient import apart, mean, pointed
+from hobble.motion.orient import degrees_between_rotations, mean_rotation, pointed_along
 from hobble.motion.rebase import rebased
 from hobble.motion.spine import SHORT, Spine
 from hobble.motion.standing import stands
@@ -78,14 +78,17 @@ def upright(clip: Clip, body: Body, target: Skeleton, others: Collection[int] = 
     problem = stands(body, rest)
     zero = from_rest(seen) if problem is None else None
     frames = from_motion(seen, zero[body.chest] if zero else None)
-    if zero and max(apart(zero[j], frames[j]) for j in (body.hips, *body.trunk)) > TRUSTED:
+    if (
+        zero
+        and max(degrees_between_rotations(zero[j], frames[j]) for j in (body.hips, *body.trunk)) > TRUSTED
+    ):
         problem, zero = "the trunk is twisted", None
         frames = from_motion(seen, None)
     unsure = [lean_doubt(seen, zero is not None)]
     if zero:
         add_rest(frames, zero, seen)
         unsure.append(zero_doubt(seen, zero))
-    said = "its zero pose" if problem is None else f"its motion, because in its zero pose {problem}"
+    source = "its zero pose" if problem is None else f"its motion, because in its zero pose {problem}"
     unsure.append(doubt(seen, problem is None))
     kept = _kept(clip, seen, others, frames)
     clip, body = with_balls(clip, body, frames)
@@ -93,7 +96,7 @@ def upright(clip: Clip, body: Body, target: Skeleton, others: Collection[int] = 
     clip, body = with_bends(clip, body, frames, bends(seen))
     made = rebased(clip, body, [*body.joints, *kept], frames, roles)
     notes = [note for note in unsure if note]
-    return Upright(*made, said, notes, height_error(seen, problem is None))
+    return Upright(*made, source, notes, height_error(seen, problem is None))
 
 
 def _speeds(clip: Clip) -> Array:
@@ -115,11 +118,11 @@ def _kept(clip: Clip, seen: BodySample, others: Collection[int], frames: dict[in
         if carrier is None:
             continue
         part = quat.mul(seen.turned[:, carrier], frames[carrier])
-        frames[joint] = mean(quat.mul(quat.inv(seen.turned[:, joint]), part))
+        frames[joint] = mean_rotation(quat.mul(quat.inv(seen.turned[:, joint]), part))
         for side, sign in (("left", 1.0), ("right", -1.0)):
             tips = [j for j in others if joint in above(parents, j)[1:]]
             bones = [bone for j in tips if np.linalg.norm(bone := seen.bone(joint, j)) > SHORT]
             if carrier == body.arms[side][3] and bones:
-                frames[joint] = pointed(frames[joint], sign * LEFT, bones[0])
+                frames[joint] = pointed_along(frames[joint], sign * LEFT, bones[0])
         out.append(joint)
     return out

@@ -90,7 +90,7 @@ def track_chart(found: Json) -> Chart | None:
     off = [(x, z, cm, r["lap"]) for r in runs for x, z, cm in zip(r["x"], r["z"], r["off_cm"], strict=True)]
     left = [row for row in off if row[2] > OFF_TRACK]
     if left:
-        traces.append(_left(left))
+        traces.append(_off_track_markers(left))
     traces.append(
         {
             "type": "scatter",
@@ -105,14 +105,14 @@ def track_chart(found: Json) -> Chart | None:
             "hoverinfo": "skip",
         }
     )
-    most = max(row[2] for row in off)
+    largest = max(row[2] for row in off)
     where = f"Red marks places more than {OFF_TRACK:.0f} cm from the track. " if left else ""
     return Chart(
         "track",
         "The track, and the path of the character",
         "From above. Dashed lines join the waypoints. Each waypoint has a number and the gait on the way to "
         "it; it counts as reached within a metre. Solid lines are the paths of the first laps. "
-        f"{where}The largest distance from the track was {most:.0f} cm.",
+        f"{where}The largest distance from the track was {largest:.0f} cm.",
         traces,
         {
             "xaxis": axis("x, m", constrain="domain", zeroline=False),
@@ -122,7 +122,7 @@ def track_chart(found: Json) -> Chart | None:
     )
 
 
-def _left(places: list[tuple[float, float, float, int]]) -> Trace:
+def _off_track_markers(places: list[tuple[float, float, float, int]]) -> Trace:
     """Markers where laps left the track. places: x, z, distance in cm and lap of each."""
     return {
         "type": "scatter",
