@@ -70,6 +70,7 @@ wildcard_constraints:
     clip=r"[^/]+(?<!_mirror)",
     channels=r"plain|[a-z_+]+(?<!clips)",
     measure="|".join(MEASURES),
+    piece="[a-z]+",
     shard=r"\d+",
 
 

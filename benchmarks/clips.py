@@ -17,6 +17,7 @@ import tempfile
 import time
 from pathlib import Path
 
+from hobble.core.processors import processor
 from hobble.motion.read import read_bvh
 from hobble.workflow.project import Project
 
@@ -46,6 +47,7 @@ def main() -> None:
     parser.add_argument("--dataset", default="cmu")
     parser.add_argument("--cores", type=int, default=2)
     arguments = parser.parse_args()
+    print(processor())
     mocap = arguments.mocap.resolve()
     project = Project(ROOT, {"mocap": str(mocap)})
     clips = sorted(project.clips.listed(arguments.dataset))
@@ -55,11 +57,11 @@ def main() -> None:
     frames = sum(len(read_bvh(path)) for path in files)
     reading = time.process_time() - start
     targets = [f"results/datasets/{arguments.dataset}/labels/{clip}.json" for clip in clips]
-    wall, processor = workflow_seconds(targets, mocap, arguments.cores)
+    wall, busy = workflow_seconds(targets, mocap, arguments.cores)
     print(f"{len(files)} clips, {frames} frames, {size:.1f} MB")
     print(f"read                       {size / reading:8.0f} MB/s")
     print(f"motion and labels, wall    {wall:8.1f} s on {arguments.cores} cores")
-    print(f"processor time             {processor:8.1f} s, {processor / (2 * len(clips)):.2f} s a job")
+    print(f"processor time             {busy:8.1f} s, {busy / (2 * len(clips)):.2f} s a job")
     print(f"machine's load             {os.getloadavg()[0]:8.1f}")
 
 

@@ -24,6 +24,7 @@ from pathlib import Path
 
 import numpy as np
 
+from hobble.core.processors import processor
 from hobble.database.merge import write_database
 from hobble.database.reader import Database
 from hobble.rows.clip_rows import ClipRows, save_clip_rows
@@ -325,6 +326,7 @@ def main() -> None:
     parser.add_argument("--joints", type=int, default=31)
     parser.add_argument("--only", choices=["reading", "training"], help="leave the other out")
     args = parser.parse_args()
+    print(processor())
     if args.task:
         globals()[f"task_{args.task}"](args.folder, args.argument)
         return

@@ -22,6 +22,7 @@ import database as of_files
 import numpy as np
 from database import BATCH, PROGRAM_MB, cold, made_up, status
 
+from hobble.core.processors import processor
 from hobble.database import chunks, order, reader, window
 from hobble.database.merge import write_database
 from hobble.database.reader import Block, Database, ahead
@@ -174,6 +175,7 @@ def measure(folder: Path, memory_mb: int, rounds: int) -> None:
 
 def main() -> None:
     args = of_files.arguments(__doc__.splitlines()[0], rounds=5).parse_args()
+    print(processor())
     if args.task:
         globals()[f"task_{args.task}"](args.folder, args.argument)
         return

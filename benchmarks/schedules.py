@@ -18,6 +18,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 import hobble.training  # noqa: F401 - first, since it says how threads wait
+from hobble.core.processors import processor
 
 # isort: split
 import matplotlib
@@ -110,6 +111,7 @@ def main() -> None:
     parser.add_argument("--plot", type=Path)
     parser.add_argument("--threads", type=int, default=2)
     options = parser.parse_args()
+    print(processor())
     curves = [trained(name, options.database, options.threads) for name in options.configurations.split(",")]
     first = curves[0]
     for curve in curves[1:]:

@@ -12,6 +12,7 @@ from pathlib import Path
 import yaml
 
 from hobble.core.bvh import write_bvh
+from hobble.core.processors import processor
 from hobble.core.skeleton import Skeleton
 from hobble.synthetic.generate_clip import generate
 
@@ -19,6 +20,7 @@ ROOT = Path(__file__).resolve().parents[1]
 
 
 def main() -> None:
+    print(processor())
     data = yaml.safe_load((ROOT / "config/skeletons/holden31.yaml").read_text())
     skeleton = Skeleton.from_dict({"name": "holden31", **data})
     frames = 1000

@@ -26,6 +26,7 @@ from scipy.ndimage import map_coordinates
 from hobble.config.sections import DatabaseOptions, LabelOptions, Synthetic, Terrain
 from hobble.core.clip import Clip
 from hobble.core.errors import HobbleError
+from hobble.core.processors import processor
 from hobble.labels.label import label_clip, mirror_labels
 from hobble.labels.model import Labels as ClipLabels
 from hobble.motion.make import make_clip
@@ -212,6 +213,7 @@ def main() -> None:
     parser.add_argument("--flat", type=float, default=0.48, help="share of them on flat ground")
     parser.add_argument("--workers", type=int, default=2)
     arguments = parser.parse_args()
+    print(processor())
     clips = synthetic()
     if arguments.folder:
         clips = [c for path in sorted(arguments.folder.glob("*.bvh")) for c in made(path, "rocky")]

@@ -63,26 +63,26 @@ class Server:
 @pytest.fixture
 def server() -> Iterator[Server]:
     """A server on a port of its own."""
-    told = Server()
+    server = Server()
 
     class Handler(BaseHTTPRequestHandler):
         def do_GET(self) -> None:
             wanted = self.headers.get("Range")
-            told.requests.append(wanted)
-            fault = told.faults.pop(0) if told.faults else 0
+            server.requests.append(wanted)
+            fault = server.faults.pop(0) if server.faults else 0
             if isinstance(fault, int) and 400 <= fault < 600:
                 return self.send_error(fault)
-            start = int(wanted[6:-1]) if wanted and told.ranges else 0
-            if start >= len(told.content):
+            start = int(wanted[6:-1]) if wanted and server.ranges else 0
+            if start >= len(server.content):
                 return self.send_error(416)
-            body = told.content[start:]
+            body = server.content[start:]
             self.send_response(206 if start else 200)
             if start:
                 first = 0 if fault == "other part" else start
                 self.send_header(
-                    "Content-Range", f"bytes {first}-{len(told.content) - 1}/{len(told.content)}"
+                    "Content-Range", f"bytes {first}-{len(server.content) - 1}/{len(server.content)}"
                 )
-            if told.announces:
+            if server.announces:
                 self.send_header("Content-Length", str(len(body)))
             self.end_headers()
             self.wfile.write(body[: fault or None] if isinstance(fault, int) else body)
@@ -95,8 +95,8 @@ def server() -> Iterator[Server]:
     http = ThreadingHTTPServer(("127.0.0.1", 0), Handler)
     thread = threading.Thread(target=http.serve_forever, kwargs={"poll_interval": 0.01})
     thread.start()
-    told.url = f"http://127.0.0.1:{http.server_port}/walk.bvh"
-    yield told
+    server.url = f"http://127.0.0.1:{http.server_port}/walk.bvh"
+    yield server
     http.shutdown()
     http.server_close()
     thread.join()

@@ -11,14 +11,14 @@ import numpy as np
 MOST = 0.01
 
 
-def told(path: str) -> dict[str, Any]:
+def read_result(path: str) -> dict[str, Any]:
     """What a file of weights says about its training."""
     with np.load(path) as file:
         return dict(json.loads(str(file["meta"])))
 
 
 def main(first: str, second: str) -> int:
-    a, b = told(first), told(second)
+    a, b = read_result(first), read_result(second)
     apart = abs(a["held_out_mse"] / b["held_out_mse"] - 1)
     print(f"held-out errors {a['held_out_mse']:.4f} and {b['held_out_mse']:.4f}, {apart:.1%} apart")
     return int(any(a[key] != b[key] for key in ("steps", "samples")) or apart > MOST)

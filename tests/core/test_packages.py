@@ -15,6 +15,6 @@ def test_no_function_of_a_package_is_hidden_by_a_module(root: Path) -> None:
         imported = {
             (node.module or "").rpartition(".")[2] for node in body if isinstance(node, ast.ImportFrom)
         }
-        beside = {path.stem for path in init.parent.iterdir() if path.suffix == ".py" or path.is_dir()}
-        found += [f"{init.parent.name}.{name}" for name in (own & beside) - imported]
+        modules = {path.stem for path in init.parent.iterdir() if path.suffix == ".py" or path.is_dir()}
+        found += [f"{init.parent.name}.{name}" for name in (own & modules) - imported]
     assert found == []

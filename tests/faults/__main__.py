@@ -90,12 +90,12 @@ def _texts(lab: Lab, folder: Path, seed: int, examples: int) -> list[Throw]:
     names = {"bvh": "a BVH file", "status": "a status file"}
     for which, base in bases.items():
 
-        def told(case: Case, became: str, which: str = which) -> None:
+        def report(case: Case, became: str, which: str = which) -> None:
             what = f"{names[which]} with {len(case.names)} mutation{'s' * (len(case.names) > 1)}"
             thrown.append(Throw(what, "its reader", REFUSED if became == "refused" else UNHARMED))
 
         try:
-            texts.throw(which, base, folder, examples, seed, told)
+            texts.throw(which, base, folder, examples, seed, report)
         except AssertionError as error:
             thrown.append(Throw(names[which], "its reader", FAULT, str(error)))
             print(thrown[-1], flush=True)

@@ -106,10 +106,10 @@ def test_every_mutation_of_a_status_file_gives_severities_or_one_message(folder:
 def test_several_mutations_of_one_file_give_a_result_or_one_message(folder: Path) -> None:
     became: list[str] = []
 
-    def told(case: Case, what: str) -> None:
+    def report(case: Case, what: str) -> None:
         became.append(what)
 
-    texts.throw("status", status_grammar.BASE, folder, 60, SEED, told)
+    texts.throw("status", status_grammar.BASE, folder, 60, SEED, report)
     assert len(became) >= 60
 
 

@@ -87,7 +87,7 @@ def base_bvh(path: Path) -> str:
 
 
 def throw(
-    which: str, base: str, folder: Path, examples: int, seed_: int, told: Callable[[Case, str], Any]
+    which: str, base: str, folder: Path, examples: int, seed_: int, report: Callable[[Case, str], Any]
 ) -> None:
     """Read and judge files of a grammar ("bvh" or "status") that hypothesis generates from a seed."""
     grammar = bvh_grammar if which == "bvh" else status_grammar
@@ -97,7 +97,7 @@ def throw(
     whole = read(path)
 
     def one(case: Case) -> None:
-        told(case, judge(case, path, read, whole))
+        report(case, judge(case, path, read, whole))
 
     phases = (Phase.generate, Phase.shrink)
     wanted = settings(

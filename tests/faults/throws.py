@@ -321,9 +321,9 @@ def changing_clip(lab: Lab, rng: Random) -> Throw:
 
 def _write_anew(clip: Path, new: bytes, how: str, pause: float) -> None:
     if how == "replaced":
-        beside = clip.with_suffix(".new")
-        beside.write_bytes(new)
-        os.replace(beside, clip)
+        new_file = clip.with_suffix(".new")
+        new_file.write_bytes(new)
+        os.replace(new_file, clip)
         return
     with open(clip, "r+b") as file:
         if how.startswith("emptied"):

@@ -47,10 +47,10 @@ def test_the_mirrored_clip_has_the_mirrored_profile(holden31, uneven, mirror):
 def test_effects_of_a_mirrored_clip_are_those_of_the_other_side(holden31, uneven, mirror, healthy):
     own = profile(measure(holden31, uneven))
     other = profile(measure(holden31, mirror(holden31, uneven)))
-    beside = mirrored(healthy)
-    assert effects(own, healthy, "right") == pytest.approx(effects(other, beside, "left"))
+    mirrored_healthy = mirrored(healthy)
+    assert effects(own, healthy, "right") == pytest.approx(effects(other, mirrored_healthy, "left"))
     for judge in (recognise, grade):
-        one, two = judge(own, healthy), judge(other, beside)
+        one, two = judge(own, healthy), judge(other, mirrored_healthy)
         assert (one.label, one.side, two.side) == (two.label, "right", "left")
         assert two.probabilities == pytest.approx(one.probabilities, abs=1e-6)
 
@@ -109,17 +109,17 @@ def test_names_are_unique():
 
 def test_each_feature_is_the_difference_that_its_name_says(holden31, stepper):
     even, limp = stepper(), stepper(stance_right=30, stance_left=42, ahead_right=10)
-    told = features(*(profile(measure(holden31, made.positions(holden31))) for made in (limp, even)))
-    assert told["stance L - R"] == pytest.approx(12 / 60)
-    assert told["step R - L"] == pytest.approx(-30 / 81)  # 30 and 60 cm, where both were 45
-    assert told["left landing"] == pytest.approx(0)
-    assert told["step width"] == pytest.approx(0)
+    found = features(*(profile(measure(holden31, made.positions(holden31))) for made in (limp, even)))
+    assert found["stance L - R"] == pytest.approx(12 / 60)
+    assert found["step R - L"] == pytest.approx(-30 / 81)  # 30 and 60 cm, where both were 45
+    assert found["left landing"] == pytest.approx(0)
+    assert found["step width"] == pytest.approx(0)
     healthy = profile(measure(holden31, even.positions(holden31)))
     walk = healthy | {"range knee_flexion_R": 0.4 * healthy["range knee_flexion_R"]}
     walk["range arm_forward_L"] = 100.0  # of nothing: five times, the most that is said
-    told = features(walk, healthy)
-    assert told["range knee_flexion R - L"] == pytest.approx(-0.6)
-    assert told["range arm_forward R - L"] == pytest.approx(-np.log(5))
+    found = features(walk, healthy)
+    assert found["range knee_flexion R - L"] == pytest.approx(-0.6)
+    assert found["range arm_forward R - L"] == pytest.approx(-np.log(5))
 
 
 def test_windows_begin_every_second_and_hold_three_cycles(holden31, stepper):

@@ -71,8 +71,8 @@ def make_network(
     for name, size in (("X", layout.x_size), ("Y", layout.y_size)):
         arrays[f"{name}mean"] = rng.normal(size=size).astype(np.float32)
         arrays[f"{name}std"] = (rng.random(size) + 0.5).astype(np.float32)
-    told = {"injury": ["Hips-Arm"]} if layout.channels else {}
-    meta = {"layout": layout.to_dict(), "skeleton": SKELETON, "channels": told}
+    channels = {"injury": ["Hips-Arm"]} if layout.channels else {}
+    meta = {"layout": layout.to_dict(), "skeleton": SKELETON, "channels": channels}
     return {**arrays, "meta": np.array(json.dumps(meta))}
 
 

@@ -17,7 +17,7 @@ from hobble.measures.registry import MEASURES, measure, modules, of_channels
 NAMES = [one.name for one in MEASURES]
 # Part -> its functions and what they are given.
 FUNCTIONS = {
-    "run": {"run": 2},
+    "run": {"run": 2, "run_piece": 3},
     "page": {"section": 2, "figures": 2, "hints": 2},
     "comparison": {"compared": 2, "tables": 1},
     "comparison_page": {"section": 1, "columns": 1},
@@ -46,6 +46,7 @@ def test_each_measurement_has_known_inputs_and_the_called_functions(one: Measure
         module = one.part(part)
         present = {name for name in functions if hasattr(module, name)}
         assert present or module is None, f"{part} has none of {', '.join(functions)}"
+        assert part != "run" or ("run_piece" in present) == (one.pieces is not None)
         for name in present:
             assert len(inspect.signature(getattr(module, name)).parameters) == functions[name], (part, name)
 

@@ -3,12 +3,17 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 
+from hobble.core.files import read_json, write_json
 from hobble.evaluation.csv_tables import write_csv
+from hobble.measures.given import Given
+from hobble.measures.responsivity import Options, pieces
 from hobble.measures.responsivity import run as module
 from hobble.measures.responsivity.run import lap_rows, parameter_counts, responsivity
 from hobble.runtime.controller import STEPS
@@ -139,6 +144,32 @@ def test_other_modes_run_fewer_laps(network) -> None:
     assert {m["mode"]: len(m["laps"]) for m in result["modes"]} == {"linear": 1, "cubic": 3}
     assert {m["mode"]: m["waypoints"] for m in result["modes"]} == {"linear": 2, "cubic": 6}
     assert len(result["laps"]) == 3
+
+
+def test_laps_that_a_job_of_their_own_ran_give_the_same_tables(
+    network, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The file of a piece has sorted keys; the result and the columns of the table are as without pieces."""
+    options = Options(laps=2, laps_other_modes=1, lap_seconds=2.0, modes=("linear",))
+    monkeypatch.setattr(module, "load_network", lambda path: network)
+    given = Given("x", {"weights": tmp_path}, runtime=RUNTIME)
+    names = pieces(options, RUNTIME, ("constant", "linear", "cubic"))
+    assert names == ("linear", "cubic")
+    files = {name: tmp_path / f"{name}.json" for name in names}
+    for name, file in files.items():
+        write_json(file, module.run_piece(given, options, name))
+    whole, merged = module.run(given, options), module.run(replace(given, pieces=files), options)
+    assert without_times(whole.result) == without_times(merged.result)
+    assert [len(mode["laps"]) for mode in merged.result["modes"]] == [1, 2]
+    of_whole, of_merged = (outcome.tables["laps"] for outcome in (whole, merged))
+    assert [list(row) for row in of_whole] == [list(row) for row in of_merged]
+    assert merged.result["modes"][1]["laps"] == read_json(files["cubic"])["laps"]["laps"]
+
+
+def test_a_network_with_one_mode_has_one_piece() -> None:
+    assert pieces(Options(), RUNTIME, ("exact",)) == ("exact",)
+    assert pieces(Options(modes=()), RUNTIME, ("constant", "linear", "cubic")) == ("cubic",)
+    assert pieces(Options(), RUNTIME, ("constant", "linear", "cubic")) == ("constant", "linear", "cubic")
 
 
 def test_known_times_of_steps_give_known_medians() -> None:

@@ -74,6 +74,11 @@ def near(network: Network, y: np.ndarray, expected: np.ndarray, within: float) -
     np.testing.assert_allclose((y - expected) / network.y_std, 0, atol=within)
 
 
+def test_the_modes_that_a_kind_names_are_those_of_its_networks(made: Made) -> None:
+    kind = json.loads(str(made[1]["meta"]))["kind"]
+    assert model(kind).modes == made[2].modes
+
+
 def test_the_read_network_equals_the_trained_one(made: Made) -> None:
     trainable, _, network = made
     x, phase = random_inputs(network)

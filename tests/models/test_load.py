@@ -208,8 +208,8 @@ MALFORMED: dict[str, tuple[Change, str]] = {
 
 
 def save(path: Path, made: Content) -> None:
-    told = made["meta"]
-    np.savez(path, **{**made, "meta": told if isinstance(told, np.ndarray) else np.array(json.dumps(told))})
+    meta = made["meta"]
+    np.savez(path, **{**made, "meta": meta if isinstance(meta, np.ndarray) else np.array(json.dumps(meta))})
 
 
 def test_a_valid_network_file_is_read(tmp_path: Path, holden31: Skeleton) -> None:

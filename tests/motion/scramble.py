@@ -73,8 +73,8 @@ def outcome(file: Path, seed: int, folder: Path, frames: int | None = None) -> O
     clip = stretched(replace(clip, rotations=clip.rotations[part], root=clip.root[part]), how)
     plain, other = folder / "plain.bvh", folder / "other.bvh"
     write_bvh(plain, clip, decimals=6)
-    told, names = written(clip, how)
-    write_bvh(other, told, how.order, decimals=8)
+    rewritten, names = written(clip, how)
+    write_bvh(other, rewritten, how.order, decimals=8)
     try:
         first, one = make_clip(plain, target, maps, "plain", "holden31", options)
         # Nothing but names tells a figure from its mirror image: of words, it has to be said.

@@ -107,9 +107,9 @@ def outcome(clip, tmp_path, make):
     """The results for a clip on another rig and for the original clip: both clips, and the joints' names."""
 
     def run(rig, source=None, **how):
-        told, names = rigged(source or clip, rig, **how)
+        rewritten, names = rigged(source or clip, rig, **how)
         write_bvh(tmp_path / "plain.bvh", source or clip, decimals=6)
-        write_bvh(tmp_path / "other.bvh", told, "YZX", decimals=8)
+        write_bvh(tmp_path / "other.bvh", rewritten, "YZX", decimals=8)
         return make(tmp_path / "plain.bvh")[0], make(tmp_path / "other.bvh"), names
 
     return run
@@ -178,9 +178,9 @@ def test_a_figure_on_four_legs_is_refused(tmp_path, make):
 
 
 @pytest.mark.shared
-@pytest.mark.parametrize(("down", "told"), [(0, None), (-20, "18 degrees flatter.*3.7 cm"), (-70, "nobody")])
-def test_a_zero_pose_on_tiptoe_gets_a_note(clip, tmp_path, make, down, told):
+@pytest.mark.parametrize(("down", "note"), [(0, None), (-20, "18 degrees flatter.*3.7 cm"), (-70, "nobody")])
+def test_a_zero_pose_on_tiptoe_gets_a_note(clip, tmp_path, make, down, note):
     turn = quat.from_axis_angle(np.array([1.0, 0, 0]), np.radians(down))
     write_bvh(tmp_path / "a.bvh", rezeroed(rigged(clip, PLAIN)[0], ("foot", "toe"), turn), decimals=8)
     unsure = " ".join(make(tmp_path / "a.bvh")[1]["unsure"])
-    assert re.search(told, unsure) if told else not unsure
+    assert re.search(note, unsure) if note else not unsure

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+from collections.abc import Iterator
 
 import numpy as np
 import pytest
@@ -10,6 +11,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from hobble.core.errors import InputError
+from hobble.motion import read, read_numbers
 from hobble.motion.read import read_bvh
 
 SMALL = """HIERARCHY
@@ -37,6 +39,17 @@ Frame Time: 0.0333333
 1 2 3 4 5 6 7 8 9
 1.5e1 -2 3 4 5 6 7 8 -9
 """
+
+
+@pytest.fixture(scope="module", autouse=True, params=["compiled", "general"])
+def reader(request: pytest.FixtureRequest) -> Iterator[None]:
+    """Read the numbers by compiled code wherever it can, or never."""
+    with pytest.MonkeyPatch.context() as patch:
+        if request.param == "compiled":
+            patch.setattr(read_numbers, "LARGE", 0)
+        else:
+            patch.setattr(read, "read_numbers", lambda *_: None)
+        yield
 
 
 @pytest.fixture

@@ -25,7 +25,7 @@ from hobble.report.scenes import scenes
 from hobble.report.walked import opened
 
 
-def beside(name: str) -> ModuleType:
+def load_module(name: str) -> ModuleType:
     """Imports a module of this folder, which is not a package."""
     path = Path(__file__).with_name(f"{name}.py")
     spec = importlib.util.spec_from_file_location(f"report_{name}", path)
@@ -40,13 +40,13 @@ def beside(name: str) -> ModuleType:
 @pytest.fixture(scope="session")
 def examples() -> ModuleType:
     """The generators of made-up artefacts."""
-    return beside("examples")
+    return load_module("examples")
 
 
 @pytest.fixture(scope="session")
 def tools() -> ModuleType:
     """The browser."""
-    return beside("browser")
+    return load_module("browser")
 
 
 @pytest.fixture(scope="session")

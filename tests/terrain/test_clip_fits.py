@@ -315,8 +315,8 @@ def test_real_clips_stand_on_the_fitted_ground(shared: Path, root: Path, made: S
             skeleton_name="holden31",
             options=ClipMotion(),
         )
-        beside = [p for s in (".phase", "_footsteps.txt") if (p := bvh.with_name(bvh.stem + s)).is_file()]
-        labels, _ = label_clip(clip, beside, report, "walk", kind, LabelOptions())
+        files = [p for s in (".phase", "_footsteps.txt") if (p := bvh.with_name(bvh.stem + s)).is_file()]
+        labels, _ = label_clip(clip, files, report, "walk", kind, LabelOptions())
         arrays = {"contacts": labels.contacts, "cycles": labels.cycles}
         fits = clip_fits(clip, arrays, patches, kind, terrain, made.database())
         assert len(fits.frame) > 60, file

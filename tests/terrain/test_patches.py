@@ -107,8 +107,8 @@ def test_no_patch_shows_a_hole() -> None:
     points = np.random.default_rng(0).uniform(-16, 15, (40_000, 2)).astype(np.float32)
     at = np.einsum("pij,nj->pin", patches.affine, np.column_stack([points, np.ones(len(points))]))
     seen = at.astype(int)
-    for beside in ((0, 0), (0, 1), (1, 0), (1, 1)):
-        rows, columns = seen[:, 0] + beside[0], seen[:, 1] + beside[1]
+    for shift in ((0, 0), (0, 1), (1, 0), (1, 1)):
+        rows, columns = seen[:, 0] + shift[0], seen[:, 1] + shift[1]
         assert not np.isnan(heights[rows, columns]).any()
     assert np.isfinite(patches.heights).all()
 

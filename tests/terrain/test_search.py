@@ -23,7 +23,7 @@ def plain_errors(patches: Patches, footing: FootPoints) -> np.ndarray:
     def at(points: np.ndarray) -> np.ndarray:
         return patches.at(every, points.astype(np.float32)).astype(float)
 
-    down, up, beside = footing.down, footing.up, footing.beam_sides
+    down, up, points_beside = footing.down, footing.up, footing.beam_sides
     under = at(down[:, :2])
     level = under.mean(axis=1, keepdims=True)
     error = 0.1 * np.mean((under - level - down[:, 2] + down[:, 2].mean()) ** 2, axis=1)
@@ -31,13 +31,13 @@ def plain_errors(patches: Patches, footing: FootPoints) -> np.ndarray:
     error += np.mean(np.maximum(over, 0) ** 2, axis=1)
     if footing.jumps:
         error += np.mean(np.maximum(-over - 5, 0) ** 2, axis=1)
-    if len(beside):
-        off, on = at(beside[:, :2]), at(beside[:, 2:])
+    if len(points_beside):
+        off, on = at(points_beside[:, :2]), at(points_beside[:, 2:])
         error += np.mean(np.maximum(off - (on - 40), 0) ** 2, axis=1)
     return error
 
 
-def made_up(seed: int, jumps: bool = False, beside: int = 0) -> FootPoints:
+def made_up(seed: int, jumps: bool = False, points_beside: int = 0) -> FootPoints:
     rng = np.random.default_rng(seed)
     n_down, n_up = rng.integers(1, 200), rng.integers(1, 400)
     place = rng.uniform(-64, 63, (n_down + n_up, 2))
@@ -45,14 +45,14 @@ def made_up(seed: int, jumps: bool = False, beside: int = 0) -> FootPoints:
     height[:n_down] -= height[:n_down].mean()
     height[n_down:] += 8
     table = np.column_stack([place, height])
-    off = rng.uniform(-64, 63, (beside, 4))
+    off = rng.uniform(-64, 63, (points_beside, 4))
     return FootPoints(table[:n_down], table[n_down:], jumps, off)
 
 
-@pytest.mark.parametrize(("jumps", "beside"), [(False, 0), (True, 0), (False, 90), (True, 7)])
-def test_the_error_is_that_of_the_formula(patches: Patches, jumps: bool, beside: int) -> None:
+@pytest.mark.parametrize(("jumps", "points_beside"), [(False, 0), (True, 0), (False, 90), (True, 7)])
+def test_the_error_is_that_of_the_formula(patches: Patches, jumps: bool, points_beside: int) -> None:
     for seed in range(6):
-        footing = made_up(seed, jumps, beside)
+        footing = made_up(seed, jumps, points_beside)
         assert np.allclose(
             patch_errors(patches, footing), plain_errors(patches, footing), rtol=2e-4, atol=2e-3
         )
@@ -61,9 +61,9 @@ def test_the_error_is_that_of_the_formula(patches: Patches, jumps: bool, beside:
 @settings(max_examples=30, deadline=None)
 @given(st.integers(0, 10_000), st.booleans(), st.sampled_from([0, 50]), st.integers(1, 20))
 def test_the_search_finds_the_lowest_of_all(
-    patches: Patches, seed: int, jumps: bool, beside: int, count: int
+    patches: Patches, seed: int, jumps: bool, points_beside: int, count: int
 ) -> None:
-    footing = made_up(seed, jumps, beside)
+    footing = made_up(seed, jumps, points_beside)
     chosen, error = best_patches(patches, footing, count)
     every = patch_errors(patches, footing)
     assert np.allclose(error, every[chosen], rtol=1e-5, atol=1e-5)

@@ -80,10 +80,10 @@ def ends(database: Path, tmp_path_factory: pytest.TempPathFactory) -> Ends:
                     "window": way[1],
                 }
             )
-        told = folder / f"{processes}.json"
-        told.write_text(json.dumps(jobs))
+        job_file = folder / f"{processes}.json"
+        job_file.write_text(json.dumps(jobs))
         start = ["-m", "torch.distributed.run", "--standalone", f"--nproc-per-node={processes}"]
-        arguments = [*(start if processes > 1 else []), str(IN_FLOAT64), str(told)]
+        arguments = [*(start if processes > 1 else []), str(IN_FLOAT64), str(job_file)]
         environment = {**os.environ, "OMP_NUM_THREADS": "1"}
         subprocess.run([sys.executable, *arguments], check=True, env=environment)
         for (cut, way), job in zip(product(stretches, WAYS), jobs, strict=True):

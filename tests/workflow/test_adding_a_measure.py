@@ -47,19 +47,20 @@ def run(given: Given, options: Options) -> Outcome:
     known = [entry["clip"] for entry in given.measured("accuracy")["clips"]]
     return Outcome({"every": options.every, "clips": rows, "known": known}, {"clips": rows}, "<hips>")
 """
-PAGE = """from hobble.report.page_parts import Part, Section, Words
-from hobble.report.summary import Figure, Hint
+PAGE = """from hobble.report.page_parts import PageSection, Paragraph, SectionPart
+from hobble.report.summary import Hint, KeyFigure
 from hobble.report.tables import Column, Table
 
 
 def section(found, material):
     rows = [[row["clip"], row["highest"]] for row in found["clips"]]
     table = Table("hips", [Column("clip"), Column.number("highest, cm")], rows)
-    return Section("hips", [Part(10, table), Part(0, Words("How high <they> are."))], title="Hips", at=15)
+    parts = [SectionPart(10, table), SectionPart(0, Paragraph("How high <they> are."))]
+    return PageSection("hips", parts, title="Hips", at=15)
 
 
 def figures(found, material):
-    yield Figure("Highest hips", f"{max(row['highest'] for row in found['clips']):.1f}", "cm", at=35)
+    yield KeyFigure("Highest hips", f"{max(row['highest'] for row in found['clips']):.1f}", "cm", at=35)
 
 
 def hints(found, material):
@@ -77,7 +78,7 @@ def tables(compared):
     return {"hips": compared["hips"]}
 """
 COMPARISON_PAGE = """from hobble.report.measured import Overview
-from hobble.report.page_parts import Part, Section, Words
+from hobble.report.page_parts import PageSection, Paragraph, SectionPart
 from hobble.report.tables import Column
 
 
@@ -87,7 +88,7 @@ def columns(compared):
 
 
 def section(compared):
-    return Section("hips", [Part(0, Words("Hips of all."))], at=15)
+    return PageSection("hips", [SectionPart(0, Paragraph("Hips of all."))], at=15)
 """
 PARTS = {
     "__init__": DECLARATION,

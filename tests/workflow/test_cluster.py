@@ -41,16 +41,16 @@ def test_a_stage_has_a_job_for_each_batch_of_clips(workflow, tmp_path) -> None:
     (tmp_path / "many").mkdir()
     for number in range(CLIPS):
         bvh(tmp_path / f"many/clip-{number:02}.bvh", 100, 100, frame_time=f"0.0100{number:02}")
-    asked = ("--config", f"mocap={tmp_path}", "--", "results/many/report.html")
-    planned = workflow.planned(*asked)
+    request = ("--config", f"mocap={tmp_path}", "--", "results/many/report.html")
+    planned = workflow.planned(*request)
     stages = ("motion_clips", "labels_clips", "channel_clips", "terrain_fits", "database_clips")
     used = len({batch_of(f"clip-{number:02}", SMALLEST) for number in range(CLIPS)})
     assert {rule: planned.pop(rule) for rule in stages} == dict.fromkeys(stages, used)
-    # Whatever is not in a batch is there once for the data set, the configuration or a measurement, not once
-    # for each clip.
-    assert [rule for rule, count in planned.items() if count > 1] == ["measure"], planned
+    # Whatever is not in a batch is there once for the data set, the configuration or a measurement or its
+    # piece, not once for each clip.
+    assert {rule for rule, count in planned.items() if count > 1} == {"measure", "measure_piece"}, planned
     made = re.findall(
-        r"database/clips/[^/,]+\.npz", workflow.run("-np", *asked).partition("rule database_merge")[0]
+        r"database/clips/[^/,]+\.npz", workflow.run("-np", *request).partition("rule database_merge")[0]
     )
     assert len(set(made)) == 2 * CLIPS
 
@@ -69,12 +69,12 @@ def test_a_job_on_another_machine_has_the_rules_of_its_batch_only(workflow) -> N
 def test_cluster_profiles_have_the_settings_of_the_default_one(root, name: str) -> None:
     ours, default = profile(root, name), profile(root, "default")
     del default["logger"]  # on a cluster Snakemake's full output says which job went where
-    asked = default.pop("default-resources")
+    defaults = default.pop("default-resources")
     if name == "kubernetes":  # a pod needs disk space for its inputs
-        del asked["disk_mb"]
+        del defaults["disk_mb"]
     assert {key: ours.get(key) for key in default} == default
-    assert ours["default-resources"].items() >= asked.items()
-    assert ("disk_mb" in ours["default-resources"]) == ("disk_mb" in asked)
+    assert ours["default-resources"].items() >= defaults.items()
+    assert ("disk_mb" in ours["default-resources"]) == ("disk_mb" in defaults)
 
 
 def test_a_pod_is_tried_as_often_as_a_job_of_slurm(root) -> None:
@@ -93,8 +93,8 @@ def test_configurations_train_side_by_side(workflow) -> None:
 @pytest.mark.workflow
 def test_a_gpu_is_requested_if_training_uses_one(workflow) -> None:
     weights = "results/test/network/weights.npz"
-    told = workflow.run("-np", "--config", "training={device: cuda}", "--", weights)
-    assert len(re.findall("gpu=1", told)) == 1
+    plan = workflow.run("-np", "--config", "training={device: cuda}", "--", weights)
+    assert len(re.findall("gpu=1", plan)) == 1
     assert "gpu=1" not in workflow.run("-np", weights)
 
 

@@ -52,7 +52,7 @@ def test_in_a_file_progress_is_printed_now_and_then() -> None:
 def test_pips_last_lines_are_printed_if_it_fails(tmp_path: Path) -> None:
     script = f"import sys; sys.path.insert(0, {str(Path(environment.__file__).parents[2])!r})\n" + (
         "from pathlib import Path\nfrom hobble.workflow.environment import *\n"
-        "install(Path(sys.executable), ['no-such-folder/x.whl'], Line(sys.stdout))\n"
+        "install(Path(sys.executable), ['no-such-folder/x.whl'], ProgressLine(sys.stdout))\n"
     )
     end = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, cwd=tmp_path)
     assert end.returncode == 1

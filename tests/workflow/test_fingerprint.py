@@ -139,8 +139,8 @@ def test_no_stage_imports_a_later_one(root: Path) -> None:
     order.insert(order.index("training"), "character")
     order.insert(order.index("channels"), "gait")  # how a walk is measured; no rule is its own
     # A channel's folder also holds how it is shown and measured, which comes after all stages.
-    told = [f"hobble.channels.{name}" for name in NAMES]
-    of_stage = fp.closure(root / "workflow/scripts/channel_clips.py", root / "src", told)
+    channels = [f"hobble.channels.{name}" for name in NAMES]
+    of_stage = fp.closure(root / "workflow/scripts/channel_clips.py", root / "src", channels)
     assert any("injury" in module.parts for module in of_stage)
     for rank, stage in enumerate(order):
         for module in (root / "src/hobble" / stage).rglob("*.py"):

@@ -53,16 +53,16 @@ def test_a_file_has_the_same_rules_as_without_this_module(file):
 
 
 def test_rules_with_fixed_output_names_are_looked_up_directly(monkeypatch):
-    asked = []
-    monkeypatch.setattr(Rule, "is_producer", lambda rule, file: asked.append(rule.name))
+    checked = []
+    monkeypatch.setattr(Rule, "is_producer", lambda rule, file: checked.append(rule.name))
     index = NamedOutputs(RULES)
     assert {rule.name for rule in index.match_producers("results/d/motion/b.json")} == {
         "batch 1",
         "also batch 1",
     }
-    assert asked == []
+    assert checked == []
     index.match_producers("results/d/look.html")
-    assert set(asked) == {"page", "folder"}
+    assert set(checked) == {"page", "folder"}
 
 
 def test_snakemake_plans_with_it(monkeypatch):

@@ -2,6 +2,7 @@ rule measure:
     """One measurement of a network: its JSON and its tables as CSV. hobble.measures lists the measurements."""
     input:
         unpack(lambda w: keep_local(measurements.inputs(w.configuration, w.measure))),
+        pieces=lambda w: measurements.pieces(w.configuration, w.measure),
     output:
         json="results/{configuration}/evaluation/{measure}.json",
         tables=directory("results/{configuration}/evaluation/{measure}"),
@@ -29,6 +30,39 @@ rule measure:
         ),
     script:
         "../scripts/measure.py"
+
+
+rule measure_piece:
+    """A piece of a measurement that takes long, such as the laps in one phase mode."""
+    input:
+        unpack(lambda w: keep_local(measurements.inputs(w.configuration, w.measure))),
+    output:
+        json="results/{configuration}/evaluation/pieces/{measure}/{piece}.json",
+    log:
+        "results/{configuration}/logs/evaluation/{measure}-{piece}.log",
+    benchmark:
+        "results/{configuration}/benchmarks/evaluation/{measure}-{piece}.tsv"
+    threads: 1
+    resources:
+        mem_mb=lambda w, attempt: demands.measure_memory(
+            w.configuration, w.measure, attempt
+        ),
+        runtime=lambda w, attempt: demands.measure_minutes(
+            w.configuration, w.measure, attempt
+        ),
+    params:
+        configuration=lambda w: w.configuration,
+        piece=lambda w: w.piece,
+        package=lambda w: measurements.package_of(w.measure),
+        splits=lambda w: measurements.splits(w.configuration, w.measure),
+        people=lambda w: measurements.people(w.configuration, w.measure),
+        runtime=lambda w: measurements.runtime(w.configuration, w.measure),
+        options=lambda w: measurements.options(w.configuration, w.measure),
+        code=lambda w: measurements.code(
+            w.measure, configurations.kind(w.configuration), script="measure_piece"
+        ),
+    script:
+        "../scripts/measure_piece.py"
 
 
 rule compare:

@@ -72,8 +72,8 @@ def read_chunk(folder: Path, chunk: Chunk, arrays: Mapping[str, np.ndarray], ver
     length or, with `verify`, another checksum.
     """
     path = folder / chunk.file
-    beside = chunk.bytes - sum(array.nbytes for array in arrays.values())
-    header = np.empty(max(beside, LENGTH), np.uint8)
+    other_bytes = chunk.bytes - sum(array.nbytes for array in arrays.values())
+    header = np.empty(max(other_bytes, LENGTH), np.uint8)
     parts = [_bytes(array) for array in (header, *arrays.values())]
     try:
         with open(path, "rb", buffering=0) as file:
@@ -86,7 +86,7 @@ def read_chunk(folder: Path, chunk: Chunk, arrays: Mapping[str, np.ndarray], ver
         raise InputError(path, f"cannot be read ({error.strerror})", fix=HINT) from error
     if verify and _checksum(parts) != chunk.crc32:
         raise InputError(path, "damaged: its checksum differs from the manifest", fix=HINT)
-    if LENGTH + int.from_bytes(header[:LENGTH].tobytes(), "little") != beside:
+    if LENGTH + int.from_bytes(header[:LENGTH].tobytes(), "little") != other_bytes:
         raise InputError(path, "its arrays differ from the manifest", fix=HINT)
 
 

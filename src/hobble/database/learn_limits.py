@@ -44,9 +44,9 @@ def add_rows(learners: Mapping[str, LimitLearner], rows: ClipRows, source: str |
         return
     layout = rows.layout
     shares = rows.x[:, body_layout(layout).x_gait].reshape(len(rows), len(GAITS), layout.samples)
-    told = {name: rows.channels[name].any(axis=1) for name, _ in layout.channels}
+    active = {name: rows.channels[name].any(axis=1) for name, _ in layout.channels}
     for name, learner in learners.items():
-        others = [on for other, on in told.items() if other != name]
+        others = [on for other, on in active.items() if other != name]
         learner.add(
             rows.clip,
             gait=shares[:, :, layout.samples // 2],

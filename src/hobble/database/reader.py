@@ -147,14 +147,14 @@ class Database:
 
     def each_row(self, split: str) -> Iterator[RawRows]:
         """Every row of a split once, with all its fits, in the order of the chunks."""
-        most = len(self.manifest.chunks[split])
+        chunks = len(self.manifest.chunks[split])
         window = self.window(split, BLOCK_ROWS)
-        if window < most:
-            every, buffers = range(most), self._buffers(split, window)
-            groups = (every[start : start + window] for start in range(0, most, window))
+        if window < chunks:
+            every, buffers = range(chunks), self._buffers(split, window)
+            groups = (every[start : start + window] for start in range(0, chunks, window))
             windows = ahead(self.load(split, some, next(buffers)) for some in groups)
         else:
-            windows = iter([self._whole(split)] if most else [])
+            windows = iter([self._whole(split)] if chunks else [])
         for read in windows:
             for start in range(0, len(read.count), BLOCK_ROWS):
                 part = slice(start, start + BLOCK_ROWS)
@@ -204,8 +204,8 @@ class Database:
     def block_rows(self, batch: int = 1) -> int:
         """A good length of blocks: a multiple of `batch`, about 4,096 rows, up to a quarter of the memory."""
         row = 4 * (self.layout.x_size + self.layout.y_size)
-        most = min(BLOCK_ROWS, (self.memory_mb << 20) // (4 * BLOCKS * row))
-        return batch * max(1, most // batch)
+        limit = min(BLOCK_ROWS, (self.memory_mb << 20) // (4 * BLOCKS * row))
+        return batch * max(1, limit // batch)
 
     def window(self, split: str, block_rows: int) -> int:
         """Chunks in memory at a time: all if both splits fit, else as many as fit twice, and at least one.

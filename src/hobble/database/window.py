@@ -39,11 +39,11 @@ class ChunkWindow:
     phase: Array
 
 
-def empty_buffers(manifest: Manifest, split: str, most: int) -> dict[str, np.ndarray]:
+def empty_buffers(manifest: Manifest, split: str, count: int) -> dict[str, np.ndarray]:
     """Empty arrays that are large enough for any `most` chunks of a split, in the order of the tables."""
     chunks = manifest.chunks[split]
-    rows = sum(sorted(chunk.rows for chunk in chunks)[-most:])
-    fits = sum(sorted(chunk.fits for chunk in chunks)[-most:])
+    rows = sum(sorted(chunk.rows for chunk in chunks)[-count:])
+    fits = sum(sorted(chunk.fits for chunk in chunks)[-count:])
     floats = STORED[manifest.dtype]
     return {
         "x": np.empty((rows, x_columns(manifest.layout)), floats),

@@ -112,10 +112,10 @@ def hips_height(
         weight += stand
     height = root[:, 1] + gaussian(needed, 3.0) / gaussian(weight, 3.0)
     excess = np.zeros(len(root))
-    for hip, ankle, most in zip(hips, ankles, longest, strict=True):
+    for hip, ankle, length in zip(hips, ankles, longest, strict=True):
         apart = (root + hip - ankle)[:, [0, 2]]
-        level = np.minimum(np.sum(apart**2, axis=1), (0.97 * most) ** 2)
-        excess = np.maximum(excess, height + hip[:, 1] - ankle[:, 1] - np.sqrt(most**2 - level))
+        level = np.minimum(np.sum(apart**2, axis=1), (0.97 * length) ** 2)
+        excess = np.maximum(excess, height + hip[:, 1] - ankle[:, 1] - np.sqrt(length**2 - level))
     return height - smooth_above(np.maximum(excess, 0.0), 2)
 
 

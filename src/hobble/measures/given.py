@@ -25,6 +25,7 @@ class Given:
     clips: clip -> its file of rows. facts: files of `hobble.rows.facts` of the same clips. splits: clip ->
     "train" or "held_out". people: clip -> the person who walks in it; a clip of which that is not known
     counts as a person of its own. runtime: the keys in its `Measure.runtime`, and defaults for the others.
+    pieces: piece -> its JSON, if the pieces ran as jobs of their own.
     files: other inputs by name, such as the JSON of another measurement.
     """
 
@@ -35,6 +36,7 @@ class Given:
     people: Mapping[str, str] = field(default_factory=dict, repr=False)
     facts: Sequence[Path] = field(default=(), repr=False)
     runtime: Runtime = field(default_factory=Runtime)
+    pieces: Mapping[str, Path] = field(default_factory=dict, repr=False)
 
     def file(self, name: str) -> Path:
         """The file of the input `name`. Raises HobbleError if it is not among the measurement's `inputs`."""
@@ -56,6 +58,10 @@ class Given:
     def published(self) -> Json:
         """The published figures."""
         return yaml.safe_load(self.file("published").read_text(encoding="utf-8"))
+
+    def measured_pieces(self) -> dict[str, Json]:
+        """Piece -> what was measured, of those that ran as jobs of their own."""
+        return {name: read_json(path) for name, path in self.pieces.items()}
 
     def measured(self, name: str) -> Json:
         """The JSON of another measurement."""

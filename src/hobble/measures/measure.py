@@ -3,7 +3,8 @@
 A measurement is a package. Its `__init__` holds `MEASURE`, a `Measure`, and must not import anything slow.
 The other modules of the package are found by name:
 
-- `run.py`: `run(given, options) -> Outcome`, the measuring itself (see `given`);
+- `run.py`: `run(given, options) -> Outcome`, the measuring itself (see `given`), and
+  `run_piece(given, options, piece) -> Json` if it has pieces;
 - `page.py`: what the report shows of it (see `hobble.report.measured`), if anything;
 - `comparison.py`: what it says of configurations side by side
   (see `hobble.evaluation.compare_configurations`), if anything;
@@ -14,10 +15,13 @@ from __future__ import annotations
 
 import importlib
 import importlib.util
+from collections.abc import Sequence
 from dataclasses import dataclass
 from types import ModuleType
+from typing import Any, Protocol
 
 from hobble.core.section import Section
+from hobble.runtime.options import Runtime
 
 # Inputs of a measurement. Any other name is that of another measurement, whose JSON is the input.
 INPUTS = ("weights", "clips", "facts", "skeleton", "published")
@@ -37,13 +41,21 @@ class Cost:
     minutes: int = 10
 
 
+class Pieces(Protocol):
+    """Tells the names of the pieces of a measurement, of letters."""
+
+    def __call__(self, options: Any, runtime: Runtime, modes: Sequence[str]) -> tuple[str, ...]:
+        """options: of the type `Measure.options`. modes: the phase modes of the kind of network."""
+
+
 @dataclass(frozen=True)
 class Measure:
     """A measurement: its `name` is that of its JSON, and of its folder of tables.
 
     package: where its parts lie (`__name__` of the package). inputs: of INPUTS, or names of other
     measurements. options: its keys of the section `evaluation`. runtime: the keys of the section `runtime`
-    that it depends on. people: whether it has to know who walks in which clip.
+    that it depends on. pieces: a measurement that takes long may have pieces, and each runs as a job of its
+    own if there are several; see `Pieces`. people: whether it has to know who walks in which clip.
     """
 
     name: str
@@ -51,6 +63,7 @@ class Measure:
     inputs: tuple[str, ...]
     options: type[Section] = Section
     runtime: tuple[str, ...] = ()
+    pieces: Pieces | None = None
     people: bool = False
     cost: Cost = Cost()
 

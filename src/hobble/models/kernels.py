@@ -17,8 +17,8 @@ SPLITMIX_STEP = np.uint64(0x9E3779B97F4A7C15)
 
 def use_threads(values: int) -> None:
     """Set the threads of the next compiled loop over `values` numbers, since waking threads takes time."""
-    most = min(torch.get_num_threads(), numba.config.NUMBA_NUM_THREADS)  # type: ignore[attr-defined]
-    numba.set_num_threads(max(1, min(most, values // NUMBERS_PER_THREAD)))
+    threads = min(torch.get_num_threads(), numba.config.NUMBA_NUM_THREADS)  # type: ignore[attr-defined]
+    numba.set_num_threads(max(1, min(threads, values // NUMBERS_PER_THREAD)))
 
 
 def as_numpy(array: Tensor) -> np.ndarray:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Protocol
+from typing import TYPE_CHECKING, Any, ClassVar, Protocol
 
 from hobble.core.skeleton import Skeleton
 from hobble.rows.layout import RowLayout
@@ -43,6 +43,8 @@ class Model(ABC):
     Methods import pydantic, PyTorch and numba only when they need them. So a game needs no PyTorch, and
     checking a configuration needs neither PyTorch nor numba.
     """
+
+    modes: ClassVar[tuple[str, ...]] = ("exact",)  # those of its networks, see `Network.modes`
 
     @abstractmethod
     def options(self) -> type[Options]:

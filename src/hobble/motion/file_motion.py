@@ -147,7 +147,7 @@ def _unknown(
         False,
         named or pairs(standing_clip.clip.skeleton, standing_clip.body, target.skeleton, theirs),
     )
-    notes = decoded.notes + straight.notes + ([] if known else _said(found, options.handedness))
+    notes = decoded.notes + straight.notes + ([] if known else _notes_on_names(found, options.handedness))
     source = FileMotion(
         standing_clip.clip,
         match,
@@ -191,7 +191,7 @@ def _swapped(limbs: Mapping[str, Limb]) -> dict[str, Limb]:
     return {a: limbs[b] for a, b in (SIDES, SIDES[::-1])}
 
 
-def _said(found: FoundBody, handedness: str) -> list[str]:
+def _notes_on_names(found: FoundBody, handedness: str) -> list[str]:
     """Sentences on what was found, and on what names did not say."""
     out = ["No skeleton file describes this rig: its parts were found from structure, motion and names."]
     if not found.sided:

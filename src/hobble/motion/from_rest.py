@@ -88,11 +88,11 @@ def zero_doubt(seen: BodySample, zero: dict[int, Array]) -> str | None:
     if not off or abs(np.mean(off)) < UNLIKE_ZERO:
         return None
     degrees, more = np.degrees(abs(np.mean(off))), "steeper" if np.mean(off) > 0 else "flatter"
-    said = f"Its feet stand {degrees:.0f} degrees {more} than in its zero pose"
+    sentence = f"Its feet stand {degrees:.0f} degrees {more} than in its zero pose"
     if degrees > TRUSTED:
-        return f"{said}: the motion was believed, so feet may be tilted by some degrees."
+        return f"{sentence}: the motion was believed, so feet may be tilted by some degrees."
     high = np.radians(degrees) * np.mean(lengths)
-    return f"{said}: if that pose is no stance, the figure stands {high:.1f} cm too high or low."
+    return f"{sentence}: if that pose is no stance, the figure stands {high:.1f} cm too high or low."
 
 
 def _foot(standing: Array, zero: Array, seen: BodySample, side: str) -> Array:

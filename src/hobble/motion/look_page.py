@@ -40,7 +40,7 @@ STYLE = """body{font:14px/1.4 system-ui,sans-serif;margin:1.5em;color:#222;backg
 table{border-collapse:collapse}th,td{padding:2px 9px;text-align:left;border-bottom:1px solid #e3e3e3}
 th{position:sticky;top:0;background:#fff}td.n{text-align:right;font-variant-numeric:tabular-nums}
 .bar{display:inline-block;width:75px;height:9px;background:#eee;margin-right:6px}
-.bar i{display:block;height:100%;background:#4a7ab5}small,.said{color:#a04000}canvas{display:block}"""
+.bar i{display:block;height:100%;background:#4a7ab5}small,.note{color:#a04000}canvas{display:block}"""
 # One timer draws all figures in view.
 SCRIPT = """const D=JSON.parse(document.getElementById('d').textContent);
 const C=[...document.querySelectorAll('canvas')];
@@ -105,7 +105,7 @@ def look_page(
     one after another.
     """
     some = chosen(reports, labels)
-    lines = [_Line(reported(report), told) for report, told in zip(reports, labels, strict=True)]
+    lines = [_Line(reported(report), labelled) for report, labelled in zip(reports, labels, strict=True)]
     for n in sorted(some):
         clip, contacts = read(n)
         lines[n] = _Line(seen(clip, reports[n]), labels[n], figure(clip), foot_down(contacts))
@@ -125,8 +125,8 @@ def chosen(reports: Sequence[Mapping[str, Any]], labels: Sequence[Mapping[str, A
     The others are spread evenly over the names. At least one clip is chosen, if there are any.
     """
     warned = [
-        bool(reported(report).warnings or told["warnings"])
-        for report, told in zip(reports, labels, strict=True)
+        bool(reported(report).warnings or labelled["warnings"])
+        for report, labelled in zip(reports, labels, strict=True)
     ]
     # The first so many numbers in this order are spread evenly, however many they are.
     spread = sorted(range(len(reports)), key=lambda n: n * GOLDEN % 1)
@@ -157,7 +157,7 @@ def _written(name: str, lines: Sequence[_Line], notes: Sequence[str]) -> str:
     return (
         f'<!doctype html><html lang="en"><meta charset="utf-8"><title>{title}</title><style>{STYLE}</style>'
         f"<h1>{title}</h1><p>{len(lines)} clips, {seconds:.0f} s. Left is red, right is blue.</p>"
-        + "".join(f'<p class="said">{html.escape(note)}</p>' for note in notes)
+        + "".join(f'<p class="note">{html.escape(note)}</p>' for note in notes)
         + f"<table><thead><tr>{''.join(f'<th>{head}</th>' for head in HEAD)}</tr></thead>"
         + f"<tbody>{''.join(_row(line) for line in lines)}</tbody></table>"
         + f'<script type="application/json" id="d">{data}</script><script>{SCRIPT}</script></html>\n'

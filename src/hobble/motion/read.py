@@ -19,6 +19,7 @@ from hobble.core.errors import InputError
 from hobble.core.quat import Array
 from hobble.core.untrusted import read_bytes
 from hobble.motion.read_header import EXPORT, Header, read_header
+from hobble.motion.read_numbers import read_numbers
 
 # Limits. An hour of a rig of 191 joints at 60 Hz is 41 million joint poses, whose rotations take 1.3 GB.
 MOST_BYTES = 1 << 30
@@ -178,8 +179,9 @@ def _values(path: Path, data: bytes, at: int, width: int, declared: int, first_l
     if not re.compile(rb"\S").search(data, at):
         raise InputError(path, f"truncated: declares {declared} frames and has none", line=first_line)
     _check_lines(path, data, at, first_line)
+    quick = read_numbers(data, at, width, declared)
     try:
-        table = np.loadtxt(text, dtype=float, comments=None, ndmin=2)
+        table = np.loadtxt(text, dtype=float, comments=None, ndmin=2) if quick is None else quick
     except ValueError:
         table = _explained(path, data[at:], width, first_line)
     if table.shape[1] != width:

@@ -85,7 +85,7 @@ def upright(clip: Clip, body: Body, target: Skeleton, others: Collection[int] = 
     if zero:
         add_rest(frames, zero, seen)
         unsure.append(zero_doubt(seen, zero))
-    said = "its zero pose" if problem is None else f"its motion, because in its zero pose {problem}"
+    source = "its zero pose" if problem is None else f"its motion, because in its zero pose {problem}"
     unsure.append(doubt(seen, problem is None))
     kept = _kept(clip, seen, others, frames)
     clip, body = with_balls(clip, body, frames)
@@ -93,7 +93,7 @@ def upright(clip: Clip, body: Body, target: Skeleton, others: Collection[int] = 
     clip, body = with_bends(clip, body, frames, bends(seen))
     made = rebased(clip, body, [*body.joints, *kept], frames, roles)
     notes = [note for note in unsure if note]
-    return Upright(*made, said, notes, height_error(seen, problem is None))
+    return Upright(*made, source, notes, height_error(seen, problem is None))
 
 
 def _speeds(clip: Clip) -> Array:

@@ -19,6 +19,7 @@ from hobble.database.reader import Database
 from hobble.models import model
 from hobble.models.model import Trained
 from hobble.models.options import Options
+from hobble.models.thread_trial import threads_for
 from hobble.models.trainable import Trainable, TrainingStep
 from hobble.training.checkpoint import State, unpack
 from hobble.training.optimiser import Adam
@@ -40,9 +41,14 @@ START_ARRAYS = (
 BFLOAT16_FROM_BATCH = 256  # from this batch size on the products take most of the time
 
 
-def use_threads(threads: int) -> None:
-    """Set the threads of PyTorch and numba, at most one for each core, and use deterministic algorithms."""
+def use_threads(threads: int, batch: int | None = None) -> None:
+    """Set the threads of PyTorch and numba, at most one for each core, and use deterministic algorithms.
+
+    batch: rows of a batch; if given, one thread is used if a trial shows that it is faster.
+    """
     threads = max(1, min(threads, cores(), numba.config.NUMBA_NUM_THREADS))  # type: ignore[attr-defined]
+    if batch is not None:
+        threads = threads_for(batch, threads)
     torch.set_num_threads(threads)
     numba.set_num_threads(threads)
     torch.use_deterministic_algorithms(True)

@@ -51,7 +51,7 @@ def train(
     if an error is not finite (the message names the batch, and the last checkpoint stays), if there are fewer
     samples than sections, and if `keep` or `patience` need a held-out error but no clip is held out.
     """
-    use_threads(threads)
+    use_threads(threads, training.batch)
     if (training.patience or training.keep == "best") and not database.rows(SPLIT):
         raise HobbleError(
             "training.keep: best and training.patience need the held-out error, but no clip is held out. "

@@ -8,7 +8,7 @@ from typing import Any
 
 from hobble.config.load_configuration import Catalogue
 from hobble.models import model
-from hobble.models.model import Built
+from hobble.models.model import Built, Model
 from hobble.workflow.channel_sources import database_folder
 from hobble.workflow.clips import DATASETS
 from hobble.workflow.datasets import Datasets
@@ -66,6 +66,10 @@ class Configurations:
     def kind(self, configuration: str) -> str:
         """The package of its kind of network, such as hobble.models.pfnn."""
         return f"hobble.models.{self.catalogue.configuration(self.owner(configuration)).network.kind}"
+
+    def model(self, configuration: str) -> Model:
+        """Its kind of network."""
+        return model(self.catalogue.configuration(self.owner(configuration)).network.kind)
 
     def network(self, configuration: str, file: str) -> str:
         """Path of a file of its network."""

@@ -5,11 +5,17 @@ from __future__ import annotations
 from typing import Any
 
 from hobble.measures.registry import MEASURES, measure
+from hobble.runtime.options import Runtime
 from hobble.workflow.clips import Clips, original
 from hobble.workflow.configurations import Configurations
 from hobble.workflow.package import Package
 
 NAMES = tuple(one.name for one in MEASURES)
+
+
+def piece_file(configuration: str, name: str, piece: str) -> str:
+    """Path of the JSON of a measurement's piece."""
+    return f"results/{configuration}/evaluation/pieces/{name}/{piece}.json"
 
 
 def result_file(configuration: str, name: str) -> str:
@@ -26,6 +32,16 @@ class Measurements:
     def inputs(self, configuration: str, name: str) -> dict[str, str | list[str]]:
         """Name of each input of the measurement -> its file or files."""
         return {need: self._input(configuration, need) for need in measure(name).inputs}
+
+    def pieces(self, configuration: str, name: str) -> list[str]:
+        """Files of the measurement's pieces that run as jobs of their own; [] if it has fewer than two."""
+        one = measure(name)
+        if one.pieces is None:
+            return []
+        options = one.options.model_validate(self.options(configuration, name))
+        runtime = Runtime.model_validate(self.runtime(configuration, name))
+        pieces = one.pieces(options, runtime, self.configurations.model(configuration).modes)
+        return [piece_file(configuration, name, piece) for piece in pieces] if len(pieces) > 1 else []
 
     def _input(self, configuration: str, need: str) -> str | list[str]:
         configurations = self.configurations
@@ -71,6 +87,6 @@ class Measurements:
         """Full name of the measurement's package."""
         return measure(name).package
 
-    def code(self, name: str, *modules: str) -> str:
+    def code(self, name: str, *modules: str, script: str = "measure") -> str:
         """Fingerprint of the measurement's code and of `modules`, which it imports dynamically."""
-        return self.package.code("measure", measure(name).module("run"), *modules)
+        return self.package.code(script, measure(name).module("run"), *modules)

@@ -22,8 +22,8 @@ from hobble.core.errors import InputError
 def folder(tmp_path: Path) -> Path:
     """films.json as the rule writes it."""
     films = [{"film": f.number, "kind": f.kind, "parts": list(f.parts)} for f in FILMS]
-    told = {"study": "abc", "configuration": "limp", "parts": PARTS, "films": films}
-    (tmp_path / "films.json").write_text(json.dumps(told))
+    study = {"study": "abc", "configuration": "limp", "parts": PARTS, "films": films}
+    (tmp_path / "films.json").write_text(json.dumps(study))
     return tmp_path
 
 

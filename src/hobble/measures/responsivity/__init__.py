@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Annotated
 
 from pydantic import Field
@@ -27,11 +28,17 @@ class Options(Section):
     )
 
 
+def pieces(options: Options, runtime: Runtime, modes: Sequence[str]) -> tuple[str, ...]:
+    """The phase modes in which laps are run."""
+    return tuple(dict.fromkeys((*options.modes, runtime.mode))) if len(modes) > 1 else tuple(modes)
+
+
 MEASURE = Measure(
     name="responsivity",
     package=__name__,
     inputs=("weights",),
     options=Options,
     runtime=tuple(Runtime.model_fields),
+    pieces=pieces,
     cost=Cost(memory_mb=134, minutes=60),
 )

@@ -90,12 +90,10 @@ def lap_lines(compared: Compared) -> Chart | None:
     for traces in options.values():
         for row in compared["published"]["responsivity"]:
             if row["configuration"] in names(compared):
-                most = max((max(t["x"], default=1) for t in traces), default=1)
+                end = max((max(t["x"], default=1) for t in traces), default=1)
                 colour = colours(compared)[row["configuration"]]
                 label = f"{row['label']}: published mean"
-                traces.append(
-                    line(label, [1, most], [row["milliseconds"]] * 2, colour, dash="dot", width=1.2)
-                )
+                traces.append(line(label, [1, end], [row["milliseconds"]] * 2, colour, dash="dot", width=1.2))
     return Chart(
         "compare-laps",
         "Milliseconds per frame, lap by lap",

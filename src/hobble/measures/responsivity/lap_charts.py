@@ -105,14 +105,14 @@ def track_chart(found: Json) -> Chart | None:
             "hoverinfo": "skip",
         }
     )
-    most = max(row[2] for row in off)
+    largest = max(row[2] for row in off)
     where = f"Red marks places more than {OFF_TRACK:.0f} cm from the track. " if left else ""
     return Chart(
         "track",
         "The track, and the path of the character",
         "From above. Dashed lines join the waypoints. Each waypoint has a number and the gait on the way to "
         "it; it counts as reached within a metre. Solid lines are the paths of the first laps. "
-        f"{where}The largest distance from the track was {most:.0f} cm.",
+        f"{where}The largest distance from the track was {largest:.0f} cm.",
         traces,
         {
             "xaxis": axis("x, m", constrain="domain", zeroline=False),

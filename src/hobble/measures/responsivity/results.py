@@ -80,6 +80,13 @@ class OfMode(TypedDict):
     milliseconds: Milliseconds
 
 
+class LapsOfMode(TypedDict):
+    """The file of a piece: all laps of a phase mode, and the paths of the first ones."""
+
+    laps: OfMode
+    runs: list[Run]
+
+
 class Track(TypedDict):
     """The track. x, z: m. metres: its length."""
 

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from itertools import pairwise
 from time import perf_counter
+from typing import Any
 
 import numpy as np
 
@@ -12,7 +13,16 @@ from hobble.core.quat import Array
 from hobble.evaluation.motion_measures import foot_slide, largest_turn
 from hobble.measures.given import Given, Outcome, Row
 from hobble.measures.responsivity import Options
-from hobble.measures.responsivity.results import Lap, Milliseconds, OfMode, Responsivity, Run, Steps
+from hobble.measures.responsivity.results import (
+    Lap,
+    LapsOfMode,
+    Milliseconds,
+    OfMode,
+    Responsivity,
+    Run,
+    Spread,
+    Steps,
+)
 from hobble.models.load import load_network
 from hobble.models.network import Network
 from hobble.runtime.animation import ProceduralAnimation, world_rotations
@@ -35,8 +45,11 @@ def responsivity(
     laps_other_modes: int | None = None,
     modes: Sequence[str] | None = None,
     track: Sequence[Waypoint] = TRACK,
+    done: Mapping[str, LapsOfMode] | None = None,
 ) -> Responsivity:
     """Run the track of Segerstedt 2021, `laps` laps in the runtime's own mode and fewer in other `modes`.
+
+    done: mode -> its laps, if they have already been run (`laps_of_mode`).
 
     laps_other_modes: laps in those; by default, and at most, `laps`. modes: by default all that the network
     has. A lap that takes longer than `lap_seconds` of simulated time ends without its remaining waypoints,
@@ -51,16 +64,11 @@ def responsivity(
     """
     own = network.mode(runtime.mode)
     fewer = min(laps, laps_other_modes or laps)
-    found = {
-        mode: _laps(
-            network,
-            runtime.model_copy(update={"mode": mode}),
-            track,
-            laps if mode == own else fewer,
-            lap_seconds,
-        )
-        for mode in dict.fromkeys((*map(network.mode, network.modes if modes is None else modes), own))
-    }
+    found = dict(done or {})
+    for mode in dict.fromkeys((*map(network.mode, network.modes if modes is None else modes), own)):
+        if mode not in found:
+            in_mode = runtime.model_copy(update={"mode": mode})
+            found[mode] = laps_of_mode(network, in_mode, laps if mode == own else fewer, lap_seconds, track)
     return {
         "configuration": configuration,
         "track": {
@@ -72,21 +80,25 @@ def responsivity(
             "x": [waypoint.position[0] / 100 for waypoint in track],
             "z": [waypoint.position[1] / 100 for waypoint in track],
         },
-        "runs": found[own][1],
+        "runs": found[own]["runs"],
         "parameters": parameter_counts(network.sizes) if network.sizes else None,
         "stored": {mode: network.stored(mode) for mode in network.modes},
         "bytes_each": np.dtype(network.storage).itemsize,
         "exact": network.mode(None),
         "laps_other_modes": fewer,
-        **found[own][0],
-        "modes": [entry for entry, _ in found.values()],
+        **found[own]["laps"],
+        "modes": [each["laps"] for each in found.values()],
     }
 
 
-def _laps(
-    network: Network, runtime: Runtime, track: Sequence[Waypoint], laps: int, lap_seconds: float
-) -> tuple[OfMode, list[Run]]:
-    """All laps of one mode, and the paths of the first ones."""
+def laps_of_mode(
+    network: Network,
+    runtime: Runtime,
+    laps: int,
+    lap_seconds: float,
+    track: Sequence[Waypoint] = TRACK,
+) -> LapsOfMode:
+    """All laps in the mode of `runtime`. For the arguments see `responsivity`."""
     animation = ProceduralAnimation(network, waypoints=track, **dict(runtime))
     for _ in range(WARM_UP):
         animation.next_pose()
@@ -113,7 +125,7 @@ def _laps(
         "turns_held_back": sum(lap["turns_held_back"] for lap in results),
         "milliseconds": _milliseconds(np.concatenate(times)),
     }
-    return entry, runs[:RUNS]
+    return {"laps": entry, "runs": runs[:RUNS]}
 
 
 def parameter_counts(sizes: Sequence[int]) -> dict[str, int]:
@@ -139,16 +151,26 @@ def lap_rows(result: Responsivity) -> list[Row]:
     rows: list[Row] = []
     for entry in result["modes"]:
         for lap in entry["laps"]:
-            row = {"mode": entry["mode"]} | {k: v for k, v in lap.items() if k != "milliseconds"}
-            times = lap["milliseconds"]
-            row |= {f"milliseconds_{key}": v for key, v in times.items() if not isinstance(v, dict)}
-            row |= {f"milliseconds_{key}_sd": v for key, v in times["sd"].items()}
-            rows.append(row | {f"milliseconds_{key}": v for key, v in times["spread"].items()})
+            # Keys in the order of the types: those of a piece come sorted from its file.
+            known: Row = {"mode": entry["mode"]} | lap
+            row = {key: known[key] for key in ("mode", *Lap.__annotations__) if key != "milliseconds"}
+            times: dict[str, Any] = {**lap["milliseconds"]}
+            row |= {f"milliseconds_{key}": times[key] for key in (*STEPS, "total")}
+            row |= {f"milliseconds_{key}_sd": times["sd"][key] for key in STEPS}
+            rows.append(row | {f"milliseconds_{key}": times["spread"][key] for key in Spread.__annotations__})
     return rows
+
+
+def run_piece(given: Given, options: Options, piece: str) -> LapsOfMode:
+    """The laps in one phase mode."""
+    laps = options.laps if piece == given.runtime.mode else min(options.laps, options.laps_other_modes)
+    runtime = given.runtime.model_copy(update={"mode": piece})
+    return laps_of_mode(load_network(given.weights), runtime, laps, options.lap_seconds)
 
 
 def run(given: Given, options: Options) -> Outcome:
     """responsivity.json, and its laps as a table."""
+    done: dict[str, Any] = given.measured_pieces()
     result = responsivity(
         load_network(given.weights),
         configuration=given.configuration,
@@ -157,6 +179,7 @@ def run(given: Given, options: Options) -> Outcome:
         lap_seconds=options.lap_seconds,
         laps_other_modes=options.laps_other_modes,
         modes=options.modes,
+        done=done,
     )
     says = [f"{m['mode']}: {m['waypoints_reached']} of {m['waypoints']} waypoints" for m in result["modes"]]
     return Outcome(result, {"laps": lap_rows(result)}, "; ".join(says))

@@ -55,10 +55,10 @@ def _evaluate(
 @njit(forceinline=True, cache=False)
 def _softmax(logits: Any) -> None:
     """Turn logits (K,) into shares in place; a share below NEGLIGIBLE becomes 0."""
-    most = logits.max()
+    largest = logits.max()
     total = np.float32(0)
     for k in range(len(logits)):
-        logits[k] = exp_below_0(logits[k] - most)
+        logits[k] = exp_below_0(logits[k] - largest)
         total += logits[k]
     for k in range(len(logits)):
         share = logits[k] / total

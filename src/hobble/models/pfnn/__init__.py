@@ -5,8 +5,9 @@ from __future__ import annotations
 from collections.abc import Mapping
 from itertools import pairwise
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, ClassVar, get_args
 
+from hobble.core.section import PhaseMode
 from hobble.core.skeleton import Skeleton
 from hobble.models.model import Trained
 from hobble.rows.layout import RowLayout
@@ -20,6 +21,8 @@ if TYPE_CHECKING:
 
 
 class _Pfnn(Trained):
+    modes: ClassVar[tuple[str, ...]] = get_args(PhaseMode)
+
     def options(self) -> type[PfnnOptions]:
         from hobble.models.pfnn.options import PfnnOptions
 

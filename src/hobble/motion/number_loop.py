@@ -1,0 +1,128 @@
+"""The compiled loop of `read_numbers`."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from hobble.core.compiled import njit
+
+EXACT = np.uint64(1 << 53)  # a double holds every integer up to here
+MOST_POWER = 22  # and every power of ten up to this one
+POWERS = np.array([float(f"1e{power}") for power in range(MOST_POWER + 1)])
+MOST_DIGITS = 18  # that fit an integer of 64 bits
+FARTHEST = 400  # larger exponents are left to Python; no double has them
+NONE, END_OF_LINE, END, OTHER = range(4)
+ZERO, TEN = np.uint8(48), np.uint64(10)
+PLUS, MINUS, POINT, SMALL_E, LARGE_E = 43, 45, 46, 101, 69
+TAB, LINE_FEED, RETURN, SPACE = 9, 10, 13, 32
+
+
+@njit(error_model="numpy")
+def read_lines(data: Any, at: int, table: Any, long: Any) -> tuple[int, int]:
+    """Read lines of data (n,) from `at` on into table (F, width).
+
+    Returns the number of lines, or -1 if something is unusual (see `read_numbers`), and how many numbers are
+    too long to be read here. long: (m, 3) gets their places in the flat table, and where they begin and end
+    in data.
+    """
+    rows, width = table.shape
+    row, column, found = 0, 0, 0
+    while True:
+        at, met = _to_next(data, at)
+        if met == OTHER:
+            return -1, found
+        if met != NONE:
+            if column != 0:
+                if column != width:
+                    return -1, found
+                row, column = row + 1, 0
+            if met == END:
+                return row, found
+            continue
+        if row == rows or column == width:
+            return -1, found
+        value, end, exact = _number(data, at)
+        if end < 0:
+            return -1, found
+        table[row, column] = value
+        if not exact:
+            if found == len(long):
+                return -1, found
+            long[found, 0], long[found, 1], long[found, 2] = row * width + column, at, end
+            found += 1
+        at, column = end, column + 1
+
+
+@njit(inline="always")
+def _to_next(data: Any, at: int) -> tuple[int, int]:
+    """Skip blanks. Returns where the next number is and NONE, or what is there in place of one.
+
+    A line end is skipped too.
+    """
+    size = len(data)
+    while at < size and (data[at] == SPACE or data[at] == TAB):
+        at += 1
+    if at == size:
+        return at, END
+    if data[at] == LINE_FEED:
+        return at + 1, END_OF_LINE
+    if data[at] == RETURN:
+        if at + 1 < size and data[at + 1] == LINE_FEED:
+            return at + 2, END_OF_LINE
+        return at, OTHER
+    return at, NONE
+
+
+@njit(inline="always")
+def _number(data: Any, at: int) -> tuple[float, int, bool]:
+    """The number at `at`, where it ends (-1 if it is none), and whether it is exact."""
+    size = len(data)
+    negative = data[at] == MINUS
+    if negative or data[at] == PLUS:
+        at += 1
+    whole, power, begin = np.uint64(0), 0, at
+    while at < size and np.uint8(data[at] - ZERO) <= 9:  # letters before "0" wrap around to more than 9
+        whole = whole * TEN + np.uint64(np.uint8(data[at] - ZERO))
+        at += 1
+    digits = at - begin
+    if at < size and data[at] == POINT:
+        at += 1
+        begin = at
+        while at < size and np.uint8(data[at] - ZERO) <= 9:
+            whole = whole * TEN + np.uint64(np.uint8(data[at] - ZERO))
+            at += 1
+        power = begin - at
+        digits -= power
+    if digits == 0:
+        return 0.0, -1, False
+    if at < size and (data[at] == SMALL_E or data[at] == LARGE_E):
+        shift, at = _exponent(data, at + 1)
+        if at < 0:
+            return 0.0, -1, False
+        power += shift
+    if at < size and not (data[at] == SPACE or TAB <= data[at] <= RETURN):
+        return 0.0, -1, False
+    exact: Any = digits <= MOST_DIGITS and whole <= EXACT and -MOST_POWER <= power <= MOST_POWER
+    value = 0.0
+    if exact:
+        of = np.float64(whole)
+        value = of / POWERS[-power] if power < 0 else of * POWERS[power]
+    return (-value if negative else value), at, exact
+
+
+@njit(inline="always")
+def _exponent(data: Any, at: int) -> tuple[int, int]:
+    """The exponent at `at`, and where it ends; -1 if there is no digit. Not exact from FARTHEST on."""
+    size = len(data)
+    negative = at < size and data[at] == MINUS
+    if at < size and (negative or data[at] == PLUS):
+        at += 1
+    shift: Any = np.int64(0)
+    begin = at
+    while at < size and np.uint8(data[at] - ZERO) <= 9:
+        if shift < FARTHEST:
+            shift = 10 * shift + np.int64(np.uint8(data[at] - ZERO))
+        at += 1
+    return (-shift if negative else shift), (at if at > begin else -1)

@@ -1,0 +1,33 @@
+"""What the script of a measurement and that of its pieces share: the inputs and the options of the job."""
+
+from __future__ import annotations
+
+import importlib
+from pathlib import Path
+from typing import Any
+
+from hobble.measures.given import Given
+from hobble.measures.measure import Measure
+from hobble.runtime.options import Runtime
+
+LISTS = ("clips", "facts", "pieces")  # inputs of several files
+
+
+def measure_of(job: Any) -> Measure:
+    """The job's measurement, imported by name, so that adding another one does not run this one again."""
+    return importlib.import_module(job.params.package).MEASURE
+
+
+def given_to(job: Any) -> Given:
+    """The inputs of a job of the rules `measure` and `measure_piece`."""
+    many = {name: [Path(file) for file in job.input.get(name, ())] for name in LISTS}
+    return Given(
+        job.params.configuration,
+        {need: Path(file) for need, file in job.input.items() if need not in LISTS},
+        {path.stem: path for path in many["clips"]},
+        job.params.splits,
+        job.params.people,
+        many["facts"],
+        Runtime.model_validate(job.params.runtime),
+        {path.stem: path for path in many["pieces"]},
+    )

@@ -1,0 +1,182 @@
+"""Which way is up, where the figure faces, and how high its floor is."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from hobble.core import quat
+from hobble.core.clip import Clip
+from hobble.core.errors import InputError
+from hobble.motion.file_motion import load_source
+from hobble.motion.options import ClipMotion
+from hobble.motion.read import read_bvh
+from hobble.motion.rig import load_skeleton
+
+
+def z_up(clip):
+    """The walk as a program with Z up writes it, with the rest pose along Z, too."""
+    turn = quat.from_axis_angle(np.array([1.0, 0, 0]), np.pi / 2)
+    rotations = quat.mul(quat.mul(turn, clip.rotations), quat.inv(turn))
+    skeleton = replace(clip.skeleton, offsets=quat.rotate(turn, clip.skeleton.offsets))
+    return replace(clip, skeleton=skeleton, rotations=rotations, root=quat.rotate(turn, clip.root))
+
+
+def left_handed(clip):
+    flip = np.array([-1.0, 1, 1])
+    skeleton = replace(clip.skeleton, offsets=clip.skeleton.offsets * flip)
+    return replace(clip, skeleton=skeleton, rotations=clip.rotations * [1, 1, -1, -1], root=clip.root * flip)
+
+
+def facing_x(clip):
+    """The same motion on a rig whose rest pose faces +X."""
+    turn = quat.yaw(np.pi / 2)
+    rotations = quat.mul(quat.mul(turn, clip.rotations), quat.inv(turn))
+    rotations[:, 0] = quat.mul(clip.rotations[:, 0], quat.inv(turn))
+    skeleton = replace(clip.skeleton, offsets=quat.rotate(turn, clip.skeleton.offsets))
+    return replace(clip, skeleton=skeleton, rotations=rotations)
+
+
+@pytest.mark.parametrize(
+    ("change", "said"),
+    [
+        (z_up, {"up": "+Z", "handedness": "right"}),
+        (left_handed, {"up": "+Y", "handedness": "left"}),
+        (facing_x, {"up": "+Y", "handedness": "right", "rest_facing": "+X"}),
+        (lambda clip: left_handed(z_up(clip)), {"up": "+Z", "handedness": "left"}),
+    ],
+)
+def test_other_axes_are_found_reported_and_converted(walk, bvh, make, change, said):
+    clip, report = make(bvh(change(walk)))
+    assert {key: report[key] for key in said} == said
+    np.testing.assert_allclose(clip.positions, walk.positions[::2], atol=1e-4)
+    assert quat.angle(clip.rotations, walk.rotations[::2]).max() < 1e-5
+
+
+def crawl(skeleton, heading, seconds=3):
+    """A figure that crawls at 36 cm/s, in a direction in degrees from +Z towards +X."""
+    time = np.arange(60 * seconds + 1) / 60
+    swing = 0.26 * np.sin(2 * np.pi * time)[:, None]
+    rotations = np.tile(quat.IDENTITY, (len(time), len(skeleton.joints), 1))
+    rotations[:, 0] = quat.mul(quat.yaw(np.radians(heading)), quat.from_euler(np.full_like(swing, 1.31), "X"))
+    for side, sign in (("left", 1), ("right", -1)):
+        rotations[:, skeleton.role(f"{side}_hip")] = quat.from_euler(sign * swing - 1.31, "X")
+        rotations[:, skeleton.role(f"{side}_knee")] = quat.from_euler(1.57 - sign * swing, "X")
+    way = np.stack(
+        [36 * time * np.sin(np.radians(heading)), 50 + 0 * time, 36 * time * np.cos(np.radians(heading))], 1
+    )
+    return Clip("crawl", skeleton, 60.0, rotations, way)
+
+
+@pytest.mark.parametrize("heading", [0.0, 50.0, 90.0, 200.0])
+def test_a_figure_that_crawls_is_not_stood_on_end(holden31, bvh, make, heading):
+    crawling = crawl(holden31, heading)
+    for change, up in ((lambda clip: clip, "+Y"), (z_up, "+Z")):
+        clip, report = make(bvh(change(crawling)))
+        assert report["up"] == up
+        np.testing.assert_allclose(clip.positions, crawling.positions, atol=1e-4)
+        (note,) = report["notes"]
+        assert f"its rest pose along {up}. {up} was taken for up, because the body crawls" in note
+    assert make(bvh(crawling), up="Y")[1]["notes"] == []
+
+
+def turned_upright(clip):
+    """The clip in a world with Z up, on a rig whose rest pose stands along Y."""
+    turn = quat.from_axis_angle(np.array([1.0, 0, 0]), np.pi / 2)
+    rotations = clip.rotations.copy()
+    rotations[:, 0] = quat.mul(turn, rotations[:, 0])
+    return replace(clip, rotations=rotations, root=quat.rotate(turn, clip.root))
+
+
+@pytest.mark.parametrize("rise", [0.0, 0.6])
+def test_a_lying_rest_pose_gives_an_upright_figure(walk, bvh, make, rise):
+    """Even on stairs, or in a jump."""
+    time = np.arange(len(walk)) / walk.fps
+    up = np.stack([0 * time, rise * walk.root[:, 2] + 40 * np.maximum(np.sin(4 * time), 0), 0 * time], axis=1)
+    climbing = replace(walk, root=walk.root + up)
+    clip, report = make(bvh(turned_upright(climbing)))
+    assert report["up"] == "+Z"
+    note = report["notes"][0]
+    assert "its rest pose along +Y. +Z was taken for up, because the body moves that way up" in note
+    np.testing.assert_allclose(clip.positions, climbing.positions[::2], atol=1e-4)
+
+
+def test_the_axes_can_be_set(walk, bvh, make):
+    clip, report = make(bvh(walk), handedness="left", proportions="clip")
+    assert report["handedness"] == "left"
+    np.testing.assert_allclose(clip.positions * [-1, 1, 1], walk.positions[::2], atol=1e-4)
+    clip, report = make(bvh(walk), up="Z", proportions="clip")
+    np.testing.assert_allclose(clip.positions[..., 1], walk.positions[::2, :, 2], atol=1e-4)
+
+
+def raised(clip, height):
+    return replace(clip, root=clip.root + np.multiply.outer(height, [0.0, 1.0, 0.0]))
+
+
+@pytest.mark.parametrize("height", [-93.0, -20.0, 20.0, 120.0])
+@pytest.mark.parametrize("rig", ["holden31", "rig22"])
+def test_a_floor_at_another_height_is_moved_to_0_and_reported(walker, bvh, make, root, height, rig):
+    clip = walker(load_skeleton(root / f"config/skeletons/{rig}.yaml").skeleton, 121, 60.0)
+    path = bvh(raised(clip, height))
+    moved, report = make(path)
+    np.testing.assert_allclose(moved.positions, make(bvh(clip, name="level"))[0].positions, atol=1.5)
+    assert [s for s in report["repairs"] if "The floor lies at" in s and s.endswith("so that it lies at 0.")]
+    with pytest.raises(InputError, match=r"walk.bvh: The floor lies at -?[\d.]+ cm.*defects: repair"):
+        make(path, defects="refuse")
+
+
+@pytest.mark.shared
+@pytest.mark.parametrize("every", [1, 4, 5])
+def test_the_floor_of_a_short_run_is_found_at_any_rate(shared, bvh, make, root, every):
+    """In one second of a run at 120, 30 and 24 frames a second a foot stands in few frames."""
+    source = load_source(
+        read_bvh(shared / "mocap/cmu/09_08.bvh"),
+        load_skeleton(root / "config/skeletons/holden31.yaml"),
+        root / "config/skeletons",
+        ClipMotion(),
+    ).clip
+    part = slice(None, None, every)
+    clip = replace(
+        source, fps=source.fps / every, rotations=source.rotations[part], root=source.root[part] - [0, 9, 0]
+    )
+    _, report = make(bvh(clip))
+    assert any(said.startswith("The floor lies at -") for said in report["repairs"])
+
+
+@pytest.mark.parametrize("height", [-1.5, 1.5])
+def test_a_floor_near_zero_stays_where_it_is(walk, bvh, make, height):
+    clip, report = make(bvh(raised(walk, height)), defects="refuse")
+    assert report["repairs"] == report["notes"] == []
+    np.testing.assert_allclose(clip.root[:, 1], walk.root[::2, 1] + height, atol=1e-6)
+
+
+def test_uneven_ground_stays_where_it_is(walk, bvh, make):
+    stairs = raised(walk, np.interp(walk.root[:, 2], [80, 120], [20, 60]))
+    clip, report = make(bvh(stairs))
+    assert "too uneven for flat ground: set `ground: rocky` for this clip" in report["notes"][0]
+    assert report["repairs"] == []
+    np.testing.assert_allclose(clip.root, stairs.root[::2], atol=1e-6)
+    beam = bvh(raised(walk, 40.0), name="beam")
+    clip, report = make(beam, ground="beam", defects="refuse")
+    assert report["repairs"] == report["notes"] == []
+    np.testing.assert_allclose(clip.root[:, 1], walk.root[::2, 1] + 40, atol=1e-6)
+
+
+def test_the_facing_direction_can_be_set(walk, bvh, make):
+    path = bvh(walk)
+    as_it_is, report = make(path)
+    assert report["facing"] == pytest.approx(0, abs=1)
+    clip, report = make(path, facing=90.0)
+    assert report["facing"] == pytest.approx(90.0)
+    np.testing.assert_allclose(clip.root[0], as_it_is.root[0], atol=1e-9)
+    assert clip.root[-1, 0] - clip.root[0, 0] > 190
+    np.testing.assert_allclose(clip.positions[..., 1], as_it_is.positions[..., 1], atol=1e-9)
+
+
+def test_defects_can_be_left_unrepaired(walk, bvh, make):
+    broken = raised(walk, np.where(np.arange(len(walk)) >= 200, 80.0, 7.0))
+    clip, report = make(bvh(broken), defects="leave")
+    assert report["repairs"] == []
+    np.testing.assert_allclose(clip.root, broken.root[::2], atol=1e-6)

@@ -1,0 +1,11 @@
+"""Creates the JSON of one piece of a measurement."""
+
+from hobble.core.files import write_json
+from hobble.workflow.job import job
+from hobble.workflow.measure_job import given_to, measure_of
+
+with job(snakemake):
+    measure = measure_of(snakemake)
+    options = measure.options.model_validate(snakemake.params.options)
+    found = measure.part("run").run_piece(given_to(snakemake), options, snakemake.params.piece)
+    write_json(snakemake.output.json, found)
