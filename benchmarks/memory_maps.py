@@ -25,7 +25,7 @@ from database import BATCH, PROGRAM_MB, cold, made_up, status
 from hobble.core.processors import processor
 from hobble.database import chunks, order, reader, window
 from hobble.database.merge import write_database
-from hobble.database.reader import Block, Database, ahead
+from hobble.database.reader import Block, Database, read_ahead
 from hobble.database.window import empty_buffers
 
 TABLES = ("x", "y", "fits", "count", "clip", "frame", "phase")
@@ -71,7 +71,9 @@ class Mapped:
             self.parts((seed, 0, layer), start, stop, window)
             for layer, start, stop in order.spans(rows, visits, section, SECTIONS)
         )
-        return ahead(self.db._composed(parts, self.db.section_pairs("train", section, SECTIONS), block_rows))
+        return read_ahead(
+            self.db._composed(parts, self.db.section_pairs("train", section, SECTIONS), block_rows)
+        )
 
     def parts(self, of: tuple[int, int, int], start: int, stop: int, window: int) -> Iterator[tuple]:
         """Rows and fits of the places start to stop of a layer, as indices into the whole tables."""

@@ -15,7 +15,7 @@ from hypothesis import strategies as st
 
 from hobble.core.errors import HobbleError, InputError
 from hobble.database.merge import write_database
-from hobble.database.reader import Block, Database, ahead
+from hobble.database.reader import Block, Database, read_ahead
 from hobble.rows.clip_rows import expanded
 
 MEMORY = 4096  # MB: everything at once
@@ -250,13 +250,13 @@ def test_reading_can_stop_at_any_block(path):
 
 
 def test_reading_ahead_keeps_the_order_and_raises_errors():
-    assert list(ahead(iter(range(100)))) == list(range(100))
+    assert list(read_ahead(iter(range(100)))) == list(range(100))
 
     def breaking():
         yield 1
         raise ValueError("here")
 
-    items = ahead(breaking())
+    items = read_ahead(breaking())
     assert next(items) == 1
     with pytest.raises(ValueError, match="here"):
         next(items)

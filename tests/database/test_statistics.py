@@ -15,8 +15,8 @@ from hobble.database.statistics import (
     UNSEEN,
     Moments,
     clip_moments,
-    finish,
     grouped,
+    statistics_of_moments,
     x_groups,
 )
 from hobble.rows.clip_rows import ClipRows, expanded
@@ -69,7 +69,7 @@ def test_a_long_clip_in_batches_gives_the_same_moments(rows_of, monkeypatch):
 def test_deviations_are_shared_in_the_groups_of_the_original_and_weighted(rows_of, layout):
     rows = rows_of(rows=300, fits=10)
     x, y = clip_moments(rows, rows.layout)
-    s = finish(layout, x, y, 0.1, [1])
+    s = statistics_of_moments(layout, x, y, 0.1, [1])
     n = layout.samples
     for start in (0, n, 2 * n, 3 * n):  # tx, tz, dx, dz each on their own
         np.testing.assert_allclose(s.x_std[start : start + n], x.std[start : start + n].mean(), rtol=1e-6)
@@ -96,7 +96,7 @@ def test_nothing_is_ever_divided_by_zero(rows_of, layout):
     still = rows_of(rows=20, fits=1)
     for values in (still.x, still.y, still.heights, still.mean, still.channels["injury"]):
         values[...] = 0.0
-    s = finish(layout, *clip_moments(still, layout), 0.1, [1])
+    s = statistics_of_moments(layout, *clip_moments(still, layout), 0.1, [1])
     for std in (s.x_std, s.y_std):
         assert (std > 0).all()
         assert np.isfinite(std).all()
@@ -118,5 +118,5 @@ def test_severities_share_one_deviation_and_unused_ones_are_scaled_to_0():
 def test_without_the_channel_severities_change_no_statistics(rows_of, layout):
     healthy = RowLayout(layout.joints)
     moments = clip_moments(rows_of(rows=30), healthy)
-    s = finish(healthy, *moments, 0.1, [])
+    s = statistics_of_moments(healthy, *moments, 0.1, [])
     assert s.x_mean.shape == s.x_std.shape == (healthy.x_size,)

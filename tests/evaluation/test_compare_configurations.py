@@ -181,7 +181,7 @@ def test_equation_3_2_divides_by_the_deviations_of_frames_and_of_means(compared)
     ours = {
         (r["measure"], r["configuration"]): (r["published"], r["ours"]) for r in compared["against_published"]
     }
-    what = "standard deviation of the means of train clips"
+    what = "standard deviation of the means of training clips"
     assert ours[what, "holden"] == (0.00954, pytest.approx(0.01))
     laps = [r for r in compared["milliseconds"]["against_published"] if r["measure"].startswith("standard")]
     assert [(r["configuration"], r["published"], r["ours"]) for r in laps] == [("holden", 0.0173, None)]

@@ -16,7 +16,7 @@ from hobble.core import quat
 from hobble.core.skeleton import Skeleton, forward_kinematics
 from hobble.figure.fit import fitted_rotations
 from hobble.figure.mesh import Mesh, body, key
-from hobble.figure.pack import balls, regions, whole
+from hobble.figure.pack import balls, regions, whole_weights
 
 
 def rig(root: Path, name: str) -> Skeleton:
@@ -85,7 +85,7 @@ def test_a_corner_has_at_most_four_bones_and_their_shares_sum_to_one(mesh: Mesh)
     assert mesh.bone.shape == mesh.share.shape == (len(mesh.corners), 4)
     assert mesh.share.sum(axis=1) == pytest.approx(1)
     assert mesh.share.min() >= 0
-    steps = whole(mesh.share)
+    steps = whole_weights(mesh.share)
     assert steps.sum(axis=1).tolist() == [255] * len(steps)
     assert np.abs(steps / 255 - mesh.share).max() < 0.02
 

@@ -103,6 +103,26 @@ ROLLS = "hips|-|Hips\nspine|hips|LowerBack\nspine1|spine|Spine\nspine2|spine1|Sp
     ]
 )
 
+# As the Master Motor Map of KIT has it: several joints in one place, one for each axis.
+KIT = "\n".join(
+    f"{name}|{parent}|{joint}"
+    for name, parent, joint in (
+        *(("root", "-", "Hips"), ("BPx", "root", "LowerBack"), ("BPy", "BPx", "LowerBack")),
+        *(("BTx", "BPy", "Spine1"), ("BTy", "BTx", "Spine1"), ("BLNx", "BTy", "Neck1")),
+        *(("BLNy", "BLNx", "Neck1"), ("BUNx", "BLNy", "Head")),
+        *(
+            (letter + name, parent if parent in ("root", "BTy") else letter + parent, side + joint)
+            for letter, side in SIDES.items()
+            for name, parent, joint in (
+                *(("Hx", "root", "UpLeg"), ("Hy", "Hx", "UpLeg"), ("Hz", "Hy", "UpLeg")),
+                *(("Kx", "Hz", "Leg"), ("Ax", "Kx", "Foot"), ("Ay", "Ax", "Foot"), ("Fx", "Ay", "ToeBase")),
+                *(("SCx", "BTy", "Shoulder"), ("Sx", "SCx", "Arm"), ("Sy", "Sx", "Arm")),
+                *(("Ex", "Sy", "ForeArm"), ("Ez", "Ex", "ForeArm"), ("Wx", "Ez", "Hand")),
+            )
+        ),
+    )
+)
+
 
 def nameless(rig: str) -> str:
     """The rig with names that only tell the side."""

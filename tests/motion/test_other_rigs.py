@@ -21,6 +21,7 @@ from tests.motion.other_rigs import (
     CLOTHES,
     GAME,
     HIND,
+    KIT,
     MECHANISM,
     PLAIN,
     ROLLS,
@@ -74,6 +75,8 @@ RIGS = {
         {"rest": "one axis"},
     ),
     "rolls in every limb": (ROLLS, {}),
+    "KIT, a joint for each axis": (KIT, {}),
+    "KIT, bones along one axis": (KIT, {"rest": "one axis"}),
     "roots and metres": (
         "Armature|-|ground\nReference|Armature|ground\n" + PLAIN.replace("hips|-|", "hips|Reference|"),
         {"unit": "m"},

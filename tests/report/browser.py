@@ -38,6 +38,11 @@ def executable() -> str | None:
     return next(filter(None, map(shutil.which, BROWSERS)), None)
 
 
+# What plotly draws inside a chart is its own; what stands around it is ours.
+AXE = """axe.run({ exclude: [[".main-svg"]] }, { resultTypes: ["violations"] }).then(({ violations }) =>
+  violations.flatMap(({ id, nodes }) => nodes.map(({ target }) => `${id}: ${target}`)))"""
+
+
 class Browser:
     """One tab. `console`: the page's messages. `requests`: the addresses that it requested."""
 
@@ -118,6 +123,12 @@ class Browser:
             deviceScaleFactor=1,
             mobile=False,
         )
+
+    def violations(self, modules: Path) -> list[str]:
+        """What axe finds wrong with the page as it is now. modules: the folder of the npm packages."""
+        if self.run("!globalThis.axe"):
+            self.run((modules / "axe-core" / "axe.min.js").read_text(encoding="utf-8") + "; 0")
+        return self.run(AXE)
 
     def picture(self, path: Path, selector: str | None = None) -> None:
         """Save the visible page, or the whole of one element, as PNG."""

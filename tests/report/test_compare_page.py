@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Iterator
 from pathlib import Path
 from types import ModuleType
@@ -136,18 +137,18 @@ def test_published_figures_are_shown_with_ours(compared: dict[str, Any]) -> None
     rows = {(row[0], row[1]): row[2:4] for row in tables.published_table(compared).rows}
     assert rows["a frame, mean", "holden"][0] == "0.376 ms"
     assert rows["a frame, mean", "holden"][1].endswith(" ms")
-    assert rows["relative error, held_out clips", "holden-xl"] == ["0.0448", ""]
+    assert rows["relative error, held-out clips", "holden-xl"] == ["0.0448", ""]
     assert rows["database, on disk", "holden"] == ["7.12 GB", "30 MB"]
     assert rows["database, time", "holden"] == ["1 h 30 min", "21 s"]
     of_clips = {row[0] for row in tables.published_table(compared).rows if "80 clips" in row[4]}
     assert of_clips == {
         f"{what} {split} clips"
         for what in ("relative error,", "standard deviation of the means of")
-        for split in ("train", "held_out")
+        for split in ("training", "held-out")
     }
     cited = {(row[0], row[1]): row[4] for row in tables.published_table(compared).rows}
     assert cited["a frame, mean", "ava"] == "Segerstedt (2021), Table 5.1 (but 1.479 ms in Appendix A.4)"
-    assert cited["relative error, train clips", "ava"].endswith(", Table 5.2 (but 0.0311 in Appendix A.5)")
+    assert cited["relative error, training clips", "ava"].endswith(", Table 5.2 (but 0.0311 in Appendix A.5)")
 
 
 def test_frame_times_are_medians_and_measures_have_names(
@@ -218,6 +219,17 @@ def test_another_configuration_is_chosen_and_linked_to(tab: Any) -> None:
     assert tab.run("Hobble.player.actors.map(({ spec }) => spec.channels.length)") == [0, 0]
     tab.run("document.getElementById('play-share').click()")
     assert "of=ava%2Cava" in tab.run("location.hash")
+
+
+def test_axe_finds_no_accessibility_problem(tab: Any, modules: Path) -> None:
+    """In a wide and in a narrow window, in light and in dark."""
+    for width, theme in itertools.product((1440, 390), ("light", "dark")):
+        tab.size(width, 900)
+        tab.run(f"document.documentElement.dataset.theme = '{theme}'")
+        assert tab.violations(modules) == []
+        assert tab.until(f"document.documentElement.scrollWidth <= {width}")
+    tab.run("delete document.documentElement.dataset.theme")
+    tab.size(1280, 900)
 
 
 def test_charts_are_drawn_without_console_messages_or_requests(tab: Any, pictures: Path) -> None:

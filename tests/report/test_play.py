@@ -22,7 +22,7 @@ from hobble.models.load import load_network
 from hobble.models.network import Network
 from hobble.motion.decode import decode, frame_rate
 from hobble.motion.read import read_bvh
-from hobble.report import walked
+from hobble.report import straight_walk, walked
 from hobble.report.formats import embedded
 from hobble.report.playable import playable
 from hobble.runtime.animation import ProceduralAnimation
@@ -178,11 +178,11 @@ def test_the_figures_at_the_top_move_as_the_python_runtime_does(
     for i, values in enumerate(({column: 7.0}, {})):
         animation = ProceduralAnimation(network, **dict(examples.RUNTIME))
         for _ in range(walked.FRAMES + 30):
-            pose = animation.next_pose(walked.AHEAD, None, "walk", injury=values)
+            pose = animation.next_pose(straight_walk.AHEAD, None, "walk", injury=values)
         seen = tab.run(f"""(() => {{
           const c = Hobble.character(Hobble.material.playable.example);
           c.follow(Hobble.material.hero.walked[{i}]);
-          for (let f = 0; f < 30; f++) c.frame({json.dumps(walked.AHEAD)}, null, "walk", () => 0);
+          for (let f = 0; f < 30; f++) c.frame({json.dumps(straight_walk.AHEAD)}, null, "walk", () => 0);
           return Array.from(c.pose);
         }})()""")
         np.testing.assert_allclose(np.reshape(seen, (-1, 3)), pose.positions, atol=0.05)
@@ -222,6 +222,33 @@ def test_a_gamepad_and_a_thumb_steer_too(tab: Any) -> None:
     assert tab.until(f"Math.hypot(...{velocity}) > 2")
     tab.send("Input.dispatchTouchEvent", type="touchEnd", touchPoints=[])
     assert tab.until(f"Math.hypot(...{velocity}) < .01")
+
+
+def test_on_a_phone_the_buttons_are_below_the_picture_and_no_text_speaks_of_keys(tab: Any) -> None:
+    of_keys = "[...document.querySelectorAll('#play kbd, #play .for-keys')]"
+    assert tab.run(f"{of_keys}.length") > 9
+    tab.size(390, 844)
+    show(tab)
+    tab.run("document.getElementById('play-stage').scrollIntoView({ block: 'start', behavior: 'instant' })")
+    tab.run("Hobble.player.start()")
+
+    def tap(selector: str) -> None:
+        x, y = tab.run(
+            "(({ x, y, width, height }) => [x + width / 2, y + height / 2])"
+            f"(document.getElementById('{selector}').getBoundingClientRect())"
+        )
+        assert y < 844, selector
+        tab.send("Input.dispatchTouchEvent", type="touchStart", touchPoints=[{"x": x, "y": y}])
+        tab.send("Input.dispatchTouchEvent", type="touchEnd", touchPoints=[])
+
+    for button in ("jog", "heal"):
+        tap(f"play-{button}")
+        pressed = f"document.getElementById('play-{button}').ariaPressed === 'true'"
+        assert tab.until(pressed), button
+        tap(f"play-{button}")
+        assert tab.until(f"!({pressed})"), button
+    assert tab.run(f"{of_keys}.filter((e) => e.offsetParent).length") == 0
+    tab.size(1280, 900)
 
 
 def test_a_click_on_the_left_shin_hurts_it_and_changes_the_gait(tab: Any) -> None:

@@ -36,6 +36,20 @@ def made(
         return folder, write_questionnaire(network, folder, examples.RUNTIME, "example", SHORT, size=48)
 
 
+def test_films_drawn_at_once_are_those_drawn_one_by_one(
+    made: tuple[Path, dict[str, Any]],
+    network: Network,
+    examples: ModuleType,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    for name, seconds in (("WARM_UP", 0.1), ("HEALTHY", 0.1), ("HURT", 0.3)):
+        monkeypatch.setattr(films, name, seconds)
+    again = write_questionnaire(network, tmp_path, examples.RUNTIME, "example", SHORT, size=48, threads=3)
+    assert again == made[1]
+    assert (tmp_path / "questionnaire.html").read_text() == (made[0] / "questionnaire.html").read_text()
+
+
 @pytest.fixture
 def tab(
     made: tuple[Path, dict[str, Any]], tools: ModuleType, tmp_path_factory: pytest.TempPathFactory
@@ -118,6 +132,20 @@ def test_orders_differ_and_a_reopened_page_continues(tab: Any) -> None:
     tab.run("document.getElementById('begin').click()")
     assert tab.run("document.getElementById('which').textContent") == "Film 2 of 4"
     assert tab.run("Study.state.order") == order
+
+
+def test_axe_finds_no_accessibility_problem_in_any_of_the_three_parts(tab: Any, modules: Path) -> None:
+    again(tab, forget=True)
+    assert tab.violations(modules) == []
+    tab.run("document.getElementById('begin').click()")
+    assert tab.violations(modules) == []
+    for _ in range(4):
+        tab.run(
+            "document.querySelector('#parts input').click(); document.querySelector('#marks input').click()"
+        )
+        tab.run("document.getElementById('next').click()")
+    assert not tab.run("document.getElementById('done').hidden")
+    assert tab.violations(modules) == []
 
 
 def test_films_without_a_visible_injury_get_a_warning() -> None:

@@ -163,6 +163,16 @@ def test_the_steps_of_a_frame_are_in_their_order(material: Material) -> None:
     assert traces[-1]["y"][0] == times["spread"]["median"]
 
 
+def test_a_row_of_the_table_of_laps_reads_as_a_sentence(material: Material) -> None:
+    table = responsivity_page.lap_table(material.found("responsivity"), "example")
+    assert table is not None
+    labels = [column.label for column in table.columns]
+    assert labels[:5] == ["lap", "finished", "waypoints reached", "seconds", "frames"]
+    assert not [label for label in labels if "_" in label]
+    assert [shown for *_, shown in table.cells[0][:5]] == ["1", "yes", "6", "113.3", "6,800"]
+    assert [shown for *_, shown in table.cells[3][:3]] == ["4", "no", "5"]
+
+
 def test_feet_with_little_contact_have_no_slide(material: Material) -> None:
     def slide(steps: int) -> KeyFigure:
         laps = [{**lap, "steps": steps} for lap in material.measured["responsivity"]["laps"][:2]]

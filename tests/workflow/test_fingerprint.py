@@ -129,7 +129,7 @@ def test_only_code_changes_a_fingerprint(source: Path, file: str, old: str, new:
 
 def test_infrastructure_modules_exist_and_have_a_reason(root: Path) -> None:
     for name, reason in fp.INFRASTRUCTURE.items():
-        assert list(fp._found(name, root / "src"))[1:], name
+        assert list(fp._files_of_module(name, root / "src"))[1:], name
         assert reason
 
 

@@ -191,6 +191,7 @@ rule questionnaire:
         "results/{configuration}/logs/report/questionnaire.log",
     benchmark:
         "results/{configuration}/benchmarks/report/questionnaire.tsv"
+    threads: 4
     resources:
         mem_mb=2000,
         runtime=30,

@@ -14,6 +14,7 @@ with job(snakemake) as log:
         folder,
         Runtime.model_validate(snakemake.params.runtime),
         snakemake.params.configuration,
+        threads=snakemake.threads,
     )
     for doubt in doubts(solution):
         log.warning("%s", doubt)

@@ -64,13 +64,13 @@ class SampleWalk:
 
 def words(name: str) -> ChannelWords:
     """The words of a channel."""
-    found = _own(name, "WORDS")
+    found = _from_module(name, "WORDS")
     return found if isinstance(found, ChannelWords) else ChannelWords()
 
 
 def shown(name: str, skeleton: Skeleton, columns: Sequence[str], trained: Collection[str]) -> Shown:
     """How a channel is shown. By default there is a slider for each column that was above 0 in training."""
-    if own := _own(name, "shown"):
+    if own := _from_module(name, "shown"):
         return own(skeleton, columns, trained)
     return Shown(tuple(columns), {column: column for column in columns if column in trained})
 
@@ -81,7 +81,7 @@ def sweeps(
     """Walks in which one column rises from 0 to the highest: name -> column. By default one for each trained
     column.
     """
-    if own := _own(name, "sweeps"):
+    if own := _from_module(name, "sweeps"):
         return own(skeleton, columns, trained)
     return {column.replace(" ", "_"): column for column in columns if column in trained}
 
@@ -93,7 +93,7 @@ def loops(
 
     By default there is one for each trained column, at its highest value.
     """
-    if own := _own(name, "loops"):
+    if own := _from_module(name, "loops"):
         return own(skeleton, columns, trained)
     used, highest = [column for column in columns if column in trained], channel(name).highest
     return [
@@ -123,5 +123,5 @@ def module(name: str) -> ModuleType | None:
     return importlib.import_module(full) if importlib.util.find_spec(full) is not None else None
 
 
-def _own(name: str, what: str) -> Any:
+def _from_module(name: str, what: str) -> Any:
     return getattr(module(name), what, None)

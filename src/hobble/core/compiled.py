@@ -64,7 +64,7 @@ def _warn_once(text: str) -> None:
 
 
 def _warn(error: Exception) -> None:
-    """Warn once per process, whatever fails and however often."""
+    """Warn at most once in a process."""
     if _warn_once.cache_info().currsize == 0:
         what = f"{type(error).__name__}: {error}"
         _warn_once(f"compiled functions are not kept for the next start ({what}). {CACHE_HINT}")

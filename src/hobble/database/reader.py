@@ -20,7 +20,7 @@ from hobble.database.precision import widen
 from hobble.database.scale import Shards
 from hobble.database.statistics import Statistics
 from hobble.database.stretches import SampleRange
-from hobble.database.window import Buffers, ChunkWindow, empty_buffers, load
+from hobble.database.window import Buffers, ChunkWindow, empty_buffers, load_chunks
 from hobble.rows.compose import compose
 from hobble.rows.layout import RowLayout
 
@@ -96,6 +96,11 @@ class Database:
         """Names of the clips, of both splits; `Block.clip` is an index into them."""
         return tuple(clip["clip"] for clip in self.manifest.clips)
 
+    @property
+    def sources(self) -> dict[str, str]:
+        """Hurt version -> the healthy clip it is made from."""
+        return {clip["clip"]: clip["source"] for clip in self.manifest.clips if "source" in clip}
+
     def rows(self, split: str) -> int:
         """Rows (frames) of "train" or "held_out"."""
         return self.manifest.rows(split)
@@ -143,7 +148,7 @@ class Database:
             self._parts(split, (seed, pass_index, layer), start, stop, window, buffers)
             for layer, start, stop in spans
         )
-        return ahead(self._composed(_own(parts, stretch), stretch.rows, block_rows))
+        return read_ahead(self._composed(_for_this_process(parts, stretch), stretch.rows, block_rows))
 
     def each_row(self, split: str) -> Iterator[RawRows]:
         """Every row of a split once, with all its fits, in the order of the chunks."""
@@ -152,7 +157,7 @@ class Database:
         if window < chunks:
             every, buffers = range(chunks), self._buffers(split, window)
             groups = (every[start : start + window] for start in range(0, chunks, window))
-            windows = ahead(self.load(split, some, next(buffers)) for some in groups)
+            windows = read_ahead(self.load(split, some, next(buffers)) for some in groups)
         else:
             windows = iter([self._whole(split)] if chunks else [])
         for read in windows:
@@ -183,7 +188,7 @@ class Database:
             windows = iter([self._whole(split)])
         else:
             wanted = list(self._wanted(split, of, start, stop, window))
-            windows = ahead(self.load(split, some, next(buffers)) for _, some, _, _ in wanted)
+            windows = read_ahead(self.load(split, some, next(buffers)) for _, some, _, _ in wanted)
         for group, _, low, high in wanted:
             w, part, visits = next(windows), slice(low, high), self.manifest.visits
             yield w, *order.rows_and_fits(w.chunks, w.rows, w.count, w.first, visits, (*of, group), part)
@@ -232,7 +237,7 @@ class Database:
     def load(self, split: str, some: Sequence[int], into: Buffers) -> ChunkWindow:
         """Read chunks of a split into the buffers `into` (`hobble.database.window.empty_buffers`)."""
         folder = self.path / self.manifest.folder
-        return load(folder, self.manifest, split, some, into, self._shards, self._verified)
+        return load_chunks(folder, self.manifest, split, some, into, self._shards, self._verified)
 
     def _composed(self, parts: Iterator[Part], total: int, block_rows: int) -> Iterator[Block]:
         """Blocks of `block_rows` rows from parts of any length."""
@@ -267,7 +272,7 @@ class Database:
         return Block(x, y, np.empty(rows, np.float32), np.empty(rows, np.int32), np.empty(rows, np.int32))
 
 
-def _own(parts: Iterator[Part], stretch: SampleRange) -> Iterator[Part]:
+def _for_this_process(parts: Iterator[Part], stretch: SampleRange) -> Iterator[Part]:
     """Only the samples of a stretch that this process reads."""
     at = 0
     for window, rows, fits in parts:
@@ -276,7 +281,7 @@ def _own(parts: Iterator[Part], stretch: SampleRange) -> Iterator[Part]:
         yield window, rows[some], fits[some]
 
 
-def ahead(items: Iterator[Item]) -> Iterator[Item]:
+def read_ahead(items: Iterator[Item]) -> Iterator[Item]:
     """The same items, where a thread makes the next item while one is in use."""
     nothing = object()
     with ThreadPoolExecutor(1, "ahead") as pool:

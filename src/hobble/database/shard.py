@@ -24,7 +24,7 @@ from hobble.database.ordered import write_chunks
 from hobble.database.plan import Plan, RowSource, make_plan
 from hobble.database.precision import STORED
 from hobble.database.scatter import make_buckets, scatter
-from hobble.database.statistics import Moments, Statistics, clip_moments, finish, unseen_joints
+from hobble.database.statistics import Moments, Statistics, clip_moments, statistics_of_moments, unseen_joints
 
 CHUNK_BYTES = 4 << 20  # read at a time: large enough to be fast on any disk, small enough for any memory
 INDEX, MOMENTS, SCALE = "shard.json", "moments.npz", "scale.npz"
@@ -48,7 +48,7 @@ def write_shard(
     There may be no clips, or none with rows. Raises InputError if a clip does not fit the others, HobbleError
     if the disk is full.
     """
-    plan = make_plan(clips, splits, channels, STORED[dtype].itemsize, chunk_bytes)
+    plan = make_plan(clips, splits, channels, STORED[dtype].itemsize, chunk_bytes, sources or {})
     try:
         for split in SPLITS:  # a chunk may have a second name in a database, so it is not written over
             shutil.rmtree(folder / split, ignore_errors=True)
@@ -85,7 +85,7 @@ def add(one: Sums, other: Sums) -> Sums:
 
 def statistics_of(plan: Plan, sums: Sums, joint_weight: float) -> Statistics:
     """The statistics of rows with these moments."""
-    return finish(plan.layout, *sums, joint_weight, unseen_joints(plan.skeleton))
+    return statistics_of_moments(plan.layout, *sums, joint_weight, unseen_joints(plan.skeleton))
 
 
 def _save(

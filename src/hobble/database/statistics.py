@@ -149,7 +149,7 @@ def grouped(std: Array, groups: Iterable[slice], constant: float) -> Array:
     return out
 
 
-def finish(
+def statistics_of_moments(
     layout: RowLayout, x: Moments, y: Moments, joint_weight: float, unseen: Sequence[int]
 ) -> Statistics:
     """Group the deviations and weight the joints: block mean / (w joint_weight), w = 1e-10 if unseen.

@@ -56,7 +56,7 @@ def empty_buffers(manifest: Manifest, split: str, count: int) -> dict[str, np.nd
     }
 
 
-def load(
+def load_chunks(
     folder: Path,
     manifest: Manifest,
     split: str,

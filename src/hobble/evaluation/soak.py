@@ -97,7 +97,7 @@ class StanceSlides:
         self.frames = np.where(standing, self.frames + 1, 0)
 
 
-def turns(now: Array, before: Array) -> Array:
+def turn_angles(now: Array, before: Array) -> Array:
     """(...) angle between rotations (..., 4), degrees."""
     dot = np.abs(np.sum(now * before, axis=-1))
     return np.asarray(np.degrees(2 * np.arccos(np.minimum(1.0, dot))))
@@ -157,7 +157,7 @@ def soak(
         low, high = min(low, float(height.min())), max(high, float(height.max()))
         now = pose.positions, pose.rotations, animation.state.joint_rotation.copy()
         if old is not None:
-            predicted, drawn = turns(now[2], old[2]), turns(now[1], old[1])
+            predicted, drawn = turn_angles(now[2], old[2]), turn_angles(now[1], old[1])
             moved = np.linalg.norm(now[0] - old[0], axis=-1)
             for key, value in zip(worst, (predicted, drawn, drawn - predicted, moved), strict=True):
                 worst[key] = max(worst[key], float(value.max()))

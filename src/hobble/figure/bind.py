@@ -52,20 +52,20 @@ def bind(skeleton: Skeleton) -> BindPose:
             bone = quat.rotate(rotations[j], _reach(skeleton, j, child))
             if np.linalg.norm(bone) > SHORTEST:
                 rotations[j] = quat.mul(quat.between(bone, wanted), rotations[j])
-    at = {role: positions[skeleton.role(role)] for role in skeleton.roles if _known(skeleton, role)}
+    at = {role: positions[skeleton.role(role)] for role in skeleton.roles if _has_role(skeleton, role)}
     return BindPose(positions, rotations, bones, _filled(at, positions, skeleton))
 
 
-def _known(skeleton: Skeleton, role: str) -> bool:
+def _has_role(skeleton: Skeleton, role: str) -> bool:
     return skeleton.roles.get(role) in skeleton.joints
 
 
 def _bones(skeleton: Skeleton) -> dict[str, int]:
     """The joint that moves the part below each role."""
-    found = {role: skeleton.role(role) for role in skeleton.roles if _known(skeleton, role)}
+    found = {role: skeleton.role(role) for role in skeleton.roles if _has_role(skeleton, role)}
     hips = found["hips"]
     found.setdefault("neck", max(skeleton.parents[found["head"]], 0))
-    found.setdefault("chest", _common(skeleton, found["left_shoulder"], found["right_shoulder"]))
+    found.setdefault("chest", _common_joint(skeleton, found["left_shoulder"], found["right_shoulder"]))
     found.setdefault("spine", _first_below(skeleton, hips, found["chest"]))
     for side in SIDES:
         found.setdefault(f"{side}_elbow", found[f"{side}_shoulder"])
@@ -83,7 +83,7 @@ def _chain(skeleton: Skeleton, joint: int) -> list[int]:
     return out
 
 
-def _common(skeleton: Skeleton, a: int, b: int) -> int:
+def _common_joint(skeleton: Skeleton, a: int, b: int) -> int:
     above = set(_chain(skeleton, b))
     return next(j for j in _chain(skeleton, a) if j in above)
 

@@ -18,7 +18,7 @@ from hobble.core.quat import Array
 from hobble.core.skeleton import Skeleton, local_rotations
 from hobble.figure.bind import bind
 from hobble.figure.mesh import NEEDED, Mesh, body
-from hobble.figure.pack import whole
+from hobble.figure.pack import whole_weights
 
 METRES = 0.01  # metres per centimetre
 MOVES = 1e-5  # a component of a rotation that varies less than this stands still
@@ -140,7 +140,7 @@ def _nodes(skeleton: Skeleton, mesh: Mesh) -> list[dict[str, object]]:
 
 
 def _primitive(mesh: Mesh, buffer: _Buffer) -> dict[str, object]:
-    share = whole(mesh.share)
+    share = whole_weights(mesh.share)
     bone = np.where(share > 0, mesh.bone, 0).astype(np.uint8)
     normals = mesh.normals.astype(np.float32)
     normals /= np.linalg.norm(normals, axis=1, keepdims=True)

@@ -7,11 +7,13 @@ import hashlib
 import json
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from hobble.core import quat
+from hobble.core.compiled import njit
 from hobble.core.quat import Array
 from hobble.core.skeleton import Skeleton
 from hobble.figure.bind import SIDES, BindPose, bind
@@ -55,12 +57,22 @@ class Mesh:
         """Corners (V, 3) with the bones at world positions (B, 3) and rotations (B, 4)."""
         turn = quat.to_matrix(quat.mul(rotations, quat.inv(self.rotations)))
         move = positions - np.einsum("bij,bj->bi", turn, self.positions)
-        out = np.zeros_like(self.corners)
-        for k in range(self.bone.shape[1]):
-            b = self.bone[:, k]
-            moved = np.einsum("vij,vj->vi", turn[b], self.corners) + move[b]
-            out += self.share[:, k, None] * moved
-        return out
+        return _skinned(self.corners, self.bone, self.share, turn, move)
+
+
+@njit(nogil=True)
+def _skinned(corners: Array, bone: Any, share: Array, turn: Array, move: Array) -> Array:  # pragma: no cover
+    """Corners (V, 3), each moved by the rotations (B, 3, 3) and translations (B, 3) of its bones."""
+    out = np.zeros_like(corners)
+    for v in range(len(corners)):
+        x, y, z = corners[v]
+        for k in range(bone.shape[1]):
+            b, weight = bone[v, k], share[v, k]
+            if weight == 0:
+                continue
+            for i in range(3):
+                out[v, i] += weight * (turn[b, i, 0] * x + turn[b, i, 1] * y + turn[b, i, 2] * z + move[b, i])
+    return out
 
 
 def body(skeleton: Skeleton) -> Mesh:
@@ -68,7 +80,7 @@ def body(skeleton: Skeleton) -> Mesh:
 
     It depends on joints, offsets and roles only, and is made once for each.
     """
-    return _made(_text(skeleton))
+    return _mesh_of(_text(skeleton))
 
 
 def key(skeleton: Skeleton) -> str:
@@ -82,7 +94,7 @@ def _text(skeleton: Skeleton) -> str:
 
 
 @functools.lru_cache(maxsize=8)
-def _made(text: str) -> Mesh:
+def _mesh_of(text: str) -> Mesh:
     skeleton = Skeleton.from_dict({"name": "body", **json.loads(text)})
     known = all(skeleton.roles.get(role) in skeleton.joints for role in NEEDED)
     if known:

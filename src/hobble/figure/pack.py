@@ -30,7 +30,7 @@ def packed_body(skeleton: Skeleton) -> dict[str, Any]:
         "faces": packed(mesh.faces.astype(wide)),
         "wide": wide is np.uint32,
         "bone": packed(mesh.bone.astype(np.uint8)),
-        "share": packed(whole(mesh.share)),
+        "share": packed(whole_weights(mesh.share)),
         "keep": mesh.bones.tolist(),
         "places": np.round(mesh.positions, 4).tolist(),
         "turns": np.round(mesh.rotations, 6).tolist(),
@@ -54,7 +54,7 @@ def balls(mesh: Mesh) -> Array:
     return out
 
 
-def whole(share: Array) -> NDArray[np.uint8]:
+def whole_weights(share: Array) -> NDArray[np.uint8]:
     """Weights (V, 4) as integers (V, 4) that sum to 255; the largest takes the rounding error."""
     steps = np.floor(share * 255).astype(np.int64)
     steps[np.arange(len(steps)), share.argmax(axis=1)] += 255 - steps.sum(axis=1)

@@ -48,11 +48,11 @@ def mirrored(values: Profile) -> dict[str, float]:
         elif kind == "mean" and curve in SIGN_CHANGES:
             out[name] = -values[name]
         else:
-            out[name] = values[_across(name)]
+            out[name] = values[_other_side(name)]
     return out
 
 
-def _across(name: str) -> str:
+def _other_side(name: str) -> str:
     if name.endswith("_R"):
         return f"{name[:-1]}L"
     return f"{name[:-1]}R" if name.endswith("_L") else name

@@ -37,7 +37,7 @@ class Chosen:
 
 @dataclass(frozen=True)
 class Loaded:
-    """Rows of a clip, of which those from `first` to `stop` were chosen. The others are around them."""
+    """Rows of a clip. Those from `first` to `stop` were chosen; the others come before and after them."""
 
     rows: ClipRows = field(repr=False)
     first: int
@@ -45,7 +45,7 @@ class Loaded:
 
     @property
     def frames(self) -> list[int]:
-        """The first and last frame of the chosen rows, of which there is at least one."""
+        """The first and last frame of the chosen rows (at least one row)."""
         return [int(self.rows.frame[at]) for at in (self.first, self.stop - 1)]
 
 

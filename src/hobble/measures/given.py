@@ -23,9 +23,9 @@ class Given:
     """The inputs of a measurement of one configuration. It gets only those listed in its `Measure.inputs`.
 
     clips: clip -> its file of rows. facts: files of `hobble.rows.facts` of the same clips. splits: clip ->
-    "train" or "held_out". people: clip -> the person who walks in it; a clip of which that is not known
-    counts as a person of its own. runtime: the keys in its `Measure.runtime`, and defaults for the others.
-    pieces: piece -> its JSON, if the pieces ran as jobs of their own.
+    "train" or "held_out". people: clip -> the person who walks in it; each clip without a known person counts
+    as another person. runtime: the keys in its `Measure.runtime`, and defaults for the others.
+    pieces: piece -> its JSON, if the pieces ran as separate jobs.
     files: other inputs by name, such as the JSON of another measurement.
     """
 

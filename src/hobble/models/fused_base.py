@@ -14,10 +14,10 @@ from hobble.models.trainable import ALL_ROWS
 
 
 class FusedBase:
-    """First base class of a kind's fused step; the second is the kind's `Step`.
+    """First base class of a kind's fused step. The second is its plain step, such as `PfnnStep`.
 
-    network, keep, widths: set by the `Step`: the network in training, the share of units that dropout keeps,
-    and the number of inputs of each layer, in the order of the masks.
+    network, keep, widths: set by the plain step: the network in training, the share of units that dropout
+    keeps, and the number of inputs of each layer, in the order of the masks.
     """
 
     network: Any
@@ -34,7 +34,7 @@ class FusedBase:
         self.counter = np.uint64(seed)
 
     def masks(self, rows: int, own: slice = ALL_ROWS) -> list[Tensor]:
-        """As in `Step`, with another generator; the masks are valid until the next call."""
+        """As in the plain step, with another generator; the masks are valid until the next call."""
         first, stop, _ = own.indices(rows)
         masks = []
         for number, width in enumerate(self.widths):
@@ -45,7 +45,7 @@ class FusedBase:
         return masks
 
     def multiplied(self, name: str, a: Tensor, b: Tensor) -> Tensor:
-        """As in `Step`, in memory that the next step uses again."""
+        """As in the plain step, in memory that the next step uses again."""
         return product(a, b, self.buffer(name, len(a), len(b), a.dtype))
 
     def buffer(self, name: str, rows: int, width: int, dtype: torch.dtype | None = None) -> Tensor:

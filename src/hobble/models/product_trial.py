@@ -1,9 +1,9 @@
 """A short trial of several ways to compute the same thing, and a file that keeps which was the fastest.
 
-The ways give results that differ in their last bits. So a choice that was made once is taken in every later
-run on such a machine: the file is in the user's cache folder, one for each kind of processor, version of
+The ways give results that differ in their last bits. So the first choice is used in every later run on the
+same kind of machine. The file is in the user's cache folder, one for each kind of processor, version of
 PyTorch and setting of the libraries. If there is no such folder, or it cannot be written, a fixed way is
-taken without a trial.
+used without a trial.
 """
 
 from __future__ import annotations

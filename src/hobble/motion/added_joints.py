@@ -38,7 +38,7 @@ def with_balls(clip: Clip, body: Body, frames: dict[int, Array]) -> tuple[Clip, 
         legs[side] = (hip, knee, heel, new)
         offsets.append(quat.rotate(frames[heel], BALL * (thigh + shank)))
     heels = [body.legs[side][2] for side in without]
-    return _with(clip, "ball", heels, offsets), replace(body, legs=legs)
+    return _with_joints(clip, "ball", heels, offsets), replace(body, legs=legs)
 
 
 def with_bends(
@@ -55,10 +55,12 @@ def with_bends(
             neck = (new, *neck)
         else:
             trunk = (new, *trunk)
-    return _with(clip, "bend", list(bends), [np.zeros(3)] * len(bends)), replace(body, trunk=trunk, neck=neck)
+    return _with_joints(clip, "bend", list(bends), [np.zeros(3)] * len(bends)), replace(
+        body, trunk=trunk, neck=neck
+    )
 
 
-def _with(clip: Clip, word: str, parents: Sequence[int], offsets: Sequence[Array]) -> Clip:
+def _with_joints(clip: Clip, word: str, parents: Sequence[int], offsets: Sequence[Array]) -> Clip:
     """The clip with more joints (at offsets (3,) from their parents) that do not move in their parents."""
     if not parents:
         return clip

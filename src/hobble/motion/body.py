@@ -114,9 +114,9 @@ def pairs(source: Skeleton, own: Body, target: Skeleton, theirs: Body) -> dict[s
     more than a fifth of the trunk. The chest follows the chest.
     """
     out: dict[int, int] = {theirs.hips: own.hips, theirs.head: own.head}
-    out |= _along(target, (theirs.hips, *theirs.trunk), source, (own.hips, *own.trunk))
+    out |= _joints_along(target, (theirs.hips, *theirs.trunk), source, (own.hips, *own.trunk))
     if own.neck:
-        out |= _along(
+        out |= _joints_along(
             target, (theirs.chest, *theirs.neck, theirs.head), source, (own.chest, *own.neck, own.head)
         )
     for side in SIDES:
@@ -129,7 +129,9 @@ def pairs(source: Skeleton, own: Body, target: Skeleton, theirs: Body) -> dict[s
     return {target.joints[a]: source.joints[b] for a, b in sorted(out.items())}
 
 
-def _along(target: Skeleton, mine: Sequence[int], source: Skeleton, theirs: Sequence[int]) -> dict[int, int]:
+def _joints_along(
+    target: Skeleton, mine: Sequence[int], source: Skeleton, theirs: Sequence[int]
+) -> dict[int, int]:
     here, there = _shares(target, mine), _shares(source, theirs)
     out = {mine[-1]: theirs[-1]}
     for joint, share in zip(mine[1:-1], here[1:-1], strict=True):

@@ -10,7 +10,7 @@ import numpy as np
 from hobble.core import quat
 from hobble.core.quat import Array
 from hobble.motion.body import Body
-from hobble.motion.orient import pointed, robust, unit
+from hobble.motion.orient import pointed_along, robust_mean, unit
 from hobble.motion.spine import SHORT, Spine
 
 LEFT = np.array([1.0, 0.0, 0.0])
@@ -55,7 +55,7 @@ class BodySample:
     def local(self, joint: int, vectors: Array) -> Array:
         """(3,) mean of world vectors (S, 3) in the joint's coordinates."""
         own = quat.rotate(quat.inv(self.turned[:, joint]), vectors)
-        return robust(own)
+        return robust_mean(own)
 
     def bone(self, start: int, end: int) -> Array:
         """(3,) the bone from `start` to `end`, in the coordinates of `start`."""
@@ -83,4 +83,6 @@ class BodySample:
         """The frame of a hand: its forearm's, but pointing where its fingers are."""
         if side not in self.body.fingers:
             return straight
-        return pointed(straight, sign * LEFT, self.bone(self.body.arms[side][3], self.body.fingers[side]))
+        return pointed_along(
+            straight, sign * LEFT, self.bone(self.body.arms[side][3], self.body.fingers[side])
+        )

@@ -130,10 +130,12 @@ def _positions(bvh: Bvh, starts: Array, still: float) -> tuple[Array, Array, Arr
         for axis, column in places.items():
             local[:, j, "XYZ".index(axis)] = bvh.values[:, column]
             given[j, "XYZ".index(axis)] = True
-    return root, *_judged(bvh, local, given, still)
+    return root, *_judge_channels(bvh, local, given, still)
 
 
-def _judged(bvh: Bvh, local: Array, given: Array, still: float) -> tuple[Array, Array | None, list[str]]:
+def _judge_channels(
+    bvh: Bvh, local: Array, given: Array, still: float
+) -> tuple[Array, Array | None, list[str]]:
     """Which position channels carry motion, which only repeat an offset, and which contradict it.
 
     local: (F, J, 3) the positions. Increments become sums here. given: (J, 3) bool, which come from channels.
@@ -149,7 +151,7 @@ def _judged(bvh: Bvh, local: Array, given: Array, still: float) -> tuple[Array, 
         for values in (local, middle):
             values[..., added, :] += bvh.offsets[added] * given[added]
         notes.append(
-            f"The position channels of {_some(bvh, added)} are about zero, unlike their OFFSETs, and were "
+            f"The position channels of {_list(bvh, added)} are about zero, unlike their OFFSETs, and were "
             "added to them."
         )
     moving = [j for j in joints if np.abs(local[:, j] - middle[j]).max() > still]
@@ -158,13 +160,13 @@ def _judged(bvh: Bvh, local: Array, given: Array, still: float) -> tuple[Array, 
     offsets[wrong] = middle[wrong]
     if wrong:
         notes.append(
-            f"The OFFSET of {_some(bvh, wrong)} contradicts its position channels, which never change; their "
+            f"The OFFSET of {_list(bvh, wrong)} contradicts its position channels, which never change; their "
             "value was used."
         )
     if moving:
         notes.append(
             f"{len(moving)} of {len(joints)} joints with position channels really move in their parents "
-            f"({_some(bvh, moving)})."
+            f"({_list(bvh, moving)})."
         )
     else:
         notes.append(
@@ -178,8 +180,8 @@ def _increments(offsets: Array, middle: Array, given: Array, still: float) -> li
     """Joints whose channels are about zero although their offsets are not, so they must be added to the
     offsets.
 
-    middle: (J, 3) the median position. given: as in `_judged`. A bone cannot be as short as a tenth of its
-    offset.
+    middle: (J, 3) the median position. given: as in `_judge_channels`. A bone cannot be as short as a tenth
+    of its offset.
     """
     apart = np.linalg.norm(middle * given, axis=1)
     length = np.linalg.norm(offsets * given, axis=1)
@@ -187,5 +189,5 @@ def _increments(offsets: Array, middle: Array, given: Array, still: float) -> li
     return np.flatnonzero((length > still) & about_zero).tolist()
 
 
-def _some(bvh: Bvh, joints: list[int]) -> str:
+def _list(bvh: Bvh, joints: list[int]) -> str:
     return ", ".join(bvh.names[j] for j in joints[:6]) + (", ..." if len(joints) > 6 else "")

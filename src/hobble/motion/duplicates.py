@@ -86,12 +86,12 @@ def same_pairs(clips: Sequence[ClipDigest]) -> list[tuple[str, str, str]]:
         for b in order[i + 1 :]:
             if b.seconds - a.seconds > LONGER * a.seconds:
                 break
-            if what := _same(a, b):
+            if what := _why_equal(a, b):
                 out.append((min(a.name, b.name), max(a.name, b.name), what))
     return sorted(out)
 
 
-def _same(a: ClipDigest, b: ClipDigest) -> str:
+def _why_equal(a: ClipDigest, b: ClipDigest) -> str:
     if a.sha256 == b.sha256:
         return "the same file"
     if a.poses.shape != b.poses.shape:

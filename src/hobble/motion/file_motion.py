@@ -77,11 +77,13 @@ def load_source(file: Bvh, target: Target, maps: str | Path, options: ClipMotion
     hips = find_hips(clean_names(file.names), target, maps)
     known = match_rig(rig_of(below_hips(file, hips)), target, maps)
     if known is not None and known.alike and known.sources:
-        return _known(file, hips, known, repairs, options)
-    return _unknown(file, target, known, repairs, options)
+        return _on_known_rig(file, hips, known, repairs, options)
+    return _on_unknown_rig(file, target, known, repairs, options)
 
 
-def _known(file: Bvh, hips: int, match: RigMatch, repairs: list[str], options: ClipMotion) -> FileMotion:
+def _on_known_rig(
+    file: Bvh, hips: int, match: RigMatch, repairs: list[str], options: ClipMotion
+) -> FileMotion:
     """The source of a file whose rig has a skeleton file."""
     rig = replace(rig_of(below_hips(file, hips)), roles=match.roles)
     unit, unit_name = _unit(file.path, leg_length(rig), options.unit)
@@ -108,14 +110,14 @@ def _known(file: Bvh, hips: int, match: RigMatch, repairs: list[str], options: C
     return _repaired(file, source, options)
 
 
-def _unknown(
+def _on_unknown_rig(
     file: Bvh, target: Target, known: RigMatch | None, repairs: list[str], options: ClipMotion
 ) -> FileMotion:
     """The source of a file on any other rig. Its parts and a standing rest pose are found."""
     rig = rig_of(file)
     decoded = _decoded(file)
     raw = Clip(file.path.stem, rig, 1.0, decoded.rotations, decoded.root, decoded.translations)
-    found = _found(file, rig, raw, known, options)
+    found = _find_body(file, rig, raw, known, options)
     body = found.body
     for a, b in (pair for leg in body.legs.values() for pair in pairwise(leg[:3])):
         if np.median(np.linalg.norm(raw.positions[:, b] - raw.positions[:, a], axis=-1)) < 1e-6:
@@ -165,7 +167,7 @@ def _unknown(
     return _repaired(file, source, options)
 
 
-def _found(file: Bvh, rig: Skeleton, raw: Clip, known: RigMatch | None, options: ClipMotion) -> FoundBody:
+def _find_body(file: Bvh, rig: Skeleton, raw: Clip, known: RigMatch | None, options: ClipMotion) -> FoundBody:
     if known is not None:
         return FoundBody(body_by_roles(replace(rig, roles=known.roles)), True)
     try:

@@ -40,7 +40,7 @@ def find_limbs(rig: MovingRig, pairs: list[LimbPair]) -> tuple[LimbPair, LimbPai
             away = _away(rig, legs, known[i, "leg"], arms)
             if away > AWAY:
                 continue
-            ratio = _long(rig, legs, known[i, "leg"]) / _long(rig, arms, known[k, "arm"])
+            ratio = _length_between(rig, legs, known[i, "leg"]) / _length_between(rig, arms, known[k, "arm"])
             score = np.log(ratio) - away
             for pair, place, kind in ((legs, known[i, "leg"], "leg"), (arms, known[k, "arm"], "arm")):
                 score += _named(rig, pair, kind) + _swing(rig, pair, place)
@@ -58,7 +58,7 @@ def _away(rig: MovingRig, legs: LimbPair, middle: tuple[int, int, int], arms: Li
     return float(np.mean(np.sum(unit(trunk) * unit(feet), axis=-1)))
 
 
-def _long(rig: MovingRig, pair: LimbPair, middle: tuple[int, int, int]) -> float:
+def _length_between(rig: MovingRig, pair: LimbPair, middle: tuple[int, int, int]) -> float:
     a, b, c = middle
     return (
         rig.chord(pair.chains[0][a], pair.chains[0][b])[0]

@@ -17,7 +17,7 @@ from hobble.core.skeleton import Skeleton, rest_positions
 from hobble.motion.axes import rest_frame
 from hobble.motion.body import SIDES, Body
 from hobble.motion.body_sample import BodySample
-from hobble.motion.orient import mean, off, unit
+from hobble.motion.orient import degrees_between, mean_rotation, unit
 from hobble.motion.spine import SHORT
 
 UP, AHEAD, LEFT = np.array([0.0, 1.0, 0.0]), np.array([0.0, 0.0, 1.0]), np.array([1.0, 0.0, 0.0])
@@ -78,7 +78,7 @@ def flat_feet(seen: BodySample) -> dict[int, Array]:
         level = quat.between(AHEAD, unit(_ahead(seen, side)[flat] * [1, 0, 1]))
         for joint in seen.body.legs[side][2:]:
             if joint is not None:
-                found = mean(quat.mul(quat.inv(seen.turned[flat, joint]), level))
+                found = mean_rotation(quat.mul(quat.inv(seen.turned[flat, joint]), level))
                 frames[joint] = quat.mul(found, quat.inv(more))
     return frames
 
@@ -241,7 +241,7 @@ def _zero_tilt(seen: BodySample, side: str) -> float | None:
     left = seen.local(knee, seen.hinge(hip, knee, heel, seen.hips_left))
     forward = unit(np.cross(shank, unit(left)))
     level = unit(foot - shank * (shank @ foot))
-    if off(level, forward) > FORWARD and off(thigh, shank) > STRAIGHT:
+    if degrees_between(level, forward) > FORWARD and degrees_between(thigh, shank) > STRAIGHT:
         return None
     return float(np.arcsin(np.clip(foot @ shank, -1.0, 1.0)))
 

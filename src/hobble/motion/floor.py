@@ -12,7 +12,7 @@ from hobble.motion.rig import leg_length
 
 SOLE = 3.0  # cm: height of a standing toe joint above the floor
 OFF = 3.0  # cm: a floor that is further off is moved
-CRAWLS = 15.0  # cm: the same for a figure that is not upright, whose toes may lie in any way
+CRAWLS = 15.0  # cm: the same for a figure that is not upright, because its toes are no measure of the floor
 UPRIGHT = 0.8  # least height of the hips above the toes of an upright figure, in leg lengths
 EVEN = 12.0  # cm between high and low steps on flat ground; running has 9, gentle bumps have 14
 SLOW = 0.3  # cm a frame at 60 Hz: a toe that rises or falls faster is in the air

@@ -12,7 +12,7 @@ from hobble.core.quat import Array
 from hobble.motion.body_sample import LEFT, BodySample
 from hobble.motion.flat_feet import flat_feet
 from hobble.motion.no_neck import has_neck, neck_bone
-from hobble.motion.orient import frame, mean, unit
+from hobble.motion.orient import frame, mean_rotation, unit
 from hobble.motion.spine import SHORT, spine_shares
 
 UP, AHEAD = np.array([0.0, 1.0, 0.0]), np.array([0.0, 0.0, 1.0])
@@ -89,12 +89,12 @@ def _arm(seen: BodySample, frames: dict[int, Array], side: str, sign: float) -> 
     clavicle, shoulder, elbow, wrist = seen.body.arms[side]
     chest = quat.mul(seen.turned[:, seen.body.chest], frames[seen.body.chest])
     if clavicle is not None:
-        frames[clavicle] = mean(quat.mul(quat.inv(seen.turned[:, clavicle]), chest))
+        frames[clavicle] = mean_rotation(quat.mul(quat.inv(seen.turned[:, clavicle]), chest))
     hinge = seen.hinge(shoulder, elbow, wrist, -seen.chest_left)
     for start, end in ((shoulder, elbow), (elbow, wrist)):
         frames[start] = frame(seen.bone(start, end), sign * LEFT, seen.local(start, hinge), -sign * UP)
     forearm = quat.mul(seen.turned[:, elbow], frames[elbow])
-    frames[wrist] = seen.hand(side, mean(quat.mul(quat.inv(seen.turned[:, wrist]), forearm)), sign)
+    frames[wrist] = seen.hand(side, mean_rotation(quat.mul(quat.inv(seen.turned[:, wrist]), forearm)), sign)
 
 
 def _leg(seen: BodySample, frames: dict[int, Array], side: str) -> None:

@@ -11,7 +11,14 @@ from hobble.core.quat import Array
 from hobble.motion.body import SIDES
 from hobble.motion.body_sample import LEFT, BodySample
 from hobble.motion.flat_feet import RAISED, feet_tilt, runs, stands
-from hobble.motion.orient import apart, frame, off, pointed, snapped, unit
+from hobble.motion.orient import (
+    degrees_between,
+    degrees_between_rotations,
+    frame,
+    pointed_along,
+    snapped_to_axes,
+    unit,
+)
 
 UP = np.array([0.0, 1.0, 0.0])
 # Degrees: if zero pose and motion differ by more for a joint, the motion counts.
@@ -35,7 +42,7 @@ def from_rest(seen: BodySample) -> dict[int, Array]:
         0.5 * (rest[side["left"][k]] + rest[side["right"][k]]) for side, k in ((body.legs, 0), (body.arms, 1))
     ]
     upward = rest[body.head] - rest[body.hips]
-    whole = snapped(
+    whole = snapped_to_axes(
         frame(upward if upward @ (middle[1] - middle[0]) > 0 else middle[1] - middle[0], UP, left, LEFT)
     )
     frames = dict.fromkeys((body.hips, *body.trunk, *body.neck, body.head), whole)
@@ -44,11 +51,11 @@ def from_rest(seen: BodySample) -> dict[int, Array]:
         if clavicle is not None:
             frames[clavicle] = whole
         for start, end in ((shoulder, elbow), (elbow, wrist)):
-            frames[start] = pointed(whole, sign * LEFT, seen.bone(start, end))
+            frames[start] = pointed_along(whole, sign * LEFT, seen.bone(start, end))
         frames[wrist] = seen.hand(side, frames[elbow], sign)
         hip, knee, heel, toe = body.legs[side]
         for start, end in ((hip, knee), (knee, heel)):
-            frames[start] = pointed(whole, -UP, seen.bone(start, end))
+            frames[start] = pointed_along(whole, -UP, seen.bone(start, end))
         frames[heel] = whole
         if toe is not None:
             frames[toe] = whole
@@ -58,13 +65,13 @@ def from_rest(seen: BodySample) -> dict[int, Array]:
 def add_rest(frames: dict[int, Array], zero: dict[int, Array], seen: BodySample) -> None:
     """Replace in `frames` the joints that the zero pose knows better."""
     body = seen.body
-    if apart(zero[body.head], frames[body.head]) < TRUSTED:
+    if degrees_between_rotations(zero[body.head], frames[body.head]) < TRUSTED:
         frames[body.head] = zero[body.head]
     for side in SIDES:
         clavicle, _, _, wrist = body.arms[side]
-        if clavicle is not None and apart(frames[body.chest], frames[clavicle]) < SHRUG:
+        if clavicle is not None and degrees_between_rotations(frames[body.chest], frames[clavicle]) < SHRUG:
             frames[clavicle] = frames[body.chest]
-        if apart(zero[wrist], frames[wrist]) < LIMP:
+        if degrees_between_rotations(zero[wrist], frames[wrist]) < LIMP:
             frames[wrist] = zero[wrist]
         heel, toe = body.legs[side][2:]
         frames[heel] = _foot(frames[heel], zero[heel], seen, side)
@@ -78,16 +85,19 @@ def zero_doubt(seen: BodySample, zero: dict[int, Array]) -> str | None:
     zero: frames of `from_rest`. A person's zero pose may stand on its toes or lean.
     """
     measured = feet_tilt(seen).measured
-    off, lengths = [], []
+    difference, lengths = [], []
     for side in SIDES:
         heel, toe = seen.body.legs[side][2:]
         if toe is not None and (tilt := measured[side]) is not None and stands(seen, side):
             x, y, z = quat.rotate(quat.inv(zero[heel]), seen.bone(heel, toe))
-            off.append(tilt - (RAISED if runs(seen) else 0.0) - np.arctan2(-y, np.hypot(x, z)))
+            difference.append(tilt - (RAISED if runs(seen) else 0.0) - np.arctan2(-y, np.hypot(x, z)))
             lengths.append(seen.length(heel, toe))
-    if not off or abs(np.mean(off)) < UNLIKE_ZERO:
+    if not difference or abs(np.mean(difference)) < UNLIKE_ZERO:
         return None
-    degrees, more = np.degrees(abs(np.mean(off))), "steeper" if np.mean(off) > 0 else "flatter"
+    degrees, more = (
+        np.degrees(abs(np.mean(difference))),
+        "steeper" if np.mean(difference) > 0 else "flatter",
+    )
     sentence = f"Its feet stand {degrees:.0f} degrees {more} than in its zero pose"
     if degrees > TRUSTED:
         return f"{sentence}: the motion was believed, so feet may be tilted by some degrees."
@@ -105,12 +115,12 @@ def _foot(standing: Array, zero: Array, seen: BodySample, side: str) -> Array:
         return zero
     heel, toe = seen.body.legs[side][2:]
     if toe is None:
-        return zero if apart(standing, zero) < TRUSTED else standing
+        return zero if degrees_between_rotations(standing, zero) < TRUSTED else standing
     bone = seen.bone(heel, toe)
-    if apart(standing, zero) > TRUSTED + 60:
+    if degrees_between_rotations(standing, zero) > TRUSTED + 60:
         return standing
     wanted, found = (quat.rotate(quat.inv(frame), bone) for frame in (zero, standing))
-    if off(wanted, found) > TRUSTED:
+    if degrees_between(wanted, found) > TRUSTED:
         return standing
     across, level = found[0], float(np.hypot(wanted[0], wanted[2]))
     wanted = np.array([across, wanted[1], np.sqrt(max(level**2 - across**2, 0.0))])

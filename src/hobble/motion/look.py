@@ -73,7 +73,7 @@ def look(folder: Path, skeleton: Path, maps: Path, options: ClipMotion | None = 
     files = [folder] if folder.is_file() else [only_file(n, f) for n, f in sorted(find_clips(folder).items())]
     if not files:
         raise InputError(folder, "no .bvh files here")
-    clips = tuple(_one(file, skeleton, maps, options or ClipMotion()) for file in files)
+    clips = tuple(_summary_of_file(file, skeleton, maps, options or ClipMotion()) for file in files)
     orphans = () if folder.is_file() else tuple(unused_file_notes(folder, [file.stem for file in files]))
     short, common = shared_warnings(clips)
     return FolderSummary(tuple(short), (*common, *same_notes(clips), *standing_notes(clips), *orphans))
@@ -87,7 +87,7 @@ def shared_warnings(clips: Sequence[ClipSummary]) -> tuple[list[ClipSummary], li
     return short, [f"{times} of {len(clips)} clips: {warning}" for warning, times in common.items()]
 
 
-def _one(file: Path, skeleton: Path, maps: Path, options: ClipMotion) -> ClipSummary:
+def _summary_of_file(file: Path, skeleton: Path, maps: Path, options: ClipMotion) -> ClipSummary:
     try:
         clip, report = make_clip(file, skeleton, maps, file.stem, skeleton.stem, options)
     except HobbleError as error:

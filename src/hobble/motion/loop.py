@@ -28,7 +28,7 @@ def loop_clip(clip: Clip, times: int, heading: float | None = None) -> Clip:
     if len(clip) < 4:
         raise HobbleError(f"{clip.name}: {len(clip)} frames are too few for a cycle that could be repeated")
     cycle = _open(clip)
-    step = _step(cycle)
+    step = _step_between_cycles(cycle)
     top = _top_speed(clip)
     reach = max(2, min(round(BLEND * clip.fps), len(cycle) // 2))
     while True:
@@ -41,7 +41,11 @@ def loop_clip(clip: Clip, times: int, heading: float | None = None) -> Clip:
 def _open(clip: Clip) -> Clip:
     """The cycle without a last frame that repeats the first."""
     first, second, last = (_pose(clip, i) for i in (0, 1, -1))
-    return _part(clip, slice(0, -1)) if _apart(first, last) < 0.5 * _apart(first, second) else clip
+    return (
+        _part(clip, slice(0, -1))
+        if _mean_distance(first, last) < 0.5 * _mean_distance(first, second)
+        else clip
+    )
 
 
 def _pose(clip: Clip, frame: int) -> Array:
@@ -51,7 +55,7 @@ def _pose(clip: Clip, frame: int) -> Array:
     return quat.rotate(turn, place)
 
 
-def _apart(a: Array, b: Array) -> float:
+def _mean_distance(a: Array, b: Array) -> float:
     return float(np.linalg.norm(a - b, axis=-1).mean())
 
 
@@ -60,7 +64,7 @@ def _yaw(clip: Clip, frame: int) -> float:
     return float(np.arctan2(ahead[0], ahead[2]))
 
 
-def _step(cycle: Clip) -> tuple[float, Array]:
+def _step_between_cycles(cycle: Clip) -> tuple[float, Array]:
     """From one cycle to the next: a turn about Y, then a shift over the ground."""
     turn = (_yaw(cycle, -1) - _yaw(cycle, 0) + np.pi) % (2 * np.pi) - np.pi
     turn = float(turn) if abs(turn) > TURNING else 0.0

@@ -13,7 +13,7 @@ def unit(v: Array) -> Array:
     return v / np.maximum(np.linalg.norm(v, axis=-1, keepdims=True), 1e-9)
 
 
-def off(a: Array, b: Array) -> float:
+def degrees_between(a: Array, b: Array) -> float:
     """Degrees between two vectors."""
     return float(np.degrees(np.arccos(np.clip(unit(a) @ unit(b), -1.0, 1.0))))
 
@@ -31,7 +31,7 @@ def _axes(first: Array, second: Array) -> Array:
     return np.stack([x, y, np.cross(x, y)], axis=1)
 
 
-def snapped(frame: Array) -> Array:
+def snapped_to_axes(frame: Array) -> Array:
     """The frame, or the nearest whole axes if they are within 20 degrees."""
     axes = quat.to_matrix(frame)
     whole = np.round(axes)
@@ -40,27 +40,27 @@ def snapped(frame: Array) -> Array:
     return frame
 
 
-def pointed(whole: Array, axis: Array, bone: Array) -> Array:
+def pointed_along(whole: Array, axis: Array, bone: Array) -> Array:
     """A frame turned as little as possible so that its `axis` lies along the bone."""
     return quat.mul(quat.between(quat.rotate(whole, axis), bone), whole)
 
 
-def robust(vectors: Array) -> Array:
+def robust_mean(vectors: Array) -> Array:
     """Mean (3,) of vectors (S, 3), without those far from their median."""
-    off = np.linalg.norm(vectors - np.median(vectors, axis=0), axis=-1)
-    return vectors[off <= 3 * np.median(off) + 1e-9].mean(axis=0)
+    apart = np.linalg.norm(vectors - np.median(vectors, axis=0), axis=-1)
+    return vectors[apart <= 3 * np.median(apart) + 1e-9].mean(axis=0)
 
 
-def mean(turns: Array) -> Array:
+def mean_rotation(turns: Array) -> Array:
     """Mean rotation (4,) of (S, 4), without those far from it."""
     for _ in range(2):
         _, vectors = np.linalg.eigh(turns.T @ turns)
         mean = vectors[:, -1]
-        off = quat.angle(turns, mean)
-        turns = turns[off <= 2.5 * np.median(off) + 1e-9]
+        apart = quat.angle(turns, mean)
+        turns = turns[apart <= 2.5 * np.median(apart) + 1e-9]
     return mean
 
 
-def apart(a: Array, b: Array) -> float:
+def degrees_between_rotations(a: Array, b: Array) -> float:
     """Degrees between two rotations."""
     return float(np.degrees(quat.angle(a, b)))

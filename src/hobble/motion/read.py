@@ -242,8 +242,3 @@ def _line_of(body: bytes, frame: int, first_line: int) -> int | None:
     used = (i for i, raw in enumerate(io.BytesIO(body)) if raw.strip())
     at = next(itertools.islice(used, frame, None), None)
     return None if at is None else first_line + at
-
-
-def cut(bvh: Bvh, frames: slice | Array) -> Bvh:
-    """The same file with only some of its frames."""
-    return replace(bvh, values=bvh.values[frames])

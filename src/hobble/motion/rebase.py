@@ -37,6 +37,7 @@ def rebased(
         wrist = body.arms[side][3]
         out = quat.rotate(turned[:, new[wrist]], LEFT if side == "left" else -LEFT)
         hand = clip.positions[:, finger] - clip.positions[:, wrist]
+        hand = np.where(np.linalg.norm(hand, axis=-1, keepdims=True) > 1e-6, hand, out)
         turned[:, new[wrist]] = quat.mul(quat.between(out, hand), turned[:, new[wrist]])
     places = clip.positions[:, joints]
     arms = quat.rotate(quat.inv(turned[:, parents]), places - places[:, parents])

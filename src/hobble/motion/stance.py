@@ -24,7 +24,7 @@ from hobble.motion.flat_feet import doubt, height_error, rest_tilt
 from hobble.motion.from_motion import bends, from_motion
 from hobble.motion.from_rest import TRUSTED, add_rest, from_rest, zero_doubt
 from hobble.motion.no_neck import lean_doubt
-from hobble.motion.orient import apart, mean, pointed
+from hobble.motion.orient import degrees_between_rotations, mean_rotation, pointed_along
 from hobble.motion.rebase import rebased
 from hobble.motion.spine import SHORT, Spine
 from hobble.motion.standing import stands
@@ -78,7 +78,10 @@ def upright(clip: Clip, body: Body, target: Skeleton, others: Collection[int] = 
     problem = stands(body, rest)
     zero = from_rest(seen) if problem is None else None
     frames = from_motion(seen, zero[body.chest] if zero else None)
-    if zero and max(apart(zero[j], frames[j]) for j in (body.hips, *body.trunk)) > TRUSTED:
+    if (
+        zero
+        and max(degrees_between_rotations(zero[j], frames[j]) for j in (body.hips, *body.trunk)) > TRUSTED
+    ):
         problem, zero = "the trunk is twisted", None
         frames = from_motion(seen, None)
     unsure = [lean_doubt(seen, zero is not None)]
@@ -115,11 +118,11 @@ def _kept(clip: Clip, seen: BodySample, others: Collection[int], frames: dict[in
         if carrier is None:
             continue
         part = quat.mul(seen.turned[:, carrier], frames[carrier])
-        frames[joint] = mean(quat.mul(quat.inv(seen.turned[:, joint]), part))
+        frames[joint] = mean_rotation(quat.mul(quat.inv(seen.turned[:, joint]), part))
         for side, sign in (("left", 1.0), ("right", -1.0)):
             tips = [j for j in others if joint in above(parents, j)[1:]]
             bones = [bone for j in tips if np.linalg.norm(bone := seen.bone(joint, j)) > SHORT]
             if carrier == body.arms[side][3] and bones:
-                frames[joint] = pointed(frames[joint], sign * LEFT, bones[0])
+                frames[joint] = pointed_along(frames[joint], sign * LEFT, bones[0])
         out.append(joint)
     return out

@@ -8,7 +8,7 @@ import numpy as np
 
 from hobble.core.quat import Array
 from hobble.motion.body import SIDES, Body
-from hobble.motion.orient import off, unit
+from hobble.motion.orient import degrees_between, unit
 from hobble.motion.spine import SHORT
 
 LEG, TRUNK, HEAD, FOOT = 40.0, 40.0, 50.0, 50.0  # degrees: largest angles of a standing person
@@ -21,26 +21,31 @@ def stands(body: Body, rest: Array) -> str | None:
     up = unit(shoulders - hips)
     left = rest[body.legs["left"][0]] - rest[body.legs["right"][0]]
     across = rest[body.arms["left"][1]] - rest[body.arms["right"][1]]
-    if off(left, across) > 30 or abs(off(left, up) - 90) > 25:
+    if degrees_between(left, across) > 30 or abs(degrees_between(left, up) - 90) > 25:
         return "hips and shoulders point in different directions"
-    if off(rest[body.head] - shoulders, up) > HEAD:
+    if degrees_between(rest[body.head] - shoulders, up) > HEAD:
         return "the head is not above the shoulders"
     ahead = np.cross(unit(left), up)
     facing = []
     for side in SIDES:
         hip, knee, heel, toe = body.legs[side]
-        if max(off(rest[knee] - rest[hip], -up), off(rest[heel] - rest[knee], -up)) > LEG:
+        if (
+            max(degrees_between(rest[knee] - rest[hip], -up), degrees_between(rest[heel] - rest[knee], -up))
+            > LEG
+        ):
             return f"the {side} leg does not point down"
         if toe is not None:
             foot = rest[toe] - rest[heel]
             level = foot - up * (foot @ up)
             facing.append(level @ ahead)
-            if abs(off(level, ahead) - 90) < 90 - FOOT or np.linalg.norm(level) < 0.4 * np.linalg.norm(foot):
+            if abs(degrees_between(level, ahead) - 90) < 90 - FOOT or np.linalg.norm(
+                level
+            ) < 0.4 * np.linalg.norm(foot):
                 return f"the {side} foot does not point forward"
     if facing and min(facing) < 0 < max(facing):
         return "the feet point in opposite directions"
     trunk = [rest[j] for j in (body.hips, *body.trunk)]
     for a, b in pairwise(trunk):
-        if np.linalg.norm(b - a) > SHORT and off(b - a, up) > TRUNK:
+        if np.linalg.norm(b - a) > SHORT and degrees_between(b - a, up) > TRUNK:
             return "the trunk is not straight"
     return None

@@ -2,14 +2,14 @@
 
 A measurement's `page.py` may have
 
-- `section(found, material) -> Section`: its part of the report,
-- `figures(found, material) -> Iterable[Figure]`: key figures for the top of the report,
+- `section(found, material) -> PageSection`: its part of the report,
+- `figures(found, material) -> Iterable[KeyFigure]`: key figures for the top of the report,
 - `hints(found, material) -> Iterable[Hint]`: advice that follows from its numbers,
 
-where `found` is its own JSON ({} if it was not run) and `material` everything else that is known of the
-configuration. Its `comparison_page.py` may have
+where `found` is its own JSON ({} if it was not run) and `material` everything else that is known about
+the configuration. Its `comparison_page.py` may have
 
-- `section(compared) -> Section`: its part of the comparison page,
+- `section(compared) -> PageSection`: its part of the comparison page,
 - `columns(compared) -> Iterable[Overview]`: for the table of configurations at the top of that page,
 - `verdicts(compared) -> Iterable[Verdict]`: which configuration is best at something, for the first screen,
 

@@ -20,12 +20,11 @@ from hobble.gait.recogniser import SIDES
 from hobble.models.network import Network
 from hobble.models.packing import packed
 from hobble.report.playable import playable
-from hobble.runtime.animation import ProceduralAnimation
+from hobble.report.straight_walk import walk_straight
 from hobble.runtime.export import jointed
 from hobble.runtime.options import Runtime
 
 FPS = 60
-SPEED = 2.5  # cm per frame, the walking speed of the page's Play section
 WARM_UP, MEASURED = 3 * FPS, 8 * FPS  # frames to get up to speed, and frames that are measured
 ROLES = ("hip", "knee", "heel", "toe", "shoulder")  # roles that both sides must have
 
@@ -49,9 +48,7 @@ def healthy_walk(network: Network, skeleton: Skeleton, runtime: Runtime) -> Prof
     """The profile of the character walking straight on, healthy, with joints placed as in the page."""
     if not all(f"{side}_{part}" in skeleton.roles for side in SIDES for part in ROLES):
         return None
-    animation = ProceduralAnimation(network, **dict(runtime))
-    ahead = np.array([0.0, SPEED])
-    poses = [animation.next_pose(ahead, None, "walk") for _ in range(WARM_UP + MEASURED)][WARM_UP:]
+    poses = [pose for _, pose in walk_straight(network, runtime, WARM_UP + MEASURED, {})][WARM_UP:]
     positions, rotations = np.array([p.positions for p in poses]), np.array([p.rotations for p in poses])
     walk = measure(skeleton, jointed(skeleton, positions, rotations)[1], FPS)
     return profile(walk) if len(walk) else None

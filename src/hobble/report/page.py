@@ -46,7 +46,7 @@ def render(
     The template escapes every value. Data for the scripts is JSON without any "<".
     """
     clips = shown_clips.shown(material)
-    terrain = shown_clips.only(material.terrain, clips)
+    terrain = shown_clips.files_of(material.terrain, clips)
     some = shown_clips.sampled(material.rows)
     found = coverage.seconds_of_data(some, material.splits, of=len(material.rows))
     sections, shown = _sections(material, found, clips, terrain), measured.sections(material)

@@ -12,13 +12,12 @@ import numpy as np
 from hobble.core.quat import Array
 from hobble.models.network import Network
 from hobble.models.packing import packed
-from hobble.runtime.animation import ProceduralAnimation
+from hobble.report.straight_walk import walk_straight
 from hobble.runtime.options import Runtime
 
 GROUP = 64  # columns that share a factor; with one factor for the whole row the error is twice as large
 MOST = 127
 WARM_UP, MEASURED = 60, 180  # frames of walking: to get up to speed, and measured
-AHEAD = (0.0, 2.5)  # cm a frame
 
 
 def rounded(spec: Mapping[str, Any]) -> dict[str, Any]:
@@ -46,14 +45,12 @@ def rounding_error(network: Network, runtime: Runtime) -> float:
     weights: Any = network.weights  # type: ignore[attr-defined]
     there = type(weights)(_of_groups(*_in_groups(w), w.shape) for w in weights)
     small = replace(network, weights=there)  # type: ignore[call-arg]
-    animation = ProceduralAnimation(network, **dict(runtime))
-    rows, phases = [], []
-    for frame in range(WARM_UP + MEASURED):
-        before = float(animation.state.phase[0])
-        animation.next_pose(AHEAD, None, "walk")
+    rows, phases, before = [], [], 0.0
+    for frame, (animation, _) in enumerate(walk_straight(network, runtime, WARM_UP + MEASURED, {})):
         if frame >= WARM_UP:
             rows.append(animation.last_inputs[0].copy())
             phases.append(before)
+        before = float(animation.state.phase[0])
     x, phase = np.array(rows), np.array(phases)
     off = (small.predict(x, phase) - network.predict(x, phase))[:, network.layout.y_joint_position]
     return float(np.linalg.norm(off.reshape(len(x), -1, 3), axis=-1).mean())

@@ -40,6 +40,6 @@ def sampled(paths: Sequence[str], most: int = MOST_SAMPLED) -> list[str]:
     return [path for path in paths if Path(path).stem in chosen]
 
 
-def only(paths: Iterable[str], names: frozenset[str]) -> list[str]:
+def files_of(paths: Iterable[str], names: frozenset[str]) -> list[str]:
     """The files of these clips."""
     return [path for path in paths if Path(path).stem in names]

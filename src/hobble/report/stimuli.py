@@ -21,11 +21,10 @@ from hobble.core.skeleton import Skeleton
 from hobble.figure.mesh import body
 from hobble.models.network import Network
 from hobble.report.raster import GRID, BodyRenderer, Camera
-from hobble.runtime.animation import ProceduralAnimation
+from hobble.report.straight_walk import walk_straight
 from hobble.runtime.export import export_bvh, fitted_skeleton, jointed
 from hobble.runtime.options import Runtime
 
-SPEED = 2.5  # target speed, cm per frame
 SETTLED = 6 * 60  # frames until the gait has settled
 SHORTEST, LONGEST = 150, 300  # frames of a loop
 BLEND = 12  # frames over which the end of a loop is blended into its start
@@ -144,11 +143,8 @@ def doubts(rows: Sequence[Mapping[str, Any]]) -> list[str]:
 
 def walk(network: Network, values: Mapping[str, Mapping[str, float]], runtime: Runtime) -> RepeatedWalk:
     """A loop of the character walking straight on, cut between the two most similar poses."""
-    animation = ProceduralAnimation(network, **dict(runtime))
-    ahead = np.array([0.0, SPEED])
-    poses = [
-        animation.next_pose(ahead, None, "walk", **values) for _ in range(SETTLED + 60 + LONGEST + BLEND)
-    ]
+    count = SETTLED + 60 + LONGEST + BLEND
+    poses = [pose for _, pose in walk_straight(network, runtime, count, values)]
     positions, rotations = np.array([p.positions for p in poses]), np.array([p.rotations for p in poses])
     first, last, gap = cut(positions)
     kept, turned = positions[first:last].copy(), rotations[first:last].copy()

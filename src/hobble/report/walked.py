@@ -11,11 +11,10 @@ from numpy.typing import ArrayLike
 from hobble.core.quat import Array
 from hobble.models.network import Network
 from hobble.report.hero import first_shown, opening
-from hobble.runtime.animation import ProceduralAnimation
+from hobble.report.straight_walk import walk_straight
 from hobble.runtime.options import Runtime
 
 FRAMES = 120  # of walking before the page opens: two seconds, enough to reach the speed and to begin to limp
-AHEAD = (0.0, 2.5)  # cm a frame, the target velocity of the top of the page
 
 # The fields of character.js with the name that the same array has in the Python state.
 ARRAYS = {
@@ -65,9 +64,7 @@ def opened(
 
 
 def _state(network: Network, runtime: Runtime, channels: Mapping[str, Mapping[str, float]]) -> dict[str, Any]:
-    animation = ProceduralAnimation(network, **dict(runtime))
-    for _ in range(FRAMES):
-        pose = animation.next_pose(AHEAD, None, "walk", **channels)
+    *_, (animation, pose) = walk_straight(network, runtime, FRAMES, channels)
     state = animation.state
     out = {name: _plain(np.ravel(getattr(state, field)[0])) for name, field in ARRAYS.items()}
     out |= {name: _plain(getattr(state, field)[0]) for name, field in SMALL.items()}

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 
@@ -74,8 +73,3 @@ def fitted_skeleton(skeleton: Skeleton, positions: Array, rotations: Array) -> S
 def export_bvh(path: str | Path, name: str, skeleton: Skeleton, positions: Array, rotations: Array) -> None:
     """Write world positions (F, J, 3) and rotations (F, J, 4), Hobble's axes, as a 60 Hz BVH file in cm."""
     write_bvh(path, motion_clip(name, skeleton, positions, rotations))
-
-
-def track_arrays(poses: Sequence) -> tuple[Array, Array]:
-    """Positions (F, J, 3) and rotations (F, J, 4) of successive poses of one character."""
-    return np.array([p.positions for p in poses]), np.array([p.rotations for p in poses])

@@ -50,26 +50,26 @@ class Track:
     swept_values: Array
 
 
-def _ahead(speed: float, degrees: float = 0.0) -> Array:
+def _velocity(speed: float, degrees: float = 0.0) -> Array:
     return speed * np.array([np.sin(np.radians(degrees)), np.cos(np.radians(degrees))])
 
 
 def scenarios(network: Network) -> list[Scenario]:
     """The scenarios of a network, with one more walk for each column that its channels sweep."""
-    facing = _ahead(1.0)
+    facing = _velocity(1.0)
     out = [
-        Scenario("walk", 900, lambda f: (_ahead(2.5, max(0, f - 300) * 0.5), None, "walk")),
-        Scenario("jog", 900, lambda f: (_ahead(7.0, max(0, f - 300) * 0.5), None, "jog")),
-        Scenario("crouch", 600, lambda f: (_ahead(2.0), None, "crouch")),
-        Scenario("strafe", 600, lambda f: (_ahead(2.5, 90 if f % 300 < 150 else -90), facing, "walk")),
-        Scenario("backward", 480, lambda f: (_ahead(2.0, 180), facing, "walk")),
-        Scenario("stop_and_go", 720, lambda f: (_ahead(2.5 if f % 240 < 150 else 0.0), None, "walk")),
-        Scenario("turn_in_place", 600, lambda f: (_ahead(0.0), _ahead(1.0, 90 * (f // 120)), "walk")),
+        Scenario("walk", 900, lambda f: (_velocity(2.5, max(0, f - 300) * 0.5), None, "walk")),
+        Scenario("jog", 900, lambda f: (_velocity(7.0, max(0, f - 300) * 0.5), None, "jog")),
+        Scenario("crouch", 600, lambda f: (_velocity(2.0), None, "crouch")),
+        Scenario("strafe", 600, lambda f: (_velocity(2.5, 90 if f % 300 < 150 else -90), facing, "walk")),
+        Scenario("backward", 480, lambda f: (_velocity(2.0, 180), facing, "walk")),
+        Scenario("stop_and_go", 720, lambda f: (_velocity(2.5 if f % 240 < 150 else 0.0), None, "walk")),
+        Scenario("turn_in_place", 600, lambda f: (_velocity(0.0), _velocity(1.0, 90 * (f // 120)), "walk")),
     ]
     taken = {one.name for one in out}
     for name, column in swept(network).items():
         free = name if name not in taken else "_".join((column[0], name))
-        out.append(Scenario(free, 720, lambda f: (_ahead(2.5), None, "walk"), column))
+        out.append(Scenario(free, 720, lambda f: (_velocity(2.5), None, "walk"), column))
     return out
 
 

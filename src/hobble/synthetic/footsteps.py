@@ -66,7 +66,7 @@ def stances(
         before, other = (out[s][-1] if out[s] else None for s in (side, 1 - side))
         ankle, turn = _footprint(path, style, ground, side, middle, other, rng)
         standing = value_at(speed, middle) < STILL
-        if before and standing and _close(before, ankle, turn):
+        if before and standing and _is_same_place(before, ankle, turn):
             out[side].append(PlannedStance(land, leave, before.ankle, before.turn, swings=False))
         else:
             out[side].append(PlannedStance(land, leave, ankle, turn))
@@ -120,6 +120,6 @@ def _planted(ground: Ground, place: Array, yaw: float) -> tuple[Array, Array]:
     return np.array([x, heel + ANKLE_HEIGHT, z]), turn
 
 
-def _close(old: PlannedStance, ankle: Array, turn: Array) -> bool:
+def _is_same_place(old: PlannedStance, ankle: Array, turn: Array) -> bool:
     moved = np.linalg.norm(ankle - old.ankle)
     return bool(moved < STAY[0] and quat.angle(old.turn, turn) < STAY[1])

@@ -49,7 +49,7 @@ def gather_stances(soles: Array, contacts: Mask, longest: int) -> Stances:
     return Stances(np.stack([mean[0], mean[2]], axis=1), mean[1], count.astype(float))
 
 
-def joined(a: Stances, b: Stances) -> Stances:
+def join_points(a: Stances, b: Stances) -> Stances:
     """The points of `a`, then those of `b`."""
     return Stances(
         np.concatenate([a.place, b.place]),

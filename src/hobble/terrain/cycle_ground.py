@@ -16,7 +16,7 @@ from hobble.terrain.correction import (
     distances,
     fit_surfaces,
     gather_stances,
-    joined,
+    join_points,
 )
 from hobble.terrain.patches import Patches
 from hobble.terrain.soles import Mask
@@ -152,7 +152,7 @@ def _refitted(
     plain: Ground, k: int, standing: Stances, covered: Stances, smoothing: float, most: float | None
 ) -> Surface:
     """The surface of fit k, fitted to the feet in contact and to the feet that were below the ground."""
-    points = joined(standing, covered)
+    points = join_points(standing, covered)
     residual = points.height - plain.at(points.place)[k]
     return fit_surfaces(points, residual[None], smoothing, most, len(standing.count))[0]
 

@@ -159,15 +159,15 @@ class LossWatch:
         bad = ~(x.all(1) & y.all(1) & p)
         if bad.any():
             places = zip(batch.clip[bad], batch.frame[bad], strict=True)
-            rows = _some([f"{self.clips[clip]} frame {frame}" for clip, frame in places])
+            rows = _name_list([f"{self.clips[clip]} frame {frame}" for clip, frame in places])
             return f"{text}, because rows of the database are not finite: {rows}. Check these frames.", True
-        names = _some([self.clips[clip] for clip in np.unique(batch.clip)])
+        names = _name_list([self.clips[clip] for clip in np.unique(batch.clip)])
         return (
             f"{text}. The batch holds frames of {names}. The last checkpoint is kept. "
             "Lower training.learning_rate, or look for broken frames in these clips."
         ), False
 
 
-def _some(names: list[str]) -> str:
+def _name_list(names: list[str]) -> str:
     more = len(names) - MOST_NAMED
     return ", ".join(names[:MOST_NAMED]) + (f" and {more} more" if more > 0 else "")

@@ -22,13 +22,13 @@ class OtherPoses:
     """Moves the pose in some rows of X towards the pose of a row with other channel values. Y is unchanged.
 
     If channels say how a whole clip walks, its poses show that, too. Then a network can continue the walk
-    that it sees and needs no channels, and a running character keeps whatever walk its pose has drifted to:
-    of 24 people with three diagnoses or none, it walked like one of a group that was not requested. With
-    these rows, only the channels tell which walk Y belongs to.
+    that it sees without the channels, and a character keeps the walk that its pose has drifted to. Trained on
+    24 people with three diagnoses or none, it walked like a group that was not requested. With these rows,
+    only the channels tell which walk Y belongs to.
 
     Each place in a batch remembers its last rows. Of those with the same gait and other channel values, the
-    one with the nearest phase is taken. So several processes get what one gets. The pose moves by a part of
-    the way between 0 and 1, spread evenly over places and batches.
+    one with the nearest phase is taken. So several processes give the same rows as one. The pose moves by a
+    part of the way between 0 and 1, spread evenly over places and batches.
 
     share: share of the rows that are moved; 0 changes nothing. batch: largest number of this process's rows
     in a batch. first: the place of its first row in the whole batch.

@@ -12,14 +12,14 @@ from hobble.database.reader import Database
 class RollOut:
     """Adds the errors that the network would have accumulated to the pose in X; Y is unchanged.
 
-    A joint's next position is the mean of the predicted one and the old one plus the predicted velocity. So
-    if it was off by d, and the network errs by v in velocity and p in position, it is off by (d + v + p) / 2
-    in the next frame, and its velocity by v. (The turn of the root meanwhile, a few hundredths of a radian,
-    is ignored.)
+    A joint's next position is the mean of two: the predicted position, and the old one plus the predicted
+    velocity. Let d be its present error, and v and p the network's errors in velocity and position. In the
+    next frame its position is off by (d + v + p) / 2 and its velocity by v. (The turn of the root meanwhile,
+    a few hundredths of a radian, is ignored.)
 
     Each place in a batch carries its errors to the same place in the next batch, although the rows are
-    shuffled. So the errors have a realistic size and pattern over the joints. (If a row got the errors of its
-    own past, the network would learn the row by heart, and held-out clips get worse.)
+    shuffled. So the errors have a realistic size and pattern over the joints. (With the errors of its own
+    past, the network would learn each row by heart, and held-out clips get worse.)
 
     frames: length of a roll-out; its first pose is the recorded one, so 1 changes nothing. batch: largest
     number of this process's rows in a batch. first: the place of its first row in the whole batch.

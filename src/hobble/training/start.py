@@ -94,7 +94,7 @@ def begin(
     start: Path | None,
     processes: Processes = ALONE,
 ) -> tuple[State, Path]:
-    """The state from the run's own checkpoint, else from `start`, else a new one; and the path of its own.
+    """The state from the run's own checkpoint, else from `start`, else a new one; and that checkpoint's path.
 
     If the run's own checkpoint has more passes than `training.passes`, it is ignored. Raises InputError
     for a checkpoint that is damaged or has a network of another shape, and for a start that is past
@@ -125,7 +125,7 @@ def _restored(
     start: Path | None,
     begun: Arrays | None,
 ) -> tuple[State, Path]:
-    """Restore `state` from the own checkpoint or the start, if there is one; and the path of its own."""
+    """Restore `state` from the run's checkpoint or the start, if any; and the path of that checkpoint."""
     state.recipe = run_name(recipe, begun)
     own = checkpoints / state.recipe / "checkpoint.npz"
     goal = training.all_sections

@@ -10,7 +10,7 @@ from pathlib import Path
 
 from hobble.core.errors import InputError
 
-OWN = Path(".snakemake")  # Snakemake's folder, in the one where it runs
+OWN = Path(".snakemake")  # Snakemake's folder, inside the folder where it runs
 DRY_RUN = re.compile(r"-[a-zA-Z]*n[a-zA-Z]*|--dry-?run")
 
 

@@ -85,7 +85,7 @@ def make_each(snakemake: Any, make: Callable[[JobPiece, logging.Logger], None]) 
         taken = failed = 0
         for piece in all_pieces:
             try:
-                taken += _made(piece, make, kept, digests, report)
+                taken += _make_piece(piece, make, kept, digests, report)
             except Exception as error:
                 report.error(error)
                 failed += 1
@@ -99,7 +99,7 @@ def make_each(snakemake: Any, make: Callable[[JobPiece, logging.Logger], None]) 
             sys.exit(1)
 
 
-def _made(
+def _make_piece(
     piece: JobPiece,
     make: Callable[[JobPiece, logging.Logger], None],
     kept: KeptFiles,

@@ -38,7 +38,7 @@ class ChannelSources:
         return [*files, *self._tables(dataset, name)]
 
     def source(self, dataset: str, clip: str, name: str) -> dict[str, Any]:
-        """The fields of a `Source` for channel `name` and a clip as plain data, without `files`."""
+        """The fields of a `ClipSource` for channel `name` and a clip as plain data, without `files`."""
         return {
             "clip": self.clips.original(clip),
             "entry": self.clips.entry(dataset, clip).model_dump(

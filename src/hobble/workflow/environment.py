@@ -102,7 +102,7 @@ def main(folder: Path) -> None:
     print(f"This downloads packages and takes {DISK_SPACE} of disk, and a few minutes with a fast network.")
     began = time.monotonic()
     python, line = folder / "bin" / "python", ProgressLine(sys.stdout)
-    # venv copies the interpreter anew, which fails while one of its programs runs.
+    # venv copies the interpreter again, which fails while one of its programs runs.
     if not is_sound(python):
         venv.create(folder, with_pip=True)
     install(python, ["--quiet", "--upgrade", "pip>=25"], line)  # older versions do not print progress

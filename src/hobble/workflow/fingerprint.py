@@ -184,10 +184,10 @@ def _is_infrastructure(module: str) -> bool:
 
 @functools.cache
 def _files_of(module: str, source: Path) -> tuple[Path, ...]:
-    return tuple(_found(module, source))
+    return tuple(_files_of_module(module, source))
 
 
-def _found(module: str, source: Path) -> Iterator[Path]:
+def _files_of_module(module: str, source: Path) -> Iterator[Path]:
     """The module's file and the `__init__.py` of each package on the way to it."""
     parts = module.split(".")
     for n in range(1, len(parts) + 1):

@@ -37,11 +37,10 @@ def played(frames: np.ndarray, rows: list[int]) -> np.ndarray:
     before = -1
     for row in rows:
         out = np.zeros((1, frames.shape[1]), np.float32)
-        show_rows(
-            memory, frames, np.ones(frames.shape[1], np.float32), phases, np.array([before]),
-            np.array([before + 1 if before >= 0 else -1]), np.array([row]), np.array([row != before + 1]),
-            phases[row : row + 1].astype(float), J, AT, HALFLIFE, out,
-        )  # fmt: skip
+        following, due = before + 1 if before >= 0 else -1, row != before + 1
+        choice = tuple(np.array([value]) for value in (before, following, due, row))
+        table = (frames, np.ones(frames.shape[1], np.float32), phases)
+        show_rows(memory, table, choice, phases[row : row + 1].astype(float), (J, AT, HALFLIFE), out)
         shown.append(out[0].astype(float))
         before = row
         assert memory[0, ROW] == row + 1
@@ -104,10 +103,9 @@ def test_the_phase_moves_to_that_of_the_clips(off: float) -> None:
     phase = np.array([off % 1.0])
     for row in range(60):
         out = np.zeros((1, frames.shape[1]), np.float32)
-        show_rows(
-            memory, frames, np.ones(frames.shape[1], np.float32), phases, np.array([row - 1]),
-            np.array([row if row else -1]), np.array([row]), np.array([False]), phase, J, AT, HALFLIFE, out,
-        )  # fmt: skip
+        choice = tuple(np.array([value]) for value in (row - 1, row if row else -1, False, row))
+        table = (frames, np.ones(frames.shape[1], np.float32), phases)
+        show_rows(memory, table, choice, phase, (J, AT, HALFLIFE), out)
         phase = (phase + out[0, AT[3]]) % 1
     away = abs((phase[0] - 60 * 0.02 + 0.5) % 1 - 0.5)
     assert away == pytest.approx(0.3 - 59 * 0.002, abs=1e-4)

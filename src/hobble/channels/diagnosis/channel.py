@@ -62,7 +62,7 @@ class Diagnosis(Channel):
         """Raise InputError if the clip's entry is not a known diagnosis."""
         if source.value is not None and source.value not in (*DIAGNOSES, HEALTHY):
             where = f"{source.clip}.channels.{self.name}"
-            raise InputError(where, f"cannot be {source.value!r:.80}", fix=f"Write one of {_known()}.")
+            raise InputError(where, f"cannot be {source.value!r:.80}", fix=f"Write one of {_known_names()}.")
 
     def read(self, clip: Clip, source: ClipSource, motion: Mapping[str, Any]) -> tuple[Array, list[str]]:
         """1 for the person's diagnosis in every frame, and a warning if the table lacks the clip."""
@@ -101,7 +101,7 @@ def read_table(path: str) -> dict[str, str]:
         clip, diagnosis = PurePosixPath(row["file"] or "").stem, (row["diagnosis"] or "").strip()
         if diagnosis not in (*DIAGNOSES, HEALTHY):
             problem = f"{printable(clip)} has {printable(diagnosis, 80)!r}"
-            raise InputError(path, problem, line=reader.line_num, fix=f"Write one of {_known()}.")
+            raise InputError(path, problem, line=reader.line_num, fix=f"Write one of {_known_names()}.")
         if out.setdefault(clip, diagnosis) != diagnosis:
             problem = f"{printable(clip)} is {diagnosis} here and {out[clip]} above"
             raise InputError(
@@ -110,7 +110,7 @@ def read_table(path: str) -> dict[str, str]:
     return out
 
 
-def _known() -> str:
+def _known_names() -> str:
     return ", ".join((*DIAGNOSES, HEALTHY))
 
 

@@ -13,6 +13,7 @@ from hobble.measures.accuracy.run import SPLITS, clip_rows
 from hobble.measures.given import Json, Row
 
 NAME = "accuracy"
+WORDS = {"train": "training", "held_out": "held-out"}
 
 
 def compared(all_measured: Sequence[ConfigurationResults], published: Json) -> SideBySide:
@@ -64,14 +65,13 @@ def _splits(all_measured: Sequence[ConfigurationResults], published: Json) -> li
         m = found.get(row["configuration"])
         for split in SPLITS:
             ours = m.found(NAME)[split]["mean_of_clips"] if m else None
-            out.append(published_row(f"relative error, {split} clips", row, row["mean"], ours))
+            out.append(published_row(f"relative error, {WORDS[split]} clips", row, row["mean"], ours))
             if "sd" in row:
                 in_text = {**row, "table": None}
                 means = clip_means(m.found(NAME), split) if m else []
                 sd = float(np.std(means)) if len(means) > 1 else None
-                out.append(
-                    published_row(f"standard deviation of the means of {split} clips", in_text, row["sd"], sd)
-                )
+                what = f"standard deviation of the means of {WORDS[split]} clips"
+                out.append(published_row(what, in_text, row["sd"], sd))
     return out
 
 

@@ -206,9 +206,9 @@ def caveat(material: Material) -> str:
     """Why these errors and the published ones may not be compared."""
     seconds = sum(clip["seconds"] or 0.0 for clip in material.motion)
     return (
-        f"Do not compare these errors with the published ones as if the clips were the same: here they are "
-        f"{duration(seconds)} of the data set {material.dataset}, there 80 clips of the original one. A "
-        "small error may only mean that the clips are easy to predict."
+        "Do not compare these errors with the published ones as if the clips were the same. Ours are "
+        f"measured on {duration(seconds)} of the data set {material.dataset}, the published ones on 80 clips "
+        "of the original data set. A small error may only mean that the clips are easy to predict."
     )
 
 

@@ -31,11 +31,11 @@ def left_out(
     manner, person = (
         np.array(one) for one in ([w.manner for w in windows], [people[w.clip] for w in windows])
     )
-    tried = [_with(values, manner, person, shrinkage) for shrinkage in shrinkages]
+    tried = [_with_shrinkage(values, manner, person, shrinkage) for shrinkage in shrinkages]
     return max(tried, key=lambda one: (one["right"] or 0.0, one["shrinkage"]))
 
 
-def _with(values: Array, manner: np.ndarray, person: np.ndarray, shrinkage: float) -> LeftOut:
+def _with_shrinkage(values: Array, manner: np.ndarray, person: np.ndarray, shrinkage: float) -> LeftOut:
     """The result for one shrinkage. values: (n, D). manner, person: (n,) text."""
     named = np.full(len(manner), "", object)  # "": nothing could be learnt from the others
     for one in np.unique(person):

@@ -90,7 +90,7 @@ def track_chart(found: Json) -> Chart | None:
     off = [(x, z, cm, r["lap"]) for r in runs for x, z, cm in zip(r["x"], r["z"], r["off_cm"], strict=True)]
     left = [row for row in off if row[2] > OFF_TRACK]
     if left:
-        traces.append(_left(left))
+        traces.append(_off_track_markers(left))
     traces.append(
         {
             "type": "scatter",
@@ -122,7 +122,7 @@ def track_chart(found: Json) -> Chart | None:
     )
 
 
-def _left(places: list[tuple[float, float, float, int]]) -> Trace:
+def _off_track_markers(places: list[tuple[float, float, float, int]]) -> Trace:
     """Markers where laps left the track. places: x, z, distance in cm and lap of each."""
     return {
         "type": "scatter",

@@ -25,6 +25,21 @@ from hobble.runtime.controller import FASTEST_TURN
 
 FEWEST_STEPS = 10  # with fewer steps, the mean foot slide is not shown
 FRAME_BUDGET_MS = 1000 / 60
+# Columns of the table of laps, by the key of a lap.
+LAP_COLUMNS = {
+    "lap": Column.count("lap"),
+    "finished": Column("finished", lambda finished: "yes" if finished else "no"),
+    "waypoints_reached": Column.count("waypoints reached"),
+    "seconds": Column.number("seconds", 4),
+    "frames": Column.count("frames"),
+    "path_distance_cm": Column.number("mean distance from the path, cm"),
+    "path_overshoot_cm": Column.number("largest distance from the path, cm"),
+    "steps": Column.count("steps"),
+    "foot_slide_cm": Column.number("mean foot slide of a step, cm"),
+    "predicted_turn_degrees": Column.number("largest turn of a joint in a frame as predicted, °"),
+    "largest_turn_degrees": Column.number("largest turn of a joint in a frame as drawn, °"),
+    "turns_held_back": Column.count("frames in which a turn was limited"),
+}
 TRACK = "The character is steered around a track of six waypoints: it walks, side-steps, jogs and crouches."
 
 
@@ -65,19 +80,17 @@ def hints(found: Json, material: Material) -> Iterator[Hint]:
 
 
 def lap_table(found: Json, name: str) -> Table | None:
-    """A row per lap."""
+    """A row per lap: how it went, the mean time of each step of a frame, and the median time of a frame."""
     laps = found.get("laps")
     if not isinstance(laps, list) or not laps:
         return None
-    plain = [k for k, v in laps[0].items() if k != "milliseconds" and isinstance(v, (int, float, str))]
+    known = {key: column for key, column in LAP_COLUMNS.items() if key in laps[0]}
     steps = sorted(lap_steps(laps[0]), key=step_place)
-    columns = [Column.number(k.replace("_", " "), 4) for k in plain] + [
-        Column.number(f"{s}, mean ms") for s in steps
-    ]
+    columns = [*known.values(), *(Column.number(f"{step}, mean ms") for step in steps)]
     columns.append(Column.number("all, median ms"))
     rows = [
-        [None if k == "foot_slide_cm" and _few(lap.get("steps")) else lap.get(k) for k in plain]
-        + [lap_steps(lap).get(s) for s in steps]
+        [None if key == "foot_slide_cm" and _few(lap.get("steps")) else lap.get(key) for key in known]
+        + [lap_steps(lap).get(step) for step in steps]
         + [lap_median(lap)]
         for lap in laps
     ]

@@ -12,7 +12,7 @@ from hobble.measures.measure import Cost, Measure
 from hobble.measures.sample_options import SampleOptions
 
 
-def _some(lengths: tuple[int, ...]) -> tuple[int, ...]:
+def _at_least_one(lengths: tuple[int, ...]) -> tuple[int, ...]:
     """At least one length: of none there is nothing to measure."""
     if not lengths:
         raise ValueError("must name at least one number of frames")
@@ -22,7 +22,7 @@ def _some(lengths: tuple[int, ...]) -> tuple[int, ...]:
 class Options(Joints, SampleOptions):
     """Its keys of the section `evaluation`."""
 
-    rollouts: Annotated[tuple[Positive, ...], AfterValidator(_some)] = Field(
+    rollouts: Annotated[tuple[Positive, ...], AfterValidator(_at_least_one)] = Field(
         (1, 10, 60, 300), description="lengths of roll-outs, in frames"
     )
 

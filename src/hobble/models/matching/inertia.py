@@ -46,17 +46,27 @@ def find_following(memory: Any, remaining: Any, every: int, before: Any, followi
         due[c] = following[c] < 0 or not memory[c, SINCE] + 1 < every
 
 
-@njit(error_model="numpy")
-def show_rows(
-    memory: Any, frames: Any, scale: Any, phases: Any, before: Any, following: Any, shown: Any, due: Any,
-    phase: Any, joints: int, at: Any, halflife: float, out: Any,
-) -> None:  # fmt: skip
-    """Write row `shown` (C,) plus the offsets of each character into `out` (C, Y), and update the memory.
+# Groups of arrays for `show_rows`.
+#
+# frames (R, Y), to be multiplied by scale (Y,); phases (R,).
+Table = tuple[Any, Any, Any]
+# For each character: before, following and due from `find_following`, and the row to show (C,).
+Choice = tuple[Any, Any, Any, Any]
+# How many joints there are; first columns (4,) of joint positions, velocities, rotations and of the change of
+# phase; the halflife of offsets in frames.
+Shape = tuple[int, Any, float]
 
-    frames: (R, Y), to be multiplied by scale (Y,); phases: (R,); at: first columns of joint positions,
-    velocities, rotations and of the change of phase. A row other than `following` starts a transition.
-    It must not be the first of its run, because the rotation speed is the turn since the row before it.
+
+@njit(error_model="numpy")
+def show_rows(memory: Any, table: Table, choice: Choice, phase: Any, shape: Shape, out: Any) -> None:
+    """Write the row to show plus the offsets of each character into `out` (C, Y), and update the memory.
+
+    memory: (C, M). phase: (C,). A row other than the following one starts a transition. It must not be the
+    first of its run, because the rotation speed is the turn since the row before it.
     """
+    frames, scale, phases = table
+    before, following, due, shown = choice
+    joints, at, halflife = shape
     damping = 2.0 * np.log(2.0) / halflife
     for c in range(len(memory)):
         row = shown[c]

@@ -59,10 +59,8 @@ class MatchingPredictor:
         if due.any():
             some = np.flatnonzero(due)
             shown[some] = self._searched(network.queries(z[some]), following[some])
-        show_rows(
-            memory, self._frames, self._scale, network.phases, before, following, shown, due, phase,
-            network.layout.joints, self._at, network.halflife, out,
-        )  # fmt: skip
+        table, choice = (self._frames, self._scale, network.phases), (before, following, due, shown)
+        show_rows(memory, table, choice, phase, (network.layout.joints, self._at, network.halflife), out)
 
     def _searched(self, queries: Array, following: NDArray[np.int64]) -> NDArray[np.int64]:
         """The rows (n,) to show for queries (n, F): the following row, unless another row is nearer."""

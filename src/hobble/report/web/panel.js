@@ -21,7 +21,7 @@ const make = (parent, tag, className = "", text = "") => {
 
 export const createPanel = (host, actor, title = "") => {
   const { spec } = actor, box = make(host, "div", "readings");
-  if (title) make(box, "h4", "", title);
+  if (title) make(box, "h3", "", title);
   const list = make(box, "dl"), row = (label) => {
     const part = make(list, "div");
     make(part, "dt", "", label);

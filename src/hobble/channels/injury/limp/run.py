@@ -151,7 +151,7 @@ def _row(
             **dict.fromkeys(EFFECTS),
             **dict.fromkeys(("called", "graded", "impaired", "named", "wrong_side")),
         }
-    row |= _plain(effects(figure.profile, healthy.profile, side))
+    row |= _rounded_values(effects(figure.profile, healthy.profile, side))
     found = compare_walk(figure.walk, figure.frames, healthy.profile, WINDOW)
     answers, grades = ([answer for _, answer in some] for some in (found.windows, found.grades))
     other = SIDES[1 - SIDES.index(side)]
@@ -165,7 +165,7 @@ def _row(
     return row
 
 
-def _plain(values: Mapping[str, float]) -> dict[str, float | None]:
+def _rounded_values(values: Mapping[str, float]) -> dict[str, float | None]:
     return {name: round(float(v), 5) if np.isfinite(v) else None for name, v in values.items()}
 
 
@@ -203,7 +203,7 @@ def _of_clip(skeleton: Skeleton, one: Limp, every: Sequence[Limp]) -> dict[str, 
     """The effects of a captured clip relative to a healthy walk."""
     healthy, whose = healthy_of(one, every)
     side = hurt_side(skeleton, max(one.hurt, key=lambda link: one.hurt[link]))
-    sizes = _plain(effects(profile(one.walk), healthy, side))
+    sizes = _rounded_values(effects(profile(one.walk), healthy, side))
     return {"clip": one.clip, "hurt": dict(one.hurt), "side": side, "healthy": whose, **sizes}
 
 
@@ -253,7 +253,7 @@ def second_injuries(
     alone. A second injury must not make the walk faster, so it should be at most 1.
     """
     assert network.skeleton is not None
-    first = next((link for link in links if _is(network.skeleton, link, "thigh", "right")), None)
+    first = next((link for link in links if _is_part_on_side(network.skeleton, link, "thigh", "right")), None)
     if first is None:
         return []
     pairs = [(a, b, s) for a in FIRST_SEVERITIES for b in links if b != first for s in SECOND_SEVERITIES[1:]]
@@ -274,7 +274,7 @@ def second_injuries(
     ]
 
 
-def _is(skeleton: Skeleton, link: str, part: str, side: str) -> bool:
+def _is_part_on_side(skeleton: Skeleton, link: str, part: str, side: str) -> bool:
     found = part_of_link(skeleton, _pair(skeleton, link))
     return found.name == part and hurt_side(skeleton, link) == side
 

@@ -37,7 +37,7 @@ def _cycle(walks: Walks, stretch: int, figure: int) -> Array:
     return mean_cycle(walks.local[span, figure], walks.phase[span, figure])
 
 
-def _from(walks: Walks, stretch: int, figure: int, cycle: Array) -> float:
+def _distance_from_cycle(walks: Walks, stretch: int, figure: int, cycle: Array) -> float:
     span = walks.measured(stretch, figure)
     return float(np.mean(distance_to_cycle(walks.local[span, figure], walks.phase[span, figure], cycle)))
 
@@ -74,15 +74,15 @@ def second_injuries(
     script += [CrowdTarget(_frames(1, seconds), gait, hurt(s)) for s in SECOND]
     walks = run(network, script, runtime)
     last = len(SECOND)
-    alone = {b: _alone(walks, last, i) for i, (a, b) in enumerate(pairs) if a is None}
+    alone = {b: _effect_of_one(walks, last, i) for i, (a, b) in enumerate(pairs) if a is None}
     out: list[SecondInjury] = []
     for i, (first, second) in enumerate(pairs):
         if first is None:
             continue
         of_second, own, normal = alone[second]
         base = _cycle(walks, 1, i)
-        away = [_from(walks, 1 + k, i, base) for k in range(last)]
-        both = _from(walks, last, i, of_second) - own
+        away = [_distance_from_cycle(walks, 1 + k, i, base) for k in range(last)]
+        both = _distance_from_cycle(walks, last, i, of_second) - own
         out.append(
             {
                 "first": first,
@@ -96,15 +96,17 @@ def second_injuries(
     return out
 
 
-def _alone(walks: Walks, last: int, figure: int) -> tuple[Array, float, float]:
+def _effect_of_one(walks: Walks, last: int, figure: int) -> tuple[Array, float, float]:
     """What one injury does to a figure that is healthy in stretch 1 and hurt in stretch `last`.
 
     The mean cycle in `last`; the distance of the walk from that cycle, cm; the effect: how much further the
     hurt walk is from the healthy cycle than the healthy walk is, cm.
     """
     healthy, cycle = _cycle(walks, 1, figure), _cycle(walks, last, figure)
-    effect = _from(walks, last, figure, healthy) - _from(walks, 1, figure, healthy)
-    return cycle, _from(walks, last, figure, cycle), effect
+    effect = _distance_from_cycle(walks, last, figure, healthy) - _distance_from_cycle(
+        walks, 1, figure, healthy
+    )
+    return cycle, _distance_from_cycle(walks, last, figure, cycle), effect
 
 
 def one_of_each_part(skeleton: Skeleton, links: Sequence[str]) -> list[str]:
@@ -138,11 +140,11 @@ def into_a_jog(network: Network, links: Sequence[str], seconds: float, runtime: 
         runtime,
     )
     healthy = {stretch: _cycle(walks, stretch, 0) for stretch in (1, 2)}
-    own = {stretch: _from(walks, stretch, 0, healthy[stretch]) for stretch in (1, 2)}
+    own = {stretch: _distance_from_cycle(walks, stretch, 0, healthy[stretch]) for stretch in (1, 2)}
     at = int(walks.starts[2])
     out: list[IntoAJog] = []
     for i, (link, severity) in enumerate(figures):
-        walking, jogging = (_from(walks, s, i, healthy[s]) - own[s] for s in (1, 2))
+        walking, jogging = (_distance_from_cycle(walks, s, i, healthy[s]) - own[s] for s in (1, 2))
         speed = _speed(network, walks, 2, i)
         going = np.linalg.norm(np.diff(walks.root[at:, i, ::2], axis=0), axis=1) * FPS
         fast = np.flatnonzero(going >= JOGGING * speed)
@@ -177,14 +179,14 @@ def divided_severities(
         walks = run(network, script, runtime.model_copy(update={"scales": {"injury": scale}}))
         for i, link in enumerate(links):
             healthy = _cycle(walks, 1, i)
-            own, speed = _from(walks, 1, i, healthy), _speed(network, walks, 1, i)
+            own, speed = _distance_from_cycle(walks, 1, i, healthy), _speed(network, walks, 1, i)
             for k, severity in enumerate(DIVIDED):
                 out.append(
                     {
                         "scale": scale,
                         "link": link,
                         "severity": severity,
-                        "from_healthy_cm": round(_from(walks, 1 + k, i, healthy) - own, 5),
+                        "from_healthy_cm": round(_distance_from_cycle(walks, 1 + k, i, healthy) - own, 5),
                         "speed_share": round(_speed(network, walks, 1 + k, i) / max(speed, 1e-9), 5),
                     }
                 )

@@ -1,0 +1,23 @@
+"""The character walks straight on, on flat ground: the same walk for every picture and measure of a page."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+
+from hobble.models.network import Network
+from hobble.runtime.animation import Pose, ProceduralAnimation
+from hobble.runtime.options import Runtime
+
+AHEAD = (0.0, 2.5)  # cm a frame, the target velocity; the same as that of "walk" in Play
+
+
+def walk_straight(
+    network: Network, runtime: Runtime, frames: int, channels: Mapping[str, Mapping[str, float]]
+) -> Iterator[tuple[ProceduralAnimation, Pose]]:
+    """The character and its pose after each frame, at 60 Hz.
+
+    channels: name of a channel to the values of its columns, as `ProceduralAnimation.next_pose` takes them.
+    """
+    animation = ProceduralAnimation(network, **dict(runtime))
+    for _ in range(frames):
+        yield animation, animation.next_pose(AHEAD, None, "walk", **channels)

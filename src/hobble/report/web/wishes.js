@@ -1,0 +1,68 @@
+// Wishes as `ProceduralAnimation.next_pose` takes them: velocity [x, z], facing [x, z] or null, gait or null. And the limits
+// of a hurt body, as in `hobble.runtime.limits`: a highest speed, and a walk instead of a jog if the body cannot jog.
+import { wrap } from "./numbers.js";
+
+export const createWishes = (spec, c) => {
+  const { gaits, constants: k } = spec, M = spec.window, G = gaits.length, { atan2, hypot, min, max, abs } = Math;
+
+  const facing = (velocity, ahead) => {
+    const going = hypot(...velocity) >= k.still;
+    if (!ahead) return [0, going ? velocity : c.direction];
+    const aside = abs(wrap(atan2(...velocity) - atan2(...ahead)));
+    return [going ? min(1, aside / k.strafeFrom) : 1, ahead];
+  };
+  const shares = (velocity, direction, gait) => {
+    const out = new Array(G).fill(0), speed = hypot(...velocity), name = gait || (speed >= k.jogFrom ? "jog" : "walk");
+    if (speed < k.still) {
+      const [a, b] = [c.dx[M], c.dz[M]];
+      const angle = atan2(direction[0] * b - direction[1] * a, direction[0] * a + direction[1] * b);
+      const turning = abs(angle) > k.turnInPlace ? 1 : 0;
+      out[gaits.indexOf("stand")] = 1 - turning;
+      out[gaits.indexOf("walk")] = turning;
+      if (name !== "crouch") return out;
+    }
+    out[gaits.indexOf(name)] = 1;
+    return out;
+  };
+
+  const limited = spec.channels.filter((one) => one.limits);
+  const allowed = (g) => {
+    let least = Infinity, both = limited[0].limits.usual[g];
+    const usual = both;
+    for (const { first, limits } of limited) {
+      const { levels, speeds } = limits;
+      let most = Infinity;
+      for (let l = 0; l < speeds[g].length; l++) {
+        const v = c.channelValues[first + l];
+        if (!(v > 0)) continue;
+        let i = 0;
+        while (i < levels.length - 2 && levels[i + 1] <= v) i++;
+        const [low, high] = [speeds[g][l][i], speeds[g][l][i + 1]];
+        most = min(most, low + (v - levels[i]) / (levels[i + 1] - levels[i]) * (high - low));
+      }
+      least = min(least, most);
+      if (usual > 0) both *= min(1, most / usual);
+    }
+    return least < usual ? both : least;
+  };
+  const hold = (velocity, gait) => {
+    if (!limited.some(({ first, columns: own }) => own.some((_, l) => c.channelValues[first + l] > 0))) return velocity;
+    const each = gaits.map((_, g) => allowed(g)), walk = gaits.indexOf("walk"), jog = gaits.indexOf("jog");
+    let hurry = 1;
+    if (each[jog] < k.lameBelow) {
+      hurry += (k.hurried - 1) * gait[jog];
+      gait[walk] += gait[jog];
+      gait[jog] = 0;
+    }
+    let whole = 0, most = 0;
+    gaits.forEach((name, g) => {
+      if (name === "stand" || !(gait[g] > 0)) return;
+      whole += gait[g];
+      most += gait[g] * each[g];
+    });
+    const held = whole > 0 ? min(1, hurry * most / whole / max(hypot(...velocity), 1e-9)) : 1;
+    return velocity.map((v) => v * held);
+  };
+
+  return { facing, shares, hold };
+};
