@@ -128,7 +128,7 @@ def ends_with_run() -> Iterator[None]:
 
 
 def _exit(number: int, frame: FrameType | None) -> None:
-    # Ctrl-C brings two signals, that of the terminal and one from Snakemake. The second would end the clean-up.
+    # Ctrl-C brings two signals, of the terminal and of Snakemake. The second would end the clean-up.
     for each in (signal.SIGINT, signal.SIGTERM):
         signal.signal(each, signal.SIG_IGN)
     raise SystemExit(128 + number)  # not caught by `except Exception`, and runs every `finally`
