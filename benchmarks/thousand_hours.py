@@ -55,6 +55,11 @@ class Run:
         reports = [dataset / "motion" / f"{clip['clip']}.json" for clip in manifest["clips"]]
         self.motion = sum(json.loads(report.read_text())["seconds"] for report in reports)
 
+    def read(self, rule: str) -> float:
+        """Seconds of motion that the jobs of a rule read."""
+        sample = self.resolved["configuration"]["evaluation"]["sample_frames"] / FPS
+        return min(self.motion, sample) if rule in SAMPLED else self.motion
+
     def seconds(self, stage: str) -> dict[str, float]:
         """Rule -> seconds of all its jobs."""
         return {rule["rule"]: rule["seconds"] for rule in self.stages[stage]["rules"]}
@@ -71,12 +76,12 @@ class Rate:
     def of(cls, rule: str, stage: str, run: Run, less: Run | None) -> Rate:
         """From a run, and from one with less motion if there is one."""
         seconds = run.seconds(stage)[rule]
-        if less is None or rule not in less.seconds(stage):
+        if less is None or rule not in less.seconds(stage) or run.read(rule) == less.read(rule):
             grows = rule in GROWING | SAMPLED
-            return cls(0.0, seconds / run.motion) if grows else cls(seconds, 0.0)
+            return cls(0.0, seconds / run.read(rule)) if grows else cls(seconds, 0.0)
         before = less.seconds(stage)[rule]
-        each = max(0.0, (seconds - before) / (run.motion - less.motion))
-        return cls(max(0.0, seconds - each * run.motion), each)
+        each = max(0.0, (seconds - before) / (run.read(rule) - less.read(rule)))
+        return cls(max(0.0, seconds - each * run.read(rule)), each)
 
     def hours(self, motion: float) -> float:
         """Hours for so many seconds of motion."""
@@ -85,13 +90,17 @@ class Rate:
 
 @dataclass(frozen=True)
 class Plan:
-    """motion: seconds in all. clips, nodes, shards: their numbers. training: hours on the clock."""
+    """motion: seconds in all. clips, nodes, shards: their numbers. training: hours on the clock.
+
+    share: the passes of the training, divided by those of the run.
+    """
 
     motion: float
     clips: int
     nodes: int
     shards: int
     training: float
+    share: float
 
     def line(self, stage: str, run: Run, less: Run | None) -> dict[str, float]:
         """One line of the table: jobs, hours of processors, hours on the clock, longest job, bytes.
@@ -107,6 +116,7 @@ class Plan:
             jobs = batch_count(self.clips) if rule in OF_BATCHES else self.shards if sharded else 1
             most = SampleOptions().sample_frames / FPS if rule in SAMPLED else self.motion
             hours = Rate.of(rule, stage, run, less).hours(min(most, self.motion))
+            hours *= self.share if rule == "training" else 1.0
             # The largest shard has about twice the average.
             one = self.training if rule == "training" else hours / jobs * (2 if sharded and jobs > 1 else 1)
             line["jobs"] += jobs
@@ -118,13 +128,19 @@ class Plan:
         return line
 
 
+def pass_share(run: Run, options: argparse.Namespace) -> float:
+    """The passes asked for, divided by those of the run."""
+    passes: float = run.resolved["configuration"]["training"]["passes"]
+    return options.passes / passes if options.passes else 1.0
+
+
 def training_hours(run: Run, less: Run | None, options: argparse.Namespace) -> float:
     """Hours on the clock of so many nodes, each as fast as the one of the run."""
     recipe = run.resolved["configuration"]["training"]
     motion = 3600 * options.hours
     history = (run.home / "network/history.csv").read_text()
     samples = int(history.splitlines()[-1].split(",")[2]) * motion / run.motion
-    share = options.passes / recipe["passes"] if options.passes else 1.0
+    share = pass_share(run, options)
     nodes, steps = options.training_nodes, samples * share / (options.batch or recipe["batch"])
     with np.load(run.home / "network/checkpoint.npz") as checkpoint:
         sent = 4 * checkpoint["weights"].size
@@ -175,7 +191,9 @@ def main() -> None:
     print("| stage | jobs | hours of work | on the clock | longest job | GB |")
     print("|---|---|---|---|---|---|")
     training = training_hours(run, less, options)
-    plan = Plan(3600 * options.hours, options.clips, options.nodes, options.shards, training)
+    plan = Plan(
+        3600 * options.hours, options.clips, options.nodes, options.shards, training, pass_share(run, options)
+    )
     lines = {stage: plan.line(stage, run, less) for stage in run.stages}
     for stage, line in lines.items():
         show(stage, line)

@@ -73,6 +73,20 @@ def test_a_stiff_leg_swings_low_over_a_straight_sound_leg(captured, hurting, par
     assert 0.25 <= rises[0] / rises[1] <= 0.53
 
 
+@pytest.mark.shared
+def test_a_stiff_back_does_not_make_the_trunk_sway(captured, hurting) -> None:
+    """CMU 105_26 hardly sways with a hurt stomach: by 2.9 degrees, and healthy by 3 to 5."""
+    clip, labels, flat = captured("105_29")
+    hurt = hurt_clip(clip, labels, hurting(len(clip), {"LowerBack-Spine": 10.0}), flat=flat).clip
+    healthy, stiff = (mean_curves(one) for one in (clip, hurt))
+    assert np.ptp(stiff["trunk_left"]) < np.ptp(healthy["trunk_left"]) + 2.0
+    assert np.ptp(stiff["pelvis_left_up"]) < np.ptp(healthy["pelvis_left_up"])
+    # Its trunk leans forward by 6 degrees and its knees bend by 9 degrees more, at severity 7.
+    assert 8 < stiff["trunk_forward"].mean() - healthy["trunk_forward"].mean() < 13
+    for side in "LR":
+        assert stiff[f"knee_flexion_{side}"].mean() > healthy[f"knee_flexion_{side}"].mean() + 3
+
+
 def mean_curves(clip):
     """Name -> (50,) mean over the cycles of the right leg."""
     cycles = measure(clip.skeleton, clip.positions, clip.fps).right

@@ -36,9 +36,10 @@ class Manifest:
     """folder: subfolder of chunks and statistics, named by a hash of their content.
 
     layout: of the composed rows. visits: how often a pass uses each row. clips: one entry for each clip with
-    `clip`, `split`, `rows`, `pairs`. shards: `clips` and `chunks` are in their order. chunks: per split; in
-    a chunk, the clip of a row is a number among the clips of its shard. original_bytes: size of the same
-    pairs in the original's layout. limits: channel -> speed limits (`hobble.channels.speed_limits`).
+    `clip`, `split`, `rows`, `pairs`, and for a hurt version `source`, its healthy clip. shards: `clips` and
+    `chunks` are in their order. chunks: per split; in a chunk, the clip of a row is a number among the clips
+    of its shard. original_bytes: size of the same pairs in the original's layout. limits: channel -> speed
+    limits (`hobble.channels.speed_limits`).
     """
 
     folder: str

@@ -22,7 +22,8 @@ RowSource = ClipRows | str | Path
 class Plan:
     """Layout of the rows, clips with their rows, and rows of a chunk and of a bucket.
 
-    visits: how often a pass uses each row. clips: for each clip `clip`, `split`, `rows` and `pairs`.
+    visits: how often a pass uses each row. clips: for each clip `clip`, `split`, `rows` and `pairs`, and
+    for a hurt version `source`, its healthy clip.
     """
 
     layout: RowLayout
@@ -55,10 +56,12 @@ def make_plan(
     channels: Sequence[str],
     item: int,
     chunk_bytes: int,
+    sources: Mapping[str, str],
 ) -> Plan | None:
     """The plan of rows by clip name, or None for no clips; see `hobble.database.merge.write_database`.
 
-    item: bytes of a number on disk. Raises InputError if a clip does not fit the others.
+    item: bytes of a number on disk. sources: hurt version -> its healthy clip. Raises InputError if a clip
+    does not fit the others.
     """
     entries: list[dict[str, Any]] = []
     first: Outline | None = None
@@ -71,7 +74,10 @@ def make_plan(
             where = name if isinstance(source, ClipRows) else source
             raise InputError(where, f"the layout of its rows differs from that of {min(clips)}")
         fits = int(one.fits.sum())
-        entries.append({"clip": name, "split": splits[name], "rows": len(one.fits), "pairs": fits})
+        source_of = {"source": sources[name]} if name in sources else {}
+        entries.append(
+            {"clip": name, "split": splits[name], "rows": len(one.fits), "pairs": fits, **source_of}
+        )
         visits = max(visits, one.visits, int(one.fits.max(initial=1)))
         rows, pairs = rows + len(one.fits), pairs + fits
     if first is None:

@@ -96,6 +96,11 @@ class Database:
         """Names of the clips, of both splits; `Block.clip` is an index into them."""
         return tuple(clip["clip"] for clip in self.manifest.clips)
 
+    @property
+    def sources(self) -> dict[str, str]:
+        """Hurt version -> the healthy clip it is made from."""
+        return {clip["clip"]: clip["source"] for clip in self.manifest.clips if "source" in clip}
+
     def rows(self, split: str) -> int:
         """Rows (frames) of "train" or "held_out"."""
         return self.manifest.rows(split)

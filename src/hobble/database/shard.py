@@ -48,7 +48,7 @@ def write_shard(
     There may be no clips, or none with rows. Raises InputError if a clip does not fit the others, HobbleError
     if the disk is full.
     """
-    plan = make_plan(clips, splits, channels, STORED[dtype].itemsize, chunk_bytes)
+    plan = make_plan(clips, splits, channels, STORED[dtype].itemsize, chunk_bytes, sources or {})
     try:
         for split in SPLITS:  # a chunk may have a second name in a database, so it is not written over
             shutil.rmtree(folder / split, ignore_errors=True)

@@ -1,8 +1,9 @@
 """How much a hurt part of the body changes the motion at severity 10.
 
 The tables say which profiles of people a part mixes, and what is added where recordings have nothing. In the
-recordings, feet and toes are poor, and arms, shoulders, neck and back were not hurt. Values of one side are
-for a hurt right side; `_sound` is the other side.
+recordings, feet and toes are poor, and arms, shoulders, neck and back were not hurt. The lean of a hurt back
+and its bent knees (`forward`, `crouch`) are about those of CMU 105_26, which is hurt at 7. Values of one side
+are for a hurt right side; `_sound` is the other side.
 """
 
 from __future__ import annotations
@@ -63,7 +64,9 @@ OWN: dict[str, dict[str, float]] = {
         "push": 0.6,
         "push_sound": 0.6,
         "stride": 1.12,
-        "forward": 21.0,
+        "forward": 17.0,
+        "crouch": 9.0,
+        "crouch_sound": 9.0,
         "back": 0.3,
         "arms": 0.4,
         "nod": -5.0,

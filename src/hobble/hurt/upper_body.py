@@ -16,6 +16,7 @@ from hobble.hurt.impairment_profiles import HARMONICS
 
 X, Y, Z = np.eye(3)
 PELVIS = 0.35  # the pelvis tilts by this share of the trunk's lean
+PELVIS_CALM = 0.7  # of the movement that a stiff back loses, the pelvis loses this share
 MEAN = 0.5  # seconds: sigma of the Gaussian that gives a joint's mean posture
 LOOK = {"neck": 0.5, "head": 0.85}  # neck and head take back this share of the trunk's lean
 MOST_GUARD = 0.93  # a held arm loses up to this share of its movement
@@ -57,11 +58,13 @@ def _world(skeleton: Skeleton, local: Array) -> Array:
 
 
 def _stiffened(source: HealthyClip, effects: Effects) -> Array:
-    """Local rotations with less movement of back, neck and arms around their mean posture."""
+    """Local rotations with less movement of pelvis, back, neck and arms around their mean posture."""
     skeleton, local = source.clip.skeleton, source.clip.rotations.copy()
     back = _between(skeleton, "chest", "hips")
     neck = _between(skeleton, "head", "chest")
-    ratios = [(back, effects.ratio("back")), (neck, effects.ratio("head"))]
+    # A stiff back cannot balance the movement of the pelvis. So the pelvis moves less, else the trunk sways.
+    pelvis = 1.0 - PELVIS_CALM * (1.0 - effects.ratio("back"))
+    ratios = [([skeleton.role("hips")], pelvis), (back, effects.ratio("back")), (neck, effects.ratio("head"))]
     for side in (LEFT, RIGHT):
         arm = _between(skeleton, f"{SIDES[side]}_wrist", "chest")
         ratios.append((arm[1:], effects.ratio("arm")[:, side]))  # without the hand

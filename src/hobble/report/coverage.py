@@ -22,7 +22,7 @@ FPS = 60.0
 SPEEDS = np.arange(0, 6.01, 0.2)  # metres a second
 TURNS = np.arange(-220, 221, 20.0)  # degrees a second, positive to the left
 LEVELS = np.arange(1, 11)  # tenths of the highest value of a channel
-MOST = 3000  # excerpts of clips whose frames are counted
+MOST = 600  # excerpts of clips whose frames are counted
 SPLITS = (("train", "training", "@muted"), ("held_out", "held out", "@accent"))
 
 

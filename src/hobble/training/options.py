@@ -50,6 +50,11 @@ class Recipe(Section):
         description="share of the samples whose input pose is moved towards that of another clip, for "
         "channels that say how a whole clip walks",
     )
+    version_poses: Annotated[float, Field(ge=0, le=1)] = Field(
+        0.0,
+        description="share of the samples of clips with hurt versions whose input pose is moved along the "
+        "line to that of another version of the clip",
+    )
     other_paces: Annotated[float, Field(ge=1, le=2)] = Field(
         1.0,
         description="for such channels, too: largest factor by which a sample is played slower or "

@@ -25,6 +25,7 @@ from hobble.training.rollout import RollOut
 from hobble.training.schedule import learning_rate_share
 from hobble.training.start import begin, recipe_hash, step_for, use_threads
 from hobble.training.update import update_for
+from hobble.training.version_poses import VersionPoses
 
 log = logging.getLogger("hobble.training")
 
@@ -84,6 +85,7 @@ def _run(
     rows = rows_for(database, device, processes, training.stretches)
     places = processes.places(batch_size)
     others = OtherPoses(database, training.other_poses, len(places), device, places.start)
+    versions = VersionPoses(database, training.version_poses, len(places), device, places.start)
     paces = OtherPaces(database, training.other_paces, len(places), device, places.start)
     roll_out = RollOut(database, training.rollout, len(places), device, places.start)
     pairs = database.pairs(TRAIN)
@@ -96,11 +98,13 @@ def _run(
         watch = LossWatch(where, database.clips, processes)
         step.seed(section_seed(seed, turn))
         others.begin()
+        versions.begin()
         paces.begin()
         roll_out.begin()
         for batch in rows.batches(pass_index, section, sections, seed, batch_size):
             paces.play(batch.x, batch.y)
             others.mix(batch.x, batch.p)
+            versions.mix(batch.x, batch.p, batch.clip)
             roll_out.add(batch.x)
             rate = learning_rate_share(training, (state.samples + watch.seen) / pairs)
             watch.add(update(batch.x, batch.y, batch.p, rate, batch.total), batch)
