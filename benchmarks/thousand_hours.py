@@ -12,9 +12,9 @@ part and a part that grows with the motion, from both runs.
 
 Mirrored clips count as motion: with them, the hours double. Under `synthetic` the bytes are those of the BVH
 files, which are the user's own. --shards: those of the database (`database.shards`). --training-nodes:
-machines that train together, whose network of 10 Gb/s adds to each step what a ring all-reduce of the
-gradient takes; --batch: samples of a step then, and --passes, where not those of the run. Measurements
-of clips read at most `evaluation.sample_frames`.
+machines that train together; each step also takes a ring all-reduce of the gradient over 10 Gb/s. --batch
+and --passes: samples of a step and passes, if they differ from the run's. Measurements of clips read at most
+`evaluation.sample_frames`.
 """
 
 from __future__ import annotations
@@ -142,7 +142,7 @@ def pass_share(run: Run, options: argparse.Namespace) -> float:
 
 
 def training_hours(run: Run, less: Run | None, options: argparse.Namespace) -> float:
-    """Hours on the clock of so many nodes, each as fast as the one of the run."""
+    """Hours of training on the clock, with nodes as fast as the run's machine."""
     recipe = run.resolved["configuration"]["training"]
     motion = 3600 * options.hours
     history = (run.home / "network/history.csv").read_text()

@@ -13,6 +13,7 @@ from hobble.rows.layout import GAITS
 KEPT = 32  # rows that each place in a batch remembers
 NEAR = 1 / 16  # of a cycle: largest difference in phase between two poses that are mixed
 SAME_GAIT = 0.5  # poses are mixed if no share of a gait differs by this much
+BEYOND = 0.5  # a pose also moves away from the other one, by up to this part of the way
 OTHER_VALUE = 1e-3  # standardised: a larger difference is another value of a channel
 # Multiples of these irrational numbers, less their whole part, are spread evenly over 0..1.
 STEP_OF_PLACE, STEP_OF_BATCH = (math.sqrt(5) - 1) / 2, math.sqrt(2) - 1
@@ -28,7 +29,9 @@ class OtherPoses:
 
     Each place in a batch remembers its last rows. Of those with the same gait and other channel values, the
     one with the nearest phase is taken. So several processes give the same rows as one. The pose moves by a
-    part of the way between 0 and 1, spread evenly over places and batches.
+    part of the way between -BEYOND and 1, spread evenly over places and batches. Where the part is negative,
+    the pose is more extreme than any captured one, and the network learns the way back. Without such poses a
+    character that leaned forward leaned more and more.
 
     share: share of the rows that are moved; 0 changes nothing. batch: largest number of this process's rows
     in a batch. first: the place of its first row in the whole batch.
@@ -84,6 +87,7 @@ class OtherPoses:
         self.batches += 1
 
     def _parts(self, rows: int) -> Tensor:
-        """(rows,) how far each pose moves: 0, or in `share` of the rows evenly spread up to 1."""
+        """(rows,) how far each pose moves: 0, or in `share` of the rows evenly spread from -BEYOND to 1."""
         even = torch.remainder(self.spread[:rows] + self.batches * STEP_OF_BATCH, 1.0)
-        return (1 - (1 - even) / self.share).clamp(min=0.0)
+        part = 1 - (1 - even) / self.share
+        return torch.where(part > 0, part * (1 + BEYOND) - BEYOND, 0.0)

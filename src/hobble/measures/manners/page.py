@@ -85,7 +85,7 @@ def together_chart(found: ChannelResult, say: Callable[[str], str] = str) -> Cha
     }
     words = (
         f"The share of windows in which the classifier names the right {found['title'].lower()} while the "
-        "value at the left is at its highest: none in a pale field, all in a dark one. "
+        "value at the left is at its highest. The darker a field, the larger the share. "
         f'Without the column "{NONE}" it is {_percent(manner / whole)} on average.'
     )
     return Chart(

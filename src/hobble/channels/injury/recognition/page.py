@@ -37,7 +37,7 @@ def recognition_chart(found: Json) -> Chart | None:
         if table.get("right") is not None:
             title += f": {100 * table['right']:.0f} % right"
         if table.get("right_without_side") is not None:
-            title += f", {100 * table['right_without_side']:.0f} % without side"
+            title += f", {100 * table['right_without_side']:.0f} % if the side does not count"
         options[title] = [
             {
                 "type": "heatmap",
