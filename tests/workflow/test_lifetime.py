@@ -124,3 +124,21 @@ def test_a_stopped_job_cleans_up_silently(tmp_path: Path, number: signal.Signals
     assert process.wait(timeout=10) == 128 + number
     assert process.stdout.read() == ""
     assert [file.name for file in tmp_path.iterdir()] == ["job.log"]
+
+
+def test_a_second_signal_does_not_end_the_clean_up(tmp_path: Path) -> None:
+    """Ctrl-C reaches a job twice: from the terminal, and from Snakemake, which ends its jobs."""
+    work = """
+    try:
+        time.sleep(60)
+    finally:
+        print("cleaning", flush=True)
+        time.sleep(1)
+        print("cleaned", flush=True)"""
+    process = started(tmp_path, work, os.getpid())
+    process.send_signal(signal.SIGINT)
+    assert process.stdout.readline() == "cleaning\n"
+    for number in (signal.SIGTERM, signal.SIGINT):
+        process.send_signal(number)
+    assert process.stdout.read() == "cleaned\n"
+    assert process.wait(timeout=10) == 128 + signal.SIGINT

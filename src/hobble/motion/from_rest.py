@@ -10,7 +10,7 @@ from hobble.core import quat
 from hobble.core.quat import Array
 from hobble.motion.body import SIDES
 from hobble.motion.body_sample import LEFT, BodySample
-from hobble.motion.flat_feet import RAISED, feet_tilt, runs, stands
+from hobble.motion.flat_feet import RAISED, feet_tilt, flat_frames, runs, stands
 from hobble.motion.orient import (
     degrees_between,
     degrees_between_rotations,
@@ -26,6 +26,9 @@ TRUSTED = 30.0
 # A larger difference between standing feet and those of the zero pose is reported. In `patients` it is at
 # most 9 degrees.
 UNLIKE_ZERO = np.radians(12.0)
+# cm between the heights of feet that stand flat, 5th to 95th percentile. With more, the ground is uneven and
+# their angle shows nothing of the rig. On flat ground it is up to 3, in CMU's walks on uneven ground 9 to 18.
+UNEVEN = 6.0
 SHRUG = 12.0  # degrees: mean angle to the chest up to which the zero pose counts for clavicles
 LIMP = 60.0  # degrees: the same for hands and their forearms
 
@@ -82,17 +85,21 @@ def add_rest(frames: dict[int, Array], zero: dict[int, Array], seen: BodySample)
 def zero_doubt(seen: BodySample, zero: dict[int, Array]) -> str | None:
     """A sentence if the feet stand at another angle than in the zero pose. None if they agree.
 
-    zero: frames of `from_rest`. A person's zero pose may stand on its toes or lean.
+    zero: frames of `from_rest`. A person's zero pose may stand on its toes or lean. On uneven ground feet
+    stand at any angle.
     """
     measured = feet_tilt(seen).measured
-    difference, lengths = [], []
+    difference, lengths, heights = [], [], []
     for side in SIDES:
         heel, toe = seen.body.legs[side][2:]
         if toe is not None and (tilt := measured[side]) is not None and stands(seen, side):
             x, y, z = quat.rotate(quat.inv(zero[heel]), seen.bone(heel, toe))
             difference.append(tilt - (RAISED if runs(seen) else 0.0) - np.arctan2(-y, np.hypot(x, z)))
             lengths.append(seen.length(heel, toe))
-    if not difference or abs(np.mean(difference)) < UNLIKE_ZERO:
+            heights.append(seen.at[flat_frames(seen, side), toe, 1])
+    if not difference or np.ptp(np.percentile(np.concatenate(heights), [5, 95])) > UNEVEN:
+        return None
+    if abs(np.mean(difference)) < UNLIKE_ZERO:
         return None
     degrees, more = (
         np.degrees(abs(np.mean(difference))),

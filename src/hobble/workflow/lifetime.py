@@ -123,10 +123,14 @@ def ends_with_run() -> Iterator[None]:
     finally:
         done.set()
         for number, handler in before.items():
-            signal.signal(number, handler)
+            if signal.getsignal(number) is _exit:
+                signal.signal(number, handler)
 
 
 def _exit(number: int, frame: FrameType | None) -> None:
+    # Ctrl-C brings two signals, of the terminal and of Snakemake. The second would end the clean-up.
+    for each in (signal.SIGINT, signal.SIGTERM):
+        signal.signal(each, signal.SIG_IGN)
     raise SystemExit(128 + number)  # not caught by `except Exception`, and runs every `finally`
 
 
