@@ -163,8 +163,8 @@ def difference_map(compared: Compared) -> Chart | None:
         "Difference between two configurations",
         "Eq. 3.2 of Segerstedt: twice the difference of the two means, divided by the sum of the two "
         "standard deviations. He uses the standard deviation of the clips' means. That of single frames is "
-        "several times as large. At 1, the means are one standard deviation apart. Our rule of thumb: "
-        "differences under 0.2 are too small to matter.",
+        "several times as large. A value of 1 says that the means are one standard deviation apart. Our rule "
+        "of thumb: differences under 0.2 are too small to matter.",
         layout=layout,
         height=max(240, 90 + 42 * len(order)),
         choose="Clips and deviation",

@@ -51,9 +51,9 @@ def rollout_chart(found: Json) -> Chart | None:
         "Error when the network continues from its own poses",
         "Mean distance between a joint and its captured position when the network continues from its own "
         "poses, as at run time, for this many frames (60 frames are one second). If the line flattens, the "
-        "character stays stable. This chart measures the pose as drawn: the mean of the predicted position "
-        "and of the previous position moved by the predicted velocity. The charts above measure the "
-        "predicted position alone, so their values differ from the first point here." + sampled(found),
+        "character stays stable. This chart measures the pose as drawn, halfway between two places of a "
+        "joint: the predicted one, and the previous one plus the predicted velocity. The charts above "
+        "measure only the predicted place, so their error of one frame has another value." + sampled(found),
         traces,
         {
             "xaxis": log_axis("frames", [x for trace in traces for x in trace["x"]]),

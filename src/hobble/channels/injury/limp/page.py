@@ -116,8 +116,8 @@ def _named(rows: Sequence[Mapping[str, Any]]) -> tuple[list[Column], list[list[A
     columns = [
         Column.number("severity"),
         Column.count("walks"),
-        Column.number("share that a classifier of strong limps calls impaired"),
-        Column.number("share recognised by the recogniser of mild limps"),
+        Column.number("share called impaired by the recogniser of strong limps"),
+        Column.number("share named by the recogniser of mild limps"),
         Column.number("share with the wrong side"),
     ]
     return columns, [[r["severity"], r["walks"], r["impaired"], r["named"], r["wrong_side"]] for r in rows]

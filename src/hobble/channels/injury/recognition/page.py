@@ -64,7 +64,7 @@ def recognition_chart(found: Json) -> Chart | None:
         "recognition",
         "Is the hurt part recognised?",
         "A classifier trained on captured clips says which part hurts. Rows: the part that hurts. Columns: "
-        "the answer of the classifier. The diagonal is right. A random guess is right "
+        "the answer of the classifier. Answers on the diagonal are right. A random guess is right "
         f"{100 * (found.get('chance') or 0):.0f} % of the time.{note}{captured_sampled(found)}",
         layout={
             "xaxis": {"type": "category", "tickangle": -50, "automargin": True},
