@@ -193,7 +193,7 @@ def task_section(folder: Path, memory_mb: str) -> None:
     """Read one section from disk with limited new address space; an allocation beyond it fails."""
     list(Database.open(folder / "small").blocks("train", 0, 0, 10, 1))  # the program itself, once through
     before = status("VmRSS")
-    limit = (int(memory_mb) << 20) + 2 * STACK  # the threads' stacks, of which the kernel counts every byte
+    limit = (int(memory_mb) << 20) + 2 * STACK  # the threads' stacks; the kernel counts every byte of them
     resource.setrlimit(resource.RLIMIT_AS, (status("VmSize") + limit, resource.RLIM_INFINITY))
     db = Database.open(folder / "db", int(memory_mb))
     rows = sum(len(block.p) for block in db.blocks("train", 0, 0, 10, 1, db.block_rows(BATCH)))

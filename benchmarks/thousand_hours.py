@@ -1,18 +1,20 @@
 """Estimate jobs, bytes and hours of each stage for more motion, from the rates of one or two finished runs.
 
     benchmarks/thousand_hours.py [FOLDER] [--configuration holden] [--against NAME] [--hours 1000]
-        [--clips 2500] [--nodes 80] [--shards 1] [--training-nodes 1] [--batch 0] [--passes 0]
+        [--clips 2500] [--nodes 80] [--shards 1] [--training-nodes 1] [--batch 0] [--passes 0] [--processor]
 
 FOLDER is the folder in which Snakemake ran. From one run, seconds and bytes of jobs over clips are scaled
 with the amount of motion that the configuration uses; all else is unchanged. --against: a run with less
 motion. It prints the growth of each stage from one to the other, as ratios. Then a rule's seconds are a fixed
 part and a part that grows with the motion, from both runs.
 
+--processor: take the processor seconds of a run that shared its machine with other work.
+
 Mirrored clips count as motion: with them, the hours double. Under `synthetic` the bytes are those of the BVH
 files, which are the user's own. --shards: those of the database (`database.shards`). --training-nodes:
-machines that train together, whose network of 10 Gb/s adds to each step what a ring all-reduce of the
-gradient takes; --batch: samples of a step then, and --passes, where not those of the run. Accuracy and
-roll-outs measure at most `evaluation.sample_frames`.
+machines that train together; each step also takes a ring all-reduce of the gradient over 10 Gb/s. --batch
+and --passes: samples of a step and passes, if they differ from the run's. Measurements of clips read at most
+`evaluation.sample_frames`.
 """
 
 from __future__ import annotations
@@ -38,13 +40,18 @@ GROWING = {*OF_BATCHES, "database_shard", "database_merge", "training", "recogni
 SAMPLED = {one.name for one in MEASURES if "sample_frames" in one.options.model_fields}
 FPS = 60
 LINK, DELAY = 1.25e9, 30e-6  # bytes and seconds of a message between machines
+THREADS = 2  # of the training
 CONSTANT_BYTES = {"training", "runtime", "evaluation"}
 
 
 class Run:
-    """A finished run of a configuration. motion: seconds of motion in its database."""
+    """A finished run of a configuration. motion: seconds of motion in its database.
 
-    def __init__(self, folder: Path, name: str) -> None:
+    key: what counts as time, "seconds" on the clock or "cpu_seconds".
+    """
+
+    def __init__(self, folder: Path, name: str, key: str) -> None:
+        self.key = key
         self.home = folder / "results" / name
         self.resolved = yaml.safe_load((self.home / "configuration.yaml").read_text())
         pipeline = json.loads((self.home / "pipeline.json").read_text())
@@ -62,7 +69,7 @@ class Run:
 
     def seconds(self, stage: str) -> dict[str, float]:
         """Rule -> seconds of all its jobs."""
-        return {rule["rule"]: rule["seconds"] for rule in self.stages[stage]["rules"]}
+        return {rule["rule"]: rule[self.key] for rule in self.stages[stage]["rules"]}
 
 
 @dataclass(frozen=True)
@@ -135,7 +142,7 @@ def pass_share(run: Run, options: argparse.Namespace) -> float:
 
 
 def training_hours(run: Run, less: Run | None, options: argparse.Namespace) -> float:
-    """Hours on the clock of so many nodes, each as fast as the one of the run."""
+    """Hours of training on the clock, with nodes as fast as the run's machine."""
     recipe = run.resolved["configuration"]["training"]
     motion = 3600 * options.hours
     history = (run.home / "network/history.csv").read_text()
@@ -145,7 +152,9 @@ def training_hours(run: Run, less: Run | None, options: argparse.Namespace) -> f
     with np.load(run.home / "network/checkpoint.npz") as checkpoint:
         sent = 4 * checkpoint["weights"].size
     ring = 2 * (nodes - 1) * (sent / nodes / LINK + DELAY)
-    return Rate.of("training", "training", run, less).hours(motion) * share / nodes + steps * ring / 3600
+    alone = Rate.of("training", "training", run, less).hours(motion) * share
+    alone /= THREADS if run.key == "cpu_seconds" else 1
+    return alone / nodes + steps * ring / 3600
 
 
 def show_growth(run: Run, less: Run) -> None:
@@ -156,7 +165,7 @@ def show_growth(run: Run, less: Run) -> None:
     print("|---|---|---|---|---|---|---|---|---|---|")
     for name, stage in run.stages.items():
         cells = []
-        for key, unit, form in (("seconds", 1, ",.0f"), ("max_rss_mb", 1, ",.0f"), ("bytes", 1e9, ",.2f")):
+        for key, unit, form in ((run.key, 1, ",.0f"), ("max_rss_mb", 1, ",.0f"), ("bytes", 1e9, ",.2f")):
             before, now = (one[key] / unit for one in (less.stages[name], stage))
             cells += [f"{before:{form}}", f"{now:{form}}", f"{now / before:.2f}" if before else ""]
         print(f"| {name} | {' | '.join(cells)} |")
@@ -175,14 +184,16 @@ def arguments() -> argparse.Namespace:
     parser.add_argument("--shards", type=int, default=1, help="of the database")
     parser.add_argument("--training-nodes", type=int, default=1)
     parser.add_argument("--batch", type=int, default=0, help="samples of a step; 0: that of the run")
+    parser.add_argument("--processor", action="store_true", help="count processor seconds, not the clock's")
     parser.add_argument("--passes", type=float, default=0.0, help="0: those of the run")
     return parser.parse_args()
 
 
 def main() -> None:
     options = arguments()
-    run = Run(options.folder, options.configuration)
-    less = Run(options.folder, options.against) if options.against else None
+    key = "cpu_seconds" if options.processor else "seconds"
+    run = Run(options.folder, options.configuration, key)
+    less = Run(options.folder, options.against, key) if options.against else None
     if less is not None:
         if less.motion >= run.motion:
             raise SystemExit("--against needs a run with less motion")

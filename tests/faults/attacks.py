@@ -1,4 +1,4 @@
-"""Attacks that are tests of their own, each with one file, server or call. They are run and counted."""
+"""Attacks that are existing tests, each with one file, server or call. They are run and counted."""
 
 from __future__ import annotations
 

@@ -63,7 +63,7 @@ PLACES = {
     "the frame time": (_within(r"^Frame Time: (\S+)"), {}),
     "a value": (_value, {"nothing": "refused"}),
 }
-# "2" stands for the row or the line that runs on; Python reads any script's digits, and so may we.
+# Python reads the digits of every script, so a reader may accept them.
 EXCEPT = {("a count of channels", "digits of another script"): "any"}
 
 

@@ -1,8 +1,7 @@
-"""What can be wrong with a text: named mutations, each with what must become of a file that has it.
+"""Mutations of a text: what can be wrong with a file, and the expected result of reading it.
 
-A mutation says "same" (the result must be bit for bit that of the file without it), "refused" (a message with
-the file, and where `placed` with the line), or "any" (another file that may be as good: a sound result or a
-refusal).
+The expected result is "same" (bit for bit that of the file without the mutation), "refused" (a message with
+the file and, if `placed`, the line), or "any" (the mutated file may be valid: a sound result or a refusal).
 """
 
 from __future__ import annotations
@@ -16,7 +15,7 @@ from hypothesis import strategies as st
 Find = Callable[[Random, str], tuple[int, int]]
 Change = Callable[[Random, str], str]
 
-# What can stand where a number should, and whether it still is one.
+# Replacements for a number, and the expected result of each.
 NUMBERS: dict[str, tuple[str, str]] = {
     "a word": ("five", "refused"),
     "nan": ("nan", "refused"),

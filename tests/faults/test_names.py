@@ -124,7 +124,7 @@ def test_an_unreadable_file_that_planning_needs_is_named(reachable: Path, closed
         check(project, ["results/test/report.html"])
         return project.datasets.selected("mine", [])
 
-    read()  # imports what nobody could not
+    read()  # imports the modules first, because the user `nobody` may not
     assert as_nobody(read).startswith("read: ")
     (reachable / closed).chmod(0)
     said = as_nobody(read)

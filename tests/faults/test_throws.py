@@ -25,7 +25,7 @@ TARGETS = [f"results/datasets/tiny/database/clips/{clip}.npz" for clip in CLIPS]
 @pytest.fixture(scope="module")
 def lab() -> Iterator[Lab]:
     with tempfile.TemporaryDirectory(prefix="lab-") as folder:
-        Path(folder).chmod(0o755)  # pytest's own folders let nobody in, as whom a job is run
+        Path(folder).chmod(0o755)  # a job runs as the user `nobody`, who may not enter pytest's own folders
         made = Lab(Path(folder) / "lab")
         made.undisturbed(*TARGETS)
         rules = {job.rule for job in made.jobs}

@@ -287,7 +287,7 @@ def changing_clip(lab: Lab, rng: Random) -> Throw:
         clip = bench.folder / next(p for p in job.inputs if p.endswith(".bvh"))
         record = next((bench.folder / "results").rglob(f"{clip.name}.crc32"), None)
         if record is not None:
-            record.unlink()  # it is a user's clip, which nobody vouches for
+            record.unlink()  # a user's clip has no checksum
         new = (lab.run / next(p for p in other.inputs if p.endswith(".bvh"))).read_bytes()
         delay, pause = rng.uniform(0, 0.8 * lab.seconds[job.name]), rng.uniform(0, 0.01)
 

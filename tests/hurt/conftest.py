@@ -21,7 +21,7 @@ from hobble.motion.options import ClipMotion
 from hobble.synthetic.generate_clip import walk
 from hobble.synthetic.recipes import Segment
 
-# The tests of this folder measure walks alike; as a module of its own, since tests are no package.
+# The tests of this folder share these measurements. Tests are no package, so the module is loaded by path.
 SPEC = importlib.util.spec_from_file_location("hurt_gait", Path(__file__).with_name("gait.py"))
 assert SPEC is not None
 assert SPEC.loader is not None

@@ -61,8 +61,8 @@ def _keeps_to_the_ground(healthy, hurting, links) -> None:
     hurt = hurt_clip(clip, labels, hurting(len(clip), links), flat=flat)
     assert np.isfinite(hurt.clip.rotations).all()
     assert np.isfinite(hurt.clip.root).all()
-    # The frames in which a foot comes down and leaves count for more where a stance is shorter; and a walker
-    # without any slide gets next to none: .3 mm a frame is a fifth of what counts as contact.
+    # A shorter stance gives more weight to the frames in which a foot lands and leaves. A generated walk has
+    # no slide, so its hurt version may have .3 mm a frame, a fifth of the limit for contact.
     assert slide(hurt.clip, hurt.labels) <= max(1.25 * slide(clip, labels), 0.03)
     assert fastest(hurt.clip) <= 1.5 * fastest(clip)
     for side in SIDES:

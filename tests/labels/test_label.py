@@ -32,7 +32,7 @@ def test_hand_made_files_replace_labels_found_from_motion(walker, options, write
     files = [write("w_footsteps.txt", FOOTSTEPS), write("w_gait.txt", "1 jog\n")]
     labels, report = label_clip(clip, files, MOTION, "walk", "rocky", options)
     assert (report.phase_source, report.gait_source) == ("file", "file")
-    # 310 to 370 ends in a line with one number, of which the original makes no rows; 250 to 310 stays.
+    # 310 to 370 ends in a line with one number. The original makes no rows of it. 250 to 310 stays.
     assert labels.cycles.tolist() == [[70, 130], [250, 310]]
     assert report.cycles_dropped == 3
     assert labels.phase_known[310:371].all()

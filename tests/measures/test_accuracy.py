@@ -103,7 +103,9 @@ def test_the_released_network_on_the_original_rows(shared):
     assert round(float(errors[..., 0].mean()), 4) == 0.0438
     assert 2.3 < errors[..., 1].mean() < 2.7
     smooth = joint_errors(RowLayout(31), y, network.predict(x, p), range(31))
-    assert round(float(smooth[..., 0].mean()), 4) == 0.0436  # a phase of its own instead of the bin's
+    assert (
+        round(float(smooth[..., 0].mean()), 4) == 0.0436
+    )  # with each row's own phase instead of that of its bin
 
 
 @pytest.mark.parametrize(("layers", "points"), [(2, 4), (3, 4), (4, 6)])

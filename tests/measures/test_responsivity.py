@@ -77,7 +77,7 @@ def test_a_lap_that_is_never_finished_ends_after_its_time(steady) -> None:
         assert lap["frames"] == 480
         assert lap["seconds"] == 8.0
         assert not lap["finished"]
-        # It passes the first waypoint after 200 frames of 1.5 cm, and never comes to the one aside.
+        # It passes the first waypoint after 200 frames of 1.5 cm. It never reaches the second one, aside.
         assert lap["waypoints_reached"] == 1
         past = 480 * 1.5 - 400
         assert lap["path_overshoot_cm"] == pytest.approx(past * 3 / np.sqrt(3**2 + 1), abs=30)

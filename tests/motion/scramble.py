@@ -25,8 +25,9 @@ from hobble.motion.options import ClipMotion
 from .rewrite import Scramble, stretched, written
 
 Array = np.ndarray
-NEAR = 3.5  # cm: a floor 3.1 cm off is put at 0, and one 2.9 off is not, which says nothing of a rig
-BALL = 3.0  # cm: how much higher or lower a figure may stand whose balls of the feet had to be guessed
+# A floor 3.1 cm off is moved to 0 and one 2.9 cm off is not. Such a difference is no error of the rig.
+NEAR = 3.5  # cm
+BALL = 3.0  # cm: allowed error of the height of a figure whose balls of the feet had to be guessed
 
 
 @dataclass(frozen=True)
@@ -128,8 +129,8 @@ def main() -> None:
 def compare(first: Clip, second: Clip, names: dict[str, str]) -> Array:
     """(N,) mean distance in centimetres of each joint that both have.
 
-    A rig without toes does not tell how high its ankles are above the balls of its feet: how much higher or
-    lower all of the figure stands for that, BALL at most, is taken off.
+    A rig without toes does not show how high its ankles are above the balls of its feet. So the error of the
+    whole figure's height, up to BALL, is subtracted.
     """
     frames = min(len(first), len(second))
     joints = [first.skeleton.index(name) for name in names]

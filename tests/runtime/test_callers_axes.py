@@ -120,8 +120,8 @@ def test_motion_in_other_axes_and_units_is_the_same_motion(network, handed: str,
 def test_an_asymmetric_pose_is_the_same_in_every_convention(
     holden31, handed: str, up: str, unit: str
 ) -> None:
-    """Left arm up, right knee bent: the caller's own bones, turned by the rotations it gets, end where it is
-    told that the joints are, and the left hand is on the caller's left."""
+    """Left arm up, right knee bent. The caller's bones, turned by the returned rotations, end at the returned
+    positions, and the left hand is on the left."""
     local = np.tile([1.0, 0, 0, 0], (1, 31, 1))
     for joint, axis, angle in (("left_shoulder", [0.3, 0, 1.0], 1.1), ("right_hip", [1.0, 0.2, 0], -0.7)):
         axis = np.array(axis) / np.linalg.norm(axis)

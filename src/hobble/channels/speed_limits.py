@@ -64,9 +64,9 @@ class Limits:
 
     @classmethod
     def from_dict(cls, data: Mapping[str, Any], gaits: int, labels: int, highest: float) -> Limits:
-        """The inverse of `to_dict`. In older files nothing is `usual`: then it is the highest speed.
+        """The inverse of `to_dict`. Older files have no `usual`; then the highest speed is used.
 
-        Raises ValueError for a table of other numbers of gaits and labels.
+        Raises ValueError for a table with another number of gaits or labels.
         """
         try:
             levels, speeds = (np.array(data[key], float) for key in ("levels", "speeds"))
@@ -93,7 +93,7 @@ def together(allowed: Sequence[Array], usual: Array) -> Array:
 
     allowed: (C, G) for each channel. usual: (G,). Each channel leaves a share of the usual speed, and the
     shares multiply: a sad person who limps is slower than one who is only sad or only limps. A channel that
-    leaves more than the usual speed takes nothing from it.
+    leaves more than the usual speed does not count.
     """
     shares = [
         np.minimum(1.0, np.divide(one, usual, out=np.ones_like(one), where=usual > 0)) for one in allowed
@@ -221,7 +221,7 @@ class LimitLearner:
         """Gait (n,), share of the healthy speed (n,) and values (n, L) of the cycles with a value above 0.
 
         A hurt version is compared with the same cycle of its source, which has the same values in the other
-        channels. A cycle of a source that has values of this channel itself says nothing.
+        channels. Cycles of a source with values of this channel are left out.
         """
         parts = []
         for source, cycles in self._clips.values():

@@ -74,7 +74,7 @@ class Manifest:
         values["layout"] = self.layout.to_dict()
         values["skeleton"] = json.dumps(
             self.skeleton
-        )  # a text, since keys get sorted and its joints must not
+        )  # as text, because keys are sorted and the joints have to keep their order
         values["shards"] = [asdict(shard) for shard in self.shards]
         values["chunks"] = {split: [c.to_dict() for c in chunks] for split, chunks in self.chunks.items()}
         write_json(path / FILE, values)

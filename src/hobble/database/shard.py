@@ -50,7 +50,7 @@ def write_shard(
     """
     plan = make_plan(clips, splits, channels, STORED[dtype].itemsize, chunk_bytes, sources or {})
     try:
-        for split in SPLITS:  # a chunk may have a second name in a database, so it is not written over
+        for split in SPLITS:  # a chunk may be linked from a database, so it is deleted and not overwritten
             shutil.rmtree(folder / split, ignore_errors=True)
         folder.mkdir(parents=True, exist_ok=True)
         if plan is None:

@@ -160,7 +160,7 @@ def _way(ankle: Array) -> Array:
 def _moved(
     place: Array, when: float, source: HealthyClip, effects: Effects, path: ShortenedPath, side: int
 ) -> Array:
-    """A footprint in the new world.
+    """A footprint after the change.
 
     It moves with the body; the hurt foot lands less far ahead, both wider apart.
     """

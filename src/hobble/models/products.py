@@ -81,7 +81,7 @@ def _by_rows(a: Tensor) -> bool:
 
 
 def _filled(rows: int, columns: int, by_rows: bool, dtype: torch.dtype) -> Tensor:
-    """(rows, columns) of some number; it takes nothing from PyTorch's generator."""
+    """(rows, columns) of one number, so that no random numbers are drawn."""
     shape = (rows, columns) if by_rows else (columns, rows)
     values = torch.full(shape, 0.01, dtype=dtype)
     return values if by_rows else values.T

@@ -94,14 +94,14 @@ def _write_tile(builder, shape, weights_from, inputs_from, sums_at):  # type: ig
 def _fetch_ahead(builder, weights, of_panel, step, k, depth):  # type: ignore[no-untyped-def]
     """Fetch the weights of the panels AHEAD inputs early; at their end, fetch those of the next panels.
 
-    The processor also fetches ahead by itself, but starts again at each panel, and waits if there is one row.
+    The processor's own fetching starts again at each panel, so that a single row would wait for memory.
     """
     index, flag, cell = ir.IntType(64), ir.IntType(32), ir.IntType(8).as_pointer()
     fetch = cgutils.get_or_insert_function(
         builder.module, ir.FunctionType(ir.VoidType(), [cell, flag, flag, flag]), "llvm.prefetch.p0"
     )
     later = builder.add(k, index(AHEAD))
-    # A panel's last input is followed by the next panel, which is among these. Those after them are further.
+    # After its last input, a panel in memory is followed by another one of this tile. Skip these.
     further = builder.select(
         builder.icmp_signed("<", later, depth), index(0), builder.mul(step, index(len(of_panel) - 1))
     )

@@ -198,7 +198,7 @@ def _short_pieces(clip: Clip, jumps: list[Jump]) -> tuple[list[Jump], list[tuple
 
 
 def _copy(clip: Clip) -> Clip:
-    """A clip whose arrays may be changed. Its positions must not have been computed before that."""
+    """A copy whose arrays may be changed, as long as its positions have not been computed."""
     moved = clip.translations
     return replace(
         clip,

@@ -1,6 +1,6 @@
 """Makes the page of a data set before training: a line for each clip, with a small walking figure.
 
-Of very many clips, a sample is read; the lines of the others have what their reports say.
+With very many clips, only a sample is read. The lines of the others show their reports alone.
 """
 
 from __future__ import annotations
@@ -128,7 +128,7 @@ def chosen(reports: Sequence[Mapping[str, Any]], labels: Sequence[Mapping[str, A
         bool(reported(report).warnings or labelled["warnings"])
         for report, labelled in zip(reports, labels, strict=True)
     ]
-    # The first so many numbers in this order are spread evenly, however many they are.
+    # In this order, the first n numbers are spread evenly for every n.
     spread = sorted(range(len(reports)), key=lambda n: n * GOLDEN % 1)
     first, rest = ([n for n in spread if warned[n] is which] for which in (True, False))
     out: list[int] = []

@@ -84,7 +84,7 @@ class MovingRig:
         return own + best[0], (a, *best[1]), (b, *best[2])
 
     def _named_alike(self, a: int, b: int) -> bool:
-        """Whether names allow that two joints are counterparts. A joint with a twin by name has no other."""
+        """Whether names allow that two joints are counterparts. A counterpart by name excludes all others."""
         across = {a: self.children[self.parents[b]], b: self.children[self.parents[a]]}
         for one, other in ((a, b), (b, a)):
             twins = [j for j in across[one] if j != one and are_twins(self.names[one], self.names[j])]

@@ -39,7 +39,7 @@ class Spine:
     def direction(self, start: float, end: float) -> Array:
         """(3,) direction of a bone between two positions along the body.
 
-        A rig with fewer joints has longer bones. They go the way that several bones go here.
+        A rig with fewer joints has longer bones. Each of them replaces several bones of this one.
         """
         chest = int(np.searchsorted(self.shares, 1.0 - 1e-6))
         first = min(self._below(start), chest - 1 if start < 1 else len(self.shares) - 2)

@@ -25,7 +25,9 @@ GAIT_MIX = 0.1
 CORRECTION_RATE = 0.01  # integral gain a frame: a steady error is corrected within a second or two
 CORRECTION_WITHIN = 0.8  # share of the target; with a larger error the character is still turning or starting
 MOST_CORRECTION = 1.0  # largest integral correction, as a share of the target
-FURTHEST_TURN = np.radians(137)  # largest turn to ask for; a larger one may come out the other way round
+FURTHEST_TURN = np.radians(
+    137
+)  # largest turn to ask for; with a larger one the character may turn the other way
 # With `Network.rooted`: largest change of a frame's movement across the target, as a share of the movement.
 PULL = 0.2
 PULL_AHEAD = 0.5  # the same along the target, as a share of PULL; a faster character takes corners wider

@@ -5,6 +5,7 @@ from __future__ import annotations
 import logging
 from collections.abc import Mapping
 from pathlib import Path
+from typing import Any
 
 from hobble.core.files import save_npz
 from hobble.database.reader import Database
@@ -13,7 +14,7 @@ from hobble.models.model import Built
 from hobble.models.network import TERRAIN_SIDE
 from hobble.models.options import Options
 from hobble.training.built import run_built
-from hobble.training.checkpoint import pack
+from hobble.training.checkpoint import State, pack
 from hobble.training.held_out import HeldOut
 from hobble.training.history import write_history
 from hobble.training.options import Training
@@ -68,28 +69,32 @@ def run(
         start=start,
         code=code,
     )
-    blocks, kept = data.layout.blocks("y"), pack(state)
-    best_section = None
+    checkpoint_arrays = pack(state)  # of the last state, before the best weights replace it
+    facts = _facts(state, training) | {"terrain_side": terrain_side}
     if training.keep == "best" and state.best is not None:
         state.network.flat.copy_(state.best)
-        best_section = state.sections - state.since_best
-        log.info("best weights: section %d of %d, by the held-out error", best_section, state.sections)
+        facts["best_section"] = state.sections - state.since_best
+        log.info(
+            "best weights: section %d of %d, by the held-out error", facts["best_section"], state.sections
+        )
+    blocks = data.layout.blocks("y")
     errors = HeldOut(data, state.network.flat.device, 0).every_row(state.network)
     named = zip(["held out, every row", *blocks], errors, strict=True)
     log.info("%s", ", ".join(f"{name} {error:.4f}" for name, error in named))
-    facts = {
-        "passes": passes_of(state.sections, training.sections),
-        "samples": state.samples,
-        "steps": state.adam.steps,
-        "terrain_side": terrain_side,
-    }
-    if best_section is not None:
-        facts["best_section"] = best_section
     if data.rows("held_out"):
         facts["held_out_mse"] = errors[0]
     write_weights(weights, state.network, data, configuration, facts)
     write_history(history, blocks, state.history)
-    save_npz(checkpoint, **kept)
+    save_npz(checkpoint, **checkpoint_arrays)
+
+
+def _facts(state: State, training: Training) -> dict[str, Any]:
+    """Numbers about a training, for the meta data of its weights."""
+    return {
+        "passes": passes_of(state.sections, training.sections),
+        "samples": state.samples,
+        "steps": state.adam.steps,
+    }
 
 
 def passes_of(sections: int, each: int) -> float:

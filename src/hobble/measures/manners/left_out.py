@@ -57,5 +57,5 @@ def _with_shrinkage(values: Array, manner: np.ndarray, person: np.ndarray, shrin
 
 
 def share(right: Sequence[bool] | np.ndarray) -> float | None:
-    """The share that is true, or None of nothing."""
+    """The share that is true; None if there are no values."""
     return round(float(np.mean(right)), 5) if len(right) else None

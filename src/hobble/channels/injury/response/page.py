@@ -20,8 +20,10 @@ UNTRAINED = "never hurt in training"
 GAIT_COLOURS = {"walk": "@accent", "jog": "@g2"}
 HOLLOW = {"symbol": "circle-open", "size": 8, "line": {"width": 1.2}}
 SIDES = (("left", "@accent"), ("right", "@g2"))
-# Small charts: name, title, unit, lines as (column, label, colour), least range of the axis.
-PANELS: tuple[tuple[str, str, str, tuple[tuple[str, str, str], ...], float, bool], ...] = (
+# A small chart: name, title, unit, lines as (column, label, colour), least range of the axis, whether it
+# starts at 0.
+Panel = tuple[str, str, str, tuple[tuple[str, str, str], ...], float, bool]
+PANELS: tuple[Panel, ...] = (
     (
         "pose",
         "Pose",
@@ -119,45 +121,10 @@ def curves(
     sweeps: dict[str, list[Mapping[str, Any]]] = {}
     for row in sorted(rows, key=lambda row: row["link"] in untrained):
         sweeps.setdefault(label_of(row), []).append(row)
-    charts = []
-    for name, title, unit, lines, span, from_zero in PANELS:
-        options: dict[str, list[Trace]] = {}
-        for sweep, some in sweeps.items():
-            x = [row["severity"] for row in some]
-            traces = [
-                line(label, x, [row.get(column) for row in some], colour, mode="lines+markers")
-                | {"marker": {"size": 5}}
-                for column, label, colour in lines
-            ]
-            healing = [row for row in back if label_of(row) == sweep]
-            for column, label, colour in lines if healing else ():
-                x, y = [row["severity"] for row in healing], [row.get(column) for row in healing]
-                traces.append(
-                    line(f"{label}, healing", x, y, colour, width=1.3, dash="dot", showlegend=False)
-                )
-            options[sweep] = traces
-        layout = {
-            "xaxis": axis("severity", dtick=2, range=[-0.3, 10.3]),
-            "yaxis": axis(unit),
-            "showlegend": len(lines) > 1,
-        }
-        ranges = {
-            sweep: {
-                "yaxis": {"range": y_range(rows, some[0]["gait"], [c for c, *_ in lines], span, from_zero)}
-            }
-            for sweep, some in sweeps.items()
-        }
-        charts.append(
-            Chart(
-                f"sweep-{name}",
-                title,
-                "",
-                layout=layout,
-                height=230,
-                options=options,
-                option_layouts=ranges,
-            )
-        )
+    healing: dict[str, list[Mapping[str, Any]]] = {}
+    for row in back:
+        healing.setdefault(label_of(row), []).append(row)
+    charts = [_panel(panel, rows, sweeps, healing) for panel in PANELS]
     return ChartGroup(
         "sweeps",
         "One link at rising severity",
@@ -168,6 +135,43 @@ def curves(
         "training show how much a healthy walk varies.",
         charts,
         "Link and gait",
+    )
+
+
+def _panel(
+    panel: Panel,
+    rows: Sequence[Mapping[str, Any]],
+    sweeps: Mapping[str, Sequence[Mapping[str, Any]]],
+    healing: Mapping[str, Sequence[Mapping[str, Any]]],
+) -> Chart:
+    """The small chart of an entry of PANELS. sweeps, healing: option of the menu -> its rows."""
+    name, title, unit, lines, span, from_zero = panel
+    options: dict[str, list[Trace]] = {}
+    for sweep, some in sweeps.items():
+        x = [row["severity"] for row in some]
+        options[sweep] = [
+            line(label, x, [row.get(column) for row in some], colour, mode="lines+markers")
+            | {"marker": {"size": 5}}
+            for column, label, colour in lines
+        ]
+        falling = healing.get(sweep, ())
+        for column, label, colour in lines if falling else ():
+            x, y = [row["severity"] for row in falling], [row.get(column) for row in falling]
+            options[sweep].append(
+                line(f"{label}, healing", x, y, colour, width=1.3, dash="dot", showlegend=False)
+            )
+    layout = {
+        "xaxis": axis("severity", dtick=2, range=[-0.3, 10.3]),
+        "yaxis": axis(unit),
+        "showlegend": len(lines) > 1,
+    }
+    columns = [column for column, *_ in lines]
+    ranges = {
+        sweep: {"yaxis": {"range": y_range(rows, some[0]["gait"], columns, span, from_zero)}}
+        for sweep, some in sweeps.items()
+    }
+    return Chart(
+        f"sweep-{name}", title, "", layout=layout, height=230, options=options, option_layouts=ranges
     )
 
 

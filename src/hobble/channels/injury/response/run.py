@@ -39,9 +39,9 @@ def injury_response(
 
     motion: the captured clips, whose largest accelerations are compared with the character's. seconds: time
     at each severity. `rows`: one for each gait, link and rising severity. `falling`: the same for falling
-    severity. `responses`: for each gait and link (see `Sweep.response`). `second`, `into_a_jog`, `divided`:
-    see `cases`. `summary`: means over the links that were hurt in training (`trained`) and over the others.
-    `applies` is false for a network without severities.
+    severity. `responses`: for each gait and link (see `SeveritySweep.response`). `second`, `into_a_jog`,
+    `divided`: see `cases`. `summary`: means over the links that were hurt in training (`trained`) and over
+    the others. `applies` is false for a network without severities.
     """
     if not links_of(network):
         return {"configuration": configuration, "applies": False, "reason": NO_SEVERITIES}

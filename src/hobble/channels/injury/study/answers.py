@@ -26,7 +26,7 @@ class ShownFilm:
 class Study:
     """The films of a questionnaire.
 
-    name: the answers have the same one. parts: the parts that people can tick.
+    name: also in each file of answers, to check that they belong together. parts: those that people can tick.
     """
 
     name: str

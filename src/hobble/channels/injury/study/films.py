@@ -26,7 +26,7 @@ from hobble.runtime.options import Runtime
 
 FPS = 60
 SEVERITY = 10.0  # as in the study
-SPEEDS = {"walk": 2.5, "jog": 6.0}  # wanted, cm a frame
+SPEEDS = {"walk": 2.5, "jog": 6.0}  # target speeds, cm a frame
 WARM_UP = 4.0  # seconds of walking before a film begins
 HEALTHY, HURT, CHANGED = 3.0, 7.0, 5.0  # seconds of the parts of a film; a gait changes half-way
 ONE, SEVERAL, GAIT = "one part", "several parts", "change of gait"
@@ -116,7 +116,7 @@ def act(network: Network, film: Film, runtime: Runtime) -> FilmMotion:
 
 
 def hurts_and_gait(film: Film, frame: int) -> tuple[bool, str]:
-    """Whether it hurts at a frame of a film, and which gait is asked for."""
+    """Whether it hurts at a frame of a film, and the target gait."""
     hurts = frame >= HEALTHY * FPS
     changed = frame >= (HEALTHY + HURT) * FPS - CHANGED * FPS / 2
     return hurts, film.gaits[1] if changed else film.gaits[0]
