@@ -161,7 +161,7 @@ def test_excerpts_cover_a_clip_once_and_are_read_as_they_are(tmp_path):
     assert fit == len(rows.mean)
     around = load_excerpt(tmp_path / "a.npz", parts[1], before=2, after=900)
     np.testing.assert_array_equal(around.y, rows.y[831:])
-    with pytest.raises(InputError, match="other rows"):
+    with pytest.raises(InputError, match="as many rows as its summary"):
         load_excerpt(tmp_path / "a.npz", Excerpt("a", 2400, 200, 2600))
 
 

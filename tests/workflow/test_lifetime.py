@@ -130,12 +130,14 @@ def test_a_second_signal_does_not_end_the_clean_up(tmp_path: Path) -> None:
     """Ctrl-C reaches a job twice: from the terminal, and from Snakemake, which ends its jobs."""
     work = """
     try:
+        print("begun", flush=True)
         time.sleep(60)
     finally:
         print("cleaning", flush=True)
         time.sleep(1)
         print("cleaned", flush=True)"""
     process = started(tmp_path, work, os.getpid())
+    assert process.stdout.readline() == "begun\n"
     process.send_signal(signal.SIGINT)
     assert process.stdout.readline() == "cleaning\n"
     for number in (signal.SIGTERM, signal.SIGINT):

@@ -54,7 +54,7 @@ class ArrayParts:
         return self._of(name)[1]
 
     def whole(self, name: str) -> np.ndarray:
-        """A whole array, such as one without rows."""
+        """A whole array. Use it for a scalar, which has no rows."""
         at, shape, dtype = self._of(name)
         return self._read(name, at, shape, dtype)
 

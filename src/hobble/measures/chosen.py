@@ -26,7 +26,7 @@ class Chosen:
     excerpt: Excerpt | None = None
 
     def load(self, before: int = 0, after: int = 0) -> Loaded:
-        """Read the rows, and up to so many of the same clip before and after them."""
+        """Read the rows, and up to `before` and `after` rows of the same clip around them."""
         if self.excerpt is None:
             rows = load_clip_rows(self.path)
             return Loaded(rows, 0, len(rows))
@@ -71,14 +71,14 @@ def sample_of(given: Given, options: SampleOptions) -> Sample | None:
 
 
 def with_sample(result: Json, sample: Sample | None) -> Json:
-    """The result, with what was drawn if it was measured on a sample."""
+    """The result, and the size of the sample if it was measured on one."""
     return result if sample is None else {**result, "sample": sample.to_dict()}
 
 
 def captured_sampled(found: Mapping[str, Any]) -> str:
     """A sentence that only a sample of the captured motion was read; empty if all of it was."""
     words = sampled_words(found)
-    return f" Of the clips, {words}, were read." if words else ""
+    return f" Only a part of the clips was read: {words}." if words else ""
 
 
 def sampled_words(found: Mapping[str, Any]) -> str:

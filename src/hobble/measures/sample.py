@@ -3,12 +3,12 @@
 What is drawn are excerpts of clips (`hobble.rows.excerpts`), so that a long clip is not measured as a whole.
 They are put into strata by split, gait, speed (the slow, middle and fast third of a gait) and channel. Of
 each stratum some are drawn, in proportion to its rows; each split gets half of the rows that are to be
-measured, since the held-out clips are few. An excerpt drawn counts for all rows of its stratum (Cochran,
-Sampling Techniques, 1977, chapters 5 and 6: stratified sampling, ratio estimates).
+measured, since the held-out clips are few. The excerpts drawn from a stratum represent all of its rows
+(Cochran, Sampling Techniques, 1977, chapters 5 and 6: stratified sampling, ratio estimates).
 
 The excerpts of a stratum are drawn one by one, whichever clips they are from. So the confidence interval
 holds although excerpts of one clip resemble each other. It says how far the mean of the sample may be from
-the mean over all rows of these clips. How much other clips would differ, it does not say.
+the mean over all rows of these clips. It does not say how much other clips would differ.
 """
 
 from __future__ import annotations
@@ -54,7 +54,7 @@ class Sample:
 
     @property
     def weights(self) -> dict[Excerpt, float]:
-        """Excerpt in the sample -> number of rows that each of its rows represents, by clip and place."""
+        """Excerpt in the sample -> number of rows that each of its rows represents. By clip and place."""
         return dict(sorted((one, stratum.weight) for stratum in self.strata for one in stratum.drawn))
 
     @property
@@ -69,7 +69,7 @@ class Sample:
     def half_width(self, split: str, values: Mapping[Excerpt, float]) -> float:
         """Half the width of the 95 % confidence interval of the mean over a split's rows.
 
-        values: excerpt in the sample -> its mean.
+        values: excerpt in the sample -> mean of the measured quantity over its rows.
         """
         strata = [stratum for stratum in self.strata if stratum.split == split and stratum.rows]
         total = sum(stratum.rows for stratum in strata)

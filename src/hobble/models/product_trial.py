@@ -62,7 +62,7 @@ def kept(name: str, trial: Callable[[], str], ways: Collection[str], without: st
 def fastest(ways: Mapping[str, Callable[[], object]], clock: Callable[[], float] = perf_counter) -> str:
     """The name of the way with the shortest call. The ways take turns, since other work comes and goes.
 
-    clock: seconds; with one thread best those of the thread, which do not run while other work does.
+    clock: returns seconds. With one thread, use the time of that thread: other work does not add to it.
     """
     best = dict.fromkeys(ways, float("inf"))
     begun = perf_counter()
@@ -114,4 +114,4 @@ def _locked(path: Path) -> Iterator[None]:
 
 @cache
 def _warn_once(problem: str) -> None:
-    log.warning("the fastest products cannot be saved, so the default ones are used (%s)", problem)
+    log.warning("the fastest way to multiply matrices cannot be saved; the default is used (%s)", problem)

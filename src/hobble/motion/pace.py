@@ -17,16 +17,18 @@ from hobble.motion.rig import leg_length
 # Speed of the hips / speed of the lower foot seen from the hips. In 172 clips of CMU, styles, patients,
 # Ferre et al. and the original release it is .88 to 1.17.
 LEAST, MOST = 0.5, 1.7
-STEPS = (50.0, 75.0)  # percentiles of the foot's speed, which is lower in the air than on the ground
-IN_PLACE = 0.15
+# Percentiles of the foot's speed seen from the hips. In the air it is lower than on the ground.
+STEPS = (50.0, 75.0)
+IN_PLACE = 0.15  # with a smaller quotient the hips stay in place
 SLOW = 0.5  # leg lengths a second: slower movements are not compared
 # A foot stands if it is slower than this share of the speed of the hips, both over this many seconds.
 STANDS, SPAN = 0.12, 2 / 15
 # The share of frames in which some foot stands while the hips go. It is .29 or more in those clips, and .2
-# with 1 cm of noise. With rotation channels declared in a wrong order it is .12 or less in 40 of 42 tries, or
-# .25 in a walk straight along an axis.
+# with 1 cm of noise. With rotation channels declared in a wrong order it is .12 or less in 40 of 42 tries.
+# In a walk straight along an axis it is .25.
 SELDOM, NEVER = 0.27, 0.12
-# The factor of the path with which feet stand most often. In those clips it is .85 to 1, as feet roll.
+# The factor by which to scale the path of the hips so that feet stand most often. In those clips it is .85 to
+# 1, as feet roll.
 SHORTEST, LONGEST = 0.79, 1.12
 FACTORS = np.exp(np.linspace(np.log(0.4), np.log(2.5), 47))
 FEWEST = 40  # frames in which the hips go
@@ -34,7 +36,10 @@ UPRIGHT = 0.6  # least height of the hips above the lower foot, in leg lengths
 
 
 def pace(clip: Clip) -> float | None:
-    """Speed of the hips divided by that of the lower foot seen from the hips, by the quantile nearest to 1.
+    """Speed of the hips divided by that of the lower foot seen from the hips.
+
+    The foot's speed may be any between its percentiles STEPS. The one that brings the quotient nearest to 1
+    is taken.
 
     None if both are slow, or if the figure is not upright.
     """

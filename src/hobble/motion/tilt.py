@@ -18,12 +18,12 @@ from hobble.motion.rig import leg_length
 
 LEAST = 6.0  # degrees: a smaller tilt is not told from the errors of the ground's fit
 AGREE = 0.6  # body and ground agree if they differ by less than this share of the tilt
-EVEN = 2.5  # cm: feet that stand at heights further from one plane show no plane
+EVEN = 2.5  # cm, median: if standing feet are further than this from the fitted plane, they show no plane
 # Degrees by which trunk, legs and the line across the body all lean to the same side. In 172 clips of CMU,
 # styles, patients, Ferre et al. and the original release it is 7.5 at most, with a hurt leg.
 ASIDE = 8.0
 LEAN = 4.0  # degrees: how far a walking body leans forward
-WIDE = 0.4  # leg lengths, standard deviation: feet spread further along an axis show its slope on their own
+WIDE = 0.4  # leg lengths, standard deviation: axes along which feet spread further are tried without others
 NARROW = 0.05  # leg lengths: with less spread than this, there is no slope to see
 SLOW = 0.3  # leg lengths a second: the ball of a standing foot is slower
 FEWEST = 10  # positions of standing feet
@@ -56,7 +56,7 @@ def check_tilt(path: Path, clip: Clip, leave: bool) -> None:
     if found is not None:
         raise InputError(
             path,
-            f"the ground under the feet or the body is tilted by {found:.0f} degrees, as if the world were",
+            f"the ground under the feet or the body is tilted by {found:.0f} degrees: the world seems tilted",
             fix="Level the floor where the clip comes from and export it again. If the figure really leans "
             "that far, set motion.defects: leave.",
         )

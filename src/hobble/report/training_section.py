@@ -91,4 +91,4 @@ def history_table(material: Material) -> Table:
         Column.count(name) if name in whole else Column.number(name.replace("_", " "), 4) for name in names
     ]
     rows = list(zip(*material.history.values(), strict=False))
-    return Table(f"{material.name}-history", columns, rows, "Every section of training")
+    return Table(f"{material.name}-history", columns, rows, "Every section (part of a pass) of training")

@@ -90,7 +90,7 @@ def shade(
 
 @njit(nogil=True)
 def fill(points: Array, faces: Any, cover: Array) -> None:  # pragma: no cover
-    """Set pixels to 1 that triangles with corners (V, 3) in pixels cover, seen from either side."""
+    """Set pixels under triangles to 1, seen from either side. points: (V, 3) corners, in pixels."""
     height, width = cover.shape
     for f in range(len(faces)):
         a, b, c = points[faces[f, 0]], points[faces[f, 1]], points[faces[f, 2]]

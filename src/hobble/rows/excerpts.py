@@ -1,4 +1,4 @@
-"""Excerpts of a clip: the units in which a large data set is sampled, so that a long clip need not be read.
+"""Excerpts of a clip: the units in which a large data set is sampled, so that no long clip is read whole.
 
 A clip is cut into excerpts of equal length, of at most LONGEST rows. A shorter clip is one excerpt.
 """
@@ -17,7 +17,7 @@ from hobble.rows.clip_rows import DELETE_IT, ClipRows, load_clip_rows
 from hobble.rows.compose import body_layout
 from hobble.rows.layout import GAITS
 
-LONGEST = 1200  # rows, 20 seconds: several steps, and many of them in an hour
+LONGEST = 1200  # rows, 20 seconds: several steps are in an excerpt, and many excerpts in an hour
 
 
 class Excerpt(NamedTuple):
@@ -73,7 +73,7 @@ def kind(rows: ClipRows, first: int, stop: int) -> Kind:
 
 
 def load_excerpt(path: str | Path, one: Excerpt, before: int = 0, after: int = 0) -> ClipRows:
-    """The rows of an excerpt, and up to so many rows of the same clip before and after it.
+    """The rows of an excerpt, and up to `before` and `after` rows of the same clip around it.
 
     Reads no more of the file than that. Raises InputError if the file is damaged, or if the clip has another
     number of rows.
@@ -81,5 +81,5 @@ def load_excerpt(path: str | Path, one: Excerpt, before: int = 0, after: int = 0
     first, stop = max(0, one.first - before), min(one.of, one.stop + after)
     rows = load_clip_rows(path, None if stop - first == one.of else (first, stop))
     if len(rows) != stop - first:
-        raise InputError(path, f"has other rows than its summary says ({one.of})", fix=DELETE_IT)
+        raise InputError(path, f"does not have as many rows as its summary says ({one.of})", fix=DELETE_IT)
     return rows

@@ -17,9 +17,10 @@ HEIGHT_MIX = 0.5  # share of the remaining foot lift that is applied each frame
 FASTEST_LIFT = 8.0
 # Share of its length to which foot placement may stretch the leg of a held foot behind the hips, unless the
 # network stretches it further. Beyond that the heel rises. Otherwise a foot that is 5 cm behind the network's
-# straightens a knee that is bent by 26 degrees, and a stiff leg would look as if it bent and stretched.
+# straightens a knee that is bent by 26 degrees, and a leg that should be stiff would bend and stretch.
 STRETCH = 0.99
-BEHIND = 10.0  # cm that the toe is behind the hip from which STRETCH holds; a foot ahead of it stays flat
+# STRETCH holds in full if the toe is this many cm behind the hip, or more. A foot ahead of it stays flat.
+BEHIND = 10.0
 BODY_MIX = 0.15  # share of the remaining body lift that is applied each frame
 BODY_FREE = 3.0  # cm that standing feet may be off the ground before the body is raised or lowered
 BODY_MIN_CONTACT = 0.3  # sum of both feet's contacts below which the feet say nothing about the ground
@@ -106,7 +107,10 @@ def raise_heel(position: Any, hip: int, knee: int, heel: int, toe: int, shift: A
 def carry_foot(
     position: Any, rotation: Any, below: Any, heel: int, toe: int, x: float, y: float, z: float, by: Any
 ) -> None:
-    """Move the joints `below` (J,) a heel that was at x, y, z. The foot turns `by` (4,), its toes do not."""
+    """Move a foot along with its heel, which was at x, y, z.
+
+    below: (J,) which joints belong to it, see `carried`. by: (4,) the turn of the foot; its toes do not turn.
+    """
     tx, ty, tz = turned(by, position[toe, 0] - x, position[toe, 1] - y, position[toe, 2] - z)
     tx += position[heel, 0] - position[toe, 0]
     ty += position[heel, 1] - position[toe, 1]
@@ -127,7 +131,10 @@ def carry_foot(
 
 @njit
 def hold_toes_back(position: Any, below: Any, toe: int, shown: Any, base: float, fastest: float) -> None:
-    """`hold_back` for the toe, with the joints `below` (J,) it. A foot may turn faster than a leg."""
+    """`hold_back` for the toe and the joints below it.
+
+    A foot that turns may move its toe faster than its heel. below: (J,), see `carried`.
+    """
     x, y, z = position[toe, 0], position[toe, 1], position[toe, 2]
     if hold_back(position[toe], shown, base, fastest):
         x, y, z = position[toe, 0] - x, position[toe, 1] - y, position[toe, 2] - z

@@ -21,7 +21,7 @@ LOCK_AT = 0.5
 # the knee bends by 46 degrees instead of the network's 53.
 RELEASE = 0.2
 TOO_FAR = 20.0  # cm; a held foot that is further than this from the network's foot steps
-MISSED = 1.0  # cm; a foot that its leg cannot hold nearer than this to its place steps
+MISSED = 1.0  # cm; a held foot steps if its leg cannot keep it within this distance of its place
 # The same while the other foot is in the air: wait for it, so that the character does not hop.
 TOO_FAR_ALONE, MISSED_ALONE = 30.0, 4.0
 STEP_FRAMES = 10  # of a step, a sixth of a second
@@ -41,7 +41,7 @@ def hold_foot(
 
     x, z: the network's toe. contact: of the toe, predicted. locking: whether feet are held at all. shown:
     (3,) where the toe was in the last frame. fastest: cm that it may move in this one. The network's own toe
-    does not move further in a frame, so a foot that is behind gets there.
+    does not move further in a frame, so a foot that is behind catches up.
     """
     lock, hold, step, missed = of
     away_x, away_z = hold[c, f, 0] - x, hold[c, f, 1] - z
@@ -50,7 +50,7 @@ def hold_foot(
         return 0.0, 0.0
     far = np.sqrt(away_x * away_x + away_z * away_z)
     if lock[c, f] < 1.0 and far > TOO_FAR_ALONE:
-        # The network may move its foot by a metre in the meantime. A foot in the air goes along with it.
+        # While the foot is in the air, the network may move its own by a metre. Then the foot goes along.
         away_x, away_z = away_x * TOO_FAR_ALONE / far, away_z * TOO_FAR_ALONE / far
         hold[c, f, 0], hold[c, f, 1] = x + away_x, z + away_z
     if step[c, f] > 0.0:
@@ -76,7 +76,7 @@ def hold_foot(
 
 @njit
 def within(by_x: float, by_z: float, x: float, z: float, shown: Any, fastest: float) -> Any:
-    """`by_x`, `by_z`, changed so that the toe at x, z is moved to `fastest` at most from `shown` (3,)."""
+    """`by_x`, `by_z`, limited so that they move the toe from x, z to within `fastest` of `shown` (3,)."""
     to_x, to_z = x + by_x - shown[0], z + by_z - shown[2]
     far = np.sqrt(to_x * to_x + to_z * to_z)
     if far <= fastest:

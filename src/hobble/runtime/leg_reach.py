@@ -13,8 +13,8 @@ from hobble.core.compiled import njit
 # degrees.
 MOST_ADDED = float(np.radians(28))
 # cm that a knee points forward from the line between hip and heel, at least. In all captured clips it is 1.6
-# or more. A network's knee may move through that line, because positions are predicted joint by joint. A leg
-# that bends where the network's bends would then flip its knee from front to back.
+# or more. A network's knee may move through that line, because positions are predicted joint by joint. If the
+# leg bent to the same side as the network's, its knee would then flip from front to back.
 KNEE_AHEAD = 3.0
 
 # Vectors below are written out by component: array expressions take seconds to compile and allocate memory.
@@ -35,7 +35,7 @@ def between(ax: float, ay: float, az: float, bx: float, by: float, bz: float) ->
 def approach(rotation: Any, w: float, x: float, y: float, z: float) -> bool:
     """Turn `rotation` (4,) in place toward the rotation (w, x, y, z), by MOST_ADDED at most.
 
-    Returns whether it did not reach it.
+    Returns True if it did not get there because of that limit.
     """
     dot = rotation[0] * w + rotation[1] * x + rotation[2] * y + rotation[3] * z
     if dot < 0.0:
@@ -151,7 +151,7 @@ def bend(
     leg: (4,) hip, knee, heel and toe. ahead: (3,) the direction in which a straight knee bends in the rest
     pose. added: (2, 4) rotations added to the network's thigh and shank in the last frame; updated to this
     frame's. shown: (2 or more, 3) knee and heel in the last frame, above `base`. Knee and heel move `fastest`
-    cm at most, so that the heel may not reach its target in this frame.
+    cm at most, so the heel may need more than one frame to reach its target.
     """
     hip, knee, heel = leg[0], leg[1], leg[2]
     hx, hy, hz = position[hip, 0], position[hip, 1], position[hip, 2]

@@ -25,12 +25,12 @@ GAIT_MIX = 0.1
 CORRECTION_RATE = 0.01  # integral gain a frame: a steady error is corrected within a second or two
 CORRECTION_WITHIN = 0.8  # share of the target; with a larger error the character is still turning or starting
 MOST_CORRECTION = 1.0  # largest integral correction, as a share of the target
-FURTHEST_TURN = np.radians(
-    137
-)  # largest turn to ask for; with a larger one the character may turn the other way
-# With `Network.rooted`: largest change of a frame's movement across the target, as a share of the movement.
+# Largest turn to ask for. With a larger one the character may turn the other way.
+FURTHEST_TURN = np.radians(137)
+# With `Network.rooted`: largest change of a frame's movement at right angles to the target, as a share of it.
 PULL = 0.2
-PULL_AHEAD = 0.5  # the same along the target, as a share of PULL; a faster character takes corners wider
+# The same along the target, as a share of PULL. With more, the character takes corners faster and wider.
+PULL_AHEAD = 0.5
 BACKWARD_LOSS = 0.5  # share of movement against the target that is removed; removing all would drag the feet
 STRAFE_FROM = np.radians(45)  # angle between facing and velocity from which the strafe share is 1
 STILL = 0.1  # cm a frame: a slower target means standing
@@ -252,10 +252,10 @@ def advance(
     y: (C, outputs) prediction. at: columns of y (root velocity, turn, phase change, position, direction),
     then the number of future samples and the step.
     rooted: as `Network.rooted`, the movement belongs to the pose. Otherwise it is scaled by (1 - stand)^.25.
-    loss: the share that is removed of movement against the velocity `target` (C, 2), or of all movement
-    if the target is to turn on the spot; 0 is the original runtime.
-    pull: how far the movement is changed toward the target, at most, as a share of its own length (after the
-    adjustment of Holden et al. 2020), because clips have only some directions and speeds.
+    loss: the share of movement against the velocity `target` (C, 2) that is removed. If the target is to turn
+    on the spot, it is removed from all movement. 0 is the original runtime.
+    pull: largest change of the movement toward the target, as a share of its own length. It is needed
+    because clips have only some directions and speeds (after the adjustment of Holden et al. 2020).
     The predicted yaw velocity is that of the world seen from the root, so the root turns by its negative.
     """
     position, direction, gait = path

@@ -29,7 +29,7 @@ class OtherPaces:
     evenly (in its logarithm) between 1 / factor and factor, and 2 a between -RISE and RISE. Trajectory, gait
     and ground are interpolated at the new times, and paths go on straight past their ends. Velocities, turn
     and change of phase are multiplied by r. Then the path moves towards the parabola nearest to it, by a part
-    of the way between 0 and 1, again spread evenly over places and batches.
+    of the way between 0 and 1, again spread evenly, over the places of a batch and over batches.
 
     factor: 1 changes nothing, not even the path. batch: largest number of this process's rows in a batch.
     first: the place of its first row in the whole batch.
@@ -69,7 +69,8 @@ class OtherPaces:
         pace, rise, part = even.to(x.dtype)[:, :, None]
         pace, rise = torch.exp((2 * pace - 1) * self.most), (2 * rise - 1) * RISE / 2
         told = [x[:, columns] for columns in self.told]
-        # The divisor of a column that never varies is far too large to multiply by and divide again.
+        # Channels are put back below as they were: the deviation of one that never varies is far too large to
+        # multiply by and divide by again.
         raw_x, raw_y = x * self.x_std + self.x_mean, y * self.y_std + self.y_mean
         self._play_window(raw_x, raw_y, pace, rise)
         self._play_frame(raw_x, raw_y, pace)
@@ -80,7 +81,7 @@ class OtherPaces:
             x[:, columns] = values
 
     def _play_window(self, x: Tensor, y: Tensor, pace: Tensor, rise: Tensor) -> None:
-        """Trajectory, gait and ground at the new times. Heights stay relative to the mean of the centre."""
+        """Trajectory, gait and ground at the new times. Heights stay relative to the path's mean ground."""
         layout, n = self.layout, self.layout.samples
         blocks = [(layout.x_position, False), (layout.x_direction, True), (layout.x_gait, True)]
         for block, ends in [*blocks, (layout.x_terrain, True)]:
@@ -114,7 +115,7 @@ class OtherPaces:
 
 
 def _nearest(powers: Array) -> Array:
-    """(n, n) the matrix that makes of n values the nearest ones that are sums of the columns of (n, k)."""
+    """(n, n) the matrix that projects n values onto the columns of `powers` (n, k), by least squares."""
     return powers @ np.linalg.pinv(powers)
 
 

@@ -27,11 +27,11 @@ class OtherPoses:
     24 people with three diagnoses or none, it walked like a group that was not requested. With these rows,
     only the channels tell which walk Y belongs to.
 
-    Each place in a batch remembers its last rows. Of those with the same gait and other channel values, the
-    one with the nearest phase is taken. So several processes give the same rows as one. The pose moves by a
-    part of the way between -BEYOND and 1, spread evenly over places and batches. Where the part is negative,
-    the pose is more extreme than any captured one, and the network learns the way back. Without such poses a
-    character that leaned forward leaned more and more.
+    Each place in a batch remembers its own last rows, so several processes give the same rows as one. Of
+    those with the same gait and other channel values, the one with the nearest phase is taken. The pose moves
+    by a part of the way between -BEYOND and 1, spread evenly over places and batches. Where the part is
+    negative, the pose is more extreme than any captured one, and the network learns the way back. Without
+    such poses a character that leaned forward leaned more and more.
 
     share: share of the rows that are moved; 0 changes nothing. batch: largest number of this process's rows
     in a batch. first: the place of its first row in the whole batch.

@@ -18,15 +18,15 @@ WARM_UP = 3  # runs before the capture, in which libraries choose algorithms and
 class Update:
     """Draws the dropout masks of a batch, finds the gradient and takes a step.
 
-    kept: blocks of inputs that are never dropped. Without its channels a row of a hurt body would look like
-    one of a body between healthy and hurt, and a network would trust its channels less.
+    kept: blocks of inputs that are never dropped, such as channels. A dropped input has its mean value. With
+    dropped channels a hurt body would seem to be less hurt, and a network would trust its channels less.
     """
 
     def __init__(self, step: TrainingStep, adam: Adam, kept: Sequence[slice] = ()) -> None:
         self.step, self.adam, self.kept = step, adam, kept
 
     def masks(self, rows: int, own: slice = ALL_ROWS) -> list[Tensor]:
-        """The masks of a batch of `rows` rows, of its rows `own`."""
+        """The masks for the rows `own` of a batch of `rows` rows."""
         masks = self.step.masks(rows, own)
         for block in self.kept:
             masks[self.step.input_mask][:, block] = 1.0

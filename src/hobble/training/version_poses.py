@@ -15,8 +15,8 @@ from hobble.database.window import ChunkWindow, empty_buffers
 from hobble.rows.compose import lower_joints, without_terrain
 
 SPLIT = "train"
-TABLE_BYTES = 256 << 20  # memory for poses; of more rows, every second, third, ... is kept
-CANDIDATES = 8  # rows with the nearest phases; of these the one that turns most alike is taken
+TABLE_BYTES = 256 << 20  # memory for poses; if they need more, only every second (third, ...) row is kept
+CANDIDATES = 8  # rows with the nearest phases; of these the one whose path turns most alike is taken
 NEAR = 1 / 32  # of a cycle: largest difference in phase between two poses that are mixed
 # Multiples of these irrational numbers, less their whole part, are spread evenly over 0..1.
 STEP_OF_PLACE, STEP_OF_BATCH = (math.sqrt(5) - 1) / 2, math.sqrt(2) - 1
@@ -30,9 +30,10 @@ class VersionPoses:
     rows it sees each clip's poses with and without the injury, and only the channels tell which one Y has.
 
     The pose of a hurt row moves along the line to the healthy clip at the same phase, and that of a healthy
-    row along the line to a hurt version. Of the rows with about that phase, the one that turns most alike is
-    taken. The pose moves by a part of the way between -1 and 1, spread evenly over places and batches. So
-    several processes get what one gets. Rows of clips without versions stay.
+    row along the line to a hurt version. Of the rows with about that phase, the one whose path turns most
+    alike is taken. The pose moves by a part of the way between -1 and 1. The part depends only on the row's
+    place in the batch and on the number of the batch, so several processes get the same rows as one. The
+    parts are spread evenly. Rows of clips without versions stay.
 
     The parts have the mean 0. If all poses moved towards the other version, the network would learn that Y
     is further from it than X is. Then a running character exaggerates.
@@ -124,7 +125,7 @@ def _table(database: Database, own: Array) -> tuple[Array, Array, Array]:
 def _of_chunk(
     window: ChunkWindow, own: Array, pose: np.ndarray, way: np.ndarray, database: Database, every: int
 ) -> tuple[Array, Array, Array]:
-    """The rows of one chunk, not sorted. Each is above its first ground."""
+    """The rows of one chunk, not sorted. Heights are above the first of the grounds fitted to the row."""
     key = own[window.clip] + window.phase
     kept = np.flatnonzero(key >= 0)[::every]
     x = widen(window.x[kept]).astype(np.float32)

@@ -130,8 +130,12 @@ def ends_with_run() -> Iterator[None]:
 def _exit(number: int, frame: FrameType | None) -> None:
     # Ctrl-C brings two signals, of the terminal and of Snakemake. The second would end the clean-up.
     for each in (signal.SIGINT, signal.SIGTERM):
-        signal.signal(each, signal.SIG_IGN)
+        signal.signal(each, _disregard)
     raise SystemExit(128 + number)  # not caught by `except Exception`, and runs every `finally`
+
+
+def _disregard(number: int, frame: FrameType | None) -> None:
+    """In place of SIG_IGN: with that, Python prints a traceback if both signals came at once."""
 
 
 def _exit_with_run(run: str, done: threading.Event) -> None:

@@ -1,7 +1,7 @@
 """Lets a run read and write its locks while another run in the same folder ends.
 
-A run that ends removes the whole folder of locks. Snakemake lists that folder and then opens each file, and
-it makes the folder only once, before it plans. A second run that was between the two ended with a
+A run that ends removes the whole folder of locks. Snakemake makes the folder only once, before it plans.
+Later it lists the files in it and opens each. If the folder went in between, a second run ended with a
 FileNotFoundError instead of doing its work.
 """
 
@@ -26,7 +26,10 @@ def _read_locks(self: FilePersistence) -> Iterator[tuple[str, str]]:
 
 
 def _write_locks(self: FilePersistence, kind: str, paths: Iterable[str]) -> None:
-    """Snakemake's own, in a folder that exists. Raises OSError if the folder goes each of ten times."""
+    """Write locks as Snakemake does, but make the folder first. If it is gone again, try ten times.
+
+    Raises OSError if the locks still cannot be written.
+    """
     paths = list(paths)
     for _ in range(10):
         Path(self._lockdir).mkdir(parents=True, exist_ok=True)
@@ -36,6 +39,6 @@ def _write_locks(self: FilePersistence, kind: str, paths: Iterable[str]) -> None
 
 
 def use() -> None:
-    """Let Snakemake lock with it."""
+    """Make Snakemake use these two functions for its locks."""
     persistence: Any = FilePersistence
     persistence._read_locks, persistence._write_locks = _read_locks, _write_locks

@@ -223,7 +223,7 @@ def sampled(found: Json) -> str:
     ]
     return (
         f" Measured on {sampled_words(found)}, and weighted to represent all of them. 95 % confidence "
-        f"intervals, of the means over all frames of these clips: {', '.join(widths)}."
+        f"intervals, of the means over all frames of all clips: {', '.join(widths)}."
     )
 
 

@@ -51,7 +51,8 @@ def summary(found: ChannelResult) -> str:
         f"three target speeds around {found['speed_asked']:.2f} m/s."
     )
     if alone := [m for m, count in captured["people_of"].items() if count < 2]:
-        text += f" Only one clip or person shows {', '.join(alone)}, so it cannot be learnt without them."
+        text += f" Only one clip or person shows {', '.join(alone)}. "
+        text += "While that one is left out, the classifier cannot learn it."
     return text
 
 

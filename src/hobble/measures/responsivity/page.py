@@ -117,7 +117,7 @@ def track_figures(found: Json) -> list[KeyFigure]:
             "Largest distance from the path",
             number(found.get("path_overshoot_cm")),
             "cm",
-            "usually the largest is at a turn",
+            "usually at a turn",
         ),
         KeyFigure("Foot slide", number(slide), "cm" if slide is not None else "", measured),
         _turn(found),

@@ -1,4 +1,4 @@
-"""Write tables III to XVI of the injury study from the answers to its questionnaire.
+"""Write tables III to XVI of the injury study of Ferre (2019) from the answers to its questionnaire.
 
 hobble study results/limp/questionnaire/films.json ANSWERS.json ... --out FOLDER
 

@@ -60,11 +60,11 @@ def section(found: Json, material: Material) -> PageSection:
 def provenance(hurt_seconds: Mapping[str, Mapping[str, float]], say: Callable[[str], str] = str) -> str:
     """Which injuries of the training data were captured and which were generated from healthy clips."""
     parts = []
-    for kind, words in (("captured", "were captured"), ("made", "were generated from healthy clips")):
+    for kind, words in (("captured", "in captured clips"), ("made", "in clips generated from healthy ones")):
         if some := hurt_seconds[kind]:
             names = f": {', '.join(map(say, sorted(some)))}" if len(some) <= MOST_NAMED else ""
-            parts.append(f"{len(some)} links {words} ({number(sum(some.values()), 3)} s{names})")
-    return f"Of the injuries in training, {'; '.join(parts)}." if parts else "No link was hurt in training."
+            parts.append(f"{len(some)} {words} ({number(sum(some.values()), 3)} s{names})")
+    return f"Links hurt in training: {'; '.join(parts)}." if parts else "No link was hurt in training."
 
 
 def size_chart(found: Json) -> Chart:
@@ -150,7 +150,7 @@ def held_out_table(name: str, rows: Sequence[Mapping[str, Any]], say: Callable[[
         f"{name}-limp-exam",
         columns,
         table,
-        "Held-out captured limps: is the hurt character nearer to them?",
+        "Held-out captured limps: is the hurt character nearer to them than the healthy one?",
     )
 
 
@@ -171,9 +171,9 @@ def together_table(name: str, rows: Sequence[Mapping[str, Any]]) -> Table | None
         Column("with"),
         Column.count("walks"),
         Column.number("speed, share of the same walk without injury"),
-        Column.number("called impaired"),
-        Column.number("recognised"),
-        Column.number("wrong side"),
+        Column.number("share that a classifier of strong limps calls impaired"),
+        Column.number("share recognised by the recogniser of mild limps"),
+        Column.number("share with the wrong side"),
     ]
     keys = ("column", "walks", "speed_share", "impaired", "named", "wrong_side")
     title = "Is the limp of a hurt leg (severity 10) recognised if another channel is high too?"

@@ -33,7 +33,7 @@ def injury_hints(found: Json) -> Iterator[Hint]:
             "note",
             f"{len(deaf)} of {_plural(len(walks), 'link')} hardly "
             f"{'changes' if len(deaf) == 1 else 'change'} the walk at severity 10",
-            "(by less than half a centimetre per joint, or by no more than a healthy walk drifts): "
+            "(by less than half a centimetre per joint, or by less than twice the drift of a healthy walk): "
             f"{', '.join(deaf[:4])}{' …' if len(deaf) > 4 else ''}. Add clips in which they hurt.",
         )
     stuck = [

@@ -129,10 +129,10 @@ def curves(
         "sweeps",
         "One link at rising severity",
         "Each point is a separate walk, healthy for the first quarter and measured over the last half. "
-        "Dotted lines: severity falls back to 0. A smooth curve means that the walk changes gradually. A gap "
-        "between left and right is a limp. A jump between neighbours means that the network switches between "
-        "two gaits. Pose distances are means over joints at the same phase. Links that were never hurt in "
-        "training show how much a healthy walk varies.",
+        "Dotted lines: the same while severity falls again. A smooth curve means that the walk changes "
+        "gradually. A gap between left and right is a limp. A jump between neighbours means that the network "
+        "switches between two gaits. Pose distances are means over joints at the same phase. Links that were "
+        "never hurt in training show how much a healthy walk varies.",
         charts,
         "Link and gait",
     )
@@ -290,6 +290,5 @@ def sweep_table(name: str, rows: Sequence[Mapping[str, Any]]) -> Table | None:
         return None
     keys = list(rows[0])
     columns = [Column(k) if isinstance(rows[0][k], str) else Column.number(k.replace("_", " ")) for k in keys]
-    return Table(
-        f"{name}-injury", columns, [[row.get(k) for k in keys] for row in rows], "Every walk measured"
-    )
+    table = [[row.get(k) for k in keys] for row in rows]
+    return Table(f"{name}-injury", columns, table, "Every walk measured (worst: severity 10)")
