@@ -11,22 +11,36 @@ OPENING = 7  # tenths of the highest value: easy to see, but not the maximum
 def opening(playable: Mapping[str, Any], measured: Iterable[Mapping[str, Any]]) -> dict[str, Any]:
     """The slider that is set when the page opens, and its value.
 
-    `part`: the label of the slider whose column changes the walk most according to `measured`, the JSON of
-    the measurements; the first slider if they do not say; None if no channel has sliders. `value`: what the
-    dial is set to, in tenths of the highest value.
+    `part`: the label of the slider whose column makes the walk limp most according to `measured`, the JSON of
+    the measurements. If they measured no limps, the one that changes the pose most; the first slider if they
+    do not say either; None if no channel has sliders. `value`: what the dial is set to, in tenths of the
+    highest value.
     """
     one = first_shown(playable)
     if one is None:
         return {"part": None, "value": 0}
     parts = {one["columns"][i]: label for label, i in one["sliders"].items()}
-    seen = {
-        row["link"]: row.get("from_healthy_cm") or 0.0
-        for found in measured
-        for row in found.get("responses") or ()
-        if row.get("gait") == "walk" and row["link"] in parts
-    }
+    seen: dict[str, tuple[float, float]] = {}
+    for found in measured:
+        for key, size in (("responses", _pose_change), ("sizes", _limp)):
+            for row in found.get(key) or ():
+                if row.get("gait") == "walk" and row["link"] in parts:
+                    seen[row["link"]] = max(seen.get(row["link"], (0.0, 0.0)), size(row))
     best = max(seen, key=lambda column: seen[column]) if seen else next(iter(parts))
     return {"part": parts[best], "value": OPENING}
+
+
+def _pose_change(row: Mapping[str, Any]) -> tuple[float, float]:
+    """How far severity 10 moves the joints, cm, below every limp: a bent back changes the pose most, but a
+    visitor looks for a limp.
+    """
+    return 0.0, row.get("from_healthy_cm") or 0.0
+
+
+def _limp(row: Mapping[str, Any]) -> tuple[float, float]:
+    """How uneven the walk is: what it changes of the stance, the step and the knee of the hurt leg."""
+    shares = [row.get(name) for name in ("step_hurt", "knee_hurt")]
+    return abs(row.get("stance") or 0.0) + sum(abs(1 - share) for share in shares if share is not None), 0.0
 
 
 def body_channel(playable: Mapping[str, Any]) -> Mapping[str, Any] | None:
