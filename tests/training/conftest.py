@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+import torch
 
 from hobble.core.skeleton import Skeleton
 from hobble.database.merge import merge_shards
@@ -17,6 +18,7 @@ from hobble.models.pfnn.options import PfnnOptions
 from hobble.rows.clip_rows import ClipRows
 from hobble.rows.layout import RowLayout
 from hobble.training.options import Training
+from hobble.training.update import Update
 
 SPLITS = {"walk": "train", "hop": "train", "turn": "held_out"}
 
@@ -89,3 +91,17 @@ class Recipe(Training):
 @pytest.fixture
 def training() -> Recipe:
     return Recipe(passes=2, sections=3, learning_rate=1e-3, memory_mb=64, device="cpu")
+
+
+@pytest.fixture
+def given(monkeypatch: pytest.MonkeyPatch) -> list[torch.Tensor]:
+    """The inputs (B, X) of each step that training takes in this test."""
+    inputs: list[torch.Tensor] = []
+
+    def noted(self: Update, x: torch.Tensor, *rest: Any) -> torch.Tensor:
+        inputs.append(x.clone())
+        return plain(self, x, *rest)
+
+    plain = Update.__call__
+    monkeypatch.setattr(Update, "__call__", noted)
+    return inputs

@@ -17,7 +17,6 @@ from hobble.database.reader import Block, Database
 from hobble.rows.clip_rows import ClipRows
 from hobble.training import version_poses
 from hobble.training.train import train
-from hobble.training.update import Update
 from hobble.training.version_poses import CANDIDATES, VersionPoses
 from training.conftest import clip_rows
 
@@ -176,16 +175,8 @@ def test_a_database_without_versions_changes_nothing(data: Database) -> None:
 
 
 def test_training_moves_poses_only_if_asked(
-    healthy_and_hurt: Database, network: Any, training: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    healthy_and_hurt: Database, network: Any, training: Any, tmp_path: Path, given: list[torch.Tensor]
 ) -> None:
-    given: list[torch.Tensor] = []
-
-    def noted(self: Update, x: torch.Tensor, *rest: Any) -> torch.Tensor:
-        given.append(x.clone())
-        return plain(self, x, *rest)
-
-    plain = Update.__call__
-    monkeypatch.setattr(Update, "__call__", noted)
     for options in ({}, {"version_poses": 1.0}):
         settings = type(training).model_validate(
             training.model_dump() | {"passes": 1, "sections": 2, "batch": 90, "rollout": 1} | options

@@ -2,21 +2,18 @@
 
 from __future__ import annotations
 
-import math
-
 import torch
 from torch import Tensor
 
 from hobble.database.reader import Database
 from hobble.rows.layout import GAITS
+from hobble.training.even_spread import EvenSpread
 
 KEPT = 32  # rows that each place in a batch remembers
 NEAR = 1 / 16  # of a cycle: largest difference in phase between two poses that are mixed
 SAME_GAIT = 0.5  # poses are mixed if no share of a gait differs by this much
 BEYOND = 0.5  # a pose also moves away from the other one, by up to this part of the way
 OTHER_VALUE = 1e-3  # standardised: a larger difference is another value of a channel
-# Multiples of these irrational numbers, less their whole part, are spread evenly over 0..1.
-STEP_OF_PLACE, STEP_OF_BATCH = (math.sqrt(5) - 1) / 2, math.sqrt(2) - 1
 
 
 class OtherPoses:
@@ -53,7 +50,7 @@ class OtherPoses:
         ]
         self.values = torch.cat(values).to(device)
         self.places = torch.arange(batch, device=device)
-        self.spread = torch.remainder((first + self.places.double()) * STEP_OF_PLACE, 1.0)
+        self.spread = EvenSpread(batch, device, first)
         rows = batch if self.share else 0
         self.poses, self.gaits, self.channels = (
             torch.zeros(rows, KEPT, len(columns), device=device)
@@ -88,6 +85,6 @@ class OtherPoses:
 
     def _parts(self, rows: int) -> Tensor:
         """(rows,) how far each pose moves: 0, or in `share` of the rows evenly spread from -BEYOND to 1."""
-        even = torch.remainder(self.spread[:rows] + self.batches * STEP_OF_BATCH, 1.0)
+        even = self.spread.numbers(rows, self.batches)
         part = 1 - (1 - even) / self.share
         return torch.where(part > 0, part * (1 + BEYOND) - BEYOND, 0.0)

@@ -13,13 +13,12 @@ from hobble.database.precision import widen
 from hobble.database.reader import Database
 from hobble.database.window import ChunkWindow, empty_buffers
 from hobble.rows.compose import lower_joints, without_terrain
+from hobble.training.even_spread import EvenSpread
 
 SPLIT = "train"
 TABLE_BYTES = 256 << 20  # memory for poses; if they need more, only every second (third, ...) row is kept
 CANDIDATES = 8  # rows with the nearest phases; of these the one whose path turns most alike is taken
 NEAR = 1 / 32  # of a cycle: largest difference in phase between two poses that are mixed
-# Multiples of these irrational numbers, less their whole part, are spread evenly over 0..1.
-STEP_OF_PLACE, STEP_OF_BATCH = (math.sqrt(5) - 1) / 2, math.sqrt(2) - 1
 
 
 class VersionPoses:
@@ -61,8 +60,7 @@ class VersionPoses:
         key, poses, ways = _table(database, self.own)
         self.key = torch.from_numpy(key).to(device)
         self.poses, self.ways = torch.from_numpy(poses).to(device), torch.from_numpy(ways).to(device)
-        self.places = torch.arange(batch, device=device)
-        self.spread = torch.remainder((first + self.places.double()) * STEP_OF_PLACE, 1.0)
+        self.spread = EvenSpread(batch, device, first)
         self.near = torch.arange(CANDIDATES, device=device) - CANDIDATES // 2
         self.batches = 0
 
@@ -92,7 +90,7 @@ class VersionPoses:
 
     def _parts(self, rows: int) -> Tensor:
         """(rows,) how far each pose moves: 0, or in `share` of the rows evenly spread from -1 to 1."""
-        even = torch.remainder(self.spread[:rows] + self.batches * STEP_OF_BATCH, 1.0)
+        even = self.spread.numbers(rows, self.batches)
         return torch.where(even < self.share, 2 * even / self.share - 1, 0.0)
 
 
