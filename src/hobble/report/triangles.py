@@ -60,6 +60,16 @@ def _range(a: float, b: float, c: float, size: int) -> tuple[int, int]:  # pragm
     return max(0, int(np.ceil(min(a, b, c)))), min(size - 1, int(np.floor(max(a, b, c))))
 
 
+@njit(nogil=True, cache=False, inline="always")
+def _weights(
+    a: Array, b: Array, c: Array, x: int, y: int, area: float
+) -> tuple[float, float]:  # pragma: no cover
+    """Weights of corners a and b at pixel (x, y); c has the rest to 1. area: twice that of the triangle."""
+    u = ((b[0] - x) * (c[1] - y) - (b[1] - y) * (c[0] - x)) / area
+    v = ((c[0] - x) * (a[1] - y) - (c[1] - y) * (a[0] - x)) / area
+    return u, v
+
+
 @njit(nogil=True)
 def shade(
     points: Array, colours: Array, faces: Any, picture: Array, depth: Array
@@ -76,8 +86,7 @@ def shade(
         y0, y1 = _range(a[1], b[1], c[1], height)
         for y in range(y0, y1 + 1):
             for x in range(x0, x1 + 1):
-                u = ((b[0] - x) * (c[1] - y) - (b[1] - y) * (c[0] - x)) / area
-                v = ((c[0] - x) * (a[1] - y) - (c[1] - y) * (a[0] - x)) / area
+                u, v = _weights(a, b, c, x, y, area)
                 w = 1.0 - u - v
                 if u < 0 or v < 0 or w < 0:
                     continue
@@ -101,8 +110,7 @@ def fill(points: Array, faces: Any, cover: Array) -> None:  # pragma: no cover
         y0, y1 = _range(a[1], b[1], c[1], height)
         for y in range(y0, y1 + 1):
             for x in range(x0, x1 + 1):
-                u = ((b[0] - x) * (c[1] - y) - (b[1] - y) * (c[0] - x)) / area
-                v = ((c[0] - x) * (a[1] - y) - (c[1] - y) * (a[0] - x)) / area
+                u, v = _weights(a, b, c, x, y, area)
                 if u >= 0 and v >= 0 and u + v <= 1:
                     cover[y, x] = 1.0
 
