@@ -1,10 +1,10 @@
 """One frame of a character in six timed steps: prepare, input, insert, predict, output, update.
 
 - prepare: smooth the caller's target, bend the future trajectory toward it, look up the ground;
-- input: write trajectory, gait, ground, last pose and channel values into a row X, in the root frame;
+- input: write trajectory, gait, ground, last pose and channel values into a row X, in root coordinates;
 - insert: standardise the row;
 - predict: evaluate the network at the present phase, which gives Y;
-- output: turn Y into a world pose, and place the feet of the caller's copy;
+- output: turn Y into a world pose, and place the feet in the copy that the caller gets;
 - update: advance root, past and future trajectory, and phase by one frame.
 """
 
@@ -31,16 +31,17 @@ from hobble.runtime.character import Character, start
 joint_place = register_jitable(rule.joint_place)
 STEPS = ("prepare", "input", "insert", "predict", "output", "update")
 FPS = 60
-HIGHEST = 1e7  # cm, 100 km: largest height of the ground above or below 0; beyond it, heights are imprecise
-# Radians a frame (1500 degrees a second). No joint of a walking or running person turns as fast. A prediction
-# can: if clips have rotations half a turn apart, as in hands, their mean may be any rotation, and a new
-# target changes the next pose at once.
+HIGHEST = 1e7  # cm, 100 km: largest height of the ground above or below 0; larger heights are imprecise
+# Radians a frame (1500 degrees a second). No joint of a walking or running person turns as fast, but a
+# predicted joint can: if clips have rotations half a turn apart, as in hands, their mean may be any rotation.
+# A new target may also change the next pose at once.
 FASTEST_TURN = np.radians(25)
-# cm a frame by which the body rises with the mean height of the path. When a new wish turns the path around
-# on a hill, that height may change by 20 cm at once, while the ground under the feet stays.
+# Largest rise or fall of the body with the mean height of the path, cm a frame. When a new target turns the
+# path around on a hill, that height may change by 20 cm at once, while the ground under the feet stays.
 MOST_CLIMB = 5.0
 
-# Parts of the state that have to be finite. The others are checked at the call or computed in each frame.
+# Parts of the state that are checked to be finite. The others are checked in the call or made anew each
+# frame.
 CHECKED = (
     *("position", "direction", "gait", "joint_position", "joint_velocity", "joint_rotation", "phase"),
     *(
@@ -63,7 +64,7 @@ Ground = Callable[[Array, Array], Array]
 #
 # The pose that the network predicted last: position, velocity (C, J, 3); rotation (C, J, 4), world.
 Joints = tuple[Any, Any, Any]
-# The caller's copy of the pose: root (C, 3), yaw (C,), position (C, J, 3), rotation (C, J, 4).
+# The copy of the pose that the caller gets: root (C, 3), yaw (C,), position (C, J, 3), rotation (C, J, 4).
 Drawn = tuple[Any, Any, Any, Any]
 
 
@@ -179,7 +180,7 @@ class Controller:
         self.seconds[:] = (t1 - t0, t2 - t1, t3 - t2, t4 - t3, t5 - t4, t6 - t5)
 
     def _restore(self, what: str) -> None:
-        """Restart the characters marked in `_unsound` where they were; wanted channel values stay."""
+        """Restart the characters marked in `_unsound` where they are, with the same channel targets."""
         self._warn(what)
         some = np.flatnonzero(self._unsound)
         fresh = start(self.predictor.network, len(some), self.root[some][:, ::2], self.yaw[some])
@@ -253,9 +254,10 @@ class Controller:
 
 
 def _heights(ground: Ground, x: Array, z: Array) -> Array:
-    """The caller's ground at x, z (N,).
+    """Heights (N,) of the caller's ground at x, z (N,), cm.
 
-    Raises ValueError for heights that are not finite, because they would stay in the state.
+    Raises ValueError for a wrong shape, and for heights that are not finite or too large: they would stay in
+    the state.
     """
     heights = np.asarray(ground(x, z), float)
     if heights.shape not in ((), x.shape):
@@ -278,10 +280,10 @@ def _fill_input(
     step: int,
     x: Any,
 ) -> None:
-    """Fill rows x (C, X).
+    """Fill the network's input rows x (C, X), in raw units.
 
-    columns: the first column of each block of BODY, and the column of each of channel_values (C, K). ground:
-    (C, samples, 3) heights. height: (C,) of the ground under the root.
+    ground: (C, samples, 3) heights. height: (C,) mean ground height along the path. columns: the first column
+    of each block of BODY, and the column of each of channel_values (C, K). step: frames between two samples.
     """
     position, direction, gait = path
     joints, velocities, _ = pose
@@ -328,13 +330,12 @@ def _take_output(
     fastest: float,
     drawn: Drawn,
 ) -> None:
-    """Turn the prediction y (C, Y), whose joints begin in column `first`, into the world poses of `pose` and
-    `drawn`.
+    """Turn the prediction y (C, Y) into the world poses `pose` and `drawn`.
 
-    heights: (C,) of the ground under the root, and the lift of the body, see `feet.carry_body`. A joint's
-    position is the mean of the predicted one and the old one plus velocity. No joint moves further
-    than `fastest` (not counting the change of the ground's height), and no joint turns by more than
-    FASTEST_TURN from the last frame.
+    first: first column of the joints. heights: (C,) mean ground height along the path, and (C,) lift of the
+    body, see `feet.carry_body`. A new joint position is the mean of two: the predicted position, and the old
+    position plus the predicted velocity. In a frame no joint moves by more than `fastest` cm, apart from the
+    change of the ground's height, and no joint turns by more than FASTEST_TURN.
     """
     position, direction, _ = path
     joints, velocities, rotations = pose
