@@ -8,8 +8,8 @@ import numpy as np
 
 from hobble.core.compiled import njit
 
-# Largest rotation, in radians, that foot placement may add to the network's thigh or shank; it also limits
-# its change in a frame. One frame in 2,000 needs more; then the foot arrives some frames later. Without the
+# Foot placement adds a rotation to the network's thigh and shank. This is the largest change of that rotation
+# in a frame, radians. One frame in 2,000 needs more; then the foot arrives some frames later. Without the
 # limit, legs snapped by up to 148 degrees.
 MOST_ADDED = float(np.radians(28))
 # Least distance, in cm, by which a knee is ahead of the line between hip and heel. In all captured clips it
