@@ -23,7 +23,7 @@ from hobble.report import compare_tables as tables
 from hobble.report.compare_page import render_compared
 from hobble.report.gather import PUBLISHED, Material
 from hobble.report.playable import playable
-from hobble.report.rounded import rounded
+from hobble.report.rounded_weights import rounded
 
 
 @pytest.fixture(scope="module")

@@ -22,7 +22,7 @@ from hobble.models.load import load_network
 from hobble.models.network import Network
 from hobble.motion.decode import decode, frame_rate
 from hobble.motion.read import read_bvh
-from hobble.report import straight_walk, walked
+from hobble.report import opening_walk, straight_walk
 from hobble.report.formats import embedded
 from hobble.report.playable import playable
 from hobble.runtime.animation import ProceduralAnimation
@@ -177,7 +177,7 @@ def test_the_figures_at_the_top_move_as_the_python_runtime_does(
     column = one["columns"][one["sliders"][hero["part"]]]
     for i, values in enumerate(({column: 7.0}, {})):
         animation = ProceduralAnimation(network, **dict(examples.RUNTIME))
-        for _ in range(walked.FRAMES + 30):
+        for _ in range(opening_walk.FRAMES + 30):
             pose = animation.next_pose(straight_walk.AHEAD, None, "walk", injury=values)
         seen = tab.run(f"""(() => {{
           const c = Hobble.character(Hobble.material.playable.example);

@@ -15,12 +15,12 @@ from hobble.core.errors import HobbleError
 from hobble.core.files import load_npz
 from hobble.core.quat import Array
 from hobble.database import order
+from hobble.database.chunk_window import Buffers, ChunkWindow, empty_buffers, load_chunks
 from hobble.database.manifest import STATISTICS, Manifest
 from hobble.database.precision import widen
 from hobble.database.scale import Shards
+from hobble.database.sharing import SampleRange
 from hobble.database.statistics import Statistics
-from hobble.database.stretches import SampleRange
-from hobble.database.window import Buffers, ChunkWindow, empty_buffers, load_chunks
 from hobble.rows.compose import compose
 from hobble.rows.layout import RowLayout
 
@@ -235,7 +235,7 @@ class Database:
         return self._loaded[split]
 
     def load(self, split: str, some: Sequence[int], into: Buffers) -> ChunkWindow:
-        """Read chunks of a split into the buffers `into` (`hobble.database.window.empty_buffers`)."""
+        """Read chunks of a split into the buffers `into` (`hobble.database.chunk_window.empty_buffers`)."""
         folder = self.path / self.manifest.folder
         return load_chunks(folder, self.manifest, split, some, into, self._shards, self._verified)
 

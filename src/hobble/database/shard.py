@@ -20,11 +20,11 @@ from hobble.core.files import load_npz, read_json, save_npz, write_error, write_
 from hobble.database.chunks import HINT, Chunk
 from hobble.database.learn_limits import add_rows, limit_learners
 from hobble.database.manifest import SPLITS
-from hobble.database.ordered import write_chunks
 from hobble.database.plan import Plan, RowSource, make_plan
 from hobble.database.precision import STORED
 from hobble.database.scatter import make_buckets, scatter
 from hobble.database.statistics import Moments, Statistics, clip_moments, statistics_of_moments, unseen_joints
+from hobble.database.write_in_order import write_chunks
 
 CHUNK_BYTES = 4 << 20  # read at a time: large enough to be fast on any disk, small enough for any memory
 INDEX, MOMENTS, SCALE = "shard.json", "moments.npz", "scale.npz"

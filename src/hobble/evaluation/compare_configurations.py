@@ -13,7 +13,7 @@ from typing import Any
 
 from hobble.evaluation.comparison_rows import PublishedRow, SideBySide, published_row
 from hobble.evaluation.configuration_results import ConfigurationResults
-from hobble.measures.given import Json
+from hobble.measures.inputs import Json
 from hobble.measures.registry import MEASURES
 from hobble.models import network_options
 

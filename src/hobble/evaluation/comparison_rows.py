@@ -9,7 +9,7 @@ from typing import TypedDict
 import numpy as np
 
 from hobble.evaluation.series import difference
-from hobble.measures.given import Json, Row
+from hobble.measures.inputs import Json, Row
 
 
 @dataclass(frozen=True)

@@ -12,7 +12,7 @@ import yaml
 from hobble.core.files import read_json
 from hobble.evaluation.csv_tables import read_numbers
 from hobble.evaluation.pipeline_results import Pipeline
-from hobble.measures.given import Json
+from hobble.measures.inputs import Json
 
 
 @dataclass(frozen=True)

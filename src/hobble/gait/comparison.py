@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 from hobble.core.clip import Clip
 from hobble.gait.cycles import WalkCycles, joined, measure
 from hobble.gait.effect_sizes import effects
-from hobble.gait.graded import Grade, grade
+from hobble.gait.limp_grade import Grade, grade
 from hobble.gait.people import people
 from hobble.gait.profile import Profile, profile
 from hobble.gait.recogniser import RIGHT, SIDES, Impairment, recognise, windows

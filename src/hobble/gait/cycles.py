@@ -84,8 +84,8 @@ def measure(skeleton: Skeleton, positions: Array, fps: float = 60.0) -> WalkCycl
     """
     if len(positions) < SHORTEST * fps:
         return WalkCycles(fps, (), ())
-    seen = signals(skeleton, positions, fps)
-    return WalkCycles(fps, tuple(_cycles(seen)), tuple(_cycles(mirrored(seen))))
+    walk = signals(skeleton, positions, fps)
+    return WalkCycles(fps, tuple(_cycles(walk)), tuple(_cycles(mirrored(walk))))
 
 
 def joined(walks: Iterable[WalkCycles]) -> WalkCycles:
@@ -126,23 +126,23 @@ def _ranges(values: Array, reach: int) -> Array:
     return np.ptp(np.lib.stride_tricks.sliding_window_view(padded, 2 * reach + 1), axis=1)
 
 
-def _cycles(seen: Signals) -> Iterable[Cycle]:
-    right, left = (landings(seen.curves[f"ankle_forward_{side}"], seen.fps) for side in "RL")
+def _cycles(walk: Signals) -> Iterable[Cycle]:
+    right, left = (landings(walk.curves[f"ankle_forward_{side}"], walk.fps) for side in "RL")
     for a, b in itertools.pairwise(right):
         between = [i for i in left if a < i < b]
-        if len(between) == 1 and SHORTEST * seen.fps <= b - a <= LONGEST * seen.fps:
-            travel = np.linalg.norm(np.diff(seen.hips[a : b + 1], axis=0), axis=1).sum()
-            straight = abs(seen.heading[b] - seen.heading[a]) <= STRAIGHT
-            if travel >= LEAST_TRAVEL and straight and seen.ahead[a:b].mean() >= AHEAD:
-                yield _cycle(seen, a, between[0], b)
+        if len(between) == 1 and SHORTEST * walk.fps <= b - a <= LONGEST * walk.fps:
+            travel = np.linalg.norm(np.diff(walk.hips[a : b + 1], axis=0), axis=1).sum()
+            straight = abs(walk.heading[b] - walk.heading[a]) <= STRAIGHT
+            if travel >= LEAST_TRAVEL and straight and walk.ahead[a:b].mean() >= AHEAD:
+                yield _cycle(walk, a, between[0], b)
 
 
-def _cycle(seen: Signals, a: int, other: int, b: int) -> Cycle:
-    seconds = (b - a) / seen.fps
-    speed = float(np.linalg.norm(seen.hips[b] - seen.hips[a])) / seconds
-    apart = seen.curves["ankle_forward_R"] - seen.curves["ankle_forward_L"]
-    standing = {side: float(np.mean(seen.ankle_speed[side][a:b] < SLOW * speed)) for side in "LR"}
-    width = [seen.across["L"][i] - seen.across["R"][i] for i in (a, other)]
+def _cycle(walk: Signals, a: int, other: int, b: int) -> Cycle:
+    seconds = (b - a) / walk.fps
+    speed = float(np.linalg.norm(walk.hips[b] - walk.hips[a])) / seconds
+    apart = walk.curves["ankle_forward_R"] - walk.curves["ankle_forward_L"]
+    standing = {side: float(np.mean(walk.ankle_speed[side][a:b] < SLOW * speed)) for side in "LR"}
+    width = [walk.across["L"][i] - walk.across["R"][i] for i in (a, other)]
     values = (
         seconds,
         speed,
@@ -155,5 +155,5 @@ def _cycle(seen: Signals, a: int, other: int, b: int) -> Cycle:
     )
     at = a + (b - a) * np.arange(SAMPLES) / SAMPLES
     frames = np.arange(a, b + 1)
-    curves = np.stack([np.interp(at, frames, seen.curves[name][a : b + 1]) for name in CURVES])
+    curves = np.stack([np.interp(at, frames, walk.curves[name][a : b + 1]) for name in CURVES])
     return Cycle(a, b, dict(zip(SCALARS, values, strict=True)), curves)

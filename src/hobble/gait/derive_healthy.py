@@ -22,7 +22,7 @@ from hobble.core.quat import Array
 from hobble.gait.comparison import healthy_profile, measure_clip
 from hobble.gait.cycles import WalkCycles
 from hobble.gait.features import features
-from hobble.gait.graded import HEALTHY
+from hobble.gait.limp_grade import HEALTHY
 from hobble.gait.profile import Profile, mirrored, profile
 from hobble.gait.read_clip import SKELETONS, read_clip
 from hobble.gait.recogniser import windows

@@ -9,7 +9,7 @@ import numpy as np
 from hobble.core.clip import Clip
 from hobble.core.quat import Array
 from hobble.core.smooth import gaussian, lowest, mean
-from hobble.labels.model import GAITS
+from hobble.labels.clip_labels import GAITS
 
 STAND, WALK, JOG, CROUCH = range(4)
 GRAVITY = 981.0 / 3600.0  # cm a frame, each frame

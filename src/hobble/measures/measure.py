@@ -3,12 +3,13 @@
 A measurement is a package. Its `__init__` holds `MEASURE`, a `Measure`, and must not import anything slow.
 The other modules of the package are found by name:
 
-- `run.py`: `run(given, options) -> Outcome` measures (see `hobble.measures.given`), and
-  `run_piece(given, options, piece) -> Json` measures one piece, if there are pieces;
-- `page.py`: what the report shows of it (see `hobble.report.measured`), if anything;
+- `run.py`: `run(inputs, options) -> Outcome` measures (see `hobble.measures.inputs`), and
+  `run_piece(inputs, options, piece) -> Json` measures one piece, if there are pieces;
+- `page.py`: what the report shows of it (see `hobble.report.measure_sections`), if anything;
 - `comparison.py`: what it says of configurations side by side
   (see `hobble.evaluation.compare_configurations`), if anything;
-- `comparison_page.py`: what the comparison's page shows of that (see `hobble.report.measured`), if anything.
+- `comparison_page.py`: what the comparison's page shows of that
+  (see `hobble.report.measure_sections`), if anything.
 """
 
 from __future__ import annotations

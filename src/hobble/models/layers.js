@@ -1,5 +1,5 @@
 // Layers with K sets of weights each, packed by `packed_rows`. Their outputs are blended by shares, with an ELU between layers.
-// Weights of 8 bits are packed by `hobble.report.rounded`. They have a factor for each group of columns, others for each row.
+// Weights of 8 bits are packed by `hobble.report.rounded_weights`. They have a factor for each group of columns, others for each row.
 import { bytes } from "../report/web/numbers.js";
 
 export const floats = (text) => new Float32Array(bytes(text));

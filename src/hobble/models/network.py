@@ -15,7 +15,7 @@ from hobble.channels.speed_limits import Limits
 from hobble.core.errors import HobbleError
 from hobble.core.quat import Array
 from hobble.core.skeleton import Skeleton
-from hobble.models.seen import SeenInTraining
+from hobble.models.training_facts import TrainingFacts
 from hobble.rows.layout import GAITS, RowLayout
 
 TERRAIN_SIDE = 25.0  # cm from the path to the side heights, if the file does not say
@@ -54,7 +54,7 @@ class Network(ABC):
     layout: the columns; gaits: the order of the gait blocks; skeleton: None if the file has none.
     channels: name -> labels of its columns, for each input channel. terrain_side: cm from the path to the
     side heights. limits: channel -> speed limits.
-    meta: the file's other metadata. seen: ranges of the training data, None if the file has none.
+    meta: the file's other metadata. training_facts: ranges of the training data, None if the file has none.
     """
 
     kind: ClassVar[str] = ""  # its folder in hobble.models
@@ -76,7 +76,7 @@ class Network(ABC):
     terrain_side: float = TERRAIN_SIDE
     limits: Mapping[str, Limits] = field(default_factory=dict, repr=False)
     meta: Mapping[str, Any] = field(default_factory=dict, repr=False)
-    seen: SeenInTraining | None = field(default=None, repr=False)
+    training_facts: TrainingFacts | None = field(default=None, repr=False)
 
     def trained(self, channel: str) -> tuple[str, ...]:
         """Labels of a channel's columns that were above 0 in training, judged by `x_mean`.

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from hobble.channels.shown import speaker
-from hobble.motion.check import MOST, worst
+from hobble.motion.check_retarget import MOST, worst
 from hobble.report.charts import Chart, Trace, axis
 from hobble.report.formats import size
 from hobble.report.gather import Material

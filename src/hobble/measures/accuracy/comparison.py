@@ -10,7 +10,7 @@ import numpy as np
 from hobble.evaluation.comparison_rows import DifferenceOf, PublishedRow, SideBySide, pair, published_row
 from hobble.evaluation.configuration_results import ConfigurationResults
 from hobble.measures.accuracy.run import SPLITS, clip_rows
-from hobble.measures.given import Json, Row
+from hobble.measures.inputs import Json, Row
 
 NAME = "accuracy"
 WORDS = {"train": "training", "held_out": "held-out"}

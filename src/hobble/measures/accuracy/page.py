@@ -7,8 +7,8 @@ from typing import Any
 
 import numpy as np
 
-from hobble.measures.chosen import sampled_words
-from hobble.measures.given import Json
+from hobble.measures.clip_parts import sampled_words
+from hobble.measures.inputs import Json
 from hobble.report.charts import Chart, axis, mark
 from hobble.report.formats import duration, number
 from hobble.report.gather import Material

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from hobble.measures.given import Json
+from hobble.measures.inputs import Json
 from hobble.report.charts import Chart, Trace, axis, line, mark
 from hobble.report.gather import Material
 

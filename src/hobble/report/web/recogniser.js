@@ -1,5 +1,5 @@
 // Recognises a limp by comparing a walk with the healthy walk of the same figure: what hurts, on which side, how likely.
-// The same as `hobble.gait.features` and `hobble.gait.graded` in Python. The page has the statistics of people's limps.
+// The same as `hobble.gait.features` and `hobble.gait.limp_grade` in Python. The page has the statistics of people's limps.
 import { measureWalk, profile } from "./cycles.js";
 import { bytes } from "./numbers.js";
 

@@ -7,8 +7,8 @@ from typing import Any
 
 from hobble.channels.injury.response.page import in_words
 from hobble.channels.shown import speaker
-from hobble.measures.chosen import captured_sampled
-from hobble.measures.given import Json
+from hobble.measures.clip_parts import captured_sampled
+from hobble.measures.inputs import Json
 from hobble.report.charts import Chart, Trace, axis, line
 from hobble.report.formats import number
 from hobble.report.gather import Material

@@ -8,7 +8,7 @@ from typing import Any
 from hobble.channels.injury.response import page_cases as cases
 from hobble.channels.injury.response.hints import injury_hints
 from hobble.channels.shown import speaker
-from hobble.measures.given import Json
+from hobble.measures.inputs import Json
 from hobble.report.charts import Chart, ChartGroup, Trace, axis, line
 from hobble.report.gather import Material
 from hobble.report.page_parts import ChartPair, PageSection, SectionPart

@@ -46,7 +46,7 @@ SMALL = {
 }
 
 
-def opened(
+def opening_walk(
     network: Network, runtime: Runtime, playable: Mapping[str, Any], measured: Iterable[Mapping[str, Any]]
 ) -> dict[str, Any]:
     """The result of `hero.opening`, with the states of its one or two figures under `walked`.

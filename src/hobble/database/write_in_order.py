@@ -11,7 +11,7 @@ from hobble.database.buckets import Buckets
 from hobble.database.chunks import Chunk, write_chunk
 from hobble.database.plan import Plan
 from hobble.database.precision import narrow
-from hobble.database.split import split_rows
+from hobble.database.standardise import standardise_rows
 from hobble.database.statistics import Statistics
 from hobble.rows.compose import x_columns
 
@@ -28,7 +28,7 @@ def write_chunks(
             count = index["count"][part]
             fit_part = slice(int(ends[start] - count[0]), int(ends[part.stop - 1]))
             raw = frames[part, :columns], frames[part, columns:], fits[fit_part]
-            x, y, ground = split_rows(plan.layout, statistics, *raw, count)
+            x, y, ground = standardise_rows(plan.layout, statistics, *raw, count)
             arrays = {
                 "x": narrow(x, dtype),
                 "y": narrow(y, dtype),

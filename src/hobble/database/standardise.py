@@ -10,7 +10,7 @@ from hobble.rows.compose import lower_joints, without_terrain
 from hobble.rows.layout import RowLayout
 
 
-def split_rows(
+def standardise_rows(
     layout: RowLayout, statistics: Statistics, x: Array, y: Array, fits: Array, count: np.ndarray
 ) -> tuple[Array, Array, Array]:
     """Standardised x, y and fits from raw ones.
