@@ -120,7 +120,7 @@ def without_touching_sheets(values: Array) -> Array:
     """The distances, changed so that two sheets of the surface never touch along an edge.
 
     They touch at a square of the grid of which two opposite corners are inside and the other two outside.
-    There the outer corner nearest to the surface is moved inside, which closes the gap.
+    There the outer corner nearest to the surface becomes an inner one, which joins the two sheets.
     """
     values = values.copy()
     while True:
@@ -144,10 +144,10 @@ def without_touching_sheets(values: Array) -> Array:
 
 
 def surface_net(values: Array, axes: Sequence[Array]) -> tuple[Array, NDArray[np.int64]]:
-    """Corners (V, 3) and triangles (T, 3) of the surface where the grid's `values` are 0.
+    """Vertices (V, 3) and triangles (T, 3) of the surface where the grid's `values` are 0.
 
-    Each cell that the surface crosses has one corner. Each edge of the grid that it crosses is surrounded by
-    four such cells; their corners make two triangles.
+    Each cell that the surface crosses gets one vertex of the mesh. Each edge of the grid that the surface
+    crosses is surrounded by four such cells; their vertices make two triangles.
     """
     inside = values < 0
     shape = np.array(values.shape) - 1
