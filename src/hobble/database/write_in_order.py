@@ -1,4 +1,4 @@
-"""Pass 2 of the shuffle: sort the buckets, standardise them and write chunks."""
+"""Second step of the shuffle: sort the rows of each bucket, standardise them and write chunks."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from hobble.rows.compose import x_columns
 def write_chunks(
     work: Path, split: str, buckets: Buckets, plan: Plan, statistics: Statistics, dtype: str
 ) -> Iterator[Chunk]:
-    """Write each bucket, sorted and standardised, as chunks of `chunk_rows` rows."""
+    """Write each bucket, sorted and standardised, as chunks of `plan.chunk_rows` rows to folder `work`."""
     columns, number = x_columns(plan.layout), 0
     for frames, fits, index in buckets.drain():
         ends = np.cumsum(index["count"])
