@@ -46,9 +46,7 @@ def _evaluate(
         for i in range(len(columns)):
             gate_z[c, i] = z[c, columns[i]]
     shares = np.empty((z.shape[0], experts), np.float32)
-    blend_layers(
-        gate_weights, gate_numbers, gate_plan, np.ones((z.shape[0], 1), np.float32), gate_z, shares
-    )
+    blend_layers(gate_weights, gate_numbers, gate_plan, np.ones((z.shape[0], 1), np.float32), gate_z, shares)
     for c in range(z.shape[0]):
         _softmax(shares[c])
     blend_layers(weights, numbers, plan, shares, z, out)
