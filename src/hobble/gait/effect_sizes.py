@@ -10,7 +10,7 @@ from hobble.gait.people import GAITS, NORMAL, People
 from hobble.gait.profile import Profile, mirrored
 from hobble.gait.recogniser import LEFT, RIGHT
 
-# name -> meaning. "hurt" and "sound" are the sides. Shares are relative to the healthy walk.
+# name -> meaning. "hurt" and "sound" are the two sides of the body.
 EFFECTS: dict[str, str] = {
     "speed": "speed, share of healthy",
     "stride": "stride time, share of healthy",
