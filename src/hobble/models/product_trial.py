@@ -36,7 +36,7 @@ GAIN = 0.97  # a later way has to take at most this share of an earlier one's ti
 log = logging.getLogger("hobble")
 
 
-def kept(name: str, trial: Callable[[], str], ways: Collection[str], without: str) -> str:
+def kept_choice(name: str, trial: Callable[[], str], ways: Collection[str], without: str) -> str:
     """The way that the file names for the product `name`. If it names none, run `trial` and keep its choice.
 
     ways: the allowed names. without: the way to take if the choice cannot be kept. Processes that ask at the

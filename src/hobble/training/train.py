@@ -1,4 +1,8 @@
-"""The training loop: passes, sections, batches; loss, step, log, checkpoint."""
+"""The training loop.
+
+A pass goes once through all training rows. It has sections, and a section has batches. Each batch is changed,
+then the network takes a step. After each section the training logs, measures and saves.
+"""
 
 from __future__ import annotations
 
@@ -42,7 +46,7 @@ def train(
     code: str | None = None,
     processes: Processes = ALONE,
 ) -> State:
-    """Train to `training.passes` passes over the database's training clips; returns where that ends.
+    """Train to `training.passes` passes over the database's training clips; returns the final state.
 
     network, training: these sections of a configuration. checkpoints: a folder with one subfolder for each
     run, named by the hash of everything that determines it; a run resumes from its own checkpoint there.
@@ -108,6 +112,8 @@ def _run(
         paces.begin()
         roll_out.begin()
         for batch in rows.batches(pass_index, section, sections, seed, batch_size):
+            # Play the motion slower or faster; move poses towards those of other channel values, then towards
+            # those of hurt or healthy versions of the clip; add the network's own errors.
             paces.play(batch.x, batch.y)
             others.mix(batch.x, batch.p)
             versions.mix(batch.x, batch.p, batch.clip)

@@ -11,7 +11,7 @@ from hobble.config.sections import PhaseMode
 from hobble.core.errors import HobbleError, InputError
 from hobble.workflow.clip_batches import dataset_of, rules_of_job
 from hobble.workflow.comparison import COMPARE
-from hobble.workflow.copies import refuse_copies
+from hobble.workflow.identical_clips import refuse_copies
 from hobble.workflow.project import Project
 
 if TYPE_CHECKING:

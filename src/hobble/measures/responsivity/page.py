@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from hobble.measures.given import Json
+from hobble.measures.inputs import Json
 from hobble.measures.responsivity.lap_charts import (
     lap_chart,
     lap_median,

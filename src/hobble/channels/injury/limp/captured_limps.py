@@ -17,7 +17,7 @@ from hobble.evaluation.crowd import FPS
 from hobble.gait.cycles import WalkCycles, joined, measure
 from hobble.gait.people import people
 from hobble.gait.profile import Profile, profile
-from hobble.measures.chosen import Chosen
+from hobble.measures.clip_parts import ClipPart
 from hobble.rows.clip_rows import ClipRows
 
 VERSION = re.compile(r"_hurt[1-9](_mirror)?$")  # end of the name of a generated hurt version
@@ -54,7 +54,7 @@ class HurtSeconds:
 
 
 def limps(
-    read: Iterable[Chosen], splits: Mapping[str, str], links: Sequence[str], skeleton: Skeleton
+    read: Iterable[ClipPart], splits: Mapping[str, str], links: Sequence[str], skeleton: Skeleton
 ) -> tuple[list[Limp], HurtSeconds]:
     """The walks of all captured clips, and the seconds for which each link hurts in the training clips.
 

@@ -17,7 +17,7 @@ from hobble.channels.injury.crowd_severities import links as links_of
 from hobble.channels.injury.limp import Options
 from hobble.channels.injury.limp.captured_limps import HurtSeconds, Limp, healthy_of, limps
 from hobble.channels.injury.limp.crowd_walks import FigureWalk, walk_figures
-from hobble.channels.injury.limp.together import limps_together, named_together
+from hobble.channels.injury.limp.with_other_channel import limps_together, named_together
 from hobble.core.errors import HobbleError
 from hobble.core.skeleton import Skeleton
 from hobble.evaluation.spearman import spearman
@@ -28,8 +28,8 @@ from hobble.gait.people import people
 from hobble.gait.profile import Profile, profile
 from hobble.gait.recogniser import RIGHT, SIDES, examples
 from hobble.hurt.body_parts import part_of_link
-from hobble.measures.chosen import chosen, sample_of, with_sample
-from hobble.measures.given import Given, Outcome
+from hobble.measures.clip_parts import clip_parts, sample_of, with_sample
+from hobble.measures.inputs import MeasureInputs, Outcome
 from hobble.models.load import load_network
 from hobble.models.network import Network
 from hobble.runtime.options import Runtime
@@ -66,7 +66,7 @@ def limp(
     `captured`: effects of captured clips. `held_out_limps`: see `compare_held_out`. `second`: see
     `second_injuries`.
     `together`: effects on hurt legs with a value of another channel, and `named_together`, see
-    `hobble.channels.injury.limp.together`.
+    `hobble.channels.injury.limp.with_other_channel`.
     """
     head: dict[str, Any] = {"configuration": configuration}
     if not links_of(network) or network.skeleton is None:
@@ -279,22 +279,22 @@ def _is_part_on_side(skeleton: Skeleton, link: str, part: str, side: str) -> boo
     return found.name == part and hurt_side(skeleton, link) == side
 
 
-def run(given: Given, options: Options) -> Outcome:
+def run(inputs: MeasureInputs, options: Options) -> Outcome:
     """limp.json and its tables."""
-    network = load_network(given.weights)
+    network = load_network(inputs.weights)
     if network.skeleton is None:
-        raise HobbleError(f"{given.weights} has no skeleton")
+        raise HobbleError(f"{inputs.weights} has no skeleton")
     # Without severities there is nothing to measure.
-    sample = sample_of(given, options)
-    read = chosen(given.clips, sample) if links_of(network) else ()
-    every, hurt_seconds = limps(read, given.splits, links_of(network), network.skeleton)
+    sample = sample_of(inputs, options)
+    read = clip_parts(inputs.clips, sample) if links_of(network) else ()
+    every, hurt_seconds = limps(read, inputs.splits, links_of(network), network.skeleton)
     result = limp(
         network,
         every,
         hurt_seconds,
-        given.splits,
-        configuration=given.configuration,
-        runtime=given.runtime,
+        inputs.splits,
+        configuration=inputs.configuration,
+        runtime=inputs.runtime,
         seconds=options.limp_seconds,
     )
     tables = {name: result.get(name, []) for name in ("sizes", "trends", "named", "second", "together")}

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from hobble.channels.injury.recognition.run import rows
 from hobble.evaluation.comparison_rows import PublishedRow, SideBySide, published_row
 from hobble.evaluation.configuration_results import ConfigurationResults
-from hobble.measures.given import Json, Row
+from hobble.measures.inputs import Json, Row
 
 NAME = "recognition"
 

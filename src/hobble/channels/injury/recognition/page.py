@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from hobble.measures.chosen import captured_sampled
-from hobble.measures.given import Json
+from hobble.measures.clip_parts import captured_sampled
+from hobble.measures.inputs import Json
 from hobble.report.charts import Chart, Trace
 from hobble.report.gather import Material
 from hobble.report.page_parts import PageSection, SectionPart

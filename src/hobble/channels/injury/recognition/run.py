@@ -26,8 +26,8 @@ from hobble.evaluation.crowd import run as run_walks
 from hobble.evaluation.gait_features import features
 from hobble.gait.discriminant import Discriminant, learn
 from hobble.hurt.body_parts import part_of_link
-from hobble.measures.chosen import captured_motion, sample_of, with_sample
-from hobble.measures.given import Given, Outcome, Row
+from hobble.measures.clip_parts import captured_motion, sample_of, with_sample
+from hobble.measures.inputs import MeasureInputs, Outcome, Row
 from hobble.measures.sample_options import SampleOptions
 from hobble.models.load import load_network
 from hobble.models.network import Network
@@ -190,19 +190,19 @@ def rows(result: Recognition) -> list[Row]:
     ]
 
 
-def run(given: Given, options: SampleOptions) -> Outcome:
+def run(inputs: MeasureInputs, options: SampleOptions) -> Outcome:
     """recognition.json, and all its confusion tables as one table."""
     # Generated hurt versions are left out: the classifier would learn the generator's table of injuries.
-    clips = {clip: file for clip, file in given.clips.items() if not VERSION.search(clip)}
-    facts = [file for file in given.facts if file.stem in clips]
-    sample = sample_of(replace(given, facts=facts), options)
+    clips = {clip: file for clip, file in inputs.clips.items() if not VERSION.search(clip)}
+    facts = [file for file in inputs.facts if file.stem in clips]
+    sample = sample_of(replace(inputs, facts=facts), options)
     result = recognition(
-        load_network(given.weights),
+        load_network(inputs.weights),
         captured_motion(clips, sample),
-        given.splits,
-        configuration=given.configuration,
-        runtime=given.runtime,
-        people=given.published["recognition"]["share"],
+        inputs.splits,
+        configuration=inputs.configuration,
+        runtime=inputs.runtime,
+        people=inputs.published["recognition"]["share"],
     )
     right = f"named right: {result['generated']['right']} of generated windows" if result["applies"] else ""
     return Outcome(with_sample(result, sample), {"confusion": rows(result)}, right or result["reason"])

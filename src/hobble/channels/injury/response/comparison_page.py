@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from typing import Any
 
+from hobble.report.comparison_charts import Compared
 from hobble.report.page_parts import PageSection, Paragraph, SectionPart
-from hobble.report.side_by_side import Compared
 from hobble.report.tables import Column, Table
 
 INTRODUCTION = (

@@ -15,8 +15,8 @@ from hobble.channels.injury.response.results import InjuryResponse, LinkResponse
 from hobble.channels.injury.response.sweep import SEVERITIES, sweeps
 from hobble.evaluation.captured import Captured
 from hobble.evaluation.crowd import SPEEDS
-from hobble.measures.chosen import captured_motion, sample_of, with_sample
-from hobble.measures.given import Given, Outcome, Row
+from hobble.measures.clip_parts import captured_motion, sample_of, with_sample
+from hobble.measures.inputs import MeasureInputs, Outcome, Row
 from hobble.models.load import load_network
 from hobble.models.network import Network
 from hobble.runtime.options import Runtime
@@ -140,14 +140,14 @@ def _mean(values: Sequence[float | None]) -> float | None:
     return round(float(np.mean(known)), 5) if known else None
 
 
-def run(given: Given, options: Options) -> Outcome:
+def run(inputs: MeasureInputs, options: Options) -> Outcome:
     """injury.json, and its sweeps as tables."""
-    sample = sample_of(given, options)
+    sample = sample_of(inputs, options)
     result = injury_response(
-        load_network(given.weights),
-        captured_motion(given.clips, sample),
-        configuration=given.configuration,
-        runtime=given.runtime,
+        load_network(inputs.weights),
+        captured_motion(inputs.clips, sample),
+        configuration=inputs.configuration,
+        runtime=inputs.runtime,
         seconds=options.seconds,
     )
     tables: dict[str, Sequence[Row]] = {
