@@ -23,7 +23,7 @@ const { spec, targets } = JSON.parse(readFileSync(process.argv[2]));
 const c = createCharacter(spec), flat = () => 0;
 console.log(JSON.stringify(targets.map((target) => {
   c.frame(target, null, "walk", flat);
-  return Array.from(c.pose);
+  return Array.from(c.posePosition);
 })));
 """
 

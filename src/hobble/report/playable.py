@@ -21,7 +21,7 @@ from hobble.runtime.character import start
 from hobble.runtime.limits import HURRY_FACTOR, LAME_BELOW
 from hobble.runtime.options import Runtime
 
-UNSEEN = 1e-7  # an input with a smaller scale has no effect
+NO_EFFECT = 1e-7  # an input with a smaller scale has no effect
 
 
 def playable(network: Network, runtime: Runtime) -> dict[str, Any]:
@@ -36,16 +36,16 @@ def playable(network: Network, runtime: Runtime) -> dict[str, Any]:
     layout = network.layout
     turning = turning_joints(skeleton)
     rows, scale = _rows(layout, turning), inverse(network.x_std)
-    seen = np.flatnonzero(scale > UNSEEN)
+    read = np.flatnonzero(scale > NO_EFFECT)
     legs = feet.leg_joints(skeleton)
     sole = feet.sole_heights(network, legs).tolist()
     carried = feet.carried(skeleton, legs)
     return {
-        "network": {"kind": network.kind, **network.page(seen, rows)},
+        "network": {"kind": network.kind, **network.page(read, rows)},
         "rooted": network.rooted,
-        "seen": seen.tolist(),
-        "xMean": packed(network.x_mean[seen].astype(np.float32)),
-        "xScale": packed(scale[seen].astype(np.float32)),
+        "inputColumns": read.tolist(),
+        "xMean": packed(network.x_mean[read].astype(np.float32)),
+        "xScale": packed(scale[read].astype(np.float32)),
         "yMean": packed(network.y_mean[rows].astype(np.float32)),
         "yStd": packed(network.y_std[rows].astype(np.float32)),
         "turning": turning,
@@ -170,7 +170,7 @@ def _constants() -> dict[str, float]:
         "correctionRate": trajectory.CORRECTION_RATE,
         "correctionWithin": trajectory.CORRECTION_WITHIN,
         "mostCorrection": trajectory.MOST_CORRECTION,
-        "unwishedLoss": trajectory.BACKWARD_LOSS,
+        "backwardLoss": trajectory.BACKWARD_LOSS,
         "pull": trajectory.PULL,
         "pullAhead": trajectory.PULL_AHEAD,
         "furthestTurn": float(trajectory.FURTHEST_TURN),
@@ -178,7 +178,7 @@ def _constants() -> dict[str, float]:
         "turnInPlace": float(animation.TURN_IN_PLACE),
         "jogFrom": animation.JOG_FROM,
         "lameBelow": LAME_BELOW,
-        "hurried": HURRY_FACTOR,
+        "hurryFactor": HURRY_FACTOR,
         "lockAt": foot_lock.LOCK_AT,
         "release": foot_lock.RELEASE,
         "tooFar": foot_lock.TOO_FAR,
@@ -193,7 +193,7 @@ def _constants() -> dict[str, float]:
         "floating": feet.FLOATING,
         "bodyMix": feet.BODY_MIX,
         "bodyFree": feet.BODY_FREE,
-        "bodyFrom": feet.BODY_MIN_CONTACT,
+        "bodyMinContact": feet.BODY_MIN_CONTACT,
         "mostClimb": controller.MOST_CLIMB,
         "mostAdded": leg_reach.MOST_ADDED,
         "kneeAhead": leg_reach.KNEE_AHEAD,

@@ -36,7 +36,7 @@ HIGHEST = 1e7  # cm, 100 km: largest height of the ground above or below 0; beyo
 # can: if clips have rotations half a turn apart, as in hands, their mean may be any rotation, and a new
 # target changes the next pose at once.
 FASTEST_TURN = np.radians(25)
-# cm a frame by which the body rises with the mean height of the path. When a new wish turns the path around
+# cm a frame by which the body rises with the mean height of the path. When a new target turns the path around
 # on a hill, that height may change by 20 cm at once, while the ground under the feet stays.
 MOST_CLIMB = 5.0
 
