@@ -65,7 +65,7 @@ def second_table(name: str, rows: Sequence[Mapping[str, Any]]) -> Table | None:
 
 
 def divided_chart(rows: Sequence[Mapping[str, Any]]) -> Chart | None:
-    """The effect of divided severities."""
+    """How far the walk of a chosen link is from the healthy walk, with a line for each divisor."""
     options: dict[str, list[Trace]] = {}
     scales = sorted({row["scale"] for row in rows})
     for link in dict.fromkeys(row["link"] for row in rows):
