@@ -8,9 +8,9 @@ from hobble.channels import modules_of, shown_modules
 from hobble.core.errors import HobbleError
 from hobble.measures.registry import modules
 from hobble.workflow import lifetime, lock_files, named_outputs
-from hobble.workflow.account import check_may_write, ensure_user_name
+from hobble.workflow.user_account import check_may_write, ensure_user_name
 from hobble.workflow.costs import stages
-from hobble.workflow.demands import Demands
+from hobble.workflow.resource_demands import Demands
 from hobble.workflow.measurements import NAMES as MEASURES
 from hobble.workflow.project import Project
 from hobble.workflow.targets import check, needed_datasets, notes

@@ -12,7 +12,7 @@ import pytest
 
 from hobble.core.files import read_json, write_json
 from hobble.evaluation.csv_tables import write_csv
-from hobble.measures.given import Given
+from hobble.measures.inputs import MeasureInputs
 from hobble.measures.responsivity import Options, pieces
 from hobble.measures.responsivity import run as module
 from hobble.measures.responsivity.run import lap_rows, parameter_counts, responsivity
@@ -152,13 +152,13 @@ def test_laps_that_a_job_of_their_own_ran_give_the_same_tables(
     """The file of a piece has sorted keys; the result and the columns of the table are as without pieces."""
     options = Options(laps=2, laps_other_modes=1, lap_seconds=2.0, modes=("linear",))
     monkeypatch.setattr(module, "load_network", lambda path: network)
-    given = Given("x", {"weights": tmp_path}, runtime=RUNTIME)
+    inputs = MeasureInputs("x", {"weights": tmp_path}, runtime=RUNTIME)
     names = pieces(options, RUNTIME, ("constant", "linear", "cubic"))
     assert names == ("linear", "cubic")
     files = {name: tmp_path / f"{name}.json" for name in names}
     for name, file in files.items():
-        write_json(file, module.run_piece(given, options, name))
-    whole, merged = module.run(given, options), module.run(replace(given, pieces=files), options)
+        write_json(file, module.run_piece(inputs, options, name))
+    whole, merged = module.run(inputs, options), module.run(replace(inputs, pieces=files), options)
     assert without_times(whole.result) == without_times(merged.result)
     assert [len(mode["laps"]) for mode in merged.result["modes"]] == [1, 2]
     of_whole, of_merged = (outcome.tables["laps"] for outcome in (whole, merged))

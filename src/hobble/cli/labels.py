@@ -16,8 +16,8 @@ import numpy as np
 from hobble.cli import batch
 from hobble.core.errors import InputError
 from hobble.core.section import Gait
+from hobble.labels.clip_labels import GAITS
 from hobble.labels.label import label_clip
-from hobble.labels.model import GAITS
 from hobble.labels.options import LabelOptions
 from hobble.labels.read_files import SourceTime
 from hobble.labels.write_files import write_label_files

@@ -12,8 +12,8 @@ from hobble.core.clip import Clip
 from hobble.core.quat import Array
 from hobble.core.smooth import gaussian
 from hobble.hurt.body_parts import LEFT, RIGHT, SIDES
+from hobble.labels.clip_labels import GAITS, Labels
 from hobble.labels.footfall import find_swings
-from hobble.labels.model import GAITS, Labels
 from hobble.labels.options import LabelOptions
 from hobble.labels.phase import phase_of_footsteps
 

@@ -22,7 +22,7 @@ from hobble.hurt.relabel import relabel
 from hobble.hurt.shortened_path import ShortenedPath, ground_below, shorten
 from hobble.hurt.timing import Timing, retime
 from hobble.hurt.upper_body import change_body
-from hobble.labels.model import Labels
+from hobble.labels.clip_labels import Labels
 
 # Radians. In people's recordings the sound knee is bent by 8 to 10 degrees while a stiff leg swings.
 STRAIGHT = np.radians(9.0)

@@ -7,7 +7,7 @@ import numpy as np
 from hobble.hurt.body_parts import LEFT, RIGHT
 from hobble.hurt.interpolate import at_frames
 from hobble.hurt.timing import Timing
-from hobble.labels.model import Labels
+from hobble.labels.clip_labels import Labels
 from hobble.labels.phase import dropped_frames, find_cycles, phase_of_footsteps
 
 

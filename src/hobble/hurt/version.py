@@ -12,7 +12,7 @@ from hobble.core.clip import Clip
 from hobble.hurt.hurt_clip import HurtClip, hurt_clip
 from hobble.hurt.options import Hurt
 from hobble.hurt.schedule import severities
-from hobble.labels.model import LabelReport, Labels
+from hobble.labels.clip_labels import LabelReport, Labels
 from hobble.labels.phase import find_cycles
 from hobble.labels.read_files import whole_frame
 

@@ -8,8 +8,8 @@ import numpy as np
 
 from hobble.core.clip import Clip
 from hobble.core.quat import Array
+from hobble.labels.clip_labels import CONTACT_ROLES
 from hobble.labels.footfall import foot_positions, relative_speeds, swing_peaks
-from hobble.labels.model import CONTACT_ROLES
 from hobble.labels.options import LabelOptions
 
 FEET = ((0, 1), (2, 3))  # heel and toe of the left and of the right foot, in the order of CONTACT_ROLES

@@ -15,7 +15,7 @@ import numpy as np
 from hobble.core.clip import Clip
 from hobble.core.quat import Array
 from hobble.core.smooth import median_of_three
-from hobble.labels.model import CONTACT_ROLES
+from hobble.labels.clip_labels import CONTACT_ROLES
 from hobble.labels.options import LabelOptions
 
 RIGHT, LEFT = 0, 1

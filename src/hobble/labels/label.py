@@ -13,11 +13,11 @@ from hobble.core.clip import Clip
 from hobble.core.files import write_json
 from hobble.core.quat import Array
 from hobble.labels import read_files as label_files
+from hobble.labels.clip_labels import GAITS, LabelReport, Labels
 from hobble.labels.contacts import contacts, stance
 from hobble.labels.footfall import Swing, find_swings, landings
 from hobble.labels.gait import automatic_gait, overwrite_crouch
 from hobble.labels.label_picture import label_picture
-from hobble.labels.model import GAITS, LabelReport, Labels
 from hobble.labels.options import LabelOptions as Options
 from hobble.labels.phase import (
     MARGINS,

@@ -9,7 +9,7 @@ import numpy as np
 from hobble.core.clip import Clip
 from hobble.core.quat import Array
 from hobble.core.smooth import mean
-from hobble.labels.model import CONTACT_ROLES, GAITS, Labels
+from hobble.labels.clip_labels import CONTACT_ROLES, GAITS, Labels
 
 POINTS = 400
 

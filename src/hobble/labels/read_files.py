@@ -15,7 +15,7 @@ import numpy as np
 from hobble.core.errors import InputError
 from hobble.core.quat import Array
 from hobble.core.untrusted import read_text
-from hobble.labels.model import GAITS
+from hobble.labels.clip_labels import GAITS
 
 FILE_GAITS = ("stand", "walk", "jog", "run", "crouch", "jump", "crawl", "unknown")
 TO_GAIT = {"run": "jog", "crawl": "crouch", "unknown": "bump"}

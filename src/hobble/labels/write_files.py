@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 
 from hobble.core.files import write_text
-from hobble.labels.model import GAITS, Labels
+from hobble.labels.clip_labels import GAITS, Labels
 from hobble.labels.read_files import SourceTime
 
 HALF_FADE = 15  # frames at 60 Hz on each side of a change of gait in which the labels fade

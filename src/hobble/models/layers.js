@@ -1,6 +1,6 @@
 // Layers with K sets of weights each. The outputs of the sets are blended by shares. An ELU follows each layer but the last.
-// 16-bit weights are packed by `packed_rows`, with a factor for each row. 8-bit weights are packed by `hobble.report.rounded`, with a
-// factor for each group of columns.
+// 16-bit weights are packed by `packed_rows`, with a factor for each row. 8-bit weights are packed by
+// `hobble.report.rounded_weights`, with a factor for each group of columns.
 import { bytes } from "../report/web/numbers.js";
 
 export const floats = (text) => new Float32Array(bytes(text));
@@ -48,11 +48,11 @@ export const createLayers = (packed) => {
 
 // standardise: raw inputs x into z; inputs that the network does not read are left out. restore: outputs to raw units, in place.
 export const createScales = (spec) => {
-  const mean = floats(spec.xMean), inverse = floats(spec.xScale), seen = Int32Array.from(spec.seen);
+  const mean = floats(spec.xMean), inverse = floats(spec.xScale), columnsOfX = Int32Array.from(spec.inputColumns);
   const yMean = floats(spec.yMean), yStd = floats(spec.yStd);
   return {
     inputs: mean.length,
-    standardise: (x, z) => { for (let c = 0; c < mean.length; c++) z[c] = (x[seen[c]] - mean[c]) * inverse[c]; },
+    standardise: (x, z) => { for (let c = 0; c < mean.length; c++) z[c] = (x[columnsOfX[c]] - mean[c]) * inverse[c]; },
     restore: (y) => { for (let r = 0; r < y.length; r++) y[r] = y[r] * yStd[r] + yMean[r]; return y; },
   };
 };

@@ -17,7 +17,7 @@ from hobble.core.skeleton import Skeleton
 from hobble.core.untrusted import read_yaml
 from hobble.models import DEFAULT, MODELS, checks, model
 from hobble.models.network import TERRAIN_SIDE, Network
-from hobble.models.seen import SeenInTraining
+from hobble.models.training_facts import TrainingFacts
 from hobble.rows.layout import GAITS, RowLayout
 
 MOST_META = 1 << 22  # characters in `meta`
@@ -79,7 +79,7 @@ def network_from_arrays(
         "channels": {name: _labels(path, name, meta, layout, skeleton) for name, _ in layout.channels},
         "terrain_side": checks.length(path, "terrain_side", meta.get("terrain_side", TERRAIN_SIDE), WIDEST),
         "meta": meta,
-        "seen": SeenInTraining.read(path, arrays, layout.x_size, layout.y_size),
+        "training_facts": TrainingFacts.read(path, arrays, layout.x_size, layout.y_size),
     }
     common["limits"] = _limits(path, meta, common["channels"], len(common["gaits"]))
     network = model(kind).read(path, arrays, common)

@@ -36,7 +36,7 @@ GAIN = 0.97  # a way replaces one listed before it only if it takes less than th
 log = logging.getLogger("hobble")
 
 
-def kept(name: str, trial: Callable[[], str], ways: Collection[str], without: str) -> str:
+def kept_choice(name: str, trial: Callable[[], str], ways: Collection[str], without: str) -> str:
     """The way that the file names for the product `name`. If it names none, run `trial` and store its choice.
 
     ways: the allowed names. without: the way to take if the choice cannot be stored. Processes that ask at

@@ -74,7 +74,7 @@ def _chosen(shape: tuple[int, int, int], by_rows: tuple[bool, bool], dtype: torc
         return product_trial.fastest({name: partial(way, a, b, out) for name, way in WAYS.items()}, clock)
 
     without = "linear" if dtype == torch.float32 and "linear" in WAYS else "plain"
-    return product_trial.kept(name, trial, WAYS, without)
+    return product_trial.kept_choice(name, trial, WAYS, without)
 
 
 def _by_rows(a: Tensor) -> bool:

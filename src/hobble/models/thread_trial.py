@@ -13,7 +13,7 @@ from time import perf_counter, process_time
 
 import torch
 
-from hobble.models.product_trial import GAIN, kept
+from hobble.models.product_trial import GAIN, kept_choice
 
 INPUTS, OUTPUTS = 512, 2048  # size of the product in the trial: a layer of 512 units, four sets of weights
 SECONDS = 0.01  # length of the calls that are timed together; single calls are too short to be timed
@@ -34,7 +34,7 @@ def threads_for(batch: int, most: int) -> int:
     rows = 1 << (batch - 1).bit_length()
     ways = ("1", str(most))
     name = f"threads for {rows} rows, at most {most}"
-    return int(kept(name, partial(_trial, rows, most), ways, without=ways[1]))
+    return int(kept_choice(name, partial(_trial, rows, most), ways, without=ways[1]))
 
 
 def _trial(rows: int, most: int) -> str:

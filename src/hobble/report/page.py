@@ -16,7 +16,7 @@ from hobble.report import (
     coverage,
     data_section,
     findings,
-    measured,
+    measure_sections,
     shown_clips,
     terrain_section,
     training_section,
@@ -49,7 +49,7 @@ def render(
     terrain = shown_clips.files_of(material.terrain, clips)
     some = shown_clips.sampled(material.rows)
     found = coverage.seconds_of_data(some, material.splits, of=len(material.rows))
-    sections, shown = _sections(material, found, clips, terrain), measured.sections(material)
+    sections, shown = _sections(material, found, clips, terrain), measure_sections.sections(material)
     strips = data_section.strips(material, clips)
     scenes = dict(scenes or {})
     grounds = ground_pictures(terrain, material.network["skeleton"])

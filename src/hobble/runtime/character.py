@@ -80,10 +80,10 @@ def start(network: Network, characters: int, position: Array, yaw: Array) -> Cha
     They start in the start frame of the network's file, a standing one if the clips have any. If the file has
     no start frame, they start in the network's mean pose.
     """
-    layout, seen = network.layout, network.seen
+    layout, facts = network.layout, network.training_facts
     count = characters
     columns = sum(columns for _, columns in layout.channels)
-    now = network.y_mean.astype(float) if seen is None else seen.start_y.astype(float)
+    now = network.y_mean.astype(float) if facts is None else facts.start_y.astype(float)
     path, heading, gait = _past(network)
     sin, cos = np.sin(yaw)[:, None], np.cos(yaw)[:, None]
     joints = now[layout.y_joint_position].reshape(-1, 3)
@@ -91,7 +91,7 @@ def start(network: Network, characters: int, position: Array, yaw: Array) -> Cha
     placed[..., ::2] += position[:, None]
     assert network.skeleton is not None
     legs = [[network.skeleton.role(f"{side}_{part}") for part in SHOWN] for side in ("left", "right")]
-    moving = np.zeros_like(joints) if seen is None else now[layout.y_joint_velocity].reshape(-1, 3)
+    moving = np.zeros_like(joints) if facts is None else now[layout.y_joint_velocity].reshape(-1, 3)
     turns = now[layout.y_joint_rotation].reshape(-1, 3)
     facing = np.concatenate([sin, cos], axis=1)
     return Character(
@@ -103,7 +103,7 @@ def start(network: Network, characters: int, position: Array, yaw: Array) -> Cha
         joint_position=np.ascontiguousarray(placed),
         joint_velocity=np.ascontiguousarray(_turned(moving, sin, cos)),
         joint_rotation=quat.mul(quat.yaw(yaw)[:, None], quat.exp(turns)),
-        phase=np.full(count, 0.0 if seen is None else seen.start_phase),
+        phase=np.full(count, 0.0 if facts is None else facts.start_phase),
         channel_values=np.zeros((count, columns)),
         channel_targets=np.zeros((count, columns)),
         smoothed_velocity=np.zeros((count, 2)),
@@ -128,16 +128,16 @@ def _past(network: Network) -> tuple[Array, Array, Array]:
 
     If the file has no start frame, the character stands still.
     """
-    layout, seen = network.layout, network.seen
+    layout, facts = network.layout, network.training_facts
     length = 2 * layout.window
-    if seen is None:
+    if facts is None:
         gait = np.zeros((length, len(network.gaits)))
         gait[:, network.gaits.index("stand")] = 1.0
         return np.zeros((length, 2)), np.tile([0.0, 1.0], (length, 1)), gait
     frames, samples = np.arange(-layout.window, layout.window), np.array(layout.offsets)
 
     def through(block: slice) -> Array:
-        rows = seen.start_x[block].astype(float).reshape(-1, layout.samples)
+        rows = facts.start_x[block].astype(float).reshape(-1, layout.samples)
         return np.stack([np.interp(frames, samples, row) for row in rows], axis=1)
 
     facing = through(layout.x_direction)

@@ -16,9 +16,9 @@ from hobble.core.files import save_npz
 from hobble.core.quat import Array
 from hobble.motion.root import RootFrames, continued, root_frames
 from hobble.terrain.cycle_ground import Ground, fit_cycle, flat_ground
+from hobble.terrain.fit_picture import FitPicture, picture_cycles, picture_of
 from hobble.terrain.options import Fitting, HeightSampling
 from hobble.terrain.patches import Patches
-from hobble.terrain.picture import Picture, picture_cycles, picture_of
 from hobble.terrain.soles import Feet, Mask, find_soles, held_above_other
 
 log = logging.getLogger("hobble.terrain")
@@ -46,7 +46,7 @@ class ClipFits:
     foot_below: Array = field(repr=False)
     heel_height: float
     toe_height: float
-    pictures: tuple[Picture, ...] = field(default=(), repr=False)
+    pictures: tuple[FitPicture, ...] = field(default=(), repr=False)
 
 
 def clip_fits(

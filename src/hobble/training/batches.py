@@ -11,7 +11,7 @@ from torch import Tensor
 
 from hobble.core.errors import HobbleError
 from hobble.database.reader import Database
-from hobble.database.stretches import SampleRange, Sharing
+from hobble.database.sharing import SampleRange, Sharing
 from hobble.training.processes import ALONE, Processes
 
 TRAIN = "train"

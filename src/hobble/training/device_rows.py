@@ -9,10 +9,10 @@ import torch
 from torch import Tensor
 
 from hobble.database import order
+from hobble.database.chunk_window import empty_buffers
 from hobble.database.manifest import Manifest
 from hobble.database.reader import Database
-from hobble.database.stretches import SampleRange, Sharing
-from hobble.database.window import empty_buffers
+from hobble.database.sharing import SampleRange, Sharing
 from hobble.rows.compose import compose, fit_columns, x_columns
 from hobble.training.batches import TRAIN, HostRows, SampleBatch, TrainingRows
 from hobble.training.processes import ALONE, Processes

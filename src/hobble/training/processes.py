@@ -20,7 +20,7 @@ import torch.distributed
 from torch import Tensor
 
 from hobble.core.errors import HobbleError
-from hobble.database.stretches import Sharing, own_places
+from hobble.database.sharing import Sharing, own_places
 
 PATIENCE = timedelta(minutes=30)  # wait for the slowest process; a dead process is noticed at once
 

@@ -13,7 +13,7 @@ from hobble.models import model
 from hobble.models.model import Built
 from hobble.models.network import TERRAIN_SIDE
 from hobble.models.options import Options
-from hobble.training.built import run_built
+from hobble.training.build_network import run_built
 from hobble.training.checkpoint import State, pack
 from hobble.training.held_out import HeldOut
 from hobble.training.history import write_history

@@ -9,9 +9,9 @@ import torch
 from torch import Tensor
 
 from hobble.core.quat import Array
+from hobble.database.chunk_window import ChunkWindow, empty_buffers
 from hobble.database.precision import widen
 from hobble.database.reader import Database
-from hobble.database.window import ChunkWindow, empty_buffers
 from hobble.rows.compose import lower_joints, without_terrain
 from hobble.training.even_spread import EvenSpread
 

@@ -18,7 +18,7 @@ from hobble.core.errors import InputError
 from hobble.workflow import checksums
 from hobble.workflow.clip_batches import family_of
 from hobble.workflow.job import JobLog, checked, reporting
-from hobble.workflow.kept import KeptFiles, fingerprint
+from hobble.workflow.kept_files import KeptFiles, fingerprint
 
 # Errors that would also stop every further clip.
 DISK_ERRORS = (errno.ENOSPC, errno.EDQUOT, errno.EROFS)

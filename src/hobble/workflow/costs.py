@@ -7,7 +7,7 @@ from pathlib import Path
 from hobble.workflow.clip_batches import Batches
 from hobble.workflow.clips import DATASETS
 from hobble.workflow.configurations import Configurations
-from hobble.workflow.kept import FOLDER
+from hobble.workflow.kept_files import FOLDER
 
 # Stages of a data set, and of each the rules that have a job for each batch of clips.
 BATCH_RULES = {

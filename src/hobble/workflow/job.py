@@ -14,7 +14,7 @@ from hobble.core.errors import HobbleError
 from hobble.workflow import checksums
 from hobble.workflow.clip_batches import family_of
 from hobble.workflow.lifetime import ends_with_run
-from hobble.workflow.usage import peak_memory_mb
+from hobble.workflow.peak_memory import peak_memory_mb
 
 BUG = "This is a bug in Hobble, not a fault in your data. Please report it with the log."
 

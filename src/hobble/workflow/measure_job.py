@@ -6,7 +6,7 @@ import importlib
 from pathlib import Path
 from typing import Any
 
-from hobble.measures.given import Given
+from hobble.measures.inputs import MeasureInputs
 from hobble.measures.measure import Measure
 from hobble.runtime.options import Runtime
 
@@ -18,10 +18,10 @@ def measure_of(job: Any) -> Measure:
     return importlib.import_module(job.params.package).MEASURE
 
 
-def given_to(job: Any) -> Given:
+def inputs_of_job(job: Any) -> MeasureInputs:
     """The inputs of a job of the rules `measure` and `measure_piece`."""
     many = {name: [Path(file) for file in job.input.get(name, ())] for name in LISTS}
-    return Given(
+    return MeasureInputs(
         job.params.configuration,
         {need: Path(file) for need, file in job.input.items() if need not in LISTS},
         {path.stem: path for path in many["clips"]},

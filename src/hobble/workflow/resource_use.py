@@ -12,7 +12,7 @@ from pathlib import Path
 
 from hobble.report.pipeline import read_benchmark
 from hobble.workflow.clip_batches import family_of
-from hobble.workflow.demands import ENGINE_MB
+from hobble.workflow.resource_demands import ENGINE_MB
 
 JOB_BLOCK = re.compile(r"^ *(?:local)?rule ([^\n]+):\n((?: +\w+: .*\n)+)", re.M)
 MEMORY_LINE = re.compile(r"took (\d+) MB of memory at most")

@@ -20,11 +20,11 @@ from hobble.core.quat import Array
 from hobble.database.statistics import Moments
 from hobble.measures.accuracy import Options
 from hobble.measures.accuracy.results import Accuracy, ErrorsOf, ErrorsOfClip, ErrorsOfExcerpt, ErrorsOfSplit
-from hobble.measures.chosen import chosen, sample_of
-from hobble.measures.given import Given, Json, Outcome, Row
+from hobble.measures.clip_parts import clip_parts, sample_of
+from hobble.measures.inputs import Json, MeasureInputs, Outcome, Row
 from hobble.measures.joints import Joints
 from hobble.measures.results import SPLITS
-from hobble.measures.sample import Sample
+from hobble.measures.stratified_sample import Sample
 from hobble.models.load import load_network
 from hobble.models.network import Network
 from hobble.rows.clip_rows import ClipRows, expanded
@@ -133,7 +133,7 @@ def measure(
     of_clip: dict[str, Errors] = {}
     excerpts: dict[Excerpt, ErrorsOfExcerpt] = {}
     totals: dict[str, Errors] = dict.fromkeys(SPLITS, Errors())
-    for one in chosen(clips, sample):
+    for one in clip_parts(clips, sample):
         read = one.load()
         check_layout(one.path, read.rows, network)
         errors = clip_errors(network, read.rows, joints)
@@ -195,9 +195,9 @@ def equivalent_joints(skeleton: Json, of: str = REFERENCE) -> list[str] | None:
     return None if counterparts is None else list(counterparts)
 
 
-def chosen_joints(given: Given, options: Joints) -> list[str] | None:
+def chosen_joints(inputs: MeasureInputs, options: Joints) -> list[str] | None:
     """Names of the joints that the options select; None for all."""
-    return equivalent_joints(given.skeleton) if options.joints == "equivalent" else None
+    return equivalent_joints(inputs.skeleton) if options.joints == "equivalent" else None
 
 
 def joint_indices(network: Network, names: Sequence[str] | None = None) -> list[int]:
@@ -206,10 +206,10 @@ def joint_indices(network: Network, names: Sequence[str] | None = None) -> list[
         return list(range(network.layout.joints))
     if network.skeleton is None:
         raise HobbleError("The network's file names no joints, so none can be chosen.")
-    chosen = [i for i, name in enumerate(network.skeleton.joints) if name in names]
-    if not chosen:
+    clip_parts = [i for i, name in enumerate(network.skeleton.joints) if name in names]
+    if not clip_parts:
         raise HobbleError(f"None of {', '.join(names)} is a joint of {network.skeleton.name}.")
-    return chosen
+    return clip_parts
 
 
 def check_layout(where: str | Path, rows: ClipRows, network: Network) -> None:
@@ -225,11 +225,16 @@ def clip_rows(result: Accuracy) -> list[Row]:
     return [{key: clip.get(key) for key in COLUMNS} for clip in result["clips"]]
 
 
-def run(given: Given, options: Options) -> Outcome:
+def run(inputs: MeasureInputs, options: Options) -> Outcome:
     """accuracy.json, and its clips and excerpts as tables."""
-    sample = sample_of(given, options)
+    sample = sample_of(inputs, options)
     result = measure(
-        given.weights, given.clips, given.splits, given.configuration, chosen_joints(given, options), sample
+        inputs.weights,
+        inputs.clips,
+        inputs.splits,
+        inputs.configuration,
+        chosen_joints(inputs, options),
+        sample,
     )
     excerpts = {"excerpts": result.pop("excerpts")} if sample else {}
     return Outcome(result, {"clips": clip_rows(result), **excerpts})

@@ -6,8 +6,8 @@ from collections.abc import Callable
 from typing import Literal
 
 from hobble.channels.shown import speaker
-from hobble.measures.chosen import captured_sampled
-from hobble.measures.given import Json
+from hobble.measures.clip_parts import captured_sampled
+from hobble.measures.inputs import Json
 from hobble.measures.manners.results import ChannelResult
 from hobble.measures.manners.windows import EFFECTS, NONE
 from hobble.report.charts import Chart

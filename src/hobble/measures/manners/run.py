@@ -16,8 +16,8 @@ from hobble.core.quat import Array
 from hobble.evaluation.captured import Captured
 from hobble.evaluation.crowd import FPS
 from hobble.gait.discriminant import Discriminant, learn
-from hobble.measures.chosen import captured_motion, sample_of, with_sample
-from hobble.measures.given import Given, Outcome, Row
+from hobble.measures.clip_parts import captured_motion, sample_of, with_sample
+from hobble.measures.inputs import MeasureInputs, Outcome, Row
 from hobble.measures.manners.left_out import left_out, share
 from hobble.measures.manners.results import ChannelResult, CombinedResult, Effect, Manners, NamedWindows
 from hobble.measures.manners.windows import (
@@ -83,39 +83,39 @@ def of_channel(
     changes the walk from neutral, captured and generated.
     """
     known = [w for w in windows if splits[w.clip] == "train"]
-    seen = sorted({w.manner for w in known} - {NONE})
-    if len(seen) < 2:
+    found = sorted({w.manner for w in known} - {NONE})
+    if len(found) < 2:
         return None
     captured = left_out(windows, people)
     judge = learn(table(known), [w.manner for w in known], captured["shrinkage"])
     speed = float(np.median([w.values["speed"] for w in known if w.manner == NONE] or [ASKED])) / FPS
-    single = [{}, *({manner: value} for value in (HALF, FULL) for manner in seen)]
-    given = [*single, *(dict.fromkeys(pair, FULL) for pair in combinations(seen, 2))]
-    figures = [WalkerInputs({name: values}, speed * pace) for values in given for pace in PACES]
+    single = [{}, *({manner: value} for value in (HALF, FULL) for manner in found)]
+    combined = [*single, *(dict.fromkeys(pair, FULL) for pair in combinations(found, 2))]
+    figures = [WalkerInputs({name: values}, speed * pace) for values in combined for pace in PACES]
     walks = generated(network, figures, name, runtime)
     per = len(PACES)
     each = [[w for walk in walks[i : i + per] for w in walk] for i in range(0, len(walks), per)]
-    half, full = (dict(zip(seen, each[1 + k * len(seen) :], strict=False)) for k in (0, 1))
-    rows = [_named(judge, values, some) for values, some in zip(given, each, strict=True)]
-    for row, values, some in zip(rows, given, each, strict=True):
+    half, full = (dict(zip(found, each[1 + k * len(found) :], strict=False)) for k in (0, 1))
+    rows = [_named(judge, values, some) for values, some in zip(combined, each, strict=True)]
+    for row, values, some in zip(rows, combined, each, strict=True):
         if len(values) == 2:
             row["between"] = _between(_mean(some), *(_mean(full[manner]) for manner in values))
     right = [(row["share"], row["windows"]) for row in rows if row["value"] == FULL]
     return {
         "channel": name,
         "title": channel(name).title,
-        "manners": seen,
+        "manners": found,
         "speed_asked": round(speed * FPS / 100, 5),
         "captured": captured,
         "generated": rows,
         "right_at_1": _weighted(right),
-        "together": together(network, name, judge, seen, speed, runtime),
-        "effects": [_effect(name, m, e, known, each[0], half[m], full[m]) for m in seen for e in EFFECTS],
+        "together": together(network, name, judge, found, speed, runtime),
+        "effects": [_effect(name, m, e, known, each[0], half[m], full[m]) for m in found for e in EFFECTS],
     }
 
 
 def together(
-    network: Network, name: str, judge: Discriminant, seen: Sequence[str], speed: float, runtime: Runtime
+    network: Network, name: str, judge: Discriminant, found: Sequence[str], speed: float, runtime: Runtime
 ) -> list[CombinedResult]:
     """How often each manner at 1 is named while a column of another channel is at its highest value.
 
@@ -124,7 +124,7 @@ def together(
     others = [
         (other, column) for other in network.channels if other != name for column in network.trained(other)
     ]
-    cases = [(manner, other, column) for manner in (NONE, *seen) for other, column in others]
+    cases = [(manner, other, column) for manner in (NONE, *found) for other, column in others]
     if not cases:
         return []
     figures = [
@@ -149,11 +149,11 @@ def together(
     return rows
 
 
-def run(given: Given, options: SampleOptions) -> Outcome:
+def run(inputs: MeasureInputs, options: SampleOptions) -> Outcome:
     """manners.json, and two tables: `effects`, and `together` for walks with values of two channels."""
-    sample = sample_of(given, options)
-    motion = captured_motion(given.clips, sample)
-    result = manners(load_network(given.weights), motion, given.splits, given.people, given.runtime)
+    sample = sample_of(inputs, options)
+    motion = captured_motion(inputs.clips, sample)
+    result = manners(load_network(inputs.weights), motion, inputs.splits, inputs.people, inputs.runtime)
     found = result.get("channels", [])
     tables: dict[str, list[Row]] = {
         "effects": [row for one in found for row in one["effects"]],

@@ -12,7 +12,7 @@ from hobble.evaluation.comparison_csv import flat
 from hobble.evaluation.comparison_rows import DifferenceOf, PublishedRow, SideBySide, pair, published_row
 from hobble.evaluation.configuration_results import ConfigurationResults
 from hobble.evaluation.series import StraightLine, line
-from hobble.measures.given import Json, Row
+from hobble.measures.inputs import Json, Row
 
 NAME = "responsivity"
 STEPS = ("prepare", "input", "insert", "predict", "output", "update", "total")

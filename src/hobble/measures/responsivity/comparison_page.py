@@ -6,10 +6,10 @@ from collections.abc import Iterator
 from typing import Any
 
 from hobble.report.charts import Chart, Trace, axis, line
+from hobble.report.comparison_charts import Compared, colours, dots, names
 from hobble.report.formats import number, size
-from hobble.report.measured import Overview
+from hobble.report.measure_sections import Overview
 from hobble.report.page_parts import PageSection, SectionPart
-from hobble.report.side_by_side import Compared, colours, dots, names
 from hobble.report.tables import Column
 from hobble.report.verdicts import Verdict, best
 

@@ -11,7 +11,7 @@ import numpy as np
 
 from hobble.core.quat import Array
 from hobble.evaluation.motion_measures import foot_slide, largest_turn
-from hobble.measures.given import Given, Outcome, Row
+from hobble.measures.inputs import MeasureInputs, Outcome, Row
 from hobble.measures.responsivity import Options
 from hobble.measures.responsivity.results import (
     Lap,
@@ -160,20 +160,20 @@ def lap_rows(result: Responsivity) -> list[Row]:
     return rows
 
 
-def run_piece(given: Given, options: Options, piece: str) -> LapsOfMode:
+def run_piece(inputs: MeasureInputs, options: Options, piece: str) -> LapsOfMode:
     """The laps in one phase mode."""
-    laps = options.laps if piece == given.runtime.mode else min(options.laps, options.laps_other_modes)
-    runtime = given.runtime.model_copy(update={"mode": piece})
-    return laps_of_mode(load_network(given.weights), runtime, laps, options.lap_seconds)
+    laps = options.laps if piece == inputs.runtime.mode else min(options.laps, options.laps_other_modes)
+    runtime = inputs.runtime.model_copy(update={"mode": piece})
+    return laps_of_mode(load_network(inputs.weights), runtime, laps, options.lap_seconds)
 
 
-def run(given: Given, options: Options) -> Outcome:
+def run(inputs: MeasureInputs, options: Options) -> Outcome:
     """responsivity.json, and its laps as a table."""
-    done: dict[str, Any] = given.measured_pieces()
+    done: dict[str, Any] = inputs.measured_pieces()
     result = responsivity(
-        load_network(given.weights),
-        configuration=given.configuration,
-        runtime=given.runtime,
+        load_network(inputs.weights),
+        configuration=inputs.configuration,
+        runtime=inputs.runtime,
         laps=options.laps,
         lap_seconds=options.lap_seconds,
         laps_other_modes=options.laps_other_modes,
@@ -275,10 +275,10 @@ def _milliseconds(seconds: Array) -> Milliseconds:
 
 def _of_steps(values: Array) -> Steps:
     """Names the values of the steps. values: in the order of STEPS; later ones are ignored."""
-    prepare, given, insert, predict, output, update = (round(float(v), 6) for v in values[: len(STEPS)])
+    prepare, inputs, insert, predict, output, update = (round(float(v), 6) for v in values[: len(STEPS)])
     return {
         "prepare": prepare,
-        "input": given,
+        "input": inputs,
         "insert": insert,
         "predict": predict,
         "output": output,

@@ -5,8 +5,8 @@ from __future__ import annotations
 from typing import Any
 
 from hobble.measures.accuracy.page import COLOURS, NAMES
-from hobble.measures.chosen import sampled_words
-from hobble.measures.given import Json
+from hobble.measures.clip_parts import sampled_words
+from hobble.measures.inputs import Json
 from hobble.report.charts import Chart, axis, line, log_axis
 from hobble.report.gather import Material
 from hobble.report.page_parts import PageSection, SectionPart

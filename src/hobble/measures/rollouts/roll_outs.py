@@ -41,7 +41,7 @@ class RollOutInputs:
     moving: Array
 
 
-def inputs(rows: ClipRows, chosen: np.ndarray, layout: RowLayout) -> RollOutInputs:
+def inputs_of_clip(rows: ClipRows, chosen: np.ndarray, layout: RowLayout) -> RollOutInputs:
     """The inputs of the rows `chosen` (F,), on the first fit of each, in the network's `layout`."""
     fit = rows.first_fit[chosen]
     x, y, *_ = pairs(rows, layout, chosen, fit)
@@ -62,7 +62,7 @@ def inputs(rows: ClipRows, chosen: np.ndarray, layout: RowLayout) -> RollOutInpu
 class RollOuts:
     """Roll-outs over `length` frames of the stretch `given`. starts: (n,) their first frames, ascending."""
 
-    given: RollOutInputs
+    inputs: RollOutInputs
     starts: np.ndarray
     length: int
 
@@ -76,16 +76,16 @@ class Crowd:
 
     def __init__(self, predictor: Predictor, groups: Sequence[RollOuts]) -> None:
         self.predictor, self.groups = predictor, groups
-        stretches = list({id(group.given): group.given for group in groups}.values())
-        begins = np.cumsum([0, *(len(given.x) for given in stretches)])
-        begin = {id(given): int(at) for given, at in zip(stretches, begins[:-1], strict=True)}
+        stretches = list({id(group.inputs): group.inputs for group in groups}.values())
+        begins = np.cumsum([0, *(len(inputs.x) for inputs in stretches)])
+        begin = {id(inputs): int(at) for inputs, at in zip(stretches, begins[:-1], strict=True)}
         self.x, self.y, self.mean, phase, self.turn, self.velocity, self.moving = (
-            np.concatenate([getattr(given, name) for given in stretches])
+            np.concatenate([getattr(inputs, name) for inputs in stretches])
             for name in ("x", "y", "mean", "phase", "turn", "velocity", "moving")
         )
-        firsts = [begin[id(group.given)] + group.starts for group in groups]
+        firsts = [begin[id(group.inputs)] + group.starts for group in groups]
         stops = [
-            begin[id(group.given)] + np.minimum(group.starts + group.length, len(group.given.x))
+            begin[id(group.inputs)] + np.minimum(group.starts + group.length, len(group.inputs.x))
             for group in groups
         ]
         self.first, each = np.unique(np.concatenate(firsts), return_inverse=True)

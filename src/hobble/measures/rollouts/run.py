@@ -24,13 +24,13 @@ from hobble.measures.accuracy.run import (
     joint_indices,
     relative_and_distance,
 )
-from hobble.measures.chosen import Chosen, Loaded, chosen, sample_of
-from hobble.measures.given import Given, Outcome, Row
+from hobble.measures.clip_parts import ClipPart, LoadedPart, clip_parts, sample_of
+from hobble.measures.inputs import MeasureInputs, Outcome, Row
 from hobble.measures.results import SPLITS
 from hobble.measures.rollouts import Options
 from hobble.measures.rollouts.results import ErrorsOf, RollOutsFound
-from hobble.measures.rollouts.roll_outs import Crowd, RollOuts, inputs
-from hobble.measures.sample import Sample
+from hobble.measures.rollouts.roll_outs import Crowd, RollOuts, inputs_of_clip
+from hobble.measures.stratified_sample import Sample
 from hobble.models.load import load_network
 from hobble.models.network import Network, Predictor
 from hobble.rows.clip_rows import ClipRows
@@ -98,20 +98,20 @@ def clip_roll_outs(
     No roll-out begins at the first frame of a stretch, because the root's movement before it is unknown.
     Each frame is in OVERLAP roll-outs of each length, or in one if the roll-outs are one frame long.
     """
-    groups = _groups(Loaded(rows, 0, len(rows)), predictor.network.layout, lengths)
+    groups = _groups(LoadedPart(rows, 0, len(rows)), predictor.network.layout, lengths)
     return _errors(predictor, [groups], joints, lengths)[0]
 
 
-def _groups(read: Loaded, layout: RowLayout, lengths: Sequence[int]) -> list[RollOuts]:
+def _groups(read: LoadedPart, layout: RowLayout, lengths: Sequence[int]) -> list[RollOuts]:
     """The roll-outs that begin in the chosen rows. They may end after these rows."""
     out = []
     for stretch in unbroken(read.rows.frame):
         first, stop = np.searchsorted(stretch, (read.first, read.stop))
-        given = inputs(read.rows, stretch, layout)
+        inputs = inputs_of_clip(read.rows, stretch, layout)
         for length in lengths:
             starts = np.arange(max(1, first), stop, max(1, length // OVERLAP))
             if len(starts):
-                out.append(RollOuts(given, starts, length))
+                out.append(RollOuts(inputs, starts, length))
     return out
 
 
@@ -147,12 +147,12 @@ def _of_group(group: RollOuts, moments: Moments, end: Array, phase: Array) -> Ro
     end: (n', joints, 2) errors in the last frame, of those that reach their full length. phase: (n,) after
     the last frame.
     """
-    frames = int(np.minimum(group.length, len(group.given.x) - group.starts).sum())
+    frames = int(np.minimum(group.length, len(group.inputs.x) - group.starts).sum())
     # The phase is already that of the frame after the last, so that frame has to be in the stretch too.
-    ended = int(np.searchsorted(group.starts, len(group.given.x) - group.length))
+    ended = int(np.searchsorted(group.starts, len(group.inputs.x) - group.length))
     if not ended:
         return RollOutErrors(frames, len(group.starts), moments)
-    truth = group.given.phase[group.starts[:ended] + group.length]
+    truth = group.inputs.phase[group.starts[:ended] + group.length]
     off = np.abs(np.mod(phase[:ended] - truth + 0.5, 1.0) - 0.5)
     last = np.stack([end[:ended, :, 1].mean(axis=1), off], axis=1)
     return RollOutErrors(frames, len(group.starts), moments, Moments.of(last), ended)
@@ -182,7 +182,7 @@ def measure_roll_outs(
     total = {length: dict.fromkeys(SPLITS, RollOutErrors()) for length in lengths}
     of_clip: dict[int, dict[str, RollOutErrors]] = {length: {} for length in lengths}
     excerpts: dict[int, dict[Excerpt, float | None]] = {length: {} for length in lengths}
-    for some in _together(chosen(clips, sample), network, lengths):
+    for some in _together(clip_parts(clips, sample), network, lengths):
         for one, errors in zip(some, _errors(predictor, list(some.values()), joints, lengths), strict=True):
             for length, found in errors.items():
                 weighed, known = found.weighing(one.weight), of_clip[length]
@@ -212,10 +212,10 @@ def measure_roll_outs(
 
 
 def _together(
-    every: Iterable[Chosen], network: Network, lengths: Sequence[int]
-) -> Iterator[dict[Chosen, list[RollOuts]]]:
+    every: Iterable[ClipPart], network: Network, lengths: Sequence[int]
+) -> Iterator[dict[ClipPart, list[RollOuts]]]:
     """Yield the roll-outs of clips or excerpts in groups of about AT_ONCE frames."""
-    some: dict[Chosen, list[RollOuts]] = {}
+    some: dict[ClipPart, list[RollOuts]] = {}
     frames = 0
     for one in every:
         # Twice as many rows as frames, because a frame that two cycles share has two rows.
@@ -264,16 +264,16 @@ def roll_out_rows(result: RollOutsFound) -> list[Row]:
     return rows
 
 
-def run(given: Given, options: Options) -> Outcome:
+def run(inputs: MeasureInputs, options: Options) -> Outcome:
     """rollouts.json, and its rows as a table."""
     result = measure_roll_outs(
-        given.weights,
-        given.clips,
-        given.splits,
-        given.configuration,
-        chosen_joints(given, options),
+        inputs.weights,
+        inputs.clips,
+        inputs.splits,
+        inputs.configuration,
+        chosen_joints(inputs, options),
         options.rollouts,
-        given.runtime.mode,
-        sample_of(given, options),
+        inputs.runtime.mode,
+        sample_of(inputs, options),
     )
     return Outcome(result, {"lengths": roll_out_rows(result)})

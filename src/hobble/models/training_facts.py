@@ -28,7 +28,7 @@ MIN_STANDING_SHARE = 0.005  # if fewer rows stand, the start frame is not a stan
 
 
 @dataclass(frozen=True)
-class SeenInTraining:
+class TrainingFacts:
     """Facts of the training rows, in raw units, float32.
 
     x_low, x_high (X,), y_low, y_high (Y,): smallest and largest value of each column. fastest: largest speed
@@ -51,7 +51,7 @@ class SeenInTraining:
         return {**of_rows, "start_phase": np.float64(self.start_phase), "fastest": np.float64(self.fastest)}
 
     @classmethod
-    def of(cls, layout: RowLayout, parts: Iterable[Any], statistics: Any) -> SeenInTraining:
+    def of(cls, layout: RowLayout, parts: Iterable[Any], statistics: Any) -> TrainingFacts:
         """From all rows, as `Database.each_row` gives them, and their statistics.
 
         Only the ground differs between the terrain fits of a row. So a row is composed with its highest and
@@ -91,7 +91,7 @@ class SeenInTraining:
     @classmethod
     def read(
         cls, path: str | Path, arrays: Mapping[str, Any], x_size: int, y_size: int
-    ) -> SeenInTraining | None:
+    ) -> TrainingFacts | None:
         """From a file's arrays; None if it has none, as the original release. Raises InputError."""
         if not any(name in arrays for name in (*ARRAYS, "start_phase", "fastest")):
             return None

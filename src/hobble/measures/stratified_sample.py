@@ -99,7 +99,7 @@ def _variance(stratum: Stratum, values: Mapping[Excerpt, float]) -> float:
     return float((1 - n / stratum.count) * (off**2).sum() / (n - 1) / n)
 
 
-def drawn(facts: Iterable[Facts], splits: Mapping[str, str], frames: int) -> Sample | None:
+def draw_sample(facts: Iterable[Facts], splits: Mapping[str, str], frames: int) -> Sample | None:
     """A sample of about `frames` rows; None if all clips together have no more.
 
     The same clips give the same sample, and one more clip changes it only a little.

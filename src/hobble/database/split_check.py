@@ -12,7 +12,7 @@ MOST_NAMED = 10
 def refuse_both_sides(where: str, pairs: Iterable[tuple[str, str, str]], splits: Mapping[str, str]) -> None:
     """Raise HobbleError with every pair of clips where one is in training and the other is held out.
 
-    where: the data set's name for messages. pairs: (clip, clip, what they are: "the same file", ...).
+    where: the data set's name for messages. pairs: (clip, clip, how they are alike, such as "the same file").
     splits: clip -> "train" or "held_out"; other clips are ignored.
     """
     alike, lacking = [], []

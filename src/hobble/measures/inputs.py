@@ -19,7 +19,7 @@ Row = Mapping[str, object]  # of a CSV table: column -> number, text or None
 
 
 @dataclass(frozen=True)
-class Given:
+class MeasureInputs:
     """The inputs of a measurement of one configuration: only those listed in its `Measure.inputs`.
 
     clips: clip -> its file of rows. facts: files of `hobble.rows.facts` of the same clips. splits: clip ->

@@ -17,7 +17,7 @@ MOST = 2
 
 
 @dataclass(frozen=True)
-class Picture:
+class FitPicture:
     """The best fit of one cycle, in centimetres in the clip's world.
 
     x, z: (G,) of the grid. ground: (G, G) heights at x[i], z[j]. soles: (T, 4, 3). contacts: (T, 4).
@@ -39,7 +39,7 @@ def picture_cycles(cycles: int) -> set[int]:
     return {cycles // 4, (3 * cycles) // 4} if cycles > 1 else set(range(cycles))
 
 
-def picture_of(clip: Clip, cycle: int, ground: Ground, feet: Feet, around: slice) -> Picture:
+def picture_of(clip: Clip, cycle: int, ground: Ground, feet: Feet, around: slice) -> FitPicture:
     """The picture of the best fit of a cycle. around: its frames, with the window on both sides."""
     soles = feet.soles[around]
     low, high = (
@@ -50,7 +50,7 @@ def picture_of(clip: Clip, cycle: int, ground: Ground, feet: Feet, around: slice
     points = np.stack(np.meshgrid(x, z, indexing="ij"), axis=-1).reshape(-1, 2)
     heights = ground.at(points)[0].reshape(GRID_POINTS, GRID_POINTS)
     frames = np.linspace(around.start, around.stop - 1, 5).astype(int)[1:4]
-    return Picture(
+    return FitPicture(
         cycle,
         x.astype(np.float32),
         z.astype(np.float32),
