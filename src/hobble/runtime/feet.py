@@ -245,7 +245,7 @@ def place_feet(
 
 
 def carried(skeleton: Skeleton, legs: np.ndarray) -> np.ndarray:
-    """(2, J) joints that move with a foot: TOES from the toe on, FOOT for others below the heel, 0 elsewhere."""
+    """(2, J) joints that move with a foot: TOES from the toe on, FOOT for others below the heel, else 0."""
     out = np.zeros((2, len(skeleton.joints)), np.int8)
     for f in range(2):
         for j, p in enumerate(skeleton.parents):
