@@ -158,7 +158,7 @@ def test_the_gait_follows_from_speed_and_argument(network) -> None:
 
     def shares(velocity, gait=None) -> dict[str, float]:
         character.next_pose(velocity, gait=gait)
-        target = dict(zip(network.gaits, character._target_gait[0], strict=True))
+        target = dict(zip(network.gaits, character._targets._shares[0], strict=True))
         return {name: share for name, share in target.items() if share}
 
     assert shares((0, 0.05), "jog") == {"stand": 1}
