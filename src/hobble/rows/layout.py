@@ -112,7 +112,7 @@ class RowLayout:
 
     @property
     def x_joint_position(self) -> slice:
-        """Joint positions of the previous frame in its root coordinates, cm, y above the mean ground height."""
+        """Joint positions of the previous frame in its root coordinates, cm, y above the mean ground."""
         return self._x["joint_position"]
 
     @property
@@ -166,7 +166,7 @@ class RowLayout:
 
     @property
     def y_joint_position(self) -> slice:
-        """Joint positions of this frame in its root coordinates, cm, y above the mean ground height."""
+        """Joint positions of this frame in its root coordinates, cm, y above the mean ground."""
         return slice(self.y_direction.stop, self.y_direction.stop + 3 * self.joints)
 
     @property
