@@ -70,6 +70,20 @@ def run(
         start=start,
         code=code,
     )
+    _write(state, data, configuration, training, terrain_side, weights, history, checkpoint)
+
+
+def _write(
+    state: State,
+    data: Database,
+    configuration: str,
+    training: Training,
+    terrain_side: float,
+    weights: Path,
+    history: Path,
+    checkpoint: Path,
+) -> None:
+    """Measure the held-out error of the finished network, and write the three files."""
     checkpoint_arrays = pack(state)  # of the last state, before the best weights replace it
     facts = _facts(state, training) | {"terrain_side": terrain_side}
     if training.keep == "best" and state.best is not None:
