@@ -6,6 +6,7 @@ import fcntl
 import hashlib
 import importlib.util
 import sys
+from collections.abc import Iterator
 from pathlib import Path
 from types import ModuleType
 from typing import Any
@@ -143,3 +144,9 @@ def page(
 ) -> str:
     """The report of the examples."""
     return render(material, play, character, compared, script, hero)
+
+
+@pytest.fixture(scope="module")
+def tab(page: str, tools: ModuleType, tmp_path_factory: pytest.TempPathFactory) -> Iterator[Any]:
+    """The example's page, open in a browser."""
+    yield from tools.opened(page, tmp_path_factory.mktemp("play"))

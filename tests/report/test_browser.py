@@ -3,9 +3,7 @@
 from __future__ import annotations
 
 import itertools
-from collections.abc import Iterator
 from pathlib import Path
-from types import ModuleType
 from typing import Any
 
 import pytest
@@ -22,12 +20,6 @@ INK = """(() => {{
   for (let i = 3; i < pixels.length; i += 4) sum += pixels[i] > 0;
   return sum / (copy.width * copy.height);
 }})()"""
-
-
-@pytest.fixture(scope="module")
-def tab(page: str, tools: ModuleType, tmp_path_factory: pytest.TempPathFactory) -> Iterator[Any]:
-    """The page, opened in a browser. Each test leaves it in a usable state for the next."""
-    yield from tools.opened(page, tmp_path_factory.mktemp("browser"))
 
 
 def show(tab: Any, what: str) -> None:

@@ -33,7 +33,6 @@ from hobble.measures.rollouts.roll_outs import Crowd, RollOuts, inputs_of_clip
 from hobble.measures.stratified_sample import Sample
 from hobble.models.load import load_network
 from hobble.models.network import Network, Predictor
-from hobble.rows.clip_rows import ClipRows
 from hobble.rows.excerpts import Excerpt
 from hobble.rows.layout import RowLayout
 
@@ -88,18 +87,6 @@ class RollOutErrors:
             "last_cm": float(self.last.mean[0]) if ended else None,
             "last_phase": float(self.last.mean[1]) if ended and phase else None,
         }
-
-
-def clip_roll_outs(
-    predictor: Predictor, rows: ClipRows, joints: Sequence[int], lengths: Sequence[int]
-) -> dict[int, RollOutErrors]:
-    """Length -> errors of roll-outs over every frame of the clip.
-
-    No roll-out begins at the first frame of a stretch, because the root's movement before it is unknown.
-    Each frame is in OVERLAP roll-outs of each length, or in one if the roll-outs are one frame long.
-    """
-    groups = _groups(LoadedPart(rows, 0, len(rows)), predictor.network.layout, lengths)
-    return _errors(predictor, [groups], joints, lengths)[0]
 
 
 def _groups(read: LoadedPart, layout: RowLayout, lengths: Sequence[int]) -> list[RollOuts]:
