@@ -31,7 +31,8 @@ from hobble.runtime.options import Runtime
 from hobble.runtime.waypoints import TRACK, Waypoint
 
 FPS = 60
-RUNS, EVERY = 5, 15  # laps whose path is stored, and frames between two stored places
+RUNS = 5  # laps whose path is stored
+EVERY = 15  # frames between two stored places of a path
 WARM_UP = 60  # frames before the first lap that are not measured, because compiled code is loaded in them
 
 
@@ -47,20 +48,18 @@ def responsivity(
     track: Sequence[Waypoint] = TRACK,
     done: Mapping[str, LapsOfMode] | None = None,
 ) -> Responsivity:
-    """Run the track of Segerstedt 2021, `laps` laps in the runtime's own mode and fewer in other `modes`.
+    """Run the track of Segerstedt 2021: `laps` laps in the runtime's phase mode, fewer in other `modes`.
 
-    done: mode -> its laps, if they have already been run (`laps_of_mode`).
-
-    laps_other_modes: laps in those; by default, and at most, `laps`. modes: by default all that the network
-    has. A lap that takes longer than `lap_seconds` of simulated time ends without its remaining waypoints,
-    and the next lap starts from the beginning of the track.
+    laps_other_modes: laps in each other mode; by default, and at most, `laps`. modes: by default all modes of
+    the network. done: mode -> its laps, if they have already been run (`laps_of_mode`). A lap that takes
+    longer than `lap_seconds` of simulated time ends without its remaining waypoints, and the next lap starts
+    from the beginning of the track.
 
     The result is described in docs/artefacts.md. `modes` has the laps and the summary of each mode; those of
     the runtime's own mode are also at the top level. Only the values under "milliseconds" depend on the
-    clock: means of the steps, their `total`, and its `spread` (sd, median, 99th percentile, mean of a whole
-    call). `largest_turn_degrees` is the largest turn of a joint from one frame to the next as drawn,
-    `predicted_turn_degrees` as predicted by the network; in `turns_held_back` frames the runtime let a joint
-    turn less than predicted. `runs`: the paths of the first RUNS laps in the runtime's own mode.
+    clock. `largest_turn_degrees` is the largest turn of a joint from one frame to the next as drawn,
+    `predicted_turn_degrees` the largest as predicted by the network; in `turns_held_back` frames the runtime
+    let a joint turn less than predicted. `runs`: the paths of the first RUNS laps in the runtime's own mode.
     """
     own = network.mode(runtime.mode)
     fewer = min(laps, laps_other_modes or laps)
@@ -129,10 +128,11 @@ def laps_of_mode(
 
 
 def parameter_counts(sizes: Sequence[int]) -> dict[str, int]:
-    """Weights and biases of one phase of layers `sizes`, truly and as Segerstedt's Table 6.1 counts them.
+    """Weights and biases that one frame uses: as they are, and as Table 6.1 of Segerstedt counts them.
 
-    table_6_1: sum of n_l (1 + n_(l+1)) + n_out over the same layers; table_6_1_as_printed: with one hidden
-    layer fewer, as the text there states the layers.
+    sizes: units of each layer, from inputs to outputs. true: the actual number. table_6_1: by the formula of
+    the table, the sum of n_l (1 + n_(l+1)) over the layers, plus n_out. table_6_1_as_printed: by that formula
+    with one hidden layer fewer, as the thesis's text states the layers.
 
     >>> parameter_counts((342, 512, 512, 311))
     {'true': 597815, 'table_6_1': 598157, 'table_6_1_as_printed': 335501}
@@ -146,12 +146,11 @@ def parameter_counts(sizes: Sequence[int]) -> dict[str, int]:
 
 
 def lap_rows(result: Responsivity) -> list[Row]:
-    """The laps of every mode as flat rows for a CSV file; the times are the last columns, with the
-    standard deviation of each step."""
+    """The laps of every mode as rows for a CSV file. The last columns are the times and their deviations."""
     rows: list[Row] = []
     for entry in result["modes"]:
         for lap in entry["laps"]:
-            # Keys in the order of the types: those of a piece come sorted from its file.
+            # The keys of a piece come sorted from its file. The table has them in the order of the types.
             known: Row = {"mode": entry["mode"]} | lap
             row = {key: known[key] for key in ("mode", *Lap.__annotations__) if key != "milliseconds"}
             times: dict[str, Any] = {**lap["milliseconds"]}
@@ -186,7 +185,10 @@ def run(inputs: MeasureInputs, options: Options) -> Outcome:
 
 
 def _lap(animation: ProceduralAnimation, number: int, longest: int) -> tuple[Lap, Array, Run]:
-    """One lap, its times (F, steps + 1) in seconds, the whole call last, and the run: see `_run`."""
+    """One lap; its times (F, steps + 1), seconds, the last of the whole call; and its path, see `_run`.
+
+    longest: frames after which the lap is stopped.
+    """
     follower, skeleton = animation.follower, animation.skeleton
     assert follower is not None
     toes = [skeleton.role("left_toe"), skeleton.role("right_toe")]
@@ -231,9 +233,10 @@ def _lap(animation: ProceduralAnimation, number: int, longest: int) -> tuple[Lap
 
 
 def _run(number: int, places: Array, off: Array) -> Run:
-    """Where a lap led: `x`, `z`, m, and `off_cm` from the line between waypoints, every EVERY frames.
+    """The path of a lap, with a place every EVERY frames.
 
-    places: (F, 2), cm; off: (F,), cm, the largest since the last one that is kept.
+    places: (F, 2), cm. off: (F,) distance from the line between waypoints, cm. A stored place has the largest
+    distance since the stored place before it.
     """
     kept = range(0, len(places), EVERY)
     return {
@@ -246,7 +249,10 @@ def _run(number: int, places: Array, off: Array) -> Run:
 
 
 def _held_back(predicted: Array, taken: Array) -> int:
-    """Number of frames in which the runtime limited the turn of a joint; both (F, J, 4), else equal."""
+    """Number of frames in which the runtime limited the turn of a joint.
+
+    predicted, taken: (F, J, 4) quaternions before and after the limit.
+    """
     same = np.abs(np.sum(predicted * taken, axis=-1)) > 1 - 1e-6
     return int((~same).any(axis=1).sum()) if len(predicted) else 0
 
@@ -268,7 +274,7 @@ def _milliseconds(seconds: Array) -> Milliseconds:
 
 
 def _of_steps(values: Array) -> Steps:
-    """values: (steps or more,), in the order of STEPS."""
+    """Names the values of the steps. values: in the order of STEPS; later ones are ignored."""
     prepare, inputs, insert, predict, output, update = (round(float(v), 6) for v in values[: len(STEPS)])
     return {
         "prepare": prepare,
