@@ -53,7 +53,7 @@ def lap_chart(found: Json, material: Material) -> Chart | None:
     counts = [max(len(trace["x"]) for trace in traces) for traces in options.values()]
     laps = max(counts)
     fewer = (
-        f" The other phase modes ran {min(counts)} laps, because from the second lap on all laps are alike."
+        f" In the other phase modes there are only {min(counts)} laps, to save time."
         if min(counts) < laps
         else ""
     )
@@ -61,9 +61,9 @@ def lap_chart(found: Json, material: Material) -> Chart | None:
         "laps",
         "Milliseconds per frame, lap by lap",
         "Each bar is one lap of the track. Its segments are the stages of a frame, averaged over the "
-        "lap (insert: the input is standardised). A diamond is the median of whole frames: a few frames that "
-        "another program delayed raise the bar but not the diamond. At 60 Hz, a frame may take 16.7 ms."
-        + fewer,
+        "first seconds of the lap (insert: the input is standardised). A diamond is the median of whole "
+        "frames: a few frames that another program delayed raise the bar but not the diamond. At 60 Hz, a "
+        "frame may take 16.7 ms." + fewer,
         layout={
             "barmode": "stack",
             "xaxis": axis("lap", dtick=1 if laps < 25 else None),

@@ -35,8 +35,8 @@ class Milliseconds(Steps):
     spread: Spread
 
 
-class Lap(TypedDict):
-    """One lap. Distances in cm from the line between waypoints; turns in degrees."""
+class LapWalk(TypedDict):
+    """How one lap went. Distances in cm from the line between waypoints; turns in degrees."""
 
     lap: int
     finished: bool
@@ -50,6 +50,11 @@ class Lap(TypedDict):
     largest_turn_degrees: float
     predicted_turn_degrees: float
     turns_held_back: int
+
+
+class Lap(LapWalk):
+    """One lap, and the times of its first frames."""
+
     milliseconds: Milliseconds
 
 
