@@ -1,4 +1,4 @@
-"""A long test of many characters with random targets, injuries and grounds, for implausible poses."""
+"""A long test for implausible poses: many characters with random targets, injuries and grounds."""
 
 from __future__ import annotations
 
@@ -26,7 +26,8 @@ LIMITS = {"hips_lowest_cm": 60.0, "hips_highest_cm": 110.0, "added_turn_degrees"
 class Targets:
     """The targets of C characters in a frame. Each character gets new ones every 1 to 8 seconds.
 
-    velocity, facing: (C, 2). gait: C names. channels: name -> (C, columns). left: (C,) frames that remain.
+    velocity: (C, 2) cm a frame. facing: (C, 2) direction; (0, 0) for none. gait: C names. channels: name ->
+    (C, columns). left: (C,) frames until the next targets.
     """
 
     velocity: Array
@@ -47,7 +48,10 @@ class Targets:
         )
 
     def renew(self, rng: np.random.Generator) -> None:
-        """Draw new targets for characters whose time is over. A third stand, half face a random direction."""
+        """Draw new targets for the characters whose targets have run out.
+
+        On average a third stand, and half face a random direction.
+        """
         self.left -= 1
         for c in np.flatnonzero(self.left <= 0):
             going, looking = rng.uniform(-np.pi, np.pi, 2)
@@ -62,9 +66,10 @@ class Targets:
 
 
 def grounds(characters: int, rng: np.random.Generator) -> Callable[[Array, Array], Array]:
-    """A ground function with a different ground for each of C characters, START_SPACING_CM apart along x.
+    """A function (x, z) -> height with a different ground around each character's start.
 
-    A quarter are flat; the others have hills 2 to 8 m long with slopes of up to .35.
+    The starts are START_SPACING_CM apart along x. On average a quarter of the grounds are flat; the others
+    have hills 2 to 8 m long with slopes of up to 0.35.
     """
     length = rng.uniform(200, 800, characters)
     height = rng.uniform(0.05, 0.35, characters) * length / np.pi * (rng.random(characters) > 0.25)
@@ -79,9 +84,10 @@ def grounds(characters: int, rng: np.random.Generator) -> Callable[[Array, Array
 
 @dataclass
 class StanceSlides:
-    """Distance that toes slide in each stance of C characters, as in `motion_measures.foot_slide`.
+    """How far the toes of C characters slide in each stance, as in `motion_measures.foot_slide`.
 
-    far: (C, 2) distance in this stance, cm. frames: (C, 2) its length. done: distances of past stances.
+    far: (C, 2) distance in the present stance, cm. frames: (C, 2) its frames so far. done: distances of past
+    stances.
     """
 
     far: Array
@@ -98,7 +104,7 @@ class StanceSlides:
 
 
 def turn_angles(now: Array, before: Array) -> Array:
-    """(...) angle between rotations (..., 4), degrees."""
+    """(...) angle between the rotations `now` and `before` (..., 4), degrees."""
     dot = np.abs(np.sum(now * before, axis=-1))
     return np.asarray(np.degrees(2 * np.arccos(np.minimum(1.0, dot))))
 
@@ -125,11 +131,12 @@ def soak(
 ) -> Soak:
     """The worst values over all characters and frames.
 
-    `finite`: whether all numbers are finite. `hips_lowest_cm`, `hips_highest_cm`: above the ground under
-    them. `network_turn_degrees`: largest turn of a joint in a frame by the network, `turn_degrees`: by the
-    pose, `added_turn_degrees`: largest difference of the two in the same joint and frame; `frames_beyond`:
-    frames of a character in which it exceeds its limit. `fastest_joint_cm`: a frame. `slide_cm`: mean of a
-    stance. `holds`: whether all values are within LIMITS.
+    `finite`: whether all numbers are finite. `hips_lowest_cm`, `hips_highest_cm`: height of the hips above
+    the ground under them. `network_turn_degrees`: largest turn of a joint in one frame as predicted by the
+    network; `turn_degrees`: as drawn; `added_turn_degrees`: largest difference, drawn minus predicted, of the
+    same joint and frame. `frames`, `frames_beyond`: frames of all characters, and those of them in which the
+    added turn exceeds its limit. `fastest_joint_cm`: largest movement of a joint in one frame. `slide_cm`:
+    mean slide of a toe in a stance. `stances`: their number. `holds`: whether all values are within LIMITS.
     """
     rng = np.random.default_rng(seed)
     skeleton = network.skeleton

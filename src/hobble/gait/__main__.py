@@ -45,7 +45,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 
 def _seconds(text: str) -> float:
-    """A window's length from the command line: at least a cycle, at most a clip."""
+    """A window's length from the command line, 1 to 3600 seconds."""
     seconds = float(text)
     if not 1.0 <= seconds <= 3600.0:
         raise ValueError
@@ -70,7 +70,7 @@ def _compared(path: str, options: argparse.Namespace, healthy: Profile) -> WalkC
 
 
 def describe(name: str, compared: WalkComparison, side: str | None = None) -> str:
-    """The answers, and the effects next to people's, as text."""
+    """The recognisers' answers as text, and the effects next to those of people."""
     answer, grade = compared.answer, compared.grade
     side = side or answer.side or grade.side or RIGHT
     likely = ", ".join(f"{gait} {answer.probabilities[gait]:.2f}" for gait in GAITS)

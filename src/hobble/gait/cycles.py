@@ -27,12 +27,12 @@ SCALARS = (
     "step_L",
     "step_width",
 )
-SLOW = 0.35  # share of the walking speed: a slower ankle stands
+SLOW = 0.35  # share of the walking speed; an ankle that is slower stands
 SHORTEST, LONGEST = 0.4, 3.5  # s, a cycle
-LEAST_TRAVEL = 0.2  # leg lengths in a cycle; a shorter one is standing
-LEAST_SWING = 0.12  # leg lengths: least range of an ankle in a step
-LEAST_TURN = 0.4  # share of the ankle's range within the longest cycle; smaller turns are no step
-STRAIGHT = 25.0  # degrees: most that the path turns in a cycle; people were measured on straight paths
+LEAST_TRAVEL = 0.2  # leg lengths that the hips travel in a cycle; less is standing
+LEAST_SWING = 0.12  # leg lengths that an ankle moves forward, and back, in a step at least
+LEAST_TURN = 0.4  # the same as a share of the ankle's range; smaller movements are no step
+STRAIGHT = 25.0  # degrees that the path turns at most in a cycle; people were measured on straight paths
 AHEAD = 0.7  # least mean cosine between facing and travel; below it the walk is backward or sideways
 
 
@@ -40,7 +40,7 @@ AHEAD = 0.7  # least mean cosine between facing and travel; below it the walk is
 class Cycle:
     """A cycle of the right leg, from its landing in frame `start` to the next in frame `end`.
 
-    scalars: by name of SCALARS. curves: (22, 50), rows as CURVES, at 50 equal steps from `start`.
+    scalars: the numbers of SCALARS. curves: (22, 50), rows as CURVES, at 50 equal steps from `start`.
     """
 
     start: int
@@ -53,8 +53,8 @@ class Cycle:
 class WalkCycles:
     """The cycles of a stretch of walking.
 
-    right: cycles that begin as the right foot lands. left: those that begin as the left foot lands, mirrored,
-    so that the leg that lands first is called R there, too.
+    right: cycles that begin as the right foot lands. left: cycles that begin as the left foot lands. They
+    are mirrored, so that R is the leg that lands first in both.
     """
 
     fps: float
@@ -62,7 +62,7 @@ class WalkCycles:
     left: tuple[Cycle, ...] = field(repr=False)
 
     def __len__(self) -> int:
-        """The number of cycles of the side with fewer."""
+        """The number of cycles of the side that has fewer."""
         return min(len(self.right), len(self.left))
 
     def within(self, start: float, end: float) -> WalkCycles:
@@ -98,9 +98,9 @@ def joined(walks: Iterable[WalkCycles]) -> WalkCycles:
 
 
 def landings(forward: Array, fps: float) -> list[int]:
-    """Frames where an ankle, (F,) leg lengths ahead of the hips, is furthest ahead.
+    """Frames in which an ankle is furthest ahead of the hips. forward: (F,) how far, in leg lengths.
 
-    The ankle must then go back by LEAST_TURN of its range within the longest cycle around.
+    The ankle must then go back by LEAST_SWING, and by LEAST_TURN of its range in the LONGEST seconds around.
     """
     reach = int(LONGEST * fps / 2)
     least = np.maximum(LEAST_SWING, LEAST_TURN * _ranges(forward, reach))

@@ -15,7 +15,8 @@ STAND, WALK, JOG, CROUCH = range(4)
 GRAVITY = 981.0 / 3600.0  # cm a frame, each frame
 
 STANDING_SPEED = 0.0019  # leg lengths a frame; a slower figure stands
-# A figure whose head or hips are lower crouches. Unit: length of the bones from there to the ground.
+# A figure crouches if its head and its hips are both lower than this. Unit: length of the bones from there to
+# the ground.
 CROUCHED_HEAD = 0.8
 CROUCHED_HIPS = 0.85
 
@@ -26,8 +27,8 @@ JOG_FLIGHT = 9.0  # share of the time without a foot down
 JOG_DOUBLE_SUPPORT = -9.0  # share of the time with both feet down
 JOG_BOUNCE = 12.5  # vertical acceleration of the hips, g, at most MOST_BOUNCE, because happy walks bounce
 MOST_BOUNCE = 0.5
-JOG_FROUDE = 6.0  # per Froude number above FASTEST_WALK, the limit of walking for long
-FASTEST_WALK = 0.5
+JOG_FROUDE = 6.0  # per Froude number above FASTEST_WALK
+FASTEST_WALK = 0.5  # Froude number of the fastest walk that people keep up for long
 JOG_CONSTANT = -3.2
 # A figure walks if both feet are down for this share of the time, one is always down, and the hips do not
 # clearly spring. Bounce does not matter then, as in happy walks.
@@ -45,7 +46,9 @@ SWITCH_COST = 18.0  # frames of full evidence that a change of gait costs
 FADE_FRAMES = 31
 LONGEST_START = 180  # frames: a shorter doubtful walk between standing and jogging counts as jog
 CLEARLY_WALKING = -4.0  # log odds in the second half of such a walk
-LONGEST_PASSAGE = 75  # frames: of any other shorter walk, half counts as standing and half as jogging
+# Frames. Any other walk between standing and jogging that is shorter is split: half counts as standing, half
+# as jogging.
+LONGEST_PASSAGE = 75
 
 
 def overwrite_crouch(gait: Array, clip: Clip) -> Array:

@@ -47,11 +47,11 @@ export const createLayers = (packed) => {
 
 // standardise: raw inputs x into z, without those that have no weight. restore: outputs to raw units, in place.
 export const createScales = (spec) => {
-  const mean = floats(spec.xMean), inverse = floats(spec.xScale), seen = Int32Array.from(spec.seen);
+  const mean = floats(spec.xMean), inverse = floats(spec.xScale), columnsOfX = Int32Array.from(spec.inputColumns);
   const yMean = floats(spec.yMean), yStd = floats(spec.yStd);
   return {
     inputs: mean.length,
-    standardise: (x, z) => { for (let c = 0; c < mean.length; c++) z[c] = (x[seen[c]] - mean[c]) * inverse[c]; },
+    standardise: (x, z) => { for (let c = 0; c < mean.length; c++) z[c] = (x[columnsOfX[c]] - mean[c]) * inverse[c]; },
     restore: (y) => { for (let r = 0; r < y.length; r++) y[r] = y[r] * yStd[r] + yMean[r]; return y; },
   };
 };

@@ -40,7 +40,7 @@ class Predictor(Protocol):
         """Write the standardised inputs x into z, both (C, X) float32."""
 
     def evaluate(self, z: Array, phase: Array, out: Array) -> None:
-        """Write Y (C, Y) float32 of standardised inputs z (C, X) at phases (C,) in cycles into `out`."""
+        """Write Y (C, Y) float32 for standardised inputs z (C, X) at phases (C,), 0 to 1, into `out`."""
 
     def predict(self, x: Array, phase: Array, out: Array | None = None) -> Array:
         """Y (C, Y) float32 of X (C, X) float32 at phases (C,): `standardise`, then `evaluate`."""
@@ -59,7 +59,9 @@ class Network(ABC):
 
     kind: ClassVar[str] = ""  # its folder in hobble.models
     phase: ClassVar[bool] = True  # whether a prediction depends on the phase
-    rooted: ClassVar[bool] = False  # whether root movement belongs to the pose, so that it is never reduced
+    # Whether the root's movement is part of the predicted pose. Then the runtime does not reduce it while the
+    # character stands or moves away from the target.
+    rooted: ClassVar[bool] = False
     modes: ClassVar[tuple[str, ...]] = ("exact",)  # of the predictor; the last one is exact
     storage: ClassVar[str] = "float32"  # of the predictor's weights by default, one of STORAGES
 
@@ -77,7 +79,7 @@ class Network(ABC):
     training_facts: TrainingFacts | None = field(default=None, repr=False)
 
     def trained(self, channel: str) -> tuple[str, ...]:
-        """Labels of a channel's columns that were above 0 in training, by the means of the inputs.
+        """Labels of a channel's columns that were above 0 in training, judged by `x_mean`.
 
         All labels if all means are 0; () for a channel that the network does not have.
         """

@@ -13,6 +13,9 @@ import numpy as np
 import torch
 from torch import Tensor
 
+from hobble.models.layer_mirror import LayerMirror
+from hobble.rows.mirror_columns import ColumnMirror
+
 ALL_ROWS = slice(None)
 
 
@@ -91,6 +94,13 @@ class Trainable(ABC):
     @abstractmethod
     def described(self) -> str:
         """Its shape in a few words. A training resumes only with a network of the same shape."""
+
+    def mirrors(self, inputs: ColumnMirror, outputs: ColumnMirror) -> list[LayerMirror]:
+        """How each layer changes with the mirrors of standardised X and Y.
+
+        Only for kinds whose `Options.asymmetric` can be empty.
+        """
+        raise TypeError(f"{type(self).__name__} has no mirror")
 
     @cached_property
     def layers(self) -> list[Tensor]:

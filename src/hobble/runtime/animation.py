@@ -18,18 +18,16 @@ from hobble.core.skeleton import Skeleton
 from hobble.models.load import load_network
 from hobble.models.network import Network
 from hobble.runtime.caller_axes import Axes
-from hobble.runtime.channel_values import ChannelValues, UnknownName
+from hobble.runtime.caller_targets import CallerTargets
+from hobble.runtime.channel_values import ChannelValues
 from hobble.runtime.character import Character, Snapshot, start
 from hobble.runtime.controller import Controller, ControllerOptions
 from hobble.runtime.ground import as_ground
-from hobble.runtime.limits import JOG_FROM, SpeedLimiter
-from hobble.runtime.trajectory import STILL, target_facing
+from hobble.runtime.limits import SpeedLimiter
+from hobble.runtime.trajectory import target_facing
 from hobble.runtime.waypoints import Follower, Waypoint
 
-# Limits of the input, well above what is real: sprinters reach 21 cm a frame, mountains 9 km.
-FASTEST = 30.0  # largest target velocity, cm a frame; 18 m/s
 FARTHEST = 1e7  # cm from the origin, 100 km: beyond it, positions are too imprecise for a step
-TURN_IN_PLACE = np.radians(20)  # a standing character steps around if it has to turn further than this
 
 
 @dataclass(frozen=True)
@@ -101,9 +99,9 @@ class ProceduralAnimation:
         self._predictor = network.predictor(mode, storage)
         self._waypoints = list(waypoints) if waypoints is not None else None
         self._contacts = network.layout.y_contacts
-        self._gaits = {name: i for i, name in enumerate(network.gaits)}
+        self._targets = CallerTargets(network.gaits, self.axes, characters)
         for waypoint in self._waypoints or ():
-            self._known_gait(waypoint.gait)
+            self._targets.check_gait(waypoint.gait)
         self._terrain: tuple[Any, Any] = (None, None)
         self.reset(position, facing)
 
@@ -145,14 +143,14 @@ class ProceduralAnimation:
         places = (
             np.broadcast_to(place, (count, 2))
             if position is None
-            else self._level("position", position, self.axes.points_in)
+            else self._targets.on_the_ground("position", position, self.axes.points_in)
         )
         if np.abs(places).max() > FARTHEST:
             raise ValueError(f"position is further than {FARTHEST / 1e5:g} km from the origin: {position}")
         if facing is None:
             yaws = np.full(count, yaw)
         else:
-            ahead = self._level("facing", facing, self.axes.directions_in)
+            ahead = self._targets.facing(facing)
             yaws = np.arctan2(ahead[:, 0], ahead[:, 1])
         self._control(start(self.network, count, np.array(places, float), yaws))
 
@@ -166,6 +164,7 @@ class ProceduralAnimation:
             raise ValueError("characters that follow waypoints cannot be copied")
         out = copy.copy(self)
         out.characters = len(of)
+        out._targets = CallerTargets(self.network.gaits, self.axes, len(of))
         out._control(self.state.copies(of))
         out._controller.take_pose(self._controller, of)
         return out
@@ -175,7 +174,6 @@ class ProceduralAnimation:
         count = self.characters
         self.state = state
         self._controller = Controller(self._predictor, state, **self._of_controller)
-        self._target_gait = np.zeros((count, len(self._gaits)))
         self._target_strafe, self._target_look = np.zeros(count), np.zeros((count, 2))
         self._nowhere = np.zeros((count, 2))
         self._limiter = SpeedLimiter(self.network, self._channel_values.columns, count)
@@ -235,9 +233,9 @@ class ProceduralAnimation:
         """
         velocity, ahead, gait = self._target(target_velocity, facing, gait)
         strafe, direction = self._target_strafe, self._target_look
-        ahead = self._nowhere if ahead is None else ahead
         target_facing(velocity, ahead, self.state.smoothed_direction, strafe, direction)
-        shares = self._gait(velocity, direction, gait)
+        heading = self.state.direction[:, self.network.layout.window]
+        shares = self._targets.gait_shares(velocity, direction, heading, gait)
         if terrain is not self._terrain[0]:
             self._terrain = (terrain, as_ground(terrain, self.axes))
         targets = [
@@ -259,18 +257,12 @@ class ProceduralAnimation:
             raise
         return self._pose()
 
-    def _target(self, velocity: Any, facing: Any, gait: Any) -> tuple[Array, Array | None, Any]:
+    def _target(self, velocity: Any, facing: Any, gait: Any) -> tuple[Array, Array, Any]:
+        """Target velocity and facing (C, 2), zero to look where the character goes, and the caller's gait."""
+        ahead = self._nowhere if facing is None else self._targets.facing(facing)
         if velocity is not None:
-            ahead = None if facing is None else self._level("facing", facing, self.axes.directions_in)
-            target = self._level("target_velocity", velocity, self.axes.points_in)
-            if (fastest := np.hypot(target[:, 0], target[:, 1]).max()) > FASTEST:
-                raise ValueError(
-                    f"target_velocity is {fastest:.4g} cm a frame, faster than a body can move: "
-                    f"{FASTEST:g} cm a frame at most ({FASTEST * 0.6:g} m/s at 60 frames a second)"
-                )
-            return target, ahead, gait
+            return self._targets.velocity(velocity), ahead, gait
         if self.follower is None:
-            ahead = None if facing is None else self._level("facing", facing, self.axes.directions_in)
             return np.zeros((self.characters, 2)), ahead, gait
         middle = self.network.layout.window
         target, heading = self.follower.lead(self.state.position[:, middle])
@@ -281,68 +273,6 @@ class ProceduralAnimation:
                 if waypoint.facing is not None:
                     ahead[c] = waypoint.facing
         return target, ahead, [w.gait for w in heading] if gait is None else gait
-
-    def _level(self, what: str, vector: Any, convert: Any) -> Array:
-        """The caller's vectors as Hobble's x, z (C, 2). Two components are taken as ground coordinates."""
-        v = np.asarray(vector, float)
-        if (
-            v.shape[-1:] not in ((2,), (3,))
-            or v.ndim > 2
-            or v.shape[:-1] not in ((), (1,), (self.characters,))
-        ):
-            each = f", or one for each of {self.characters}" if self.characters > 1 else ""
-            raise ValueError(f"{what} has to be a vector of 2 or 3 components{each}, not of shape {v.shape}")
-        if not np.isfinite(v).all():
-            raise ValueError(f"{what} is not a finite vector: {vector}")
-        if v.shape[-1] == 2:
-            if self.axes.native:
-                return np.array(np.broadcast_to(v, (self.characters, 2)), order="C")
-            full = np.zeros((*v.shape[:-1], 3))
-            full[..., [k for k in range(3) if k != "XYZ".index(self.axes.up)]] = v
-            v = full
-        if not self.axes.native:
-            v = convert(v)
-        return np.array(np.broadcast_to(v[..., ::2], (self.characters, 2)), order="C")
-
-    def _gait(self, velocity: Array, direction: Array, gait: Any) -> Array:
-        """Shares (C, 6) of the gaits, from the caller's gait, speed and facing."""
-        shares = self._target_gait
-        speed = np.hypot(velocity[:, 0], velocity[:, 1])
-        given = np.asarray(gait)
-        if given.dtype.kind in "biuf":
-            known = (given >= 0) & (given <= 1)
-            if given.shape not in (shares.shape, shares.shape[1:]) or not known.all():
-                raise ValueError(
-                    f"gait shares have to be {shares.shape[1:]} or {shares.shape} numbers from 0 to 1, not "
-                    f"{given.tolist()}; order: {', '.join(self._gaits)}"
-                )
-            shares[:] = given
-            return shares
-        names = [gait] * self.characters if gait is None or isinstance(gait, str) else gait
-        if len(names) != self.characters:
-            raise ValueError(f"{len(names)} gaits for {self.characters} characters")
-        shares[:] = 0.0
-        for c, name in enumerate(names):
-            if name is None:
-                name = "jog" if speed[c] >= JOG_FROM else "walk"
-            self._known_gait(name)
-            if speed[c] < STILL:
-                shares[c, self._gaits["stand"]] = 1.0 - self._turning(c, direction[c])
-                shares[c, self._gaits["walk"]] = 1.0 - shares[c, self._gaits["stand"]]
-                if name != "crouch":
-                    continue
-            shares[c, self._gaits[name]] = 1.0
-        return shares
-
-    def _known_gait(self, name: Any) -> None:
-        if name not in self._gaits:
-            raise UnknownName("no gait", name, self._gaits)
-
-    def _turning(self, c: int, direction: Array) -> float:
-        """1 if a standing character has to step around to face `direction`, else 0."""
-        x, z = self.state.direction[c, self.network.layout.window]
-        angle = np.arctan2(direction[0] * z - direction[1] * x, direction[0] * x + direction[1] * z)
-        return float(abs(angle) > TURN_IN_PLACE)
 
     def _pose(self) -> Pose:
         c, state = self._controller, self.state

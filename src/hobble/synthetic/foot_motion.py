@@ -23,7 +23,7 @@ FOLLOW = 0.45  # share of its pitch rate that the foot keeps as it leaves
 SPEED_LEFT = 0.36  # speed of the foot as it lands, as a share of its mean speed
 EARLY = 0.81  # below 1 the foot covers more than half of its distance in the first half of the swing
 RISE, SETTLE = 0.36, 0.3  # shares of the swing in which the foot rises to its clearance and comes down again
-SOLE_HEIGHT = 2.0  # cm: a moving joint of the foot stays this and the clearance above the ground
+SOLE_HEIGHT = 2.0  # cm: a joint of the swinging foot stays at least this plus the clearance above the ground
 
 
 @dataclass(frozen=True)

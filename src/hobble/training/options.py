@@ -61,6 +61,10 @@ class Recipe(Section):
         "faster, along a smoother path; 1: none",
     )
     keep_channels: bool = Field(False, description="dropout never drops the inputs of channels")
+    symmetric: bool = Field(
+        False,
+        description="keep the network the same for left and right; for data sets with `mirror: true`",
+    )
     keep: Literal["last", "best"] = Field(
         "last",
         description="weights to write: those at the end, as in the original, or those with the lowest "

@@ -19,7 +19,7 @@ from hobble.report.tables import Column, Table
 
 INTRODUCTION = (
     "The network gets the captured input of a frame and predicts the next frame. The error is measured on "
-    "every frame of a gait cycle."
+    "every frame that belongs to a gait cycle."
 )
 COLOURS = {"train": "@muted", "held_out": "@accent"}
 NAMES = {"train": "training", "held_out": "held out"}
@@ -249,7 +249,10 @@ def _centimetres(error: float, split: str, material: Material) -> str:
     drawn = (lengths.get(1, {}).get(split) or {}).get("position_error_cm")
     if drawn is None:
         return f"{number(error)} cm per joint on average"
-    return f"{number(error)} cm per joint; {number(drawn)} cm for the pose that is drawn"
+    return (
+        f"{number(error)} cm per joint as predicted; {number(drawn)} cm as drawn (predicted position and "
+        "velocity averaged)"
+    )
 
 
 def hints(found: Json, material: Material) -> Iterator[Hint]:

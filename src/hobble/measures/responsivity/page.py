@@ -21,7 +21,7 @@ from hobble.report.page_parts import KeyFigures, PageSection, Paragraph, Section
 from hobble.report.published import cited
 from hobble.report.summary import Hint, KeyFigure, placed
 from hobble.report.tables import Column, Table
-from hobble.runtime.controller import FASTEST_TURN
+from hobble.runtime.network_rows import FASTEST_TURN
 
 FEWEST_STEPS = 10  # with fewer steps, the mean foot slide is not shown
 FRAME_BUDGET_MS = 1000 / 60

@@ -41,12 +41,12 @@ def _evaluate(
     gate_weights: Any, gate_numbers: Any, gate_plan: Any, columns: Any,
     weights: Any, numbers: Any, plan: Any, experts: int, z: Any, out: Any,
 ) -> None:  # fmt: skip
-    seen = np.empty((z.shape[0], len(columns)), np.float32)
+    gate_z = np.empty((z.shape[0], len(columns)), np.float32)
     for c in range(z.shape[0]):
         for i in range(len(columns)):
-            seen[c, i] = z[c, columns[i]]
+            gate_z[c, i] = z[c, columns[i]]
     shares = np.empty((z.shape[0], experts), np.float32)
-    blend_layers(gate_weights, gate_numbers, gate_plan, np.ones((z.shape[0], 1), np.float32), seen, shares)
+    blend_layers(gate_weights, gate_numbers, gate_plan, np.ones((z.shape[0], 1), np.float32), gate_z, shares)
     for c in range(z.shape[0]):
         _softmax(shares[c])
     blend_layers(weights, numbers, plan, shares, z, out)

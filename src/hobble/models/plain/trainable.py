@@ -10,11 +10,13 @@ import numpy as np
 import torch
 from torch import Tensor
 
+from hobble.models.layer_mirror import LayerMirror, layer_mirrors
 from hobble.models.pfnn.fused import FusedPfnnStep
 from hobble.models.pfnn.step import PfnnStep as BlendedStep
 from hobble.models.plain.network import PHASE_COLUMNS
 from hobble.models.products import product
 from hobble.models.trainable import ALL_ROWS, Trainable, TrainingStep, uniform_start
+from hobble.rows.mirror_columns import ColumnMirror
 
 
 @dataclass(frozen=True)
@@ -54,6 +56,16 @@ class TrainablePlain(Trainable):
                 x = torch.nn.functional.elu(x)
             x = product(torch.cat([x, torch.ones_like(x[:, :1])], dim=1), layer.flatten(1))
         return x
+
+    def mirrors(self, inputs: ColumnMirror, outputs: ColumnMirror) -> list[LayerMirror]:
+        """As in `Trainable`. Half a cycle later, sine and cosine of the phase have the other sign."""
+        phase = np.arange(PHASE_COLUMNS)
+        with_phase = ColumnMirror(
+            np.append(inputs.source, len(inputs.source) + phase),
+            np.append(inputs.sign, -np.ones(PHASE_COLUMNS)),
+            np.append(inputs.shift, np.zeros(PHASE_COLUMNS)),
+        )
+        return layer_mirrors(with_phase, outputs, self.units[1:-1], 0)
 
     def step(self, dropout: float, half: bool) -> TrainingStep:
         """Compiled loops on a CPU, PyTorch elsewhere."""

@@ -38,10 +38,11 @@ def injury_response(
     """The content of injury.json: a sweep of each of `links` (default: all).
 
     motion: the captured clips, whose largest accelerations are compared with the character's. seconds: time
-    at each severity. `rows`: one for each gait, link and rising severity. `falling`: the same for falling
-    severity. `responses`: for each gait and link (see `SeveritySweep.response`). `second`, `into_a_jog`,
-    `divided`: see `cases`. `summary`: means over the links that were hurt in training (`trained`) and over
-    the others. `applies` is false for a network without severities.
+    at each severity. `rows`: one for each gait, link and rising severity. `falling`: one for each gait, link
+    and falling severity. `responses`: one for each gait and link (see `SeveritySweep.response`). `second`,
+    `into_a_jog`, `divided`: see `hobble.channels.injury.response.cases`. `trained`: the links that were hurt
+    in training. `summary`: means over these. `summary_untrained`: means over the others. `applies` is false
+    for a network without severities.
     """
     if not links_of(network):
         return {"configuration": configuration, "applies": False, "reason": NO_SEVERITIES}
@@ -94,9 +95,9 @@ def injury_response(
 def largest_accelerations(
     motion: Iterable[Captured], network: Network
 ) -> dict[tuple[str, str | None], float]:
-    """(gait, link) -> largest joint acceleration (cm per frame squared) in captured motion.
+    """(gait, link) -> largest joint acceleration (cm per frame squared) in captured motion with that injury.
 
-    (gait, None): the largest in that gait with any or no injury.
+    (gait, None): the largest in that gait with any injury or none.
     """
     out: dict[tuple[str, str | None], float] = {}
     for clip in motion:
@@ -114,7 +115,7 @@ def largest_accelerations(
 
 
 def _summary(responses: Sequence[LinkResponse]) -> dict[str, Summary]:
-    """Means over links, by gait; {} without links."""
+    """Gait -> means over links; {} without links."""
     out: dict[str, Summary] = {}
     for gait in GAITS:
         some = [r for r in responses if r["gait"] == gait]
