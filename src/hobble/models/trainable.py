@@ -1,4 +1,4 @@
-"""The interface of a network in training: parameters in one buffer, and a step that finds the gradient."""
+"""The interface of a network in training: parameters in one buffer, and a step that computes the gradient."""
 
 from __future__ import annotations
 
@@ -20,11 +20,11 @@ ALL_ROWS = slice(None)
 
 
 class TrainingStep(Protocol):
-    """The gradient of the mean squared error on one batch.
+    """Computes the gradient of the mean squared error on one batch.
 
-    gradients: of the last call, one for each layer, with the layer's numbers in the same order. error: of the
-    last call, (B, Y), prediction minus y. generator: for dropout on CUDA. input_mask: which of the masks is
-    that of all inputs.
+    gradients: of the last call, one for each layer, in the order of the layer's parameters. error: (B, Y) of
+    the last call, prediction minus y. generator: random numbers for dropout on CUDA. input_mask: index of the
+    mask of the network's inputs among `masks`.
     """
 
     gradients: list[Tensor]
@@ -33,7 +33,7 @@ class TrainingStep(Protocol):
     input_mask: int
 
     def __call__(self, x: Tensor, y: Tensor, p: Tensor, masks: list[Tensor]) -> Tensor:
-        """Find `gradients` for x (B, X), y (B, Y), p (B,). Returns the mean squared error, a scalar."""
+        """Compute `gradients` for x (B, X), y (B, Y), p (B,). Returns the mean squared error, a scalar."""
 
     def masks(self, rows: int, own: slice = ALL_ROWS) -> list[Tensor]:
         """Draw the dropout masks of a batch of `rows` rows, and return those of the rows `own`.
@@ -50,8 +50,8 @@ class Trainable(ABC):
     """All parameters in one buffer `flat`, layer by layer.
 
     A layer is (out, K, in + 1): K sets of weights that the network blends, with the bias as the last column.
-    So the optimiser is one loop for all architectures, and a layer is one product with the inputs, extended
-    by a 1 and multiplied by the K shares.
+    So one loop of the optimiser serves all architectures, and a layer is one matrix product with its inputs,
+    which are extended by a 1 and multiplied by each of the K shares.
     """
 
     kind: ClassVar[str] = ""  # its folder in hobble.models
@@ -79,7 +79,7 @@ class Trainable(ABC):
 
     @abstractmethod
     def step(self, dropout: float, half: bool) -> TrainingStep:
-        """The fastest step on this device. half: round the factors of the products to bfloat16."""
+        """The fastest step on this device. half: round the factors of the matrix products to bfloat16."""
 
     @abstractmethod
     def arrays(self) -> dict[str, np.ndarray]:

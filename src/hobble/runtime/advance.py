@@ -1,6 +1,7 @@
 """Moves a trajectory on by one frame: root and future path follow the network's prediction.
 
-All is in one file because numba renews cached code only when its own file changes, not when a callee's does.
+All functions are in one file, because numba renews cached code only when its own file changes, not when that
+of a function it calls does.
 """
 
 from __future__ import annotations
@@ -17,9 +18,11 @@ from hobble.runtime.trajectory import STILL, Trajectory
 
 phase_change, moving_share = register_jitable(rule.phase_change), register_jitable(rule.moving)
 
-# With `Network.rooted`: largest change of a frame's movement at right angles to the target, as a share of it.
+# With `Network.rooted`: largest change of the root's movement at right angles to the target, as a share of
+# the movement.
 PULL = 0.2
-# The same along the target, as a share of PULL. With more, the character takes corners faster and wider.
+# Largest change along the target, as a share of PULL. With more, the character takes corners faster and
+# wider.
 PULL_AHEAD = 0.5
 BACKWARD_LOSS = 0.5  # share of movement against the target that is removed; removing all would drag the feet
 
@@ -28,9 +31,9 @@ BACKWARD_LOSS = 0.5  # share of movement against the target that is removed; rem
 def _pull(share: float, target_x: float, target_z: float, x: float, z: float) -> tuple[float, float]:
     """What to add to a movement (x, z) so that it comes nearer to the target.
 
-    Across the target by at most `share` times the movement's length, and along it by PULL_AHEAD of that. If
-    the two shared one limit, a clip that is too slow would use all of it, and the character would leave its
-    path sideways.
+    It changes the movement across the target by at most `share` times the movement's length, and along the
+    target by at most PULL_AHEAD of that. If both shared one limit, a clip that is too slow would use it up,
+    and the character would drift off its path.
     """
     most = share * np.sqrt(x * x + z * z)
     size = np.sqrt(target_x * target_x + target_z * target_z)
@@ -61,14 +64,14 @@ def advance(
 ) -> None:
     """Advance one frame: shift the past, move and turn the root, take the predicted future and phase change.
 
-    y: (C, outputs) prediction. at: columns of y (root velocity, turn, phase change, position, direction),
-    then the number of future samples and the step.
-    rooted: as `Network.rooted`, the movement belongs to the pose. Otherwise it is scaled by (1 - stand)^.25.
-    loss: the share of movement against the velocity `target` (C, 2) that is removed. If the target is to turn
-    on the spot, it is removed from all movement. 0 is the original runtime.
-    pull: largest change of the movement toward the target, as a share of its own length. It is needed
-    because clips have only some directions and speeds (after the adjustment of Holden et al. 2020).
-    The predicted yaw velocity is that of the world seen from the root, so the root turns by its negative.
+    y: (C, Y) prediction. at: first columns in y of root velocity, turn, phase change, position and direction,
+    then the number of future samples and the frames between two samples. target: (C, 2) velocity.
+    rooted: see `Network.rooted`. If false, the movement is scaled by (1 - stand)^.25.
+    loss: share of the movement against the target that is removed; if the target is to stand, that share of
+    all movement. The original runtime removes nothing.
+    pull: largest change of the movement toward the target, as a share of the movement. It is needed because
+    clips have only some directions and speeds (after the adjustment of Holden et al. 2020).
+    The predicted turn is that of the world seen from the root, so the root turns by its negative.
     """
     position, direction, gait = path
     length = position.shape[1]

@@ -27,17 +27,18 @@ from hobble.runtime.limits import SpeedLimiter
 from hobble.runtime.trajectory import target_facing
 from hobble.runtime.waypoints import Follower, Waypoint
 
-FARTHEST = 1e7  # cm from the origin, 100 km: beyond it, positions are too imprecise for a step
+FARTHEST = 1e7  # cm from the origin, 100 km; farther away, positions are too imprecise for a step
 
 
 @dataclass(frozen=True)
 class Pose:
-    """One frame. The caller may keep and change it. A single character has no leading axis C.
+    """One frame of C characters. The caller may keep and change it. For one character there is no axis C.
 
-    positions: (C, J, 3); rotations: (C, J, 4) world, w first; contacts: (C, 4) left heel, left toe, right
-    heel, right toe, 0..1: as predicted, and 0 while the runtime lifts a foot to set it down elsewhere; phase:
-    (C,) in cycles; root: (C, 3) on the trajectory; yaw: (C,) radians of the root's facing, 0 for +Z, growing
-    to the left; channels: name -> (C, columns), the values that the network got.
+    positions: (C, J, 3) world, in the caller's axes and unit. rotations: (C, J, 4) world, w first.
+    contacts: (C, 4) of left heel, left toe, right heel, right toe, from 0 to 1, as predicted; 0 while the
+    runtime makes the foot step. phase: (C,) in cycles. root: (C, 3) on the ground. yaw: (C,) radians, where
+    the root faces: 0 is +Z, growing to the left, in Hobble's axes. channels: name -> (C, columns), the values
+    that the network got.
     """
 
     positions: Array = field(repr=False)
@@ -55,7 +56,7 @@ class ProceduralAnimation:
         character = ProceduralAnimation.load("results/injured/network")
         pose = character.next_pose((0, 2.5), injury={"LeftUpLeg-LeftLeg": 7})
 
-    One call moves all characters. With C > 1, every argument is either one value for all or one for each.
+    One call moves all C characters. An argument is either one value for all of them or one value for each.
     """
 
     def __init__(
@@ -111,15 +112,15 @@ class ProceduralAnimation:
     ) -> ProceduralAnimation:
         """Load weights.npz, its folder, or a folder of the original release's .bin files.
 
-        skeleton: a Skeleton or a file of config/skeletons, for a file without one.
-        mode: "constant", "linear" or "cubic". storage: of the weights, "float32" or "int16"; default: the
-        kind's own.
+        skeleton: a Skeleton or a file of config/skeletons, for a network file that has none.
+        mode: how the phase gets its weights: "constant", "linear" or "cubic".
+        storage: how weights are stored in memory, "float32" or "int16"; the default depends on the kind.
         characters: how many.
         waypoints: the track to follow when `next_pose` gets no velocity.
         rates: channel -> largest change of its values per second; default: the channel's own rate.
         scales: channel -> divisor of its values.
         foot_locking: hold feet in contact where they landed.
-        steering: gain of the correction when the target velocity is not reached; 0 as in the original.
+        steering: gain of the correction when the target velocity is not reached; 0: none, as in the original.
         limits: limit the target speed to what the injured body can do.
         axes: the caller's axes and unit. position, facing: see `reset`.
 
@@ -135,7 +136,7 @@ class ProceduralAnimation:
     def reset(self, position: Any = None, facing: Any = None) -> None:
         """Restart healthy at `position` (3,) or (C, 3), facing the direction `facing` (3,) or (C, 3).
 
-        Default: all characters at the origin facing forward, or at the start of the waypoints.
+        By default they start at the origin facing forward, or at the start of the waypoints.
         """
         count = self.characters
         self.follower = Follower(self._waypoints, count) if self._waypoints is not None else None
@@ -155,10 +156,9 @@ class ProceduralAnimation:
         self._control(start(self.network, count, np.array(places, float), yaws))
 
     def copies(self, of: np.ndarray) -> ProceduralAnimation:
-        """A new animation, whose character i goes on as this one's character of[i] would. of: (C',) indices.
+        """A new animation whose character i continues from this one's character of[i]. of: (C',) indices.
 
-        What is done with one of the two later does not change the other. Raises ValueError if the characters
-        follow waypoints.
+        The two animations share no state. Raises ValueError if the characters follow waypoints.
         """
         if self.follower is not None:
             raise ValueError("characters that follow waypoints cannot be copied")
@@ -170,7 +170,7 @@ class ProceduralAnimation:
         return out
 
     def _control(self, state: Character) -> None:
-        """Go on from `state`."""
+        """Continue from `state`, with a new controller."""
         count = self.characters
         self.state = state
         self._controller = Controller(self._predictor, state, **self._of_controller)
@@ -185,7 +185,7 @@ class ProceduralAnimation:
 
     @property
     def last_inputs(self) -> Array:
-        """(C, inputs) of the network in the last frame, in raw units. The next frame overwrites them."""
+        """(C, X) inputs of the network in the last frame, in raw units. The next frame overwrites them."""
         return self._controller.x
 
     @property
@@ -198,7 +198,10 @@ class ProceduralAnimation:
 
     @property
     def predicted_turns(self) -> tuple[Array, Array]:
-        """The same before `world_rotations`, which is quicker for many frames at once: copies."""
+        """The arguments of `world_rotations` in the last frame, (C, J, 3) and (C,), as copies.
+
+        Collect them and convert many frames at once: that is faster than `predicted_rotations`.
+        """
         made = self._controller
         turns = made.y[:, self.network.layout.y_joint_rotation].reshape(self.characters, -1, 3)
         return turns.copy(), made.yaw.copy()
@@ -215,16 +218,15 @@ class ProceduralAnimation:
         """Advance by one 60 Hz frame and return the pose.
 
         target_velocity: (2,) on the ground, (3,), or (C, 2 or 3): distance per frame, in your unit. None
-        follows the waypoints, or stands.
-        facing: direction to look in, same shapes, any length. None or zero: where the character goes.
-        gait: a name ("walk"), one name for each character, shares (6,) or (C, 6), or None to choose by speed.
-        Below 0.1 cm a frame the character stands, whatever the gait.
-        terrain: None for flat ground at 0; a function of two ground coordinates (arrays) that returns
-        heights; a `ground.Heightmap`; or a 2D array around the origin. All in your axes and unit. Pass the
-        same object every frame.
-        channels: keywords named after channels, such as injury={"LeftUpLeg-LeftLeg": 7}. The value is
-        label -> value (or (C,) values), or an array (L,) or (C, L). Labels that are not named go back to 0.
-        None, or no keyword, leaves the channel unchanged.
+        follows the waypoints; without waypoints the character stands. facing: direction to look in, same
+        shapes, any length. None or zero: the direction of movement. gait: a name ("walk"), one name for each
+        character, shares (6,) or (C, 6), or None to choose by speed. Below 0.1 cm a frame the character
+        stands, whatever the gait. terrain: None for flat ground at 0; a function of two ground coordinates
+        (arrays) that returns heights; a `ground.Heightmap`; or a 2D array around the origin. All in your axes
+        and unit. Pass the same object every frame. channels: keywords named after channels, such as
+        injury={"LeftUpLeg-LeftLeg": 7}. The value is a mapping from label (column of the channel) to value or
+        (C,) values, or an array (L,) or (C, L) of all L labels. Labels that are not named go back to 0. None,
+        or no keyword, leaves the channel unchanged.
 
         Raises UnknownName (a KeyError) for a label or gait that the network does not have; TypeError for a
         keyword that is no channel; ValueError for a channel that the network has no input for, for values out
@@ -299,5 +301,5 @@ class ProceduralAnimation:
 
 
 def world_rotations(turns: Array, yaw: Array) -> Array:
-    """(..., J, 4) world rotations of vectors (..., J, 3) relative to a root that faces `yaw` (...)."""
+    """(..., J, 4) world rotations from rotation vectors (..., J, 3) relative to a root that faces `yaw`."""
     return quat.mul(quat.yaw(yaw)[..., None, :], quat.exp(turns.astype(float)))

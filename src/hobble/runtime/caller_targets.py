@@ -15,7 +15,7 @@ from hobble.runtime.trajectory import STILL
 
 # cm a frame, 18 m/s: largest target velocity, well above what is real. Sprinters reach 21 cm a frame.
 FASTEST = 30.0
-TURN_IN_PLACE = np.radians(20)  # a standing character steps around if it has to turn further than this
+TURN_IN_PLACE = np.radians(20)  # a standing character steps around if it has to turn by more than this
 
 
 class CallerTargets:

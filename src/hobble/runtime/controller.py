@@ -1,10 +1,10 @@
 """One frame of a character in six timed steps: prepare, input, insert, predict, output, update.
 
 - prepare: smooth the caller's target, bend the future trajectory toward it, look up the ground;
-- input: write trajectory, gait, ground, last pose and channel values into a row X, in the root frame;
+- input: write trajectory, gait, ground, last pose and channel values into a row X, in root coordinates;
 - insert: standardise the row;
 - predict: evaluate the network at the present phase, which gives Y;
-- output: turn Y into a world pose, and place the feet of the caller's copy;
+- output: turn Y into a world pose, and place the feet in the copy that the caller gets;
 - update: advance root, past and future trajectory, and phase by one frame.
 """
 
@@ -28,9 +28,10 @@ from hobble.runtime.character import Character, start
 
 STEPS = ("prepare", "input", "insert", "predict", "output", "update")
 FPS = 60
-HIGHEST = 1e7  # cm, 100 km: largest height of the ground above or below 0; beyond it, heights are imprecise
+HIGHEST = 1e7  # cm, 100 km: largest height of the ground above or below 0; larger heights are imprecise
 
-# Parts of the state that have to be finite. The others are checked at the call or computed in each frame.
+# Parts of the state that are checked to be finite. The others are checked in the call or made anew each
+# frame.
 CHECKED = (
     *("position", "direction", "gait", "joint_position", "joint_velocity", "joint_rotation", "phase"),
     *(
@@ -161,7 +162,7 @@ class Controller:
         self.seconds[:] = (t1 - t0, t2 - t1, t3 - t2, t4 - t3, t5 - t4, t6 - t5)
 
     def _restore(self, what: str) -> None:
-        """Restart the characters marked in `_unsound` where they were; wanted channel values stay."""
+        """Restart the characters marked in `_unsound` where they are, with the same channel targets."""
         self._warn(what)
         some = np.flatnonzero(self._unsound)
         fresh = start(self.predictor.network, len(some), self.root[some][:, ::2], self.yaw[some])
@@ -233,9 +234,10 @@ class Controller:
 
 
 def _heights(ground: Ground, x: Array, z: Array) -> Array:
-    """The caller's ground at x, z (N,).
+    """Heights (N,) of the caller's ground at x, z (N,), cm.
 
-    Raises ValueError for heights that are not finite, because they would stay in the state.
+    Raises ValueError for a wrong shape, and for heights that are not finite or too large: they would stay in
+    the state.
     """
     heights = np.asarray(ground(x, z), float)
     if heights.shape not in ((), x.shape):

@@ -15,19 +15,19 @@ from hobble.core.compiled import njit
 from hobble.runtime.trajectory import Trajectory
 
 joint_place = register_jitable(rule.joint_place)
-# Radians a frame (1500 degrees a second). No joint of a walking or running person turns as fast. A prediction
-# can: if clips have rotations half a turn apart, as in hands, their mean may be any rotation, and a new
-# target changes the next pose at once.
+# Radians a frame (1500 degrees a second). No joint of a walking or running person turns as fast, but a
+# predicted joint can: if clips have rotations half a turn apart, as in hands, their mean may be any rotation.
+# A new target may also change the next pose at once.
 FASTEST_TURN = np.radians(25)
-# cm a frame by which the body rises with the mean height of the path. When a new target turns the path around
-# on a hill, that height may change by 20 cm at once, while the ground under the feet stays.
+# Largest rise or fall of the body with the mean height of the path, cm a frame. When a new target turns the
+# path around on a hill, that height may change by 20 cm at once, while the ground under the feet stays.
 MOST_CLIMB = 5.0
 
-# Groups of arrays for compiled functions, which unpack them by name.
+# Groups of arrays for compiled functions, which unpack them into names.
 #
 # The pose that the network predicted last: position, velocity (C, J, 3); rotation (C, J, 4), world.
 Joints = tuple[Any, Any, Any]
-# The caller's copy of the pose: root (C, 3), yaw (C,), position (C, J, 3), rotation (C, J, 4).
+# The copy of the pose that the caller gets: root (C, 3), yaw (C,), position (C, J, 3), rotation (C, J, 4).
 Drawn = tuple[Any, Any, Any, Any]
 
 
@@ -42,10 +42,10 @@ def write_inputs(
     step: int,
     x: Any,
 ) -> None:
-    """Write the state into the input rows x (C, X).
+    """Write the state into the network's input rows x (C, X), in raw units.
 
-    columns: the first column of each block of BODY, and the column of each of channel_values (C, K). ground:
-    (C, samples, 3) heights. height: (C,) of the ground under the root.
+    ground: (C, samples, 3) heights. height: (C,) mean ground height along the path. columns: the first column
+    of each block of BODY, and the column of each of channel_values (C, K). step: frames between two samples.
     """
     position, direction, gait = path
     joints, velocities, _ = pose
@@ -92,13 +92,12 @@ def take_outputs(
     fastest: float,
     drawn: Drawn,
 ) -> None:
-    """Turn the prediction y (C, Y), whose joints begin in column `first`, into the world poses of `pose` and
-    `drawn`.
+    """Turn the prediction y (C, Y) into the world poses `pose` and `drawn`.
 
-    heights: (C,) of the ground under the root, and the lift of the body, see `feet.carry_body`. A joint's
-    position is the mean of the predicted one and the old one plus velocity. No joint moves further
-    than `fastest` (not counting the change of the ground's height), and no joint turns by more than
-    FASTEST_TURN from the last frame.
+    first: first column of the joints. heights: (C,) mean ground height along the path, and (C,) lift of the
+    body, see `feet.carry_body`. A new joint position is the mean of two: the predicted position, and the old
+    position plus the predicted velocity. In a frame no joint moves by more than `fastest` cm, apart from the
+    change of the ground's height, and no joint turns by more than FASTEST_TURN.
     """
     position, direction, _ = path
     joints, velocities, rotations = pose

@@ -1,9 +1,8 @@
 """The character's trajectory on the ground, and how the target bends it.
 
-A trajectory has one entry per frame, half of them past and half future.
-
-The first axis of every array is the C characters. Angles are yaw: 0 faces +Z, growing toward +X (left). The
-formulas are those of the runtime of Holden et al. 2017.
+A trajectory has one entry per frame, half of them past and half future. The first axis of every array is the
+C characters. Angles are yaw: 0 faces +Z, and they grow toward +X (left). The formulas are those of the
+runtime of Holden et al. 2017.
 """
 
 from __future__ import annotations
@@ -14,22 +13,22 @@ import numpy as np
 
 from hobble.core.compiled import njit
 
-# Largest correction of the target, as a multiple of it. With 1, a network trained on few starts stands for
-# seconds before it walks.
+# Largest correction of the target velocity, as a multiple of that velocity. With 1, a network that saw few
+# starts of a walk in training stands for seconds before it walks.
 STEERING_LIMIT = 2.0
 TARGET_MIX = 0.9  # share of the remaining difference to the target that is applied each frame
-GAIT_MIX = 0.1
+GAIT_MIX = 0.1  # the same for the gait
 CORRECTION_RATE = 0.01  # integral gain a frame: a steady error is corrected within a second or two
 CORRECTION_WITHIN = 0.8  # share of the target; with a larger error the character is still turning or starting
 MOST_CORRECTION = 1.0  # largest integral correction, as a share of the target
-# Largest turn to ask for. With a larger one the character may turn the other way.
+# Largest turn to ask the network for. With a larger one the character may turn the other way.
 FURTHEST_TURN = np.radians(137)
-STRAFE_FROM = np.radians(45)  # angle between facing and velocity from which the strafe share is 1
+STRAFE_FROM = np.radians(45)  # from this angle between facing and velocity on, the strafe share is 1
 STILL = 0.1  # cm a frame: a slower target means standing
 
 
-# Groups of arrays for compiled functions, which unpack them by name. They are plain tuples, because a named
-# tuple as an argument costs a microsecond.
+# Groups of arrays for compiled functions, which unpack them into names. They are plain tuples, because
+# passing a named tuple costs a microsecond.
 #
 # position, direction (C, T, 2): world x and z. gait (C, T, 6): shares. T is twice the window (120); entry T/2
 # is the present frame.
@@ -53,8 +52,8 @@ def wrap(angle: float) -> float:
 def target_facing(velocity: Any, ahead: Any, direction: Any, strafe: Any, look: Any) -> None:
     """Write the share of strafing into `strafe` (C,) and the target facing into `look` (C, 2).
 
-    velocity: (C, 2) the target. ahead: (C, 2) direction to look in; zero looks where the character goes, or
-    keeps `direction` (C, 2) if it stands.
+    velocity: (C, 2) the target. ahead: (C, 2) direction to look in. If it is zero, the character looks where
+    it goes, or keeps `direction` (C, 2) if it stands.
     """
     for c in range(velocity.shape[0]):
         x, z = velocity[c, 0], velocity[c, 1]
@@ -71,7 +70,7 @@ def target_facing(velocity: Any, ahead: Any, direction: Any, strafe: Any, look: 
 
 @njit
 def follow_target(target: Target, steering: float, smoothed: Smoothed, path: Trajectory) -> None:
-    """Move `smoothed` toward the caller's target; the gait of the present frame blends slowly.
+    """Move `smoothed` toward the caller's target, and the gait of the present frame slowly toward its target.
 
     `_ask_velocity` and `_ask_turn` correct the target; with `steering` 0 there is no correction, as in the
     original runtime.
@@ -102,10 +101,10 @@ def follow_target(target: Target, steering: float, smoothed: Smoothed, path: Tra
 def _ask_velocity(steering: float, x: float, z: float, position: Any, correction: Any) -> tuple[float, float]:
     """The velocity to ask the network for, so that the character reaches (x, z).
 
-    A network tends to keep its past velocity. So the error (target minus mean velocity over the last half of
-    the past window) is added to the target, times `steering`, up to STEERING_LIMIT times the target. A steady
-    error, such as weaker strafing to one side, is integrated in `correction` (2,): along the target, and
-    across it to the left, as shares of the target.
+    A network tends to keep its past velocity. So `steering` times the error is added to the target, at most
+    STEERING_LIMIT times the target. The error is the target minus the mean velocity over the later half of
+    the past. A steady error, such as weaker strafing to one side, is integrated in `correction` (2,): along
+    the target, and to its left, as shares of the target.
     """
     middle = position.shape[0] // 2
     span = middle // 2
@@ -131,17 +130,17 @@ def _ask_velocity(steering: float, x: float, z: float, position: Any, correction
 
 @njit
 def _ask_turn(gain: float, turn: float) -> float:
-    """Radians to add to the remaining `turn`: `gain` times it, limited by FURTHEST_TURN in all."""
+    """Radians to add to the remaining `turn`: `gain` times the turn. The sum is at most FURTHEST_TURN."""
     room = max(FURTHEST_TURN - abs(turn), 0.0)
     return min(max(gain * turn, -room), room)
 
 
 @njit
 def blend_future(smoothed: Smoothed, path: Trajectory) -> None:
-    """Bend the predicted future toward the target velocity and facing; the bend grows with time.
+    """Bend the predicted future toward the target velocity and facing, more at later times.
 
-    At t in 0..1 of the future, the share of the target is 1 - (1 - t)^b, with b = .5 for the position (1 when
-    strafing) and 2 for the direction (.5 when strafing).
+    At time t of the future (0 to 1), the share of the target is 1 - (1 - t)^b. b is .5 for the position (1
+    when strafing) and 2 for the direction (.5 when strafing).
     """
     velocity, facing, strafe, _ = smoothed
     position, direction, gait = path
@@ -169,7 +168,10 @@ def blend_future(smoothed: Smoothed, path: Trajectory) -> None:
 
 @njit
 def sample_points(path: Trajectory, step: int, side: float, points: Any) -> None:
-    """Write the points (C, samples, 3, 2) where the ground is looked up: left, on the path, right."""
+    """Write the points (C, samples, 3, 2) where the ground is looked up: left, on the path, right.
+
+    step: frames between two samples. side: cm from the path to the points at its sides.
+    """
     position, direction, _ = path
     for c in range(points.shape[0]):
         for s in range(points.shape[1]):

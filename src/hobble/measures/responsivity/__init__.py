@@ -29,7 +29,7 @@ class Options(Section):
 
 
 def pieces(options: Options, runtime: Runtime, modes: Sequence[str]) -> tuple[str, ...]:
-    """The phase modes in which laps are run."""
+    """The phase modes in which laps are run. modes: those of the network."""
     return tuple(dict.fromkeys((*options.modes, runtime.mode))) if len(modes) > 1 else tuple(modes)
 
 

@@ -1,4 +1,4 @@
-"""Charts of the laps: milliseconds of each step of a frame, and the paths on the track."""
+"""Charts of the laps: the time of each step of a frame in milliseconds, and the paths on the track."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ STEPS = {
     "update": "@muted",
 }
 
-OFF_TRACK = 100.0  # cm from the line between two waypoints; farther places are marked
+OFF_TRACK = 100.0  # cm from the line between two waypoints; places farther away are marked in the chart
 
 
 def lap_steps(lap: dict[str, Any]) -> dict[str, float]:

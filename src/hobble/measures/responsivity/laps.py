@@ -21,7 +21,7 @@ from hobble.runtime.options import Runtime
 from hobble.runtime.waypoints import Waypoint
 
 FPS = 60
-EVERY = 15  # frames between two places of a path that is kept
+EVERY = 15  # frames between two stored places of a path
 AT_ONCE = 60  # frames whose rotations are in memory together
 RUN_UP = 1000.0  # cm; figures start nearer than this to the waypoint where their laps begin
 
@@ -162,7 +162,10 @@ class _Turns:
 
 
 def held_back(predicted: Array, taken: Array) -> np.ndarray:
-    """(...) whether the runtime limited the turn of a joint; both (..., J, 4), else equal."""
+    """(...) whether the runtime limited the turn of a joint.
+
+    predicted, taken: (..., J, 4) quaternions before and after the limit.
+    """
     same = np.abs(np.sum(predicted * taken, axis=-1)) > 1 - 1e-6
     return np.asarray((~same).any(axis=-1))
 
@@ -194,9 +197,10 @@ def _lap(recorded: _Recorded, c: int, first: int, waypoints: int, longest: int) 
 
 
 def _run(number: int, places: Array, off: Array) -> Run:
-    """Where a lap led: `x`, `z`, m, and `off_cm` from the line between waypoints, every EVERY frames.
+    """The path of a lap, with a place every EVERY frames.
 
-    places: (F, 2), cm; off: (F,), cm, the largest since the last one that is kept.
+    places: (F, 2), cm. off: (F,) distance from the line between waypoints, cm. A stored place has the largest
+    distance since the stored place before it.
     """
     kept = range(0, len(places), EVERY)
     return {

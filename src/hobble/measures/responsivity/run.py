@@ -38,20 +38,17 @@ def responsivity(
     track: Sequence[Waypoint] = TRACK,
     done: Mapping[str, LapsOfMode] | None = None,
 ) -> Responsivity:
-    """Laps of the track of Segerstedt 2021: `laps` in the runtime's own mode and fewer in other `modes`.
+    """Laps of the track of Segerstedt 2021: `laps` in the runtime's phase mode, fewer in other `modes`.
 
-    done: mode -> its laps, if they have already been run (`laps_of_mode`).
-
-    laps_other_modes: laps in those; by default, and at most, `laps`. modes: by default all that the network
-    has. A lap that takes longer than `lap_seconds` of simulated time ends without its remaining waypoints.
+    laps_other_modes: laps in each other mode; by default, and at most, `laps`. modes: by default all modes of
+    the network. done: mode -> its laps, if they have already been run (`laps_of_mode`). A lap that takes
+    longer than `lap_seconds` of simulated time ends without its remaining waypoints.
 
     The result is described in docs/artefacts.md. `modes` has the laps and the summary of each mode; those of
     the runtime's own mode are also at the top level. Only the values under "milliseconds" depend on the
-    clock: means of the steps over the first seconds of each lap (see `times`), their `total`, and its
-    `spread` (sd, median, 99th percentile, mean of a whole call). `largest_turn_degrees` is the largest turn
-    of a joint from one frame to the next as drawn, `predicted_turn_degrees` as predicted by the network; in
-    `turns_held_back` frames the runtime let a joint turn less than predicted. `runs`: the paths of the first
-    RUNS laps in the runtime's own mode.
+    clock. `largest_turn_degrees` is the largest turn of a joint from one frame to the next as drawn,
+    `predicted_turn_degrees` the largest as predicted by the network; in `turns_held_back` frames the runtime
+    let a joint turn less than predicted. `runs`: the paths of the first RUNS laps in the runtime's own mode.
     """
     own = network.mode(runtime.mode)
     fewer = min(laps, laps_other_modes or laps)
@@ -115,10 +112,11 @@ def laps_of_mode(
 
 
 def parameter_counts(sizes: Sequence[int]) -> dict[str, int]:
-    """Weights and biases of one phase of layers `sizes`, truly and as Segerstedt's Table 6.1 counts them.
+    """Weights and biases that one frame uses: as they are, and as Table 6.1 of Segerstedt counts them.
 
-    table_6_1: sum of n_l (1 + n_(l+1)) + n_out over the same layers; table_6_1_as_printed: with one hidden
-    layer fewer, as the text there states the layers.
+    sizes: units of each layer, from inputs to outputs. true: the actual number. table_6_1: by the formula of
+    the table, the sum of n_l (1 + n_(l+1)) over the layers, plus n_out. table_6_1_as_printed: by that formula
+    with one hidden layer fewer, as the thesis's text states the layers.
 
     >>> parameter_counts((342, 512, 512, 311))
     {'true': 597815, 'table_6_1': 598157, 'table_6_1_as_printed': 335501}
@@ -132,12 +130,11 @@ def parameter_counts(sizes: Sequence[int]) -> dict[str, int]:
 
 
 def lap_rows(result: Responsivity) -> list[Row]:
-    """The laps of every mode as flat rows for a CSV file; the times are the last columns, with the
-    standard deviation of each step."""
+    """The laps of every mode as rows for a CSV file. The last columns are the times and their deviations."""
     rows: list[Row] = []
     for entry in result["modes"]:
         for lap in entry["laps"]:
-            # Keys in the order of the types: those of a piece come sorted from its file.
+            # The keys of a piece come sorted from its file. The table has them in the order of the types.
             known: Row = {"mode": entry["mode"]} | lap
             row = {key: known[key] for key in ("mode", *Lap.__annotations__) if key != "milliseconds"}
             times: dict[str, Any] = {**lap["milliseconds"]}

@@ -66,7 +66,7 @@ def milliseconds(seconds: Array) -> Milliseconds:
 
 
 def _of_steps(values: Array) -> Steps:
-    """values: (steps or more,), in the order of STEPS."""
+    """Names the values of the steps. values: in the order of STEPS; later ones are ignored."""
     prepare, inputs, insert, predict, output, update = (round(float(v), 6) for v in values[: len(STEPS)])
     return {
         "prepare": prepare,

@@ -13,7 +13,7 @@ from hobble.models.stack import Stack, StackPredictor, blend_layers, exp_below_0
 if TYPE_CHECKING:
     from hobble.models.mann.network import Mann
 
-NEGLIGIBLE = 1e-7  # smaller shares are below single precision next to a share near 1
+NEGLIGIBLE = 1e-7  # a smaller share changes nothing in single precision beside shares near 1
 
 
 class MannPredictor(StackPredictor):

@@ -1,5 +1,5 @@
-// Motion matching: plays a run of the clips, searches every few frames, hides the transitions. The same as `predictor.py` and
-// `inertia.py` in Python. memory: an array of `spec.network.memory` numbers, zeros at first.
+// Motion matching: plays a run of the clips, searches every few frames, smooths the transitions. It computes the same as `predictor.py`
+// and `inertia.py` in Python. memory: an array of `spec.network.memory` numbers for each character, zeros at first.
 import { bytes } from "../../report/web/numbers.js";
 import { createScales, floats } from "../layers.js";
 

@@ -1,5 +1,5 @@
-// The phase-functioned network: a prediction from a row of inputs and a phase. As Python's `Predictor` in
-// cubic mode it blends the outputs of the four control points around the phase, and not their weights.
+// The phase-functioned network: a prediction from a row of inputs and a phase. Like `PfnnPredictor` in Python in
+// cubic mode, it blends the outputs of the four control points around the phase, not their weights.
 import { floats, unpacked } from "../layers.js";
 
 export const createNetwork = (spec) => {
@@ -32,7 +32,7 @@ export const createNetwork = (spec) => {
     }
     return out;
   };
-  // x: raw inputs; those without weight are ignored. Returns raw outputs in an array that the next call overwrites.
+  // x: raw inputs; those that the network does not read are ignored. Returns raw outputs in an array that the next call overwrites.
   return (x, phase) => {
     for (let c = 0; c < z.length; c++) z[c] = (x[columnsOfX[c]] - mean[c]) * inverse[c];
     around(phase);

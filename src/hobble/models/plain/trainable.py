@@ -1,4 +1,4 @@
-"""The plain network in training. Its step is that of `pfnn` with one set of weights."""
+"""The plain network in training. Its training step is that of `pfnn` with one control point."""
 
 from __future__ import annotations
 
@@ -21,10 +21,13 @@ from hobble.rows.mirror_columns import ColumnMirror
 
 @dataclass(frozen=True)
 class TrainablePlain(Trainable):
-    """units: of each layer, the columns of X first. The first layer has PHASE_COLUMNS more inputs."""
+    """A plain network in training.
+
+    units: of each layer, the columns of X first. The first layer has PHASE_COLUMNS more inputs.
+    """
 
     kind: ClassVar[str] = "plain"
-    control_points: ClassVar[int] = 1  # the step's name for sets of weights
+    control_points: ClassVar[int] = 1  # sets of weights, under the name that the step of `pfnn` reads
 
     units: tuple[int, ...]
 
@@ -103,13 +106,13 @@ class _WithPhase:
         return super().__call__(with_phase(x, p), y, p, masks)  # type: ignore[misc]
 
     def masks(self, rows: int, own: slice = ALL_ROWS) -> list[Tensor]:
-        """As in `TrainingStep`, but the phase is never dropped, as it never is in `pfnn`."""
+        """As in `TrainingStep`, but dropout never drops the phase, because it cannot do so in `pfnn`."""
         masks: list[Tensor] = super().masks(rows, own)  # type: ignore[misc]
         masks[0][:, -PHASE_COLUMNS:] = 1
         return masks
 
     def coefficients(self, p: Tensor) -> Tensor:
-        """(B, 1) of ones."""
+        """(B, 1) ones, the coefficients of the only set of weights."""
         return torch.ones_like(p[:, None])
 
 

@@ -72,21 +72,9 @@ def limp(
     if not links_of(network) or network.skeleton is None:
         return {**head, "applies": False, "reason": NO_SEVERITIES}
     links = list(links or links_of(network))
-    rows: list[dict[str, Any]] = []
-    for gait, speed in SPEEDS.items():
-        cases = [(link, s) for link in links for s in SEVERITIES]
-        figures = walk_figures(
-            network, [{}, *({link: s} for link, s in cases)], speed, gait, seconds, runtime
-        )
-        healthy = figures[0]
-        if healthy.profile is None:
-            if gait == "walk":
-                return {**head, "applies": False, "reason": NO_CYCLE}
-            continue
-        rows += [
-            _row(network, gait, *case, figure, healthy)
-            for case, figure in zip(cases, figures[1:], strict=True)
-        ]
+    rows = _sizes(network, links, seconds, runtime)
+    if rows is None:
+        return {**head, "applies": False, "reason": NO_CYCLE}
     return {
         **head,
         "applies": True,
@@ -107,6 +95,25 @@ def limp(
         "second": second_injuries(network, links, seconds, runtime),
         **_together(network, links, seconds, runtime),
     }
+
+
+def _sizes(
+    network: Network, links: Sequence[str], seconds: float, runtime: Runtime
+) -> list[dict[str, Any]] | None:
+    """The row of each gait, link and severity; None if the healthy character does not walk a whole cycle."""
+    rows: list[dict[str, Any]] = []
+    cases = [(link, severity) for link in links for severity in SEVERITIES]
+    injuries = [{}, *({link: severity} for link, severity in cases)]
+    for gait, speed in SPEEDS.items():
+        healthy, *hurt = walk_figures(network, injuries, speed, gait, seconds, runtime)
+        if healthy.profile is None:
+            if gait == "walk":
+                return None
+            continue
+        rows += [
+            _row(network, gait, *case, figure, healthy) for case, figure in zip(cases, hurt, strict=True)
+        ]
+    return rows
 
 
 def _together(

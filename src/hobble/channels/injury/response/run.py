@@ -48,31 +48,7 @@ def injury_response(
         return {"configuration": configuration, "applies": False, "reason": NO_SEVERITIES}
     links = list(links or links_of(network))
     trained = [link for link in links if link in hurt_links(network)]
-    largest = largest_accelerations(motion, network)
-    rows: list[SweepRow] = []
-    falling: list[SweepRow] = []
-    responses: list[LinkResponse] = []
-    for sweep in sweeps(network, links, GAITS, seconds, runtime):
-        gait = sweep.gait
-        for figure, link in enumerate(links):
-            found = sweep.rows(figure)
-            rows += found[: len(SEVERITIES)]
-            falling += found[len(SEVERITIES) :]
-            response = sweep.response(figure, found)
-            clips = largest.get((gait, link), largest.get((gait, None)))
-            responses.append(
-                {
-                    "gait": gait,
-                    "link": link,
-                    "trained": link in trained,
-                    **response,
-                    "clip_acceleration": clips,
-                    "clip_acceleration_of": "link" if (gait, link) in largest else "gait" if clips else None,
-                    "clip_acceleration_share": round(response["largest_acceleration"] / clips, 5)
-                    if clips
-                    else None,
-                }
-            )
+    rows, falling, responses = _sweeps(network, links, trained, motion, seconds, runtime)
     return {
         "configuration": configuration,
         "applies": True,
@@ -90,6 +66,42 @@ def injury_response(
         "summary": _summary([r for r in responses if r["trained"]]),
         "summary_untrained": _summary([r for r in responses if not r["trained"]]),
     }
+
+
+def _sweeps(
+    network: Network,
+    links: Sequence[str],
+    trained: Sequence[str],
+    motion: Iterable[Captured],
+    seconds: float,
+    runtime: Runtime,
+) -> tuple[list[SweepRow], list[SweepRow], list[LinkResponse]]:
+    """`rows`, `falling` and `responses` of `injury_response`."""
+    largest = largest_accelerations(motion, network)
+    rows: list[SweepRow] = []
+    falling: list[SweepRow] = []
+    responses: list[LinkResponse] = []
+    for sweep in sweeps(network, links, GAITS, seconds, runtime):
+        gait = sweep.gait
+        for figure, link in enumerate(links):
+            found = sweep.rows(figure)
+            rows += found[: len(SEVERITIES)]
+            falling += found[len(SEVERITIES) :]
+            response = sweep.response(figure, found)
+            clips = largest.get((gait, link), largest.get((gait, None)))
+            share = round(response["largest_acceleration"] / clips, 5) if clips else None
+            responses.append(
+                {
+                    "gait": gait,
+                    "link": link,
+                    "trained": link in trained,
+                    **response,
+                    "clip_acceleration": clips,
+                    "clip_acceleration_of": "link" if (gait, link) in largest else "gait" if clips else None,
+                    "clip_acceleration_share": share,
+                }
+            )
+    return rows, falling, responses
 
 
 def largest_accelerations(
