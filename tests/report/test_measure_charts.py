@@ -10,12 +10,12 @@ from hobble.channels.injury.response import page_cases
 from hobble.measures.responsivity import lap_charts
 from hobble.measures.responsivity import page as responsivity_page
 from hobble.report.charts import ChartGroup
-from hobble.report.gather import Material
+from hobble.report.gather import ReportMaterial
 from hobble.report.page_parts import ChartPair
 from hobble.report.summary import KeyFigure
 
 
-def test_the_steps_of_a_frame_are_in_their_order(material: Material) -> None:
+def test_the_steps_of_a_frame_are_in_their_order(material: ReportMaterial) -> None:
     chart = lap_charts.lap_chart(material.found("responsivity"), material)
     assert chart is not None
     traces = next(iter(chart.options.values()))
@@ -33,7 +33,7 @@ def test_the_steps_of_a_frame_are_in_their_order(material: Material) -> None:
     assert traces[-1]["y"][0] == times["spread"]["median"]
 
 
-def test_a_row_of_the_table_of_laps_reads_as_a_sentence(material: Material) -> None:
+def test_a_row_of_the_table_of_laps_reads_as_a_sentence(material: ReportMaterial) -> None:
     table = responsivity_page.lap_table(material.found("responsivity"), "example")
     assert table is not None
     labels = [column.label for column in table.columns]
@@ -43,7 +43,7 @@ def test_a_row_of_the_table_of_laps_reads_as_a_sentence(material: Material) -> N
     assert [shown for *_, shown in table.cells[3][:3]] == ["4", "no", "5"]
 
 
-def test_feet_with_little_contact_have_no_slide(material: Material) -> None:
+def test_feet_with_little_contact_have_no_slide(material: ReportMaterial) -> None:
     def slide(steps: int) -> KeyFigure:
         laps = [{**lap, "steps": steps} for lap in material.measured["responsivity"]["laps"][:2]]
         found = {**material.measured["responsivity"], "laps": laps, "foot_slide_cm": 0.0}
@@ -55,7 +55,7 @@ def test_feet_with_little_contact_have_no_slide(material: Material) -> None:
     assert (slide(5).value, slide(5).unit) == ("0", "cm")
 
 
-def test_links_never_hurt_in_training_are_told_from_the_others(material: Material) -> None:
+def test_links_never_hurt_in_training_are_told_from_the_others(material: ReportMaterial) -> None:
     responses = [
         {**r, "trained": r["link"].startswith("Left")} for r in material.measured["injury"]["responses"]
     ]

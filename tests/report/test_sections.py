@@ -21,12 +21,12 @@ from hobble.report import (
     training_section,
 )
 from hobble.report.charts import Chart
-from hobble.report.gather import Material, describe_network
+from hobble.report.gather import ReportMaterial, describe_network
 from hobble.report.ground_pictures import ground_pictures
 from hobble.rows.clip_rows import load_clip_rows, save_clip_rows
 
 
-def test_sections_of_a_pass_are_spread_evenly_on_the_axis(material: Material) -> None:
+def test_sections_of_a_pass_are_spread_evenly_on_the_axis(material: ReportMaterial) -> None:
     x = training_section.passes_axis(material)
     assert (x[0], x[9], x[10], x[-1]) == (pytest.approx(0.1), 1.0, pytest.approx(1.1), 20.0)
 
@@ -46,7 +46,7 @@ def test_empty_cells_of_the_history_are_read_and_words_refused(tmp_path: Path) -
             read_numbers(path)
 
 
-def test_a_learning_curve_needs_no_held_out_clips(material: Material) -> None:
+def test_a_learning_curve_needs_no_held_out_clips(material: ReportMaterial) -> None:
     nothing = {**material.history, "held_out_mse": [None] * 200}
     chart = training_section.learning_curve(replace(material, history=nothing))
     assert [trace["name"] for trace in chart.traces] == ["training"]
@@ -59,7 +59,7 @@ def test_a_file_that_holds_no_weights_is_refused(tmp_path: Path) -> None:
         describe_network(path)
 
 
-def test_bars_show_every_clip_of_its_split(material: Material) -> None:
+def test_bars_show_every_clip_of_its_split(material: ReportMaterial) -> None:
     chart = accuracy_page.clip_bars(material.found("accuracy"), material)
     assert chart is not None
     bars = {trace["name"]: dict(zip(trace["y"], trace["x"], strict=True)) for trace in chart.traces}
@@ -70,13 +70,13 @@ def test_bars_show_every_clip_of_its_split(material: Material) -> None:
     assert set(chart.layout["yaxis"]["categoryarray"]) == set(bars["held out"]) | set(bars["training"])
 
 
-def test_boxes_only_where_there_are_quantiles(material: Material) -> None:
+def test_boxes_only_where_there_are_quantiles(material: ReportMaterial) -> None:
     assert accuracy_page.clip_boxes(material.found("accuracy")) is not None
     clips = [{k: v for k, v in row.items() if k != "p50"} for row in material.measured["accuracy"]["clips"]]
     assert accuracy_page.clip_boxes({"clips": clips}) is None
 
 
-def test_gait_seconds_add_up(material: Material) -> None:
+def test_gait_seconds_add_up(material: ReportMaterial) -> None:
     chart = data_section.gait_chart(material)
     assert chart is not None
     drawn = sum(sum(trace["y"]) for trace in chart.traces)
@@ -108,7 +108,7 @@ def test_turns_speeds_and_severities_are_counted_in_seconds(
     assert chart.traces[0]["z"][0][6] == pytest.approx(hurt, abs=0.02)
 
 
-def test_strips_show_the_injured_parts(material: Material) -> None:
+def test_strips_show_the_injured_parts(material: ReportMaterial) -> None:
     strips = {strip["clip"]: strip for strip in data_section.strips(material, shown_clips.shown(material))}
     assert len(strips) == 8, "a mirror says the same again"
     (row,) = strips["hurt_left_knee"]["status"]
@@ -117,7 +117,7 @@ def test_strips_show_the_injured_parts(material: Material) -> None:
     assert strips["jog"]["status"] == []
 
 
-def test_stages_are_listed_with_published_values_of_the_same_configuration(material: Material) -> None:
+def test_stages_are_listed_with_published_values_of_the_same_configuration(material: ReportMaterial) -> None:
     """A published time or size is shown only for its own configuration."""
     nothing, patches = [None, None], [1680, 606.0e6]
     known = {
@@ -158,7 +158,7 @@ def test_a_damaged_terrain_file_is_named(tmp_path: Path) -> None:
         terrain_section.read_fits(path)
 
 
-def test_flat_clips_have_no_ground_to_show(material: Material) -> None:
+def test_flat_clips_have_no_ground_to_show(material: ReportMaterial) -> None:
     section = terrain_section.section(material.terrain)
     assert len(section["table"].rows) == 6
     assert "hurt_back" not in section["charts"][0].options

@@ -34,7 +34,7 @@ SAMPLES = 400
 
 
 @dataclass(frozen=True)
-class Upright:
+class UprightMotion:
     """A clip with a standing rest pose that faces +Z with the arms out. Its joints are those of the body.
 
     rest: where the stance comes from, in words. body: the parts by their new indices. notes: sentences on
@@ -48,7 +48,7 @@ class Upright:
     height_error: float = 0.0
 
 
-def upright(clip: Clip, body: Body, target: Skeleton, others: Collection[int] = ()) -> Upright:
+def upright(clip: Clip, body: Body, target: Skeleton, others: Collection[int] = ()) -> UprightMotion:
     """The motion of a body on a rig that stands in its rest pose.
 
     clip: centimetres, right-handed, Y up. target: the skeleton that it is for. others: further joints to
@@ -96,7 +96,7 @@ def upright(clip: Clip, body: Body, target: Skeleton, others: Collection[int] = 
     clip, body = with_bends(clip, body, frames, bends(seen))
     made = rebased(clip, body, [*body.joints, *kept], frames, roles)
     notes = [note for note in unsure if note]
-    return Upright(*made, source, notes, height_error(seen, problem is None))
+    return UprightMotion(*made, source, notes, height_error(seen, problem is None))
 
 
 def _speeds(clip: Clip) -> Array:

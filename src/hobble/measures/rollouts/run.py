@@ -28,7 +28,7 @@ from hobble.measures.clip_parts import ClipPart, LoadedPart, clip_parts, sample_
 from hobble.measures.inputs import MeasureInputs, Outcome, Row
 from hobble.measures.results import SPLITS
 from hobble.measures.rollouts import Options
-from hobble.measures.rollouts.results import ErrorsOf, RollOutsFound
+from hobble.measures.rollouts.results import RollOutNumbers, RollOutsFound
 from hobble.measures.rollouts.roll_outs import Crowd, RollOuts, inputs_of_clip
 from hobble.measures.stratified_sample import Sample
 from hobble.models.load import load_network
@@ -72,7 +72,7 @@ class RollOutErrors:
             return self
         return RollOutErrors(self.frames, self.starts, self.moments * weight, self.last * weight, self.ended)
 
-    def to_dict(self, phase: bool = True) -> ErrorsOf:
+    def to_dict(self, phase: bool = True) -> RollOutNumbers:
         """Plain data. A value without frames, or without roll-outs that reached their full length, is None.
 
         phase: whether the network uses the phase. If not, the phase error has no meaning and is None.
