@@ -176,7 +176,7 @@ def doubt(seen: BodySample, zero: bool) -> str | None:
     why = "nobody could stand in its zero pose"
     if seen.seconds < BRIEF:
         why += f" and {seen.seconds:.2f} s are too short for a step of each foot"
-    if _on_tiptoe(seen, np.radians(tilts)):
+    if _on_tiptoe(seen, [float(np.radians(x)) for x in tilts]):
         why += " and the figure squats, perhaps on tiptoe"
     if abs(tilts[0] - tilts[1]) > APART:
         why += f" and its feet stand at different angles ({tilts[0]:.0f} and {tilts[1]:.0f} degrees)"

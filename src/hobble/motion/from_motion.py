@@ -22,8 +22,8 @@ AGREE = np.radians(25.0)  # trunk joints that differ by less have the same rest 
 def from_motion(seen: BodySample, trunk: BodySample, zero: Array | None) -> dict[int, Array]:
     """Frames of all joints from the directions of the bones while the figure moves.
 
-    trunk: the poses that show how the trunk is turned (`trunk_sample`). zero: (4,) frame of the chest in the zero pose, which counts if the rig has no neck. None if nobody could
-    stand in that pose.
+    trunk: the poses that show how the trunk is turned (`trunk_sample`). zero: (4,) frame of the chest in the
+    zero pose, which counts if the rig has no neck. None if nobody could stand in that pose.
     """
     frames: dict[int, Array] = {}
     _trunk(trunk, frames, zero)

@@ -37,8 +37,8 @@ def stoop_doubt(seen: BodySample, zero: bool) -> str | None:
     if zero or np.mean(_leans(seen) < STOOPS) >= FEWEST:
         return None
     return (
-        "The figure is never upright, and nobody could stand in its zero pose, so how far its pelvis tilts is "
-        f"uncertain: hips, trunk and arms may lie {OFF:g} cm too far forward or back."
+        "The figure is never upright, and nobody could stand in its zero pose, so how far its pelvis tilts "
+        f"is uncertain: hips, trunk and arms may lie {OFF:g} cm too far forward or back."
     )
 
 
