@@ -10,7 +10,7 @@ from hobble.core.section import Positive, PositiveFloat, Section
 
 
 class LabelOptions(Section):
-    """Contacts, phase and gait. Speeds are in the unit of the facts page: centimetres a frame at 120 Hz."""
+    """Contacts, phase and gait. Speeds are in centimetres a frame at 120 Hz."""
 
     files: bool = Field(True, description="use hand-made label files beside the clip")
     contacts: Literal["stance", "original"] = Field(
@@ -27,7 +27,7 @@ class LabelOptions(Section):
     valley_factor: PositiveFloat = 2.875
     margins: Literal["extend", "drop"] = Field(
         "extend",
-        description="cycles with less than a second of clip before or after them: extend continues the path "
-        "straight past the clip's end, drop leaves them out, as in the original",
+        description="cycles with less than a second of clip before or after them: extend uses them, and "
+        "continues the path straight past the clip's end; drop leaves them out, as in the original",
     )
     shortest_step: Positive = Field(5, description="steps of this many 120 Hz frames or fewer are dropped")
