@@ -144,7 +144,7 @@ def _spring(clip: Clip) -> Array:
 
 
 def _relative_heights(clip: Clip) -> tuple[Array, Array]:
-    """(F,) heights of head and of hips above the lowest foot, each divided by the length of the bones below."""
+    """(F,) heights of head and hips above the lowest foot, each divided by the length of the bones below."""
     skeleton, y = clip.skeleton, clip.positions[..., 1]
     toes = y[:, [skeleton.role("left_toe"), skeleton.role("right_toe")]]
     floor = lowest(toes, 61).mean(axis=1)

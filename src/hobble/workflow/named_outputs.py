@@ -1,7 +1,8 @@
-"""Finds the rule of a file that a rule makes by its full name, without asking every rule.
+"""Finds the rule that makes a file by the file's full name, without trying every rule.
 
-The rules of batches have no wildcards. For each file of a clip, Snakemake compares the name with patterns of
-many rules, one regular expression after another. With tens of thousands of files that is a third of planning.
+The rules of batches have no wildcards. But for each file of a clip, Snakemake tries the patterns of many
+rules, one regular expression after another. With tens of thousands of files this is a third of the time for
+planning.
 """
 
 from __future__ import annotations
@@ -37,5 +38,5 @@ class NamedOutputs(OutputIndex):  # type: ignore[misc]
 
 
 def use() -> None:
-    """Let Snakemake plan with it."""
+    """Make Snakemake plan with `NamedOutputs`."""
     dag.OutputIndex = NamedOutputs
