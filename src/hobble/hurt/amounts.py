@@ -27,12 +27,14 @@ MIXES: dict[str, dict[str, float]] = {
 BOTH_SIDES = ("back",)  # parts whose profile is applied to both sides
 # Factors on the mixed curves of trunk, pelvis and shoulders.
 GAIN: dict[str, float] = {"pelvis": 1.6, "hip": 2.1, "thigh": 1.25, "shank": 1.0, "foot": 0.9}
-# Ratios to the healthy clip: speed; stride (time); lift (height of the swinging foot); push and strike (pitch
-# of the foot while the heel is up and while the toe is up); arms (swing of both arms); back and head
-# (movement of the joints of back and neck). Share: vault (how far the standing knee straightens while the
-# other leg swings; 1 is nearly straight). Leg lengths: out (how far the foot swings outward). Degrees:
-# toe_out; crouch (knee flexion added in stance); forward and side (lean of the trunk forward and to the hurt
-# side); list (pelvis up on the hurt side while that leg swings); nod (head forward).
+# Part -> changes that the recordings do not show.
+# - Ratios to the healthy clip: speed; stride (time); lift (height of the swinging foot); push and strike
+#   (pitch of the foot while the heel is up and while the toe is up); arms (swing of both arms); back and head
+#   (movement of the joints of back and neck).
+# - Share: vault (how far the standing knee straightens while the other leg swings; 1 is nearly straight).
+# - Leg lengths: out (how far the foot swings outward).
+# - Degrees: toe_out; crouch (knee flexion added in stance); forward and side (lean of the trunk forward and
+#   to the hurt side); list (pelvis up on the hurt side while that leg swings); nod (head forward).
 OWN: dict[str, dict[str, float]] = {
     "pelvis": {"speed": 0.74, "stride": 1.15, "push": 0.65, "back": 0.6, "lift": 0.8, "list": 2.0},
     "hip": {"speed": 0.66, "stride": 1.2, "push": 0.6, "lift": 0.75, "forward": 2.0, "out": 0.02},

@@ -22,9 +22,11 @@ class LabelOptions(Section):
         0.02, description="for `contacts: original`: squared displacement, cm2 per 60 Hz frame"
     )
     phase_zero: Literal["right", "left"] = Field("right", description="the foot that lands at phase 0")
-    heel_speed: PositiveFloat = 0.375
-    toe_speed: PositiveFloat = 0.0875
-    valley_factor: PositiveFloat = 2.875
+    heel_speed: PositiveFloat = Field(0.375, description="unit in which the speed of a heel is judged")
+    toe_speed: PositiveFloat = Field(0.0875, description="unit in which the speed of a toe is judged")
+    valley_factor: PositiveFloat = Field(
+        2.875, description="a foot that never rests is down while its speed is at most this times its lowest"
+    )
     margins: Literal["extend", "drop"] = Field(
         "extend",
         description="cycles with less than a second of clip before or after them: extend uses them, and "

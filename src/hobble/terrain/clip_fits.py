@@ -116,8 +116,9 @@ def _standing_feet(
 ) -> Feet:
     """The soles of a clip, and which of them stand on the ground.
 
-    On flat ground a heel in contact that is more than `held_up` above its toe does not count. If a cycle has
-    no contact at all, the lowest 5 % of its sole positions count.
+    On flat ground a joint in contact does not count if it is more than `held_up` above the other joint of its
+    foot and that is in contact, too. If a cycle has no contact at all, the lowest 5 % of its sole positions
+    count.
     """
     counted = np.zeros(len(clip), bool)
     for start, end in cycles:
@@ -198,8 +199,8 @@ def sample_points(root: RootFrames, side: float) -> Array:
 def heights_under(ground: Ground, samples: Array, start: int, end: int, offsets: np.ndarray) -> Array:
     """Heights (rows of the cycle * fits, 3 * samples), cm. Each point of the path is looked up only once.
 
-    samples: as of `sample_points`. start, end: the cycle, as indices of their frames. offsets: frames of the
-    samples of a row, relative to its frame.
+    samples: from `sample_points`. start, end: first and last frame of the cycle, as indices into `samples`.
+    offsets: frames of the samples of a row, relative to its frame.
     """
     first, last = start + offsets[0], end + offsets[-1]
     points = samples[:, first : last + 1]

@@ -3,9 +3,10 @@
 A patch is a view of a heightmap. Its cell (u, v) is counted from the middle of the patch along the world's x
 and z. The affine map A (2, 3) of the patch gives its place in the heightmap: row, column = A (u, v, 1).
 
-These arguments are the same in all functions. heights: all heightmaps, one after another, in one float32
-array. starts, shapes: where each map begins, and its rows and columns. which, affine: map and A of each
-patch. All arguments are plain arrays, so one compiled version serves all data sets.
+Functions that other modules call have these arguments. heights: all heightmaps, one after another, in one
+float32 array. starts, shapes: where each map begins, and its rows and columns. which, affine: map and A of
+each patch. All arguments are plain arrays, so one compiled version serves all data sets. Helpers get the
+heights of one map, its rows and columns, and `a`, the two rows of A.
 
 Everything is in one file because numba renews its cache only if the file of the called function changes. Only
 functions that other modules call are cached, and helpers are inlined in them. Separately compiled helpers
@@ -18,7 +19,7 @@ import numpy as np
 
 from hobble.core.compiled import njit
 
-DOWN_WEIGHT = 0.1  # of the error at feet in contact
+DOWN_WEIGHT = 0.1  # weight of the error at feet in contact
 JUMP_HEIGHT = 5.0  # cm; in jumps the ground should not be further than this below a foot in the air
 BEAM_HEIGHT = 40.0  # cm; next to a beam the ground should be at least this far below it
 FAST = {"reassoc", "contract", "nsz", "nnan"}  # allows vectorised sums; heights are never nan
@@ -138,7 +139,7 @@ def lowest_cone(x, z, place_x, place_z, heights, steepness):
 def _down_means(heights, rows, columns, a, points):
     """The first height d of the patch above feet in contact, and the means of d - first and of its square.
 
-    d - first is a small number, so single precision is enough. a: A. points: u, v and height of each foot.
+    d - first is a small number, so single precision is enough. points: u, v and height of each foot.
     """
     u, v, foot = points
     (ru, rv, r0), (cu, cv, c0) = a

@@ -83,8 +83,8 @@ class Fitting(Section):
     )
     held_up: PositiveFloat | None = Field(
         2.0,
-        description="on flat ground a heel or toe in contact does not count if it is higher than this above "
-        "the other joint of its foot, which is in contact, too, cm; null: no such rule, as in the original",
+        description="on flat ground a heel in contact does not count if it is more than this above its toe, "
+        "which is in contact, too (cm), and the other way round; null: no such rule, as in the original",
     )
 
 

@@ -1,7 +1,7 @@
 """Finds the patches that fit a cycle best. It tries every patch, but gives most up early.
 
 The error of a patch is a sum of terms that only grow with more points. So a patch can be skipped as soon as
-its partial sum exceeds the worst of the best errors so far. The result is the same as that of a full search.
+its partial sum exceeds the largest error of the best patches so far. The result is that of a full search.
 """
 
 from __future__ import annotations
