@@ -18,7 +18,7 @@ from hobble.rows.facts import load_facts
 
 @dataclass(frozen=True)
 class ClipPart:
-    """Rows of a clip: all of them, or those of `excerpt`. weight: the number of rows that each represents."""
+    """Rows of a clip: all of them, or those of `excerpt`. weight: how many rows each row stands for."""
 
     clip: str
     path: Path
@@ -37,7 +37,7 @@ class ClipPart:
 
 @dataclass(frozen=True)
 class LoadedPart:
-    """Rows of a clip. Those from `first` to `stop` were chosen; the others come before and after them."""
+    """Rows read from a clip's file. The chosen ones are rows[first:stop]; the others lie around them."""
 
     rows: ClipRows = field(repr=False)
     first: int
@@ -45,7 +45,7 @@ class LoadedPart:
 
     @property
     def frames(self) -> list[int]:
-        """The first and last frame of the chosen rows (at least one row)."""
+        """The frames of the first and the last chosen row. There must be at least one chosen row."""
         return [int(self.rows.frame[at]) for at in (self.first, self.stop - 1)]
 
 
@@ -60,7 +60,7 @@ def clip_parts(clips: Mapping[str, str | Path], sample: Sample | None) -> Iterat
 
 
 def captured_motion(clips: Mapping[str, str | Path], sample: Sample | None) -> Iterator[Captured]:
-    """The unbroken stretches of all clips, or of the excerpts of a sample, with one in memory at a time."""
+    """The unbroken stretches of all clips, or of a sample's excerpts. They are loaded one after another."""
     for one in clip_parts(clips, sample):
         yield from captured(one.load().rows)
 
@@ -71,12 +71,12 @@ def sample_of(inputs: MeasureInputs, options: SampleOptions) -> Sample | None:
 
 
 def with_sample(result: Json, sample: Sample | None) -> Json:
-    """The result, and the size of the sample if it was measured on one."""
+    """The result, with a key `sample` (the size of the sample) if only a sample was measured."""
     return result if sample is None else {**result, "sample": sample.to_dict()}
 
 
 def captured_sampled(found: Mapping[str, Any]) -> str:
-    """A sentence that only a sample of the captured motion was read; empty if all of it was."""
+    """A sentence which says that only a sample of the captured motion was read; empty if all of it was."""
     words = sampled_words(found)
     return f" Only a part of the clips was read: {words}." if words else ""
 

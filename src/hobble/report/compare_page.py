@@ -31,7 +31,7 @@ def render_compared(
 
     compared: compare.json. playables: configuration -> data from `playable.playable`; as many as fit into the
     page are kept, in order. If not all fit, their weights get 8 bits. bundle: the scripts, from
-    `bundle.bundle`. errors: configuration -> centimetres from `rounded.rounding_error`.
+    `bundle.bundle`. errors: configuration -> centimetres from `rounded_weights.rounding_error`.
     """
     sections: dict[str, dict[str, Any]] = {
         "overview": {

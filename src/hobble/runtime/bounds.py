@@ -1,8 +1,8 @@
 """Clip the network's inputs and outputs to the range of the training data plus a margin.
 
 Outside that range a network may predict anything, and its prediction is part of the next frame's input.
-Without bounds, a character whose clips had no standing flew apart when it was asked to stand. With bounds it
-stumbles at worst.
+Without bounds, a character trained on clips without standing flew apart when it was asked to stand. With
+bounds it stumbles at worst.
 """
 
 from __future__ import annotations
@@ -21,14 +21,15 @@ MARGIN_SHARE = 0.25  # margin on each side, as a share of a column's range in tr
 DEFAULT_DEVIATIONS = 15.0
 DEFAULT_MARGIN = 50.0  # cm
 SPEED_MARGIN = 1.5  # largest joint speed, as a multiple of the fastest joint in training
-LARGEST_SOUND = 1e8  # no sound number is as large; larger ones are treated as not finite
+LARGEST_SOUND = 1e8  # larger numbers are treated as not finite; no value of a working character is as large
 
 
 @dataclass(frozen=True)
 class Bounds:
-    """x_low, x_high (X,), y_low, y_high (Y,) float32; fastest: largest joint movement, cm a frame.
+    """The allowed ranges: x_low, x_high (X,) and y_low, y_high (Y,), float32, raw units.
 
-    hips: lowest and highest in training, cm above the ground; unbounded if the file has no ranges.
+    fastest: largest joint movement, cm a frame. hips: lowest and highest hips in training, cm above the
+    ground; unbounded if the network's file has no ranges.
     """
 
     x_low: Array = field(repr=False)
@@ -53,7 +54,8 @@ class Bounds:
         for name, _ in layout.channels:
             x_low[layout.x_channel(name)], x_high[layout.x_channel(name)] = -LARGEST_SOUND, LARGEST_SOUND
         y_low, on = facts.y_low - y_more, layout.y_phase_change
-        y_low[on] = np.maximum(y_low[on], np.minimum(facts.y_low[on], 0.0))  # a gait does not run backwards
+        # The phase may run backwards only as fast as it did in training.
+        y_low[on] = np.maximum(y_low[on], np.minimum(facts.y_low[on], 0.0))
         assert network.skeleton is not None
         height = layout.y_joint_position.start + 3 * network.skeleton.role("hips") + 1
         hips = float(facts.y_low[height]), float(facts.y_high[height])

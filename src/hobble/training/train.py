@@ -28,6 +28,7 @@ from hobble.training.processes import ALONE, Processes
 from hobble.training.rollout import RollOut
 from hobble.training.schedule import learning_rate_share
 from hobble.training.start import begin, recipe_hash, step_for, use_threads
+from hobble.training.symmetric import Symmetry
 from hobble.training.update import update_for
 from hobble.training.version_poses import VersionPoses
 
@@ -62,6 +63,8 @@ def train(
             "training.keep: best and training.patience need the held-out error, but no clip is held out. "
             "List some under held_out in the data set."
         )
+    if training.symmetric and network.asymmetric:
+        raise HobbleError(f"training.symmetric: {network.asymmetric}")
     pairs, sections = database.pairs(TRAIN), training.sections
     if pairs < sections:
         raise HobbleError(f"{pairs} training samples are fewer than training.sections, {sections}")
@@ -86,6 +89,9 @@ def _run(
     device, batch_size = state.network.flat.device, training.batch
     step = step_for(state.network, training)
     update = update_for(step, state.adam, batch_size, processes, _kept(database, training))
+    symmetry = Symmetry(state.network, database) if training.symmetric else None
+    if symmetry and not state.adam.steps:
+        symmetry.start()
     rows = rows_for(database, device, processes, training.stretches)
     places = processes.places(batch_size)
     others = OtherPoses(database, training.other_poses, len(places), device, places.start)
@@ -115,8 +121,12 @@ def _run(
             rate = learning_rate_share(training, (state.samples + watch.seen) / pairs)
             watch.add(update(batch.x, batch.y, batch.p, rate, batch.total), batch)
             roll_out.remember(step.error)
+            if symmetry:
+                symmetry.after(state.adam.steps)
             if record:
                 record.bar.update(batch.total)
+        if symmetry:
+            symmetry.enforce()
         train_mse = watch.mean()
         processes.check_same(state.network.flat)
         state.sections, state.samples = turn + 1, state.samples + watch.samples

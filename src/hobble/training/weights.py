@@ -24,7 +24,7 @@ UNITS = "centimetres, 60 Hz frames, velocities per frame, right-handed, Y up, +Z
 def write_weights(
     path: Path, network: FinishedNetwork, database: Database, configuration: str, facts: Mapping[str, Any]
 ) -> None:
-    """Write the network's arrays, `Xmean`, `Xstd`, `Ymean`, `Ystd`, those of `TrainingFacts`, `meta` (JSON).
+    """Write the network's arrays, `Xmean`, `Xstd`, `Ymean`, `Ystd`, those of `TrainingFacts`, and `meta`.
 
     facts: numbers about the training, which are added to `meta`. Equal networks give equal bytes.
     """
@@ -35,7 +35,7 @@ def write_weights(
 
 
 def meta(network: FinishedNetwork, database: Database, configuration: str, facts: Mapping[str, Any]) -> str:
-    """The file's meta as JSON: meaning of the columns and origin of the network."""
+    """The array `meta` of the file, as JSON: meaning of the columns and origin of the network."""
     rig = Skeleton.from_dict(database.skeleton)
     channels = [channel(name) for name, _ in database.layout.channels]
     return json.dumps(

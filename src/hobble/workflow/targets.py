@@ -89,9 +89,22 @@ def _check_configuration(project: Project, name: str) -> None:
         project.catalogue.configuration(other)
     if model.training.continues:
         _check_continues(project, name, model)
+    if model.training.symmetric and not model.network_of:
+        _check_symmetric(project, name, model)
     _check_dataset(project, model.dataset)
     project.datasets.selected(model.dataset, model.channels)
     refuse_copies(project.clips, project.datasets, model.dataset, tuple(model.channels))
+
+
+def _check_symmetric(project: Project, name: str, model: Configuration) -> None:
+    """Check that the network can be symmetric and that the data set has mirrored clips."""
+    if model.network.asymmetric:
+        raise HobbleError(f"configuration {name}: training.symmetric: {model.network.asymmetric}")
+    if not project.catalogue.dataset(model.dataset).mirror:
+        raise HobbleError(
+            f"configuration {name}: training.symmetric: data set {model.dataset} has no mirrored clips, so "
+            "its left and right may differ. Write `mirror: true` there, or `symmetric: false`."
+        )
 
 
 def _check_continues(project: Project, name: str, model: Configuration) -> None:

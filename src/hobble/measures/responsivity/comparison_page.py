@@ -15,7 +15,7 @@ from hobble.report.verdicts import Verdict, best
 
 
 def section(compared: Compared) -> PageSection:
-    """Times of the laps, and time over the size of the network."""
+    """Two charts: the times of the laps, and the time of a frame over the size of the network."""
     parts = [SectionPart(10, lap_lines(compared)), SectionPart(20, fit_chart(compared))]
     return PageSection("speed", parts, title="Speed and response", at=30, nav="Speed")
 
@@ -32,7 +32,7 @@ def columns(compared: Compared) -> Iterator[Overview]:
 
 
 def verdicts(compared: Compared) -> Iterator[Verdict]:
-    """Which configuration stays closest to the path, is smoothest, fastest and smallest."""
+    """Which configuration stays closest to the path, and which is smoothest, fastest and smallest."""
     exact = in_exact_mode(compared)
     whole = {name: e for name, e in exact.items() if e["waypoints_reached"] == e["waypoints"]}
     astray = [name for name in exact if name not in whole]

@@ -15,6 +15,7 @@ from hobble.report.gather import Material
 from hobble.report.page_parts import PageSection, Paragraph, SectionPart
 from hobble.report.tables import Column, Table
 
+# The effects in the chart and in the table of captured limps.
 SHOWN = ("speed", "stance", "step_hurt", "knee_hurt", "hip_hurt", "lean", "pelvis_drop", "arm_hurt")
 MOST_NAMED = 8  # links that a sentence lists
 RECOGNISERS = (
@@ -28,6 +29,7 @@ RECOGNISED = (
     Column.number("share in which the graded one names the wrong side"),
 )
 COLOURS = {"hip": "@g1", "thigh": "@g2", "shank": "@g3", "foot": "@g4", "back": "@g5"}  # of parts; arms: @g0
+# Part of the body -> the impairment of people that is most like its limp.
 IMPAIRMENTS = {
     "hip": "trendelenburg",
     "pelvis": "trendelenburg",
@@ -39,9 +41,7 @@ IMPAIRMENTS = {
 
 
 def section(found: Json, material: Material) -> PageSection:
-    """Charts of sizes, tables, the comparison with held-out captured limps, and where the training data came
-    from.
-    """
+    """Where the training data came from, the chart of sizes, the recognition, and all tables."""
     if not found.get("applies"):
         return PageSection("injury", [])
     name, say, found = material.name, speaker(material.network["skeleton"]), in_words(found, material)
@@ -81,7 +81,7 @@ def provenance(hurt_seconds: Mapping[str, Mapping[str, float]], say: Callable[[s
 
 
 def size_chart(found: Json) -> Chart:
-    """Each effect over severity, for a chosen effect: a line for each link, and people's mean."""
+    """The chosen effect over severity: a line for each link, and the means over people."""
     options: dict[str, list[Trace]] = {}
     rows = [row for row in found["sizes"] if row["gait"] == "walk"]
     for effect in SHOWN:
@@ -166,11 +166,14 @@ def held_out_table(name: str, rows: Sequence[Mapping[str, Any]], say: Callable[[
 
 
 def size_table(name: str, rows: Sequence[Mapping[str, Any]]) -> Table | None:
-    """Every walk with its effects and its recognised limp."""
+    """Every walk with its effects and the limp that is recognised."""
     texts = ("gait", "link", "part", "side", "called", "graded")
     if not rows:
         return None
-    columns = [Column(k) if k in texts else Column.number(k.replace("_", " ")) for k in rows[0]]
+    words = {"called": "linear recogniser", "graded": "graded recogniser"}
+    words |= dict(zip(("impaired", "named", "wrong_side"), (c.label for c in RECOGNISED), strict=True))
+    named = {key: words.get(key, key.replace("_", " ")) for key in rows[0]}
+    columns = [Column(word) if key in texts else Column.number(word) for key, word in named.items()]
     return Table(f"{name}-limp-sizes", columns, [list(row.values()) for row in rows], "Sizes of all effects")
 
 
@@ -190,7 +193,7 @@ def together_table(name: str, rows: Sequence[Mapping[str, Any]]) -> Table | None
 
 
 def captured_table(name: str, rows: Sequence[Mapping[str, Any]], say: Callable[[str], str]) -> Table | None:
-    """Captured limps with the same effects."""
+    """The SHOWN effects of captured limps."""
     if not rows:
         return None
     columns = [

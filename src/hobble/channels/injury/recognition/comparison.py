@@ -13,7 +13,7 @@ NAME = "recognition"
 
 
 def compared(all_measured: Sequence[ConfigurationResults], published: Json) -> SideBySide:
-    """The result of each configuration, and the share that people recognised."""
+    """The result of each configuration, beside the share of hurt parts that people recognised."""
     return SideBySide(
         entries=[{**m.found(NAME), "configuration": m.name} for m in all_measured],
         against_published=[row for m in all_measured for row in _against_people(m, published["recognition"])],

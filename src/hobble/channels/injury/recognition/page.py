@@ -15,7 +15,7 @@ def section(found: Json, material: Material) -> PageSection:
 
 
 def recognition_chart(found: Json) -> Chart | None:
-    """Confusion tables of the classifier that recognises the hurt part."""
+    """Confusion tables of the classifier that recognises the hurt part. None if nothing was measured."""
     if not found.get("applies"):
         return None
     generated, captured = found["generated"], found["captured"]

@@ -13,7 +13,7 @@ INTRODUCTION = (
     "mean over the links that were hurt in training. ρ is Spearman's rank correlation: 1 means that the "
     "measure always rises with severity, −1 that it always falls, 0 that it does neither."
 )
-# Keys of the injury summary -> words.
+# Keys of a `Summary` in injury.json -> words.
 INJURY = {
     "from_healthy_cm": "distance from the healthy pose at severity 10, cm per joint",
     "speed_share": "share of the healthy speed at severity 10",

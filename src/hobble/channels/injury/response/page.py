@@ -58,7 +58,7 @@ PANELS: tuple[Panel, ...] = (
 
 
 def section(found: Json, material: Material) -> PageSection:
-    """Charts and tables. Empty for a network without severities."""
+    """The charts and tables of injury.json. Empty for a network without severities."""
     parts = _parts(in_words(found, material), material.name) if found.get("applies") else []
     return PageSection("injury", parts, title="Injury response", at=20)
 
@@ -69,7 +69,7 @@ def hints(found: Json, material: Material) -> Iterator[Hint]:
 
 
 def in_words(found: Json, material: Material) -> dict[str, Any]:
-    """The same results with spoken names of links."""
+    """The results with names for readers in place of the labels of links."""
     say = speaker(material.network["skeleton"])
 
     def named(value: Any, key: str = "") -> Any:
@@ -109,9 +109,10 @@ def curves(
     back: Sequence[Mapping[str, Any]] = (),
     untrained: Collection[str] = (),
 ) -> ChartGroup:
-    """A small chart for each measure over severity, for a chosen gait and link.
+    """A small chart of each measure over severity, for a chosen gait and link.
 
-    Dotted: falling severity. Links in `untrained` come last and are marked.
+    rows, back: injury.json's rows of rising and of falling severity; the latter are dotted. untrained: links
+    that come last and are marked.
     """
 
     def label_of(row: Mapping[str, Any]) -> str:
@@ -179,7 +180,8 @@ def y_range(
 ) -> list[float] | None:
     """The range of the vertical axis, the same for all links of a gait, so that they can be compared.
 
-    It spans at least `span`, so that noise looks small.
+    columns: those that the chart shows. span: least length of the range, so that noise looks small.
+    from_zero: whether it starts at 0. None if no row has a value.
     """
     found = [row[c] for row in rows if row["gait"] == gait for c in columns if row.get(c) is not None]
     if not found:
@@ -250,7 +252,7 @@ def overview(responses: Sequence[Mapping[str, Any]]) -> list[Chart]:
 
 
 def response_table(name: str, responses: Sequence[Mapping[str, Any]]) -> Table:
-    """A row per gait and link."""
+    """A row for each gait and link."""
     columns = [
         Column("gait"),
         Column("link"),

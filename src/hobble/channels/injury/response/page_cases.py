@@ -39,8 +39,8 @@ def second_chart(rows: Sequence[Mapping[str, Any]]) -> Chart | None:
         "second-injury",
         "A second injury in addition to a first",
         "Rows: the first injury, at severity 7, one link of each part of the body. Columns: the second, at "
-        "10. The cell says how much the second changes the walk, in centimetres and as a share of its effect "
-        "on a healthy body. A pale field means that the first injury hides the second.",
+        "10. The cell says how much the second changes the walk, in centimetres or as a share of its effect "
+        "on a healthy body. A pale cell means that the first injury hides the second.",
         layout={
             "xaxis": {"type": "category", "tickangle": -50, "automargin": True},
             "yaxis": {"type": "category", "autorange": "reversed", "automargin": True},
@@ -65,7 +65,7 @@ def second_table(name: str, rows: Sequence[Mapping[str, Any]]) -> Table | None:
 
 
 def divided_chart(rows: Sequence[Mapping[str, Any]]) -> Chart | None:
-    """The effect of divided severities."""
+    """How far the walk of a chosen link is from the healthy walk, with a line for each divisor."""
     options: dict[str, list[Trace]] = {}
     scales = sorted({row["scale"] for row in rows})
     for link in dict.fromkeys(row["link"] for row in rows):
