@@ -65,8 +65,8 @@ def hurt_clip(
     severity = np.asarray(severity, float)
     if severity.shape != (len(clip), len(clip.skeleton.links)):
         raise HobbleError(
-            f"clip {clip.name}: severities {severity.shape} for {len(clip)} frames and "
-            f"{len(clip.skeleton.links)} links"
+            f"clip {clip.name}: the severities have shape {severity.shape}, but there are {len(clip)} frames "
+            f"and {len(clip.skeleton.links)} links"
         )
     if not np.isfinite(severity).all() or severity.min(initial=0) < 0 or severity.max(initial=0) > HIGHEST:
         raise HobbleError(f"clip {clip.name}: a severity is not in 0..10")

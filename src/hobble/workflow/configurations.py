@@ -72,7 +72,7 @@ class Configurations:
         return model(self.catalogue.configuration(self.owner(configuration)).network.kind)
 
     def network(self, configuration: str, file: str) -> str:
-        """Path of a file of its network."""
+        """Path of `file` in the folder of its network."""
         return f"results/{self.owner(configuration)}/network/{file}"
 
     def database(self, configuration: str) -> str:

@@ -85,7 +85,7 @@ def install(python: Path, arguments: list[str], line: ProgressLine) -> None:
 
 
 def is_sound(python: Path) -> bool:
-    """Whether `python` is an interpreter with pip and of the same version as the one that runs this."""
+    """Whether `python` has pip and is of the same version as the Python that runs this."""
     version = "import sys, pip; print(sys.version)"
     try:
         found = subprocess.run([python, "-c", version], capture_output=True, text=True, check=True).stdout

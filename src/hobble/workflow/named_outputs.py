@@ -33,7 +33,7 @@ class NamedOutputs(OutputIndex):  # type: ignore[misc]
         super().__init__(patterns)
 
     def match_producers(self, targetfile: str) -> set[Rule]:
-        """The rules that make a file: those that name it, else those with a pattern that matches."""
+        """The rules that make a file: those that name it, or else those whose pattern matches."""
         return self._rules.get(str(targetfile)) or super().match_producers(targetfile)
 
 

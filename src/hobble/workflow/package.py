@@ -36,5 +36,5 @@ class Package:
         return sorted(str(path) for path in files if path.suffix == suffix)
 
     def published(self) -> str:
-        """The file of published figures that the report shows beside ours."""
+        """The file of published figures that the report shows next to ours."""
         return str(self.folder / "evaluation" / "published.yaml")

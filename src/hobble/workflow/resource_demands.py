@@ -143,7 +143,7 @@ class Demands:
         return self.project.catalogue.configuration(configuration).training
 
     def training_threads(self, configuration: str) -> int:
-        """Threads of a training job: one for each process on CPUs, at least 2; with GPUs 2 for each GPU."""
+        """Threads of a training job: one for each process, at least 2; with GPUs 2, meant for each GPU."""
         machines = self.machines(configuration)
         return 2 if machines.gpus else max(2, machines.processes)
 

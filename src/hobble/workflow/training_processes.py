@@ -25,9 +25,7 @@ GRACE_SECONDS = 10.0  # time for torchrun to end its processes
 
 
 def on_machines(training: Training, machines: Machines, gpus: bool) -> Training:
-    """The training options for these machines. gpus: whether each of several processes uses a GPU or all use
-    CPUs.
-    """
+    """The training options for these machines. gpus: with several processes, whether each uses a GPU."""
     device = training.device if machines.count == 1 else "cuda" if gpus else "cpu"
     own = {"nodes": machines.nodes, **({"gpus": machines.each} if gpus else {"processes": machines.each})}
     return Training.model_validate({**training.model_dump(), **own, "device": device})
