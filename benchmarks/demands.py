@@ -15,7 +15,7 @@ import sys
 from collections import defaultdict
 from pathlib import Path
 
-from hobble.workflow.demands import ENGINE_MB
+from hobble.workflow.resource_demands import ENGINE_MB
 from hobble.workflow.resource_use import JobResources, planned_jobs, with_use
 
 ROOT = Path(__file__).resolve().parents[1]

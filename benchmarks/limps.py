@@ -24,14 +24,14 @@ from hobble.core.files import load_npz
 from hobble.gait.comparison import compare, healthy_profile
 from hobble.gait.cycles import joined, measure
 from hobble.gait.derive_healthy import REFERENCE, healthy_windows
-from hobble.gait.graded import HEALTHY, Grader, grade, healthy_covariance, learn_grader
+from hobble.gait.limp_grade import HEALTHY, Grader, grade, healthy_covariance, learn_grader
 from hobble.gait.people import GAITS, NORMAL, people
 from hobble.gait.profile import NAMES, Profile, mirrored, profile
 from hobble.gait.read_clip import read_clip
 from hobble.gait.recogniser import SHRINKAGE, examples, learn, recognise
 from hobble.hurt.hurt_clip import hurt_clip
+from hobble.labels.clip_labels import Labels
 from hobble.labels.label import label_clip
-from hobble.labels.model import Labels
 from hobble.labels.options import LabelOptions
 from hobble.motion.make import make_clip
 from hobble.motion.options import ClipMotion
@@ -70,18 +70,18 @@ def people_left_out(name: str, judges: dict[int, Callable]) -> None:
     totals = {s: np.zeros(3) for s in STRENGTHS}
     lines = {gait: f"{gait:15}" for gait in GAITS[1:]}
     for strength in STRENGTHS:
-        seen: dict[str, list[tuple[bool, bool, bool]]] = {gait: [] for gait in GAITS[1:]}
+        outcomes: dict[str, list[tuple[bool, bool, bool]]] = {gait: [] for gait in GAITS[1:]}
         for person, judge in judges.items():
             for gait, side, walk, healthy in limps(person, strength):
                 said = judge(walk, healthy)
                 right = said.label == gait and said.side == side
-                seen[gait].append((said.impaired, right, said.side in (None, side)))
+                outcomes[gait].append((said.impaired, right, said.side in (None, side)))
                 if strength == 1.0:
                     confusion[gait, said.label] += 1
-        for gait, rows in seen.items():
+        for gait, rows in outcomes.items():
             share = np.mean(rows, axis=0)
             lines[gait] += "{:>13.2f}{:>6.2f}{:>6.2f}".format(*share)
-            totals[strength] += share / len(seen)
+            totals[strength] += share / len(outcomes)
     print("\n".join(lines.values()))
     print(f"{'mean':15}" + "".join("{:>13.2f}{:>6.2f}{:>6.2f}".format(*totals[s]) for s in STRENGTHS))
     print(
@@ -122,14 +122,14 @@ def captured(folder: Path, clips: list[str]) -> None:
     print("\ncaptured impaired walks, beside the healthy walks of CMU 105")
     for path in [*(folder / f"{name}.bvh" for name in EXAM), *map(Path, clips)]:
         try:
-            seen = compare(read_clip(path), healthy)
+            compared = compare(read_clip(path), healthy)
         except HobbleError as error:
             print(f"  {path.stem}: {error}")
             continue
-        a, g = seen.answer, seen.grade
+        a, g = compared.answer, compared.grade
         print(f"  {path.stem}")
-        print(f"    linear {a.label} {a.side or ''}; windows: {rounded(seen.named())}")
-        print(f"    graded {g.label} {g.side or ''} {g.strength:.1f}; windows: {rounded(seen.graded())}")
+        print(f"    linear {a.label} {a.side or ''}; windows: {rounded(compared.named())}")
+        print(f"    graded {g.label} {g.side or ''} {g.strength:.1f}; windows: {rounded(compared.graded())}")
 
 
 def made(folder: Path) -> None:

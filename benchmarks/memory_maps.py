@@ -23,10 +23,10 @@ import numpy as np
 from database import BATCH, PROGRAM_MB, cold, made_up, status
 
 from hobble.core.processors import processor
-from hobble.database import chunks, order, reader, window
+from hobble.database import chunk_window, chunks, order, reader
+from hobble.database.chunk_window import empty_buffers
 from hobble.database.merge import write_database
 from hobble.database.reader import Block, Database, read_ahead
-from hobble.database.window import empty_buffers
 
 TABLES = ("x", "y", "fits", "count", "clip", "frame", "phase")
 SECTIONS = 10
@@ -192,8 +192,10 @@ def main() -> None:
         write_tables(db, folder / "tables")
         of_files.child("same", folder, str(args.memory_mb), script=__file__)
         print(f"both give the same blocks; {db.manifest.bytes >> 20} MB of rows")
-        ours = lines(reader, window, chunks)
-        without = lines(window, chunks, Database._parts, Database._wanted, Database.load, Database._whole)
+        ours = lines(reader, chunk_window, chunks)
+        without = lines(
+            chunk_window, chunks, Database._parts, Database._wanted, Database.load, Database._whole
+        )
         without += lines(Database._buffers)
         print(f"lines of reader, window and chunks: {ours}; with memory maps about ", end="")
         print(f"{ours - without + lines(Mapped)}, without checksums and the memory limit")

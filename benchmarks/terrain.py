@@ -27,8 +27,8 @@ from hobble.config.sections import DatabaseOptions, LabelOptions, Synthetic, Ter
 from hobble.core.clip import Clip
 from hobble.core.errors import HobbleError
 from hobble.core.processors import processor
+from hobble.labels.clip_labels import Labels as ClipLabels
 from hobble.labels.label import label_clip, mirror_labels
-from hobble.labels.model import Labels as ClipLabels
 from hobble.motion.make import make_clip
 from hobble.motion.mirror import mirror_clip
 from hobble.motion.options import ClipMotion

@@ -8,7 +8,7 @@ import torch
 from numba import njit
 
 from hobble.character import rule
-from hobble.runtime import controller, trajectory
+from hobble.runtime import advance, network_rows
 
 
 def test_places_standing_and_phase_follow_the_formulas() -> None:
@@ -23,7 +23,7 @@ def test_the_rule_is_the_same_compiled_and_in_python() -> None:
 
     @njit
     def compiled(a: float, b: float) -> tuple[float, float, float]:
-        return controller.joint_place(a, b), trajectory.moving_share(a), trajectory.phase_change(a, b)
+        return network_rows.joint_place(a, b), advance.moving_share(a), advance.phase_change(a, b)
 
     for a, b in rng.random((100, 2)):
         assert compiled(a, b) == (rule.joint_place(a, b), rule.moving(a), rule.phase_change(a, b))

@@ -17,7 +17,7 @@ import numpy as np
 import pytest
 
 from hobble.core.errors import HobbleError, InputError
-from hobble.database import ordered, plan, scatter
+from hobble.database import plan, scatter, write_in_order
 from hobble.database.buckets import INDEX, Buckets
 from hobble.database.merge import write_database
 from hobble.database.reader import Database
@@ -199,7 +199,7 @@ def test_a_full_disk_gives_a_message_and_keeps_the_old_database(rows_of, tmp_pat
     def full(*_: object) -> None:
         raise OSError(errno.ENOSPC, "No space left on device")
 
-    monkeypatch.setattr(ordered, "write_chunk", full)
+    monkeypatch.setattr(write_in_order, "write_chunk", full)
     with pytest.raises(HobbleError, match="disk is full"):
         write_database(tmp_path / "db", {"a": rows_of("a", 61)}, {"a": "train"}, **OPTIONS)
     assert contents(tmp_path / "db") == before

@@ -7,8 +7,8 @@ import pytest
 
 from hobble.evaluation.captured import captured, root_path, unbroken
 from hobble.evaluation.motion_measures import acceleration, in_root_frame
-from hobble.measures.chosen import captured_motion
-from hobble.measures.sample import Sample, Stratum
+from hobble.measures.clip_parts import captured_motion
+from hobble.measures.stratified_sample import Sample, Stratum
 from hobble.rows.clip_rows import ClipRows, save_clip_rows
 from hobble.rows.excerpts import Excerpt
 from hobble.rows.layout import GAITS, RowLayout

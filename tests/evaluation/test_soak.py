@@ -10,7 +10,7 @@ import pytest
 
 from hobble.evaluation.soak import LIMITS, StanceSlides, grounds, soak
 from hobble.models.pfnn.network import Pfnn
-from hobble.models.seen import SeenInTraining
+from hobble.models.training_facts import TrainingFacts
 from hobble.runtime import controller, feet
 
 HIPS = 93.0  # cm above the ground, of the figures of `mean_output`
@@ -24,8 +24,8 @@ def on_its_feet(network: Pfnn) -> Pfnn:
     x[network.layout.x_direction][network.layout.samples :] = 1
     x[network.layout.x_gait].reshape(-1, network.layout.samples)[1] = 1
     x[network.layout.x_joint_position] = mean[network.layout.y_joint_position]
-    seen = SeenInTraining(x - 50, x + 50, mean - 8, mean + 8, x, mean, start_phase=0.3, fastest=9.0)
-    return replace(network, y_mean=mean, seen=seen)
+    seen = TrainingFacts(x - 50, x + 50, mean - 8, mean + 8, x, mean, start_phase=0.3, fastest=9.0)
+    return replace(network, y_mean=mean, training_facts=seen)
 
 
 def test_hips_stay_above_the_ground_under_them(hurtable: Pfnn) -> None:

@@ -14,7 +14,7 @@ from scipy.spatial import cKDTree
 
 from hobble.core import quat
 from hobble.core.skeleton import Skeleton, forward_kinematics
-from hobble.figure.fit import fitted_rotations
+from hobble.figure.fit_rotations import fitted_rotations
 from hobble.figure.mesh import Mesh, body, key
 from hobble.figure.pack import balls, regions, whole_weights
 

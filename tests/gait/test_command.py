@@ -13,7 +13,7 @@ from hobble.core.files import load_npz, save_npz
 from hobble.gait import derive_healthy, derive_people
 from hobble.gait.__main__ import main
 from hobble.gait.comparison import compare, healthy_profile
-from hobble.gait.graded import HEALTHY
+from hobble.gait.limp_grade import HEALTHY
 from hobble.motion.mirror import mirror_clip
 from hobble.synthetic.generate_clip import walk
 from hobble.synthetic.recipes import WALK, Segment

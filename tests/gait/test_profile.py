@@ -9,7 +9,7 @@ from hobble.core.errors import HobbleError
 from hobble.gait.cycles import WalkCycles, measure
 from hobble.gait.effect_sizes import effects
 from hobble.gait.features import features
-from hobble.gait.graded import grade
+from hobble.gait.limp_grade import grade
 from hobble.gait.profile import NAMES, mirrored, profile
 from hobble.gait.recogniser import recognise, windows
 

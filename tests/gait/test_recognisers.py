@@ -14,7 +14,7 @@ from hobble.gait.comparison import compare, healthy_profile, measure_clip
 from hobble.gait.cycles import SCALARS
 from hobble.gait.effect_sizes import EFFECTS, effects_of_people
 from hobble.gait.features import features
-from hobble.gait.graded import PARTS, grade, healthy_covariance, learn_grader
+from hobble.gait.limp_grade import PARTS, grade, healthy_covariance, learn_grader
 from hobble.gait.people import GAITS, NORMAL, people
 from hobble.gait.profile import NAMES, mirrored, profile
 from hobble.gait.recogniser import SHRINKAGE, examples, learn, recognise, windows

@@ -13,8 +13,8 @@ import pytest
 
 from hobble.core.clip import Clip
 from hobble.core.skeleton import Skeleton
+from hobble.labels.clip_labels import Labels
 from hobble.labels.label import label_clip
-from hobble.labels.model import Labels
 from hobble.labels.options import LabelOptions
 from hobble.motion.make import make_clip
 from hobble.motion.options import ClipMotion

@@ -7,8 +7,8 @@ import numpy as np
 from hobble.core import quat
 from hobble.core.clip import Clip
 from hobble.hurt.hurt_clip import HurtClip
+from hobble.labels.clip_labels import CONTACT_ROLES, Labels
 from hobble.labels.footfall import feet_up, find_swings
-from hobble.labels.model import CONTACT_ROLES, Labels
 from hobble.labels.options import LabelOptions as Options
 
 SIDES = ("left", "right")

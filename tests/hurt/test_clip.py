@@ -10,8 +10,8 @@ from hobble.core import quat
 from hobble.core.errors import HobbleError
 from hobble.core.skeleton import other_side
 from hobble.hurt.hurt_clip import hurt_clip
+from hobble.labels.clip_labels import LabelReport
 from hobble.labels.label import mirror_labels
-from hobble.labels.model import LabelReport
 from hobble.motion.mirror import mirror_clip
 
 MADE = ("straight", "turning", "jog", "starting", "uneven")

@@ -12,8 +12,8 @@ from hobble.hurt.effects import POWER
 from hobble.hurt.hurt_clip import hurt_clip
 from hobble.hurt.options import Hurt
 from hobble.hurt.version import NEAR, hurt_version
+from hobble.labels.clip_labels import LabelReport
 from hobble.labels.label import mirror_labels
-from hobble.labels.model import LabelReport
 from hobble.motion.mirror import mirror_clip
 
 REPORT = LabelReport("straight", "automatic", "automatic", "right", "extend", 0)

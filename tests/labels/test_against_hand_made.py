@@ -13,8 +13,8 @@ import yaml
 
 from hobble.config.sections import Synthetic
 from hobble.core.clip import Clip
+from hobble.labels.clip_labels import Labels
 from hobble.labels.label import label_clip
-from hobble.labels.model import Labels
 from hobble.labels.options import LabelOptions as Options
 from hobble.motion.make import make_clip
 from hobble.motion.options import ClipMotion

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from hobble.labels import gait as g
+from hobble.labels.clip_labels import GAITS
 from hobble.labels.contacts import stance
-from hobble.labels.model import GAITS
 from hobble.labels.options import LabelOptions
 
 

@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 
 from hobble.core.errors import InputError
-from hobble.labels import model
+from hobble.labels import clip_labels
+from hobble.labels.clip_labels import LabelReport, load_labels, save_labels
 from hobble.labels.label import label_clip, mirror_labels, write_report
-from hobble.labels.model import LabelReport, load_labels, save_labels
 from hobble.rows.layout import CONTACTS, GAITS
 
 MOTION = {"source_frames": 1200, "source_fps": 120.0, "source_start": 0}
@@ -23,8 +23,8 @@ def apart(a: np.ndarray, b: np.ndarray) -> np.ndarray:
 
 
 def test_gaits_and_contacts_have_the_same_order_as_in_rows():
-    assert model.GAITS == GAITS
-    assert model.CONTACT_ROLES == CONTACTS
+    assert clip_labels.GAITS == GAITS
+    assert clip_labels.CONTACT_ROLES == CONTACTS
 
 
 def test_hand_made_files_replace_labels_found_from_motion(walker, options, write):

@@ -12,10 +12,10 @@ import pytest
 
 from hobble.core.errors import InputError
 from hobble.evaluation.motion_measures import in_root_frame
-from hobble.measures.given import Given
+from hobble.measures.inputs import MeasureInputs
 from hobble.measures.measure import Measure
 from hobble.measures.registry import MEASURES
-from hobble.measures.rollouts.roll_outs import RollOutInputs, inputs
+from hobble.measures.rollouts.roll_outs import RollOutInputs, inputs_of_clip
 from hobble.measures.rollouts.run import clip_roll_outs, measure_roll_outs, roll_out_rows
 from hobble.models.network import Network
 from hobble.models.pfnn.predictor import PfnnPredictor
@@ -53,7 +53,7 @@ def recorded(network: Network, frames: int, ground: Any) -> tuple[RollOutInputs,
     step = np.diff(root, axis=0, append=root[-1:])
     sin, cos = np.sin(yaw), np.cos(yaw)
     velocity = np.stack([step[:, 0] * cos - step[:, 1] * sin, step[:, 0] * sin + step[:, 1] * cos], axis=1)
-    given = RollOutInputs(
+    inputs = RollOutInputs(
         np.array(rows["x"]),
         np.array(rows["y"]),
         np.array(rows["mean"]),
@@ -62,7 +62,7 @@ def recorded(network: Network, frames: int, ground: Any) -> tuple[RollOutInputs,
         velocity,
         np.maximum(0, 1 - np.array(rows["stand"])) ** 0.25,
     )
-    return given, np.array(rows["local"])
+    return inputs, np.array(rows["local"])
 
 
 @pytest.mark.parametrize("ground", [None, hills])
@@ -71,15 +71,15 @@ def test_a_roll_out_equals_the_motion_of_the_runtime(hurtable: Network, ground: 
     scale = hurtable.x_std.copy()  # one that feels its own velocities and its phase
     scale[hurtable.layout.x_joint_velocity] = 1.0
     hurtable = replace(hurtable, x_std=scale, y_std=np.full_like(hurtable.y_std, 0.2))
-    given, local = recorded(hurtable, 80, ground)
+    inputs, local = recorded(hurtable, 80, ground)
     starts = np.array([1, 2, 17, 40, 79])
-    made, phase = roll_out(PfnnPredictor(hurtable), given, starts, 60)
+    made, phase = roll_out(PfnnPredictor(hurtable), inputs, starts, 60)
     assert [len(place) for place in made] == [5] + [4] * 39 + [3] * 20
     for age, place in enumerate(made):
         np.testing.assert_allclose(place, local[starts[: len(place)] + age], atol=1e-3)
-    np.testing.assert_allclose(phase[:2], given.phase[starts[:2] + 60], atol=1e-4)
+    np.testing.assert_allclose(phase[:2], inputs.phase[starts[:2] + 60], atol=1e-4)
     # The pose is its own: a start from another pose stays another for a while.
-    other = RollOutInputs(given.x.copy(), *list(vars(given).values())[1:])
+    other = RollOutInputs(inputs.x.copy(), *list(vars(inputs).values())[1:])
     other.x[1, hurtable.layout.x_joint_position] += 5
     moved, _ = roll_out(PfnnPredictor(hurtable), other, starts[:1], 2)
     assert np.abs(moved[0] - local[1]).max() > 1
@@ -156,21 +156,21 @@ def test_roll_outs_start_four_times_within_each_length(hurtable: Network) -> Non
 
 def test_after_one_frame_a_pose_is_the_mean_of_prediction_and_extrapolation(hurtable: Network) -> None:
     rows = clip_rows(hurtable, 40, 2)
-    given = inputs(rows, np.arange(40), rows.layout)
+    inputs = inputs_of_clip(rows, np.arange(40), rows.layout)
     layout = hurtable.layout
-    np.testing.assert_array_equal(given.x[:, layout.x_channel("injury")], rows.channels["injury"])
-    y = PfnnPredictor(hurtable).predict(given.x, given.phase)
-    made, _ = roll_out(PfnnPredictor(hurtable), given, np.arange(1, 40), 1)
-    before = given.x[1:, layout.x_joint_position].reshape(39, 31, 3).astype(float)
-    a = given.turn[:-1, None]
-    x, z = before[..., 0] - given.velocity[:-1, :1], before[..., 2] - given.velocity[:-1, 1:]
+    np.testing.assert_array_equal(inputs.x[:, layout.x_channel("injury")], rows.channels["injury"])
+    y = PfnnPredictor(hurtable).predict(inputs.x, inputs.phase)
+    made, _ = roll_out(PfnnPredictor(hurtable), inputs, np.arange(1, 40), 1)
+    before = inputs.x[1:, layout.x_joint_position].reshape(39, 31, 3).astype(float)
+    a = inputs.turn[:-1, None]
+    x, z = before[..., 0] - inputs.velocity[:-1, :1], before[..., 2] - inputs.velocity[:-1, 1:]
     carried = np.stack(
         [x * np.cos(a) + z * np.sin(a), before[..., 1], z * np.cos(a) - x * np.sin(a)], axis=-1
     )
     speed = y[1:, layout.y_joint_velocity].reshape(39, 31, 3)
     guess = y[1:, layout.y_joint_position].reshape(39, 31, 3)
     np.testing.assert_allclose(made[0], (carried + speed + guess) / 2, atol=1e-4)
-    truth = given.y[1:, layout.y_joint_position].reshape(39, 31, 3)
+    truth = inputs.y[1:, layout.y_joint_position].reshape(39, 31, 3)
     found = clip_roll_outs(PfnnPredictor(hurtable), rows, range(31), (1,))[1].to_dict()
     assert found["position_error_cm"] == pytest.approx(
         np.linalg.norm(truth - made[0], axis=-1).mean(), rel=1e-5
@@ -231,8 +231,8 @@ def test_a_channel_s_measure_does_not_apply_to_a_network_without_it(
     """`holden` is measured on clips with severities, and ignores them."""
     save(tmp_path / "weights.npz", make_network())
     files = {"weights": tmp_path / "weights.npz", "published": ROOT / "src/hobble/evaluation/published.yaml"}
-    given = Given("plain", files, {"a": tmp_path / "unread.npz"}, {"a": "train"})
-    found = measure.part("run").run(given, measure.options())
+    inputs = MeasureInputs("plain", files, {"a": tmp_path / "unread.npz"}, {"a": "train"})
+    found = measure.part("run").run(inputs, measure.options())
     assert found.result["applies"] is False
     assert "network" in found.result["reason"]
 

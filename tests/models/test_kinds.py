@@ -128,13 +128,13 @@ def test_javascript_predicts_the_same_as_python(made: Made, tmp_path: Path) -> N
     """The page lacks the first input, which has no weight, and has some outputs only, in another order."""
     network = made[2]
     object.__setattr__(network, "x_std", np.where(np.arange(len(network.x_std)) == 0, 0, network.x_std))
-    seen, rows = np.arange(1, len(network.x_mean)), np.array([5, 0, 310, 17])
+    read, rows = np.arange(1, len(network.x_mean)), np.array([5, 0, 310, 17])
     x, phase = random_inputs(network)
     spec = {
-        "network": {"kind": network.kind, **network.page(seen, rows)},
-        "seen": seen.tolist(),
-        "xMean": packed(network.x_mean[seen]),
-        "xScale": packed(inverse(network.x_std)[seen].astype(np.float32)),
+        "network": {"kind": network.kind, **network.page(read, rows)},
+        "inputColumns": read.tolist(),
+        "xMean": packed(network.x_mean[read]),
+        "xScale": packed(inverse(network.x_std)[read].astype(np.float32)),
         "yMean": packed(network.y_mean[rows]),
         "yStd": packed(network.y_std[rows]),
     }

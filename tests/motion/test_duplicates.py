@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from hobble.core.errors import HobbleError
-from hobble.database.sides import refuse_both_sides
+from hobble.database.split_check import refuse_both_sides
 from hobble.motion.axes import turned
 from hobble.motion.duplicates import likeness, load_likenesses, same_pairs, save_likenesses
 from hobble.motion.mirror import mirror_clip

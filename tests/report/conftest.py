@@ -19,10 +19,10 @@ from hobble.models.network import Network
 from hobble.report.bundle import WEB, bundle, install
 from hobble.report.captured_and_predicted import comparisons
 from hobble.report.gather import Material, gather
+from hobble.report.opening_walk import opening_walk
 from hobble.report.page import render
 from hobble.report.playable import playable
 from hobble.report.scenes import scenes
-from hobble.report.walked import opened
 
 
 def load_module(name: str) -> ModuleType:
@@ -93,7 +93,7 @@ def hero(
     network: Network, character: dict[str, Any], material: Material, examples: ModuleType
 ) -> dict[str, Any]:
     """The figures at the top of the page."""
-    return opened(network, examples.RUNTIME, character, material.measured.values())
+    return opening_walk(network, examples.RUNTIME, character, material.measured.values())
 
 
 @pytest.fixture(scope="session")

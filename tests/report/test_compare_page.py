@@ -23,7 +23,7 @@ from hobble.report import compare_tables as tables
 from hobble.report.compare_page import render_compared
 from hobble.report.gather import PUBLISHED, Material
 from hobble.report.playable import playable
-from hobble.report.rounded import rounded
+from hobble.report.rounded_weights import rounded
 
 
 @pytest.fixture(scope="module")
@@ -199,9 +199,9 @@ def test_two_figures_get_the_same_targets(tab: Any) -> None:
     tab.run("document.getElementById('play-stage').focus({ preventScroll: true })")
     assert tab.run("Hobble.player.actors.length") == 2
     tab.send("Input.dispatchKeyEvent", type="keyDown", key="w", code="KeyW", text="w")
-    wished = "Hobble.player.actors.map(({ character }) => character.velocity)"
-    assert tab.until(f"{wished}.every((v) => Math.hypot(...v) > 2)")
-    first, second = tab.run(wished)
+    speeds = "Hobble.player.actors.map(({ character }) => character.smoothedVelocity)"
+    assert tab.until(f"{speeds}.every((v) => Math.hypot(...v) > 2)")
+    first, second = tab.run(speeds)
     tab.send("Input.dispatchKeyEvent", type="keyUp", key="w", code="KeyW")
     assert first[0] * second[0] + first[1] * second[1] > 0
     tab.run("[...document.querySelectorAll('#play-presets button')][0].click()")

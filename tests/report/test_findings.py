@@ -155,7 +155,7 @@ def test_errors_of_the_prediction_and_of_the_drawn_pose_are_shown(material: Mate
     one = {"length": 1, "held_out": {"position_error_cm": 0.51}, "train": {"position_error_cm": 0.4}}
     found = changed(material, rollouts={"lengths": [one]})
     figure = next(f for f in key_figures(found) if f.label == "Error on held-out clips")
-    assert "cm per joint; 0.510 cm for the pose that is drawn" in figure.note
+    assert "cm per joint as predicted; 0.510 cm as drawn" in figure.note
 
 
 def test_key_figures_show_the_published_values(material: Material) -> None:

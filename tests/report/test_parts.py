@@ -8,7 +8,7 @@ from typing import Any
 import pytest
 
 from hobble.measures.registry import MEASURES
-from hobble.report import measured
+from hobble.report import measure_sections
 from hobble.report.charts import Chart, ChartGroup
 from hobble.report.page_parts import ChartPair, PageSection, Paragraph, SectionPart, joined
 from hobble.report.tables import Column, Table
@@ -50,8 +50,8 @@ def test_a_pair_without_charts_is_left_out() -> None:
 @pytest.mark.parametrize("found", [{}, {"applies": False, "reason": "no such input"}])
 def test_a_measurement_that_found_nothing_leaves_no_section(found: dict[str, Any], material: Any) -> None:
     nothing = replace(material, measured={one.name: found for one in MEASURES})
-    assert measured.sections(material) != []
-    assert measured.sections(nothing) == []
+    assert measure_sections.sections(material) != []
+    assert measure_sections.sections(nothing) == []
 
 
 def test_charts_are_found_wherever_they_stand() -> None:

@@ -22,7 +22,7 @@ from hobble.models.load import load_network
 from hobble.models.network import Network
 from hobble.motion.decode import decode, frame_rate
 from hobble.motion.read import read_bvh
-from hobble.report import straight_walk, walked
+from hobble.report import opening_walk, straight_walk
 from hobble.report.formats import embedded
 from hobble.report.playable import playable
 from hobble.runtime.animation import ProceduralAnimation
@@ -44,7 +44,7 @@ def test_parts_are_the_links_of_their_roles(holden31: Skeleton) -> None:
 
 
 def test_weights_are_kept_to_a_part_in_sixty_thousand(network: Network, character: dict[str, Any]) -> None:
-    layer, kept = character["network"]["layers"][0], network.weights[0][:, :, character["seen"]]
+    layer, kept = character["network"]["layers"][0], network.weights[0][:, :, character["inputColumns"]]
     integers = np.frombuffer(base64.b64decode(layer["weights"]), "<i2").reshape(kept.shape)
     scale = np.frombuffer(base64.b64decode(layer["scale"]), "<f4").reshape(kept.shape[:2])
     error = np.abs(integers * scale[..., None] - kept)
@@ -59,10 +59,10 @@ def test_inputs_without_effect_are_left_out(examples: ModuleType, holden31: Skel
     examples.weights(tmp_path / "weights.npz", holden31)
     network = load_network(tmp_path / "weights.npz")
     x_std = network.x_std.copy()
-    unseen = network.layout.x_joint_position.start + 3 * holden31.index("LThumb")
-    x_std[unseen] *= 1e10
-    seen = playable(replace(network, x_std=x_std), examples.RUNTIME)["seen"]
-    assert sorted(set(range(network.layout.x_size)) - set(seen)) == [unseen]
+    unread = network.layout.x_joint_position.start + 3 * holden31.index("LThumb")
+    x_std[unread] *= 1e10
+    read = playable(replace(network, x_std=x_std), examples.RUNTIME)["inputColumns"]
+    assert sorted(set(range(network.layout.x_size)) - set(read)) == [unread]
 
 
 def target_at(frame: int) -> dict[str, Any]:
@@ -116,8 +116,8 @@ def test_the_page_moves_as_python_does(
           c.channelTargets[{links.index("Hips-LowerBack")}] = 3;
         }}
         c.frame(velocity, facing, gait, hills);
-        rig.take(c.pose, c.turns);
-        const made = [c.pose, c.phase, c.channelValues, c.turns, rig.places, rig.turns];
+        rig.take(c.posePosition, c.poseRotation);
+        const made = [c.posePosition, c.phase, c.channelValues, c.poseRotation, rig.places, rig.turns];
         return made.map((v) => (v.length ? Array.from(v) : v));
       }});
     }})()"""
@@ -177,13 +177,13 @@ def test_the_figures_at_the_top_move_as_the_python_runtime_does(
     column = one["columns"][one["sliders"][hero["part"]]]
     for i, values in enumerate(({column: 7.0}, {})):
         animation = ProceduralAnimation(network, **dict(examples.RUNTIME))
-        for _ in range(walked.FRAMES + 30):
+        for _ in range(opening_walk.FRAMES + 30):
             pose = animation.next_pose(straight_walk.AHEAD, None, "walk", injury=values)
         seen = tab.run(f"""(() => {{
           const c = Hobble.character(Hobble.material.playable.example);
           c.follow(Hobble.material.hero.walked[{i}]);
           for (let f = 0; f < 30; f++) c.frame({json.dumps(straight_walk.AHEAD)}, null, "walk", () => 0);
-          return Array.from(c.pose);
+          return Array.from(c.posePosition);
         }})()""")
         np.testing.assert_allclose(np.reshape(seen, (-1, 3)), pose.positions, atol=0.05)
 
@@ -195,10 +195,10 @@ def test_keys_move_the_figure(tab: Any) -> None:
     tab.run("Hobble.player.start()")
     before = tab.run(where)
     tab.send("Input.dispatchKeyEvent", type="keyDown", key="w", code="KeyW", text="w")
-    assert tab.until(f"Math.hypot(...{character}.velocity) > 2")
+    assert tab.until(f"Math.hypot(...{character}.smoothedVelocity) > 2")
     assert tab.until(f"Math.hypot({where}[0] - {before[0]}, {where}[1] - {before[1]}) > 5")
     tab.send("Input.dispatchKeyEvent", type="keyUp", key="w", code="KeyW")
-    assert tab.until(f"Math.hypot(...{character}.velocity) < .01")
+    assert tab.until(f"Math.hypot(...{character}.smoothedVelocity) < .01")
     panel = "document.getElementById('play-panel').textContent"
     assert tab.until(f"/Speed\\d\\.\\d\\d m\\/sPhase.*Time per frame\\d+\\.\\d ms/.test({panel})"), tab.run(
         panel
@@ -208,7 +208,7 @@ def test_keys_move_the_figure(tab: Any) -> None:
 def test_a_gamepad_and_a_thumb_steer_too(tab: Any) -> None:
     show(tab)
     tab.run("Hobble.player.start()")
-    velocity = "Hobble.player.actors[0].character.velocity"
+    velocity = "Hobble.player.actors[0].character.smoothedVelocity"
     pad = "{ connected: true, axes: [0, -1, 0, 0], buttons: [{ pressed: true }] }"
     tab.run(f"navigator.getGamepads = () => [null, {pad}]")
     assert tab.until(f"Math.hypot(...{velocity}) > 6"), "the first button jogs"
@@ -259,7 +259,7 @@ def test_a_click_on_the_left_shin_hurts_it_and_changes_the_gait(tab: Any) -> Non
     place = """(() => {
       const { view, actors: [{ character, spec }] } = Hobble.player, [, knee, heel] = spec.legs[0];
       const box = document.getElementById("play-view").getBoundingClientRect();
-      const at = (j) => view.project(Array.from(character.pose.subarray(3 * j, 3 * j + 3)));
+      const at = (j) => view.project(Array.from(character.posePosition.subarray(3 * j, 3 * j + 3)));
       const [p, q] = [at(knee), at(heel)];
       return [box.x + (p[0] + q[0]) / 2, box.y + (p[1] + q[1]) / 2];
     })()"""
@@ -281,7 +281,7 @@ def test_a_click_on_the_left_shin_hurts_it_and_changes_the_gait(tab: Any) -> Non
       const hurt = Hobble.character(spec), healthy = Hobble.character(spec);
       hurt.channelTargets[{index}] = 2;
       for (let f = 0; f < 60; f++) for (const c of [hurt, healthy]) c.frame([0, 2.5], null, "walk", () => 0);
-      return Math.max(...hurt.pose.map((v, i) => Math.abs(v - healthy.pose[i])));
+      return Math.max(...hurt.posePosition.map((v, i) => Math.abs(v - healthy.posePosition[i])));
     }})()"""
     assert tab.run(apart) > 0.01
 

@@ -14,7 +14,7 @@ import pytest
 from hobble.core.quat import Array
 from hobble.core.skeleton import Skeleton
 from hobble.gait.cycles import measure
-from hobble.gait.graded import grade, grader
+from hobble.gait.limp_grade import grade, grader
 from hobble.gait.people import people
 from hobble.gait.profile import profile
 from hobble.models.network import Network

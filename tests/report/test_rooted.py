@@ -23,7 +23,7 @@ const { spec, targets } = JSON.parse(readFileSync(process.argv[2]));
 const c = createCharacter(spec), flat = () => 0;
 console.log(JSON.stringify(targets.map((target) => {
   c.frame(target, null, "walk", flat);
-  return Array.from(c.pose);
+  return Array.from(c.posePosition);
 })));
 """
 
@@ -56,7 +56,7 @@ def test_the_page_pulls_a_rooted_network_toward_its_target_as_python_does(
     found = np.reshape(json.loads(done.stdout), np.shape(poses))
     np.testing.assert_allclose(found, poses, atol=1e-3)
     # The test would say nothing if the target drew nothing.
-    monkeypatch.setattr("hobble.runtime.trajectory.PULL", 0.0)
+    monkeypatch.setattr("hobble.runtime.controller.PULL", 0.0)
     animation = ProceduralAnimation(network, storage="int16", **dict(examples.RUNTIME))
     other = [animation.next_pose(target, None, "walk").positions for target in targets]
     assert np.abs(found - other).max() > 1.0

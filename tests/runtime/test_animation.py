@@ -158,7 +158,7 @@ def test_the_gait_follows_from_speed_and_argument(network) -> None:
 
     def shares(velocity, gait=None) -> dict[str, float]:
         character.next_pose(velocity, gait=gait)
-        target = dict(zip(network.gaits, character._target_gait[0], strict=True))
+        target = dict(zip(network.gaits, character._targets._shares[0], strict=True))
         return {name: share for name, share in target.items() if share}
 
     assert shares((0, 0.05), "jog") == {"stand": 1}
@@ -282,16 +282,16 @@ def test_a_character_starts_on_the_ground_at_any_height(steady) -> None:
 
 def test_copies_go_on_as_their_characters_would(hurtable: Network) -> None:
     """Copies of two characters, one of them twice, walk as three that were there from the beginning."""
-    wishes = np.array([(0.0, 2.5), (1.5, 1.0), (0.0, 2.5)])
+    targets = np.array([(0.0, 2.5), (1.5, 1.0), (0.0, 2.5)])
     link = hurtable.channels["injury"][4]
     three, two = (ProceduralAnimation(hurtable, characters=n) for n in (3, 2))
     for _ in range(25):
-        three.next_pose(wishes, injury={link: [0, 6, 0]})
-        two.next_pose(wishes[:2], injury={link: [0, 6]})
+        three.next_pose(targets, injury={link: [0, 6, 0]})
+        two.next_pose(targets[:2], injury={link: [0, 6]})
     copies = two.copies(np.array([0, 1, 0]))
     two.next_pose((3.0, 0.0))  # what the first does after the copy changes nothing
     for _ in range(25):
-        asked, made = (c.next_pose(wishes, injury={link: [0, 6, 9]}) for c in (three, copies))
+        asked, made = (c.next_pose(targets, injury={link: [0, 6, 9]}) for c in (three, copies))
         for name in ("positions", "rotations", "contacts", "phase", "root", "yaw"):
             np.testing.assert_array_equal(getattr(made, name), getattr(asked, name), name)
 

@@ -11,12 +11,12 @@ import pytest
 from hobble.core.errors import InputError
 from hobble.core.skeleton import Skeleton
 from hobble.models.pfnn.network import Pfnn
-from hobble.models.seen import SeenInTraining
+from hobble.models.training_facts import TrainingFacts
 from hobble.runtime.animation import ProceduralAnimation
 from hobble.runtime.bounds import MARGIN_SHARE, SPEED_MARGIN, Bounds, clip_rows
 
 
-def walked(network: Pfnn, fastest: float = 4.0) -> SeenInTraining:
+def walked(network: Pfnn, fastest: float = 4.0) -> TrainingFacts:
     """The ranges of training data in which figures move at 1 to 2 cm a frame and never stand."""
     layout = network.layout
     x = np.zeros(layout.x_size, np.float32)
@@ -29,7 +29,7 @@ def walked(network: Pfnn, fastest: float = 4.0) -> SeenInTraining:
     x_wide, y_wide = np.full_like(x, 0.05), np.full_like(y, 0.05)
     x_wide[layout.x_position], y_wide[layout.y_position] = 30, 30
     x_wide[layout.x_joint_position], y_wide[layout.y_joint_position] = 8, 8
-    return SeenInTraining(
+    return TrainingFacts(
         x - x_wide, x + x_wide, y - y_wide, y + y_wide, x, y, start_phase=0.3, fastest=fastest
     )
 
@@ -56,7 +56,7 @@ def run(network: Pfnn, frames: int = 600) -> tuple[np.ndarray, np.ndarray]:
 
 def test_wild_predictions_do_not_break_the_character(make_network) -> None:
     wild = replace(make_network(scale=60.0), y_std=np.ones_like(make_network().y_std))
-    hips, moved = run(replace(wild, seen=walked(wild)))
+    hips, moved = run(replace(wild, training_facts=walked(wild)))
     standing = wild.y_mean[wild.layout.y_joint_position][1]
     assert 0.5 * standing < hips.min() <= hips.max() < 1.2 * standing
     assert moved.max() <= SPEED_MARGIN * 4.0 + 1e-3
@@ -74,7 +74,7 @@ def test_bounds_do_not_change_a_well_behaved_network(make_network) -> None:
     wide = replace(seen, **far, **start, fastest=1e6)
     start["start_x"][network.layout.x_direction][network.layout.samples :] = 1
     start["start_x"][network.layout.x_gait][: network.layout.samples] = 1
-    ours, free = run(replace(network, seen=wide), 200), run(network, 200)
+    ours, free = run(replace(network, training_facts=wide), 200), run(network, 200)
     np.testing.assert_allclose(ours[0][20:], free[0][20:], atol=0.5)
 
 
@@ -82,7 +82,7 @@ def test_a_character_starts_in_the_start_frame(make_network) -> None:
     network = make_network(scale=0.0)
     seen = walked(network)
     character = ProceduralAnimation(
-        replace(network, seen=seen), position=(100.0, 0, 50.0), facing=(1.0, 0, 0)
+        replace(network, training_facts=seen), position=(100.0, 0, 50.0), facing=(1.0, 0, 0)
     )
     state, middle = character.state, network.layout.window
     assert state.phase[0] == 0.3
@@ -104,7 +104,7 @@ def test_rows_are_clipped_to_the_bounds() -> None:
 
 def test_bounds_are_the_training_range_plus_a_margin(hurtable) -> None:
     seen = walked(hurtable)
-    bounds, layout = Bounds.of(replace(hurtable, seen=seen)), hurtable.layout
+    bounds, layout = Bounds.of(replace(hurtable, training_facts=seen)), hurtable.layout
     place = layout.x_joint_position
     np.testing.assert_allclose(bounds.x_high[place], seen.x_high[place] + MARGIN_SHARE * 16, rtol=1e-5)
     assert bounds.fastest == SPEED_MARGIN * 4.0
@@ -134,11 +134,11 @@ def test_a_state_that_is_not_finite_restarts_and_warns_once(hurtable, part: str,
 
 def test_the_ranges_of_the_training_data_survive_their_file(network, holden31: Skeleton) -> None:
     seen, sizes = walked(network), (network.layout.x_size, network.layout.y_size)
-    back = SeenInTraining.read("x.npz", seen.arrays(), *sizes)
+    back = TrainingFacts.read("x.npz", seen.arrays(), *sizes)
     assert back is not None
     for f in fields(seen):
         np.testing.assert_array_equal(getattr(back, f.name), getattr(seen, f.name))
-    assert SeenInTraining.read("x.npz", {}, *sizes) is None
+    assert TrainingFacts.read("x.npz", {}, *sizes) is None
     for broken in (
         {"Xlow": seen.x_low[1:]},
         {"Yhigh": seen.y_high * np.nan},
@@ -147,8 +147,8 @@ def test_the_ranges_of_the_training_data_survive_their_file(network, holden31: S
         {"start_phase": np.float64(-3)},
     ):
         with pytest.raises(InputError, match=r"x\.npz"):
-            SeenInTraining.read("x.npz", {**seen.arrays(), **broken}, *sizes)
+            TrainingFacts.read("x.npz", {**seen.arrays(), **broken}, *sizes)
     whole = seen.arrays()
     del whole["start_x"]
     with pytest.raises(InputError, match="start_x"):
-        SeenInTraining.read("x.npz", whole, *sizes)
+        TrainingFacts.read("x.npz", whole, *sizes)

@@ -68,10 +68,10 @@ def test_the_character_follows_waypoints(network) -> None:
     np.testing.assert_allclose(character.state.smoothed_velocity, [[0, 0.9 * 2.5]])
     character.follower.reached[:] = 1
     character.next_pose()
-    assert character._target_gait[0].tolist() == [0, 0, 1, 0, 0, 0]
+    assert character._targets._shares[0].tolist() == [0, 0, 1, 0, 0, 0]
     # On the way to the second it strafes, facing +Z.
     np.testing.assert_allclose(character.state.smoothed_direction, [[0, 1]], atol=1e-9)
     assert character.state.strafe[0] > 0.5
     # A velocity of the caller's own takes precedence.
     character.next_pose((0.0, -1.0))
-    np.testing.assert_allclose(character._target_gait[0], np.eye(6)[1])
+    np.testing.assert_allclose(character._targets._shares[0], np.eye(6)[1])

@@ -15,7 +15,7 @@ from hobble.core.skeleton import Skeleton
 from hobble.database.reader import Database
 from hobble.models import model
 from hobble.models.pfnn.options import PfnnOptions
-from hobble.models.seen import SeenInTraining
+from hobble.models.training_facts import TrainingFacts
 from hobble.rows.layout import CONTACTS, GAITS, RowLayout
 from hobble.training.weights import write_weights
 
@@ -61,7 +61,7 @@ def test_the_weights_file_describes_its_columns(data: Database, tmp_path: Path) 
 def test_the_weights_file_has_the_ranges_of_the_training_rows_only(data: Database, tmp_path: Path) -> None:
     write(tmp_path / "weights.npz", data)
     arrays = load_npz(tmp_path / "weights.npz")
-    seen = SeenInTraining.read("weights.npz", arrays, data.layout.x_size, data.layout.y_size)
+    seen = TrainingFacts.read("weights.npz", arrays, data.layout.x_size, data.layout.y_size)
     assert seen is not None
     blocks = list(data.blocks("train", 0, 0, 1, 0))
     s = data.statistics
@@ -78,7 +78,7 @@ def test_the_weights_file_has_the_ranges_of_the_training_rows_only(data: Databas
 def test_the_ranges_cover_every_row_with_every_fit(small_database: Path, memory: int) -> None:
     data = Database.open(small_database, memory)
     s = data.statistics
-    seen = SeenInTraining.of(data.layout, data.each_row("train"), s)
+    seen = TrainingFacts.of(data.layout, data.each_row("train"), s)
     (block,) = data.blocks("train", 0, 0, 1, 0, data.pairs("train"))
     x, y = block.x * s.x_std + s.x_mean, block.y * s.y_std + s.y_mean
     for name, values in (("x", x), ("y", y)):

@@ -33,18 +33,18 @@ MEASURE = Measure(
 '''
 RUN = """from hobble.rows.clip_rows import load_clip_rows
 from hobble.evaluation.captured import captured
-from hobble.measures.given import Given, Outcome
+from hobble.measures.inputs import MeasureInputs, Outcome
 from hobble.measures.hips import Options
 
 
-def run(given: Given, options: Options) -> Outcome:
-    joint = list(given.skeleton["joints"]).index(given.skeleton["roles"]["hips"])
+def run(inputs: MeasureInputs, options: Options) -> Outcome:
+    joint = list(inputs.skeleton["joints"]).index(inputs.skeleton["roles"]["hips"])
     rows = []
-    for clip, path in given.clips.items():
+    for clip, path in inputs.clips.items():
         parts = captured(load_clip_rows(path))
         heights = [h for part in parts for h in part.local[:: options.every, joint, 1]]
         rows.append({"clip": clip, "frames": len(heights), "highest": round(float(max(heights)), 3)})
-    known = [entry["clip"] for entry in given.measured("accuracy")["clips"]]
+    known = [entry["clip"] for entry in inputs.measured("accuracy")["clips"]]
     return Outcome({"every": options.every, "clips": rows, "known": known}, {"clips": rows}, "<hips>")
 """
 PAGE = """from hobble.report.page_parts import PageSection, Paragraph, SectionPart
@@ -77,7 +77,7 @@ def compared(all_measured, published):
 def tables(compared):
     return {"hips": compared["hips"]}
 """
-COMPARISON_PAGE = """from hobble.report.measured import Overview
+COMPARISON_PAGE = """from hobble.report.measure_sections import Overview
 from hobble.report.page_parts import PageSection, Paragraph, SectionPart
 from hobble.report.tables import Column
 

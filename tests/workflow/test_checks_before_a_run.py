@@ -62,6 +62,29 @@ def test_impossible_targets_are_reported_before_training(
     check(Project(base, {}), fine)
 
 
+@pytest.mark.parametrize(
+    ("text", "dataset", "message"),
+    [
+        ("network: {kind: mann}", DATASET, "lame: training.symmetric: a network of kind mann cannot"),
+        ("network: {control_points: 5}", DATASET, "it needs an even number of network.control_points, not 5"),
+        ("", DATASET.replace("mirror: true\n", ""), "data set mine has no mirrored clips.* `mirror: true`"),
+        ("network: {kind: plain}", DATASET, ""),
+    ],
+)
+def test_a_symmetric_training_without_mirrors_is_refused(
+    base: Path, monkeypatch: pytest.MonkeyPatch, text: str, dataset: str, message: str
+) -> None:
+    monkeypatch.setattr(targets, "_check_dataset", lambda *_: None)
+    (base / "config/datasets/mine.yaml").write_text(dataset)
+    (base / "config/lame.yaml").write_text(f"extends: hurt\ntraining: {{symmetric: true}}\n{text}\n")
+    project = Project(base, {})
+    if not message:
+        check(project, ["results/lame/report.html"])
+        return
+    with pytest.raises(HobbleError, match=message):
+        check(project, ["results/lame/report.html"])
+
+
 LISTED = "skeleton: s\nfolder: mine\nclips: {a: , b: {%s}}\n"
 
 

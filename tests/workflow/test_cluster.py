@@ -9,8 +9,8 @@ import pytest
 import yaml
 
 from hobble.workflow.clip_batches import SMALLEST, ClipBatch, batch_of
-from hobble.workflow.demands import ENGINE_MB, WEEK_MINUTES, Demands, bvh_seconds
 from hobble.workflow.project import Project
+from hobble.workflow.resource_demands import ENGINE_MB, WEEK_MINUTES, Demands, bvh_seconds
 from hobble.workflow.resource_use import planned_jobs, with_use
 
 CLIPS = 40

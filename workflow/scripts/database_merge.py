@@ -6,7 +6,7 @@ from hobble.core.clip import load_clip
 from hobble.core.files import read_json
 from hobble.database.merge import merge_shards, write_database
 from hobble.database.options import Merging
-from hobble.database.sides import refuse_both_sides
+from hobble.database.split_check import refuse_both_sides
 from hobble.motion.duplicates import likeness, load_likenesses, same_pairs
 from hobble.workflow.job import job
 

@@ -2,8 +2,8 @@
 
 from hobble.core.clip import load_clip
 from hobble.core.files import read_json
+from hobble.labels.clip_labels import LabelReport, load_labels, save_labels
 from hobble.labels.label import label_clip, mirror_labels, write_report
-from hobble.labels.model import LabelReport, load_labels, save_labels
 from hobble.labels.options import LabelOptions
 from hobble.workflow.batch_job import make_each
 

@@ -2,10 +2,10 @@
 
 from hobble.core.files import write_json
 from hobble.workflow.job import job
-from hobble.workflow.measure_job import given_to, measure_of
+from hobble.workflow.measure_job import inputs_of_job, measure_of
 
 with job(snakemake):
     measure = measure_of(snakemake)
     options = measure.options.model_validate(snakemake.params.options)
-    found = measure.part("run").run_piece(given_to(snakemake), options, snakemake.params.piece)
+    found = measure.part("run").run_piece(inputs_of_job(snakemake), options, snakemake.params.piece)
     write_json(snakemake.output.json, found)

@@ -6,10 +6,10 @@ from hobble.core.files import write_text
 from hobble.models.load import load_network
 from hobble.report.captured_and_predicted import comparisons
 from hobble.report.gather import gather
+from hobble.report.opening_walk import opening_walk
 from hobble.report.pack_recogniser import playable_with_recogniser
 from hobble.report.page import render
 from hobble.report.scenes import scenes
-from hobble.report.walked import opened
 from hobble.runtime.options import Runtime
 from hobble.workflow.job import job
 
@@ -36,7 +36,7 @@ with job(snakemake):
     trained = load_network(given.weights)
     runtime = Runtime.model_validate(material.resolved["configuration"]["runtime"])
     character = playable_with_recogniser(trained, runtime)
-    hero = opened(trained, runtime, character, material.measured.values())
+    hero = opening_walk(trained, runtime, character, material.measured.values())
     compared = comparisons(trained, given.rows, params.splits)
     bundle = Path(given.bundle).read_text(encoding="utf-8")
     write_text(snakemake.output.html, render(material, play, character, compared, bundle, hero))

@@ -8,7 +8,7 @@ from hobble.core.files import read_json, write_text
 from hobble.models.load import load_network
 from hobble.report.compare_page import render_compared
 from hobble.report.pack_recogniser import playable_with_recogniser
-from hobble.report.rounded import has_weights, rounding_error
+from hobble.report.rounded_weights import has_weights, rounding_error
 from hobble.runtime.options import Runtime
 from hobble.workflow.job import job
 

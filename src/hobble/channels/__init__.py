@@ -40,7 +40,7 @@ def channel(name: str) -> Channel:
 
 
 def every() -> tuple[Channel, ...]:
-    """All channels, in the order of the list."""
+    """All channels, in the order of NAMES."""
     return tuple(channel(name) for name in NAMES)
 
 
@@ -50,13 +50,13 @@ def modules_of(names: Iterable[str]) -> list[str]:
 
 
 def shown_modules() -> list[str]:
-    """Full names of the modules that say how channels are shown."""
+    """Full names of the modules `shown` that channels have (see `hobble.channels.shown`)."""
     found = (f"{__name__}.{name}.shown" for name in NAMES)
     return [module for module in found if importlib.util.find_spec(module) is not None]
 
 
 def channel_of_old_key(key: str) -> str:
-    """The channel that `key` stands for in files from before channels had names.
+    """The channel that `key` stands for in old files, which do not name channels.
 
     Raises ValueError for an unknown key.
     """

@@ -9,7 +9,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Protocol
 
-# Methods import numpy themselves, because the list of clips is read without it.
+# Methods import numpy themselves: the list of clips is read at planning, which should not wait for numpy.
 if TYPE_CHECKING:
     from hobble.core.clip import Clip
     from hobble.core.quat import Array
@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 
 
 class HasLinks(Protocol):
-    """What the columns of a channel may depend on: a clip's skeleton, or a skeleton file."""
+    """What the columns of a channel may depend on: the links of a clip's skeleton or of a skeleton file."""
 
     @property
     def links(self) -> Sequence[tuple[str, str]]:
@@ -28,9 +28,10 @@ class HasLinks(Protocol):
 class ClipSource:
     """Where the values of one clip come from.
 
-    clip: its name (for a mirrored clip, the original's). entry: its entry in the data set. value: the part of
-    the entry for this channel. options: the data set's section `channels.<name>` as the channel's model.
-    files: the existing files beside the clip, and the tables that the data set names.
+    clip: its name; a mirrored clip has the name of its original. entry: the clip's entry in the data set.
+    value: what the entry says for this channel, or None. options: the data set's section `channels.<name>`,
+    read by the channel's `Options`. files: the existing files of the channel beside the clip, and the tables
+    that the data set names.
     """
 
     clip: str
@@ -41,16 +42,16 @@ class ClipSource:
 
 
 class Channel(ABC):
-    """An input of the network. Each channel is a subclass in channels/<name>/.
+    """An input of the network besides motion and ground. Each channel is a subclass in channels/<name>/.
 
-    name: name of the folder, in configurations, and the keyword of `next_pose`. title, value: words for the
-    channel and for one of its values on the page. highest: the values are 0 to this. rate: how much a value
-    may change in a second at run time, unless the configuration says otherwise. suffix: of a file beside a
-    clip that holds values, or None. old_keys: keys of this channel in older files. Options: model of the data
-    set's section `channels.<name>`. If it is None, every data set has the channel; else only those with the
-    section. slows: whether values above 0 make the body slower. Then its speed limits are learnt from the
-    rows (see `hobble.channels.speed_limits`). manner: whether a column above 0 is a manner in which a whole
-    clip walks, such as a mood. Then `hobble.measures.manners` measures whether a recogniser sees it. targets:
+    name: the name of its folder, in configurations, and as a keyword of `next_pose`. title, value: words on
+    the page for the channel and for one of its values. highest: the highest value. rate: how much a value may
+    change in a second at run time, unless the configuration says otherwise. suffix: how the name of a file of
+    values beside a clip ends, or None. old_keys: keys of this channel in old files. Options: model of the
+    data set's section `channels.<name>`. If it is None, every data set has the channel, else only those with
+    the section. slows: whether values above 0 make the body slower. Then its speed limits are learnt from the
+    rows (see `hobble.channels.speed_limits`). manner: whether a column stands for a way in which a whole clip
+    walks, such as a mood. Then `hobble.measures.manners` measures whether a recogniser sees it. targets:
     folders of results/<configuration>/ that only a configuration with this channel can have.
     """
 
@@ -68,7 +69,7 @@ class Channel(ABC):
 
     @abstractmethod
     def columns(self, rig: HasLinks) -> tuple[str, ...]:
-        """Labels of the columns for a skeleton. No label appears twice."""
+        """Labels of the channel's C columns for a skeleton. No label appears twice."""
 
     @abstractmethod
     def is_neutral(self, source: ClipSource) -> bool:
@@ -79,7 +80,7 @@ class Channel(ABC):
 
     @abstractmethod
     def read(self, clip: Clip, source: ClipSource, motion: Mapping[str, Any]) -> tuple[Array, list[str]]:
-        """Values (F, C) float32 of a clip, one column for each label, and warnings.
+        """Values (F, C) float32 of a clip with F frames, one column for each label, and warnings.
 
         motion: the report of the motion stage. Raises InputError if the source cannot be read.
         """
@@ -95,11 +96,11 @@ class Channel(ABC):
         return ClipSource(**{**fields, "options": self.options_of(fields.get("options", {}))}, files=files)
 
     def options_of(self, section: Mapping[str, Any]) -> Section | None:
-        """The data set's section for this channel as its model; None without a section."""
+        """The data set's section for this channel, read by `Options`; None without a section."""
         return self.Options.model_validate(section) if self.Options is not None and section else None
 
     def tables(self, options: Section | None) -> Sequence[str]:
-        """Files in the mocap folder that the options name."""
+        """Files in the mocap folder that the options name, such as a table of all clips."""
         return ()
 
     def mirror(self, values: Array, rig: Any) -> Array:
@@ -107,12 +108,12 @@ class Channel(ABC):
         return values
 
     def deviation(self, std: Array) -> Array:
-        """What the network's input columns are divided by. std: their standard deviations (C,).
+        """(C,) divisors of the network's input columns. std: (C,) standard deviations of the columns.
 
         All columns get the same divisor: the length of the vector `std`, but at least a tenth of `highest`.
-        With its own deviation, a column that is above 0 in 1 frame of 1,000 would become an input of 30
-        deviations. A column that never varies gets an infinite divisor in effect, because the network cannot
-        know its meaning.
+        If each were divided by its own deviation, a column that is above 0 in 1 frame of 1,000 would become
+        an input of 30 deviations. A column that never varies gets a divisor so large that it has no effect,
+        because the network cannot know its meaning.
         """
         import numpy as np
 
@@ -120,8 +121,9 @@ class Channel(ABC):
         return np.where(std > CONSTANT, max(self.highest / 10, whole), SILENT)
 
     def summary(self, values: Array, labels: Sequence[str], fps: float) -> dict[str, Any]:
-        """For the clip's report: label -> `seconds` above 0, `highest` value and `spells`. Labels without
-        values are left out.
+        """For the clip's report: label -> `seconds` above 0, `highest` value, and `spells` (see `spells`).
+
+        Labels whose values are all 0 are left out.
         """
         import numpy as np
 
@@ -137,16 +139,15 @@ class Channel(ABC):
 
 
 SILENT = 1e10  # divisor of an input that must have no effect
-JUMP = 0.05  # a larger change between two frames starts a new spell; share of the highest value
+JUMP = 0.05  # a larger change between two frames starts a new spell; share of the channel's highest value
 CONSTANT = 1e-6  # a column with a smaller deviation does not vary
 
 
 def spells(column: Array, fps: float, highest: float) -> list[list[float]]:
-    """[from, to, highest value] of each stretch above 0, in seconds.
+    """The spells of a column (F,): stretches above 0, each as [start, end, highest value], times in seconds.
 
-    A jump of the value starts a new stretch.
-
-    A value that rises or falls over many frames does not jump.
+    A jump of the value also starts a new spell. A value that rises or falls over many frames does not jump.
+    highest: the channel's highest value.
     """
     import numpy as np
 

@@ -1,4 +1,7 @@
-"""Makes and keeps the values of one channel in each frame of a clip."""
+"""Makes, checks, saves and loads the values of one channel in each frame of a clip.
+
+F: frames of the clip. C: columns of the channel.
+"""
 
 from __future__ import annotations
 
@@ -53,7 +56,7 @@ def load_values(path: str | Path) -> tuple[Array, tuple[str, ...]]:
 def write_report(
     path: str | Path, name: str, clip: Clip, values: Array, labels: Sequence[str], warnings: Sequence[str]
 ) -> None:
-    """Write the JSON beside the values: for each label the time above 0, the highest value, and when."""
+    """Write the JSON beside the values: `Channel.summary`, the channel's highest value, and warnings."""
     one = channel(name)
     summary = one.summary(values, labels, clip.fps)
     report = {"clip": clip.name, "channel": name, "title": one.title, "values": summary}

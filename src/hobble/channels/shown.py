@@ -1,7 +1,9 @@
 """How channels are shown for a skeleton: words, sliders, presets, sweeps and loops.
 
-A channel may have a module channels/<name>/shown.py with its own WORDS, `shown`, `sweeps` and `loops`. The
-functions here find them by name and have defaults. Neither training nor measurements depend on them.
+A sweep is a walk in which one column rises from 0 to its highest value. A loop is a walk for a looping
+picture. A channel may have a module channels/<name>/shown.py with its own WORDS, `shown`, `sweeps` and
+`loops`. The functions here find them by name and have defaults. Neither training nor measurements depend on
+them.
 """
 
 from __future__ import annotations
@@ -19,13 +21,13 @@ from hobble.core.skeleton import Skeleton
 
 @dataclass(frozen=True)
 class ChannelWords:
-    """Words of a channel on the page.
+    """Words of a channel on the page. {} stands for the name of a column.
 
-    rest: label of the button that sets all values to 0. step: of a slider. key: name of its values in the
-    address of a page, by default the channel's name. grows: a sentence about a column that rises. never: a
-    sentence about a column that was 0 in all of training. headline: of the page. says: what the page says
-    about a value that the figure has, with {} for the column. on: a word for a figure with a value; empty:
-    the column's name.
+    rest: label of the button that sets all values to 0. step: step of a slider. key: name of the values in
+    the address of a page, by default the channel's name. grows: says that a column rises. never: says that a
+    column was 0 in all of training. headline: headline of the page. says: what the page says about the
+    network's input for a figure with a value above 0. on: a word for such a figure; if it is empty, the
+    column's name is used.
     """
 
     rest: str = "Neutral"
@@ -42,9 +44,9 @@ class ChannelWords:
 class Shown:
     """How a channel is shown.
 
-    spoken: a name for each column. sliders: label -> column, of the sliders that are there at the start.
-    presets: button -> column -> value. regions: for each bone the indices of the columns whose body part it
-    moves; empty for a channel that has no place on the body.
+    spoken: a name for each column. sliders: label -> column, for the sliders that are there at the start.
+    presets: button -> column -> value. regions: for each bone, the indices of the columns that lie in the
+    part of the body that it moves; empty for a channel without places on the body.
     """
 
     spoken: Sequence[str]
@@ -55,7 +57,7 @@ class Shown:
 
 @dataclass(frozen=True)
 class SampleWalk:
-    """A walk to look at. values: column -> value. coloured: whether the values colour the body."""
+    """A walk for a looping picture. values: column -> value. coloured: whether the values colour the body."""
 
     name: str
     values: Mapping[str, float]
@@ -69,7 +71,10 @@ def words(name: str) -> ChannelWords:
 
 
 def shown(name: str, skeleton: Skeleton, columns: Sequence[str], trained: Collection[str]) -> Shown:
-    """How a channel is shown. By default there is a slider for each column that was above 0 in training."""
+    """How a channel is shown. By default there is a slider for each column that was above 0 in training.
+
+    columns: all labels of the channel. trained: the labels that were above 0 in training.
+    """
     if own := _from_module(name, "shown"):
         return own(skeleton, columns, trained)
     return Shown(tuple(columns), {column: column for column in columns if column in trained})
@@ -78,9 +83,7 @@ def shown(name: str, skeleton: Skeleton, columns: Sequence[str], trained: Collec
 def sweeps(
     name: str, skeleton: Skeleton, columns: Sequence[str], trained: Collection[str]
 ) -> Mapping[str, str]:
-    """Walks in which one column rises from 0 to the highest: name -> column. By default one for each trained
-    column.
-    """
+    """Name -> column of each sweep. By default there is one for each trained column."""
     if own := _from_module(name, "sweeps"):
         return own(skeleton, columns, trained)
     return {column.replace(" ", "_"): column for column in columns if column in trained}
@@ -89,9 +92,9 @@ def sweeps(
 def loops(
     name: str, skeleton: Skeleton, columns: Sequence[str], trained: Collection[str]
 ) -> list[SampleWalk]:
-    """Walks to look at. All values are 0 in the first.
+    """Walks for looping pictures. All values are 0 in the first.
 
-    By default there is one for each trained column, at its highest value.
+    By default there is one more for each trained column, at its highest value.
     """
     if own := _from_module(name, "loops"):
         return own(skeleton, columns, trained)
@@ -103,7 +106,7 @@ def loops(
 
 
 def speaker(skeleton: Mapping[str, Any]) -> Callable[[str], str]:
-    """A function from a column's label to the name that readers see. Other texts stay the same.
+    """A function that turns a column's label into the name that readers see, and leaves other texts alone.
 
     skeleton: as in a network's file; empty if unknown.
     """

@@ -16,28 +16,28 @@ import numpy as np
 from hobble.core.quat import Array
 
 UNLIMITED = 1e4  # cm a frame: limit of a gait in which no healthy clip goes forward
-LEVELS = 5  # number of values (0 to the highest) with a speed; others are interpolated
+LEVELS = 5  # number of values, from 0 to the channel's highest, for which a speed is stored
 TOP = 95  # percentile of the speeds of healthy cycles in a gait: the limit of a healthy body
-# Percentile of the same speeds that counts as usual. The median is too low, because clips start and stop.
+# Percentile of these speeds that counts as the usual speed. The median is too low: clips start and stop.
 USUAL = 65
-# A body that keeps at most this share of the usual speed cannot hurry. One that keeps all of it can go as
-# fast as a healthy one.
+# A body that keeps at most this share of the usual speed cannot go faster than that. A body that keeps all of
+# it can go as fast as a healthy one.
 CANNOT_HURRY = 0.85
 AHEAD = 0.9  # a cycle counts if at least this share of its speed is forward
-STEADY = 0.35  # of the highest value: a cycle in which a value changes by more is left out
-FAINT = 0.05  # of the highest value: a smaller mean over a cycle counts as 0
+STEADY = 0.35  # a cycle is left out if a value changes in it by more than this share of the highest value
+FAINT = 0.05  # a mean over a cycle below this share of the highest value counts as 0
 MOVING = 0.1  # cm a frame: slower cycles of a healthy body are left out
-EXPECTED_WEIGHT = 2.0  # the expected curve counts as much as this many cycles
+EXPECTED_WEIGHT = 2.0  # at each level, the expected share counts as much as this many cycles (`_fitted`)
 SLOWEST = 0.1  # least share of the healthy speed
 
 
 @dataclass(frozen=True)
 class Limits:
-    """Speed limits of a channel.
+    """Speed limits of a channel with L labels in G gaits. A label names a column, such as a link or a mood.
 
-    levels: (K,) values from 0 to the channel's highest. speeds: (G, L, K) cm a frame at these values, for
-    each gait and label; they never rise with the value. usual: (G,) cm a frame, of a body without values in
-    any channel.
+    levels: (K,) values from 0 to the channel's highest. speeds: (G, L, K) highest speeds, cm a frame, for
+    each gait, label and level; a higher level is never faster. usual: (G,) usual speeds of a healthy body, cm
+    a frame.
     """
 
     levels: Array = field(repr=False)
@@ -45,9 +45,9 @@ class Limits:
     usual: Array = field(repr=False)
 
     def allowed(self, values: Array) -> Array:
-        """(C, G) highest speed in cm a frame in each gait, for values (C, L).
+        """(C, G) highest speeds of C characters in each gait, cm a frame, for their values (C, L).
 
-        With several values above 0 it is the lowest of their limits; with none it is inf.
+        If several values are above 0, the lowest of their limits counts. If none is, the speed is inf.
         """
         at = np.clip(np.searchsorted(self.levels, values, side="right") - 1, 0, len(self.levels) - 2)
         low, high = self.levels[at], self.levels[at + 1]
@@ -64,15 +64,16 @@ class Limits:
 
     @classmethod
     def from_dict(cls, data: Mapping[str, Any], gaits: int, labels: int, highest: float) -> Limits:
-        """The inverse of `to_dict`. Older files have no `usual`; then the highest speed is used.
+        """The inverse of `to_dict`. Older files have no `usual`; then each gait's highest speed is used.
 
-        Raises ValueError for a table with another number of gaits or labels.
+        highest: the highest value of the channel. Raises ValueError if a key is missing, a shape does not fit
+        the number of gaits and labels, or a number is not possible.
         """
         try:
             levels, speeds = (np.array(data[key], float) for key in ("levels", "speeds"))
             usual = np.array(data.get("usual", np.max(speeds, axis=(1, 2), initial=0.0)), float)
         except (KeyError, TypeError, ValueError, OverflowError):
-            raise ValueError("no table of numbers: it has `levels` and `speeds`") from None
+            raise ValueError("`levels` and `speeds` have to be tables of numbers") from None
         shapes = [table.shape for table in (levels, speeds, usual)]
         if levels.size < 2 or shapes != [(levels.size,), (gaits, labels, levels.size), (gaits,)]:
             of = "levels {}, speeds {}, usual {}".format(*shapes)
@@ -89,11 +90,11 @@ class Limits:
 
 
 def together(allowed: Sequence[Array], usual: Array) -> Array:
-    """(C, G) highest speeds of bodies with values of several channels.
+    """(C, G) highest speeds of C characters in each gait under the limits of several channels, cm a frame.
 
-    allowed: (C, G) for each channel. usual: (G,). Each channel leaves a share of the usual speed, and the
-    shares multiply: a sad person who limps is slower than one who is only sad or only limps. A channel that
-    leaves more than the usual speed does not count.
+    allowed: (C, G) highest speeds for each channel. usual: (G,) usual speeds of a healthy body. Each channel
+    leaves a share of the usual speed, and the shares multiply: a sad person who limps is slower than one who
+    is only sad or only limps. A channel that allows the usual speed does not count.
     """
     shares = [
         np.minimum(1.0, np.divide(one, usual, out=np.ones_like(one), where=usual > 0)) for one in allowed
@@ -106,8 +107,9 @@ def together(allowed: Sequence[Array], usual: Array) -> Array:
 class _Cycles:
     """N cycles of one clip.
 
-    gait: (N,). speed, ahead: (N,) cm a frame. values: (N, L). number: (N,). others: (N,) bool, whether
-    another channel has a value above 0.
+    gait: (N,) index of the main gait. speed: (N,) mean speed, cm a frame. ahead: (N,) mean of its forward
+    part, cm a frame. values: (N, L) mean value of each label. number: (N,) number of the cycle in the clip.
+    others: (N,) bool, whether another channel has a value above 0.
     """
 
     gait: np.ndarray
@@ -121,8 +123,8 @@ class _Cycles:
 class LimitLearner:
     """Gathers the cycles of clips, one clip at a time, and learns the limits of a channel from them.
 
-    highest: of the channel's values. across: (L,) for each label the label on the other side of the body.
-    Both sides get the same limits.
+    highest: the channel's highest value. across: (L,) for each label the index of the label on the other side
+    of the body. Both sides get the same limits. gaits: number of gaits.
     """
 
     def __init__(self, highest: float, across: np.ndarray, gaits: int) -> None:
@@ -140,11 +142,12 @@ class LimitLearner:
         others: np.ndarray,
         source: str | None = None,
     ) -> None:
-        """Add a clip's rows.
+        """Add a clip with R rows.
 
-        gait: (R, G) shares. velocity: (R, 2) of the root in its own frame, cm a frame. values: (R, L). cycle:
-        (R,) numbers of the cycles. others: (R,) bool, whether another channel has a value above 0. source:
-        the healthy clip, if this is a hurt version of it.
+        gait: (R, G) shares of the gaits. velocity: (R, 2) of the root, to the side and forward in root
+        coordinates, cm per frame. values: (R, L) of this channel. cycle: (R,) number of the row's cycle.
+        others: (R,) bool, whether another channel has a value above 0. source: the healthy clip, if this clip
+        is a hurt version of it.
         """
         numbers, of_row, count = np.unique(cycle, return_inverse=True, return_counts=True)
 
@@ -182,7 +185,12 @@ class LimitLearner:
         self._clips[clip] = (str(arrays["source"]) or None, _Cycles(**named))
 
     def learn(self) -> Limits | None:
-        """The limits, or None if no cycle has a value above 0."""
+        """The limits, or None if no cycle has a value above 0.
+
+        For each label, the share of the healthy speed is fitted as a function of the value in three steps: a
+        straight line through the cycles of all gaits, a curve through these cycles that is drawn towards the
+        line, and for each gait a curve through its own cycles that is drawn towards that curve (`_fitted`).
+        """
         levels = np.linspace(0, self.highest, LEVELS)
         healthy = self._healthy()
         top = np.full(self.gaits, UNLIMITED)
@@ -209,7 +217,7 @@ class LimitLearner:
         return Limits(levels, speeds, usual)
 
     def _healthy(self) -> Array:
-        """(n, 2) gait and speed of forward cycles in which the values of all channels are 0."""
+        """(n, 2) gait and speed of the forward cycles in which the values of all channels are 0."""
         found = [np.zeros((0, 2))]
         for _, cycles in self._clips.values():
             neutral = ~cycles.values.any(axis=1) & ~cycles.others
@@ -220,8 +228,8 @@ class LimitLearner:
     def _shares(self, usual: Array) -> tuple[np.ndarray, Array, Array]:
         """Gait (n,), share of the healthy speed (n,) and values (n, L) of the cycles with a value above 0.
 
-        A hurt version is compared with the same cycle of its source, which has the same values in the other
-        channels. Cycles of a source with values of this channel are left out.
+        A cycle of a hurt version is compared with the same cycle of its source, which has the same values in
+        the other channels. It is left out if that cycle of the source has a value of this channel, too.
         """
         parts = []
         for source, cycles in self._clips.values():
@@ -244,10 +252,10 @@ class LimitLearner:
 
 
 def _of_label(label: int, values: Array, across: np.ndarray) -> Sequence[tuple[np.ndarray, Array]]:
-    """Which cycles count for a label, and its values in them.
+    """The cycles that count for a label, as (indices, values), first of one side of the body, then the other.
 
-    Cycles of both sides count in which no other label has a value. If there are none, those in which no other
-    label has a higher value.
+    values: (n, L) of all cycles. A cycle counts if no other label has a value above 0 in it. If there is no
+    such cycle, it counts if no other label has a higher value.
     """
     sides = sorted({label, int(across[label])})
     alone = [np.flatnonzero((values[:, k] > 0) & ((values > 0).sum(axis=1) == 1)) for k in sides]
@@ -258,9 +266,11 @@ def _of_label(label: int, values: Array, across: np.ndarray) -> Sequence[tuple[n
 
 
 def _fitted(levels: Array, values: Array, shares: Array, expected: Array) -> Array:
-    """(K,) shares at `levels` whose interpolation is nearest to the shares (n,) at values (n,).
+    """(K,) shares of the healthy speed at `levels` (K,), fitted to n cycles by least squares.
 
-    The first is 1 and they never rise. `expected` (K,) counts as EXPECTED_WEIGHT cycles at each level.
+    values, shares: (n,) value and share of each cycle. Shares between two levels are interpolated. The first
+    share is 1, and a higher level never has a higher share. expected: (K,) shares that count at each level
+    like EXPECTED_WEIGHT cycles.
     """
     at = np.clip(np.searchsorted(levels, values, side="right") - 1, 0, len(levels) - 2)
     far = (values - levels[at]) / (levels[at + 1] - levels[at])

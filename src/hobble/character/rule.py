@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-CARRIED_SHARE = 0.5  # share of the velocity's place, and of the predicted place, in a joint's new place
+CARRIED_SHARE = 0.5  # weight of each of the two places whose mean is a joint's new place
 STANDING_SHARE = 0.1  # share of the predicted change of phase that a standing figure keeps
 
 
@@ -22,10 +22,10 @@ def joint_place(carried: Any, predicted: Any) -> Any:
 
 
 def moving(stand: Any) -> Any:
-    """The share of the predicted movement that is applied. stand: share of the gait "stand", 0 to 1."""
+    """The share of the root's predicted movement that is applied. stand: share of the gait "stand"."""
     return np.maximum(0.0, 1.0 - stand) ** 0.25
 
 
 def phase_change(share: Any, predicted: Any) -> Any:
-    """The change of phase in cycles. share: the result of `moving`; predicted: the network's change."""
+    """The change of phase that is applied, cycles. share: from `moving`. predicted: the network's, cycles."""
     return ((1.0 - STANDING_SHARE) * share + STANDING_SHARE) * predicted

@@ -1,4 +1,7 @@
-"""Does the same work for every BVH file of a folder, with progress. A bad file does not stop the others."""
+"""What subcommands share: work on every BVH file of a folder, and the skeleton files.
+
+A bad file does not stop the work on the others.
+"""
 
 from __future__ import annotations
 
@@ -38,7 +41,8 @@ def clips_in(folder: Path) -> dict[str, Path]:
 def for_each(clips: dict[str, Path], work: Callable[[str, Path], list[str]]) -> int:
     """Call `work(name, file)` for every clip. Print the notes that it returns, and a summary.
 
-    If a clip fails, its message is printed and the others go on. Returns the exit status.
+    clips: name -> file. If a clip fails, its message is printed and the next one follows. Returns the exit
+    status, 1 if a clip failed.
     """
     failed = 0
     bar = tqdm(clips.items(), unit=" clips", disable=None, file=sys.stderr)
@@ -63,7 +67,10 @@ def skeleton_folder() -> Path:
 
 
 def skeleton_file(name: str) -> Path:
-    """The path of a skeleton file; `name` is a skeleton or a path. Raises InputError if it is missing."""
+    """The path of a skeleton file. name: a skeleton's name, or a path to a YAML file.
+
+    Raises InputError if there is no skeleton of that name.
+    """
     if name.endswith((".yaml", ".yml")):
         return Path(name)
     folder = skeleton_folder()
@@ -75,6 +82,6 @@ def skeleton_file(name: str) -> Path:
 
 
 def skeleton(name: str) -> Target:
-    """The skeleton in the form that retargeting takes. Raises InputError if it is missing or wrong."""
+    """The skeleton as a target of retargeting. Raises InputError if its file is missing or wrong."""
     path = skeleton_file(name)
     return load_skeleton(path, path.stem)

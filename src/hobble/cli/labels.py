@@ -2,7 +2,7 @@
 
 hobble labels FOLDER OUT
 
-For each clip this writes NAME_footsteps.txt, NAME_gait.txt and NAME.phase, with the frame numbers of the
+For each clip this writes CLIP_footsteps.txt, CLIP_gait.txt and CLIP.phase, with the frame numbers of the
 clip's file. Correct them and put them beside the clip. The workflow then uses them instead of its own labels.
 """
 
@@ -16,20 +16,22 @@ import numpy as np
 from hobble.cli import batch
 from hobble.core.errors import InputError
 from hobble.core.section import Gait
+from hobble.labels.clip_labels import GAITS
 from hobble.labels.label import label_clip
-from hobble.labels.model import GAITS
 from hobble.labels.options import LabelOptions
 from hobble.labels.read_files import SourceTime
 from hobble.labels.write_files import write_label_files
 from hobble.motion.make import make_clip
 from hobble.motion.options import ClipMotion
 
-SKELETON = "holden31"  # clips are put on it for labelling; the labels do not depend on the skeleton
+SKELETON = "holden31"  # clips are retargeted to this skeleton for labelling; the labels do not depend on it
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the arguments of `hobble labels`."""
-    batch.add_folders(parser, "the folder to write into; with FOLDER itself the files go beside the clips")
+    batch.add_folders(
+        parser, "the folder to write into; it may be FOLDER, so that the files lie beside the clips"
+    )
     parser.add_argument("--gait", choices=GAITS, help="the main gait of the clips, used in unclear cases")
     parser.add_argument(
         "--source-fps", type=float, help="frame rate of the files, if their Frame Time is wrong"

@@ -3,8 +3,8 @@
 hobble motion FOLDER OUT --fps 60
 hobble motion FOLDER OUT --skeleton holden31 --mirror
 
-Files may have any rotation order, unit, axes and frame rate. Each is checked, repaired if that is safe, and
-written in centimetres, Y up. Rotations are interpolated as quaternions, not as Euler angles.
+Files may have any rotation order, unit, axes and frame rate. Each file is checked, repaired if that is safe,
+and written in centimetres, Y up. Rotations are interpolated as quaternions, not as Euler angles.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ from hobble.motion.mirror import mirror_clip
 from hobble.motion.options import ClipMotion
 from hobble.motion.read import read_bvh
 
-ROLES_FROM = "holden31"  # the skeleton that defines the roles of joints, if none is given
+ROLES_FROM = "holden31"  # without --skeleton, joints get the roles that they have on this skeleton
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -38,7 +38,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--skeleton", help="put the motion on this skeleton: a name of config/skeletons or a file"
     )
     parser.add_argument(
-        "--mirror", action="store_true", help="write each clip's mirror as NAME_mirror.bvh too"
+        "--mirror", action="store_true", help="write each clip's mirror as CLIP_mirror.bvh too"
     )
     parser.add_argument("--loops", type=int, default=1, help="repeat a clip of one cycle this many times")
     parser.add_argument(

@@ -41,7 +41,7 @@ def merge(base: Mapping[str, Any], over: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def _kind(network: Mapping[str, Any], below: Mapping[str, Any] | None = None) -> Any:
-    """The kind that a section `network` names; else that of the section `below`; else the default."""
+    """The kind that a section `network` names. Without one, it is that of the section `below`, or DEFAULT."""
     return network.get("kind", _kind(below) if below is not None else DEFAULT)
 
 
@@ -59,9 +59,9 @@ def read_yaml(path: Path) -> dict[str, Any]:
 
 
 def read_layers(folder: Path, name: str, within: tuple[str, ...] = ()) -> tuple[dict[str, Any], list[Path]]:
-    """The values of `<folder>/<name>.yaml` merged over those of the file it `extends`, and the files read.
+    """The values of `<folder>/<name>.yaml` over those of the file that it `extends`, and the files read.
 
-    within: names of the configurations that are being read, to find a loop.
+    within: names of the configurations that are being read, so that a loop is found.
     """
     files: list[Path] = []
     chain: list[dict[str, Any]] = []
@@ -155,7 +155,7 @@ class Catalogue:
 
     @staticmethod
     def _model_for(model: type[Model], values: Mapping[str, Any], where: str) -> type[Model]:
-        """The model to validate with. That of a configuration depends on the kind of its network."""
+        """The model to validate with. For a configuration it depends on the kind of network."""
         network = values.get("network")
         if model is not Configuration or not isinstance(network, Mapping):
             return model

@@ -22,7 +22,7 @@ def _clip_name(name: str) -> str:
 
 
 def _refuse_old_keys(values: Any, model: type[s.Section], how: str) -> Any:
-    """Refuse a key from before there were channels. how: what to write instead; {} is the channel."""
+    """Raise ValueError for a key from before channels. how: what to write instead, {} for the channel."""
     for key in values if isinstance(values, dict) else ():
         if key not in model.model_fields and isinstance(key, str) and key in OLD_KEYS:
             raise ValueError(f"`{key}` is now `{how.format(OLD_KEYS[key])}`")
@@ -39,7 +39,7 @@ Name = Annotated[str, Field(pattern=r"^[A-Za-z0-9][A-Za-z0-9_.-]{0,99}$")]
 ClipName = Annotated[str, AfterValidator(_clip_name)]
 ChannelName = Annotated[str, AfterValidator(_channel)]
 OLD_KEYS = {key: one.name for one in every() for key in one.old_keys}
-WALKER_KEYS = ("recipe", "share")  # keys of a clip that only the walker reads
+WALKER_KEYS = ("recipe", "share")  # keys of a clip that only the generator of synthetic clips reads
 
 
 class ClipEntry(s.Section):
@@ -131,7 +131,7 @@ class Dataset(s.Section):
 
 
 class Configuration(s.Section):
-    """One network: its data set, its training, and how it is run, measured and reported."""
+    """One network: its data set, its training, and the options to run, measure and report it."""
 
     extends: Name | None = None
     dataset: Name = "synthetic"
@@ -153,13 +153,13 @@ class Configuration(s.Section):
     @field_validator("channels")
     @classmethod
     def _in_order(cls, names: tuple[str, ...]) -> tuple[str, ...]:
-        """Each channel once, in the order of the list of channels, so that equal sets share a database."""
+        """Each channel once, in the order of `hobble.channels.NAMES`, so that equal sets share a database."""
         return tuple(name for name in NAMES_OF_CHANNELS if name in names)
 
 
 @functools.cache
 def configuration_of(kind: str) -> type[Configuration]:
-    """`Configuration` with the network keys of this kind, one of MODELS."""
+    """`Configuration` whose section `network` has the keys of this kind of network, one of MODELS."""
     of_network = model(kind).options()
     return create_model("Configuration", __base__=Configuration, network=(of_network, of_network()))
 
@@ -172,7 +172,7 @@ class JointEntry(s.Section):
 
 
 class SkeletonFile(s.Section):
-    """A rig: see `hobble.core.skeleton.Skeleton`."""
+    """A skeleton file. See `hobble.core.skeleton.Skeleton` for its keys."""
 
     joints: dict[str, JointEntry]
     roles: dict[str, str]

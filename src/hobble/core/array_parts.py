@@ -1,4 +1,4 @@
-"""Reads some rows of the arrays of an npz, so that a large file need not fit into memory."""
+"""Reads single rows of the arrays in an npz file, so that a large file need not fit into memory."""
 
 from __future__ import annotations
 
@@ -18,8 +18,8 @@ LOCAL_HEADER = 30  # bytes before the name of an entry; the lengths of name and 
 class ArrayParts:
     """The arrays of an uncompressed npz, as `save_npz` writes it.
 
-    Unlike `load_npz` it cannot verify checksums, which cover whole arrays. Raises InputError if the file is
-    missing or damaged.
+    Checksums are not verified (`load_npz` does), because they cover whole arrays. Raises InputError if the
+    file is missing or damaged.
     """
 
     def __init__(self, path: str | Path) -> None:
@@ -59,7 +59,7 @@ class ArrayParts:
         return self._read(name, at, shape, dtype)
 
     def rows(self, name: str, first: int, stop: int) -> np.ndarray:
-        """Rows `first` to `stop` of an array. Rows that it does not have are left out."""
+        """The rows of an array from `first` up to `stop`, as in a slice."""
         at, shape, dtype = self._of(name)
         if not shape:
             raise InputError(self.path, f"{printable(name)} has no rows", fix=DELETE_IT)

@@ -20,7 +20,7 @@ CLIP_NAME_RULE = (
     "no control characters, braces, angle brackets, slashes or backslashes, no dot or space first and no "
     "space last, 200 bytes at most"
 )
-LONGEST_CLIP_NAME = 200  # bytes; the names of its files, while they are written, are up to 50 longer
+LONGEST_CLIP_NAME = 200  # bytes; a file of the clip has a name up to 50 bytes longer while it is written
 
 
 def is_valid_clip_name(clip: str) -> bool:

@@ -1,8 +1,9 @@
 """numba's `njit` with a disk cache that may fail.
 
 numba writes compiled functions next to the package, or into the user's home if it cannot write there. If it
-can write to neither, it raises at import. If the disk is full or a cached file is damaged, it raises at the
-first call. Here each of these gives one warning, and the functions are compiled again.
+can write to neither, it raises an error at import. If the disk is full or a cached file is damaged, it raises
+an error at the first call. With the `njit` of this module there is only one warning, and the functions are
+compiled again.
 """
 
 from __future__ import annotations
@@ -34,7 +35,7 @@ def njit(function: Callable | None = None, **options: Any) -> Any:
 
 
 class ForgivingCache:
-    """A numba cache whose failures count as a miss. Everything else is passed on."""
+    """A numba cache. If it fails, the function counts as not cached. Everything else is left to numba."""
 
     def __init__(self, cache: Any) -> None:
         self._cache = cache

@@ -8,10 +8,10 @@ from hobble.core.quat import Array
 
 
 def value_at(curve: Array, when: Array | float) -> Array:
-    """Linear interpolation of a curve (F,) at times in frames, as by `np.interp(when, np.arange(F), curve)`.
+    """Linear interpolation of a curve (F,) at times in frames: `np.interp(when, np.arange(F), curve)`.
 
-    That would read the whole curve at every call, so calls for each step of a long clip would take time in
-    proportion to the square of its length.
+    np.interp reads the whole curve at every call. Called for each step of a long clip, it would take time in
+    proportion to the square of the clip's length. This reads only the frames around `when`.
 
     >>> float(value_at(np.array([0.0, 10.0, 40.0]), 1.5))
     25.0

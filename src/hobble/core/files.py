@@ -1,4 +1,7 @@
-"""Files that are either whole or absent: written under a temporary name, then renamed."""
+"""Writes files so that they are whole or absent, and reads JSON, npz and npy files that may be damaged.
+
+A file is written under a temporary name and then renamed.
+"""
 
 from __future__ import annotations
 
@@ -19,7 +22,7 @@ import numpy as np
 from hobble.core.errors import HobbleError, InputError
 from hobble.core.untrusted import check_regular, printable, read_text
 
-MAX_INFLATED_BYTES = 1 << 30  # for all compressed arrays of a file, unpacked; Hobble writes uncompressed ones
+MAX_INFLATED_BYTES = 1 << 30  # of all compressed arrays of a file, unpacked; Hobble itself does not compress
 MAX_JSON_BYTES = 1 << 30
 DELETE_IT = "Delete it; the next run makes it again."
 HEADER_READERS = {
@@ -85,7 +88,7 @@ def _remove_leftovers(path: Path) -> None:
 
 
 def write_error(error: OSError, path: Path) -> HobbleError:
-    """A HobbleError that says what a person can do about a failed write."""
+    """An error for a failed write that says what a person can do about it."""
     reasons = {
         errno.ENOSPC: ("the disk is full", "Free some space and run the same command again."),
         errno.EDQUOT: ("the disk quota is used up", "Free some space and run the same command again."),
@@ -163,7 +166,7 @@ def check_archive(path: str | Path, archive: zipfile.ZipFile) -> None:
 
 
 def _entry_count(path: str | Path, archive: zipfile.ZipFile) -> int:
-    """Number of files in the archive's end record, which zipfile does not compare with its directory."""
+    """The number of files that the archive's end record states. zipfile does not compare it with the list."""
     with open(path, "rb") as file:
         file.seek(-22 - len(archive.comment), os.SEEK_END)
         (count,) = struct.unpack("<10xH10x", file.read(22))
@@ -173,8 +176,8 @@ def _entry_count(path: str | Path, archive: zipfile.ZipFile) -> int:
 def _check_sizes(path: str | Path, archive: zipfile.ZipFile) -> None:
     """Raise ValueError if the entries would need too much memory.
 
-    Uncompressed entries may not add up to more than the file, as they do if several share the same bytes.
-    Compressed entries may not unpack to more than MAX_INFLATED_BYTES.
+    All entries together may not be larger than the file; they are if several share the same bytes. Compressed
+    entries may not unpack to more than MAX_INFLATED_BYTES.
     """
     entries = archive.infolist()
     if any(entry.compress_type not in (zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED) for entry in entries):
@@ -188,7 +191,7 @@ def _check_sizes(path: str | Path, archive: zipfile.ZipFile) -> None:
 
 
 def _array(archive: zipfile.ZipFile, member: str) -> np.ndarray:
-    """One array. Its header is compared with the number of bytes before memory is allocated."""
+    """One array. Before memory is allocated, its header is compared with its number of bytes."""
     info = archive.getinfo(member)
     if not info.compress_type and info.header_offset + info.file_size > archive.start_dir:
         raise EOFError(f"{member} does not fit into the file")
@@ -226,7 +229,7 @@ def check_header(file: IO[bytes], size: int) -> None:
         shape, _, dtype = HEADER_READERS[np.lib.format.read_magic(file)](file)
     except OSError:
         raise
-    except (Exception, MemoryError):  # MemoryError here means nested too deeply: a header is short
+    except (Exception, MemoryError):  # Python raises MemoryError for a header that is nested too deeply
         raise ValueError("an array whose header cannot be understood") from None
     count = 1
     for length in shape:

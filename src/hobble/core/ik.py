@@ -11,8 +11,9 @@ from hobble.core.quat import Array
 def two_bone_knee(hip: Array, target: Array, pole: Array, upper: float, lower: float) -> tuple[Array, Array]:
     """Positions of knee and ankle by the law of cosines, each (..., 3).
 
-    hip, target: (..., 3) positions. pole: (..., 3) direction in which the knee points, not along the leg.
-    upper, lower: bone lengths. If the target is out of reach, the leg stretches to 99.9% of its length.
+    hip: (..., 3) its position. target: (..., 3) where the ankle should be. pole: (..., 3) direction in which
+    the knee points; it must not be along the leg. upper, lower: lengths of thigh and shank. If the target is
+    out of reach, the leg stretches to 99.9 % of its length.
     """
     reach = target - hip
     distance = np.linalg.norm(reach, axis=-1, keepdims=True)
@@ -27,5 +28,9 @@ def two_bone_knee(hip: Array, target: Array, pole: Array, upper: float, lower: f
 
 
 def aim(rotation: Array, bone: Array, direction: Array) -> Array:
-    """Turn a world rotation by the least amount that points its local `bone` along world `direction`."""
+    """Turn a joint by the smallest angle after which its bone points in a direction.
+
+    rotation: (..., 4) of the joint in the world. bone: (..., 3) in the joint's own axes. direction: (..., 3)
+    in the world. Returns the new world rotation (..., 4).
+    """
     return quat.mul(quat.between(quat.rotate(rotation, bone), direction), rotation)

@@ -1,4 +1,4 @@
-"""This machine's processor: its name, how many cores it has, whether they multiply bfloat16 in hardware."""
+"""This machine's processor: its name, its number of cores, and whether it multiplies bfloat16 in hardware."""
 
 from __future__ import annotations
 
@@ -9,15 +9,15 @@ from pathlib import Path
 
 TOPOLOGY = Path("/sys/devices/system/cpu")
 CPUINFO = Path("/proc/cpuinfo")
-# Values of ONEDNN_MAX_CPU_ISA, which limits oneDNN's instructions, that exclude those for bfloat16.
+# ONEDNN_MAX_CPU_ISA limits the instructions that oneDNN uses. These values exclude those for bfloat16.
 WITHOUT_BFLOAT16 = ("SSE41", "AVX", "AVX2", "AVX2_VNNI", "AVX512_CORE", "AVX512_CORE_VNNI")
 
 
 def cores(processors: Iterable[int] | None = None, topology: Path = TOPOLOGY) -> int:
     """Number of cores among `processors` (default: those this process may use), at least 1.
 
-    Two hardware threads of one core count once, because compiled products gain nothing from the second: on
-    such a pair one thread was 1.06 to 1.2 times faster than two. If the system does not say which processors
+    Two hardware threads of one core count once, because matrix products gain nothing from the second thread:
+    on one core, one thread was 1.06 to 1.2 times faster than two. If the system does not say which processors
     share a core, each processor counts.
     """
     if processors is None:
@@ -37,8 +37,8 @@ def cores(processors: Iterable[int] | None = None, topology: Path = TOPOLOGY) ->
 def multiplies_bfloat16(cpuinfo: Path = CPUINFO, environment: Mapping[str, str] = os.environ) -> bool:
     """Whether this CPU multiplies bfloat16 in hardware (AVX-512 BF16 or AMX), twice as fast as float32.
 
-    Also False if ONEDNN_MAX_CPU_ISA forbids those instructions: oneDNN would emulate them, which takes many
-    times as long as float32.
+    It is also False if ONEDNN_MAX_CPU_ISA forbids these instructions. oneDNN would then emulate them, which
+    takes many times as long as float32.
     """
     if environment.get("ONEDNN_MAX_CPU_ISA", "").upper() in WITHOUT_BFLOAT16:
         return False

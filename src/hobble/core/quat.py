@@ -1,4 +1,4 @@
-"""Unit quaternions, w first, as arrays whose last axis is 4. All functions take any leading axes."""
+"""Unit quaternions as arrays (..., 4), w first. All functions take any leading axes."""
 
 from __future__ import annotations
 
@@ -63,9 +63,10 @@ def from_axis_angle(axis: ArrayLike, angle: ArrayLike) -> Array:
 
 
 def between(a: ArrayLike, b: ArrayLike) -> Array:
-    """The shortest rotation that takes direction `a` to direction `b`, each (..., 3), of any length.
+    """The shortest rotation (..., 4) from direction `a` to direction `b`, each (..., 3) of any length.
 
-    For opposite directions every axis across `a` gives such a rotation. The one nearest to Y is used.
+    For opposite directions every axis at right angles to `a` is right. The one nearest to Y is used, or to X
+    if `a` itself is near Y.
     """
     a = np.asarray(a, float) / np.linalg.norm(a, axis=-1, keepdims=True)
     b = np.asarray(b, float) / np.linalg.norm(b, axis=-1, keepdims=True)
@@ -81,9 +82,10 @@ def between(a: ArrayLike, b: ArrayLike) -> Array:
 
 
 def from_euler(angles: ArrayLike, order: str) -> Array:
-    """Intrinsic Euler angles in radians, (..., 3) in the sequence that `order` names ("ZYX": Z first).
+    """Rotations (..., 4) from intrinsic Euler angles (..., 3) in radians.
 
-    This is what a BVH file's channels mean: R = R_first R_second R_third.
+    order: the axes of the three angles; "ZYX" means Z first. The channels of a BVH file mean the same:
+    R = R_first R_second R_third.
     """
     angles = np.asarray(angles, float)
     q = None
@@ -95,7 +97,10 @@ def from_euler(angles: ArrayLike, order: str) -> Array:
 
 
 def to_euler(q: ArrayLike, order: str = "ZYX") -> Array:
-    """Intrinsic Tait-Bryan angles in radians, the inverse of `from_euler`; the middle within +-90 degrees."""
+    """Intrinsic Tait-Bryan angles (..., 3) in radians, the inverse of `from_euler`.
+
+    The middle angle is within +-90 degrees.
+    """
     from scipy.spatial.transform import Rotation
 
     q = np.asarray(q, float)
@@ -143,7 +148,7 @@ def positive(q: ArrayLike) -> Array:
 
 
 def log(q: ArrayLike) -> Array:
-    """Axis times HALF the angle, (..., 4) -> (..., 3), of the rotation with w >= 0."""
+    """Axis times HALF the angle in radians, (..., 4) -> (..., 3). q and -q give the same result."""
     q = positive(q)
     length = np.linalg.norm(q[..., 1:], axis=-1, keepdims=True)
     half = np.arctan2(length, q[..., :1])
@@ -159,13 +164,13 @@ def exp(v: ArrayLike) -> Array:
 
 
 def slerp(a: ArrayLike, b: ArrayLike, t: ArrayLike) -> Array:
-    """From `a` at t = 0 to `b` at t = 1 along the shorter arc. `t` broadcasts against the leading axes."""
+    """Rotations on the shorter arc from `a` (t = 0) to `b` (t = 1). `t` broadcasts against the other axes."""
     a, b = np.asarray(a), np.asarray(b)
     return mul(a, exp(log(mul(inv(a), b)) * np.asarray(t)[..., None]))
 
 
 def continuous(q: ArrayLike) -> Array:
-    """Flip signs along axis 0 so that the dot product of successive frames is not negative."""
+    """Quaternions (F, ..., 4) with signs such that the dot product of successive frames is not negative."""
     q = np.array(q)
     flips = np.sum(q[1:] * q[:-1], axis=-1) < 0
     signs = np.where(np.cumsum(flips, axis=0) % 2 == 1, -1.0, 1.0)

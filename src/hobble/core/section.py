@@ -7,8 +7,8 @@ from typing import Annotated, Literal
 
 from pydantic import AfterValidator, BaseModel, ConfigDict, Field
 
-LONGEST_FILE_NAME = 255  # bytes, of Linux and others
-LONGEST_PATH = 1000
+LONGEST_FILE_NAME = 255  # bytes; the limit of Linux and other systems
+LONGEST_PATH = 1000  # characters
 
 
 def _inside(path: str) -> str:

@@ -14,7 +14,7 @@ from hobble.core.errors import HobbleError
 from hobble.core.quat import Array
 
 SIDE_WORDS = (("Left", "Right"), ("left", "right"), ("LEFT", "RIGHT"))
-# L_Leg, leg.r and Bip01 L Leg; LLeg and rLeg
+# The letter of the side: apart, as in L_Leg, leg.r and Bip01 L Leg, or first, as in LLeg and rLeg.
 SIDE_LETTER = re.compile(r"(?<![^_. -])[LRlr](?![^_. -])|^[LRlr](?=[A-Z])")
 OTHER_LETTER = str.maketrans("LRlr", "RLrl")
 PAIRED_NAMES = "the same except for Left and Right, or L and R, as in LeftLeg, L_Leg, Leg.L, LLeg"
@@ -38,12 +38,13 @@ def other_side(name: str) -> str:
 class Skeleton:
     """The rig that a clip moves.
 
-    joints: J names, a parent always before its children; the first is the root.
+    joints: J names, each parent before its children; the first is the root.
     parents: J indices, -1 for the root.
-    offsets: (J, 3) in centimetres, from the parent, with every rotation at identity (the rest pose).
+    offsets: (J, 3) from the parent to the joint in the rest pose (every rotation is the identity), cm.
     roles: role ("hips", "left_heel", ...) -> name of the joint; see config/skeletons/README.md.
     links: pairs (upper joint, lower joint) that can be hurt, in the order of the severity columns.
     unseen: joints that the network predicts but does not get as input (their input weight is 1e-10).
+    end_sites: joint without children -> (x, y, z) from the joint to the end of its bone, cm.
     """
 
     name: str
@@ -87,7 +88,7 @@ class Skeleton:
         }
 
     def index(self, joint: str) -> int:
-        """Index of a joint by name. Raises KeyError, which lists the names of all joints."""
+        """Index of a joint by name. For an unknown name, raises KeyError with the names of all joints."""
         try:
             return self.joints.index(joint)
         except ValueError:
@@ -99,7 +100,7 @@ class Skeleton:
 
     @property
     def leg_length(self) -> float:
-        """Length of the left thigh and shank, cm. Bodies of different size are compared in this unit."""
+        """Length of the left thigh and shank together, cm: a unit in which bodies of any size compare."""
         bones = np.linalg.norm(self.offsets, axis=1)
         knee, heel = self.role("left_knee"), self.role("left_heel")
         length, joint = 0.0, heel
@@ -110,7 +111,7 @@ class Skeleton:
 
     @property
     def link_names(self) -> tuple[str, ...]:
-        """Links as status files write them: "LeftUpLeg-LeftLeg"."""
+        """Names of the links, as in status files: "LeftUpLeg-LeftLeg"."""
         return tuple(f"{a}-{b}" for a, b in self.links)
 
     @property
@@ -169,9 +170,10 @@ def rest_positions(skeleton: Skeleton) -> Array:
 def forward_kinematics(
     skeleton: Skeleton, rotations: Array, root: Array, translations: Array | None = None
 ) -> tuple[Array, Array]:
-    """World rotations (F, J, 4) and positions (F, J, 3) of local rotations (F, J, 4) and root (F, 3).
+    """World rotations (F, J, 4) and positions (F, J, 3), cm.
 
-    translations: (F, J, 3) local positions that replace the rest offsets of every joint but the root.
+    rotations: (F, J, 4) local. root: (F, 3) position of the root, cm. translations: (F, J, 3) positions of
+    the joints relative to their parents, which replace the rest offsets of every joint but the root.
     """
     global_rotations = np.empty_like(rotations, dtype=float)
     positions = np.empty((*rotations.shape[:-1], 3))
@@ -188,7 +190,7 @@ def forward_kinematics(
 
 
 def local_rotations(skeleton: Skeleton, global_rotations: Array) -> Array:
-    """Local rotations (..., J, 4) of world rotations (..., J, 4), the inverse of forward kinematics."""
+    """Local rotations (..., J, 4) from world rotations (..., J, 4), the inverse of `forward_kinematics`."""
     out = np.array(global_rotations, float)
     for j, p in enumerate(skeleton.parents):
         if p >= 0:

@@ -1,4 +1,4 @@
-"""Filters over time for (F, ...) arrays; the first and last values are repeated past the ends.
+"""Filters over time for arrays (F, ...). Past the ends, the first and the last value are repeated.
 
 They use numpy only, because importing SciPy would slow the start of every job.
 """

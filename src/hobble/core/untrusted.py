@@ -14,16 +14,16 @@ if TYPE_CHECKING:
     import yaml
 
 MB = 1 << 20
-MAX_TEXT_BYTES = 64 * MB  # enough for label files of ten minutes at 100 Hz with 1 kB a frame
+MAX_TEXT_BYTES = 64 * MB  # enough for a label file of ten minutes at 100 Hz with 1 kB for each frame
 MAX_YAML_BYTES = 4 * MB  # enough for a data set of 20,000 clips with five keys each
 MAX_YAML_DEPTH = 100
-MAX_YAML_NODES = 1_000_000  # values with all aliases replaced; about 100 MB as Python objects
+MAX_YAML_NODES = 1_000_000  # values, after aliases are replaced by what they stand for; about 100 MB
 
 
 def check_regular(path: str | Path) -> os.stat_result:
-    """The stat result of a regular file or of the target of a link.
+    """The stat result of a regular file, or of the file that a link points to.
 
-    Raises InputError for a folder, and for a device or a pipe, because reading those may never end. Raises
+    Raises InputError for a folder, and for a device or a pipe, because reading them may never end. Raises
     OSError if there is no such file.
     """
     kind = os.stat(path)
@@ -48,7 +48,7 @@ def read_bytes(path: str | Path, most: int) -> bytes:
     try:
         kind = check_regular(path)
         with open(path, "rb") as file:
-            # read() allocates what it is asked for, so ask for the file's size and not for `most`
+            # read(n) allocates n bytes, so n is the file's size and not `most`.
             data = file.read(kind.st_size + 1) if kind.st_size <= most else b""
     except FileNotFoundError:
         raise InputError(path, "no such file") from None
@@ -74,7 +74,7 @@ def read_text(path: str | Path, most: int = MAX_TEXT_BYTES) -> str:
 def read_yaml(path: str | Path) -> Any:
     """The content of a YAML file as plain data.
 
-    Raises InputError, with the line if it is known: for invalid YAML, tags that would create Python objects,
+    Raises InputError, with the line if it is known, for invalid YAML, tags that would create Python objects,
     duplicate keys, deep nesting, and aliases that would expand to more than MAX_YAML_NODES values.
     """
     import yaml  # imported here because most jobs do not need it
@@ -134,13 +134,17 @@ def _check_keys(path: str | Path, top: yaml.Node) -> None:
 
 
 def _children(node: yaml.Node) -> list[yaml.Node]:
-    """The values of a sequence, or the keys and values of a mapping."""
+    """The items of a sequence, or the keys and values of a mapping."""
     pairs = (child if isinstance(child, tuple) else (child,) for child in node.value)
     return [part for pair in pairs for part in pair]
 
 
 def _size_without_aliases(node: yaml.Node, known: dict[int, int], above: set[int]) -> int:
-    """Number of values in a node after every alias is replaced by its content."""
+    """Number of values in a node after every alias is replaced by what it stands for.
+
+    known: sizes of the nodes counted so far, by id. above: ids of the nodes that contain this one. Raises
+    RecursionError for an alias that contains itself.
+    """
     if not isinstance(node.value, list):
         return 1
     if id(node) in above:

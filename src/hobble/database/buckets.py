@@ -1,4 +1,4 @@
-"""Buckets of the external shuffle: files of rows, each for a consecutive part of the final order."""
+"""Buckets: files of rows, each for a part of the new order. They shuffle more rows than fit in memory."""
 
 from __future__ import annotations
 
@@ -11,11 +11,15 @@ from hobble.core.errors import InputError
 from hobble.core.quat import Array
 
 HINT = "Delete the folder; the next run makes it again."
+# For each row: its place in the final order, its number of terrain fits, its clip, frame and phase.
 INDEX = np.dtype([("place", "<i8"), ("count", "<i4"), ("clip", "<i4"), ("frame", "<i4"), ("phase", "<f4")])
 
 
 def gather_fits(fits: Array, count: np.ndarray, order: np.ndarray) -> Array:
-    """The fits (S, columns) of rows, in a new order of the rows. count: (R,) fits of each row."""
+    """The terrain fits (S, columns) of R rows after the rows are put in a new order.
+
+    fits: (S, columns), row after row. count: (R,) number of fits of each row. order: indices of the rows.
+    """
     first = np.cumsum(count) - count
     taken = count[order]
     starts = np.cumsum(taken) - taken
@@ -23,7 +27,10 @@ def gather_fits(fits: Array, count: np.ndarray, order: np.ndarray) -> Array:
 
 
 class Buckets:
-    """Files of up to `rows_each` rows for consecutive places in the final order. Rows arrive in any order."""
+    """Files of up to `rows_each` rows for consecutive places in the final order. Rows arrive in any order.
+
+    rows: number of all rows. columns, fit_columns: numbers of columns of a row and of a terrain fit.
+    """
 
     def __init__(self, folder: Path, rows: int, rows_each: int, columns: int, fit_columns: int) -> None:
         self.folder, self.rows_each = folder, rows_each
@@ -32,7 +39,7 @@ class Buckets:
         folder.mkdir(parents=True)
 
     def add(self, frames: Array, fits: Array, index: np.ndarray) -> None:
-        """Scatter rows: frames (R, columns), their fits (S, fit_columns) and index (R,) of INDEX."""
+        """Add rows to their buckets: frames (R, columns), fits (S, fit_columns) and index (R,) of INDEX."""
         bucket = index["place"] // self.rows_each
         order = np.argsort(bucket, kind="stable")
         edges = np.searchsorted(bucket[order], np.arange(self.count + 1))
@@ -50,7 +57,7 @@ class Buckets:
         return self.folder / f"{bucket:05d}.{table}"
 
     def read(self, bucket: int) -> tuple[Array, Array, np.ndarray]:
-        """A bucket's frames, fits and index in the order in which they were added; empty if there are none.
+        """A bucket's frames, fits and index in the order in which they were added; empty if it has no rows.
 
         Raises InputError if the lengths of the files do not match.
         """

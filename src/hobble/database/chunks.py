@@ -19,14 +19,17 @@ import numpy as np
 from hobble.core.errors import InputError
 
 LENGTH = 8  # bytes of the header's length
-MOST_PARTS = 16  # buffers in one vectored read: the least that POSIX guarantees
+MOST_PARTS = 16  # buffers in one vectored read; POSIX guarantees at least this many
 TYPES = {"<f2": "F16", "<u2": "BF16", "<f4": "F32", "<i4": "I32"}
 HINT = "Delete the folder of the database, and those of its shards. The next run makes them again."
 
 
 @dataclass(frozen=True)
 class Chunk:
-    """A chunk's entry in the manifest: its file in the database, rows, fits, bytes and checksum."""
+    """A chunk's entry in the manifest.
+
+    file: its path in the database. rows, fits, bytes: its numbers of rows, of terrain fits and of bytes.
+    """
 
     file: str
     rows: int
@@ -40,7 +43,7 @@ class Chunk:
 
 
 def write_chunk(folder: Path, file: str, arrays: Mapping[str, np.ndarray]) -> Chunk:
-    """Write arrays (types as in TYPES; `x` and `fits` have to be among them) to folder/file."""
+    """Write arrays to folder/file. Their types are those of TYPES; `x` and `fits` have to be among them."""
     header: dict[str, Any] = {}
     place = 0
     for name, array in arrays.items():

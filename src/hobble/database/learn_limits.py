@@ -1,4 +1,4 @@
-"""Collect the speeds of clips with channel values while their rows are merged, to learn speed limits."""
+"""Collect the speeds of clips with channel values while their rows are stored, to learn speed limits."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from hobble.rows.layout import GAITS, RowLayout
 
 
 def limit_learners(layout: RowLayout, skeleton: Mapping[str, Any]) -> dict[str, LimitLearner]:
-    """A `LimitLearner` for each channel of the layout that slows a body. It learns the speed limits."""
+    """For each channel of the layout whose values slow a body: what learns its speed limits."""
     slowing = [(one, columns) for name, columns in layout.channels if (one := channel(name)).slows]
     if not slowing:
         return {}
@@ -30,16 +30,19 @@ def limit_learners(layout: RowLayout, skeleton: Mapping[str, Any]) -> dict[str, 
 
 
 def _other_side(one: Channel, columns: int, rig: Skeleton) -> np.ndarray:
-    """(columns,) for each column, that of the other side; itself if the rig does not pair left and right."""
+    """(columns,) for each column of a channel, the column of the same part on the other side of the body.
+
+    A column is its own partner if the rig does not pair left and right.
+    """
     own = np.arange(columns, dtype=float)
     try:
         return one.mirror(own[None], rig)[0].astype(int)
-    except HobbleError:  # the rig does not pair left and right: each side is learnt separately
+    except HobbleError:  # each side is learnt separately
         return own.astype(int)
 
 
 def add_rows(learners: Mapping[str, LimitLearner], rows: ClipRows, source: str | None) -> None:
-    """Add the rows of a clip. source: its healthy clip if it is a hurt version, else None."""
+    """Add the rows of a clip. source: the healthy clip that a hurt version was made from; None for others."""
     if not learners or not len(rows):
         return
     layout = rows.layout

@@ -17,14 +17,14 @@ from hobble.rows.layout import RowLayout
 
 FILE = "manifest.json"
 STATISTICS = "statistics.npz"
-SCALES = "scales.npz"  # of each shard: the statistics by which its chunks are standardised
+SCALES = "scales.npz"  # for each shard, the statistics by which its chunks are standardised
 VERSION = 2
 SPLITS = ("train", "held_out")
 
 
 @dataclass(frozen=True)
 class ShardCounts:
-    """The numbers of clips, and of chunks of each split, that a shard has."""
+    """How many clips a shard has, and how many chunks of each split."""
 
     clips: int
     train: int
@@ -33,13 +33,15 @@ class ShardCounts:
 
 @dataclass(frozen=True)
 class Manifest:
-    """folder: subfolder of chunks and statistics, named by a hash of their content.
+    """What a database contains.
 
-    layout: of the composed rows. visits: how often a pass uses each row. clips: one entry for each clip with
-    `clip`, `split`, `rows`, `pairs`, and for a hurt version `source`, its healthy clip. shards: `clips` and
-    `chunks` are in their order. chunks: per split; in a chunk, the clip of a row is a number among the clips
-    of its shard. original_bytes: size of the same pairs in the original's layout. limits: channel -> speed
-    limits (`hobble.channels.speed_limits`).
+    folder: subfolder of chunks and statistics, named by a hash of their content. layout: of the rows that a
+    network gets. visits: how often a pass over the data uses each row. dtype: type of the numbers on disk.
+    joint_weight: see `hobble.database.options`. clips: one entry for each clip: `clip` (its name), `split`,
+    `rows`, `pairs` (of a row and a terrain fit), and for a hurt version `source`, its healthy clip. shards:
+    in the order of their clips and chunks. chunks: those of each split; in a chunk, the clip of a row is a
+    number among the clips of its shard. original_bytes: size of the same pairs in the original's layout.
+    bytes: of all chunks. limits: channel -> speed limits (`hobble.channels.speed_limits`).
     """
 
     folder: str
@@ -56,7 +58,7 @@ class Manifest:
     limits: Mapping[str, Any] = field(default_factory=dict)
 
     def rows(self, split: str) -> int:
-        """Rows of a split."""
+        """Number of rows of a split."""
         return sum(chunk.rows for chunk in self.chunks[split])
 
     def shard_of_chunk(self, split: str) -> np.ndarray:
@@ -81,7 +83,7 @@ class Manifest:
 
     @classmethod
     def load(cls, path: Path) -> Manifest:
-        """Read it. Raises InputError if there is no complete database."""
+        """Read the manifest of the database folder `path`. Raises InputError if it is not complete."""
         file = path / FILE
         if not file.exists():
             raise InputError(

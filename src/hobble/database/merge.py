@@ -1,8 +1,8 @@
 """Merge shards into a database, without reading their rows.
 
-The chunks of the shards get a second name in the database's folder. The statistics are those of all training
-rows, from the moments of the shards. The manifest is written last and atomically. So a killed merge leaves
-the previous database, or none.
+The chunks of the shards get a second name (a hard link) in the database's folder. The statistics of all
+training rows are computed from the moments of the shards. The manifest is written last and atomically. So a
+killed merge leaves the previous database, or none.
 """
 
 from __future__ import annotations
@@ -39,12 +39,13 @@ def write_database(
     seed: int = 1,
     chunk_bytes: int = CHUNK_BYTES,
 ) -> Manifest:
-    """Build the database folder `path` of one shard from the rows of clips, or from files of rows.
+    """Build a database with one shard in folder `path` from the rows of clips, or from files of rows.
 
     clips: clip name -> rows or file. splits: clip name -> "train" or "held_out". channels: the network's
     input channels, in the order of their columns. sources: hurt version -> its healthy clip. dtype: float32,
-    float16 or bfloat16. The statistics are those of the training clips. The same rows and options give the
-    same bytes. Raises HobbleError if no training clip has rows, InputError if a clip does not fit the others.
+    float16 or bfloat16. chunk_bytes: size of a chunk. The statistics are those of the training clips. The
+    same rows and options give the same bytes. Raises HobbleError if no training clip has rows, InputError if
+    a clip does not fit the others.
     """
     with _work(Path(path)) as work:
         shard = work / "0"
@@ -75,10 +76,9 @@ def merge_shards(
 
 @contextlib.contextmanager
 def _work(path: Path) -> Iterator[Path]:
-    """A new folder in the database's folder for what is not finished. It is gone afterwards.
+    """Make a folder for unfinished files in the database's folder, and remove it at the end.
 
-    The folders of killed builds are removed first. Raises HobbleError for a file that cannot be written
-    there.
+    Folders that killed builds left are removed first. Raises HobbleError for a file that cannot be written.
     """
     path.mkdir(parents=True, exist_ok=True)
     _remove_others(path, keep=None)
@@ -171,7 +171,7 @@ def _remove_others(path: Path, keep: str | None) -> None:
 
 
 def _folder_name(rows: Path, chunks: Mapping[str, list[Chunk]]) -> str:
-    """A name for the build from a hash of its content."""
+    """The name of a build, from a hash of its content."""
     digest = hashlib.sha256((rows / STATISTICS).read_bytes() + (rows / SCALES).read_bytes())
     digest.update(repr(chunks).encode())
     return f"rows-{digest.hexdigest()[:12]}"

@@ -1,4 +1,4 @@
-"""The keys of a data set's `database` section."""
+"""The keys of the section `database`."""
 
 from __future__ import annotations
 
@@ -26,13 +26,13 @@ class RowOptions(Section):
 
 
 class Merging(Section):
-    """How rows are stored, and their statistics; read by the rule `database_merge`."""
+    """How rows are standardised and stored; read by the rule `database_merge`."""
 
-    joint_weight: PositiveFloat = 0.1
+    joint_weight: PositiveFloat = Field(0.1, description="weight of the joints in the network's input")
     dtype: Literal["float32", "float16", "bfloat16"] = Field(
         "float32", description="type of the rows on disk; float16 and bfloat16 take half the bytes"
     )
-    seed: int = 1
+    seed: int = Field(1, description="seed of the order in which rows are stored")
 
 
 class DatabaseOptions(RowOptions, Merging):
@@ -41,7 +41,7 @@ class DatabaseOptions(RowOptions, Merging):
     shards: Annotated[int, Field(gt=0, le=1000)] = Field(
         1,
         description="shards of the database, each made by a job from the rows of some clips; a new clip "
-        "changes one. The order in which training sees the rows depends on it",
+        "changes only one of them. The order in which training sees the rows depends on their number",
     )
 
-    terrain_side: PositiveFloat = Field(25.0, description="centimetres from the path to the side heights")
+    terrain_side: PositiveFloat = Field(25.0, description="cm from the path to the ground heights beside it")

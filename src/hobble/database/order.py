@@ -1,4 +1,4 @@
-"""The order in which a pass visits rows and their fits, as pure functions of the seed.
+"""The order in which a pass over the data visits rows and their terrain fits: pure functions of the seed.
 
 A pass has `visits` layers. A layer visits every row once: in layer l, row r has fit number
 picks[r, l % fits of r], where picks is a permutation drawn for each row and pass. So a pass has every
@@ -24,9 +24,9 @@ def generator(seed: int, *of: int) -> np.random.Generator:
 def spans(
     rows: int, visits: int, section: int, sections: int, part: tuple[int, int] | None = None
 ) -> Iterator[tuple[int, int, int]]:
-    """The parts of layers in a section: (layer, first place, last place + 1).
+    """The parts of layers that a section consists of: (layer, first place, last place + 1).
 
-    part: (start, stop), only these samples of the section.
+    rows: number of rows of a layer. part: (start, stop), to get only these samples of the section.
     """
     total = rows * visits
     start, stop = total * section // sections, total * (section + 1) // sections
@@ -44,8 +44,8 @@ def groups(shards: np.ndarray, window: int, seed: int, pass_index: int, layer: i
     before, up to `window` chunks.
 
     shards: (chunks,) the shard of each chunk. The first group has as many chunks as there are shards. Each
-    group has chunks of all shards in proportion, up to a chunk. So the first rows of a layer are ready soon,
-    and small groups mix as well as large ones, because the rows of a shard were permuted when they were
+    group has chunks of all shards in proportion, to within a chunk. So the first rows of a layer are ready
+    soon, and small groups mix as well as large ones, because the rows of a shard were permuted when they were
     written.
     """
     draw = generator(seed, CHUNKS, pass_index, layer)
@@ -63,8 +63,8 @@ def groups(shards: np.ndarray, window: int, seed: int, pass_index: int, layer: i
 def _places(shards: np.ndarray, of_each: np.ndarray, first: np.ndarray) -> np.ndarray:
     """(chunks,) places from 0 to 1 that spread the chunks of each shard evenly.
 
-    shards: (chunks,) of the chunks in their order. of_each: (S,) chunks of each shard. first: (S,) from 0 to
-    1, the place of a shard's first chunk within its first share.
+    shards: (chunks,) the shard of each chunk. of_each: (shards,) number of chunks of each shard. first:
+    (shards,) from 0 to 1: the first chunk of a shard with n chunks is at first / n.
     """
     number, by_shard = np.empty(len(shards)), np.argsort(shards, kind="stable")
     number[by_shard] = np.arange(len(shards)) - np.repeat(np.cumsum(of_each) - of_each, of_each)
@@ -77,9 +77,9 @@ def row_order(rows: int, seed: int, pass_index: int, layer: int, group: int) -> 
 
 
 def picks(count: np.ndarray, visits: int, seed: int, pass_index: int, layer: int, chunk: int) -> np.ndarray:
-    """(R,) the number of the fit that each row of a chunk has in this layer.
+    """(R,) the number of the fit that each of the R rows of a chunk has in this layer.
 
-    count: (R,) fits of each row, at most `visits`.
+    count: (R,) number of fits of each row, at most `visits`.
     """
     if np.all(count <= 1):
         return np.zeros(len(count), np.int64)
@@ -94,7 +94,7 @@ def picks(count: np.ndarray, visits: int, seed: int, pass_index: int, layer: int
 
 
 def starts(count: np.ndarray) -> np.ndarray:
-    """(R,) the index of each row's first fit. count: (R,) fits of each row."""
+    """(R,) the index of each row's first fit. count: (R,) number of fits of each row."""
     return np.cumsum(count, dtype=np.int64) - count
 
 
@@ -109,8 +109,9 @@ def rows_and_fits(
 ) -> tuple[np.ndarray, np.ndarray]:
     """Rows of a group of chunks in the order of a layer, and the fit of each: both (n,).
 
-    chunks: their numbers; rows: of each chunk. count, first: (R,) of the group's rows, see `starts`. place:
-    seed, pass, layer and group. part: which n places of the order to return.
+    chunks: their numbers. rows: number of rows of each chunk. count, first: (R,) number of fits and index of
+    the first fit (`starts`) of each row of the group. place: seed, pass, layer and group. part: the n places
+    of the order to return.
     """
     seed, pass_index, layer, group = place
     picked = [

@@ -13,17 +13,18 @@ from hobble.rows.clip_rows import ClipRows, Outline, outline
 from hobble.rows.compose import fit_columns, x_columns
 from hobble.rows.layout import RowLayout
 
-BUCKET_BYTES = 64 << 20  # of a bucket; pass 2 needs a few times as much memory
+BUCKET_BYTES = 64 << 20  # size of a bucket; sorting one needs a few times as much memory
 
 RowSource = ClipRows | str | Path
 
 
 @dataclass(frozen=True)
 class Plan:
-    """Layout of the rows, clips with their rows, and rows of a chunk and of a bucket.
+    """What a shard will contain.
 
-    visits: how often a pass uses each row. clips: for each clip `clip`, `split`, `rows` and `pairs`, and
-    for a hurt version `source`, its healthy clip.
+    layout: of its rows. visits: how often a pass over the data uses each row. clips: for each clip `clip`
+    (its name), `split`, `rows` and `pairs` (of a row and a terrain fit), and for a hurt version `source`, its
+    healthy clip. chunk_rows, bucket_rows: number of rows of a chunk and of a bucket.
     """
 
     layout: RowLayout
@@ -34,7 +35,7 @@ class Plan:
     bucket_rows: int
 
     def rows(self, split: str) -> int:
-        """Rows of a split."""
+        """Number of rows of a split."""
         return sum(clip["rows"] for clip in self.clips if clip["split"] == split)
 
     def to_dict(self) -> dict[str, Any]:
@@ -58,10 +59,10 @@ def make_plan(
     chunk_bytes: int,
     sources: Mapping[str, str],
 ) -> Plan | None:
-    """The plan of rows by clip name, or None for no clips; see `hobble.database.merge.write_database`.
+    """The plan of a shard with the rows of `clips`; None if there are no clips.
 
-    item: bytes of a number on disk. sources: hurt version -> its healthy clip. Raises InputError if a clip
-    does not fit the others.
+    item: bytes of a number on disk. For the other arguments see `hobble.database.merge.write_database`.
+    Raises InputError if a clip does not fit the others.
     """
     entries: list[dict[str, Any]] = []
     first: Outline | None = None

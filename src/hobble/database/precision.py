@@ -21,7 +21,7 @@ STORED: dict[str, np.dtype[Any]] = {
 
 
 def narrow(values: Array, precision: str) -> np.ndarray:
-    """Values in their storage type, rounded to nearest even.
+    """The values in their storage type, rounded to nearest even.
 
     Raises HobbleError if a value is too large for float16.
     """
@@ -40,7 +40,7 @@ def narrow(values: Array, precision: str) -> np.ndarray:
 
 
 def widen(values: np.ndarray) -> Array:
-    """Stored bfloat16 as float32; other types unchanged."""
+    """Convert stored bfloat16 to float32. Other types are returned unchanged."""
     if values.dtype != STORED["bfloat16"]:
         return values
     return (values.astype("<u4") << 16).view("<f4")

@@ -15,25 +15,26 @@ from hobble.core.errors import HobbleError
 from hobble.core.files import load_npz
 from hobble.core.quat import Array
 from hobble.database import order
+from hobble.database.chunk_window import Buffers, ChunkWindow, empty_buffers, load_chunks
 from hobble.database.manifest import STATISTICS, Manifest
 from hobble.database.precision import widen
 from hobble.database.scale import Shards
+from hobble.database.sharing import SampleRange
 from hobble.database.statistics import Statistics
-from hobble.database.stretches import SampleRange
-from hobble.database.window import Buffers, ChunkWindow, empty_buffers, load_chunks
 from hobble.rows.compose import compose
 from hobble.rows.layout import RowLayout
 
 Item = TypeVar("Item")
 Part = tuple[ChunkWindow, np.ndarray, np.ndarray]
 BLOCK_ROWS = 4096
-BLOCKS = 3  # in memory at a time: one being made, one waiting, one in use
+BLOCKS = 3  # blocks in memory at a time: one being made, one waiting, one in use
 
 
 class Block(NamedTuple):
-    """n composed rows: x (n, X) and y (n, Y), standardised float32; p (n,) phase 0 to 1, float32.
+    """n rows as a network gets them: x (n, X) and y (n, Y), standardised float32; p (n,) phase 0 to 1.
 
-    clip: (n,) index into `Database.clips`; frame: (n,) frame of the clip at 60 Hz.
+    They are composed of frame, channels and a terrain fit (`hobble.rows.compose`). clip: (n,) index into
+    `Database.clips`; frame: (n,) frame of the clip at 60 Hz.
     """
 
     x: Array
@@ -44,9 +45,10 @@ class Block(NamedTuple):
 
 
 class RawRows(NamedTuple):
-    """n rows that are not composed, standardised float32: x (n, X without terrain), y (n, Y), p (n,) phase.
+    """n rows before composing, standardised float32: x (n, X without terrain), y (n, Y), p (n,) phase.
 
-    fits: (m, columns) heights, then the mean height, of all fits of these rows. first: (n,) each row's first.
+    fits: (m, columns) of all terrain fits of these rows: heights, then the lift in cm (see
+    `hobble.database.split`). first: (n,) index of each row's first fit.
     """
 
     x: Array
@@ -72,9 +74,8 @@ class Database:
     def open(cls, path: str | Path, memory_mb: int = 512) -> Database:
         """Open the database folder `path`.
 
-        memory_mb: memory limit for its rows, for each reader of a section. A database that fits is loaded
-        once; a larger one is read again and again, chunk by chunk. Raises InputError if there is no complete
-        database.
+        memory_mb: memory for rows, for each reader of a section. A database that fits is loaded once; a
+        larger one is read again and again, chunk by chunk. Raises InputError if the database is not complete.
         """
         path = Path(path)
         manifest = Manifest.load(path)
@@ -102,15 +103,15 @@ class Database:
         return {clip["clip"]: clip["source"] for clip in self.manifest.clips if "source" in clip}
 
     def rows(self, split: str) -> int:
-        """Rows (frames) of "train" or "held_out"."""
+        """Number of rows (frames) of "train" or "held_out"."""
         return self.manifest.rows(split)
 
     def pairs(self, split: str) -> int:
-        """Samples of one pass: every (frame, fit) pair; the one fit of a flat row counts `visits` times."""
+        """Samples of a pass: the (frame, fit) pairs. The one pair of a flat row counts `visits` times."""
         return self.rows(split) * self.manifest.visits
 
     def section_pairs(self, split: str, section: int, sections: int) -> int:
-        """Samples of one section of a pass."""
+        """Number of samples of one section of a pass."""
         total = self.pairs(split)
         return total * (section + 1) // sections - total * section // sections
 
@@ -125,14 +126,14 @@ class Database:
         stretch: SampleRange | None = None,
         window: int | None = None,
     ) -> Iterator[Block]:
-        """One section of one pass, in shuffled order, as blocks of `block_rows` rows; the last has the rest.
+        """One section of one pass, shuffled, as blocks of `block_rows` rows; the last may be shorter.
 
         Over the `sections` sections of a pass, every (frame, fit) pair comes once (the one fit of a flat row:
         `visits` times). The blocks depend only on the arguments (and on memory_mb, if the split does not fit
         in memory), not on what was read before. The next block is made in a thread.
 
-        stretch: the part of the section to read; None: all. window: chunks in memory at a time; None: see
-        `window`. Raises InputError with the chunk's file if it is damaged.
+        stretch: the part of the section to read; None: all. window: chunks in memory at a time; None: as many
+        as the method `window` says. Raises InputError, which names the file, if a chunk is damaged.
         """
         if not 0 <= section < sections:
             raise HobbleError(f"there is no section {section} in a pass of {sections}")
@@ -179,8 +180,8 @@ class Database:
     ) -> Iterator[Part]:
         """Places start to stop of a layer: windows, the rows to use in order, and the fit of each row.
 
-        of: seed, pass and layer. A window is loaded into one of `buffers` while the previous window is in use
-        in the other. So a window must not be used after the next one is requested.
+        of: seed, pass and layer. buffers: two. A window is loaded into one of them while the previous window,
+        in the other, is in use. So a window must not be used after the next one is requested.
         """
         every = range(len(self.manifest.chunks[split]))
         if window >= len(every):
@@ -196,7 +197,10 @@ class Database:
     def _wanted(
         self, split: str, of: tuple[int, int, int], start: int, stop: int, window: int
     ) -> Iterator[tuple[int, Sequence[int], int, int]]:
-        """The groups of chunks with places start to stop of a layer, and the places of each group."""
+        """The groups of chunks that have places start to stop of a layer.
+
+        Yields (number of the group, chunks, first place in the group, last place + 1).
+        """
         rows = [chunk.rows for chunk in self.manifest.chunks[split]]
         done = 0
         for group, some in enumerate(order.groups(self._shards.of[split], window, *of)):
@@ -207,15 +211,19 @@ class Database:
             done += n
 
     def block_rows(self, batch: int = 1) -> int:
-        """A good length of blocks: a multiple of `batch`, about 4,096 rows, up to a quarter of the memory."""
+        """A good length of blocks: about 4,096 rows, or fewer, so that blocks take a quarter of the memory.
+
+        It is a multiple of `batch`.
+        """
         row = 4 * (self.layout.x_size + self.layout.y_size)
         limit = min(BLOCK_ROWS, (self.memory_mb << 20) // (4 * BLOCKS * row))
         return batch * max(1, limit // batch)
 
     def window(self, split: str, block_rows: int) -> int:
-        """Chunks in memory at a time: all if both splits fit, else as many as fit twice, and at least one.
+        """How many chunks are in memory at a time: all if both splits fit, else as many as fit twice.
 
-        Twice, because the next window is read while one is in use. Memory of the blocks is subtracted first.
+        Twice, because the next window is read while one is in use. At least one. Memory for the blocks is
+        subtracted first.
         """
         memory = self.memory_mb << 20
         memory -= BLOCKS * block_rows * 4 * (self.layout.x_size + self.layout.y_size)
@@ -235,7 +243,7 @@ class Database:
         return self._loaded[split]
 
     def load(self, split: str, some: Sequence[int], into: Buffers) -> ChunkWindow:
-        """Read chunks of a split into the buffers `into` (`hobble.database.window.empty_buffers`)."""
+        """Read chunks of a split into the buffers `into` (`hobble.database.chunk_window.empty_buffers`)."""
         folder = self.path / self.manifest.folder
         return load_chunks(folder, self.manifest, split, some, into, self._shards, self._verified)
 
@@ -282,7 +290,7 @@ def _for_this_process(parts: Iterator[Part], stretch: SampleRange) -> Iterator[P
 
 
 def read_ahead(items: Iterator[Item]) -> Iterator[Item]:
-    """The same items, where a thread makes the next item while one is in use."""
+    """Yield the items. A thread makes the next item while one is in use."""
     nothing = object()
     with ThreadPoolExecutor(1, "ahead") as pool:
         future = pool.submit(next, items, nothing)

@@ -1,4 +1,4 @@
-"""Changes the rows of a shard, standardised by its own statistics, to those of the whole database."""
+"""Converts rows that are standardised by their shard's statistics to the statistics of the whole database."""
 
 from __future__ import annotations
 
@@ -47,18 +47,21 @@ def _apply(values: np.ndarray, line: Line, dtype: str) -> None:
 
 
 def _line(mean: Array, std: Array, to_mean: Array, to_std: Array) -> Line:
-    """The line from values standardised by mean and std to those by to_mean and to_std."""
+    """Converts values standardised by mean and std to values standardised by to_mean and to_std."""
     factor, summand = np.float64(std) / to_std, (np.float64(mean) - to_mean) / to_std
     return factor.astype(np.float32), summand.astype(np.float32)
 
 
 def scale_to(whole: Statistics, own: Statistics, terrain: slice) -> Scale | None:
-    """From a shard's statistics to those of the database; None if they are equal. terrain: columns of X."""
+    """The conversion from a shard's statistics (`own`) to the database's; None if they are equal.
+
+    terrain: the terrain columns of X.
+    """
     if all(np.array_equal(vars(own)[name], values) for name, values in vars(whole).items()):
         return None
     factor, summand = _line(own.x_mean, own.x_std, whole.x_mean, whole.x_std)
     rows = np.delete(factor, terrain), np.delete(summand, terrain)
-    # The last column of the fits is a height in cm.
+    # The last column of the fits is a height in cm, which is not standardised.
     fits = np.append(factor[terrain], np.float32(1)), np.append(summand[terrain], np.float32(0))
     return Scale(rows, _line(own.y_mean, own.y_std, whole.y_mean, whole.y_std), fits)
 
@@ -66,11 +69,12 @@ def scale_to(whole: Statistics, own: Statistics, terrain: slice) -> Scale | None
 class Shards:
     """The conversions of all shards of a database.
 
-    scale: of each shard. first: (shards,) number of its first clip. of: split -> (chunks,) shard of each.
+    scale: the conversion of each shard, or None. first: (shards,) number of each shard's first clip. of:
+    split -> (chunks,) the shard of each chunk.
     """
 
     def __init__(self, path: Path, manifest: Manifest, whole: Statistics) -> None:
-        """Read the scales of the database `path`. Raises InputError if they are not of its shards."""
+        """Read the scales of the database `path`. Raises InputError if their shapes do not fit its shards."""
         data = load_npz(path / manifest.folder / SCALES)
         count, terrain = len(manifest.shards), manifest.layout.x_terrain
         if any(data[name].shape != (count, *values.shape) for name, values in vars(whole).items()):

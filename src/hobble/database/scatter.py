@@ -1,4 +1,4 @@
-"""Pass 1 of the shuffle: scatter the rows of clips over buckets, by their places in the final order."""
+"""First step of the shuffle: scatter the rows of clips over buckets, by their places in the final order."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ def make_buckets(folder: Path, plan: Plan) -> dict[str, Buckets]:
 def scatter(
     buckets: Mapping[str, Buckets], clips: Mapping[str, RowSource], plan: Plan, seed: int
 ) -> Iterator[tuple[dict[str, Any], ClipRows]]:
-    """Put each clip into the buckets of its split, then yield its entry and its rows.
+    """Put each clip into the buckets of its split, then yield its entry in the plan and its rows.
 
     One permutation of all rows of a split determines the place of each row.
     """

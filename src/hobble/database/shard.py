@@ -1,8 +1,8 @@
-"""A shard: the rows of some clips of a database, shuffled and in chunks. Its job reads no other clips.
+"""A shard: the rows of some clips of a database, shuffled and in chunks. Its job reads only these clips.
 
-Its rows are standardised by its own statistics, so that half precision stores them well. The reader changes
-them to those of the whole database (`hobble.database.scale`). The clip of a row is a number among the clips
-of the shard. So a shard stays the same to the byte when another one changes.
+Its rows are standardised by its own statistics, so that half precision stores them well. The reader converts
+them to the statistics of the whole database (`hobble.database.scale`). The clip of a row is a number among
+the clips of the shard. So a shard stays the same to the byte when another shard changes.
 """
 
 from __future__ import annotations
@@ -20,13 +20,13 @@ from hobble.core.files import load_npz, read_json, save_npz, write_error, write_
 from hobble.database.chunks import HINT, Chunk
 from hobble.database.learn_limits import add_rows, limit_learners
 from hobble.database.manifest import SPLITS
-from hobble.database.ordered import write_chunks
 from hobble.database.plan import Plan, RowSource, make_plan
 from hobble.database.precision import STORED
 from hobble.database.scatter import make_buckets, scatter
 from hobble.database.statistics import Moments, Statistics, clip_moments, statistics_of_moments, unseen_joints
+from hobble.database.write_in_order import write_chunks
 
-CHUNK_BYTES = 4 << 20  # read at a time: large enough to be fast on any disk, small enough for any memory
+CHUNK_BYTES = 4 << 20  # read in one go: large enough to be fast on any disk, small enough for any memory
 INDEX, MOMENTS, SCALE = "shard.json", "moments.npz", "scale.npz"
 Sums = tuple[Moments, Moments]  # of X and of Y
 
@@ -114,7 +114,7 @@ class Shard:
 
     @classmethod
     def load(cls, folder: Path) -> Shard | None:
-        """Read it; None if it has no clips. Raises InputError if it is incomplete."""
+        """Read the shard in `folder`; None if it has no clips. Raises InputError if it is incomplete."""
         values = read_json(folder / INDEX)
         try:
             if values["plan"] is None:
@@ -135,7 +135,7 @@ class Shard:
         return Statistics(**load_npz(self.folder / SCALE))
 
     def add_speeds(self, learners: Mapping[str, LimitLearner]) -> None:
-        """Add the speeds of its training clips."""
+        """Add the speeds of its training clips to the learners of the channels."""
         for channel, learner in learners.items():
             data = load_npz(self.folder / f"pace-{channel}.npz")
             cycles: dict[int, dict[str, np.ndarray]] = {}

@@ -9,16 +9,17 @@ from hobble.database.precision import STORED
 from hobble.rows.compose import fit_columns, x_columns
 
 RELEASED_FRAMES = 465_990  # at 60 Hz, mirrors included, in the released clips of Holden, Komura, Saito (2017)
-RELEASED_FLAT = 0.479  # share of them on flat ground, which have one fit and not ten
+RELEASED_FLAT = 0.479  # share of these frames on flat ground: they have one terrain fit, the others ten
 INDEX_BYTES = 16  # bytes of a row besides its floats: count of fits, clip, frame, phase
 
 
 class Sizes(TypedDict):
     """Sizes of a database.
 
-    frames, pairs: of both splits; pairs are the samples of a pass. bytes: of all chunks. original_bytes: the
-    same pairs as rows of X, Y and P in float32. share: bytes / original_bytes. bytes_a_frame: with its fits.
-    released_bytes: size of all frames of the released clips in this layout and type.
+    frames, pairs: numbers in both splits; a pass over the data has every pair once. bytes: of all chunks.
+    original_bytes: the same pairs as rows of X, Y and P in float32. share: bytes / original_bytes.
+    bytes_a_frame: bytes of a frame with its terrain fits. released_frames, released_bytes: number of frames
+    of the released clips, and their size in this layout and type.
     """
 
     joints: int

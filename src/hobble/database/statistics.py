@@ -21,7 +21,7 @@ BATCH = 2048  # rows held in float64 at a time
 
 @dataclass(frozen=True)
 class Moments:
-    """Weight, mean (C,) and sum of weighted squared deviations (C,) of what has been seen so far."""
+    """Weight, mean and sum of weighted squared deviations, (C,) each, of the rows so far; C columns."""
 
     weight: float
     mean: Array = field(repr=False)
@@ -125,7 +125,7 @@ def _joined(*parts: Moments) -> Moments:
 
 
 def x_groups(layout: RowLayout) -> list[slice]:
-    """Columns of X that share the mean of their deviations, as in the original; not the channels."""
+    """Groups of columns of X that share the mean of their deviations, as in the original; no channels."""
     half = layout.samples
     split = [
         slice(start, start + half)
@@ -136,12 +136,12 @@ def x_groups(layout: RowLayout) -> list[slice]:
 
 
 def y_groups(layout: RowLayout) -> list[slice]:
-    """Columns of Y that share the mean of their standard deviations: the layout's blocks."""
+    """Groups of columns of Y that share the mean of their deviations: the layout's blocks."""
     return list(layout.blocks("y").values())
 
 
 def grouped(std: Array, groups: Iterable[slice], constant: float) -> Array:
-    """Each column gets the mean deviation of its group, or `constant` if the group never varies."""
+    """(C,) the mean deviation of each column's group, or `constant` if the group never varies."""
     out = np.array(std, np.float64)
     for group in groups:
         mean = float(np.mean(std[group]))
@@ -152,9 +152,10 @@ def grouped(std: Array, groups: Iterable[slice], constant: float) -> Array:
 def statistics_of_moments(
     layout: RowLayout, x: Moments, y: Moments, joint_weight: float, unseen: Sequence[int]
 ) -> Statistics:
-    """Group the deviations and weight the joints: block mean / (w joint_weight), w = 1e-10 if unseen.
+    """Means, and deviations that are shared within groups (`x_groups`, `y_groups`).
 
-    Each channel defines the deviations of its own columns.
+    The deviation of a joint's inputs is divided by w * joint_weight, where w is 1e-10 if the joint is left
+    out of the input (`unseen`), else 1. Each channel defines the deviations of its own columns.
     """
     x_std = grouped(x.std, x_groups(layout), SILENT)
     w = np.ones(layout.joints)

@@ -1,1 +1,1 @@
-"""The `evaluation` stage: accuracy, responsivity and the rest, as JSON and CSV."""
+"""The `evaluation` stage: what measurements share, and the comparison of configurations."""

@@ -1,4 +1,4 @@
-"""Captured motion for the measurements: unbroken stretches of a clip's rows, in the root frame."""
+"""Captured motion for the measurements: unbroken stretches of a clip's rows, in root coordinates."""
 
 from __future__ import annotations
 
@@ -17,10 +17,11 @@ from hobble.rows.layout import GAITS
 class Captured:
     """F consecutive frames of a clip.
 
-    local: (F, J, 3) joint positions in the root frame, heights above the ground, cm. contacts: (F, 4).
-    phase: (F,). channels: name -> (F, columns). gait: (F, 6) shares. velocity: (F, 2) of the root in its own
-    frame, cm a frame. root: (F, 3) position on the ground, starting at the origin. acceleration: (F,) largest
-    of any joint, cm per frame squared, 0 in the first frame. rows: (F,) the clip's row of each frame.
+    local: (F, J, 3) joint positions in root coordinates, heights above the ground, cm. contacts: (F, 4).
+    phase: (F,). channels: name -> (F, columns). gait: (F, 6) shares. velocity: (F, 2) of the root in root
+    coordinates, cm per frame. root: (F, 3) position on the ground in cm; the first is the origin.
+    acceleration: (F,) the largest of any joint, cm per frame squared, 0 in the first frame. rows: (F,) index
+    of each frame's row in `ClipRows`.
     """
 
     clip: str
@@ -79,7 +80,7 @@ def headings(turn: Array) -> Array:
 
 
 def root_path(velocity: Array, turn: Array) -> Array:
-    """(F, 3) path of a root from its velocity (F, 2) in its own frame and its turn (F,); see `headings`."""
+    """(F, 3) path of a root from its velocity (F, 2) in root coordinates and turn (F,); see `headings`."""
     steps = rotate_by_yaw(velocity, headings(turn))
     out = np.zeros((len(turn), 3))
     out[1:, ::2] = np.cumsum(steps, axis=0)[:-1]
@@ -87,14 +88,17 @@ def root_path(velocity: Array, turn: Array) -> Array:
 
 
 def rotate_by_yaw(vectors: Array, yaw: Array) -> Array:
-    """Rotate ground vectors x, z (..., 2) from the frame of a root with this yaw (...) to the world."""
+    """Rotate ground vectors x, z (..., 2) from the coordinates of a root with this yaw (...) to the world."""
     sin, cos = np.sin(yaw), np.cos(yaw)
     x, z = vectors[..., 0], vectors[..., 1]
     return np.stack([x * cos + z * sin, z * cos - x * sin], axis=-1)
 
 
 def _accelerations(velocity: Array, turn: Array) -> Array:
-    """(F,) largest change of any joint's velocity. velocity: (F, J, 3) in the root frame of each frame."""
+    """(F,) largest change of any joint's velocity.
+
+    velocity: (F, J, 3) in the root coordinates of each frame. turn: as in `headings`.
+    """
     carried = velocity[:-1].copy()
     carried[..., ::2] = rotate_by_yaw(velocity[:-1, :, ::2], turn[:-1, None])
     change = np.linalg.norm(velocity[1:] - carried, axis=-1)

@@ -1,9 +1,9 @@
 """Compares any number of configurations with each other and with published figures.
 
-Gathers the results of each configuration, and calls the `comparison.py` of each measurement, which may have
+It calls the module `comparison.py` of each measurement. The module may have these functions:
 
 - `compared(all_measured, published) -> SideBySide`: what it adds to compare.json (see `comparison_rows`),
-- `tables(compared) -> Mapping[str, Sequence[Row]]`: the same as CSV tables, by name.
+- `tables(compared) -> Mapping[str, Sequence[Row]]`: name -> rows of a CSV table with the same data.
 """
 
 from __future__ import annotations
@@ -13,18 +13,18 @@ from typing import Any
 
 from hobble.evaluation.comparison_rows import PublishedRow, SideBySide, published_row
 from hobble.evaluation.configuration_results import ConfigurationResults
-from hobble.measures.given import Json
+from hobble.measures.inputs import Json
 from hobble.measures.registry import MEASURES
 from hobble.models import network_options
 
 
 def compare(all_measured: Sequence[ConfigurationResults], published: Json) -> Json:
-    """The content of compare.json. Its lists have entries for each configuration, in their order.
+    """The content of compare.json. Configurations are in the order of `all_measured`.
 
     `configurations`: how they differ. `training`: their histories. `stages`: time, memory and size of their
-    stages. The name of each measurement: its results. `difference`: eq. 3.2 for each pair.
-    `against_published`: published figures with ours. `published`: all published figures. `milliseconds`:
-    everything that depends on a clock, again with `difference` and `against_published`.
+    stages. The name of each measurement: its results. `difference`: of each pair (eq. 3.2 of Segerstedt
+    2021). `against_published`: published figures next to ours. `published`: all published figures.
+    `milliseconds`: what was measured with a clock, with its own `difference` and `against_published`.
     """
     found = {name: say(all_measured, published) for name, say in each("compared")}
     times = SideBySide(milliseconds={"against_published": stage_times(all_measured, published)})
@@ -59,7 +59,7 @@ def each(function: str) -> Iterator[tuple[str, Callable[..., Any]]]:
 
 
 def describe(measured: ConfigurationResults, found: Iterable[SideBySide]) -> Json:
-    """A description of a configuration: data set, network, training, and entries of the measurements."""
+    """A description of a configuration: data set, network, training, and what the measurements add to it."""
     model = measured.resolved["configuration"]
     hidden = network_options(model["network"]).hidden
     about = {key: value for one in found for key, value in one.about.get(measured.name, {}).items()}
@@ -70,14 +70,14 @@ def describe(measured: ConfigurationResults, found: Iterable[SideBySide]) -> Jso
         "channels": list(model.get("channels") or ()),
         "hidden_layers": len(hidden) or None,
         "units": max(hidden, default=None),
-        # Motion matching has no layers and is not trained, whatever the section says.
+        # Motion matching has no layers and is not trained, even if the section `training` says passes.
         "passes": model["training"]["passes"] if hidden else None,
         **about,
     }
 
 
 def stage_sizes(all_measured: Sequence[ConfigurationResults], published: Json) -> list[PublishedRow]:
-    """Published sizes of the database and the patches, with ours."""
+    """Published sizes of the database and of the terrain patches, next to ours."""
     found = {m.name: m for m in all_measured}
     out = []
     for row in published["stages"]:
@@ -93,7 +93,7 @@ def stage_sizes(all_measured: Sequence[ConfigurationResults], published: Json) -
 
 
 def stage_times(all_measured: Sequence[ConfigurationResults], published: Json) -> list[PublishedRow]:
-    """Published seconds of whole stages, with ours."""
+    """Published seconds of whole stages, next to ours."""
     found = {m.name: m for m in all_measured}
     out = []
     for row in published["stages"]:

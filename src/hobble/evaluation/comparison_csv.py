@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 
 from hobble.evaluation.compare_configurations import each
-from hobble.measures.given import Json, Row
+from hobble.measures.inputs import Json, Row
 
 
 def tables(compared: Json) -> dict[str, Sequence[Row]]:

@@ -9,16 +9,16 @@ from typing import TypedDict
 import numpy as np
 
 from hobble.evaluation.series import difference
-from hobble.measures.given import Json, Row
+from hobble.measures.inputs import Json, Row
 
 
 @dataclass(frozen=True)
 class SideBySide:
     """What one measurement adds to compare.json.
 
-    entries: the list under its own name. about: configuration -> entries for its description. differences:
-    rows from `pair`. against_published: rows from `published_row`. milliseconds: everything that depends on
-    a clock, with the keys `difference`, `against_published` and others.
+    entries: the list under the measurement's name. about: configuration -> what to add to its description.
+    differences: rows from `pair`. against_published: rows from `published_row`. milliseconds: what was
+    measured with a clock, with the keys `difference`, `against_published` and others.
     """
 
     entries: Sequence[Json] = field(default=(), repr=False)
@@ -29,7 +29,7 @@ class SideBySide:
 
 
 class Difference(TypedDict):
-    """Two series and their difference by eq. 3.2. See `pair`."""
+    """Means and standard deviations (sd) of two series, and their difference. See `pair`."""
 
     mean_a: float
     sd_a: float
@@ -42,7 +42,7 @@ class Difference(TypedDict):
 
 
 class DifferenceOf(Difference):
-    """The difference of configurations `a` and `b`, `over` some clips, or laps of one mode."""
+    """The difference of configurations `a` and `b`. over: which clips, or laps of which mode."""
 
     a: str
     b: str
@@ -50,7 +50,7 @@ class DifferenceOf(Difference):
 
 
 class PublishedRow(TypedDict):
-    """A published figure beside ours. See `published_row`."""
+    """A published figure next to ours. See `published_row`."""
 
     measure: str
     configuration: str
@@ -65,8 +65,9 @@ class PublishedRow(TypedDict):
 def pair(a: Json, b: Json) -> Difference:
     """Means and standard deviations of two series, and their difference by eq. 3.2 of Segerstedt 2021.
 
-    `difference` divides by the deviations over single frames. `difference_of_means` divides by those over the
-    means of clips or laps (`means` of a and b), as published. It is None if a or b has fewer than two means.
+    a, b: `mean` and `sd` over single frames, and possibly `means` of clips or laps. `difference` divides by
+    the deviations over single frames. `difference_of_means` divides by the deviations over `means`, as the
+    published one does. It is None if a or b has fewer than two means.
     """
     means = [np.asarray(one.get("means", ()), float) for one in (a, b)]
     sds = [float(some.std()) if len(some) > 1 else None for some in means]
@@ -87,10 +88,10 @@ def pair(a: Json, b: Json) -> Difference:
 
 
 def published_row(measure: str, row: Json, theirs: float, ours: float | None, unit: str = "") -> PublishedRow:
-    """A published figure (`theirs`) with ours, which is None if it was not measured.
+    """A published figure (`theirs`) next to ours, which is None if it was not measured.
 
-    row: has `configuration` and `source`, and may have the `table` in which it was printed and
-    `other_figure`, a different value in the same publication.
+    row: the published row. It has `configuration` and `source`. It may have the `table` that printed the
+    figure, and `other_figure`, a different value in the same publication.
     """
     return {
         "measure": measure,

@@ -12,15 +12,15 @@ import yaml
 from hobble.core.files import read_json
 from hobble.evaluation.csv_tables import read_numbers
 from hobble.evaluation.pipeline_results import Pipeline
-from hobble.measures.given import Json
+from hobble.measures.inputs import Json
 
 
 @dataclass(frozen=True)
 class ConfigurationResults:
     """The results of one configuration.
 
-    resolved: configuration.yaml. measured: measurement -> its JSON. pipeline: pipeline.json. history: column
-    -> values of history.csv, None for empty fields.
+    resolved: the content of configuration.yaml. measured: measurement -> its JSON. pipeline: the content of
+    pipeline.json. history: column -> values of history.csv, None for empty fields.
     """
 
     name: str
@@ -46,7 +46,7 @@ class ConfigurationResults:
 def read_results(name: str, files: Mapping[str, str | Path]) -> ConfigurationResults:
     """Read one configuration's files: `configuration`, `pipeline`, `history`, and one for each measurement.
 
-    Raises InputError naming the file that cannot be read.
+    Raises InputError, which names the file, if one cannot be read.
     """
     paths = dict(files)
     resolved = yaml.safe_load(Path(paths.pop("configuration")).read_text(encoding="utf-8"))

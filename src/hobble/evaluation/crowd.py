@@ -1,4 +1,4 @@
-"""Many figures at once. Each walks by its own script of speeds, gaits and channel values."""
+"""Many figures walk at once. Each follows its own script of speeds, gaits and channel values."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ SETTLING_SHARE = 0.25  # share of a stretch, at its beginning, in which channels
 class CrowdTarget:
     """A number of frames with a constant target for each of C figures.
 
-    gait: (C,) names. channels: name -> (C, columns). speed: (C,) cm a frame, or None for SPEEDS of the gait.
+    gait: (C,) names. channels: name -> (C, columns). speed: (C,) cm a frame; None: SPEEDS of each gait.
     """
 
     frames: int
@@ -34,11 +34,11 @@ class CrowdTarget:
 
 @dataclass(frozen=True)
 class Walks:
-    """The motion of C figures over F frames and S stretches.
+    """The motion of C figures over F frames and S stretches (one for each `CrowdTarget`).
 
-    local: (F, C, J, 3) positions in the root frame, cm, float32. contacts: (F, C, 4). phase: (F, C).
-    root: (F, C, 3). acceleration: (F, C) largest of any joint, cm per frame squared, 0 in the first and last
-    frame. starts: (S + 1,) first frame of each stretch, then F.
+    local: (F, C, J, 3) joint positions in root coordinates, cm, float32. contacts: (F, C, 4). phase: (F, C).
+    root: (F, C, 3) positions of the root in the world, cm. acceleration: (F, C) the largest of any joint, cm
+    per frame squared, 0 in the first and last frame. starts: (S + 1,) first frame of each stretch, then F.
     """
 
     local: Array = field(repr=False)
@@ -74,10 +74,10 @@ class Walks:
 
 
 def run(network: Network, script: Sequence[CrowdTarget], runtime: Runtime) -> Walks:
-    """Run figures through `script`, from a stand, straight ahead on flat ground.
+    """Run figures through `script`. They begin standing and walk straight ahead on flat ground.
 
-    Figures with the same targets from the beginning on do the same, to the last bit. So one of them walks for
-    all until their targets differ.
+    As long as figures have had the same targets from the beginning, they move in the same way, to the last
+    bit. So one character walks for all of them until their targets differ.
     """
     assert network.skeleton is not None
     count, frames = len(script[0].gait), sum(s.frames for s in script)
@@ -121,10 +121,10 @@ def _targets(network: Network, stretch: CrowdTarget) -> dict[str, Array]:
 
 
 def _unlike(of: np.ndarray, *targets: Array) -> tuple[np.ndarray, np.ndarray]:
-    """Which figures now need a character of their own.
+    """Groups figures that one character can walk for: those with the same character and the same targets.
 
-    of: (C,) the character that has walked for each figure. targets: (C, n) arrays. Figures with the same
-    character and the same targets form a set. Returns the first figure of each set, and the set of each (C,).
+    of: (C,) the character that has walked for each figure. targets: (C, n) arrays. Returns the first figure
+    of each group (groups,), and the group of each figure (C,).
     """
     _, first, now = np.unique(np.column_stack([of, *targets]), axis=0, return_index=True, return_inverse=True)
     return first, now.reshape(-1)

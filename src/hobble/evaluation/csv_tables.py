@@ -29,7 +29,7 @@ def frame(rows: Sequence[Mapping[str, Any]]) -> pandas.DataFrame:
 
 
 def write_csv(path: str | Path, rows: Sequence[Mapping[str, Any]]) -> None:
-    """Write rows. None, NaN and keys that only other rows have are empty fields. No rows: an empty file."""
+    """Write rows. A field is empty if its value is missing, None or NaN. Without rows, the file is empty."""
     write_text(path, frame(rows).to_csv(index=False, lineterminator="\n") if rows else "")
 
 
@@ -43,7 +43,7 @@ def write_tables(folder: str | Path, tables: Mapping[str, Sequence[Mapping[str, 
 def read_numbers(path: str | Path) -> dict[str, list[float | None]]:
     """Column -> values of a CSV of numbers, such as history.csv; None for an empty or infinite cell.
 
-    Raises InputError for a file that is no such table, naming the column and the cell.
+    Raises InputError, which names the column and the cell, if a cell is not a number.
     """
     import pandas
 

@@ -1,4 +1,4 @@
-"""Describes a stretch of walking with about forty numbers, from which a classifier finds what hurts."""
+"""Describes a stretch of walking with about forty numbers. From them a classifier finds what hurts."""
 
 from __future__ import annotations
 
@@ -12,10 +12,11 @@ SIDES = ("left", "right")
 
 
 def features(skeleton: Skeleton, local: Array, contacts: Array, root: Array) -> dict[str, float]:
-    """The measures of the gait, and mean and standard deviation of the motion of each limb.
+    """The measures of the gait (`gait_measures`), and mean and standard deviation of the limbs' angles.
 
-    local: (F, J, 3) positions in the root frame, cm. contacts: (F, 4). root: (F, 3), cm. Returns degrees, cm
-    and shares. Step lengths and asymmetries are 0 if there is no step.
+    local: (F, J, 3) joint positions in root coordinates, cm. contacts: (F, 4). root: (F, 3) positions of the
+    root in the world, cm. Returns degrees, cm and shares. Step lengths and asymmetries are 0 if there is no
+    step.
     """
     measured = gait_measures(skeleton, local, contacts, root)
     out = {name: value if value is not None else 0.0 for name, value in measured.items()}
@@ -50,7 +51,7 @@ def features(skeleton: Skeleton, local: Array, contacts: Array, root: Array) -> 
 
 
 def _swing(down: Array) -> Array:
-    """Angle of a limb (F, 3) forward from straight down, degrees."""
+    """(F,) degrees by which a limb (F, 3) is swung forward from straight down."""
     return np.degrees(np.arctan2(down[:, 2], -down[:, 1]))
 
 

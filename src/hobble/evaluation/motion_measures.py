@@ -1,6 +1,6 @@
-"""Measures of generated motion: foot slide, turns, gait events, angles. Centimetres, 60 Hz, degrees.
+"""Measures of generated motion: foot slide, turns, steps, angles. Centimetres, degrees, 60 frames a second.
 
-The first axis is frames.
+The first axis of arrays is the frame. contacts (F, 4) are left heel, left toe, right heel, right toe.
 """
 
 from __future__ import annotations
@@ -44,11 +44,12 @@ def foot_slide(toes: Array, contacts: Array) -> Array:
 
 
 def skating(toes: Array, standing_height: float) -> Array:
-    """(F - 1, 2) how far each toe moves over the ground in a frame, cm, whatever contact is predicted.
+    """(F - 1, 2) how far each toe skates over the ground in a frame, cm. Contacts do not matter.
 
     After Zhang, Starke, Komura, Saito (2018): the horizontal movement v counts as
-    v (2 - 2^(h / SKATING_BELOW)) at a height h from 0 to SKATING_BELOW. h is the larger one of the two
-    frames. toes: (F, 2, 3) above the ground. standing_height: of the toe joint in a standing foot, cm.
+    v (2 - 2^(h / SKATING_BELOW)) at a height h from 0 to SKATING_BELOW above that of a standing toe. h is the
+    larger height of the two frames. toes: (F, 2, 3), heights above the ground. standing_height: height of the
+    toe joint in a standing foot, cm.
     """
     moved = np.linalg.norm(np.diff(toes[..., ::2], axis=0), axis=-1)
     height = np.maximum(toes[1:, :, 1], toes[:-1, :, 1]) - standing_height
@@ -56,11 +57,14 @@ def skating(toes: Array, standing_height: float) -> Array:
 
 
 def largest_turn(rotations: Array) -> float:
-    """Largest turn of any joint from one frame to the next, degrees. rotations: (F, J, 4) world."""
-    if len(rotations) < 2:
-        return 0.0
+    """Largest turn of any joint from one frame to the next, degrees. rotations: (F, J, 4) in the world."""
+    return float(turns_between(rotations).max(initial=0.0))
+
+
+def turns_between(rotations: Array) -> Array:
+    """(F - 1, ...) largest turn of any joint since the frame before, degrees. rotations: (F, ..., J, 4)."""
     dot = np.abs(np.sum(rotations[1:] * rotations[:-1], axis=-1, dtype=float))
-    return float(np.degrees(2 * np.arccos(np.minimum(1.0, dot.min()))))
+    return np.asarray(np.degrees(2 * np.arccos(np.minimum(1.0, dot.min(axis=-1)))))
 
 
 def acceleration(positions: Array) -> Array:
@@ -69,7 +73,7 @@ def acceleration(positions: Array) -> Array:
 
 
 def bend(a: Array, b: Array, c: Array) -> Array:
-    """(...) angle by which the joint at b (..., 3) is bent between a and c, degrees; 0 is straight."""
+    """(...) degrees by which the joint at b is bent; 0 is straight. a, b, c: (..., 3) along the limb."""
     u, v = b - a, c - b
     cosine = np.sum(u * v, axis=-1) / np.maximum(
         np.linalg.norm(u, axis=-1) * np.linalg.norm(v, axis=-1), 1e-9
@@ -78,7 +82,7 @@ def bend(a: Array, b: Array, c: Array) -> Array:
 
 
 def in_root_frame(positions: Array, root: Array, yaw: Array) -> Array:
-    """World positions (..., J, 3) relative to root (..., 3), rotated so that its facing `yaw` (...) is +Z."""
+    """World positions (..., J, 3) in the coordinates of a root at `root` (..., 3) with `yaw` (...)."""
     p = positions - root[..., None, :]
     sin, cos = np.sin(yaw)[..., None], np.cos(yaw)[..., None]
     x, z = p[..., 0] * cos - p[..., 2] * sin, p[..., 0] * sin + p[..., 2] * cos
@@ -86,7 +90,7 @@ def in_root_frame(positions: Array, root: Array, yaw: Array) -> Array:
 
 
 def asymmetry(left: float | None, right: float | None) -> float | None:
-    """(left - right) / mean: 0 if equal, positive if the left is larger. None if one is missing."""
+    """(left - right) / mean: 0 if equal, positive if the left is larger. None if one is missing or both 0."""
     if left is None or right is None or left + right == 0:
         return None
     return 2 * (left - right) / (left + right)
@@ -97,10 +101,11 @@ def gait_measures(
 ) -> dict[str, float | None]:
     """Measures of one character's walk.
 
-    local: (F, J, 3) positions in the root frame. contacts: (F, 4). travelled: (F, 3) world root positions.
-    Returns speed (cm/s, straight-line distance), stance shares, step lengths (distance of the landing heel
-    ahead of the other, cm), knee and arm ranges (degrees, 5th to 95th percentile), trunk lean (degrees,
-    forward and to the left), hip height (cm) and asymmetries. Step lengths are None if there is no step.
+    local: (F, J, 3) joint positions in root coordinates, cm. contacts: (F, 4). travelled: (F, 3) positions of
+    the root in the world, cm. Returns speed (cm/s, from the straight distance between first and last frame),
+    stance shares, step lengths (how far the landing heel is ahead of the other, cm), knee and arm ranges
+    (degrees from the 5th to the 95th percentile), trunk lean (degrees, forward and to the left), hip height
+    (cm) and asymmetries (`asymmetry`). Step lengths are None if there is no step.
     """
     role = skeleton.role
     seconds = (len(local) - 1) / 60

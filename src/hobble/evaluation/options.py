@@ -11,9 +11,9 @@ from hobble.measures.registry import MEASURES
 
 
 def joined_sections(sections: list[type[Section]]) -> type[Section]:
-    """One section with the keys of all sections.
+    """A section that has the keys of all `sections`.
 
-    Raises TypeError if two sections define the same key, unless they inherit it from the same base.
+    Raises TypeError if two of them define the same key, unless they inherit it from the same base.
     """
     owner: dict[str, type] = {}
     for section in sections:

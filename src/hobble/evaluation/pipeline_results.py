@@ -1,4 +1,4 @@
-"""The parts of pipeline.json, which the report and the comparison read."""
+"""The parts of pipeline.json. The report and the comparison read this file."""
 
 from __future__ import annotations
 
@@ -8,7 +8,11 @@ from hobble.database.sizes import Sizes
 
 
 class JobTotal(TypedDict):
-    """Jobs together. seconds: the sum over them. longest: of one job. max_rss_mb: None if not measured."""
+    """Some jobs together.
+
+    seconds, cpu_seconds: sums over the jobs. longest: seconds of the longest job. max_rss_mb: most memory of
+    a job, MB; None if not measured.
+    """
 
     jobs: int
     seconds: float
@@ -42,7 +46,7 @@ class Machine(TypedDict):
 
 
 class Pipeline(TypedDict):
-    """pipeline.json. missing: files that were not there. database: None if there is none."""
+    """pipeline.json. missing: files that do not exist. database: None if there is none."""
 
     configuration: str
     stages: list[StageTotal]

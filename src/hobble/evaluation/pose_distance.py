@@ -1,4 +1,4 @@
-"""The distance between two walks: that of their poses at the same phase."""
+"""The distance between two walks: the distance of their poses at the same phase."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ def phase_bins(phase: Array) -> np.ndarray:
 
 
 def mean_cycle(local: Array, phase: Array) -> Array:
-    """(PHASES, J, 3) mean pose in each phase bin of local (F, J, 3), phase (F,).
+    """(PHASES, J, 3) mean pose in each phase bin. local: (F, J, 3) joint positions, cm. phase: (F,).
 
     An empty bin gets the pose of the nearest bin.
     """
@@ -39,16 +39,17 @@ def distance_to_cycle(local: Array, phase: Array, cycle: Array) -> Array:
 
 
 def period(phase: Array) -> int:
-    """Mean length of a cycle of phase (F,) in frames, limited to 10 to 90."""
+    """Mean length of a cycle in frames, limited to 10 to 90. phase: (F,)."""
     rate = np.mod(np.diff(phase), 1.0).mean()
     return int(np.clip(round(1 / max(rate, 1e-3)), 10, 3 * FPS // 2))
 
 
 def settling(distance: Array, normal: float, window: int) -> float | None:
-    """Seconds until a distance (F,) from a motion stays close to its last value.
+    """Seconds until a motion has settled after a change: until `distance` stays close to its last value.
 
-    window: frames to average over, usually a cycle. normal: the distance before the change. Close means
-    within SETTLED_SHARE of the whole change. None if the change is below SMALLEST_CHANGE_CM.
+    distance: (F,) from a reference motion, cm, from the change on. window: frames to average over, usually a
+    cycle. normal: the distance before the change. Close means within SETTLED_SHARE of the whole change. None
+    if the change is below SMALLEST_CHANGE_CM.
     """
     window = min(window, len(distance))
     smooth = np.convolve(distance, np.ones(window) / window, mode="valid")

@@ -9,7 +9,7 @@ import numpy as np
 
 
 def difference(mean_a: float, sd_a: float, mean_b: float, sd_b: float) -> float | None:
-    """2 |mean a - mean b| / (sd a + sd b), eq. 3.2 of Segerstedt 2021; None if both deviations are 0.
+    """2 |mean_a - mean_b| / (sd_a + sd_b), eq. 3.2 of Segerstedt 2021; None if both deviations are 0.
 
     >>> difference(3.0, 0.5, 1.0, 1.5)
     2.0
@@ -19,7 +19,7 @@ def difference(mean_a: float, sd_a: float, mean_b: float, sd_b: float) -> float 
 
 
 class StraightLine(TypedDict):
-    """y = intercept + slope x through `points` points, and its r2; None where they do not exist."""
+    """The line y = intercept + slope x through `points` points, and its r2. None for what does not exist."""
 
     slope: float | None
     intercept: float | None

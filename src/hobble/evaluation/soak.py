@@ -1,4 +1,4 @@
-"""A long test of many characters with random targets, injuries and grounds, for implausible poses."""
+"""A long test for implausible poses: many characters with random targets, injuries and grounds."""
 
 from __future__ import annotations
 
@@ -26,7 +26,8 @@ LIMITS = {"hips_lowest_cm": 60.0, "hips_highest_cm": 110.0, "added_turn_degrees"
 class Targets:
     """The targets of C characters in a frame. Each character gets new ones every 1 to 8 seconds.
 
-    velocity, facing: (C, 2). gait: C names. channels: name -> (C, columns). left: (C,) frames that remain.
+    velocity: (C, 2) cm a frame. facing: (C, 2) direction; (0, 0) for none. gait: C names. channels: name ->
+    (C, columns). left: (C,) frames until the next targets.
     """
 
     velocity: Array
@@ -47,7 +48,10 @@ class Targets:
         )
 
     def renew(self, rng: np.random.Generator) -> None:
-        """Draw new targets for characters whose time is over. A third stand, half face a random direction."""
+        """Draw new targets for the characters whose targets have run out.
+
+        On average a third stand, and half face a random direction.
+        """
         self.left -= 1
         for c in np.flatnonzero(self.left <= 0):
             going, looking = rng.uniform(-np.pi, np.pi, 2)
@@ -62,9 +66,10 @@ class Targets:
 
 
 def grounds(characters: int, rng: np.random.Generator) -> Callable[[Array, Array], Array]:
-    """A ground function with a different ground for each of C characters, START_SPACING_CM apart along x.
+    """A function (x, z) -> height with a different ground around each character's start.
 
-    A quarter are flat; the others have hills 2 to 8 m long with slopes of up to .35.
+    The starts are START_SPACING_CM apart along x. On average a quarter of the grounds are flat; the others
+    have hills 2 to 8 m long with slopes of up to 0.35.
     """
     length = rng.uniform(200, 800, characters)
     height = rng.uniform(0.05, 0.35, characters) * length / np.pi * (rng.random(characters) > 0.25)
@@ -79,9 +84,10 @@ def grounds(characters: int, rng: np.random.Generator) -> Callable[[Array, Array
 
 @dataclass
 class StanceSlides:
-    """Distance that toes slide in each stance of C characters, as in `motion_measures.foot_slide`.
+    """How far the toes of C characters slide in each stance, as in `motion_measures.foot_slide`.
 
-    far: (C, 2) distance in this stance, cm. frames: (C, 2) its length. done: distances of past stances.
+    far: (C, 2) distance in the present stance, cm. frames: (C, 2) its frames so far. done: distances of past
+    stances.
     """
 
     far: Array
@@ -98,9 +104,51 @@ class StanceSlides:
 
 
 def turn_angles(now: Array, before: Array) -> Array:
-    """(...) angle between rotations (..., 4), degrees."""
+    """(...) angle between the rotations `now` and `before` (..., 4), degrees."""
     dot = np.abs(np.sum(now * before, axis=-1))
     return np.asarray(np.degrees(2 * np.arccos(np.minimum(1.0, dot))))
+
+
+@dataclass
+class WorstPoses:
+    """The worst values of all characters in the frames so far. Names and units as in `soak`."""
+
+    finite: bool = True
+    hips_lowest: float = np.inf
+    hips_highest: float = -np.inf
+    network_turn: float = 0.0
+    turn: float = 0.0
+    added_turn: float = 0.0
+    fastest_joint: float = 0.0
+    frames_beyond: int = 0
+
+    def add_heights(self, hips: Array) -> None:
+        """Add the heights (C,) of the hips above the ground in a frame."""
+        self.hips_lowest = min(self.hips_lowest, float(hips.min()))
+        self.hips_highest = max(self.hips_highest, float(hips.max()))
+
+    def add_movement(self, now: tuple[Array, ...], before: tuple[Array, ...]) -> None:
+        """Add what changed from one frame to the next.
+
+        now, before: positions (C, J, 3), rotations (C, J, 4) of the pose, rotations that the network holds.
+        """
+        turn, predicted = turn_angles(now[1], before[1]), turn_angles(now[2], before[2])
+        added = turn - predicted
+        self.turn = max(self.turn, float(turn.max()))
+        self.network_turn = max(self.network_turn, float(predicted.max()))
+        self.added_turn = max(self.added_turn, float(added.max()))
+        self.fastest_joint = max(self.fastest_joint, float(np.linalg.norm(now[0] - before[0], axis=-1).max()))
+        self.frames_beyond += int((added.max(axis=1) > LIMITS["added_turn_degrees"]).sum())
+
+    @property
+    def hold(self) -> bool:
+        """Whether all values are finite and within LIMITS."""
+        return (
+            self.finite
+            and self.hips_lowest >= LIMITS["hips_lowest_cm"]
+            and self.hips_highest <= LIMITS["hips_highest_cm"]
+            and self.added_turn <= LIMITS["added_turn_degrees"]
+        )
 
 
 class Soak(TypedDict):
@@ -125,11 +173,12 @@ def soak(
 ) -> Soak:
     """The worst values over all characters and frames.
 
-    `finite`: whether all numbers are finite. `hips_lowest_cm`, `hips_highest_cm`: above the ground under
-    them. `network_turn_degrees`: largest turn of a joint in a frame by the network, `turn_degrees`: by the
-    pose, `added_turn_degrees`: largest difference of the two in the same joint and frame; `frames_beyond`:
-    frames of a character in which it exceeds its limit. `fastest_joint_cm`: a frame. `slide_cm`: mean of a
-    stance. `holds`: whether all values are within LIMITS.
+    `finite`: whether all numbers are finite. `hips_lowest_cm`, `hips_highest_cm`: height of the hips above
+    the ground under them. `network_turn_degrees`: largest turn of a joint in one frame as predicted by the
+    network; `turn_degrees`: as drawn; `added_turn_degrees`: largest difference, drawn minus predicted, of the
+    same joint and frame. `frames`, `frames_beyond`: frames of all characters, and those of them in which the
+    added turn exceeds its limit. `fastest_joint_cm`: largest movement of a joint in one frame. `slide_cm`:
+    mean slide of a toe in a stance. `stances`: their number. `holds`: whether all values are within LIMITS.
     """
     rng = np.random.default_rng(seed)
     skeleton = network.skeleton
@@ -142,43 +191,34 @@ def soak(
     ground, targets = grounds(characters, rng), Targets.none(characters, dict(network.layout.channels))
     hips = skeleton.role("hips")
     toes = [skeleton.role("left_toe"), skeleton.role("right_toe")]
-    low, high, worst = np.inf, -np.inf, dict.fromkeys(("network", "pose", "added", "speed"), 0.0)
+    worst = WorstPoses()
     slides = StanceSlides(np.zeros((characters, 2)), np.zeros((characters, 2), int))
     old: tuple[Array, ...] | None = None
-    finite, wild = True, 0
     for _ in range(frames):
         targets.renew(rng)
         pose = animation.next_pose(
             targets.velocity, targets.facing, targets.gait, terrain=ground, **targets.channels
         )
-        finite = finite and bool(np.isfinite(pose.positions).all() and np.isfinite(pose.rotations).all())
+        worst.finite &= bool(np.isfinite(pose.positions).all() and np.isfinite(pose.rotations).all())
         at = pose.positions[:, hips]
-        height = at[:, 1] - ground(at[:, 0], at[:, 2])
-        low, high = min(low, float(height.min())), max(high, float(height.max()))
+        worst.add_heights(at[:, 1] - ground(at[:, 0], at[:, 2]))
         now = pose.positions, pose.rotations, animation.state.joint_rotation.copy()
         if old is not None:
-            predicted, drawn = turn_angles(now[2], old[2]), turn_angles(now[1], old[1])
-            moved = np.linalg.norm(now[0] - old[0], axis=-1)
-            for key, value in zip(worst, (predicted, drawn, drawn - predicted, moved), strict=True):
-                worst[key] = max(worst[key], float(value.max()))
-            wild += int(((drawn - predicted).max(axis=1) > LIMITS["added_turn_degrees"]).sum())
+            worst.add_movement(now, old)
             slides.add(now[0][:, toes], old[0][:, toes], pose.contacts[:, 1::2] >= STANCE)
         old = now
     slide = np.concatenate(slides.done)
     return {
         "frames": characters * frames,
-        "finite": finite,
-        "hips_lowest_cm": round(low, 1),
-        "hips_highest_cm": round(high, 1),
-        "network_turn_degrees": round(worst["network"], 1),
-        "turn_degrees": round(worst["pose"], 1),
-        "added_turn_degrees": round(worst["added"], 1),
-        "frames_beyond": wild,
-        "fastest_joint_cm": round(worst["speed"], 1),
+        "finite": worst.finite,
+        "hips_lowest_cm": round(worst.hips_lowest, 1),
+        "hips_highest_cm": round(worst.hips_highest, 1),
+        "network_turn_degrees": round(worst.network_turn, 1),
+        "turn_degrees": round(worst.turn, 1),
+        "added_turn_degrees": round(worst.added_turn, 1),
+        "frames_beyond": worst.frames_beyond,
+        "fastest_joint_cm": round(worst.fastest_joint, 1),
         "slide_cm": round(float(slide.mean()), 3) if len(slide) else None,
         "stances": len(slide),
-        "holds": finite
-        and low >= LIMITS["hips_lowest_cm"]
-        and high <= LIMITS["hips_highest_cm"]
-        and worst["added"] <= LIMITS["added_turn_degrees"],
+        "holds": worst.hold,
     }

@@ -1,4 +1,4 @@
-"""Does the motion stay plausible? The worst values in minutes of walks, jogs, crouches, strafes and turns."""
+"""Does the motion stay plausible? The worst values in minutes of walking, jogging, crouching and turning."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from hobble.runtime.feet import leg_joints, sole_heights
 from hobble.runtime.options import Runtime
 
 FPS = 60
-# kind -> speed in cm a frame, whether to face a random direction, gait
+# kind of target -> speed in cm a frame, whether to face a random direction, gait
 KINDS: dict[str, tuple[float, bool, str]] = {
     "walk": (2.5, False, "walk"),
     "jog": (7.0, False, "jog"),
@@ -45,7 +45,7 @@ class SteadyTarget:
 
 
 class Worst(TypedDict):
-    """The worst values of some frames; None without a step or a foot near the ground. See `stability`."""
+    """The worst values of some frames. A value is None if there was nothing to measure. See `stability`."""
 
     frames: int
     finite: bool
@@ -83,12 +83,13 @@ def stretches(minutes: float, seed: int = 1) -> Iterator[SteadyTarget]:
 def stability(
     network: Network, minutes: float = 10.0, seed: int = 1, runtime: Runtime | None = None
 ) -> Stability:
-    """The worst values of `minutes` on flat ground, in all and by kind.
+    """The worst values in `minutes` on flat ground: of all frames, and of each of KINDS.
 
     `finite`: whether all numbers are finite. `hips_lowest_cm`, `hips_highest_cm`: above the ground.
-    `largest_turn_degrees`: of a joint in a frame, in the world. `foot_slide_cm`: mean of a step. `steps`:
-    their number. `foot_down_share`: share of the frames in which a foot stands. `skating_cm`: mean of a foot
-    and frame, see `motion_measures.skating`. `stable`: whether all values are within LIMITS.
+    `largest_turn_degrees`: largest turn of a joint in one frame, in the world. `foot_slide_cm`: mean slide of
+    a toe in a step. `steps`: their number. `foot_down_share`: share of the frames in which a foot stands.
+    `skating_cm`: mean over feet and frames (`motion_measures.skating`). `stable`: whether all values are
+    within LIMITS.
     """
     animation = ProceduralAnimation(network, **dict(runtime or Runtime()))
     assert network.skeleton is not None

@@ -1,1 +1,1 @@
-"""The body of a skeleton: one closed surface that the joint rotations move."""
+"""The body around a skeleton: one closed surface, which moves with the joints."""

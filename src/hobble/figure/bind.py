@@ -1,4 +1,4 @@
-"""The bind pose of a body: arms and legs slightly spread, so that they do not touch it."""
+"""The bind pose of a body: arms and legs are slightly spread, so that they do not touch other parts."""
 
 from __future__ import annotations
 
@@ -20,8 +20,8 @@ SHORTEST = 0.5  # cm; a bone shorter than this has no direction
 class BindPose:
     """World positions (J, 3) in cm and rotations (J, 4) of all joints.
 
-    `bones`: role -> the joint that moves that part of the body; if the skeleton has no such joint, the next
-    joint above. `at`: role -> its position (3,).
+    `bones`: role (such as "left_knee") -> the joint that moves this part of the body; if the skeleton has no
+    joint for the role, the next joint above. `at`: role -> its position (3,), cm.
     """
 
     positions: Array
@@ -61,7 +61,7 @@ def _has_role(skeleton: Skeleton, role: str) -> bool:
 
 
 def _bones(skeleton: Skeleton) -> dict[str, int]:
-    """The joint that moves the part below each role."""
+    """Role -> the joint that moves the part of the body below it."""
     found = {role: skeleton.role(role) for role in skeleton.roles if _has_role(skeleton, role)}
     hips = found["hips"]
     found.setdefault("neck", max(skeleton.parents[found["head"]], 0))

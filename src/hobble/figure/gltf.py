@@ -21,9 +21,9 @@ from hobble.figure.mesh import NEEDED, Mesh, body
 from hobble.figure.pack import whole_weights
 
 METRES = 0.01  # metres per centimetre
-MOVES = 1e-5  # a component of a rotation that varies less than this stands still
+MOVES = 1e-5  # a joint does not move if the components of its rotation vary by less than this
 COLOUR = (0.72, 0.72, 0.69, 1.0)
-# Component types and targets of the format.
+# Component types (FLOAT to INT) and buffer targets (ARRAY, ELEMENTS) of the format.
 FLOAT, BYTE, SHORT, INT = 5126, 5121, 5123, 5125
 ARRAY, ELEMENTS = 34962, 34963
 
@@ -81,7 +81,7 @@ class _Buffer:
 
 
 def write_glb(path: str | Path, skeleton: Skeleton, motions: Iterable[BodyMotion] = ()) -> None:
-    """Write the body of a skeleton, standing with its soles at height 0, and its motions as animations."""
+    """Write the body of a skeleton and its motions, as animations. The body stands on height 0."""
     mesh, buffer = body(skeleton), _Buffer()
     nodes = _nodes(skeleton, mesh)
     document: dict[str, object] = {
@@ -160,7 +160,7 @@ def _primitive(mesh: Mesh, buffer: _Buffer) -> dict[str, object]:
 
 
 def _undoing(mesh: Mesh) -> NDArray[np.float32]:
-    """Inverse bind matrices (B, 16), in column order."""
+    """Inverse bind matrices (B, 16), column by column."""
     turn = quat.to_matrix(quat.inv(mesh.rotations))
     out = np.tile(np.eye(4), (len(mesh.bones), 1, 1))
     out[:, :3, :3] = turn

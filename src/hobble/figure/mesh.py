@@ -22,25 +22,27 @@ from hobble.figure.skin import owners, spread
 from hobble.figure.solids import Rod, Solid
 from hobble.figure.surface import FAR, Fine, distances, slopes, surface
 
-STEP = 1.9  # cm between the corners of trunk and limbs
-FINE = {"hand": 0.64, "face": 0.85, "foot": 1.2}
-WIDE = {"": 3.6, "hand": 0.8, "head": 2.6, "foot": 1.8}  # cm over which the weights of two bones blend
+STEP = 1.9  # cm between corners of the mesh on trunk and limbs
+FINE = {"hand": 0.64, "face": 0.85, "foot": 1.2}  # cm between corners on finer parts
+# cm over which the weights of two bones blend; "": all other parts
+WIDE = {"": 3.6, "hand": 0.8, "head": 2.6, "foot": 1.8}
 OPEN = (
     (1.5, 0.30),
     (4.0, 0.30),
     (9.0, 0.25),
 )  # distances (cm) at which surroundings are sampled for shading, with weights
 NEEDED = ("hips", "head", *(f"{s}_{r}" for s in SIDES for r in ("shoulder", "hip", "knee", "heel", "toe")))
-STICK = (2.6, 1.9)  # cm, half widths of a bone of a skeleton without roles
+STICK = (2.6, 1.9)  # cm, half widths at both ends of a bone, for a skeleton without roles
 
 
 @dataclass(frozen=True)
 class Mesh:
     """A body in its bind pose, centimetres.
 
-    corners, normals: (V, 3); faces: (T, 3), counter-clockwise seen from outside; shade: (V,) how open to the
-    sky around a corner is, 0..1; bones: (B,) joints of the skeleton; bone: (V, 4) indices into these; share:
-    (V, 4), summing to 1; positions (B, 3) and rotations (B, 4): the bones in the bind pose.
+    corners, normals: (V, 3). faces: (T, 3) indices of corners, counter-clockwise seen from outside. shade:
+    (V,) how little of a corner's surroundings is covered by the body, 0 to 1. bones: (B,) joints of the
+    skeleton that move the body. bone: (V, 4) the bones that move each corner, as indices into `bones`. share:
+    (V, 4) their weights, which sum to 1. positions (B, 3), rotations (B, 4): the bones in the bind pose.
     """
 
     corners: Array = field(repr=False)
@@ -76,15 +78,15 @@ def _skinned(corners: Array, bone: Any, share: Array, turn: Array, move: Array) 
 
 
 def body(skeleton: Skeleton) -> Mesh:
-    """The body of a skeleton: a person if it has the roles, else a rod for every bone.
+    """The body of a skeleton: a person if the skeleton has the roles NEEDED, else a rod for every bone.
 
-    It depends on joints, offsets and roles only, and is made once for each.
+    It depends only on joints, offsets and roles. Skeletons that agree in these share one mesh.
     """
     return _mesh_of(_text(skeleton))
 
 
 def key(skeleton: Skeleton) -> str:
-    """A name for the body of a skeleton, the same for skeletons that share it."""
+    """A name for the body of a skeleton. Skeletons with the same body get the same name."""
     return hashlib.sha256(_text(skeleton).encode()).hexdigest()[:12]
 
 
@@ -124,7 +126,7 @@ def _mesh_of(text: str) -> Mesh:
 
 
 def _fine(stand: BindPose) -> list[Fine]:
-    """The regions with finer steps: hands, face, feet."""
+    """The boxes in which the mesh is finer: hands, face, feet."""
     size, at = scale(stand), stand.at
     out: list[Fine] = []
     head = at["head"]
@@ -158,7 +160,7 @@ def _reach(owner: NDArray[np.int64], stand: BindPose, size: float) -> Array:
 
 
 def _shade(solids: Sequence[Solid], corners: Array, normals: Array, size: float) -> Array:
-    """Ambient shade (V,) of each corner, 0 to 1, from distances along its normal."""
+    """`Mesh.shade` (V,), from the distances to the body at points along each corner's normal (OPEN)."""
     shade = np.ones(len(corners))
     for away, weight in OPEN:
         reach = size * away
@@ -168,7 +170,7 @@ def _shade(solids: Sequence[Solid], corners: Array, normals: Array, size: float)
 
 
 def _sticks(skeleton: Skeleton) -> tuple[BindPose, list[Solid], dict[str, int]]:
-    """A rod for every bone, at rest."""
+    """The rest pose, a rod for every bone in it, and joint name -> index."""
     count = len(skeleton.joints)
     positions = np.zeros((count, 3))
     for j, p in enumerate(skeleton.parents):

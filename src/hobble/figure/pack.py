@@ -1,4 +1,4 @@
-"""Packs a body for the page: integers as base64, and the links in each part of the body."""
+"""Packs a body for the page: its arrays as integers in base64, and the links that each bone moves."""
 
 from __future__ import annotations
 
@@ -14,12 +14,16 @@ from hobble.core.skeleton import Skeleton
 from hobble.figure.mesh import Mesh, body
 from hobble.models.packing import packed
 
-UNIT = 0.01  # cm, one step of positions of corners and bones
+UNIT = 0.01  # cm; positions of corners are multiples of this
 TURN = 32767  # integer that stands for 1 in a rotation
 
 
 def packed_body(skeleton: Skeleton) -> dict[str, Any]:
-    """The mesh of `mesh.body` with the data that moves it. `keep`: the joints that are its bones."""
+    """The mesh of `mesh.body` with the data that moves it.
+
+    `unit`: UNIT. `wide`: whether `faces` are 32-bit. `keep`: the joints that are bones of the mesh. `places`,
+    `turns`: their positions and rotations in the bind pose. `balls`: see `balls`. Other keys: as in `Mesh`.
+    """
     mesh = body(skeleton)
     wide = np.uint16 if len(mesh.corners) < 1 << 16 else np.uint32
     return {
@@ -39,9 +43,9 @@ def packed_body(skeleton: Skeleton) -> dict[str, Any]:
 
 
 def balls(mesh: Mesh) -> Array:
-    """A ball for the part that each bone moves: its middle (B, 3) seen from the bone, and its half width.
+    """(B, 4) a ball for the part that each bone moves: centre in the bone's coordinates, and radius, cm.
 
-    They stand for the body where only its outline counts, as in the shade that it gives the ground.
+    The balls replace the body where a rough shape is enough, as for its shadow on the ground.
     """
     out = np.zeros((len(mesh.bones), 4))
     main = np.take_along_axis(mesh.bone, mesh.share.argmax(axis=1)[:, None], axis=1)[:, 0]
@@ -55,17 +59,17 @@ def balls(mesh: Mesh) -> Array:
 
 
 def whole_weights(share: Array) -> NDArray[np.uint8]:
-    """Weights (V, 4) as integers (V, 4) that sum to 255; the largest takes the rounding error."""
+    """Weights (V, 4) as integers (V, 4) that sum to 255. The rounding error is added to the largest."""
     steps = np.floor(share * 255).astype(np.int64)
     steps[np.arange(len(steps)), share.argmax(axis=1)] += 255 - steps.sum(axis=1)
     return steps.astype(np.uint8)
 
 
 def regions(skeleton: Skeleton, links: Sequence[str]) -> list[list[int]]:
-    """For each bone of the body the links, by index, that lie in the part of the body that it moves.
+    """For each bone of the body, the indices of the links in the part of the body that it moves.
 
-    A link lies where the joint at its upper end is; those that leave hips and chest belong to the limb, or
-    to the part of the back, to which they lead.
+    A link belongs to the bone that moves its upper joint. A link that starts at the hips or the chest belongs
+    to the bone of the limb, or of the part of the back, that it leads to.
     """
     bones = body(skeleton).bones.tolist()
     turning = {
@@ -106,5 +110,5 @@ def link_ends(joints: Sequence[str], links: Sequence[str]) -> list[tuple[int, in
 
 
 def packed_turns(rotations: Array) -> str:
-    """Rotations (F, B, 4) as 16-bit integers."""
+    """Rotations (F, B, 4) as 16-bit integers in base64; TURN is 1."""
     return packed(np.round(np.clip(rotations, -1, 1) * TURN).astype(np.int16))

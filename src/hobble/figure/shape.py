@@ -1,6 +1,6 @@
 """The shape of a person around the joints of a skeleton: all numbers of its proportions.
 
-Tables are in centimetres for a body whose hips are 81 cm above its ankles, and grow with the skeleton.
+Tables are in centimetres for a body with LEG_LENGTH, and are scaled to the skeleton.
 """
 
 from __future__ import annotations
@@ -13,12 +13,12 @@ from hobble.core.quat import Array
 from hobble.figure.bind import SIDES, BindPose
 from hobble.figure.solids import Ball, Floor, Owner, Rod, Solid, SweptSolid
 
-LEG_LENGTH = 81.0  # cm from hip to ankle in the body of the tables
+LEG_LENGTH = 81.0  # cm from hip to ankle of the body that the tables describe
 TOE_HEIGHT = 2.5  # cm, height of the ball of the foot above the sole
-# Heights (cm) of hip joints, chest, neck and head in the table of the trunk. They are scaled to the skeleton.
+# Heights (cm) of hip joints, chest, neck and head in TRUNK. They are moved to those of the skeleton.
 LEVELS = (-8.0, 23.0, 38.0, 48.0)
 
-# height; half width; half depth; centre, to the front; exponent of the superellipse
+# height; half width; half depth; how far the centre is to the front; exponent of the superellipse
 TRUNK = (
     (-18.5, 3.5, 4.5, 0.2, 2.0),
     (-16.5, 7.0, 7.0, 0.0, 2.0),
@@ -38,7 +38,7 @@ TRUNK = (
     (49.0, 5.1, 5.4, -0.1, 2.0),
     (54.0, 4.2, 4.6, 0.4, 2.0),
 )
-# position along thigh (0 to 1) and shank (1 to 2); half width; half depth; centre, to the front
+# position along thigh (0 to 1) and shank (1 to 2); half width; half depth; how far the centre is to the front
 LEG = (
     (-0.2, 2.5, 3.5, -0.4),
     (-0.12, 6.0, 7.6, -0.3),
@@ -72,7 +72,7 @@ ARM = (
     (1.93, 2.7, 1.95),
     (2.03, 2.7, 1.9),
 )
-# cm from the wrist; half width; half thickness; centre, towards the thumb
+# cm from the wrist; half width; half thickness; how far the centre is towards the thumb
 PALM = (
     (-1.5, 2.4, 1.7, 0.0),
     (0.5, 2.8, 1.75, 0.1),
@@ -81,11 +81,11 @@ PALM = (
     (9.2, 3.9, 1.3, 0.0),
     (10.2, 3.3, 1.0, 0.0),
 )
-# each finger: place across the palm; cm from the wrist where it begins; length; half width
+# each finger: place across the palm; distance of its beginning from the wrist; length; half width
 FINGERS = ((3.1, 8.7, 7.0, 0.84), (1.0, 9.2, 7.8, 0.86), (-1.1, 8.9, 7.2, 0.83), (-3.05, 8.1, 5.6, 0.74))
 CURL = (0.16, 0.30, 0.26)  # radians, bend of each finger joint
-# place along the foot (share of the way from ankle to ball, plus cm); half width; height; centre, towards the
-# other foot
+# place along the foot in two numbers (share of the way from ankle to ball, and cm to add); half width;
+# height; how far the centre is towards the other foot
 FOOT = (
     (0.0, -6.0, 2.4, 4.6, 0.0),
     (0.0, -5.0, 3.2, 6.8, 0.0),
@@ -118,7 +118,7 @@ def person(bind: BindPose) -> Iterator[Solid]:
 
 
 def scale(bind: BindPose) -> float:
-    """Leg length of the body, divided by LEG_LENGTH."""
+    """Leg length of the body, divided by LEG_LENGTH. The tables are multiplied by this."""
     legs = [np.linalg.norm(bind.at[f"{s}_{a}"] - bind.at[f"{s}_{b}"]) for s in SIDES for a, b in
             (("heel", "knee"), ("knee", "hip"))]  # fmt: skip
     return float(max(sum(legs) / 2 / LEG_LENGTH, 0.05))
@@ -186,14 +186,14 @@ def _unit(v: Array) -> Array:
 def _limb(
     places: tuple[Array, Array, Array], forward: Array, table: tuple, size: float, roles: tuple[str, str]
 ) -> SweptSolid:
-    """A sweep along two bones in a line.
+    """A solid along two bones, which are in one line in the bind pose.
 
-    table: rows of position, half width, half depth, centre to the front.
+    places: the three joints. table: rows as in LEG. roles: of the two bones.
     """
     a, b, c = places
     axis = _unit(c - a)
     first, second = float((b - a) @ axis), float((c - b) @ axis)
-    across = _unit(np.cross(axis, forward))  # so that the third direction is the front
+    across = _unit(np.cross(axis, forward))  # so that the third direction is `forward`
     across = -across if np.cross(axis, across) @ forward < 0 else across
     rows = []
     for t, wide, deep, front in table:
@@ -217,7 +217,7 @@ def _with_blend(sweep: SweptSolid, blend: float) -> SweptSolid:
 
 def _arm(at: dict[str, Array], side: str, sign: float, size: float) -> Iterator[Solid]:
     shoulder, elbow, wrist = (at[f"{side}_{role}"] for role in ("shoulder", "elbow", "wrist"))
-    # The third direction points to the back of the hand, so that the half width is from front to back.
+    # The third direction points outward, to the back of the hand. So the half width is from front to back.
     out = np.array([sign, 0.6, 0.0])
     table = [(t, wide, deep, 0.0) for t, wide, deep in ARM]
     arm = _limb((shoulder, elbow, wrist), out, tuple(table), size, (f"{side}_shoulder", f"{side}_elbow"))

@@ -12,11 +12,11 @@ from scipy.sparse.linalg import splu
 from hobble.core.quat import Array
 from hobble.figure.solids import Solid
 
-MOST = 4  # bones that move one corner
+MOST = 4  # most bones that move one corner
 
 
 def owners(solids: Sequence[Solid], points: Array, bones: Mapping[str, int]) -> NDArray[np.int64]:
-    """The joint (V,) whose part of the body is nearest to each corner."""
+    """(V,) the joint whose part of the body is nearest to each of the points (V, 3)."""
     best, found = np.full(len(points), np.inf), np.zeros(len(points), np.int64)
     x, y, z = points.T
     for solid in solids:
@@ -38,11 +38,11 @@ def owners(solids: Sequence[Solid], points: Array, bones: Mapping[str, int]) -> 
 def spread(
     corners: Array, faces: NDArray[np.int64], owner: NDArray[np.int64], reach: float | Array
 ) -> tuple[NDArray[np.int64], Array]:
-    """Joints (V, 4) and their weights (V, 4), largest first. Weights sum to 1.
+    """The joints (V, 4) that move each corner and their weights (V, 4), largest first. Weights sum to 1.
 
-    At first each corner belongs to its owner alone. Then the weights spread along the surface like heat, over
-    about `reach` cm (one number, or one for each corner). So a hand that hangs beside a thigh gets no weight
-    from it.
+    At first each corner has weight 1 for its `owner` (V,). Then the weights spread along the surface like
+    heat, over about `reach` cm (one number, or one for each corner). So a hand that hangs beside a thigh gets
+    no weight from it.
     """
     joints = np.unique(owner)
     shares = (owner[:, None] == joints).astype(float)

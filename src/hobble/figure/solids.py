@@ -11,7 +11,7 @@ from scipy.interpolate import CubicSpline
 
 from hobble.core.quat import Array
 
-# The part of a solid that one bone moves: (where it starts along the solid, role of the bone).
+# The part of a solid that one bone moves: (where this part starts along the solid, cm; role of the bone).
 Owner = tuple[float, str]
 
 
@@ -19,8 +19,8 @@ Owner = tuple[float, str]
 class Solid:
     """A part of a body. Solids are added one after another; each is blended with the body so far.
 
-    blend: width of the blend, cm. owners: the bones that move it, in order along its length. cut: remove it
-    from the body instead of adding it.
+    blend: width of the blend, cm. owners: the bones that move it, in order along its length. cut: the solid
+    is removed from the body instead of added.
     """
 
     blend: float
@@ -28,7 +28,7 @@ class Solid:
     cut: bool = field(default=False, kw_only=True)
 
     def distance(self, x: Any, y: Any, z: Any) -> Array:
-        """Signed distances of world points, given as arrays that broadcast."""
+        """Signed distances of the points (x, y, z), cm. The three arrays broadcast."""
         raise NotImplementedError
 
     def bounds(self) -> tuple[Array, Array]:
@@ -42,11 +42,11 @@ class Solid:
 
 @dataclass(frozen=True)
 class SweptSolid(Solid):
-    """Sections across a straight line from `start` along the unit vector `axis`.
+    """A solid that is given by sections across a straight line from `start` along the unit vector `axis`.
 
     sections: rows of (position along the line, half width along `across`, half depth along the third
     direction, centre along `across`, centre along the third direction, exponent of the superellipse: 2 is an
-    ellipse). Cubic splines connect the sections, so that none is visible as an edge.
+    ellipse), cm. Cubic splines connect the sections, so that none is visible as an edge.
     """
 
     start: Array
@@ -94,7 +94,7 @@ class SweptSolid(Solid):
 
 @dataclass(frozen=True)
 class Ball(Solid):
-    """An ellipsoid: half axes `radii` along the rows of `axes` (3, 3)."""
+    """An ellipsoid with half axes `radii` (3,) along the rows of `axes` (3, 3)."""
 
     centre: Array
     radii: Array
@@ -139,7 +139,7 @@ class Rod(Solid):
 
 @dataclass(frozen=True)
 class Floor(Solid):
-    """Removes everything below a plane through `place`, within `reach` cm of that point."""
+    """What is below a plane through `place`, within `reach` cm of that point. up: normal of the plane."""
 
     place: Array
     up: Array

@@ -21,7 +21,10 @@ Fine = tuple[Array, Array, float]
 
 
 def distances(solids: Sequence[Solid], points: Array) -> Array:
-    """Distance (N,) of points (N, 3) to the surface of the blended solids, below 0 inside, FAR at most."""
+    """(N,) distance of points (N, 3) from the surface of the blended solids, cm. It is negative inside.
+
+    The largest value is FAR.
+    """
     out = np.full(len(points), FAR)
     x, y, z = (np.ascontiguousarray(part) for part in points.T)
     for solid in solids:
@@ -37,7 +40,7 @@ def distances(solids: Sequence[Solid], points: Array) -> Array:
 
 
 def grid_lines(low: float, high: float, step: float, bands: Sequence[tuple[float, float, float]]) -> Array:
-    """Grid coordinates from low to high with spacing `step`, finer near bands (from, to, step)."""
+    """Grid coordinates from low to high with spacing `step`, or finer near the `bands` (from, to, step)."""
     places, at = [low], low
     while at < high:
         here = min([step, *(_gentle(at, band) for band in bands)])
@@ -47,13 +50,13 @@ def grid_lines(low: float, high: float, step: float, bands: Sequence[tuple[float
 
 
 def _gentle(at: float, band: tuple[float, float, float]) -> float:
-    """Largest spacing at a coordinate: that of the band, growing with the distance from it."""
+    """The largest spacing at a coordinate: the step of the band, plus a quarter of the distance from it."""
     low, high, step = band
     return step + 0.25 * max(low - at, at - high, 0.0)
 
 
 def field(solids: Sequence[Solid], axes: Sequence[Array]) -> Array:
-    """Distances (X, Y, Z) to the blended solids on the grid of three axes, cm; FAR away from all solids."""
+    """(X, Y, Z) distances from the blended solids on the grid of three axes, cm; FAR away from all solids."""
     out = np.full([len(axis) for axis in axes], FAR, np.float64)
     for solid in solids:
         low, high = solid.bounds()
@@ -92,7 +95,7 @@ def surface(
 
 
 def offsets(solids: Sequence[Solid], points: Array, most: float) -> Array:
-    """(N, 3) vectors from the surface to points (N, 3), along the slope, at most `most` cm long."""
+    """(N, 3) vectors from the surface to points (N, 3), in the direction of the slope, at most `most` cm."""
     slope, away = slopes(solids, points)
     steep = (slope * slope).sum(axis=1)
     move = (away / np.maximum(steep, 0.25))[:, None] * slope
@@ -103,7 +106,7 @@ def offsets(solids: Sequence[Solid], points: Array, most: float) -> Array:
 def slopes(solids: Sequence[Solid], points: Array, h: float = 0.06) -> tuple[Array, Array]:
     """Slope (N, 3) of the distance at points (N, 3), and the distance (N,).
 
-    Both are estimated from the corners of a tetrahedron of `h` cm around each point.
+    Both are estimated from the corners of a tetrahedron around each point, `h` cm away along each axis.
     """
     slope, away = np.zeros_like(points), np.zeros(len(points))
     for corner in np.array([[1.0, -1, -1], [-1, -1, 1], [-1, 1, -1], [1, 1, 1]]):
@@ -117,7 +120,7 @@ def without_touching_sheets(values: Array) -> Array:
     """The distances, changed so that two sheets of the surface never touch along an edge.
 
     They touch at a square of the grid of which two opposite corners are inside and the other two outside.
-    There the outer corner nearest to the surface is moved inside, which closes the gap.
+    There the outer corner nearest to the surface becomes an inner one, which joins the two sheets.
     """
     values = values.copy()
     while True:
@@ -141,10 +144,10 @@ def without_touching_sheets(values: Array) -> Array:
 
 
 def surface_net(values: Array, axes: Sequence[Array]) -> tuple[Array, NDArray[np.int64]]:
-    """Corners (V, 3) and triangles (T, 3) of the surface where the grid's `values` are 0.
+    """Vertices (V, 3) and triangles (T, 3) of the surface where the grid's `values` are 0.
 
-    Each cell that the surface crosses has one corner. Each edge of the grid that it crosses is surrounded by
-    four such cells; their corners make two triangles.
+    Each cell that the surface crosses gets one vertex of the mesh. Each edge of the grid that the surface
+    crosses is surrounded by four such cells; their vertices make two triangles.
     """
     inside = values < 0
     shape = np.array(values.shape) - 1

@@ -45,7 +45,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 
 def _seconds(text: str) -> float:
-    """A window's length from the command line: at least a cycle, at most a clip."""
+    """A window's length from the command line, 1 to 3600 seconds."""
     seconds = float(text)
     if not 1.0 <= seconds <= 3600.0:
         raise ValueError
@@ -69,21 +69,22 @@ def _compared(path: str, options: argparse.Namespace, healthy: Profile) -> WalkC
     return compare(clip, healthy, options.window)
 
 
-def describe(name: str, seen: WalkComparison, side: str | None = None) -> str:
-    """The answers, and the effects next to people's, as text."""
-    answer, grade = seen.answer, seen.grade
+def describe(name: str, compared: WalkComparison, side: str | None = None) -> str:
+    """The recognisers' answers as text, and the effects next to those of people."""
+    answer, grade = compared.answer, compared.grade
     side = side or answer.side or grade.side or RIGHT
     likely = ", ".join(f"{gait} {answer.probabilities[gait]:.2f}" for gait in GAITS)
     lines = [
-        f"{name}: {answer.label} {answer.side or ''} ({len(seen.walk)} cycles)",
+        f"{name}: {answer.label} {answer.side or ''} ({len(compared.walk)} cycles)",
         f"  probabilities: {likely}",
-        f"  windows: {len(seen.windows)}, called {_listed(seen.named())}",
+        f"  windows: {len(compared.windows)}, called {_listed(compared.named())}",
         f"  mild limps too: {grade.label} {grade.side or ''}, {grade.strength:.2f} of what people showed, "
         f"{grade.distance:.1f} standard deviations from it",
-        f"  what may hurt: {', '.join(grade.parts) or 'nothing'}; windows called {_listed(seen.graded())}",
+        f"  what may hurt: {', '.join(grade.parts) or 'nothing'}; "
+        f"windows called {_listed(compared.graded())}",
         f"  effects, hurt side {side}, beside people ({SOURCE}; mean, spread over people)",
     ]
-    return "\n".join([*lines, *_effects(seen.effects[side])])
+    return "\n".join([*lines, *_effects(compared.effects[side])])
 
 
 def _effects(sizes: Mapping[str, float]) -> list[str]:

@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 from hobble.core.clip import Clip
 from hobble.gait.cycles import WalkCycles, joined, measure
 from hobble.gait.effect_sizes import effects
-from hobble.gait.graded import Grade, grade
+from hobble.gait.limp_grade import Grade, grade
 from hobble.gait.people import people
 from hobble.gait.profile import Profile, profile
 from hobble.gait.recogniser import RIGHT, SIDES, Impairment, recognise, windows
@@ -18,9 +18,10 @@ from hobble.gait.recogniser import RIGHT, SIDES, Impairment, recognise, windows
 class WalkComparison:
     """Measurements of a clip and the recognisers' answers.
 
-    walk: its cycles. profile: its numbers. answer: the linear classifier's, for the whole clip. grade: the
-    graded recogniser's, which knows mild limps. windows, grades: (first frame, answer or grade) of each
-    window. effects: side -> sizes, as if that side were hurt.
+    walk: the clip's cycles. profile: their medians. answer: what the linear classifier says of the whole
+    clip. grade: what the graded recogniser, which knows mild limps, says of it. windows, grades: (first
+    frame, answer or grade) of each window. effects: side -> sizes of the effects if that side is the hurt
+    one.
     """
 
     walk: WalkCycles = field(repr=False)
@@ -41,7 +42,7 @@ class WalkComparison:
         return _shares([answer for _, answer in self.windows])
 
     def graded(self) -> dict[str, float]:
-        """The same for the graded recogniser."""
+        """Share of windows for each label and side of the graded recogniser."""
         return _shares([answer for _, answer in self.grades])
 
 
@@ -56,7 +57,7 @@ def measure_clip(clip: Clip) -> WalkCycles:
 
 
 def healthy_profile(clips: Sequence[Clip]) -> Profile:
-    """The profile of a figure's healthy clips, all cycles together. Without clips, people's mean.
+    """The profile of all cycles of a figure's healthy clips. Without clips, the mean of people.
 
     Raises HobbleError if no clip has a cycle.
     """
@@ -69,7 +70,7 @@ def compare(clip: Clip, healthy: Profile, seconds: float = 4.0) -> WalkCompariso
 
 
 def compare_walk(walk: WalkCycles, frames: int, healthy: Profile, seconds: float = 4.0) -> WalkComparison:
-    """The same for the cycles that `measure` found in a motion of `frames` frames."""
+    """Compare the cycles of a motion of `frames` frames with a healthy profile. See `compare`."""
     own = profile(walk)
     parts = [(start, profile(part)) for start, part in windows(walk, frames, seconds)]
     return WalkComparison(

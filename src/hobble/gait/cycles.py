@@ -27,12 +27,12 @@ SCALARS = (
     "step_L",
     "step_width",
 )
-SLOW = 0.35  # share of the walking speed: a slower ankle stands
+SLOW = 0.35  # share of the walking speed; an ankle that is slower stands
 SHORTEST, LONGEST = 0.4, 3.5  # s, a cycle
-LEAST_TRAVEL = 0.2  # leg lengths in a cycle; a shorter one is standing
-LEAST_SWING = 0.12  # leg lengths: least range of an ankle in a step
-LEAST_TURN = 0.4  # share of the ankle's range within the longest cycle; smaller turns are no step
-STRAIGHT = 25.0  # degrees: most that the path turns in a cycle; people were measured on straight paths
+LEAST_TRAVEL = 0.2  # leg lengths that the hips travel in a cycle; less is standing
+LEAST_SWING = 0.12  # leg lengths that an ankle moves at least in a step, forward and then back
+LEAST_TURN = 0.4  # the same as a share of the ankle's range; smaller movements are no step
+STRAIGHT = 25.0  # degrees that the path turns at most in a cycle; people were measured on straight paths
 AHEAD = 0.7  # least mean cosine between facing and travel; below it the walk is backward or sideways
 
 
@@ -40,7 +40,7 @@ AHEAD = 0.7  # least mean cosine between facing and travel; below it the walk is
 class Cycle:
     """A cycle of the right leg, from its landing in frame `start` to the next in frame `end`.
 
-    scalars: by name of SCALARS. curves: (22, 50), rows as CURVES, at 50 equal steps from `start`.
+    scalars: the numbers of SCALARS. curves: (22, 50), rows as CURVES, at 50 equal steps from `start`.
     """
 
     start: int
@@ -53,8 +53,8 @@ class Cycle:
 class WalkCycles:
     """The cycles of a stretch of walking.
 
-    right: cycles that begin as the right foot lands. left: those that begin as the left foot lands, mirrored,
-    so that the leg that lands first is called R there, too.
+    right: cycles that begin as the right foot lands. left: cycles that begin as the left foot lands. They
+    are mirrored, so that R is the leg that lands first in both.
     """
 
     fps: float
@@ -62,7 +62,7 @@ class WalkCycles:
     left: tuple[Cycle, ...] = field(repr=False)
 
     def __len__(self) -> int:
-        """The number of cycles of the side with fewer."""
+        """The number of cycles of the side that has fewer."""
         return min(len(self.right), len(self.left))
 
     def within(self, start: float, end: float) -> WalkCycles:
@@ -78,14 +78,14 @@ class WalkCycles:
 def measure(skeleton: Skeleton, positions: Array, fps: float = 60.0) -> WalkCycles:
     """Find and measure the cycles in which a figure walks straight ahead.
 
-    positions: (F, J, 3) world, cm, Y up. Frames of standing, turning, and walking backward or
-    sideways give no cycle. Between the two landings of a cycle the other foot must land exactly once. A clip
+    positions: (F, J, 3) in the world, cm, Y up. Frames of standing, turning, and walking backward or sideways
+    give no cycle. Between the two landings of a cycle the other foot must land exactly once. A clip that is
     shorter than a cycle has none.
     """
     if len(positions) < SHORTEST * fps:
         return WalkCycles(fps, (), ())
-    seen = signals(skeleton, positions, fps)
-    return WalkCycles(fps, tuple(_cycles(seen)), tuple(_cycles(mirrored(seen))))
+    walk = signals(skeleton, positions, fps)
+    return WalkCycles(fps, tuple(_cycles(walk)), tuple(_cycles(mirrored(walk))))
 
 
 def joined(walks: Iterable[WalkCycles]) -> WalkCycles:
@@ -98,9 +98,9 @@ def joined(walks: Iterable[WalkCycles]) -> WalkCycles:
 
 
 def landings(forward: Array, fps: float) -> list[int]:
-    """Frames where an ankle, (F,) leg lengths ahead of the hips, is furthest ahead.
+    """Frames in which an ankle is furthest ahead of the hips. forward: (F,) how far, in leg lengths.
 
-    The ankle must then go back by LEAST_TURN of its range within the longest cycle around.
+    The ankle must then go back by LEAST_SWING, and by LEAST_TURN of its range in the LONGEST seconds around.
     """
     reach = int(LONGEST * fps / 2)
     least = np.maximum(LEAST_SWING, LEAST_TURN * _ranges(forward, reach))
@@ -126,23 +126,23 @@ def _ranges(values: Array, reach: int) -> Array:
     return np.ptp(np.lib.stride_tricks.sliding_window_view(padded, 2 * reach + 1), axis=1)
 
 
-def _cycles(seen: Signals) -> Iterable[Cycle]:
-    right, left = (landings(seen.curves[f"ankle_forward_{side}"], seen.fps) for side in "RL")
+def _cycles(walk: Signals) -> Iterable[Cycle]:
+    right, left = (landings(walk.curves[f"ankle_forward_{side}"], walk.fps) for side in "RL")
     for a, b in itertools.pairwise(right):
         between = [i for i in left if a < i < b]
-        if len(between) == 1 and SHORTEST * seen.fps <= b - a <= LONGEST * seen.fps:
-            travel = np.linalg.norm(np.diff(seen.hips[a : b + 1], axis=0), axis=1).sum()
-            straight = abs(seen.heading[b] - seen.heading[a]) <= STRAIGHT
-            if travel >= LEAST_TRAVEL and straight and seen.ahead[a:b].mean() >= AHEAD:
-                yield _cycle(seen, a, between[0], b)
+        if len(between) == 1 and SHORTEST * walk.fps <= b - a <= LONGEST * walk.fps:
+            travel = np.linalg.norm(np.diff(walk.hips[a : b + 1], axis=0), axis=1).sum()
+            straight = abs(walk.heading[b] - walk.heading[a]) <= STRAIGHT
+            if travel >= LEAST_TRAVEL and straight and walk.ahead[a:b].mean() >= AHEAD:
+                yield _cycle(walk, a, between[0], b)
 
 
-def _cycle(seen: Signals, a: int, other: int, b: int) -> Cycle:
-    seconds = (b - a) / seen.fps
-    speed = float(np.linalg.norm(seen.hips[b] - seen.hips[a])) / seconds
-    apart = seen.curves["ankle_forward_R"] - seen.curves["ankle_forward_L"]
-    standing = {side: float(np.mean(seen.ankle_speed[side][a:b] < SLOW * speed)) for side in "LR"}
-    width = [seen.across["L"][i] - seen.across["R"][i] for i in (a, other)]
+def _cycle(walk: Signals, a: int, other: int, b: int) -> Cycle:
+    seconds = (b - a) / walk.fps
+    speed = float(np.linalg.norm(walk.hips[b] - walk.hips[a])) / seconds
+    apart = walk.curves["ankle_forward_R"] - walk.curves["ankle_forward_L"]
+    standing = {side: float(np.mean(walk.ankle_speed[side][a:b] < SLOW * speed)) for side in "LR"}
+    width = [walk.across["L"][i] - walk.across["R"][i] for i in (a, other)]
     values = (
         seconds,
         speed,
@@ -155,5 +155,5 @@ def _cycle(seen: Signals, a: int, other: int, b: int) -> Cycle:
     )
     at = a + (b - a) * np.arange(SAMPLES) / SAMPLES
     frames = np.arange(a, b + 1)
-    curves = np.stack([np.interp(at, frames, seen.curves[name][a : b + 1]) for name in CURVES])
+    curves = np.stack([np.interp(at, frames, walk.curves[name][a : b + 1]) for name in CURVES])
     return Cycle(a, b, dict(zip(SCALARS, values, strict=True)), curves)

@@ -2,9 +2,9 @@
 
 python -m hobble.gait.derive_healthy CMU_FOLDER [OUT.npz]
 
-The file says how much a healthy walk differs from other healthy walks of the same person: at other speeds, on
-slight curves, between windows. The motion was obtained from mocap.cs.cmu.edu, which was funded by NSF
-EIA-0196217.
+The file says how much the features of a healthy walk differ from those of other healthy walks of the same
+person: at other speeds, on slight curves, between windows. The motion was obtained from mocap.cs.cmu.edu,
+which was funded by NSF EIA-0196217.
 """
 
 from __future__ import annotations
@@ -22,12 +22,12 @@ from hobble.core.quat import Array
 from hobble.gait.comparison import healthy_profile, measure_clip
 from hobble.gait.cycles import WalkCycles
 from hobble.gait.features import features
-from hobble.gait.graded import HEALTHY
+from hobble.gait.limp_grade import HEALTHY
 from hobble.gait.profile import Profile, mirrored, profile
 from hobble.gait.read_clip import SKELETONS, read_clip
 from hobble.gait.recogniser import windows
 
-# performer -> reference walks, and other walks: slow, quick, on curves
+# performer -> reference walks, which count as the healthy ones; and other walks: slow, quick, on curves
 REFERENCE = {
     "105": ("105_29", "105_31", "105_34", "105_36"),
     "07": ("07_01", "07_02", "07_03", "07_06"),
@@ -40,13 +40,13 @@ OTHERS = {
     "08": ("08_03", "08_04", "08_09", "08_11"),
     "16": ("16_11", "16_13", "16_17", "16_23", "16_25"),
 }
-SECONDS = 4.0
+SECONDS = 4.0  # length of a window
 
 
 def healthy_windows(
     folder: str | Path, performer: str, skeletons: str | Path = SKELETONS
 ) -> Iterator[tuple[str, Profile, Profile]]:
-    """(clip, profile, profile of the performer's other healthy walks) of each window of a performer."""
+    """For each window of a performer: clip, profile, and profile of the performer's other reference walks."""
     names = REFERENCE[performer] + OTHERS[performer]
     clips = {name: read_clip(Path(folder, f"{name}.bvh"), skeletons) for name in names}
     for name, clip in clips.items():
@@ -56,16 +56,16 @@ def healthy_windows(
 
 
 def _parts(clip: Clip) -> list[WalkCycles]:
-    """A clip's windows. A clip that is too short for one counts whole if it has a cycle."""
+    """The cycles in each window of a clip. A clip without a window is one part if it has a cycle."""
     walk = measure_clip(clip)
     found = [part for _, part in windows(walk, len(clip), SECONDS)]
     return found or [walk] * bool(len(walk))
 
 
 def covariance(seen: Iterable[tuple[str, Profile, Profile]]) -> tuple[Array, int]:
-    """(D, D) mean square of the windows' features, and the number of clips.
+    """The mean of x x^T, (D, D), over the features x (D,) of windows, and the number of clips.
 
-    Left and right count equally, and so does each clip.
+    Left and right count equally, and so do all clips. seen: from `healthy_windows`.
     """
     by_clip: dict[str, list[Array]] = {}
     for name, walk, healthy in seen:
@@ -76,7 +76,7 @@ def covariance(seen: Iterable[tuple[str, Profile, Profile]]) -> tuple[Array, int
 
 
 def derive(folder: str | Path, out: str | Path = HEALTHY) -> None:
-    """Write the covariance of each performer, and the number of clips that it is the mean of."""
+    """Write the covariance of each performer, and from how many clips it was computed."""
     each = [covariance(healthy_windows(folder, performer)) for performer in REFERENCE]
     save_npz(
         out,

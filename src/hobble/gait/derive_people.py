@@ -22,7 +22,10 @@ from hobble.gait.signals import CURVES
 
 
 def derive(walks: str | Path, out: str | Path = FILE) -> None:
-    """Write mean and spread over people, and each person's profile. Raises InputError for other files."""
+    """Write mean and standard deviation over people, and each person's profile.
+
+    Raises InputError if `walks` does not have these gaits, curves and scalars.
+    """
     data = load_npz(walks)
     for name, wanted in (("gaits", GAITS), ("curves", CURVES), ("scalars", SCALARS)):
         if tuple(map(str, data[name])) != tuple(wanted):

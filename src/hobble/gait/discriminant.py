@@ -1,4 +1,4 @@
-"""Linear discriminant analysis: finds the class with the nearest mean, in spreads within the classes."""
+"""Linear discriminant analysis: finds the class with the nearest mean, measured in spreads within classes."""
 
 from __future__ import annotations
 
@@ -13,14 +13,17 @@ from hobble.core.quat import Array
 # values 0.02 to 0.8, this one recognises left-out captured motion best.
 SHRINKAGE = 0.02
 CONSTANT = 1e-9  # features with a smaller spread, relative to their size, are constant and ignored
-NARROWEST = 0.02  # least spread within classes, relative to the whole; else a constant would decide alone
+# Least spread within classes, relative to the spread of all values. Without it, a feature that is constant
+# within classes would decide alone.
+NARROWEST = 0.02
 
 
 @dataclass(frozen=True)
 class Discriminant:
-    """A classifier.
+    """A linear classifier of K classes.
 
-    The linear scores of `classes` for values (n, D) are values @ weights (D, K) + offset (K,).
+    The scores of `classes` for n rows of D features, values (n, D), are values @ weights (D, K) + offset
+    (K,).
     """
 
     classes: tuple[str, ...]
@@ -32,7 +35,7 @@ class Discriminant:
         return values @ self.weights + self.offset
 
     def names(self, values: Array) -> list[str]:
-        """The likeliest class of each of values (n, D)."""
+        """The likeliest class for each row of values (n, D)."""
         return [self.classes[k] for k in np.argmax(self.scores(values), axis=1)]
 
 

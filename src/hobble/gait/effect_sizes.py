@@ -10,22 +10,22 @@ from hobble.gait.people import GAITS, NORMAL, People
 from hobble.gait.profile import Profile, mirrored
 from hobble.gait.recogniser import LEFT, RIGHT
 
-# name -> meaning. "hurt" and "sound" are the sides. Shares are relative to the healthy walk.
+# name -> meaning. "hurt" and "sound" are the two sides of the body.
 EFFECTS: dict[str, str] = {
     "speed": "speed, share of healthy",
     "stride": "stride time, share of healthy",
-    "stance": "stance of the sound leg minus that of the hurt leg (share of the cycle), above healthy",
+    "stance": "stance of the sound leg minus that of the hurt leg, share of the cycle, change from healthy",
     "step_hurt": "step onto the hurt foot, share of healthy",
     "step_sound": "step onto the sound foot, share of healthy",
     "knee_hurt": "knee range of the hurt leg, share of healthy",
     "knee_sound": "knee range of the sound leg, share of healthy",
     "hip_hurt": "hip flexion range of the hurt leg, share of healthy",
     "hip_sound": "hip flexion range of the sound leg, share of healthy",
-    "lean": "lean of the trunk from healthy, degrees",
+    "lean": "change of the trunk's mean lean in any direction, degrees",
     "lean_forward": "mean lean of the trunk forward, degrees from healthy",
     "lean_hurt": "mean lean of the trunk to the hurt side, degrees from healthy",
-    "sway_forward": "range of the trunk forward, degrees from healthy",
-    "sway_sideways": "range of the trunk sideways, degrees from healthy",
+    "sway_forward": "range of the trunk's forward lean in a cycle, degrees above healthy",
+    "sway_sideways": "range of the trunk's sideways lean in a cycle, degrees above healthy",
     "pelvis_drop": "mean drop of the pelvis on the sound side, degrees from healthy",
     "arm_hurt": "swing of the arm of the hurt side, share of healthy",
     "arm_sound": "swing of the other arm, share of healthy",
@@ -66,7 +66,7 @@ def effects(walk: Profile, healthy: Profile, side: str = RIGHT) -> dict[str, flo
 
 
 def effects_of_people(known: People) -> Mapping[str, Mapping[str, tuple[float, float]]]:
-    """For each impairment the mean and the spread over people of each effect."""
+    """For each impairment and each of the EFFECTS, the mean and the standard deviation over people."""
     out = {}
     for gait in GAITS:
         if gait == NORMAL:

@@ -21,8 +21,8 @@ ARMS = "range arm_forward R - L"
 def features(walk: Profile, healthy: Profile) -> dict[str, float]:
     """The features of a walk relative to the same person's healthy walk.
 
-    Degrees, leg lengths and shares of the cycle. Ranges of knees and hips are shares of the healthy range,
-    those of arms logarithms of it.
+    They are changes in degrees, leg lengths and shares of the cycle. The flexion ranges of knees and hips are
+    shares of the healthy range. Those of the arms are logarithms of such shares.
     """
 
     def change(name: str) -> float:

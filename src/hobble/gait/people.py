@@ -1,8 +1,8 @@
 """Statistics of people who walk with an impaired right leg.
 
-They come from skeleton recordings of ten people who each walked normally and imitated five impairments: Jun
+They come from skeleton recordings of ten people. Each walked normally and imitated five impairments: Jun
 et al. (2020), "Pathological gait classification using Kinect v2 and gated recurrent neural networks", IEEE
-Access 8. They are in `people.npz`, which `derive_people.py` writes.
+Access 8. The statistics are in `people.npz`, which `derive_people.py` writes.
 """
 
 from __future__ import annotations
@@ -49,7 +49,7 @@ class People:
         return dict(zip(NAMES, map(float, row), strict=True))
 
     def normal(self) -> Profile:
-        """The mean of their normal walks: the reference for a figure without a healthy walk."""
+        """The mean of the people's normal walks: the reference for a figure without a healthy walk."""
         return dict(zip(NAMES, map(float, self.profiles[0].mean(axis=0)), strict=True))
 
     def curve(self, gait: str, name: str) -> tuple[Array, Array]:
@@ -65,7 +65,7 @@ class People:
 
 @cache
 def people() -> People:
-    """The statistics of the package."""
+    """The statistics in `people.npz`."""
     data = load_npz(FILE)
     names = ("profiles", "curve_mean", "curve_spread", "scalar_mean", "scalar_spread")
     return People(*(data[name].astype(float) for name in names))

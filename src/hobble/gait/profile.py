@@ -1,4 +1,4 @@
-"""A walk as some fifty numbers: medians over its cycles."""
+"""A profile: a walk as some fifty numbers, which are medians over its cycles."""
 
 from __future__ import annotations
 
@@ -17,11 +17,11 @@ NAMES = (*SCALARS, *(f"{kind} {curve}" for curve in CURVES for kind in ("range",
 
 
 def profile(walk: WalkCycles) -> dict[str, float]:
-    """The numbers of NAMES: each scalar, and each curve's range and mean over the cycle.
+    """The numbers of NAMES: each scalar, and range and mean of each curve over a cycle.
 
-    They are medians over the cycles. Cycles of the right leg and mirrored cycles of the left leg count
-    equally, so the mirrored walk has exactly the mirrored profile. Degrees, leg lengths, seconds. Raises
-    HobbleError if the walk has no cycle.
+    Scalars and curves are medians over the cycles. Cycles of the right leg and mirrored cycles of the left
+    leg count equally, so the mirrored walk has exactly the mirrored profile. Units: degrees, leg lengths,
+    seconds. Raises HobbleError if the walk has no cycle.
     """
     if not len(walk):
         raise HobbleError(NO_CYCLE)

@@ -1,4 +1,4 @@
-"""Reads clips for measurement, on their own rig with its own bone lengths."""
+"""Reads clips for measurement. Each keeps its own rig and bone lengths."""
 
 from __future__ import annotations
 

@@ -1,7 +1,7 @@
-"""Recognises which of people's impairments a walk resembles, and the side.
+"""Recognises which impairment of people a walk resembles, and the side.
 
-It is a linear classifier of people's walks, each relative to the same person's normal walk, with either leg
-impaired; the left leg is a mirrored right leg. Speed and stride time are not used, and most features compare
+It is a linear classifier that learnt from people's walks, each relative to the same person's normal walk. An
+impaired left leg is a mirrored right one. Speed and stride time are not used, and most features compare
 the two sides, because a healthy walk changes with its speed but stays symmetric.
 """
 
@@ -21,7 +21,7 @@ from hobble.gait.people import GAITS, NORMAL, People, people
 from hobble.gait.profile import Profile, mirrored
 
 SHRINKAGE = 0.2  # of the covariance towards its diagonal; there are 110 examples for some twenty features
-LEAST_CYCLES = 3  # in a window, both legs together: two of one leg and one of the other
+LEAST_CYCLES = 3  # in a window, both legs together; at least one of each leg
 RIGHT, LEFT = "right", "left"
 SIDES = (RIGHT, LEFT)
 
@@ -42,12 +42,12 @@ class Impairment:
 
     @property
     def impaired(self) -> bool:
-        """Whether some impairment is likelier than none."""
+        """Whether an impairment is more likely than none."""
         return self.probabilities[NORMAL] < 0.5
 
 
 def examples(known: People, whose: Iterable[int]) -> tuple[Array, list[str]]:
-    """Features (n, D) and classes of the walks of some people, each with the right and with the left leg.
+    """Features (n, D) and classes of the walks of some people, each as it is and mirrored.
 
     A class is "normal", or "antalgic right" and so on.
     """
@@ -64,7 +64,7 @@ def examples(known: People, whose: Iterable[int]) -> tuple[Array, list[str]]:
 
 @cache
 def classifier() -> Discriminant:
-    """The classifier that learnt from all people of the package."""
+    """The classifier that learnt from all people in `people.npz`."""
     return learn(*examples(people(), range(people().count)), shrinkage=SHRINKAGE)
 
 
@@ -88,9 +88,9 @@ def recognise(walk: Profile, healthy: Profile, judge: Discriminant | None = None
 def windows(
     walk: WalkCycles, frames: int, seconds: float = 4.0, step: float = 1.0
 ) -> list[tuple[int, WalkCycles]]:
-    """(first frame, its cycles) of each window of a clip of `frames` with at least LEAST_CYCLES cycles.
+    """(first frame, cycles) of each window that has LEAST_CYCLES. frames: number of frames of the clip.
 
-    Windows begin every `step` seconds and last `seconds`.
+    A window begins every `step` seconds and lasts `seconds`.
     """
     long = round(seconds * walk.fps)
     starts = range(0, max(frames - long, 0) + 1, max(1, round(step * walk.fps)))

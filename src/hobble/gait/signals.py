@@ -1,7 +1,7 @@
-"""A walking body as 22 curves over time, as in the data on people with an impaired leg.
+"""A walking body as 22 curves over time, the same as in the data of people with an impaired leg.
 
 Joints are found by role, so any rig of config/skeletons/ works. Angles are relative to the vertical and the
-direction of travel, as seen from beside the path.
+direction of travel.
 """
 
 from __future__ import annotations
@@ -42,12 +42,12 @@ TRAVEL = 0.5  # seconds: sigma of the smoothing of the hips' velocity, which giv
 
 @dataclass(frozen=True)
 class Signals:
-    """F frames of a moving body. All lengths are in leg lengths.
+    """F frames of a moving body. All lengths are in leg lengths; `leg` is the leg length in cm.
 
-    curves: name of CURVES -> (F,), degrees and leg lengths. heading: (F,) direction of travel, degrees from
+    curves: name of CURVES -> (F,), degrees or leg lengths. heading: (F,) direction of travel, degrees from
     +Z towards +X, unwrapped. ahead: (F,) cosine of the angle between facing and travel. hips: (F, 2) path
-    over the ground. ankle_speed: side -> (F,), leg lengths a second, over the ground. across: side -> (F,)
-    how far the ankle is to the left of the hips. leg: cm.
+    over the ground. ankle_speed: side -> (F,) over the ground, leg lengths a second. across: side -> (F,)
+    how far the ankle is to the left of the hips.
     """
 
     fps: float
@@ -78,10 +78,11 @@ def mirrored(signals: Signals) -> Signals:
 def signals(skeleton: Skeleton, positions: Array, fps: float) -> Signals:
     """The curves of joint positions (F, J, 3), cm, Y up, at `fps` frames a second. F is 2 or more.
 
-    Hip flexion and abduction are the thigh's angles to the vertical, forward and outward. The arm's is from
-    shoulder to elbow, forward. Knee and elbow are 0 if straight. Foot pitch is of the line from ankle to toe,
-    positive upward. The trunk is the line from hips to neck. On a rig without elbows or wrists those curves
-    are 0.
+    Hip flexion and abduction are the angles of the thigh to the vertical, forward and outward. The arm's
+    angle is that of the line from shoulder to elbow, forward. Knee and elbow flexion are 0 if straight. Foot
+    pitch is the angle of the line from ankle to toe, positive upward. The trunk is the line from hips to
+    neck. Elbow flexion is 0 on a rig without elbows or wrists, and so is the arm's angle on a rig without
+    both.
     """
     at = {role: positions[:, skeleton.role(role)].astype(float) for role in skeleton.roles}
     ahead, left = _travel(at["hips"], fps)
@@ -116,14 +117,14 @@ def signals(skeleton: Skeleton, positions: Array, fps: float) -> Signals:
 
 
 def _travel(hips: Array, fps: float) -> tuple[Array, Array]:
-    """Unit vectors (F, 3), horizontal: the direction of travel, and its left."""
+    """Horizontal unit vectors (F, 3): the direction of travel, and the direction to its left."""
     velocity = gaussian(np.gradient(hips, axis=0), TRAVEL * fps) * [1.0, 0.0, 1.0]
     ahead = velocity / np.maximum(np.linalg.norm(velocity, axis=1, keepdims=True), 1e-9)
     return ahead, np.cross([0.0, 1.0, 0.0], ahead)
 
 
 def _leg(at: dict[str, Array]) -> float:
-    """Thigh and shank, mean of both sides, cm."""
+    """Length of thigh plus shank, mean of both sides, cm."""
     bones = [("hip", "knee"), ("knee", "heel")]
     return float(
         sum(

@@ -2,6 +2,10 @@
 
 The right foot lands at phase 0 and the left one at .5, as in the original. `phase_zero="left"` shifts this
 by half a cycle.
+
+Footsteps are an array (N, 3). Each row holds the frame in which the right foot lands, the next frame in which
+the left foot lands, and a mark: 1 if the frames from this row's right landing to the next row's must not be
+used, else 0. An unknown landing is nan. A row without landings ends a bout of walking.
 """
 
 from __future__ import annotations
@@ -14,15 +18,16 @@ from hobble.core.quat import Array
 from hobble.labels.read_files import whole_frame
 
 BREAK = (np.nan, np.nan, 1.0)
-IDLE_RATE = 0.0017  # cycles a frame, a tenth of the usual rate, as at run time for a standing character
-FASTEST = 0.25
+IDLE_RATE = 0.0017  # cycles a frame: a tenth of the usual rate, the same as for a standing character
+FASTEST = 0.25  # cycles a frame: a larger change of a hand-made phase is a jump, not movement
 MARGINS = {"extend": 1, "drop": 60}  # least number of frames before a cycle; one more is needed after it
 
 
 def phase_of_footsteps(footsteps: Array, frames: int) -> tuple[Array, np.ndarray]:
-    """Phase (frames,) in 0..1, linear between landings, right foot = 0; and where it is known.
+    """Phase (frames,) in 0..1, 0 as the right foot lands, and bool (frames,) where it is known.
 
-    Elsewhere it advances by about IDLE_RATE, or a little faster so that it meets the next landing.
+    It is known and linear between the landings of a bout of walking. Elsewhere it advances by about
+    IDLE_RATE, or a little faster, to have the right value at the next landing.
     """
     when, value, joined = _landings(footsteps)
     frame = np.arange(frames)
@@ -41,16 +46,16 @@ def phase_of_footsteps(footsteps: Array, frames: int) -> tuple[Array, np.ndarray
 
 
 def dropped_frames(footsteps: Array, frames: int) -> np.ndarray:
-    """(frames,) bool: frames inside a marked line of footsteps."""
+    """(frames,) bool: frames that must not be used, because their row of footsteps is marked."""
     out = np.zeros(frames, bool)
-    for line, following in itertools.pairwise(footsteps):
-        if line[2] and np.isfinite(line[0]) and np.isfinite(following[0]):
-            out[whole_frame(line[0]) : whole_frame(following[0])] = True
+    for row, following in itertools.pairwise(footsteps):
+        if row[2] and np.isfinite(row[0]) and np.isfinite(following[0]):
+            out[whole_frame(row[0]) : whole_frame(following[0])] = True
     return out
 
 
 def footsteps_of_phase(phase: Array) -> tuple[Array, np.ndarray]:
-    """Footsteps (N, 3) where a hand-made phase (F,) passes 0 and .5, and (F,) where it moves."""
+    """Footsteps (N, 3) at which a hand-made phase (F,) passes 0 and .5, and bool (F,): where it moves."""
     step = np.diff(phase) % 1.0
     moving = np.concatenate([[False], (step > 0) & (step < FASTEST), [False]])
     edges = np.flatnonzero(np.diff(moving))
@@ -91,21 +96,21 @@ def rows_of_landings(events: list[tuple[float, int]]) -> Array:
 
 
 def find_cycles(footsteps: Array, frames: int, zero: str, margins: str) -> tuple[np.ndarray, int]:
-    """Cycles (C, 2) between landings of the foot `zero`, both frames included, and the number left out.
+    """First and last frame (C, 2) of each cycle between landings of the foot `zero`, and the number left out.
 
-    Cycles with a marked line are left out, and cycles too near an end of the clip. With `margins` "drop", as
-    in the original, these start before frame 60 or end within 61 frames of the clip's
-    end. With "extend", they have no frame before them or less than two after.
+    Cycles in marked rows are left out, and so are cycles too near an end of the clip. With `margins` "drop",
+    as in the original, a cycle is too near if it starts before frame 60 or ends within 61 frames of the
+    clip's end. With "extend", it is too near if there is no frame before it or less than two after.
     """
     margin = MARGINS[margins]
     own = 0 if zero == "right" else 1
     kept, dropped = [], 0
-    for line, following in itertools.pairwise(footsteps):
-        between = line[1] if zero == "right" else following[0]
-        if not line[own] < between < following[own]:
+    for row, following in itertools.pairwise(footsteps):
+        between = row[1] if zero == "right" else following[0]
+        if not row[own] < between < following[own]:
             continue
-        first, last = whole_frame(line[own]), whole_frame(following[own])
-        if line[2] or following[2] or first < margin or frames - last <= margin + 1:
+        first, last = whole_frame(row[own]), whole_frame(following[own])
+        if row[2] or following[2] or first < margin or frames - last <= margin + 1:
             dropped += 1
         else:
             kept.append((first, last))
@@ -115,8 +120,8 @@ def find_cycles(footsteps: Array, frames: int, zero: str, margins: str) -> tuple
 def mirrored_footsteps(footsteps: Array) -> Array:
     """The footsteps (M, 3) of the mirrored clip, with left and right exchanged.
 
-    A line goes from a landing of the left foot to the next of the right foot. It is marked if the line
-    that had this landing of the left foot is marked.
+    A row of the mirrored clip starts with its right landing, which was a left landing before. The row takes
+    the mark of the old row with that landing.
     """
     landings: list[tuple[float, int]] = []
     marks: list[float] = []
@@ -135,7 +140,7 @@ def mirrored_footsteps(footsteps: Array) -> Array:
 
 
 def _landings(footsteps: Array) -> tuple[Array, Array, np.ndarray]:
-    """Frames and phases (0 or .5) of all landings, and (n - 1,) whether the next is in the same bout."""
+    """Frame (n,) and phase (n,), 0 or .5, of each landing, and (n - 1,) whether the next is in its bout."""
     when: list[float] = []
     value: list[float] = []
     joined: list[bool] = []
@@ -154,7 +159,10 @@ def _landings(footsteps: Array) -> tuple[Array, Array, np.ndarray]:
 
 
 def _climbing(when: Array, value: Array, joined: np.ndarray) -> Array:
-    """Phase of each landing without wrapping: half a cycle for a step, about the idle rate for a gap."""
+    """(n,) phase of each landing, not wrapped to 0..1.
+
+    It rises by half a cycle in a step, and by about IDLE_RATE per frame where no steps are known.
+    """
     level = [value[0]]
     for i, together in enumerate(joined):
         if together:

@@ -3,12 +3,13 @@
 A measurement is a package. Its `__init__` holds `MEASURE`, a `Measure`, and must not import anything slow.
 The other modules of the package are found by name:
 
-- `run.py`: `run(given, options) -> Outcome`, the measuring itself (see `given`), and
-  `run_piece(given, options, piece) -> Json` if it has pieces;
-- `page.py`: what the report shows of it (see `hobble.report.measured`), if anything;
+- `run.py`: `run(inputs, options) -> Outcome` measures (see `hobble.measures.inputs`), and
+  `run_piece(inputs, options, piece) -> Json` measures one piece, if there are pieces;
+- `page.py`: what the report shows of it (see `hobble.report.measure_sections`), if anything;
 - `comparison.py`: what it says of configurations side by side
   (see `hobble.evaluation.compare_configurations`), if anything;
-- `comparison_page.py`: what the comparison's page shows of that (see `hobble.report.measured`), if anything.
+- `comparison_page.py`: what the comparison's page shows of that
+  (see `hobble.report.measure_sections`), if anything.
 """
 
 from __future__ import annotations
@@ -29,10 +30,11 @@ INPUTS = ("weights", "clips", "facts", "skeleton", "published")
 
 @dataclass(frozen=True)
 class Cost:
-    """Memory (MB) and time that a job requests on a cluster.
+    """Memory and time that a job requests on a cluster.
 
-    memory_mb: fixed part. memory_each: for each thousand frames of 31 joints in the longest clip.
-    seconds_each: the same over all clips. minutes: at least.
+    memory_mb: MB for any data. memory_each: MB added for each thousand frames of 31 joints in the longest
+    clip. seconds_each: seconds for each thousand frames of 31 joints in all clips together. minutes: the
+    least time.
     """
 
     memory_mb: float = 0.0
@@ -42,7 +44,7 @@ class Cost:
 
 
 class Pieces(Protocol):
-    """Tells the names of the pieces of a measurement, of letters."""
+    """Returns the names of a measurement's pieces. A name consists of letters only."""
 
     def __call__(self, options: Any, runtime: Runtime, modes: Sequence[str]) -> tuple[str, ...]:
         """options: of the type `Measure.options`. modes: the phase modes of the kind of network."""

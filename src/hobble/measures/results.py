@@ -9,9 +9,9 @@ SPLITS: tuple[Split, Split] = ("train", "held_out")
 
 
 class SampleSize(TypedDict):
-    """How many excerpts were measured, `of_excerpts` how many, from how many clips, `of` how many.
+    """The size of a sample. excerpts, clips: how many are in the sample; strata: how many it is drawn from.
 
-    strata: their number.
+    of_excerpts, of: how many excerpts and clips there are in all.
     """
 
     excerpts: int

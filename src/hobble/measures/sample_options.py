@@ -1,4 +1,4 @@
-"""The option that limits a measurement to a sample of the clips' frames (`hobble.measures.sample`)."""
+"""The option that limits a measurement to a sample of the clips' frames: `measures.stratified_sample`."""
 
 from __future__ import annotations
 

@@ -1,7 +1,7 @@
 """The kinds of network, one folder each; this folder holds what they share.
 
-Every subfolder with an `__init__.py` is a kind. So adding a kind edits no list, and the fingerprints of
-existing rules stay.
+Every subfolder with an `__init__.py` is a kind. So there is no list to edit for a new kind, and the
+fingerprints of existing rules do not change.
 """
 
 from __future__ import annotations
@@ -27,8 +27,8 @@ def model(kind: str) -> Model:
 
 
 def network_options(section: Mapping[str, Any]) -> Options:
-    """A configuration's section `network`, as the options type of its kind.
+    """The options of a configuration's section `network`, in the type of its kind.
 
-    The name `options` is taken: it is a module of this package.
+    It is not called `options`, because that is a module of this package.
     """
     return model(section.get("kind", DEFAULT)).options().model_validate(section)

@@ -1,7 +1,7 @@
 """Checks of the arrays and the metadata of a network's file. Every error names the file.
 
-A file may come from anywhere, and compiled code indexes memory with its numbers. So type, shape, count and
-range of everything are checked here before use.
+A file may come from anywhere, and compiled code uses its numbers as indices into memory. So type, shape,
+count and range of everything are checked here before use.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ from hobble.core.quat import Array
 from hobble.core.skeleton import Skeleton
 
 MOST_LAYERS = 16
-MOST_NUMBERS = 1 << 26  # in an array, 256 MB as float32; the largest array of a known network has 3 million
+MOST_NUMBERS = 1 << 26  # in one array, 256 MB as float32; the largest array of a known network has 3 million
 LARGEST_WEIGHT = 1e6  # trained weights are below 10
 LARGEST_MEAN = 1e9
 LARGEST_STD = 1e20  # the std of a joint that is left out of the input is multiplied by 1e11
@@ -73,7 +73,7 @@ def stacked(
     """Weights (..., out, in) and biases (..., out) of consecutive layers, checked to fit one another.
 
     names: prefixes of weights and biases, ("W", "b") for W0, b0, W1, ... axes: number of axes of the weights;
-    the leading ones have to be the same in all layers. inputs: of the first layer; outputs: of the last.
+    all but the last two have to be equal in all layers. inputs: of the first layer. outputs: of the last one.
     """
     count = layers(path, arrays, *names)
     weights = tuple(numbers(path, arrays, f"{names[0]}{i}", axes) for i in range(count))
@@ -109,7 +109,7 @@ def statistics(path: str | Path, arrays: Mapping[str, Any]) -> dict[str, Array]:
 
 
 def names(path: str | Path, what: str, value: Any) -> tuple[str, ...]:
-    """A list of short names without duplicates."""
+    """`value` as a tuple of short names without duplicates."""
     if not isinstance(value, Sequence) or isinstance(value, str | bytes) or len(value) > MOST_NAMES:
         raise InputError(path, f"{what} is {_short(value)}, not a list of names")
     for name in value:
@@ -121,14 +121,14 @@ def names(path: str | Path, what: str, value: Any) -> tuple[str, ...]:
 
 
 def whole(path: str | Path, what: str, value: Any, least: int, most: int) -> int:
-    """A whole number from `least` to `most`."""
+    """`value`, if it is a whole number from `least` to `most`."""
     if isinstance(value, bool) or not isinstance(value, int) or not least <= value <= most:
         raise InputError(path, f"{what} is {_short(value)}, not a whole number from {least} to {most}")
     return value
 
 
 def length(path: str | Path, what: str, value: Any, most: float, least: float = 0.0) -> float:
-    """A finite number above `least` and up to `most`."""
+    """`value`, if it is a finite number above `least` and up to `most`."""
     number = isinstance(value, int | float) and not isinstance(value, bool)
     if not number or not least < value <= most:
         raise InputError(path, f"{what} is {_short(value)}, not a number above {least:g} and up to {most:g}")
@@ -136,7 +136,7 @@ def length(path: str | Path, what: str, value: Any, most: float, least: float = 
 
 
 def mapping(path: str | Path, what: str, value: Any) -> dict[str, Any]:
-    """A mapping from names to anything."""
+    """`value`, if it is a mapping."""
     if not isinstance(value, dict):
         raise InputError(path, f"{what} is {_short(value)}, not keys and values")
     return value
@@ -182,7 +182,7 @@ def _one_of(name: Any, joints: set[str]) -> bool:
 
 
 def _three_numbers(path: str | Path, what: str, value: Any) -> None:
-    """Three finite numbers, centimetres."""
+    """Check that `value` is three finite numbers, in centimetres."""
     if not isinstance(value, list | tuple) or len(value) != 3:
         raise InputError(path, f"{what} is {_short(value)}, not three numbers")
     for number in value:

@@ -1,4 +1,4 @@
-"""Shared by the fast training steps on a CPU: dropout masks, and buffers that are reused for every batch."""
+"""What the fast (fused) training steps on a CPU share: dropout masks, and buffers reused for every batch."""
 
 from __future__ import annotations
 
@@ -16,8 +16,8 @@ from hobble.models.trainable import ALL_ROWS
 class FusedBase:
     """First base class of a kind's fused step. The second is its plain step, such as `PfnnStep`.
 
-    network, keep, widths: set by the plain step: the network in training, the share of units that dropout
-    keeps, and the number of inputs of each layer, in the order of the masks.
+    The plain step sets three fields. network: the network in training. keep: the share of units that dropout
+    keeps. widths: the number of inputs of each layer, in the order of the masks.
     """
 
     network: Any
@@ -34,7 +34,7 @@ class FusedBase:
         self.counter = np.uint64(seed)
 
     def masks(self, rows: int, own: slice = ALL_ROWS) -> list[Tensor]:
-        """As in the plain step, with another generator; the masks are valid until the next call."""
+        """Like `masks` of the plain step, with other random numbers. The next call overwrites the masks."""
         first, stop, _ = own.indices(rows)
         masks = []
         for number, width in enumerate(self.widths):
@@ -45,7 +45,7 @@ class FusedBase:
         return masks
 
     def multiplied(self, name: str, a: Tensor, b: Tensor) -> Tensor:
-        """As in the plain step, in memory that the next step uses again."""
+        """Like `multiplied` of the plain step. The result is in memory that the next step uses again."""
         return product(a, b, self.buffer(name, len(a), len(b), a.dtype))
 
     def buffer(self, name: str, rows: int, width: int, dtype: torch.dtype | None = None) -> Tensor:

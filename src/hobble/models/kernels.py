@@ -16,19 +16,19 @@ SPLITMIX_STEP = np.uint64(0x9E3779B97F4A7C15)
 
 
 def use_threads(values: int) -> None:
-    """Set the threads of the next compiled loop over `values` numbers, since waking threads takes time."""
+    """Set how many threads the next compiled loop over `values` numbers uses: waking threads takes time."""
     threads = min(torch.get_num_threads(), numba.config.NUMBA_NUM_THREADS)  # type: ignore[attr-defined]
     numba.set_num_threads(max(1, min(threads, values // NUMBERS_PER_THREAD)))
 
 
 def as_numpy(array: Tensor) -> np.ndarray:
-    """The tensor as a numpy array; bfloat16 as its bits in uint16, since numpy has no bfloat16."""
+    """The tensor as a numpy array. bfloat16 becomes uint16 with the same bits: numpy has no bfloat16."""
     return array.view(torch.uint16).numpy() if array.dtype == torch.bfloat16 else array.numpy()
 
 
 @njit(inline="always")
 def to_bfloat16(value: Any) -> Any:
-    """The bfloat16 bits of a float32, rounded to nearest even."""
+    """The bits of a float32 as bfloat16, rounded to nearest, ties to even."""
     word = np.float32(value).view(np.uint32)
     even = np.uint32(np.uint32(word >> np.uint32(16)) & np.uint32(1))
     return np.uint16(np.uint32(word + even + np.uint32(0x7FFF)) >> np.uint32(16))

@@ -1,5 +1,6 @@
-// Layers with K sets of weights each, packed by `packed_rows`. Their outputs are blended by shares, with an ELU between layers.
-// Weights of 8 bits are packed by `hobble.report.rounded`. They have a factor for each group of columns, others for each row.
+// Layers with K sets of weights each. The outputs of the sets are blended by shares. An ELU follows each layer but the last.
+// 16-bit weights are packed by `packed_rows`, with a factor for each row. 8-bit weights are packed by
+// `hobble.report.rounded_weights`, with a factor for each group of columns.
 import { bytes } from "../report/web/numbers.js";
 
 export const floats = (text) => new Float32Array(bytes(text));
@@ -14,7 +15,7 @@ export const unpacked = ({ points, rows, columns, weights, scale, biases, bits =
   return { points, rows, columns, w, b: floats(biases), out: new Float32Array(rows) };
 };
 
-// Sum of w[from + c] x[c]. Four sums go on side by side, because an addition has to wait for the one before it.
+// Sum of w[from + c] x[c]. Four sums run side by side, because each addition has to wait for the one before it.
 const product = (w, from, x, n) => {
   const whole = n - n % 4;
   let p = 0, q = 0, s = 0, t = 0;
@@ -45,13 +46,13 @@ export const createLayers = (packed) => {
   return (x, shares) => layers.reduce((h, one, i) => applied(one, shares, h, i === layers.length - 1), x);
 };
 
-// standardise: raw inputs x into z, without those that have no weight. restore: outputs to raw units, in place.
+// standardise: raw inputs x into z; inputs that the network does not read are left out. restore: outputs to raw units, in place.
 export const createScales = (spec) => {
-  const mean = floats(spec.xMean), inverse = floats(spec.xScale), seen = Int32Array.from(spec.seen);
+  const mean = floats(spec.xMean), inverse = floats(spec.xScale), columnsOfX = Int32Array.from(spec.inputColumns);
   const yMean = floats(spec.yMean), yStd = floats(spec.yStd);
   return {
     inputs: mean.length,
-    standardise: (x, z) => { for (let c = 0; c < mean.length; c++) z[c] = (x[seen[c]] - mean[c]) * inverse[c]; },
+    standardise: (x, z) => { for (let c = 0; c < mean.length; c++) z[c] = (x[columnsOfX[c]] - mean[c]) * inverse[c]; },
     restore: (y) => { for (let r = 0; r < y.length; r++) y[r] = y[r] * yStd[r] + yMean[r]; return y; },
   };
 };

@@ -17,12 +17,12 @@ from hobble.core.skeleton import Skeleton
 from hobble.core.untrusted import read_yaml
 from hobble.models import DEFAULT, MODELS, checks, model
 from hobble.models.network import TERRAIN_SIDE, Network
-from hobble.models.seen import SeenInTraining
+from hobble.models.training_facts import TrainingFacts
 from hobble.rows.layout import GAITS, RowLayout
 
-MOST_META = 1 << 22  # characters
-WIDEST = 1e4  # cm from the path to the side heights
-LARGEST_Y = 1e9  # in the prediction for the mean input; sound values are below 1000
+MOST_META = 1 << 22  # characters in `meta`
+WIDEST = 1e4  # cm from the path to the points at its sides where the ground is looked up
+LARGEST_Y = 1e9  # in the prediction for the mean input; a working network predicts values below 1000
 
 
 def read_skeleton(path: str | Path) -> Skeleton:
@@ -79,7 +79,7 @@ def network_from_arrays(
         "channels": {name: _labels(path, name, meta, layout, skeleton) for name, _ in layout.channels},
         "terrain_side": checks.length(path, "terrain_side", meta.get("terrain_side", TERRAIN_SIDE), WIDEST),
         "meta": meta,
-        "seen": SeenInTraining.read(path, arrays, layout.x_size, layout.y_size),
+        "training_facts": TrainingFacts.read(path, arrays, layout.x_size, layout.y_size),
     }
     common["limits"] = _limits(path, meta, common["channels"], len(common["gaits"]))
     network = model(kind).read(path, arrays, common)
@@ -136,9 +136,9 @@ def _layout(
 
 
 def _guess_layout(x_size: int, y_size: int, skeleton: Skeleton | None) -> RowLayout:
-    """The layout of a file without one: the default window, with the number of joints from the size of Y.
+    """The layout for a file that has none: the default window, and as many joints as fit the size of Y.
 
-    Columns of X that are left over become the first channel with that many columns.
+    Columns of X that are left over become the first channel that has as many columns.
     """
     joints = max(1, (y_size - RowLayout(0).y_size) // 9)
     left = x_size - RowLayout(joints).x_size
@@ -186,7 +186,10 @@ def _limits(
 
 
 def _check_prediction(path: str | Path, network: Network) -> None:
-    """Predict for the mean input at eight phases: weights that pass one by one may overflow together."""
+    """Raise InputError if the prediction for the mean input, at eight phases, is not finite.
+
+    Weights may overflow together although each one passes the checks.
+    """
     phase = np.arange(8) / 8
     with np.errstate(all="ignore"):
         y = network.predict(np.repeat(network.x_mean[None], len(phase), axis=0), phase)

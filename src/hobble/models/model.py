@@ -68,7 +68,7 @@ class Trained(Model):
 
     @abstractmethod
     def parameters(self, options: Any, inputs: int, outputs: int) -> int:
-        """The number of trained parameters, for rows of `inputs` and `outputs` columns."""
+        """The number of trained parameters, for X of `inputs` columns and Y of `outputs` columns."""
 
     @abstractmethod
     def trainable(self, options: Any, layout: RowLayout, skeleton: Skeleton, seed: int) -> Trainable:
@@ -87,6 +87,6 @@ class Built(Model):
     ) -> FinishedNetwork:
         """Build it from the files of rows `clips` (`hobble.rows.clip_rows`).
 
-        layout: of the database; it may have fewer channels than the files. Raises InputError if a file does
-        not fit it.
+        layout: of the database, which may have fewer channels than the files. Raises InputError if a file
+        does not fit the layout.
         """

@@ -15,7 +15,7 @@ from hobble.channels.speed_limits import Limits
 from hobble.core.errors import HobbleError
 from hobble.core.quat import Array
 from hobble.core.skeleton import Skeleton
-from hobble.models.seen import SeenInTraining
+from hobble.models.training_facts import TrainingFacts
 from hobble.rows.layout import GAITS, RowLayout
 
 TERRAIN_SIDE = 25.0  # cm from the path to the side heights, if the file does not say
@@ -40,7 +40,7 @@ class Predictor(Protocol):
         """Write the standardised inputs x into z, both (C, X) float32."""
 
     def evaluate(self, z: Array, phase: Array, out: Array) -> None:
-        """Write Y (C, Y) float32 of standardised inputs z (C, X) at phases (C,) in cycles into `out`."""
+        """Write Y (C, Y) float32 for standardised inputs z (C, X) at phases (C,), 0 to 1, into `out`."""
 
     def predict(self, x: Array, phase: Array, out: Array | None = None) -> Array:
         """Y (C, Y) float32 of X (C, X) float32 at phases (C,): `standardise`, then `evaluate`."""
@@ -54,12 +54,14 @@ class Network(ABC):
     layout: the columns; gaits: the order of the gait blocks; skeleton: None if the file has none.
     channels: name -> labels of its columns, for each input channel. terrain_side: cm from the path to the
     side heights. limits: channel -> speed limits.
-    meta: the file's other metadata. seen: ranges of the training data, None if the file has none.
+    meta: the file's other metadata. training_facts: ranges of the training data, None if the file has none.
     """
 
     kind: ClassVar[str] = ""  # its folder in hobble.models
     phase: ClassVar[bool] = True  # whether a prediction depends on the phase
-    rooted: ClassVar[bool] = False  # whether root movement belongs to the pose, so that it is never reduced
+    # Whether the root's movement is part of the predicted pose. Then the runtime does not reduce it while the
+    # character stands or moves away from the target.
+    rooted: ClassVar[bool] = False
     modes: ClassVar[tuple[str, ...]] = ("exact",)  # of the predictor; the last one is exact
     storage: ClassVar[str] = "float32"  # of the predictor's weights by default, one of STORAGES
 
@@ -74,10 +76,10 @@ class Network(ABC):
     terrain_side: float = TERRAIN_SIDE
     limits: Mapping[str, Limits] = field(default_factory=dict, repr=False)
     meta: Mapping[str, Any] = field(default_factory=dict, repr=False)
-    seen: SeenInTraining | None = field(default=None, repr=False)
+    training_facts: TrainingFacts | None = field(default=None, repr=False)
 
     def trained(self, channel: str) -> tuple[str, ...]:
-        """Labels of a channel's columns that were above 0 in training, by the means of the inputs.
+        """Labels of a channel's columns that were above 0 in training, judged by `x_mean`.
 
         All labels if all means are 0; () for a channel that the network does not have.
         """

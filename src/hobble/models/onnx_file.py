@@ -1,8 +1,8 @@
 """Write and check a network as one ONNX file, with standardisation inside the graph.
 
-Inputs `x` (batch, X) and `phase` (batch,) in cycles, output `y` (batch, Y), float32, any batch. Networks that
-ignore the phase have this input too, so that all files are called in the same way. Only this module needs the
-onnx packages: pip install "hobble[onnx]".
+The inputs are `x` (batch, X) and `phase` (batch,) in cycles, the output is `y` (batch, Y): float32, raw
+units, any batch size. Networks that ignore the phase have this input too, so that all files are called in the
+same way. Only this module needs the onnx packages: pip install "hobble[onnx]".
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ from hobble.core.files import atomic_path
 from hobble.models.network import Network, inverse
 
 OPSET = 15
-TOLERANCE = 1e-4  # difference from the runtime, in units of Y, relative for values above 1
+TOLERANCE = 1e-4  # largest difference from the runtime, in units of Y; relative for values above 1
 CHECKED_ROWS = 64
 
 
@@ -49,10 +49,11 @@ Body = Callable[[Graph, str], str]
 
 
 def export(path: str | Path, network: Network, mode: str, body: Body) -> None:
-    """Write the network, with its columns, skeleton and channels as the metadata entry `hobble`.
+    """Write the network, with a metadata entry `hobble` that describes columns, skeleton and channels.
 
-    body: gets the name of the standardised inputs, adds the nodes of the network and returns the name of the
-    standardised outputs; "phase" is the name of the phases. Raises HobbleError if onnx is not installed.
+    body: adds the nodes of the network to the graph. It gets the name of the standardised inputs and returns
+    the name of the standardised outputs; the phases are named "phase". Raises HobbleError if onnx is not
+    installed.
     """
     try:
         import onnx

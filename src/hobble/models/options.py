@@ -14,3 +14,8 @@ class Options(Section):
     def hidden(self) -> tuple[int, ...]:
         """Units of each hidden layer; () where there are no layers."""
         return ()
+
+    @property
+    def asymmetric(self) -> str:
+        """Why such a network cannot be trained with `training.symmetric`; empty if it can."""
+        return f"a network of kind {self.kind} cannot treat left and right alike"

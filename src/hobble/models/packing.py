@@ -1,4 +1,4 @@
-"""Pack arrays as text for the page: little-endian bytes in base64, weights as 16-bit integers."""
+"""Packs arrays as text for the page: little-endian bytes in base64, weights as 16-bit integers."""
 
 from __future__ import annotations
 
@@ -18,7 +18,10 @@ def packed(array: NDArray[Any]) -> str:
 
 
 def packed_rows(weights: Array, biases: Array) -> dict[str, Any]:
-    """Weights (K, out, in) as integers of -32767..32767 with a factor for each row; biases (K, out)."""
+    """Weights (K, out, in) as integers of -32767..32767, with a factor for each row, and biases (K, out).
+
+    In the result, points: K; rows: out; columns: in; scale: (K, out) factors of the integers.
+    """
     scale = np.maximum(np.abs(weights).max(axis=-1) / 32767, 1e-30).astype(np.float32)
     return {
         "points": weights.shape[0],

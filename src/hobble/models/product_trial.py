@@ -1,9 +1,9 @@
-"""A short trial of several ways to compute the same thing, and a file that keeps which was the fastest.
+"""A short trial of several ways to compute the same thing, and a file that stores which one was the fastest.
 
-The ways give results that differ in their last bits. So the first choice is used in every later run on the
-same kind of machine. The file is in the user's cache folder, one for each kind of processor, version of
-PyTorch and setting of the libraries. If there is no such folder, or it cannot be written, a fixed way is
-used without a trial.
+The results of the ways differ in their last bits. So the first choice is used in every later run on the same
+kind of machine. The file is in the user's cache folder, one for each kind of processor, version of PyTorch
+and setting of the libraries. If there is no such folder, or it cannot be written, a default is used without a
+trial.
 """
 
 from __future__ import annotations
@@ -26,21 +26,21 @@ from hobble.core.errors import HobbleError
 from hobble.core.files import read_json, write_json
 from hobble.core.processors import processor
 
-# Variables that limit the instructions of the libraries, and so change their speed and their rounding.
+# Environment variables that limit which instructions the libraries use, and so change speed and rounding.
 SETTINGS = ("ATEN_CPU_CAPABILITY", "ONEDNN_MAX_CPU_ISA", "MKL_ENABLE_INSTRUCTIONS", "MKL_CBWR")
-SECONDS = 0.1  # of a trial of one product
-TURNS = 5, 50  # of each way in a trial, at least and at most
+SECONDS = 0.1  # length of a trial of one product
+TURNS = 5, 50  # fewest and most calls of each way in a trial
 HOPELESS = 1.5  # a way this many times slower than another after two turns gets no more turns
-GAIN = 0.97  # a later way has to take at most this share of an earlier one's time
+GAIN = 0.97  # a way replaces one listed before it only if it takes less than this share of its time
 
 log = logging.getLogger("hobble")
 
 
-def kept(name: str, trial: Callable[[], str], ways: Collection[str], without: str) -> str:
-    """The way that the file names for the product `name`. If it names none, run `trial` and keep its choice.
+def kept_choice(name: str, trial: Callable[[], str], ways: Collection[str], without: str) -> str:
+    """The way that the file names for the product `name`. If it names none, run `trial` and store its choice.
 
-    ways: the allowed names. without: the way to take if the choice cannot be kept. Processes that ask at the
-    same time wait for the trial of the first.
+    ways: the allowed names. without: the way to take if the choice cannot be stored. Processes that ask at
+    the same time wait for the trial of the first one.
     """
     try:
         path = choices_file()
@@ -60,7 +60,7 @@ def kept(name: str, trial: Callable[[], str], ways: Collection[str], without: st
 
 
 def fastest(ways: Mapping[str, Callable[[], object]], clock: Callable[[], float] = perf_counter) -> str:
-    """The name of the way with the shortest call. The ways take turns, since other work comes and goes.
+    """The name of the way with the shortest call. The ways take turns, because other programs come and go.
 
     clock: returns seconds. With one thread, use the time of that thread: other work does not add to it.
     """
@@ -83,7 +83,7 @@ def fastest(ways: Mapping[str, Callable[[], object]], clock: Callable[[], float]
 
 
 def machine() -> dict[str, str]:
-    """What a choice depends on."""
+    """The facts about the machine on which a choice depends."""
     settings = {name: os.environ[name] for name in SETTINGS if name in os.environ}
     return {"processor": processor(), "torch": str(torch.__version__), **settings}
 
@@ -96,7 +96,7 @@ def choices_file() -> Path:
 
 
 def _read(path: Path) -> dict[str, Any]:
-    """The choices in the file; none if it is missing or damaged, for then they are made again."""
+    """The choices in the file; none if it is missing or damaged, so that they are made again."""
     try:
         ways = read_json(path)["ways"]
         return ways if isinstance(ways, dict) else {}

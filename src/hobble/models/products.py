@@ -1,4 +1,4 @@
-"""Matrix products of the training, by the fastest of the libraries that PyTorch has for a CPU."""
+"""Matrix products for training, computed in the fastest way that PyTorch's libraries offer on this CPU."""
 
 from __future__ import annotations
 
@@ -13,8 +13,8 @@ from hobble.models import product_trial
 
 Way = Callable[[Tensor, Tensor, Tensor], Tensor]
 
-# Multiplications and additions from which a trial of the ways pays; below, a product takes some 50
-# microseconds in any of them.
+# A trial of the ways is worth its time from this number of multiplications and additions on. A smaller
+# product takes some 50 microseconds in any of them.
 WORTH_A_TRIAL = 8_000_000
 TYPES = (torch.float32, torch.bfloat16)
 
@@ -23,7 +23,8 @@ def product(a: Tensor, b: Tensor, out: Tensor | None = None) -> Tensor:
     """a @ b.T for a (m, n) and b (k, n).
 
     out: (m, k) memory that the result may use, so that none has to be allocated. On a CPU the way is chosen
-    by a trial, once for each machine and shape (`hobble.models.product_trial`); the ways round differently.
+    by a trial, once for each machine and shape, because the ways round differently
+    (`hobble.models.product_trial`).
     """
     m, n, k = *a.shape, len(b)
     if a.device.type != "cpu" or a.dtype not in TYPES or 2 * m * n * k < WORTH_A_TRIAL:
@@ -33,17 +34,17 @@ def product(a: Tensor, b: Tensor, out: Tensor | None = None) -> Tensor:
 
 
 def _plain(a: Tensor, b: Tensor, out: Tensor | None) -> Tensor:
-    """By PyTorch's default: MKL for float32, oneDNN for bfloat16."""
+    """The product by PyTorch's default library: MKL for float32, oneDNN for bfloat16."""
     return torch.mm(a, b.T, out=out)
 
 
 def _turned(a: Tensor, b: Tensor, out: Tensor) -> Tensor:
-    """The transposed product (b a')', by the same library. It is faster for few rows."""
+    """The transpose of b @ a.T, by PyTorch's default library. It is faster for few rows."""
     return out.copy_(torch.mm(b, a.T).T)
 
 
 def _linear(a: Tensor, b: Tensor, out: Tensor) -> Tensor:
-    """By oneDNN's inner product. On processors other than Intel's, MKL has no 512-bit kernels."""
+    """The product by oneDNN. MKL has no 512-bit kernels for processors of other makers than Intel."""
     return torch.ops.mkldnn._linear_pointwise(a, b, None, "none", [], "")
 
 
@@ -54,7 +55,7 @@ if torch.backends.mkldnn.is_available() and hasattr(torch.ops.mkldnn, "_linear_p
 
 @cache
 def _chosen(shape: tuple[int, int, int], by_rows: tuple[bool, bool], dtype: torch.dtype, threads: int) -> str:
-    """The way for a product. Batches of nearly the same size share one.
+    """The name of the way for a product. Batches of nearly the same size share a choice.
 
     shape: (m, n, k). by_rows: whether a and b are stored row by row, or else column by column.
     """
@@ -73,7 +74,7 @@ def _chosen(shape: tuple[int, int, int], by_rows: tuple[bool, bool], dtype: torc
         return product_trial.fastest({name: partial(way, a, b, out) for name, way in WAYS.items()}, clock)
 
     without = "linear" if dtype == torch.float32 and "linear" in WAYS else "plain"
-    return product_trial.kept(name, trial, WAYS, without)
+    return product_trial.kept_choice(name, trial, WAYS, without)
 
 
 def _by_rows(a: Tensor) -> bool:
@@ -81,7 +82,7 @@ def _by_rows(a: Tensor) -> bool:
 
 
 def _filled(rows: int, columns: int, by_rows: bool, dtype: torch.dtype) -> Tensor:
-    """(rows, columns) of one number, so that no random numbers are drawn."""
+    """(rows, columns) filled with one number, so that no random numbers are drawn."""
     shape = (rows, columns) if by_rows else (columns, rows)
     values = torch.full(shape, 0.01, dtype=dtype)
     return values if by_rows else values.T

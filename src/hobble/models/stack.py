@@ -1,9 +1,9 @@
 """Layers prepared to run on a CPU: K sets of weights each, whose outputs are blended by given shares.
 
-sum_k c_k (W_k x + b_k) equals blending the weights first (a layer is linear before its activation), but
-writes no blended matrix to memory. One character is limited by reading weights from memory. A crowd reads
-each set of weights once for all characters that use it. A character's prediction has the same bits alone and
-in any crowd, because its sums always have the same order (`hobble.models.tiles`).
+sum_k c_k (W_k x + b_k) equals the output of blended weights, because a layer is linear before its activation,
+but no blended matrix is written to memory. For one character, reading weights from memory limits the speed. A
+crowd reads each set of weights once for all characters that use it. A character's prediction has the same
+bits alone and in any crowd, because its sums always have the same order (`hobble.models.tiles`).
 """
 
 from __future__ import annotations
@@ -18,19 +18,22 @@ from hobble.core.quat import Array
 from hobble.models.network import STORAGES, Network, inverse
 from hobble.models.tiles import WIDTH, aligned, in_panels, multiply, panels_of
 
-# Columns of the plan, one row per layer: numbers of inputs and outputs, and where weights, factors and biases
-# begin. Everything is in a few flat arrays, since each array argument costs 0.3 microseconds.
+# Columns of `Stack.plan`, which has a row for each layer: numbers of inputs and outputs, and the indices
+# where weights, factors and biases begin. Everything is in a few flat arrays, because each array that is
+# passed to a compiled function costs 0.3 microseconds.
 INPUTS, OUTPUTS, WEIGHTS, FACTORS, BIASES = range(5)
 
 
 class Stack:
     """Layers of weights (K, out, in) and biases (K, out), an ELU between them, packed for `blend_layers`.
 
-    mean, std: (Y,) to restore the last layer's outputs, by default 0 and 1. storage: "float32", or "int16"
-    with a factor for each row: half the memory traffic. Raises ValueError for any other.
+    mean, std: (Y,) statistics to bring the last layer's outputs to raw units, by default 0 and 1. storage:
+    "float32", or "int16" with a factor for each row, which halves the memory traffic. Raises ValueError for
+    another storage.
 
-    weights: (n,) in panels, set by set. numbers: (n,) float32: mean, std, then for each layer the factors of
-    the rows and the biases of each set. plan: see INPUTS to BIASES.
+    weights: flat array of all weights in panels (`hobble.models.tiles`), set by set. numbers: flat float32
+    array of mean and std, then for each layer the factors of the rows and the biases of each set. plan: see
+    INPUTS to BIASES.
     """
 
     def __init__(
@@ -93,7 +96,7 @@ def _panel_numbers(table: Array) -> int:
 
 
 def _pack(weights: Array, storage: str) -> tuple[Array, Array]:
-    """Weights (K, out, in) in their storage type, and the factor of each row (K, out)."""
+    """Weights (K, out, in) in the storage type, and the factors (K, out) of their rows."""
     if storage == "float32":
         return np.asarray(weights, np.float32), np.ones(weights.shape[:2], np.float32)
     factors = np.maximum(np.abs(weights).max(axis=-1) / 32767, 1e-30)
@@ -108,14 +111,15 @@ def standardise(x: Any, mean: Any, factor: Any, z: Any) -> None:
             z[c, i] = (x[c, i] - mean[i]) * factor[i]
 
 
-# Only functions called from Python are cached on disk; their callees are inlined. Otherwise the compiler may
-# optimise across calls the first time but not after loading from the cache, which changes the rounding.
+# Only functions called from Python are cached on disk, and their callees are inlined. If callees were cached,
+# too, the compiler could optimise across calls the first time but not after loading from the cache, and the
+# rounding would change.
 @njit(forceinline=True, cache=False)
 def blend_layers(weights: Any, numbers: Any, plan: Any, shares: Any, z: Any, out: Any) -> None:
-    """Write the last layer's outputs, restored, into out (C, Y).
+    """Run the layers and write their outputs, in raw units, into out (C, Y).
 
-    weights, numbers, plan: of a `Stack`. shares: (C, K) float32; sets with a share of 0 are not computed.
-    z: (C, X) float32.
+    weights, numbers, plan: of a `Stack`. shares: (C, K) float32 of the sets; a set with a share of 0 is not
+    computed. z: (C, X) float32 standardised inputs.
     """
     count, sets, layers = z.shape[0], shares.shape[1], plan.shape[0]
     widest = 0
@@ -158,7 +162,7 @@ def blend_layers(weights: Any, numbers: Any, plan: Any, shares: Any, z: Any, out
 
 @njit(forceinline=True, cache=False)
 def exp_below_0(x: Any) -> Any:
-    """e^x for x <= 0 in float32, relative error 2e-7; written out so that the compiler can vectorise it."""
+    """e^x for x <= 0 in float32, with a relative error of 2e-7, in a form that the compiler can vectorise."""
     one = np.float32(1)
     x = max(x, np.float32(-87))
     n = np.floor(x * np.float32(1.44269504) + np.float32(0.5))

@@ -1,8 +1,8 @@
-"""Whether a training takes one thread or several, by a short trial.
+"""A short trial that decides whether a training uses one thread or several.
 
-A virtual machine may have two processors that are one core, and does not always say so. Products then take
-longer with two threads than with one. Results with another number of threads differ in their last bits, so
-the choice is kept like those of `hobble.models.product_trial`.
+Two processors of a virtual machine may be one physical core, and the machine does not always say so. Products
+then take longer with two threads than with one. Results with another number of threads differ in their last
+bits, so the choice is stored like those of `hobble.models.product_trial`.
 """
 
 from __future__ import annotations
@@ -13,28 +13,28 @@ from time import perf_counter, process_time
 
 import torch
 
-from hobble.models.product_trial import GAIN, kept
+from hobble.models.product_trial import GAIN, kept_choice
 
-INPUTS, OUTPUTS = 512, 2048  # of the product in the trial: a layer of 512 units at four control points
-SECONDS = 0.01  # of the calls that are timed together, since threads take time to start
-TURNS = 8  # of each number of threads
-# Processor seconds of each thread in a second. If they are fewer, other work took the processors meanwhile,
-# and the trial says nothing.
+INPUTS, OUTPUTS = 512, 2048  # size of the product in the trial: a layer of 512 units, four sets of weights
+SECONDS = 0.01  # length of the calls that are timed together; single calls are too short to be timed
+TURNS = 8  # how often each number of threads is timed
+# Least processor time of each thread, in seconds per second. With less, other programs used the processors
+# during the trial, and the trial says nothing.
 UNDISTURBED = 0.9
 
 
 def threads_for(batch: int, most: int) -> int:
-    """The number of threads for batches of this size: 1, or `most` of them.
+    """The number of threads for batches of `batch` rows: 1 or `most`.
 
-    `most` if the machine is busy during the trial, or if the choice cannot be kept. Batches of nearly the
-    same size share a choice.
+    It is `most` if the machine is busy during the trial, or if the choice cannot be stored. Batches of nearly
+    the same size share a choice.
     """
     if most == 1:
         return 1
     rows = 1 << (batch - 1).bit_length()
     ways = ("1", str(most))
     name = f"threads for {rows} rows, at most {most}"
-    return int(kept(name, partial(_trial, rows, most), ways, without=ways[1]))
+    return int(kept_choice(name, partial(_trial, rows, most), ways, without=ways[1]))
 
 
 def _trial(rows: int, most: int) -> str:
@@ -57,7 +57,7 @@ def compare(
 ) -> str:
     """The number of threads, "1" or `most`, with which `call` is faster; `most` if the machine is busy.
 
-    use: sets the number of threads. The two take turns, and the shortest time of each counts.
+    use: sets the number of threads. The two numbers take turns, and the shortest time of each counts.
     """
     best = {threads: (float("inf"), 0.0) for threads in (1, most)}
     calls = 1
@@ -69,7 +69,7 @@ def compare(
             for _ in range(calls):
                 call()
             seconds, busy = clock() - began, processor_clock() - busy
-            if turn:  # the first turn only says how many calls take long enough
+            if turn:  # the first turn only finds how many calls are long enough to be timed
                 best[threads] = min(best[threads], (seconds, busy / max(seconds, 1e-9)))
             elif threads == 1:
                 calls = max(1, round(SECONDS / max(seconds, 1e-6)))

@@ -1,8 +1,11 @@
-"""Products of a few rows with many weights. A row's bits do not depend on the number of rows.
+"""Products of a few rows of inputs with many weights.
+
+The result for a row has the same bits whatever the number of rows.
 
 Weights are stored in panels of WIDTH outputs, (panels, inputs, WIDTH), so that each input is multiplied with
 WIDTH neighbouring weights. Every output is one running sum over the inputs in their order, by fused
-multiply-add. A tile keeps the sums of some rows and panels in registers; its shape changes only the speed.
+multiply-add. A tile is a group of rows and panels whose sums are kept in registers. Its shape changes only
+the speed.
 """
 
 from __future__ import annotations
@@ -20,9 +23,9 @@ from hobble.core.compiled import njit
 from hobble.core.quat import Array
 
 WIDTH = 16  # outputs in a panel: two registers with AVX2, one with AVX-512
-DEPTH = 256  # largest number of inputs at a time: their part of a panel stays in the L1 cache
+DEPTH = 256  # most inputs at a time, so that their part of a panel stays in the L1 cache
 ALIGNMENT = 64  # bytes of a cache line
-AHEAD = 48  # inputs: how far ahead a single row's weights are fetched from memory
+AHEAD = 48  # number of inputs by which the weights are fetched ahead from memory, if there is one row
 
 
 def panels_of(outputs: int) -> int:
@@ -48,7 +51,7 @@ def in_panels(weights: Array) -> Array:
 
 
 def _write_tile(builder, shape, weights_from, inputs_from, sums_at):  # type: ignore[no-untyped-def]
-    """Write the loop of `_tile` in LLVM IR with vectors of WIDTH numbers, on every processor.
+    """Write the loop of `_tile` in LLVM IR, with vectors of WIDTH numbers on every processor.
 
     This keeps the sums in registers, which compilers do not achieve from plain loops. shape: numbers of rows
     and panels. weights_from, inputs_from, sums_at: the tuples of `_tile` as values, arrays as pointers.
@@ -92,16 +95,16 @@ def _write_tile(builder, shape, weights_from, inputs_from, sums_at):  # type: ig
 
 
 def _fetch_ahead(builder, weights, of_panel, step, k, depth):  # type: ignore[no-untyped-def]
-    """Fetch the weights of the panels AHEAD inputs early; at their end, fetch those of the next panels.
+    """Fetch the panels' weights AHEAD inputs early. At the end of a panel, fetch those of the next tile.
 
-    The processor's own fetching starts again at each panel, so that a single row would wait for memory.
+    The processor's own prefetching starts anew at each panel, so a single row would wait for memory.
     """
     index, flag, cell = ir.IntType(64), ir.IntType(32), ir.IntType(8).as_pointer()
     fetch = cgutils.get_or_insert_function(
         builder.module, ir.FunctionType(ir.VoidType(), [cell, flag, flag, flag]), "llvm.prefetch.p0"
     )
     later = builder.add(k, index(AHEAD))
-    # After its last input, a panel in memory is followed by another one of this tile. Skip these.
+    # A panel is followed in memory by the other panels of this tile. Skip them to get to the next tile.
     further = builder.select(
         builder.icmp_signed("<", later, depth), index(0), builder.mul(step, index(len(of_panel) - 1))
     )
@@ -133,10 +136,10 @@ def _spread(builder, one, vector):  # type: ignore[no-untyped-def]
 def _typed_tile(typing, rows, panels, weights_from, inputs_from, sums_at):  # type: ignore[no-untyped-def]
     """Add the products of some inputs with `panels` panels of weights to `rows` rows of sums.
 
-    rows, panels: compile-time constants. The others are tuples of (n,) arrays and indices:
-    weights_from: weights; index of the first panel's weights for these inputs; distance to the next panel's.
-    inputs_from: inputs; index of the first row's; distance to the next row's; their number in each row.
-    sums_at: sums; (rows,) index of each row's sums for the first panel.
+    rows, panels: compile-time constants. The other arguments are tuples of flat arrays and indices:
+    weights_from: the weights; index of the first panel's weights for these inputs; distance to those of the
+    next panel. inputs_from: the inputs; index of the first row's inputs; distance to those of the next row;
+    number of inputs in each row. sums_at: the sums; (rows,) index of each row's sums for the first panel.
     """
     if not (isinstance(rows, types.IntegerLiteral) and isinstance(panels, types.IntegerLiteral)):
         return None
@@ -170,8 +173,9 @@ def _has_32_registers() -> bool:
     return not getattr(config, "CPU_NAME", None) and bool(llvm.get_host_cpu_features().get("avx512f"))
 
 
-# Panels in a tile of two or three rows, and of four to six rows. With these numbers the sums nearly fill the
-# registers, and there are enough of them to hide the latency of an addition. One row waits for memory.
+# Number of panels in a tile with one row, with two or three rows, and with four to six rows. With two rows or
+# more, the sums nearly fill the registers, and there are enough sums to hide the latency of an addition. With
+# one row the processor waits for memory anyway.
 PANELS_FOR_1_ROW = 4
 PANELS_FOR_3_ROWS, PANELS_FOR_6_ROWS = (4, 4) if _has_32_registers() else (2, 1)
 ROWS = 6
@@ -181,15 +185,16 @@ ROWS = 6
 def multiply(
     weights: Any, start: int, panels: int, inputs: int, x: Any, rows: int, y: Any, y_at: Any
 ) -> None:
-    """Add W x to rows of y.
+    """Add W x to rows of y. All arrays are flat.
 
-    weights: (n,), from `start` on (panels, inputs, WIDTH). x: (n,), from 0 on (rows, inputs). y: (n,), with
-    panels * WIDTH sums at each index of y_at (rows,).
+    weights: from index `start` on (panels, inputs, WIDTH). x: (rows, inputs). y: panels * WIDTH sums of each
+    row, from its index in y_at (rows,) on.
     """
     at = np.empty(ROWS, np.int64)
     tiles = -(-rows // ROWS)
     wide = PANELS_FOR_1_ROW if rows == 1 else PANELS_FOR_3_ROWS if rows <= 3 else PANELS_FOR_6_ROWS
-    stretches = 1 if rows == 1 else -(-inputs // DEPTH)  # no other row takes the same weights again
+    # With one row each weight is used only once, so there is nothing to keep in the cache.
+    stretches = 1 if rows == 1 else -(-inputs // DEPTH)
     for stretch in range(stretches):
         k = inputs * stretch // stretches
         depth = inputs * (stretch + 1) // stretches - k

@@ -1,4 +1,4 @@
-"""The interface of a network in training: parameters in one buffer, and a step that finds the gradient."""
+"""The interface of a network in training: parameters in one buffer, and a step that computes the gradient."""
 
 from __future__ import annotations
 
@@ -13,15 +13,18 @@ import numpy as np
 import torch
 from torch import Tensor
 
+from hobble.models.layer_mirror import LayerMirror
+from hobble.rows.mirror_columns import ColumnMirror
+
 ALL_ROWS = slice(None)
 
 
 class TrainingStep(Protocol):
-    """The gradient of the mean squared error on one batch.
+    """Computes the gradient of the mean squared error on one batch.
 
-    gradients: of the last call, one for each layer, with the layer's numbers in the same order. error: of the
-    last call, (B, Y), prediction minus y. generator: for dropout on CUDA. input_mask: which of the masks is
-    that of all inputs.
+    gradients: of the last call, one for each layer, in the order of the layer's parameters. error: (B, Y) of
+    the last call, prediction minus y. generator: random numbers for dropout on CUDA. input_mask: index of the
+    mask of the network's inputs among `masks`.
     """
 
     gradients: list[Tensor]
@@ -30,7 +33,7 @@ class TrainingStep(Protocol):
     input_mask: int
 
     def __call__(self, x: Tensor, y: Tensor, p: Tensor, masks: list[Tensor]) -> Tensor:
-        """Find `gradients` for x (B, X), y (B, Y), p (B,). Returns the mean squared error, a scalar."""
+        """Compute `gradients` for x (B, X), y (B, Y), p (B,). Returns the mean squared error, a scalar."""
 
     def masks(self, rows: int, own: slice = ALL_ROWS) -> list[Tensor]:
         """Draw the dropout masks of a batch of `rows` rows, and return those of the rows `own`.
@@ -47,8 +50,8 @@ class Trainable(ABC):
     """All parameters in one buffer `flat`, layer by layer.
 
     A layer is (out, K, in + 1): K sets of weights that the network blends, with the bias as the last column.
-    So the optimiser is one loop for all architectures, and a layer is one product with the inputs, extended
-    by a 1 and multiplied by the K shares.
+    So one loop of the optimiser serves all architectures, and a layer is one matrix product with its inputs,
+    which are extended by a 1 and multiplied by each of the K shares.
     """
 
     kind: ClassVar[str] = ""  # its folder in hobble.models
@@ -76,7 +79,7 @@ class Trainable(ABC):
 
     @abstractmethod
     def step(self, dropout: float, half: bool) -> TrainingStep:
-        """The fastest step on this device. half: round the factors of the products to bfloat16."""
+        """The fastest step on this device. half: round the factors of the matrix products to bfloat16."""
 
     @abstractmethod
     def arrays(self) -> dict[str, np.ndarray]:
@@ -91,6 +94,13 @@ class Trainable(ABC):
     @abstractmethod
     def described(self) -> str:
         """Its shape in a few words. A training resumes only with a network of the same shape."""
+
+    def mirrors(self, inputs: ColumnMirror, outputs: ColumnMirror) -> list[LayerMirror]:
+        """How each layer changes with the mirrors of standardised X and Y.
+
+        Only for kinds whose `Options.asymmetric` can be empty.
+        """
+        raise TypeError(f"{type(self).__name__} has no mirror")
 
     @cached_property
     def layers(self) -> list[Tensor]:

@@ -35,8 +35,8 @@ from hobble.motion.rig import (
     missing_bone,
     unit_of,
 )
-from hobble.motion.stance import upright
 from hobble.motion.standing import stands
+from hobble.motion.upright_rest import upright
 
 STILL = 0.1  # cm: a position channel that stays nearer to its offset only repeats it
 Limb = TypeVar("Limb")

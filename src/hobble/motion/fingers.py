@@ -17,8 +17,8 @@ AWAY = (0.1, 0.7)  # range of the distance from wrist to the base of a finger, i
 def pointing_fingers(skeleton: Skeleton, wrists: Mapping[str, int]) -> dict[str, int]:
     """Side -> the base of the hand's longest finger. Sides without one are left out.
 
-    A thumb does not count, nor anything longer than a forearm, which is a thing in the hand. Fingers with
-    meaningful names come first.
+    A thumb does not count, nor a chain longer than the forearm: that is an object held in the hand. Fingers
+    with meaningful names come first.
     """
     lengths = np.linalg.norm(skeleton.offsets, axis=-1)
     fingers = {}

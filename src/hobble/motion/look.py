@@ -19,7 +19,7 @@ from hobble.core.clip import Clip
 from hobble.core.clip_files import find_clips, only_file, unused_file_notes
 from hobble.core.errors import HobbleError, InputError
 from hobble.core.quat import Array
-from hobble.motion.check import worst
+from hobble.motion.check_retarget import worst
 from hobble.motion.duplicates import ClipDigest, likeness, same_pairs
 from hobble.motion.make import make_clip
 from hobble.motion.options import ClipMotion

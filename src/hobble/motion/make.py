@@ -14,7 +14,7 @@ from hobble.core.quat import Array
 from hobble.core.skeleton import Skeleton
 from hobble.motion.axes import turned
 from hobble.motion.body import body_by_roles
-from hobble.motion.check import check, check_knees, compare
+from hobble.motion.check_retarget import check, check_knees, compare
 from hobble.motion.file_motion import FOUND, FileMotion, load_source
 from hobble.motion.loop import loop_clip
 from hobble.motion.options import ClipMotion
@@ -24,8 +24,8 @@ from hobble.motion.resample import sample_positions, sample_rotations, sample_ti
 from hobble.motion.retarget import plan, retarget_clip
 from hobble.motion.rig import load_skeleton
 from hobble.motion.root import facing
-from hobble.motion.stance import upright
 from hobble.motion.tilt import check_tilt
+from hobble.motion.upright_rest import upright
 
 SAME = 1e-3  # cm: offsets that differ less from the skeleton's are equal
 
@@ -135,7 +135,8 @@ def resample(clip: Clip, fps: float) -> Clip:
 class Fitted:
     """A clip on the joints of the target, the scale of its path, and notes.
 
-    figures: difference from its source (`hobble.motion.check.compare`), or None if it was not retargeted.
+    figures: difference from its source (`hobble.motion.check_retarget.compare`), or None if it was not
+    retargeted.
     unsure: sentences on what is uncertain.
     """
 

@@ -8,12 +8,12 @@ from typing import Any
 from hobble.figure.pack import packed_body
 from hobble.report import compare_sections as parts
 from hobble.report import compare_tables as tables
-from hobble.report import measured, side_by_side
+from hobble.report import comparison_charts, measure_sections
 from hobble.report.formats import embedded
 from hobble.report.hero import body_channel
 from hobble.report.playable import skeleton_of
 from hobble.report.provenance import commit, machine, versions
-from hobble.report.rounded import has_weights, rounded
+from hobble.report.rounded_weights import has_weights, rounded
 from hobble.report.templates import FOLDER, specs, style, template, trusted
 
 LARGEST_PAGE = 19_850_000  # bytes; the page must stay under 20 MB
@@ -31,18 +31,18 @@ def render_compared(
 
     compared: compare.json. playables: configuration -> data from `playable.playable`; as many as fit into the
     page are kept, in order. If not all fit, their weights get 8 bits. bundle: the scripts, from
-    `bundle.bundle`. errors: configuration -> centimetres from `rounded.rounding_error`.
+    `bundle.bundle`. errors: configuration -> centimetres from `rounded_weights.rounding_error`.
     """
     sections: dict[str, dict[str, Any]] = {
         "overview": {
-            "verdicts": measured.compared_verdicts(compared),
+            "verdicts": measure_sections.compared_verdicts(compared),
             "table": tables.configuration_table(compared),
             "published": tables.published_table(compared),
         },
         "training": {"curves": parts.training_curves(compared)},
         "stages": {"charts": parts.stage_dots(compared)},
     }
-    shown, names = measured.compared_sections(compared), side_by_side.names(compared)
+    shown, names = measure_sections.compared_sections(compared), comparison_charts.names(compared)
     charts = specs([sections, shown])
     bodies = {spec["body"]: packed_body(skeleton_of(spec)) for spec in (playables or {}).values()}
     used = len(bundle.encode()) + len(embedded(charts).encode()) + len(embedded(bodies).encode())

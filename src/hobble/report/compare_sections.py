@@ -6,9 +6,9 @@ from collections.abc import Mapping
 from typing import Any
 
 from hobble.report.charts import Chart, Trace, axis, line, log_axis
+from hobble.report.comparison_charts import Compared, colours, dots
 from hobble.report.cost_section import log_range
 from hobble.report.formats import duration, size
-from hobble.report.side_by_side import Compared, colours, dots
 
 X_AXES = {"pass": "passes", "seconds": "seconds of training", "samples": "samples seen"}
 

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from typing import Any
 
+from hobble.report.comparison_charts import Compared
 from hobble.report.formats import duration, number, size
-from hobble.report.measured import Overview, compared_columns
+from hobble.report.measure_sections import Overview, compared_columns
 from hobble.report.published import cited
-from hobble.report.side_by_side import Compared
 from hobble.report.tables import Column, Table
 
 # Longer names of published measures whose own names are unclear.

@@ -13,7 +13,7 @@ import numpy as np
 from hobble.channels import channel
 from hobble.core.quat import Array
 from hobble.core.skeleton import Skeleton
-from hobble.measures.sample import shuffle_key
+from hobble.measures.stratified_sample import shuffle_key
 from hobble.report.charts import Chart, Trace, axis
 from hobble.rows.clip_rows import row_count
 from hobble.rows.excerpts import Excerpt, excerpts, load_excerpt

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from hobble.channels.shown import speaker
-from hobble.motion.check import MOST, worst
+from hobble.motion.check_retarget import MOST, worst
 from hobble.report.charts import Chart, Trace, axis
 from hobble.report.formats import size
 from hobble.report.gather import Material
@@ -164,7 +164,10 @@ def clip_table(material: Material, clips: frozenset[str]) -> Table:
 
 
 def remarks_table(material: Material) -> Table | None:
-    """Every repair, doubt and warning; of many, each kind with its number and one of its clips."""
+    """Every repair, doubt and warning.
+
+    If there are more than MOST_REMARKS, one row for each kind, with the number of its clips and one example.
+    """
     rows = []
     for stage, reports, key in (
         ("motion", material.motion, "repairs"),

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from hobble.core.quat import Array
-from hobble.report import measured
+from hobble.report import measure_sections
 from hobble.report.coverage import TURNS
 from hobble.report.formats import duration, number, size
 from hobble.report.gather import Material
@@ -44,7 +44,7 @@ def lead(material: Material) -> str:
 
 def key_figures(material: Material) -> list[KeyFigure]:
     """The numbers at the top of the page, most important first."""
-    figures = measured.figures(material)
+    figures = measure_sections.figures(material)
     seconds = sum(report.get("seconds", 0) for report in material.motion)
     if seconds:
         kept = sum(material.split(report["clip"]) == "held_out" for report in material.motion)
@@ -69,7 +69,7 @@ def hints(material: Material, turns: Mapping[str, Array] | None = None) -> list[
     turns: split -> seconds at each turn (`coverage.seconds_of_data`), if they were counted.
     """
     found = [
-        *measured.hints(material),
+        *measure_sections.hints(material),
         *placed(10, _coverage(material)),  # first, because training cannot make up for missing data
         *placed(10, _turning(turns or {})),
         *placed(11, _repairs(material)),

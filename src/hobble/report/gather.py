@@ -11,7 +11,7 @@ from hobble.core.files import read_json
 from hobble.core.untrusted import read_yaml
 from hobble.evaluation.csv_tables import read_numbers
 from hobble.evaluation.pipeline_results import Pipeline
-from hobble.measures.given import Json
+from hobble.measures.inputs import Json
 from hobble.models.load import load_network
 
 PUBLISHED = Path(__file__).parents[1] / "evaluation" / "published.yaml"

@@ -11,7 +11,7 @@ import numpy as np
 from hobble.core.array_parts import ArrayParts
 from hobble.core.quat import Array
 from hobble.core.skeleton import Skeleton
-from hobble.figure.fit import fitted_rotations
+from hobble.figure.fit_rotations import fitted_rotations
 from hobble.figure.mesh import body, key
 from hobble.figure.pack import packed_turns
 from hobble.models.packing import packed

@@ -13,7 +13,7 @@ import numpy as np
 from hobble.core.skeleton import Skeleton
 from hobble.gait.cycles import measure
 from hobble.gait.features import features
-from hobble.gait.graded import LEANING, PARTS, STRENGTHS, Grader, grader
+from hobble.gait.limp_grade import LEANING, PARTS, STRENGTHS, Grader, grader
 from hobble.gait.people import people
 from hobble.gait.profile import Profile, profile
 from hobble.gait.recogniser import SIDES
@@ -55,7 +55,7 @@ def healthy_walk(network: Network, skeleton: Skeleton, runtime: Runtime) -> Prof
 
 
 def learnt(known: Grader | None = None) -> dict[str, Any]:
-    """The statistics that `hobble.gait.graded` learnt, with D features per walk.
+    """The statistics that `hobble.gait.limp_grade` learnt, with D features per walk.
 
     `features`: their names. `strengths`. `healthySpread`: (D, D) covariance of healthy walks. `kinds`: for
     each label and side its `words` for the page, `mean` (D,) at strength 1 and covariance `spread` (D, D).

@@ -16,7 +16,7 @@ from hobble.report import (
     coverage,
     data_section,
     findings,
-    measured,
+    measure_sections,
     shown_clips,
     terrain_section,
     training_section,
@@ -41,7 +41,8 @@ def render(
 
     scenes: from `scenes.scenes`; playable: from `playable.playable`; compared: from
     `captured_and_predicted.comparisons`. A part without data is left out. bundle: the page's scripts, from
-    `bundle.bundle`. hero: from `walked.opened`; without it the figures at the top start from a stand.
+    `bundle.bundle`. hero: from `opening_walk.opening_walk`; without it the figures at the top start from a
+    stand.
 
     The template escapes every value. Data for the scripts is JSON without any "<".
     """
@@ -49,50 +50,69 @@ def render(
     terrain = shown_clips.files_of(material.terrain, clips)
     some = shown_clips.sampled(material.rows)
     found = coverage.seconds_of_data(some, material.splits, of=len(material.rows))
-    sections, shown = _sections(material, found, clips, terrain), measured.sections(material)
+    sections, measured = _sections(material, found, clips, terrain), measure_sections.sections(material)
+    scenes, compared, playable = dict(scenes or {}), compared or {}, playable or {}
     strips = data_section.strips(material, clips)
-    scenes = dict(scenes or {})
     grounds = ground_pictures(terrain, material.network["skeleton"])
-    figure = (
-        Skeleton.from_dict({"name": "", **material.network["skeleton"]})
-        if material.network["skeleton"]
-        else None
-    )
+    playables = {material.name: playable} if playable else {}
     data = {
-        "charts": specs([sections, shown]),
-        "bodies": {key(figure): packed_body(figure)} if figure else {},
-        "hero": hero or opening(playable or {}, material.measured.values()),
+        "charts": specs([sections, measured]),
+        "bodies": _bodies(material),
+        "hero": hero or opening(playable, material.measured.values()),
         "scenes": scenes,
         "strips": strips,
         "grounds": grounds,
         "name": material.name,
-        "playable": {material.name: playable} if playable else {},
-        "compare": compared or {},
+        "playable": playables,
+        "compare": compared,
     }
     return template("page.html.j2").render(
         material=material,
-        name=material.name,
-        title=material.title or material.name,
-        titled=bool(material.title),
-        eyebrow=f"Hobble report · configuration {material.name} · data set {material.dataset}",
-        measured=shown,
+        measured=measured,
         figures=findings.key_figures(material),
         hints=findings.hints(material, found["turns"]),
-        lead=findings.lead(material),
         embedded={name: embedded(part) for name, part in data.items()},
         scene_names=[scene["name"] for scene in scenes.get("scenarios", ())],
-        playable={material.name: playable} if playable else {},
-        hurts=body_channel(playable or {}) is not None,
-        shown_channel=first_shown(playable or {}),
-        compared=[clip["name"] for clip in (compared or {}).get("clips", ())],
+        playable=playables,
+        compared=[clip["name"] for clip in compared.get("clips", ())],
         grounds=[picture["name"] for picture in grounds["pictures"]],
         strips=[strip["clip"] for strip in strips],
         style=style(),
         bundle=trusted("the bundle", bundle),
-        configuration=yaml.safe_dump(plain(dict(material.resolved)), sort_keys=False, allow_unicode=True),
-        provenance={"commit": commit(FOLDER), "machine": machine(), "versions": versions()},
+        **_top(material, playable),
+        **_origin(material),
         **sections,
     )
+
+
+def _bodies(material: Material) -> dict[str, Any]:
+    """The body to draw, by the key of its skeleton; {} if the network has no skeleton."""
+    if not material.network["skeleton"]:
+        return {}
+    figure = Skeleton.from_dict({"name": "", **material.network["skeleton"]})
+    return {key(figure): packed_body(figure)}
+
+
+def _top(material: Material, playable: Mapping[str, Any]) -> dict[str, Any]:
+    """Title and text above the first section, and the channel that the figure there shows."""
+    return {
+        "name": material.name,
+        "title": material.title or material.name,
+        "titled": bool(material.title),
+        "eyebrow": f"Hobble report · configuration {material.name} · data set {material.dataset}",
+        "lead": findings.lead(material),
+        "hurts": body_channel(playable) is not None,
+        "shown_channel": first_shown(playable),
+    }
+
+
+def _origin(material: Material) -> dict[str, Any]:
+    """The configuration, and the versions and the machine that the page is from."""
+    resolved = plain(dict(material.resolved))
+    return {
+        "configuration": yaml.safe_dump(resolved, sort_keys=False, allow_unicode=True),
+        "provenance": {"commit": commit(FOLDER), "machine": machine(), "versions": versions()},
+    }
 
 
 def _sections(

@@ -14,7 +14,7 @@ from hobble.database.sizes import Sizes, sizes
 from hobble.evaluation.csv_tables import read_numbers
 from hobble.evaluation.pipeline_results import JobTotal, Pipeline, StageTotal
 from hobble.report.provenance import machine, versions
-from hobble.workflow.kept import recorded_seconds
+from hobble.workflow.kept_files import recorded_seconds
 
 
 def summarise(configuration: str, stages: Mapping[str, Mapping[str, Iterable[str]]]) -> Pipeline:

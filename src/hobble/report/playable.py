@@ -15,13 +15,21 @@ from hobble.figure.mesh import body, key
 from hobble.models.network import Network, inverse
 from hobble.models.packing import packed
 from hobble.rows.layout import RowLayout
-from hobble.runtime import animation, controller, feet, foot_lock, leg_reach, trajectory
+from hobble.runtime import (
+    advance,
+    caller_targets,
+    feet,
+    foot_lock,
+    leg_reach,
+    limits,
+    network_rows,
+    trajectory,
+)
 from hobble.runtime.bounds import Bounds
 from hobble.runtime.character import start
-from hobble.runtime.limits import HURRY_FACTOR, LAME_BELOW
 from hobble.runtime.options import Runtime
 
-UNSEEN = 1e-7  # an input with a smaller scale has no effect
+NO_EFFECT = 1e-7  # an input with a smaller scale has no effect
 
 
 def playable(network: Network, runtime: Runtime) -> dict[str, Any]:
@@ -36,16 +44,16 @@ def playable(network: Network, runtime: Runtime) -> dict[str, Any]:
     layout = network.layout
     turning = turning_joints(skeleton)
     rows, scale = _rows(layout, turning), inverse(network.x_std)
-    seen = np.flatnonzero(scale > UNSEEN)
+    read = np.flatnonzero(scale > NO_EFFECT)
     legs = feet.leg_joints(skeleton)
     sole = feet.sole_heights(network, legs).tolist()
     carried = feet.carried(skeleton, legs)
     return {
-        "network": {"kind": network.kind, **network.page(seen, rows)},
+        "network": {"kind": network.kind, **network.page(read, rows)},
         "rooted": network.rooted,
-        "seen": seen.tolist(),
-        "xMean": packed(network.x_mean[seen].astype(np.float32)),
-        "xScale": packed(scale[seen].astype(np.float32)),
+        "inputColumns": read.tolist(),
+        "xMean": packed(network.x_mean[read].astype(np.float32)),
+        "xScale": packed(scale[read].astype(np.float32)),
         "yMean": packed(network.y_mean[rows].astype(np.float32)),
         "yStd": packed(network.y_std[rows].astype(np.float32)),
         "turning": turning,
@@ -84,7 +92,7 @@ def shown_channels(network: Network, runtime: Runtime) -> list[dict[str, Any]]:
     assert skeleton is not None
     for name, columns in network.channels.items():
         one, wording, at = channel(name), words(name), list(columns).index
-        limits = network.limits.get(name)
+        speed_limits = network.limits.get(name)
         face = shown(name, skeleton, columns, network.trained(name))
         presets = [
             {"name": preset, "values": [[at(column), value] for column, value in values.items()]}
@@ -111,7 +119,7 @@ def shown_channels(network: Network, runtime: Runtime) -> list[dict[str, Any]]:
                 "on": wording.on,
                 "rate": runtime.rates.get(name, one.rate) / 60,
                 "scale": runtime.scales.get(name, 1.0),
-                "limits": limits.to_dict() if runtime.limits and limits is not None else None,
+                "limits": speed_limits.to_dict() if runtime.limits and speed_limits is not None else None,
             }
         )
         first += len(columns)
@@ -170,15 +178,15 @@ def _constants() -> dict[str, float]:
         "correctionRate": trajectory.CORRECTION_RATE,
         "correctionWithin": trajectory.CORRECTION_WITHIN,
         "mostCorrection": trajectory.MOST_CORRECTION,
-        "unwishedLoss": trajectory.BACKWARD_LOSS,
-        "pull": trajectory.PULL,
-        "pullAhead": trajectory.PULL_AHEAD,
+        "backwardLoss": advance.BACKWARD_LOSS,
+        "pull": advance.PULL,
+        "pullAhead": advance.PULL_AHEAD,
         "furthestTurn": float(trajectory.FURTHEST_TURN),
         "strafeFrom": float(trajectory.STRAFE_FROM),
-        "turnInPlace": float(animation.TURN_IN_PLACE),
-        "jogFrom": animation.JOG_FROM,
-        "lameBelow": LAME_BELOW,
-        "hurried": HURRY_FACTOR,
+        "turnInPlace": float(caller_targets.TURN_IN_PLACE),
+        "jogFrom": limits.JOG_FROM,
+        "lameBelow": limits.LAME_BELOW,
+        "hurryFactor": limits.HURRY_FACTOR,
         "lockAt": foot_lock.LOCK_AT,
         "release": foot_lock.RELEASE,
         "tooFar": foot_lock.TOO_FAR,
@@ -187,14 +195,14 @@ def _constants() -> dict[str, float]:
         "missedAlone": foot_lock.MISSED_ALONE,
         "stepFrames": foot_lock.STEP_FRAMES,
         "stepHeight": foot_lock.STEP_HEIGHT,
-        "fastestTurn": float(controller.FASTEST_TURN),
+        "fastestTurn": float(network_rows.FASTEST_TURN),
         "heightMix": feet.HEIGHT_MIX,
         "fastestLift": feet.FASTEST_LIFT,
         "floating": feet.FLOATING,
         "bodyMix": feet.BODY_MIX,
         "bodyFree": feet.BODY_FREE,
-        "bodyFrom": feet.BODY_MIN_CONTACT,
-        "mostClimb": controller.MOST_CLIMB,
+        "bodyMinContact": feet.BODY_MIN_CONTACT,
+        "mostClimb": network_rows.MOST_CLIMB,
         "mostAdded": leg_reach.MOST_ADDED,
         "kneeAhead": leg_reach.KNEE_AHEAD,
         "stretch": feet.STRETCH,

@@ -13,7 +13,7 @@ from hobble.channels.shown import Shown, shown, words
 from hobble.core.files import load_npz
 from hobble.core.quat import Array
 from hobble.core.skeleton import Skeleton
-from hobble.figure.fit import fitted_rotations
+from hobble.figure.fit_rotations import fitted_rotations
 from hobble.figure.mesh import body, key
 from hobble.figure.pack import packed_turns
 from hobble.models.packing import packed

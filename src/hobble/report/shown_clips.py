@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 from pathlib import Path
 
-from hobble.measures.sample import shuffle_key
+from hobble.measures.stratified_sample import shuffle_key
 from hobble.report.gather import Material
 
 MOST = 150  # clips with a strip, a row of the table and ground of their own

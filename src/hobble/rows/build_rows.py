@@ -34,9 +34,11 @@ def clip_rows(
     """The rows of a clip's locomotion cycles, one cycle after another. See `ClipRows` for their form.
 
     labels, terrain: arrays of these stages, see docs/artefacts.md. channels: name -> values (F, columns).
-    window, step, facing_sigma: frames. Past the ends of the clip the root moves on (`continued`) and the gait
-    is repeated. Raises InputError if the files do not belong together, or if the clip has no frame before or
-    after a cycle.
+    window: frames of the trajectory before and after the row's frame. step: frames between two samples of the
+    trajectory. facing_sigma: sigma of the Gaussian that smooths the facing direction, frames. Past the ends
+    of the clip the root moves on (`continued`), and the gait of the first or the last frame is repeated.
+    Raises InputError if the files do not belong together, or if the clip has no frame before or after a
+    cycle.
     """
     skeleton = clip.skeleton
     columns = tuple((name, values.shape[1]) for name, values in channels.items())
@@ -83,7 +85,9 @@ def clip_rows(
 
 
 def cycle_frames(cycles: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Frames (R,) and cycle numbers (R,) of cycles (C, 2); both the first and last frame belong to a cycle.
+    """Frame (R,) and cycle number (R,) of each row. cycles: (C, 2) first and last frame of each cycle.
+
+    Both ends belong to a cycle. So the frame in which one cycle ends and the next begins has two rows.
 
     >>> cycle_frames(np.array([[60, 62], [62, 63]]))
     (array([60, 61, 62, 62, 63]), array([0, 0, 0, 1, 1]))
@@ -95,7 +99,7 @@ def cycle_frames(cycles: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 
 
 def cycle_phase(phase: Array, cycles: np.ndarray) -> Array:
-    """Phase (R,) of the frames of the cycles. It is set to exactly 0 and 1 in their first and last frames."""
+    """Phase (R,) of the rows of the cycles, exactly 0 in the first row of a cycle and 1 in the last."""
     frame, cycle = cycle_frames(cycles)
     out = phase[frame].astype(float)
     out[frame == cycles[cycle, 0]] = 0.0
@@ -104,15 +108,16 @@ def cycle_phase(phase: Array, cycles: np.ndarray) -> Array:
 
 
 def phase_change(phase: Array) -> Array:
-    """(F - 1,) change of phase from each frame to the next, plus 1 where a new cycle begins."""
+    """(F - 1,) change of phase (F,) from each frame to the next, plus 1 where a new cycle begins."""
     change = np.diff(phase.astype(float))
     return np.where(change < 0, change + 1, change)
 
 
 def trajectory(root: RootFrames, frame: np.ndarray, seen_from: np.ndarray, offsets: range) -> list[Array]:
-    """Root positions and directions at `frame` + offsets, in the root frames of the frames `seen_from`.
+    """Root positions and directions at `frame` + offsets, in the root coordinates of `seen_from`.
 
-    frame, seen_from: (R,). Returns four arrays (R, samples): position x and z, direction x and z.
+    frame, seen_from: (R,) frame numbers. Returns four arrays (R, samples): position x and z (cm), direction x
+    and z.
     """
     at = frame[:, None] + np.array(offsets)
     ground = np.zeros((*at.shape, 3))
@@ -123,7 +128,10 @@ def trajectory(root: RootFrames, frame: np.ndarray, seen_from: np.ndarray, offse
 
 
 def gait_columns(gait: Array, frame: np.ndarray, offsets: range) -> Array:
-    """(R, gaits * samples) share of each gait at every sample; gait: (F, gaits), repeated past the ends."""
+    """(R, gaits, samples) share of each gait at `frame` + offsets.
+
+    frame: (R,) frame numbers. gait: (F, gaits); its first and last frame are repeated past the ends.
+    """
     at = np.clip(frame[:, None] + np.array(offsets), 0, len(gait) - 1)
     return np.swapaxes(gait[at], 1, 2)
 

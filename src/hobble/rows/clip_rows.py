@@ -1,4 +1,7 @@
-"""The rows of one clip. Data of a frame is stored once, data of a terrain fit once for each fit."""
+"""The rows of one clip: a row for each frame of its cycles. A row has several fits of the terrain.
+
+What depends only on the frame is stored once for each row, what depends on the fit once for each fit.
+"""
 
 from __future__ import annotations
 
@@ -25,13 +28,14 @@ DELETE_IT = "Delete it; the next run makes it again."
 class ClipRows:
     """R rows of a clip with S terrain fits in all.
 
-    x: (R, columns of X without terrain and channels); y: (R, Y). Joint heights are above the world's zero.
-    p: (R,) phase. channels: name -> (R, columns of the channel).
-    frame, cycle: (R,) int. fits: (R,) number of terrain fits of each row; S is their sum.
-    heights: (S, 3 * samples) ground heights minus `mean`. mean: (S,) mean height of the centre samples, to be
-    subtracted from the joint heights. Fits are in the order of the rows.
+    layout: the columns of rows with every channel of the data set. skeleton: see `Skeleton.to_dict`.
+    x: (R, columns of X without terrain and channels). y: (R, columns of Y). Joint heights in both are above
+    the world's zero. p: (R,) phase. channels: name -> (R, columns of the channel).
+    frame: (R,) int, frame of the clip. cycle: (R,) int, number of the cycle.
+    fits: (R,) number of terrain fits of each row; S is their sum. heights: (S, 3 * samples) ground heights
+    minus `mean`, cm. mean: (S,) mean height of the centre samples, cm; it has to be subtracted from the joint
+    heights. Fits are in the order of the rows.
     visits: how often a row is used in a pass over the data, however many fits it has.
-    layout: of rows with every channel of the data set.
     """
 
     clip: str
@@ -57,7 +61,10 @@ class ClipRows:
         return np.cumsum(self.fits) - self.fits
 
     def check(self, where: str | Path) -> None:
-        """Check shapes, fits and finite values. Raises InputError, which names `where`."""
+        """Check shapes and numbers of fits, and that all values are finite.
+
+        Raises InputError, which names `where`.
+        """
         layout, rows, fits = self.layout, len(self.p), int(np.sum(self.fits))
         expected = {
             "x": (rows, body_columns(layout)),
@@ -90,9 +97,10 @@ class ClipRows:
 
 
 class Pairs(NamedTuple):
-    """n (frame, fit) pairs, float32: x (n, X), y (n, Y), p (n,). The original's rows are such pairs.
+    """n pairs of a row and one of its terrain fits. The original's rows are such pairs.
 
-    row: (n,) index of the row. weight: (n,) 1 / fits of the row, so that every frame has the same weight.
+    x: (n, X) float32. y: (n, Y) float32. p: (n,) phase. row: (n,) index of the row. weight: (n,) 1 divided by
+    the row's number of fits, so that every row has the same weight.
     """
 
     x: Array
@@ -103,9 +111,9 @@ class Pairs(NamedTuple):
 
 
 def expanded(rows: ClipRows, layout: RowLayout, batch: int = 2048) -> Iterator[Pairs]:
-    """Yield a clip's (frame, fit) pairs in raw units, about `batch` at a time.
+    """Yield all pairs of a row and a fit in raw units, about `batch` at a time.
 
-    layout: that of the rows, or one with fewer channels.
+    layout: the layout of the rows, or one with fewer channels.
     """
     first = rows.first_fit
     start = 0
@@ -118,7 +126,7 @@ def expanded(rows: ClipRows, layout: RowLayout, batch: int = 2048) -> Iterator[P
 
 
 def pairs(rows: ClipRows, layout: RowLayout, row: np.ndarray, fit: np.ndarray) -> Pairs:
-    """The pairs of row[i] and fit[i], in raw units. row: (n,) indices of rows. fit: (n,) indices of fits."""
+    """The pairs of row[i] and fit[i] in raw units, for indices of rows (n,) and of fits (n,)."""
     x = np.empty((len(row), layout.x_size), np.float32)
     y = rows.y[row].astype(np.float32)
     values = {name: rows.channels[name][row] for name, _ in layout.channels}
@@ -143,7 +151,7 @@ def save_clip_rows(path: str | Path, rows: ClipRows) -> None:
 
 
 class Outline(NamedTuple):
-    """The small part of a clip's rows that a merge reads first. fits: (R,)."""
+    """The small part of a clip's rows that is read before clips are merged. See `ClipRows` for the fields."""
 
     layout: RowLayout
     skeleton: Mapping[str, Any]
@@ -166,7 +174,8 @@ def outline(source: ClipRows | str | Path) -> Outline:
 def load_clip_rows(path: str | Path, part: tuple[int, int] | None = None) -> ClipRows:
     """Read what `save_clip_rows` wrote. Raises InputError if the file is damaged or inconsistent.
 
-    part: first row and the one after the last, to read only these, without a check of the file's checksums.
+    part: the first row to read and the one after the last; None for all rows. The file's checksums are
+    checked only if all rows are read.
     """
     data: dict[str, Any] = load_npz(path) if part is None else _part(ArrayParts(path), *part)
     try:
@@ -189,7 +198,7 @@ def row_count(path: str | Path) -> int:
 
 
 def _part(file: ArrayParts, first: int, stop: int) -> dict[str, Any]:
-    """The arrays of rows `first` to `stop`."""
+    """The arrays of the rows from `first` up to `stop`, which is not included."""
     of_fits = ("heights", "mean")
     whole = {name: file.whole(name) for name in ("clip", "layout", "skeleton", "visits")}
     rows = {name: file.rows(name, first, stop) for name in file.names if name not in (*whole, *of_fits)}

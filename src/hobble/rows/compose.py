@@ -1,6 +1,6 @@
-"""Composes rows from the columns of a frame, the channels, and the heights of one terrain fit.
+"""Composes rows of X from the columns of a frame, the channels, and the heights of one terrain fit.
 
-Works for numpy arrays and PyTorch tensors, raw or standardised. `n` is the number of rows.
+It works for numpy arrays and PyTorch tensors, raw or standardised. `n` is the number of rows.
 """
 
 from __future__ import annotations
@@ -28,12 +28,12 @@ def body_layout(layout: RowLayout) -> RowLayout:
 
 
 def x_columns(layout: RowLayout) -> int:
-    """Number of columns of X without terrain. They depend only on the frame."""
+    """Number of columns of X without terrain, that is of those that depend only on the frame."""
     return layout.x_size - 3 * layout.samples
 
 
 def fit_columns(layout: RowLayout) -> int:
-    """Number of columns of `fits` in a database: heights, then the mean height (lift)."""
+    """Number of columns of `fits` in a database: ground heights, then their mean (the lift)."""
     return 3 * layout.samples + 1
 
 
@@ -43,10 +43,10 @@ def joint_heights(joints: slice) -> slice:
 
 
 def frame_inputs(layout: RowLayout, body: Array, channels: Mapping[str, Array]) -> Array:
-    """(n, X without terrain), in the order of the layout.
+    """The columns of X without terrain (n, x_columns), in the order of the layout.
 
-    body: (n, body_columns), the blocks of X without terrain and channels, in the order of BODY.
-    channels: name -> (n, columns of the channel).
+    body: (n, body_columns) the columns without terrain and channels, in the order of BODY. channels: name ->
+    (n, columns of the channel).
     """
     if not layout.order:  # the channels come last
         return np.concatenate([body, *(channels[name] for name, _ in layout.channels)], axis=1)
@@ -76,11 +76,11 @@ def compose(
     x_std: Any = None,
     y_std: Any = None,
 ) -> None:
-    """Fill x (n, X), and subtract the mean ground height from the joint heights of x and y (n, Y).
+    """Fill x (n, X), and subtract the mean ground height from the joint heights of x and y (n, Y), in place.
 
-    frames: (n, X without terrain), ground: (n, 3 * samples), both in the units of x. lift: (n, 1) mean ground
-    height in cm, or None to subtract nothing. x_std (X,), y_std (Y,): standard deviations by which
-    standardised rows were divided; None for raw rows.
+    frames: (n, x_columns) columns without terrain. ground: (n, 3 * samples) ground heights. Both are in the
+    units of x. lift: (n, 1) mean ground height in cm, or None to subtract nothing. x_std (X,), y_std (Y,):
+    standard deviations by which standardised rows were divided; None for raw rows.
     """
     terrain = layout.x_terrain
     x[:, : terrain.start] = frames[:, : terrain.start]

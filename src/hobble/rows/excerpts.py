@@ -1,4 +1,4 @@
-"""Excerpts of a clip: the units in which a large data set is sampled, so that no long clip is read whole.
+"""Excerpts of clips. A sample of a large data set consists of excerpts, so that no long clip is read whole.
 
 A clip is cut into excerpts of equal length, of at most LONGEST rows. A shorter clip is one excerpt.
 """
@@ -17,11 +17,11 @@ from hobble.rows.clip_rows import DELETE_IT, ClipRows, load_clip_rows
 from hobble.rows.compose import body_layout
 from hobble.rows.layout import GAITS
 
-LONGEST = 1200  # rows, 20 seconds: several steps are in an excerpt, and many excerpts in an hour
+LONGEST = 1200  # rows, 20 seconds: an excerpt has several steps, and an hour has many excerpts
 
 
 class Excerpt(NamedTuple):
-    """`rows` rows of a clip that has `of` rows, from row `first` on."""
+    """Rows of a clip. first: index of the first. rows: how many. of: how many rows the whole clip has."""
 
     clip: str
     first: int
@@ -41,8 +41,11 @@ class Excerpt(NamedTuple):
 
 @dataclass(frozen=True)
 class Kind:
-    """What is in an excerpt. gait: the one with the largest share. speed: of the root, mean over the rows, cm
-    a frame. channels: names of those with a value above 0 in some row."""
+    """What is in an excerpt.
+
+    gait: the gait with the largest share. speed: mean speed of the root, cm a frame. channels: names of the
+    channels with a value above 0 in some row.
+    """
 
     gait: str
     speed: float
@@ -50,7 +53,7 @@ class Kind:
 
 
 def excerpts(clip: str, rows: int, longest: int = LONGEST) -> list[Excerpt]:
-    """A clip of `rows` rows in excerpts whose lengths differ by at most one row.
+    """The excerpts of a clip of `rows` rows. Their lengths differ by at most one row.
 
     >>> [(one.first, one.rows) for one in excerpts("walk", 2500)]
     [(0, 833), (833, 833), (1666, 834)]
@@ -63,7 +66,7 @@ def excerpts(clip: str, rows: int, longest: int = LONGEST) -> list[Excerpt]:
 
 
 def kind(rows: ClipRows, first: int, stop: int) -> Kind:
-    """What is in the rows `first` to `stop`, at least one."""
+    """What is in the rows from `first` up to `stop`, which is not included; at least one row."""
     layout, part = rows.layout, slice(first, stop)
     channels = tuple(name for name, values in rows.channels.items() if np.any(values[part] != 0))
     shares = rows.x[part, body_layout(layout).x_gait].reshape(stop - first, len(GAITS), layout.samples)
@@ -75,8 +78,8 @@ def kind(rows: ClipRows, first: int, stop: int) -> Kind:
 def load_excerpt(path: str | Path, one: Excerpt, before: int = 0, after: int = 0) -> ClipRows:
     """The rows of an excerpt, and up to `before` and `after` rows of the same clip around it.
 
-    Reads no more of the file than that. Raises InputError if the file is damaged, or if the clip has another
-    number of rows.
+    Only these rows are read from the file. Raises InputError if the file is damaged, or if the clip does not
+    have `one.of` rows.
     """
     first, stop = max(0, one.first - before), min(one.of, one.stop + after)
     rows = load_clip_rows(path, None if stop - first == one.of else (first, stop))

@@ -15,8 +15,10 @@ from hobble.rows.excerpts import Excerpt, Kind, excerpts, kind
 
 @dataclass(frozen=True)
 class Facts:
-    """rows: number of rows of the clip. kinds: what is in each of its excerpts, in the order of
-    `hobble.rows.excerpts.excerpts`."""
+    """A summary of a clip's rows.
+
+    rows: number of rows. kinds: what is in each excerpt, in the order of `hobble.rows.excerpts.excerpts`.
+    """
 
     clip: str
     rows: int

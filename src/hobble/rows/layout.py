@@ -18,13 +18,16 @@ BODY = ("position", "direction", "gait", "joint_position", "joint_velocity", "te
 
 @dataclass(frozen=True)
 class RowLayout:
-    """The columns of X and Y for J joints, a window of `window` frames to each side, and channels.
+    """The columns of X (inputs) and Y (outputs) of the network. Each block of columns is a slice.
 
-    With 31 joints, window 60 and step 10, X has 342 columns (372 with a channel of 30) and Y has 311. Every
-    block is a slice. Joint blocks hold x, y, z of joint 0, then of joint 1, and so on. Trajectory blocks hold
-    x of every sample, then z of every sample.
-    channels: (name, number of columns). order: names of the blocks of X in column order; empty for BODY, then
-    the channels. Raises ValueError if `order` is not exactly these blocks.
+    joints: number of joints. window: frames of the trajectory before and after the present frame. step:
+    frames between two samples of it. channels: (name, number of columns) of each channel. order: names of the
+    blocks of X in column order; empty for BODY, then the channels. Raises ValueError if `order` is not
+    exactly these blocks.
+
+    With 31 joints, window 60 and step 10, X has 342 columns (372 with a channel of 30) and Y has 311. Joint
+    blocks hold x, y, z of joint 0, then of joint 1, and so on. Trajectory blocks hold x of every sample, then
+    z of every sample.
     """
 
     joints: int
@@ -39,7 +42,7 @@ class RowLayout:
 
     @classmethod
     def from_dict(cls, data: Mapping[str, Any]) -> RowLayout:
-        """The inverse of `to_dict`. Files from before channels have their columns under an old key."""
+        """The inverse of `to_dict`. In old files the columns of a channel are under an old key."""
         known = {key: data[key] for key in ("joints", "window", "step") if key in data}
         channels = dict(data.get("channels", {}))
         for key in set(data) - {"joints", "window", "step", "channels", "order"}:
@@ -55,7 +58,7 @@ class RowLayout:
         return {**sizes, "channels": [list(pair) for pair in self.channels], **own}
 
     def with_channels(self, names: Iterable[str]) -> RowLayout:
-        """The same layout with only the channels `names`, in that order. Raises KeyError if it lacks one."""
+        """The layout with only the channels `names`, in that order. Raises KeyError if it lacks one."""
         size = dict(self.channels)
         kept = tuple((name, size[name]) for name in names)
         order = tuple(name for name in self.order if name in BODY or name in dict(kept))
@@ -95,7 +98,7 @@ class RowLayout:
 
     @property
     def x_position(self) -> slice:
-        """Trajectory positions, x then z, in the root frame of this frame, cm."""
+        """Trajectory positions, x then z, in the root coordinates of this frame, cm."""
         return self._x["position"]
 
     @property
@@ -110,17 +113,17 @@ class RowLayout:
 
     @property
     def x_joint_position(self) -> slice:
-        """Joint positions of the previous frame in its root frame, y minus the mean terrain height."""
+        """Joint positions of the previous frame in its root coordinates, cm, y above the mean ground."""
         return self._x["joint_position"]
 
     @property
     def x_joint_velocity(self) -> slice:
-        """Joint velocities of the previous frame, cm a frame."""
+        """Joint velocities of the previous frame in its root coordinates, cm a frame."""
         return self._x["joint_velocity"]
 
     @property
     def x_terrain(self) -> slice:
-        """Ground heights to the left (+X), in the centre and to the right, minus the mean of the centre."""
+        """Ground heights left (+X) of the path, on it and right of it, minus the mean of those on it, cm."""
         return self._x["terrain"]
 
     def x_channel(self, name: str) -> slice:
@@ -134,7 +137,7 @@ class RowLayout:
 
     @property
     def y_root_velocity(self) -> slice:
-        """Root velocity x, z in the root frame, cm a frame."""
+        """Root velocity x, z in root coordinates, cm a frame."""
         return slice(0, 2)
 
     @property
@@ -154,7 +157,7 @@ class RowLayout:
 
     @property
     def y_position(self) -> slice:
-        """Future trajectory positions, x then z, in the root frame of the next frame."""
+        """Future trajectory positions, x then z, in the root coordinates of the next frame, cm."""
         return slice(8, 8 + 2 * self.future)
 
     @property
@@ -164,7 +167,7 @@ class RowLayout:
 
     @property
     def y_joint_position(self) -> slice:
-        """Joint positions of this frame in its root frame, y minus the mean terrain height."""
+        """Joint positions of this frame in its root coordinates, cm, y above the mean ground."""
         return slice(self.y_direction.stop, self.y_direction.stop + 3 * self.joints)
 
     @property
@@ -174,7 +177,7 @@ class RowLayout:
 
     @property
     def y_joint_rotation(self) -> slice:
-        """Joint rotations of this frame in its root frame: axis times half the angle."""
+        """Joint rotations of this frame in its root coordinates: axis times half the angle, radians."""
         return slice(self.y_joint_velocity.stop, self.y_joint_velocity.stop + 3 * self.joints)
 
     @property

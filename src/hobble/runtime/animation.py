@@ -18,28 +18,27 @@ from hobble.core.skeleton import Skeleton
 from hobble.models.load import load_network
 from hobble.models.network import Network
 from hobble.runtime.caller_axes import Axes
-from hobble.runtime.channel_values import ChannelValues, UnknownName
+from hobble.runtime.caller_targets import CallerTargets
+from hobble.runtime.channel_values import ChannelValues
 from hobble.runtime.character import Character, Snapshot, start
 from hobble.runtime.controller import Controller, ControllerOptions
 from hobble.runtime.ground import as_ground
-from hobble.runtime.limits import JOG_FROM, SpeedLimiter
-from hobble.runtime.trajectory import STILL, target_facing
+from hobble.runtime.limits import SpeedLimiter
+from hobble.runtime.trajectory import target_facing
 from hobble.runtime.waypoints import Follower, Waypoint
 
-# Limits of the input, well above what is real: sprinters reach 21 cm a frame, mountains 9 km.
-FASTEST = 30.0  # largest target velocity, cm a frame; 18 m/s
-FARTHEST = 1e7  # cm from the origin, 100 km: beyond it, positions are too imprecise for a step
-TURN_IN_PLACE = np.radians(20)  # a standing character steps around if it has to turn further than this
+FARTHEST = 1e7  # cm from the origin, 100 km; farther away, positions are too imprecise for a step
 
 
 @dataclass(frozen=True)
 class Pose:
-    """One frame. The caller may keep and change it. A single character has no leading axis C.
+    """One frame of C characters. The caller may keep and change it. For one character there is no axis C.
 
-    positions: (C, J, 3); rotations: (C, J, 4) world, w first; contacts: (C, 4) left heel, left toe, right
-    heel, right toe, 0..1: as predicted, and 0 while the runtime lifts a foot to set it down elsewhere; phase:
-    (C,) in cycles; root: (C, 3) on the trajectory; yaw: (C,) radians of the root's facing, 0 for +Z, growing
-    to the left; channels: name -> (C, columns), the values that the network got.
+    positions: (C, J, 3) world, in the caller's axes and unit. rotations: (C, J, 4) world, w first.
+    contacts: (C, 4) of left heel, left toe, right heel, right toe, from 0 to 1, as predicted; 0 while the
+    runtime makes the foot step. phase: (C,) in cycles. root: (C, 3) on the ground. yaw: (C,) radians, where
+    the root faces: 0 is +Z, growing to the left, in Hobble's axes. channels: name -> (C, columns), the values
+    that the network got.
     """
 
     positions: Array = field(repr=False)
@@ -57,7 +56,7 @@ class ProceduralAnimation:
         character = ProceduralAnimation.load("results/injured/network")
         pose = character.next_pose((0, 2.5), injury={"LeftUpLeg-LeftLeg": 7})
 
-    One call moves all characters. With C > 1, every argument is either one value for all or one for each.
+    One call moves all C characters. An argument is either one value for all of them or one value for each.
     """
 
     def __init__(
@@ -101,9 +100,9 @@ class ProceduralAnimation:
         self._predictor = network.predictor(mode, storage)
         self._waypoints = list(waypoints) if waypoints is not None else None
         self._contacts = network.layout.y_contacts
-        self._gaits = {name: i for i, name in enumerate(network.gaits)}
+        self._targets = CallerTargets(network.gaits, self.axes, characters)
         for waypoint in self._waypoints or ():
-            self._known_gait(waypoint.gait)
+            self._targets.check_gait(waypoint.gait)
         self._terrain: tuple[Any, Any] = (None, None)
         self.reset(position, facing)
 
@@ -113,15 +112,15 @@ class ProceduralAnimation:
     ) -> ProceduralAnimation:
         """Load weights.npz, its folder, or a folder of the original release's .bin files.
 
-        skeleton: a Skeleton or a file of config/skeletons, for a file without one.
-        mode: "constant", "linear" or "cubic". storage: of the weights, "float32" or "int16"; default: the
-        kind's own.
+        skeleton: a Skeleton or a file of config/skeletons, for a network file that has none.
+        mode: how the phase gets its weights: "constant", "linear" or "cubic".
+        storage: how weights are stored in memory, "float32" or "int16"; the default depends on the kind.
         characters: how many.
         waypoints: the track to follow when `next_pose` gets no velocity.
         rates: channel -> largest change of its values per second; default: the channel's own rate.
         scales: channel -> divisor of its values.
         foot_locking: hold feet in contact where they landed.
-        steering: gain of the correction when the target velocity is not reached; 0 as in the original.
+        steering: gain of the correction when the target velocity is not reached; 0: none, as in the original.
         limits: limit the target speed to what the injured body can do.
         axes: the caller's axes and unit. position, facing: see `reset`.
 
@@ -137,7 +136,7 @@ class ProceduralAnimation:
     def reset(self, position: Any = None, facing: Any = None) -> None:
         """Restart healthy at `position` (3,) or (C, 3), facing the direction `facing` (3,) or (C, 3).
 
-        Default: all characters at the origin facing forward, or at the start of the waypoints.
+        By default they start at the origin facing forward, or at the start of the waypoints.
         """
         count = self.characters
         self.follower = Follower(self._waypoints, count) if self._waypoints is not None else None
@@ -145,37 +144,36 @@ class ProceduralAnimation:
         places = (
             np.broadcast_to(place, (count, 2))
             if position is None
-            else self._level("position", position, self.axes.points_in)
+            else self._targets.on_the_ground("position", position, self.axes.points_in)
         )
         if np.abs(places).max() > FARTHEST:
             raise ValueError(f"position is further than {FARTHEST / 1e5:g} km from the origin: {position}")
         if facing is None:
             yaws = np.full(count, yaw)
         else:
-            ahead = self._level("facing", facing, self.axes.directions_in)
+            ahead = self._targets.facing(facing)
             yaws = np.arctan2(ahead[:, 0], ahead[:, 1])
         self._control(start(self.network, count, np.array(places, float), yaws))
 
     def copies(self, of: np.ndarray) -> ProceduralAnimation:
-        """A new animation, whose character i goes on as this one's character of[i] would. of: (C',) indices.
+        """A new animation whose character i continues from this one's character of[i]. of: (C',) indices.
 
-        What is done with one of the two later does not change the other. Raises ValueError if the characters
-        follow waypoints.
+        The two animations share no state. Raises ValueError if the characters follow waypoints.
         """
         if self.follower is not None:
             raise ValueError("characters that follow waypoints cannot be copied")
         out = copy.copy(self)
         out.characters = len(of)
+        out._targets = CallerTargets(self.network.gaits, self.axes, len(of))
         out._control(self.state.copies(of))
         out._controller.take_pose(self._controller, of)
         return out
 
     def _control(self, state: Character) -> None:
-        """Go on from `state`."""
+        """Continue from `state`, with a new controller."""
         count = self.characters
         self.state = state
         self._controller = Controller(self._predictor, state, **self._of_controller)
-        self._target_gait = np.zeros((count, len(self._gaits)))
         self._target_strafe, self._target_look = np.zeros(count), np.zeros((count, 2))
         self._nowhere = np.zeros((count, 2))
         self._limiter = SpeedLimiter(self.network, self._channel_values.columns, count)
@@ -187,7 +185,7 @@ class ProceduralAnimation:
 
     @property
     def last_inputs(self) -> Array:
-        """(C, inputs) of the network in the last frame, in raw units. The next frame overwrites them."""
+        """(C, X) inputs of the network in the last frame, in raw units. The next frame overwrites them."""
         return self._controller.x
 
     @property
@@ -200,7 +198,10 @@ class ProceduralAnimation:
 
     @property
     def predicted_turns(self) -> tuple[Array, Array]:
-        """The same before `world_rotations`, which is quicker for many frames at once: copies."""
+        """The arguments of `world_rotations` in the last frame, (C, J, 3) and (C,), as copies.
+
+        Collect them and convert many frames at once: that is faster than `predicted_rotations`.
+        """
         made = self._controller
         turns = made.y[:, self.network.layout.y_joint_rotation].reshape(self.characters, -1, 3)
         return turns.copy(), made.yaw.copy()
@@ -217,16 +218,15 @@ class ProceduralAnimation:
         """Advance by one 60 Hz frame and return the pose.
 
         target_velocity: (2,) on the ground, (3,), or (C, 2 or 3): distance per frame, in your unit. None
-        follows the waypoints, or stands.
-        facing: direction to look in, same shapes, any length. None or zero: where the character goes.
-        gait: a name ("walk"), one name for each character, shares (6,) or (C, 6), or None to choose by speed.
-        Below 0.1 cm a frame the character stands, whatever the gait.
-        terrain: None for flat ground at 0; a function of two ground coordinates (arrays) that returns
-        heights; a `ground.Heightmap`; or a 2D array around the origin. All in your axes and unit. Pass the
-        same object every frame.
-        channels: keywords named after channels, such as injury={"LeftUpLeg-LeftLeg": 7}. The value is
-        label -> value (or (C,) values), or an array (L,) or (C, L). Labels that are not named go back to 0.
-        None, or no keyword, leaves the channel unchanged.
+        follows the waypoints; without waypoints the character stands. facing: direction to look in, same
+        shapes, any length. None or zero: the direction of movement. gait: a name ("walk"), one name for each
+        character, shares (6,) or (C, 6), or None to choose by speed. Below 0.1 cm a frame the character
+        stands, whatever the gait. terrain: None for flat ground at 0; a function of two ground coordinates
+        (arrays) that returns heights; a `ground.Heightmap`; or a 2D array around the origin. All in your axes
+        and unit. Pass the same object every frame. channels: keywords named after channels, such as
+        injury={"LeftUpLeg-LeftLeg": 7}. The value is a mapping from label (column of the channel) to value or
+        (C,) values, or an array (L,) or (C, L) of all L labels. Labels that are not named go back to 0. None,
+        or no keyword, leaves the channel unchanged.
 
         Raises UnknownName (a KeyError) for a label or gait that the network does not have; TypeError for a
         keyword that is no channel; ValueError for a channel that the network has no input for, for values out
@@ -235,9 +235,9 @@ class ProceduralAnimation:
         """
         velocity, ahead, gait = self._target(target_velocity, facing, gait)
         strafe, direction = self._target_strafe, self._target_look
-        ahead = self._nowhere if ahead is None else ahead
         target_facing(velocity, ahead, self.state.smoothed_direction, strafe, direction)
-        shares = self._gait(velocity, direction, gait)
+        heading = self.state.direction[:, self.network.layout.window]
+        shares = self._targets.gait_shares(velocity, direction, heading, gait)
         if terrain is not self._terrain[0]:
             self._terrain = (terrain, as_ground(terrain, self.axes))
         targets = [
@@ -259,18 +259,12 @@ class ProceduralAnimation:
             raise
         return self._pose()
 
-    def _target(self, velocity: Any, facing: Any, gait: Any) -> tuple[Array, Array | None, Any]:
+    def _target(self, velocity: Any, facing: Any, gait: Any) -> tuple[Array, Array, Any]:
+        """Target velocity and facing (C, 2), zero to look where the character goes, and the caller's gait."""
+        ahead = self._nowhere if facing is None else self._targets.facing(facing)
         if velocity is not None:
-            ahead = None if facing is None else self._level("facing", facing, self.axes.directions_in)
-            target = self._level("target_velocity", velocity, self.axes.points_in)
-            if (fastest := np.hypot(target[:, 0], target[:, 1]).max()) > FASTEST:
-                raise ValueError(
-                    f"target_velocity is {fastest:.4g} cm a frame, faster than a body can move: "
-                    f"{FASTEST:g} cm a frame at most ({FASTEST * 0.6:g} m/s at 60 frames a second)"
-                )
-            return target, ahead, gait
+            return self._targets.velocity(velocity), ahead, gait
         if self.follower is None:
-            ahead = None if facing is None else self._level("facing", facing, self.axes.directions_in)
             return np.zeros((self.characters, 2)), ahead, gait
         middle = self.network.layout.window
         target, heading = self.follower.lead(self.state.position[:, middle])
@@ -281,68 +275,6 @@ class ProceduralAnimation:
                 if waypoint.facing is not None:
                     ahead[c] = waypoint.facing
         return target, ahead, [w.gait for w in heading] if gait is None else gait
-
-    def _level(self, what: str, vector: Any, convert: Any) -> Array:
-        """The caller's vectors as Hobble's x, z (C, 2). Two components are taken as ground coordinates."""
-        v = np.asarray(vector, float)
-        if (
-            v.shape[-1:] not in ((2,), (3,))
-            or v.ndim > 2
-            or v.shape[:-1] not in ((), (1,), (self.characters,))
-        ):
-            each = f", or one for each of {self.characters}" if self.characters > 1 else ""
-            raise ValueError(f"{what} has to be a vector of 2 or 3 components{each}, not of shape {v.shape}")
-        if not np.isfinite(v).all():
-            raise ValueError(f"{what} is not a finite vector: {vector}")
-        if v.shape[-1] == 2:
-            if self.axes.native:
-                return np.array(np.broadcast_to(v, (self.characters, 2)), order="C")
-            full = np.zeros((*v.shape[:-1], 3))
-            full[..., [k for k in range(3) if k != "XYZ".index(self.axes.up)]] = v
-            v = full
-        if not self.axes.native:
-            v = convert(v)
-        return np.array(np.broadcast_to(v[..., ::2], (self.characters, 2)), order="C")
-
-    def _gait(self, velocity: Array, direction: Array, gait: Any) -> Array:
-        """Shares (C, 6) of the gaits, from the caller's gait, speed and facing."""
-        shares = self._target_gait
-        speed = np.hypot(velocity[:, 0], velocity[:, 1])
-        given = np.asarray(gait)
-        if given.dtype.kind in "biuf":
-            known = (given >= 0) & (given <= 1)
-            if given.shape not in (shares.shape, shares.shape[1:]) or not known.all():
-                raise ValueError(
-                    f"gait shares have to be {shares.shape[1:]} or {shares.shape} numbers from 0 to 1, not "
-                    f"{given.tolist()}; order: {', '.join(self._gaits)}"
-                )
-            shares[:] = given
-            return shares
-        names = [gait] * self.characters if gait is None or isinstance(gait, str) else gait
-        if len(names) != self.characters:
-            raise ValueError(f"{len(names)} gaits for {self.characters} characters")
-        shares[:] = 0.0
-        for c, name in enumerate(names):
-            if name is None:
-                name = "jog" if speed[c] >= JOG_FROM else "walk"
-            self._known_gait(name)
-            if speed[c] < STILL:
-                shares[c, self._gaits["stand"]] = 1.0 - self._turning(c, direction[c])
-                shares[c, self._gaits["walk"]] = 1.0 - shares[c, self._gaits["stand"]]
-                if name != "crouch":
-                    continue
-            shares[c, self._gaits[name]] = 1.0
-        return shares
-
-    def _known_gait(self, name: Any) -> None:
-        if name not in self._gaits:
-            raise UnknownName("no gait", name, self._gaits)
-
-    def _turning(self, c: int, direction: Array) -> float:
-        """1 if a standing character has to step around to face `direction`, else 0."""
-        x, z = self.state.direction[c, self.network.layout.window]
-        angle = np.arctan2(direction[0] * z - direction[1] * x, direction[0] * x + direction[1] * z)
-        return float(abs(angle) > TURN_IN_PLACE)
 
     def _pose(self) -> Pose:
         c, state = self._controller, self.state
@@ -369,5 +301,5 @@ class ProceduralAnimation:
 
 
 def world_rotations(turns: Array, yaw: Array) -> Array:
-    """(..., J, 4) world rotations of vectors (..., J, 3) relative to a root that faces `yaw` (...)."""
+    """(..., J, 4) world rotations from rotation vectors (..., J, 3) relative to a root that faces `yaw`."""
     return quat.mul(quat.yaw(yaw)[..., None, :], quat.exp(turns.astype(float)))

@@ -1,8 +1,8 @@
 """Clip the network's inputs and outputs to the range of the training data plus a margin.
 
 Outside that range a network may predict anything, and its prediction is part of the next frame's input.
-Without bounds, a character whose clips had no standing flew apart when it was asked to stand. With bounds it
-stumbles at worst.
+Without bounds, a character trained on clips without standing flew apart when it was asked to stand. With
+bounds it stumbles at worst.
 """
 
 from __future__ import annotations
@@ -21,14 +21,15 @@ MARGIN_SHARE = 0.25  # margin on each side, as a share of a column's range in tr
 DEFAULT_DEVIATIONS = 15.0
 DEFAULT_MARGIN = 50.0  # cm
 SPEED_MARGIN = 1.5  # largest joint speed, as a multiple of the fastest joint in training
-LARGEST_SOUND = 1e8  # no sound number is as large; larger ones are treated as not finite
+LARGEST_SOUND = 1e8  # larger numbers are treated as not finite; no value of a working character is as large
 
 
 @dataclass(frozen=True)
 class Bounds:
-    """x_low, x_high (X,), y_low, y_high (Y,) float32; fastest: largest joint movement, cm a frame.
+    """The allowed ranges: x_low, x_high (X,) and y_low, y_high (Y,), float32, raw units.
 
-    hips: lowest and highest in training, cm above the ground; unbounded if the file has no ranges.
+    fastest: largest joint movement, cm a frame. hips: lowest and highest hips in training, cm above the
+    ground; unbounded if the network's file has no ranges.
     """
 
     x_low: Array = field(repr=False)
@@ -41,23 +42,24 @@ class Bounds:
     @classmethod
     def of(cls, network: Network) -> Bounds:
         """The bounds of a network. Channel inputs are not bounded here: each channel has its own range."""
-        layout, seen = network.layout, network.seen
-        if seen is None:
+        layout, facts = network.layout, network.training_facts
+        if facts is None:
             spread = DEFAULT_DEVIATIONS * network.y_std + DEFAULT_MARGIN
             x = np.full(layout.x_size, LARGEST_SOUND, np.float32)
             spread[layout.y_joint_rotation] = 2 * np.pi  # angles of joints stay within a full turn
             return cls(-x, x, network.y_mean - spread, network.y_mean + spread, LARGEST_SOUND)
-        x_more = MARGIN_SHARE * (seen.x_high - seen.x_low)
-        y_more = MARGIN_SHARE * (seen.y_high - seen.y_low)
-        x_low, x_high = seen.x_low - x_more, seen.x_high + x_more
+        x_more = MARGIN_SHARE * (facts.x_high - facts.x_low)
+        y_more = MARGIN_SHARE * (facts.y_high - facts.y_low)
+        x_low, x_high = facts.x_low - x_more, facts.x_high + x_more
         for name, _ in layout.channels:
             x_low[layout.x_channel(name)], x_high[layout.x_channel(name)] = -LARGEST_SOUND, LARGEST_SOUND
-        y_low, on = seen.y_low - y_more, layout.y_phase_change
-        y_low[on] = np.maximum(y_low[on], np.minimum(seen.y_low[on], 0.0))  # a gait does not run backwards
+        y_low, on = facts.y_low - y_more, layout.y_phase_change
+        # The phase may run backwards only as fast as it did in training.
+        y_low[on] = np.maximum(y_low[on], np.minimum(facts.y_low[on], 0.0))
         assert network.skeleton is not None
         height = layout.y_joint_position.start + 3 * network.skeleton.role("hips") + 1
-        hips = float(seen.y_low[height]), float(seen.y_high[height])
-        return cls(x_low, x_high, y_low, seen.y_high + y_more, SPEED_MARGIN * seen.fastest, hips)
+        hips = float(facts.y_low[height]), float(facts.y_high[height])
+        return cls(x_low, x_high, y_low, facts.y_high + y_more, SPEED_MARGIN * facts.fastest, hips)
 
 
 @njit

@@ -49,7 +49,7 @@ class Axes:
 
     @property
     def scale(self) -> float:
-        """How many of the caller's units are one centimetre."""
+        """One centimetre in the caller's unit."""
         return UNITS[self.unit]
 
     def directions_out(self, v: Array) -> Array:
@@ -69,7 +69,10 @@ class Axes:
         return self.directions_in(p) / self.scale
 
     def rotations_out(self, q: Array) -> Array:
-        """Convert Hobble's rotations (..., 4) to the caller's: M R M^-1. A change of hand flips the axis."""
+        """Convert Hobble's rotations (..., 4) to the caller's: M R M^-1.
+
+        If the handedness changes, the rotation axis is negated.
+        """
         out = np.array(q, float)
         out[..., 1:] = self.directions_out(out[..., 1:]) * np.linalg.det(self.matrix).round()
         return out

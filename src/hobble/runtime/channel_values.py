@@ -1,4 +1,4 @@
-"""Channel values given by the caller, checked and converted to the state's columns."""
+"""Checks the caller's channel values and converts them to columns of the character's state."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ class UnknownName(KeyError):
 
 
 class ChannelValues:
-    """The channels of a network. columns: name -> its columns in the state. scales: name -> divisor."""
+    """The channels of a network. columns: channel -> its columns in the state. scales: channel -> divisor."""
 
     def __init__(self, network: Network, scales: Mapping[str, float]) -> None:
         self.labels = {

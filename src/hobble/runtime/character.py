@@ -17,10 +17,11 @@ SHOWN = ("knee", "heel", "toe")  # the joints of `leg_shown`
 class Character:
     """The state of C characters, changed in place by the controller. World axes, cm, velocities per frame.
 
-    position, direction: (C, T, 2) trajectory; gait: (C, T, 6).
+    position, direction: (C, T, 2) trajectory; gait: (C, T, 6) shares; T frames, see `trajectory.Trajectory`.
     ground: (C, samples, 3) heights at left, path, right; root_height: (C,) mean of the heights on the path.
-    joint_position, joint_velocity: (C, J, 3); joint_rotation: (C, J, 4) world. This is the network's copy.
-    phase: (C,). channel_values, channel_targets: (C, K) present and wanted values of all channels' columns.
+    joint_position, joint_velocity: (C, J, 3); joint_rotation: (C, J, 4) world: the pose as predicted, before
+    feet are placed.
+    phase: (C,). channel_values, channel_targets: (C, K) present and target values of all channels' columns.
     smoothed_velocity, smoothed_direction: (C, 2); strafe: (C,); correction: (C, 2): see
     `trajectory.follow_target`.
     foot_lock (C, 2), foot_hold (C, 2, 2), foot_step (C, 2), foot_missed (C, 2): see `foot_lock`.
@@ -56,7 +57,7 @@ class Character:
     memory: Array
 
     def copies(self, of: np.ndarray) -> Character:
-        """A new state, whose character i is a copy of this one's character of[i]. of: (C',) indices."""
+        """A new state whose character i is a copy of this one's character of[i]. of: (C',) indices."""
         return Character(**{field.name: getattr(self, field.name)[of] for field in fields(self)})
 
 
@@ -76,13 +77,13 @@ class Snapshot:
 def start(network: Network, characters: int, position: Array, yaw: Array) -> Character:
     """C healthy characters at ground positions (C, 2), facing `yaw` (C,) in radians.
 
-    They start in the frame that the network's file names, a standing one if the clips have any. If the file
-    names none, they start in the network's mean pose.
+    They start in the start frame of the network's file, a standing one if the clips have any. If the file has
+    no start frame, they start in the network's mean pose.
     """
-    layout, seen = network.layout, network.seen
+    layout, facts = network.layout, network.training_facts
     count = characters
     columns = sum(columns for _, columns in layout.channels)
-    now = network.y_mean.astype(float) if seen is None else seen.start_y.astype(float)
+    now = network.y_mean.astype(float) if facts is None else facts.start_y.astype(float)
     path, heading, gait = _past(network)
     sin, cos = np.sin(yaw)[:, None], np.cos(yaw)[:, None]
     joints = now[layout.y_joint_position].reshape(-1, 3)
@@ -90,7 +91,7 @@ def start(network: Network, characters: int, position: Array, yaw: Array) -> Cha
     placed[..., ::2] += position[:, None]
     assert network.skeleton is not None
     legs = [[network.skeleton.role(f"{side}_{part}") for part in SHOWN] for side in ("left", "right")]
-    moving = np.zeros_like(joints) if seen is None else now[layout.y_joint_velocity].reshape(-1, 3)
+    moving = np.zeros_like(joints) if facts is None else now[layout.y_joint_velocity].reshape(-1, 3)
     turns = now[layout.y_joint_rotation].reshape(-1, 3)
     facing = np.concatenate([sin, cos], axis=1)
     return Character(
@@ -102,7 +103,7 @@ def start(network: Network, characters: int, position: Array, yaw: Array) -> Cha
         joint_position=np.ascontiguousarray(placed),
         joint_velocity=np.ascontiguousarray(_turned(moving, sin, cos)),
         joint_rotation=quat.mul(quat.yaw(yaw)[:, None], quat.exp(turns)),
-        phase=np.full(count, 0.0 if seen is None else seen.start_phase),
+        phase=np.full(count, 0.0 if facts is None else facts.start_phase),
         channel_values=np.zeros((count, columns)),
         channel_targets=np.zeros((count, columns)),
         smoothed_velocity=np.zeros((count, 2)),
@@ -125,18 +126,18 @@ def start(network: Network, characters: int, position: Array, yaw: Array) -> Cha
 def _past(network: Network) -> tuple[Array, Array, Array]:
     """Path (T, 2), facing (T, 2) and gait (T, 6) of the start frame, relative to its root.
 
-    Standing still if the file has no start frame.
+    If the file has no start frame, the character stands still.
     """
-    layout, seen = network.layout, network.seen
+    layout, facts = network.layout, network.training_facts
     length = 2 * layout.window
-    if seen is None:
+    if facts is None:
         gait = np.zeros((length, len(network.gaits)))
         gait[:, network.gaits.index("stand")] = 1.0
         return np.zeros((length, 2)), np.tile([0.0, 1.0], (length, 1)), gait
     frames, samples = np.arange(-layout.window, layout.window), np.array(layout.offsets)
 
     def through(block: slice) -> Array:
-        rows = seen.start_x[block].astype(float).reshape(-1, layout.samples)
+        rows = facts.start_x[block].astype(float).reshape(-1, layout.samples)
         return np.stack([np.interp(frames, samples, row) for row in rows], axis=1)
 
     facing = through(layout.x_direction)

@@ -1,10 +1,10 @@
 """One frame of a character in six timed steps: prepare, input, insert, predict, output, update.
 
 - prepare: smooth the caller's target, bend the future trajectory toward it, look up the ground;
-- input: write trajectory, gait, ground, last pose and channel values into a row X, in the root frame;
+- input: write trajectory, gait, ground, last pose and channel values into a row X, in root coordinates;
 - insert: standardise the row;
 - predict: evaluate the network at the present phase, which gives Y;
-- output: turn Y into a world pose, and place the feet of the caller's copy;
+- output: turn Y into a world pose, and place the feet in the copy that the caller gets;
 - update: advance root, past and future trajectory, and phase by one frame.
 """
 
@@ -14,33 +14,24 @@ import warnings
 from collections.abc import Callable, Mapping
 from dataclasses import fields
 from time import perf_counter
-from typing import Any, TypedDict
+from typing import TypedDict
 
 import numpy as np
-from numba.extending import register_jitable
 
-from hobble.character import rule
-from hobble.core.compiled import njit
 from hobble.core.quat import Array
 from hobble.models.network import Predictor
 from hobble.rows.layout import BODY
-from hobble.runtime import feet, trajectory
+from hobble.runtime import feet, network_rows, trajectory
+from hobble.runtime.advance import BACKWARD_LOSS, PULL, advance, advance_columns
 from hobble.runtime.bounds import Bounds, clip_rows, find_unsound
 from hobble.runtime.character import Character, start
 
-joint_place = register_jitable(rule.joint_place)
 STEPS = ("prepare", "input", "insert", "predict", "output", "update")
 FPS = 60
-HIGHEST = 1e7  # cm, 100 km: largest height of the ground above or below 0; beyond it, heights are imprecise
-# Radians a frame (1500 degrees a second). No joint of a walking or running person turns as fast. A prediction
-# can: if clips have rotations half a turn apart, as in hands, their mean may be any rotation, and a new
-# target changes the next pose at once.
-FASTEST_TURN = np.radians(25)
-# cm a frame by which the body rises with the mean height of the path. When a new wish turns the path around
-# on a hill, that height may change by 20 cm at once, while the ground under the feet stays.
-MOST_CLIMB = 5.0
+HIGHEST = 1e7  # cm, 100 km: largest height of the ground above or below 0; larger heights are imprecise
 
-# Parts of the state that have to be finite. The others are checked at the call or computed in each frame.
+# Parts of the state that are checked to be finite. The others are checked in the call or made anew each
+# frame.
 CHECKED = (
     *("position", "direction", "gait", "joint_position", "joint_velocity", "joint_rotation", "phase"),
     *(
@@ -57,14 +48,6 @@ CHECKED = (
 )
 
 Ground = Callable[[Array, Array], Array]
-
-
-# Groups of arrays for compiled functions, which unpack them by name.
-#
-# The pose that the network predicted last: position, velocity (C, J, 3); rotation (C, J, 4), world.
-Joints = tuple[Any, Any, Any]
-# The caller's copy of the pose: root (C, 3), yaw (C,), position (C, J, 3), rotation (C, J, 4).
-Drawn = tuple[Any, Any, Any, Any]
 
 
 class ControllerOptions(TypedDict):
@@ -118,7 +101,7 @@ class Controller:
         self._x_columns = (of_body, np.concatenate([np.zeros(0, np.int64), *of_channel]))
         steps = [np.full(columns, rates[name] / FPS) for name, columns in layout.channels]
         self._channel_steps = np.concatenate([np.zeros(0), *steps])
-        self._y_columns = trajectory.advance_columns(layout)
+        self._y_columns = advance_columns(layout)
         self._y_joints = layout.y_joint_position.start
         assert network.skeleton is not None
         legs = feet.leg_joints(network.skeleton)
@@ -179,7 +162,7 @@ class Controller:
         self.seconds[:] = (t1 - t0, t2 - t1, t3 - t2, t4 - t3, t5 - t4, t6 - t5)
 
     def _restore(self, what: str) -> None:
-        """Restart the characters marked in `_unsound` where they were; wanted channel values stay."""
+        """Restart the characters marked in `_unsound` where they are, with the same channel targets."""
         self._warn(what)
         some = np.flatnonzero(self._unsound)
         fresh = start(self.predictor.network, len(some), self.root[some][:, ::2], self.yaw[some])
@@ -217,14 +200,14 @@ class Controller:
 
     def _input(self) -> None:
         c = self.character
-        _fill_input(
+        network_rows.write_inputs(
             self._path, c.ground, c.root_height, self._joints, c.channel_values, self._x_columns,
             self.layout.step, self.x,
         )  # fmt: skip
 
     def _output(self, ground: Ground | None) -> None:
         c = self.character
-        _take_output(
+        network_rows.take_outputs(
             self.y, self._y_joints, self._path, (c.root_height, c.body_lift), self._joints,
             self.bounds.fastest, self._drawn,
         )  # fmt: skip
@@ -245,17 +228,16 @@ class Controller:
     def _update(self, velocity: Array) -> None:
         rooted = self.predictor.network.rooted
         steered = self.steering > 0
-        loss = trajectory.BACKWARD_LOSS if steered and not rooted else 0.0
-        pull = trajectory.PULL if steered and rooted else 0.0
-        trajectory.advance(
-            self.y, self._y_columns, velocity, loss, rooted, pull, self._path, self.character.phase
-        )
+        loss = BACKWARD_LOSS if steered and not rooted else 0.0
+        pull = PULL if steered and rooted else 0.0
+        advance(self.y, self._y_columns, velocity, loss, rooted, pull, self._path, self.character.phase)
 
 
 def _heights(ground: Ground, x: Array, z: Array) -> Array:
-    """The caller's ground at x, z (N,).
+    """Heights (N,) of the caller's ground at x, z (N,), cm.
 
-    Raises ValueError for heights that are not finite, because they would stay in the state.
+    Raises ValueError for a wrong shape, and for heights that are not finite or too large: they would stay in
+    the state.
     """
     heights = np.asarray(ground(x, z), float)
     if heights.shape not in ((), x.shape):
@@ -265,134 +247,3 @@ def _heights(ground: Ground, x: Array, z: Array) -> Array:
     if np.abs(heights).max() > HIGHEST:
         raise ValueError(f"the terrain has a height of {np.abs(heights).max():.4g} cm; {HIGHEST:g} at most")
     return np.broadcast_to(heights, x.shape)
-
-
-@njit
-def _fill_input(
-    path: trajectory.Trajectory,
-    ground: Any,
-    height: Any,
-    pose: Joints,
-    channel_values: Any,
-    columns: tuple[Any, Any],
-    step: int,
-    x: Any,
-) -> None:
-    """Fill rows x (C, X).
-
-    columns: the first column of each block of BODY, and the column of each of channel_values (C, K). ground:
-    (C, samples, 3) heights. height: (C,) of the ground under the root.
-    """
-    position, direction, gait = path
-    joints, velocities, _ = pose
-    at, channel_at = columns
-    middle, samples = position.shape[1] // 2, ground.shape[1]
-    for c in range(x.shape[0]):
-        px, pz = position[c, middle]
-        cos, sin = direction[c, middle, 1], direction[c, middle, 0]
-        for s in range(samples):
-            dx, dz = position[c, s * step, 0] - px, position[c, s * step, 1] - pz
-            x[c, at[0] + s] = dx * cos - dz * sin
-            x[c, at[0] + samples + s] = dx * sin + dz * cos
-            dx, dz = direction[c, s * step]
-            x[c, at[1] + s] = dx * cos - dz * sin
-            x[c, at[1] + samples + s] = dx * sin + dz * cos
-            for g in range(gait.shape[2]):
-                x[c, at[2] + g * samples + s] = gait[c, s * step, g]
-            for side in range(3):
-                x[c, at[5] + side * samples + s] = ground[c, s, side] - height[c]
-        px, pz = position[c, middle - 1]
-        cos, sin = direction[c, middle - 1, 1], direction[c, middle - 1, 0]
-        for j in range(joints.shape[1]):
-            dx, dz = joints[c, j, 0] - px, joints[c, j, 2] - pz
-            k = at[3] + 3 * j
-            x[c, k], x[c, k + 1], x[c, k + 2] = (
-                dx * cos - dz * sin,
-                joints[c, j, 1] - height[c],
-                dx * sin + dz * cos,
-            )
-            dx, dz = velocities[c, j, 0], velocities[c, j, 2]
-            k = at[4] + 3 * j
-            x[c, k], x[c, k + 1], x[c, k + 2] = dx * cos - dz * sin, velocities[c, j, 1], dx * sin + dz * cos
-        for k in range(channel_values.shape[1]):
-            x[c, channel_at[k]] = channel_values[c, k]
-
-
-@njit
-def _take_output(
-    y: Any,
-    first: int,
-    path: trajectory.Trajectory,
-    heights: tuple[Any, Any],
-    pose: Joints,
-    fastest: float,
-    drawn: Drawn,
-) -> None:
-    """Turn the prediction y (C, Y), whose joints begin in column `first`, into the world poses of `pose` and
-    `drawn`.
-
-    heights: (C,) of the ground under the root, and the lift of the body, see `feet.carry_body`. A joint's
-    position is the mean of the predicted one and the old one plus velocity. No joint moves further
-    than `fastest` (not counting the change of the ground's height), and no joint turns by more than
-    FASTEST_TURN from the last frame.
-    """
-    position, direction, _ = path
-    joints, velocities, rotations = pose
-    root, yaw, pose_position, pose_rotation = drawn
-    height, lift = heights
-    slowest = np.cos(FASTEST_TURN / 2)
-    middle, count = position.shape[1] // 2, joints.shape[1]
-    for c in range(y.shape[0]):
-        sin, cos = direction[c, middle, 0], direction[c, middle, 1]
-        climbed = height[c] - root[c, 1]
-        lift[c] += min(max(climbed, -MOST_CLIMB), MOST_CLIMB) - climbed
-        root[c, 0], root[c, 1], root[c, 2] = position[c, middle, 0], height[c], position[c, middle, 1]
-        yaw[c] = np.arctan2(sin, cos)
-        half_cos, half_sin = np.cos(yaw[c] / 2), np.sin(yaw[c] / 2)
-        for j in range(count):
-            p = first + 3 * j
-            v, r = p + 3 * count, p + 6 * count
-            velocities[c, j, 0] = y[c, v] * cos + y[c, v + 2] * sin
-            velocities[c, j, 1] = y[c, v + 1]
-            velocities[c, j, 2] = y[c, v + 2] * cos - y[c, v] * sin
-            new_x = y[c, p] * cos + y[c, p + 2] * sin + root[c, 0]
-            new_z = y[c, p + 2] * cos - y[c, p] * sin + root[c, 2]
-            sx = joint_place(joints[c, j, 0] + velocities[c, j, 0], new_x) - joints[c, j, 0]
-            sy = (
-                joint_place(joints[c, j, 1] + velocities[c, j, 1], y[c, p + 1] + root[c, 1]) - joints[c, j, 1]
-            )
-            sz = joint_place(joints[c, j, 2] + velocities[c, j, 2], new_z) - joints[c, j, 2]
-            step = np.sqrt(sx * sx + (sy - climbed) ** 2 + sz * sz)
-            if step > fastest:
-                sx, sy, sz = (
-                    sx * fastest / step,
-                    climbed + (sy - climbed) * fastest / step,
-                    sz * fastest / step,
-                )
-            joints[c, j, 0] += sx
-            joints[c, j, 1] += sy
-            joints[c, j, 2] += sz
-            rx, ry, rz = y[c, r], y[c, r + 1], y[c, r + 2]
-            half = np.sqrt(rx * rx + ry * ry + rz * rz)
-            scale = np.sin(half) / half if half > 1e-8 else 1.0
-            w, rx, ry, rz = np.cos(half), rx * scale, ry * scale, rz * scale
-            w, rx, ry, rz = (
-                half_cos * w - half_sin * ry,
-                half_cos * rx + half_sin * rz,
-                half_cos * ry + half_sin * w,
-                half_cos * rz - half_sin * rx,
-            )
-            old = rotations[c, j]
-            dot = old[0] * w + old[1] * rx + old[2] * ry + old[3] * rz
-            keep, take = 0.0, 1.0
-            if abs(dot) < slowest:
-                # Turn by FASTEST_TURN along the shorter way (slerp).
-                half = np.arccos(abs(dot))
-                keep = np.sin(half - FASTEST_TURN / 2) / np.sin(half)
-                take = np.sin(FASTEST_TURN / 2) / np.sin(half) * (1.0 if dot >= 0 else -1.0)
-            old[0], old[1] = keep * old[0] + take * w, keep * old[1] + take * rx
-            old[2], old[3] = keep * old[2] + take * ry, keep * old[3] + take * rz
-            for k in range(3):
-                pose_position[c, j, k] = joints[c, j, k]
-            for k in range(4):
-                pose_rotation[c, j, k] = rotations[c, j, k]

@@ -21,8 +21,8 @@ FPS = 60.0
 def motion_clip(name: str, skeleton: Skeleton, positions: Array, rotations: Array) -> Clip:
     """A clip of world positions (F, J, 3) in cm and world rotations (F, J, 4), in Hobble's axes.
 
-    The root gets its position, every other joint its rotation. Predicted rotations and positions differ by
-    some millimetres, which would show as sliding feet. So the legs are bent, see `jointed`.
+    A clip has the root's position and the rotations of all joints. Predicted rotations and positions differ
+    by some millimetres, which would show as sliding feet. So the legs are bent, see `jointed`.
     """
     world, _ = jointed(skeleton, positions, rotations)
     local = quat.continuous(local_rotations(skeleton, world))
@@ -58,7 +58,7 @@ def _reach(world: Array, positions: Array, leg: Array, target: Array) -> None:
 
 
 def fitted_skeleton(skeleton: Skeleton, positions: Array, rotations: Array) -> Skeleton:
-    """The skeleton with a motion's bone lengths: mean position of each joint in its parent's frame.
+    """The skeleton with a motion's bones: the mean offset of each joint in its parent's coordinates.
 
     For networks that were trained on a body other than `skeleton`.
     """

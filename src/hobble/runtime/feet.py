@@ -13,30 +13,33 @@ from hobble.runtime.foot_lock import Hold, hold_foot, note_missed, step_rise
 from hobble.runtime.leg_reach import MOST_ADDED, bend, hold_back, turn, turned
 
 HEIGHT_MIX = 0.5  # share of the remaining foot lift that is applied each frame
-# cm a frame by which the foot lift may change. A network may predict contact with a foot at knee height.
+# Largest change of the foot lift, cm a frame. It is needed because a network may predict contact while the
+# foot is at knee height.
 FASTEST_LIFT = 8.0
-# Share of its length to which foot placement may stretch the leg of a held foot behind the hips, unless the
-# network stretches it further. Beyond that the heel rises. Otherwise a foot that is 5 cm behind the network's
-# straightens a knee that is bent by 26 degrees, and a leg that should be stiff would bend and stretch.
+# A held foot behind the hips may stretch its leg to this share of full length, or as far as the network
+# stretches it. If it has to stretch more, the heel rises. Without this rule, holding a foot 5 cm behind the
+# network's foot straightens a knee that is bent by 26 degrees, and a leg that should be stiff bends and
+# stretches.
 STRETCH = 0.99
-# STRETCH holds in full if the toe is this many cm behind the hip, or more. A foot ahead of it stays flat.
+# STRETCH holds in full if the toe is at least this many cm behind the hip. A foot ahead of the hip stays
+# flat.
 BEHIND = 10.0
 BODY_MIX = 0.15  # share of the remaining body lift that is applied each frame
 BODY_FREE = 3.0  # cm that standing feet may be off the ground before the body is raised or lowered
-BODY_MIN_CONTACT = 0.3  # sum of both feet's contacts below which the feet say nothing about the ground
-FLOATING = 3.0  # cm that a standing foot may be above SOLE, since rigs differ
+BODY_MIN_CONTACT = 0.3  # if the contacts of both feet sum to less, the feet do not decide the body's height
+FLOATING = 3.0  # cm that a standing foot may be above SOLE, because skeletons differ
 SOLE = (5.0, 4.0)  # height of heel and toe joint above the ground in a standing foot, cm
 FOOT, TOES = 1, 2  # the joints of a foot, see `carried`
 
 
-# Groups of arrays for compiled functions, which unpack them by name.
+# Groups of arrays for compiled functions, which unpack them into names.
 #
 # joints (2, 4), see `leg_joints`; carried (2, J), see `carried`; sole (2,), see `sole_heights`; ahead (3,),
-# see `knees_ahead`; fastest: cm a frame that foot placement may move a joint.
+# see `knees_ahead`; fastest: largest movement of a joint by foot placement, cm a frame.
 Legs = tuple[Any, Any, Any, Any, float]
-# The state of the feet between frames: the hold of each foot; lift (C, 2), smoothed rise of the heel; added
-# (C, 2, 2, 4), see `bend`; shown (C, 2, 3, 3), knee, heel and toe as they were drawn. The heights in `shown`
-# are above root_height (C,) + body_lift (C,), because the whole body may rise in a frame.
+# The state of the feet between frames: the hold of each foot; lift (C, 2), smoothed rise of the foot, cm;
+# added (C, 2, 2, 4), see `bend`; shown (C, 2, 3, 3), knee, heel and toe as they were drawn. The heights in
+# `shown` are above root_height (C,) + body_lift (C,), because the whole body may rise in a frame.
 Feet = tuple[Hold, Any, Any, Any, Any, Any]
 
 
@@ -47,10 +50,10 @@ def leg_joints(skeleton: Skeleton) -> np.ndarray:
 
 
 def sole_heights(network: Network, legs: np.ndarray) -> np.ndarray:
-    """(2,) heel and toe height below which a foot is in the ground: SOLE, or less on a rig with lower feet.
+    """(2,) heel and toe height below which a foot is in the ground, cm: SOLE, or less on a lower foot.
 
-    The network's mean pose gives the mean heel and toe heights. Feet are in the air half of the time, so 60%
-    of these means is below any standing foot.
+    The network's mean pose gives the mean heights of heel and toe. Feet are in the air half of the time, so
+    60% of these means is below any standing foot.
     """
     layout = network.layout
     height = network.y_mean[layout.y_joint_position].reshape(-1, 3)[:, 1]
@@ -69,8 +72,8 @@ def knees_ahead(skeleton: Skeleton) -> np.ndarray:
 def raise_heel(position: Any, hip: int, knee: int, heel: int, toe: int, shift: Any, by: Any) -> None:
     """Raise the heel of a foot that `shift` (3,) moves back, so that the leg stretches to STRETCH at most.
 
-    by: (4,) is set to the foot's rotation, about the toe and by MOST_ADDED at most; the heel's movement is
-    added to `shift`. A foot ahead of the hip stays flat.
+    The foot turns about its toe, by MOST_ADDED at most. That rotation is written to `by` (4,), and the heel's
+    movement is added to `shift`. A foot ahead of the hip stays flat.
     """
     by[0], by[1], by[2], by[3] = 1.0, 0.0, 0.0, 0.0
     upper, lower, before, needed = 0.0, 0.0, 0.0, 0.0
@@ -167,10 +170,10 @@ def carry_body(
 ) -> None:
     """Raise or lower whole bodies, positions (C, J, 3), so that they stand on the ground under them.
 
-    The network gets the ground as the mean height along two seconds of path. On a hill a few metres long this
-    is 30 cm off, and a network trained on gentler hills does not correct it: legs fold, or hang in the air.
-    So the standing feet decide the height of the body, and the hips stay within their height range above the
-    ground in training.
+    The network stands on the mean ground height along two seconds of path. On a hill a few metres long this
+    height is 30 cm off, and a network trained on gentler hills does not correct it: legs fold, or hang in the
+    air. So the standing feet decide the height of the body, and the hips stay in the range of heights above
+    the ground that they had in training.
 
     contacts: see `place_feet`. ground: (C, 5) heights under the feet as in `place_feet`, then under the hips.
     hips: the joint. hips_range: lowest and highest, cm above the ground. lift: (C,) cm by which the body is
@@ -242,7 +245,7 @@ def place_feet(
 
 
 def carried(skeleton: Skeleton, legs: np.ndarray) -> np.ndarray:
-    """(2, J) for the joints below each heel: TOES from the toe joint on, FOOT for the rest; else 0."""
+    """(2, J) joints that move with a foot: TOES from the toe on, FOOT for others below the heel, else 0."""
     out = np.zeros((2, len(skeleton.joints)), np.int8)
     for f in range(2):
         for j, p in enumerate(skeleton.parents):

@@ -11,7 +11,7 @@ from hobble.core.errors import HobbleError
 from hobble.core.files import load_npz
 from hobble.core.quat import Array
 from hobble.core.skeleton import Skeleton, local_rotations
-from hobble.figure.fit import fitted_rotations
+from hobble.figure.fit_rotations import fitted_rotations
 from hobble.figure.gltf import BodyMotion, write_glb
 from hobble.models.network import Network
 from hobble.runtime.export import fitted_skeleton, jointed

@@ -20,7 +20,7 @@ class Heightmap:
     """Heights (rows, columns) on a grid around `centre` with spacing `cell`, in the caller's axes and unit.
 
     Columns run along the first ground coordinate and rows along the second: +X and +Z, or +X and +Y if Z is
-    up. The default cell is 3.937 cm in every unit. Outside the grid, the border heights continue.
+    up. cell: None for 3.937 cm, whatever the unit. Outside the grid, the heights at its border continue.
     """
 
     heights: Array = field(repr=False)

@@ -1,4 +1,4 @@
-"""Moves the heel of a pose by bending its leg (two-bone IK). Thigh and shank turn by little in each frame."""
+"""Moves the heel of a pose by bending its leg (two-bone IK). The turns of thigh and shank are limited."""
 
 from __future__ import annotations
 
@@ -8,13 +8,13 @@ import numpy as np
 
 from hobble.core.compiled import njit
 
-# Radians a frame by which foot placement may turn thigh and shank beyond the network's own turn. One frame in
-# 2,000 needs more; then the foot arrives some frames later. Without the limit, legs snapped by up to 148
-# degrees.
+# Foot placement adds a rotation to the network's thigh and shank. This is the largest change of that rotation
+# in a frame, radians. One frame in 2,000 needs more; then the foot arrives some frames later. Without the
+# limit, legs snapped by up to 148 degrees.
 MOST_ADDED = float(np.radians(28))
-# cm that a knee points forward from the line between hip and heel, at least. In all captured clips it is 1.6
-# or more. A network's knee may move through that line, because positions are predicted joint by joint. If the
-# leg bent to the same side as the network's, its knee would then flip from front to back.
+# Least distance, in cm, by which a knee is ahead of the line between hip and heel. In all captured clips it
+# is 1.6 or more. A predicted knee may cross that line, because positions are predicted joint by joint. If the
+# leg kept bending to the side of the predicted knee, it would then flip from front to back.
 KNEE_AHEAD = 3.0
 
 # Vectors below are written out by component: array expressions take seconds to compile and allocate memory.
@@ -35,7 +35,7 @@ def between(ax: float, ay: float, az: float, bx: float, by: float, bz: float) ->
 def approach(rotation: Any, w: float, x: float, y: float, z: float) -> bool:
     """Turn `rotation` (4,) in place toward the rotation (w, x, y, z), by MOST_ADDED at most.
 
-    Returns True if it did not get there because of that limit.
+    Returns True if it does not reach that rotation because of the limit.
     """
     dot = rotation[0] * w + rotation[1] * x + rotation[2] * y + rotation[3] * z
     if dot < 0.0:
@@ -76,9 +76,9 @@ def reach(
 ) -> None:
     """Move the heel of a pose, positions (J, 3), by `shift` (3,), by bending the knee.
 
-    ahead: the direction in which a straight knee bends. Bone lengths stay, and the knee keeps bending to the
-    same side, but by KNEE_AHEAD forward at least. A target out of reach is approached up to 99.9% of full
-    stretch (law of cosines, as `hobble.core.ik.two_bone_knee`). A pose that needs none of this stays.
+    ahead: the direction in which a straight knee bends. Bone lengths stay. The knee keeps bending to the same
+    side, but is at least KNEE_AHEAD forward. If the target is out of reach, the leg stretches to 99.9% (law
+    of cosines, as `hobble.core.ik.two_bone_knee`). A pose that already fulfils all this is not changed.
     """
     sx, sy, sz = shift[0], shift[1], shift[2]
     hx, hy, hz = position[hip, 0], position[hip, 1], position[hip, 2]
@@ -104,7 +104,8 @@ def reach(
     if more == 0.0 and abs(sx) + abs(sy) + abs(sz) < 1e-9:
         return
     ox, oy, oz = ox + more * fx / size, oy + more * fy / size, oz + more * fz / size
-    # Turn the old bend direction with the leg. One from the new leg alone may bend the knee backwards.
+    # Turn the old bend direction with the leg. A direction from the new leg alone may bend the knee
+    # backwards.
     factor = (ox * wx + oy * wy + oz * wz) / max(1 + ax * wx + ay * wy + az * wz, 1e-6)
     ox, oy, oz = ox - factor * (ax + wx), oy - factor * (ay + wy), oz - factor * (az + wz)
     size = np.sqrt(ox * ox + oy * oy + oz * oz)
@@ -121,7 +122,7 @@ def reach(
 
 @njit
 def hold_back(at: Any, shown: Any, base: float, fastest: float) -> bool:
-    """Move the point `at` (3,) to where it is `fastest` from `shown` (3,) if it is further.
+    """Move the point `at` (3,) toward `shown` (3,) until it is at most `fastest` away from it.
 
     base: added to the height of `shown`. Returns whether the point was moved.
     """
@@ -146,7 +147,7 @@ def bend(
     base: float,
     fastest: float,
 ) -> None:
-    """`reach` by `shift` (3,), where thigh and shank turn at most MOST_ADDED beyond the network's own turn.
+    """Move the heel by `shift` (3,), see `reach`, but change the rotations `added` by MOST_ADDED at most.
 
     leg: (4,) hip, knee, heel and toe. ahead: (3,) the direction in which a straight knee bends in the rest
     pose. added: (2, 4) rotations added to the network's thigh and shank in the last frame; updated to this

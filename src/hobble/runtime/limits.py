@@ -11,8 +11,8 @@ from hobble.core.quat import Array
 from hobble.models.network import Network
 
 JOG_FROM = 5.0  # cm a frame: half way between walking at 2.5 and jogging at 7.5
-LAME_BELOW = 4.5  # cm a frame: a body that cannot jog at this speed walks instead
-HURRY_FACTOR = 1.25  # such a body may walk at this multiple of its walking limit if the target is a jog
+LAME_BELOW = 4.5  # cm a frame: a lame body, which cannot jog at this speed, walks instead
+HURRY_FACTOR = 1.25  # if the target is a jog, a lame body may walk this many times as fast as its limit
 
 
 class SpeedLimiter:
@@ -27,8 +27,8 @@ class SpeedLimiter:
     def hold(self, values: Array, velocity: Array, shares: Array) -> None:
         """Shorten velocities (C, 2) to the limits of bodies with channel values `values` (C, K).
 
-        shares: (C, G) of the gaits. Both are changed in place: a body whose jog would be slower than
-        LAME_BELOW gets a hurried walk instead.
+        shares: (C, G) of the gaits. velocity and shares are changed in place. A body whose jog would be
+        slower than LAME_BELOW gets a hurried walk instead.
         """
         if not self._tables:
             return

@@ -23,9 +23,10 @@ Target = tuple[Array, Array | None, str]  # velocity, facing, gait
 
 @dataclass(frozen=True)
 class Scenario:
-    """target(frame) gives velocity (2,) in cm a frame, facing (2,) or None, and gait, for `frames` frames.
+    """A script of `frames` frames.
 
-    swept: channel and column whose value rises from 0 to its highest during the walk, or None.
+    target: frame -> velocity (2,) in cm a frame, facing (2,) or None, and gait. swept: channel and column
+    whose value rises from 0 to its highest during the walk, or None.
     """
 
     name: str
@@ -74,7 +75,7 @@ def scenarios(network: Network) -> list[Scenario]:
 
 
 def swept(network: Network) -> dict[str, tuple[str, str]]:
-    """Swept scenarios: name -> channel and column. Empty for a network without channels."""
+    """The scenarios with a swept value: name -> channel and column. Empty for a network without channels."""
     if network.skeleton is None:
         return {}
     return {

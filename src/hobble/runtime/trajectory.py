@@ -1,7 +1,8 @@
-"""The character's trajectory on the ground: one entry per frame, half past, half future.
+"""The character's trajectory on the ground, and how the target bends it.
 
-The first axis of every array is the C characters. Angles are yaw: 0 faces +Z, growing toward +X (left). The
-formulas are those of the runtime of Holden et al. 2017.
+A trajectory has one entry per frame, half of them past and half future. The first axis of every array is the
+C characters. Angles are yaw: 0 faces +Z, and they grow toward +X (left). The formulas are those of the
+runtime of Holden et al. 2017.
 """
 
 from __future__ import annotations
@@ -9,35 +10,25 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from numba.extending import register_jitable
 
-from hobble.character import rule
 from hobble.core.compiled import njit
-from hobble.rows.layout import RowLayout
 
-phase_change, moving_share = register_jitable(rule.phase_change), register_jitable(rule.moving)
-
-# Largest correction of the target, as a multiple of it. With 1, a network trained on few starts stands for
-# seconds before it walks.
+# Largest correction of the target velocity, as a multiple of that velocity. With 1, a network that saw few
+# starts of a walk in training stands for seconds before it walks.
 STEERING_LIMIT = 2.0
 TARGET_MIX = 0.9  # share of the remaining difference to the target that is applied each frame
-GAIT_MIX = 0.1
+GAIT_MIX = 0.1  # the same for the gait
 CORRECTION_RATE = 0.01  # integral gain a frame: a steady error is corrected within a second or two
 CORRECTION_WITHIN = 0.8  # share of the target; with a larger error the character is still turning or starting
 MOST_CORRECTION = 1.0  # largest integral correction, as a share of the target
-# Largest turn to ask for. With a larger one the character may turn the other way.
+# Largest turn to ask the network for. With a larger one the character may turn the other way.
 FURTHEST_TURN = np.radians(137)
-# With `Network.rooted`: largest change of a frame's movement at right angles to the target, as a share of it.
-PULL = 0.2
-# The same along the target, as a share of PULL. With more, the character takes corners faster and wider.
-PULL_AHEAD = 0.5
-BACKWARD_LOSS = 0.5  # share of movement against the target that is removed; removing all would drag the feet
-STRAFE_FROM = np.radians(45)  # angle between facing and velocity from which the strafe share is 1
+STRAFE_FROM = np.radians(45)  # from this angle between facing and velocity on, the strafe share is 1
 STILL = 0.1  # cm a frame: a slower target means standing
 
 
-# Groups of arrays for compiled functions, which unpack them by name. They are plain tuples, because a named
-# tuple as an argument costs a microsecond.
+# Groups of arrays for compiled functions, which unpack them into names. They are plain tuples, because
+# passing a named tuple costs a microsecond.
 #
 # position, direction (C, T, 2): world x and z. gait (C, T, 6): shares. T is twice the window (120); entry T/2
 # is the present frame.
@@ -61,8 +52,8 @@ def wrap(angle: float) -> float:
 def target_facing(velocity: Any, ahead: Any, direction: Any, strafe: Any, look: Any) -> None:
     """Write the share of strafing into `strafe` (C,) and the target facing into `look` (C, 2).
 
-    velocity: (C, 2) the target. ahead: (C, 2) direction to look in; zero looks where the character goes, or
-    keeps `direction` (C, 2) if it stands.
+    velocity: (C, 2) the target. ahead: (C, 2) direction to look in. If it is zero, the character looks where
+    it goes, or keeps `direction` (C, 2) if it stands.
     """
     for c in range(velocity.shape[0]):
         x, z = velocity[c, 0], velocity[c, 1]
@@ -79,7 +70,7 @@ def target_facing(velocity: Any, ahead: Any, direction: Any, strafe: Any, look: 
 
 @njit
 def follow_target(target: Target, steering: float, smoothed: Smoothed, path: Trajectory) -> None:
-    """Move `smoothed` toward the caller's target; the gait of the present frame blends slowly.
+    """Move `smoothed` toward the caller's target, and the gait of the present frame slowly toward its target.
 
     `_ask_velocity` and `_ask_turn` correct the target; with `steering` 0 there is no correction, as in the
     original runtime.
@@ -110,10 +101,10 @@ def follow_target(target: Target, steering: float, smoothed: Smoothed, path: Tra
 def _ask_velocity(steering: float, x: float, z: float, position: Any, correction: Any) -> tuple[float, float]:
     """The velocity to ask the network for, so that the character reaches (x, z).
 
-    A network tends to keep its past velocity. So the error (target minus mean velocity over the last half of
-    the past window) is added to the target, times `steering`, up to STEERING_LIMIT times the target. A steady
-    error, such as weaker strafing to one side, is integrated in `correction` (2,): along the target, and
-    across it to the left, as shares of the target.
+    A network tends to keep its past velocity. So `steering` times the error is added to the target, at most
+    STEERING_LIMIT times the target. The error is the target minus the mean velocity over the later half of
+    the past. A steady error, such as weaker strafing to one side, is integrated in `correction` (2,): along
+    the target, and to its left, as shares of the target.
     """
     middle = position.shape[0] // 2
     span = middle // 2
@@ -139,17 +130,17 @@ def _ask_velocity(steering: float, x: float, z: float, position: Any, correction
 
 @njit
 def _ask_turn(gain: float, turn: float) -> float:
-    """Radians to add to the remaining `turn`: `gain` times it, limited by FURTHEST_TURN in all."""
+    """Radians to add to the remaining `turn`: `gain` times the turn. The sum is at most FURTHEST_TURN."""
     room = max(FURTHEST_TURN - abs(turn), 0.0)
     return min(max(gain * turn, -room), room)
 
 
 @njit
 def blend_future(smoothed: Smoothed, path: Trajectory) -> None:
-    """Bend the predicted future toward the target velocity and facing; the bend grows with time.
+    """Bend the predicted future toward the target velocity and facing, more at later times.
 
-    At t in 0..1 of the future, the share of the target is 1 - (1 - t)^b, with b = .5 for the position (1 when
-    strafing) and 2 for the direction (.5 when strafing).
+    At time t of the future (0 to 1), the share of the target is 1 - (1 - t)^b. b is .5 for the position (1
+    when strafing) and 2 for the direction (.5 when strafing).
     """
     velocity, facing, strafe, _ = smoothed
     position, direction, gait = path
@@ -177,7 +168,10 @@ def blend_future(smoothed: Smoothed, path: Trajectory) -> None:
 
 @njit
 def sample_points(path: Trajectory, step: int, side: float, points: Any) -> None:
-    """Write the points (C, samples, 3, 2) where the ground is looked up: left, on the path, right."""
+    """Write the points (C, samples, 3, 2) where the ground is looked up: left, on the path, right.
+
+    step: frames between two samples. side: cm from the path to the points at its sides.
+    """
     position, direction, _ = path
     for c in range(points.shape[0]):
         for s in range(points.shape[1]):
@@ -222,92 +216,3 @@ def prepare(
         for k in range(values.shape[1]):
             change = targets[c, k] - values[c, k]
             values[c, k] += min(max(change, -steps[k]), steps[k])
-
-
-@njit
-def _pull(share: float, target_x: float, target_z: float, x: float, z: float) -> tuple[float, float]:
-    """What to add to a movement (x, z) so that it comes nearer to the target.
-
-    Across the target by at most `share` times the movement's length, and along it by PULL_AHEAD of that. If
-    the two shared one limit, a clip that is too slow would use all of it, and the character would leave its
-    path sideways.
-    """
-    most = share * np.sqrt(x * x + z * z)
-    size = np.sqrt(target_x * target_x + target_z * target_z)
-    ahead_x, ahead_z = (target_x / size, target_z / size) if size >= STILL else (0.0, 0.0)
-    lack_x, lack_z = target_x - x, target_z - z
-    along = lack_x * ahead_x + lack_z * ahead_z
-    lack_x, lack_z = lack_x - along * ahead_x, lack_z - along * ahead_z
-    along = min(max(along, -PULL_AHEAD * most), PULL_AHEAD * most)
-    part = min(1.0, most / max(np.sqrt(lack_x * lack_x + lack_z * lack_z), 1e-9))
-    return along * ahead_x + part * lack_x, along * ahead_z + part * lack_z
-
-
-@njit
-def advance(
-    y: Any, at: Any, target: Any, loss: float, rooted: bool, pull: float, path: Trajectory, phase: Any
-) -> None:
-    """Advance one frame: shift the past, move and turn the root, take the predicted future and phase change.
-
-    y: (C, outputs) prediction. at: columns of y (root velocity, turn, phase change, position, direction),
-    then the number of future samples and the step.
-    rooted: as `Network.rooted`, the movement belongs to the pose. Otherwise it is scaled by (1 - stand)^.25.
-    loss: the share of movement against the velocity `target` (C, 2) that is removed. If the target is to turn
-    on the spot, it is removed from all movement. 0 is the original runtime.
-    pull: largest change of the movement toward the target, as a share of its own length. It is needed
-    because clips have only some directions and speeds (after the adjustment of Holden et al. 2020).
-    The predicted yaw velocity is that of the world seen from the root, so the root turns by its negative.
-    """
-    position, direction, gait = path
-    length = position.shape[1]
-    middle = length // 2
-    future, step = at[5], at[6]
-    for c in range(y.shape[0]):
-        for i in range(middle):
-            for k in range(2):
-                position[c, i, k] = position[c, i + 1, k]
-                direction[c, i, k] = direction[c, i + 1, k]
-            for k in range(gait.shape[2]):
-                gait[c, i, k] = gait[c, i + 1, k]
-        moving = 1.0 if rooted else moving_share(gait[c, middle, 0])
-        yaw = np.arctan2(direction[c, middle, 0], direction[c, middle, 1])
-        sin, cos = np.sin(yaw), np.cos(yaw)
-        vx, vz = y[c, at[0]], y[c, at[0] + 1]
-        x, z = moving * (vx * cos + vz * sin), moving * (vz * cos - vx * sin)
-        speed = target[c, 0] * target[c, 0] + target[c, 1] * target[c, 1]
-        if speed < STILL * STILL:
-            x, z = (1.0 - loss) * x, (1.0 - loss) * z
-        else:
-            against = loss * min(0.0, x * target[c, 0] + z * target[c, 1]) / speed
-            x, z = x - against * target[c, 0], z - against * target[c, 1]
-        more_x, more_z = _pull(pull, target[c, 0], target[c, 1], x, z)
-        position[c, middle, 0] += x + more_x
-        position[c, middle, 1] += z + more_z
-        yaw -= moving * y[c, at[1]]
-        sin, cos = np.sin(yaw), np.cos(yaw)
-        direction[c, middle, 0], direction[c, middle, 1] = sin, cos
-        for i in range(middle + 1, length):
-            # Beyond the last predicted sample, extrapolate the line through the last two.
-            place = (i - middle) / step
-            k = min(int(place), future - 2)
-            m = place - k
-            p, d = at[3] + k, at[4] + k
-            x = (1 - m) * y[c, p] + m * y[c, p + 1]
-            z = (1 - m) * y[c, p + future] + m * y[c, p + future + 1]
-            position[c, i, 0] = position[c, middle, 0] + x * cos + z * sin
-            position[c, i, 1] = position[c, middle, 1] + z * cos - x * sin
-            x = (1 - m) * y[c, d] + m * y[c, d + 1]
-            z = (1 - m) * y[c, d + future] + m * y[c, d + future + 1]
-            norm = max(np.sqrt(x * x + z * z), 1e-6)
-            direction[c, i, 0] = (x * cos + z * sin) / norm
-            direction[c, i, 1] = (z * cos - x * sin) / norm
-        change = phase_change(moving, y[c, at[2]])
-        phase[c] = phase[c] + change - np.floor(phase[c] + change)
-
-
-def advance_columns(layout: RowLayout) -> np.ndarray:
-    """The argument `at` of `advance`."""
-    blocks = (
-        layout.y_root_velocity, layout.y_turn, layout.y_phase_change, layout.y_position, layout.y_direction
-    )  # fmt: skip
-    return np.array([*(b.start for b in blocks), layout.future, layout.step], np.int64)

@@ -1,4 +1,4 @@
-"""Following a closed track of waypoints, each with speed, gait and facing."""
+"""Leads characters around a closed track of waypoints, each with speed, gait and facing."""
 
 from __future__ import annotations
 

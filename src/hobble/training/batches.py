@@ -1,4 +1,4 @@
-"""Batches from the database's blocks, and a monitor of their losses."""
+"""Batches of training samples from the database, and a monitor of their losses."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from torch import Tensor
 
 from hobble.core.errors import HobbleError
 from hobble.database.reader import Database
-from hobble.database.stretches import SampleRange, Sharing
+from hobble.database.sharing import SampleRange, Sharing
 from hobble.training.processes import ALONE, Processes
 
 TRAIN = "train"
@@ -19,13 +19,14 @@ CHECK_EVERY = 2048  # samples between checks of the losses; checking every batch
 DIVERGED = 100.0  # a larger error means that training diverged; predicting the mean gives 1
 MOST_NAMED = 8  # clips in a message
 
-Piece = tuple[Tensor, Tensor, Tensor, np.ndarray, np.ndarray]  # the first five of a batch
+Piece = tuple[Tensor, Tensor, Tensor, np.ndarray, np.ndarray]  # x, y, p, clip and frame of a `SampleBatch`
 
 
 class SampleBatch(NamedTuple):
-    """n samples on the training's device: x (n, X), y (n, Y), p (n,); clip and frame (n,) as in a `Block`.
+    """The n samples of a batch that one process has, maybe none, on the device of the training.
 
-    These are the samples of one process, maybe none. total: number of samples over all processes.
+    x (n, X) and y (n, Y): standardised. p (n,): phase. clip (n,): index of the clip; frame (n,): its frame.
+    total: number of samples of the batch over all processes.
     """
 
     x: Tensor
@@ -37,9 +38,10 @@ class SampleBatch(NamedTuple):
 
 
 class TrainingRows:
-    """The training rows of a database, as one process reads them.
+    """The training rows of a database, as one process reads them. A section is a part of a pass over them.
 
-    processes: those that share a batch; stretches: parts of a section from which each batch is taken.
+    processes: those that share a batch. stretches: number of parts of a section from which each batch takes
+    its samples; None: one for each process.
     """
 
     def __init__(
@@ -64,20 +66,20 @@ class HostRows(TrainingRows):
     def batches(
         self, pass_index: int, section: int, sections: int, seed: int, size: int
     ) -> Iterator[SampleBatch]:
-        """This process's rows of the section's consecutive batches of `size`.
+        """Yield this process's part of each batch of a section. size: samples of a batch over all processes.
 
-        The last batch may be shorter and is trained like the others (a loss is a mean over its rows). So a
-        section uses each of its samples once and leaves none for the next section, and a checkpoint between
-        sections is complete.
+        section: from 0 to `sections` - 1 in each pass. The last batch may be shorter. It is trained like the
+        others, because a loss is a mean over the batch. So a section uses each of its samples once, leaves
+        none for the next section, and a checkpoint between sections is complete.
         """
         place = (pass_index, section, sections, seed)
-        # From the size of the whole batch, not of this process's part: the order of the rows depends on it,
-        # and must be the same for any number of processes.
+        # The order of the rows depends on this window and must be the same for any number of processes. So
+        # the window follows from the size of the whole batch, not of this process's part.
         window = self.database.window(TRAIN, self.database.block_rows(size))
         sharing = self.sharing(section, sections, size)
         read = [self._pieces(place, stretch, window) for stretch in sharing.read()]
         for total, _ in sharing.sizes():
-            # A short batch fills its first places only, so later stretches may have no samples for it.
+            # A short last batch fills only its first places, so later stretches may have no samples for it.
             pieces = [piece for one in read if (piece := next(one, None)) is not None]
             piece = pieces[0] if len(pieces) == 1 else _joined(pieces, self._nothing)
             yield SampleBatch(*piece, total)
@@ -108,8 +110,8 @@ def _joined(pieces: Sequence[Piece], nothing: Piece) -> Piece:
 class LossWatch:
     """Adds up the losses of a section, and stops the training if it diverges.
 
-    where: the pass and section, for messages. clips: names by index. processes: all stop together, with the
-    message of the process that has the broken rows.
+    where: names the pass and section in messages. clips: names by index. processes: all of them stop
+    together, with the message of the process that has the broken rows.
     """
 
     def __init__(self, where: str, clips: tuple[str, ...], processes: Processes = ALONE) -> None:
@@ -119,7 +121,7 @@ class LossWatch:
         self._worst: tuple[float, int, SampleBatch] | None = None
 
     def add(self, loss: Tensor, batch: SampleBatch) -> None:
-        """Note a batch and its loss over all processes, a scalar on any device."""
+        """Add a batch and its loss over all processes, a scalar tensor on any device."""
         self._waiting.append((loss, batch))
         self.seen += batch.total
         self._new += batch.total
@@ -154,7 +156,7 @@ class LossWatch:
         return self.processes.most_certain(*self._explained(text, batch))
 
     def _explained(self, text: str, batch: SampleBatch) -> tuple[str, bool]:
-        """The message with the rows or clips of the batch, and whether the rows are the cause."""
+        """`text` with the broken rows or the clips of the batch, and whether broken rows are the cause."""
         x, y, p = (part.isfinite().cpu().numpy() for part in batch[:3])
         bad = ~(x.all(1) & y.all(1) & p)
         if bad.any():

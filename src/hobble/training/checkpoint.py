@@ -23,10 +23,11 @@ HELD_OUT = COLUMNS.index("held_out_mse")
 class State:
     """The state of a training after `sections` whole sections, counted from its start.
 
-    recipe: hash of everything that determines the result (`hobble.training.start.run_name`).
-    samples, seconds: used so far. best, best_mse: flat weights with the lowest held-out error so far.
-    history: one row of numbers per section, in the order of `hobble.training.history.columns`. There is no
-    state of random generators: the order of the rows and dropout are seeded by pass and section.
+    adam: the optimiser. recipe: hash of everything that determines the result
+    (`hobble.training.start.run_name`). samples, seconds: used so far. best, best_mse: the flat weights with
+    the lowest held-out error so far, and this error. history: one row of numbers per section, in the order of
+    `hobble.training.history.columns`. There is no state of random generators: the order of the rows and
+    dropout are seeded by pass and section.
     """
 
     network: Trainable
@@ -46,7 +47,7 @@ class State:
 
     @property
     def since_best(self) -> int:
-        """Sections since the one with the lowest held-out error; 0 before the first section."""
+        """Number of sections since the one with the lowest held-out error; 0 before the first section."""
         errors = [row[HELD_OUT] for row in self.history]
         return len(errors) - 1 - int(np.argmin(errors)) if errors else 0
 
@@ -97,7 +98,7 @@ def _copied(flat: torch.Tensor) -> np.ndarray:
 
 
 class Saver:
-    """Writes checkpoints in a background thread, one at a time. A file gets its name when it is complete."""
+    """Writes checkpoints in a background thread, one at a time, under a temporary name until complete."""
 
     def __init__(self, path: Path) -> None:
         self.path = path

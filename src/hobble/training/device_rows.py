@@ -9,23 +9,23 @@ import torch
 from torch import Tensor
 
 from hobble.database import order
+from hobble.database.chunk_window import empty_buffers
 from hobble.database.manifest import Manifest
 from hobble.database.reader import Database
-from hobble.database.stretches import SampleRange, Sharing
-from hobble.database.window import empty_buffers
+from hobble.database.sharing import SampleRange, Sharing
 from hobble.rows.compose import compose, fit_columns, x_columns
 from hobble.training.batches import TRAIN, HostRows, SampleBatch, TrainingRows
 from hobble.training.processes import ALONE, Processes
 
-ROWS_AT_ONCE = 4096  # rows composed at a time: few kernel launches, 10 MB
+ROWS_AT_ONCE = 4096  # rows composed at a time: that takes few kernel launches and 10 MB
 MEMORY_SHARE = 0.6  # of the device's memory for rows; the rest is for the network and its buffers
 
 
 class DeviceRows(TrainingRows):
-    """All rows on the device, uploaded chunk by chunk to save host memory.
+    """All training rows in the memory of the device. They are uploaded chunk by chunk to save host memory.
 
-    The batches equal those of the database's reader when it holds all rows in memory. The host computes only
-    the order of rows and fits, and sends it once a section.
+    The batches equal those of `HostRows` if the host holds all rows in memory. The host computes only the
+    order of rows and terrain fits, and sends it once a section.
     """
 
     def __init__(
@@ -70,7 +70,7 @@ class DeviceRows(TrainingRows):
     def batches(
         self, pass_index: int, section: int, sections: int, seed: int, size: int
     ) -> Iterator[SampleBatch]:
-        """As `hobble.training.batches.HostRows.batches`."""
+        """See `hobble.training.batches.HostRows.batches`."""
         sharing = self.sharing(section, sections, size)
         rows, fits = self._read(sharing, (pass_index, section, sections, seed))
         sent, fits_sent = (torch.from_numpy(part).to(self.device) for part in (rows, fits))
@@ -88,7 +88,7 @@ class DeviceRows(TrainingRows):
             yield SampleBatch(x[:0], y[:0], p[:0], clip[:0], frame[:0], total)
 
     def _read(self, sharing: Sharing, place: tuple[int, int, int, int]) -> tuple[np.ndarray, np.ndarray]:
-        """Numbers of the rows and fits that this process reads in a section, batch by batch."""
+        """Indices of the rows and of the fits that this process reads in a section, batch by batch."""
         places, batches = [], []
         for stretch in sharing.read():
             parts = list(self._places(*place, stretch))
@@ -105,7 +105,10 @@ class DeviceRows(TrainingRows):
     def _places(
         self, pass_index: int, section: int, sections: int, seed: int, stretch: SampleRange
     ) -> Iterator[tuple[np.ndarray, np.ndarray]]:
-        """Rows and fits of a stretch in order, one layer at a time. All chunks are one group."""
+        """Rows and fits of a stretch in order, one layer (visit of all rows) at a time.
+
+        All chunks are one group, that is, their rows are shuffled together.
+        """
         visits, cut = self.database.manifest.visits, (stretch.start, stretch.stop)
         every, of_each = range(len(self.chunks)), [chunk.rows for chunk in self.chunks]
         nothing = np.empty(0, np.int64)
@@ -137,8 +140,8 @@ def rows_for(
 def fits_on(device: torch.device, manifest: Manifest) -> bool:
     """Whether the training rows fit on the GPU beside the training itself.
 
-    Uses its total memory, not the free memory: the rows have another order on the GPU than on
-    the host, and a resumed run needs the order that it began with.
+    Uses the total memory, not the free memory: the rows have another order on the GPU than on the host, and a
+    resumed run must make the same choice as before.
     """
     needed = sum(chunk.bytes for chunk in manifest.chunks[TRAIN])
     return needed < MEMORY_SHARE * torch.cuda.mem_get_info(device)[1]

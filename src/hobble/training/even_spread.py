@@ -7,7 +7,7 @@ import math
 import torch
 from torch import Tensor
 
-# Multiples of these irrational numbers, less their whole part, are spread evenly over 0..1.
+# The fractional parts of the multiples of these irrational numbers are spread evenly over 0..1.
 STEP_OF_PLACE, STEP_OF_BATCH = (math.sqrt(5) - 1) / 2, math.sqrt(2) - 1
 
 
@@ -25,5 +25,5 @@ class EvenSpread:
         self.of_places = torch.remainder(places * STEP_OF_PLACE, 1.0)
 
     def numbers(self, rows: int, batches: int) -> Tensor:
-        """(rows,) float64 between 0 and 1, for the first rows of a batch after `batches` others."""
+        """(rows,) float64 between 0 and 1, for the first `rows` rows of the batch with number `batches`."""
         return torch.remainder(self.of_places[:rows] + batches * STEP_OF_BATCH, 1.0)

@@ -1,4 +1,4 @@
-"""The held-out error: on clips that are not in training, in all and for each block of Y."""
+"""The error on held-out clips, which are not in training: over all outputs, and for each block of Y."""
 
 from __future__ import annotations
 
@@ -12,11 +12,11 @@ from torch import Tensor
 from hobble.database.reader import Database
 
 SPLIT = "held_out"
-ROWS_AT_ONCE = 2048  # rows in one product: fast, and within 50 MB
+ROWS_AT_ONCE = 2048  # rows predicted at once; that is fast and takes less than 50 MB
 
 
 class Predicts(Protocol):
-    """A network that predicts standardised outputs: in training, or read from a file."""
+    """A network that predicts standardised outputs. It may be in training or read from a file."""
 
     @property
     def outputs(self) -> int:
@@ -27,11 +27,11 @@ class Predicts(Protocol):
 
 
 class HeldOut:
-    """Rows of the held-out clips, each with one of its terrain fits, kept in memory.
+    """A sample of the held-out clips' rows, kept in memory, each with one of its terrain fits.
 
-    section: samples of a section of the training. After each section a tenth as many rows are measured, 2,000
-    to 20,000, which takes a few percent of the training time. `every_row` measures every row, without keeping
-    them.
+    section: number of training samples in a section. The sample has a tenth as many rows, but 2,000 to
+    20,000, so measuring it after each section takes a few percent of the training time. `every_row` measures
+    all rows without keeping them in memory.
     """
 
     def __init__(self, database: Database, device: torch.device, section: int) -> None:
@@ -50,7 +50,7 @@ class HeldOut:
         return self._errors(network, self.sample)
 
     def every_row(self, network: Predicts) -> list[float]:
-        """The same over every held-out row."""
+        """The same errors over every held-out row."""
         return self._errors(network, self._stream())
 
     def _errors(self, network: Predicts, batches: Iterable[tuple[Tensor, ...]]) -> list[float]:
@@ -64,7 +64,7 @@ class HeldOut:
         return [float(mean.mean()), *(float(mean[columns].mean()) for columns in self.blocks.values())]
 
     def _stream(self) -> Iterator[tuple[Tensor, ...]]:
-        """Every row once, in random order: the first layer of a pass."""
+        """Yield every row once, in random order: the first of the visits to each row in a pass."""
         visits = self.database.manifest.visits
         for block in self.database.blocks(SPLIT, 0, 0, visits, 0, ROWS_AT_ONCE):
             yield tuple(torch.from_numpy(array).to(self.device) for array in block[:3])

@@ -11,7 +11,7 @@ COLUMNS = ("pass", "section", "samples", "seconds", "train_mse", "held_out_mse")
 
 
 def columns(blocks: Iterable[str]) -> list[str]:
-    """Names of the columns. Samples and seconds count from the start, passes and sections from 1.
+    """Names of the columns. Samples and seconds are totals from the start; passes and sections begin at 1.
 
     train_mse is the mean over the section's batches, with dropout. The held-out errors are measured at the
     end of the section, without dropout. All are mean squared errors of the standardised output.
@@ -20,7 +20,7 @@ def columns(blocks: Iterable[str]) -> list[str]:
 
 
 def write_history(path: Path, blocks: Iterable[str], rows: Sequence[Sequence[float]]) -> None:
-    """Write history.csv. Missing values (without held-out clips) are left empty."""
+    """Write history.csv. A value that is nan (an error without held-out clips) is left empty."""
     lines = [",".join(columns(blocks))]
     lines += [",".join(_cell(i, value) for i, value in enumerate(row)) for row in rows]
     write_text(path, "\n".join(lines) + "\n")

@@ -19,17 +19,18 @@ EPSILON = 1e-8
 def l1_slopes(network: Trainable, l1: float) -> list[float]:
     """For each layer, the factor of sign(w) that the L1 term adds to the gradient of a weight w.
 
-    The term is l1 * sum over the layers of mean|W| / (2 * layers). The original divides by its number of
-    parameter arrays: three of weights and three of biases.
+    The term is l1 * (sum over the layers of mean|W|) / (2 * number of layers). The factor 2 is there because
+    the original divides by its number of parameter arrays: three of weights and three of biases.
     """
     layers = network.layers
     return [l1 / (2 * len(layers)) / layer[:, :, :-1].numel() for layer in layers]
 
 
 class Adam:
-    """Adam (Kingma and Ba 2015) on `network.flat`. It adds the gradient of the L1 term.
+    """Adam (Kingma and Ba 2015) on the flat parameters `network.flat`. It adds the gradient of the L1 term.
 
-    first, second: the running moments, laid out like `network.flat`. steps: number of steps so far.
+    first, second: running means of the gradient and of its square, laid out like `network.flat`. steps:
+    number of steps so far.
     """
 
     def __init__(
@@ -57,15 +58,15 @@ class Adam:
     def numbers(self, share: float) -> tuple[float, float]:
         """The factors that change from step to step: (rate, root).
 
-        rate: learning rate with the bias correction of the first moment; root: bias correction of the root of
-        the second moment.
+        rate: learning rate with the bias correction of the first moment. root: bias correction of the square
+        root of the second moment.
         """
         steps = max(self.steps, 1)
         rate = share * self.learning_rate / (1 - self.beta1**steps)
         return rate, 1 / (1 - self.beta2**steps) ** 0.5
 
     def _sweep(self, gradients: list[Tensor], rate: float, root: float) -> None:
-        """The step on a CPU, in one pass over memory, whose bandwidth limits the speed."""
+        """The step on a CPU, in one pass over memory, because memory bandwidth limits the speed."""
         views = [self.network.layers, self.network.views(self.first), self.network.views(self.second)]
         for *layer, gradient, slope in zip(*views, gradients, self.slopes, strict=True):
             arrays = [as_numpy(array.flatten(0, 1)) for array in layer]

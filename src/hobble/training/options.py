@@ -11,19 +11,20 @@ from hobble.core.section import Positive, PositiveFloat, Section, Share
 
 
 def _int_if_whole(number: float) -> float:
-    """3 for 3.0, so that both are the same recipe."""
+    """Turns 3.0 into 3, so that both are the same recipe."""
     return int(number) if number == int(number) else number
 
 
-# As it is: pydantic would write 3 as 3.0.
+# Writes a number as it is, because pydantic would write 3 as 3.0.
 AsItIs = PlainSerializer(lambda number: number, return_type=int | float)
 Passes = Annotated[float, Field(gt=0, le=1_000_000), AfterValidator(_int_if_whole), AsItIs]
 
 
 class Recipe(Section):
-    """How a network is trained. A pass is every (frame, fit) pair once, in `sections` sections.
+    """How a network is trained. A pass visits every (frame, terrain fit) pair once, in `sections` sections.
 
-    Each section is another random part of the pairs. So a fraction of a pass sees a random part of the data.
+    The sections of a pass are random parts of the pairs, so a fraction of a pass sees a random part of the
+    data.
     """
 
     passes: Passes = Field(20, description="passes over the data; a fraction ends after some sections")
@@ -52,15 +53,19 @@ class Recipe(Section):
     )
     version_poses: Annotated[float, Field(ge=0, le=1)] = Field(
         0.0,
-        description="share of the samples of clips with hurt versions whose input pose is moved along the "
-        "line to that of another version of the clip",
+        description="share of the samples whose input pose is moved along the line to the pose of another "
+        "version (healthy or hurt) of the same clip; only for clips with hurt versions",
     )
     other_paces: Annotated[float, Field(ge=1, le=2)] = Field(
         1.0,
-        description="for such channels, too: largest factor by which a sample is played slower or "
-        "faster, along a smoother path; 1: none",
+        description="largest factor by which a sample is played slower or faster, along a smoother path, for "
+        "channels that say how a whole clip walks; 1: none",
     )
     keep_channels: bool = Field(False, description="dropout never drops the inputs of channels")
+    symmetric: bool = Field(
+        False,
+        description="keep the network the same for left and right; for data sets with `mirror: true`",
+    )
     keep: Literal["last", "best"] = Field(
         "last",
         description="weights to write: those at the end, as in the original, or those with the lowest "
@@ -68,19 +73,19 @@ class Recipe(Section):
     )
     patience: Positive | None = Field(
         None,
-        description="end the training after this many sections without a lower held-out error; none: after "
-        "all passes",
+        description="end the training after this many sections without a lower held-out error; none: only "
+        "after all passes",
     )
     seed: int = 1
     memory_mb: Positive = Field(512, description="memory for the rows of the database, for each process")
     continues: Annotated[str, Field(pattern=r"^[A-Za-z0-9][A-Za-z0-9_.-]{0,99}$")] | None = Field(
-        None, description="a configuration whose last checkpoint the training starts from"
+        None, description="configuration from whose last checkpoint the training starts"
     )
     device: Literal["auto", "cpu", "cuda"] = "auto"
     precision: Literal["auto", "float32", "tf32", "bfloat16"] = Field(
         "auto",
-        description="precision of the factors of products; auto: bfloat16 from batch 256 on if it is fast, "
-        "else tf32 on CUDA and float32 on a CPU",
+        description="precision of the factors in matrix products; auto: bfloat16 for batches of 256 or more "
+        "if it is fast on this machine, else tf32 on CUDA and float32 on a CPU",
     )
     stretches: Positive | None = Field(
         None,
@@ -115,7 +120,7 @@ class Machines(Section):
 
     nodes: Annotated[int, Field(gt=0, le=10_000)] = 1
     gpus: Annotated[int, Field(ge=0, le=1_000)] = Field(
-        0, description="GPUs of each node, with one process each; 0: `processes` on its CPU"
+        0, description="GPUs of each node, one process for each; 0: train with `processes` on the CPU"
     )
     processes: Annotated[int, Field(gt=0, le=1_000)] = Field(
         1, description="processes on each node if `gpus` is 0"

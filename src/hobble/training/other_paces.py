@@ -1,4 +1,4 @@
-"""Rows played at other paces along smooth paths, so that neither the speed nor the path says who walks."""
+"""Plays rows at other paces along smooth paths, so that neither speed nor path shows who walks."""
 
 from __future__ import annotations
 
@@ -12,8 +12,8 @@ from hobble.core.quat import Array
 from hobble.database.reader import Database
 
 RISE = 0.5  # largest change of the pace from the middle of the window to its end, as a share of the pace
-# Multiples of these irrational numbers, less their whole part, are spread evenly over 0..1: for the pace, its
-# change, and how smooth the path is.
+# The fractional parts of the multiples of these irrational numbers are spread evenly over 0..1. Three
+# numbers: for the pace, for its change, and for how smooth the path is.
 STEPS_OF_PLACE = (math.sqrt(3) - 1, math.sqrt(7) - 2, math.sqrt(11) - 3)
 STEPS_OF_BATCH = (math.sqrt(13) - 3, math.sqrt(17) - 4, math.sqrt(19) - 4)
 
@@ -21,15 +21,16 @@ STEPS_OF_BATCH = (math.sqrt(13) - 3, math.sqrt(17) - 4, math.sqrt(19) - 4)
 class OtherPaces:
     """Plays each row's motion slower or faster, and moves its path towards a smooth one. X and Y both change.
 
-    If few people walk, each at one speed, the speed in the input shows who it is. So does the sway of the
-    path in each step. A running character has another speed and a straighter path, so a network takes it for
-    somebody else, and the walk changes with the speed. With these rows anybody walks at any speed.
+    If the clips have few people, each at one speed, the speed in the input shows who walks. So does the sway
+    of the path in each step. At run time the character has another speed and a straighter path, so the
+    network takes it for somebody else, and the walk changes with the speed. With these rows anybody walks at
+    any speed.
 
-    The time t of the window becomes r t (1 + a t / T) for a window of T frames to each side. r is spread
-    evenly (in its logarithm) between 1 / factor and factor, and 2 a between -RISE and RISE. Trajectory, gait
-    and ground are interpolated at the new times, and paths go on straight past their ends. Velocities, turn
-    and change of phase are multiplied by r. Then the path moves towards the parabola nearest to it, by a part
-    of the way between 0 and 1, again spread evenly, over the places of a batch and over batches.
+    The time t in the window, which has T frames on each side, becomes r t (1 + a t / T). The logarithm of r
+    is spread evenly between those of 1 / factor and factor, and 2 a between -RISE and RISE. Trajectory, gait
+    and ground are interpolated at the new times; past their ends, paths continue straight. Velocities, turn
+    and change of phase are multiplied by r. Then the path moves towards the nearest parabola, by a part of
+    the way between 0 and 1. All these numbers are spread evenly over the places of a batch and over batches.
 
     factor: 1 changes nothing, not even the path. batch: largest number of this process's rows in a batch.
     first: the place of its first row in the whole batch.
@@ -69,8 +70,8 @@ class OtherPaces:
         pace, rise, part = even.to(x.dtype)[:, :, None]
         pace, rise = torch.exp((2 * pace - 1) * self.most), (2 * rise - 1) * RISE / 2
         told = [x[:, columns] for columns in self.told]
-        # Channels are put back below as they were: the deviation of one that never varies is far too large to
-        # multiply by and divide by again.
+        # Channels are put back below as they were: the deviation of a channel that never varies is so large
+        # that multiplying and dividing by it loses the value.
         raw_x, raw_y = x * self.x_std + self.x_mean, y * self.y_std + self.y_mean
         self._play_window(raw_x, raw_y, pace, rise)
         self._play_frame(raw_x, raw_y, pace)
@@ -95,7 +96,7 @@ class OtherPaces:
         y[:, layout.y_joint_position][:, 1::3] -= mean
 
     def _play_frame(self, x: Tensor, y: Tensor, pace: Tensor) -> None:
-        """Less or more happens in a frame, and the previous pose is nearer to this one or farther."""
+        """Scale what happens in a frame by the pace. The previous pose moves nearer or farther to match."""
         layout = self.layout
         before, now = x[:, layout.x_joint_position], y[:, layout.y_joint_position]
         before += (1 - pace) * (now - before)
@@ -120,10 +121,10 @@ def _nearest(powers: Array) -> Array:
 
 
 def _at(values: Tensor, samples: int, half: int, pace: Tensor, rise: Tensor, ends: bool) -> Tensor:
-    """values (B, C samples) at the new times. pace, rise: (B, 1).
+    """Interpolate values (B, columns * samples) at the new times. pace, rise: (B, 1).
 
     half: samples in half of the window; the values are those of the whole window or of its second half. ends:
-    past the ends of the window the last value holds; else it goes on straight.
+    whether the last value is kept past the ends of the window; else the values continue straight.
     """
     table, middle = values.unflatten(1, (-1, samples)), samples - half
     time = torch.arange(samples, device=values.device) - middle

@@ -1,4 +1,4 @@
-"""Input poses moved towards those of clips with other channel values, so that a network uses its channels."""
+"""Moves input poses towards those of clips with other channel values, so that a network uses its channels."""
 
 from __future__ import annotations
 
@@ -10,25 +10,25 @@ from hobble.rows.layout import GAITS
 from hobble.training.even_spread import EvenSpread
 
 KEPT = 32  # rows that each place in a batch remembers
-NEAR = 1 / 16  # of a cycle: largest difference in phase between two poses that are mixed
+NEAR = 1 / 16  # largest difference in phase between two poses that are mixed, in cycles
 SAME_GAIT = 0.5  # poses are mixed if no share of a gait differs by this much
-BEYOND = 0.5  # a pose also moves away from the other one, by up to this part of the way
-OTHER_VALUE = 1e-3  # standardised: a larger difference is another value of a channel
+BEYOND = 0.5  # a pose may also move away from the other one, by up to this part of the distance
+OTHER_VALUE = 1e-3  # a larger difference of a standardised channel value means another value
 
 
 class OtherPoses:
     """Moves the pose in some rows of X towards the pose of a row with other channel values. Y is unchanged.
 
-    If channels say how a whole clip walks, its poses show that, too. Then a network can continue the walk
-    that it sees without the channels, and a character keeps the walk that its pose has drifted to. Trained on
-    24 people with three diagnoses or none, it walked like a group that was not requested. With these rows,
-    only the channels tell which walk Y belongs to.
+    If channels say how a whole clip walks, the poses of the clip show it, too. Then a network can ignore the
+    channels and continue the walk that it sees, and a character keeps the walk that its pose has drifted to.
+    A network trained on 24 people with three diagnoses or none made the character walk like a group that was
+    not requested. With these rows, only the channels tell which walk Y belongs to.
 
-    Each place in a batch remembers its own last rows, so several processes give the same rows as one. Of
-    those with the same gait and other channel values, the one with the nearest phase is taken. The pose moves
-    by a part of the way between -BEYOND and 1, spread evenly over places and batches. Where the part is
-    negative, the pose is more extreme than any captured one, and the network learns the way back. Without
-    such poses a character that leaned forward leaned more and more.
+    Each place in a batch remembers its own last rows, so several processes give the same rows as one. From
+    the remembered rows with the same gait and other channel values, the one with the nearest phase is taken.
+    The pose moves towards it by a part of the way between -BEYOND and 1, spread evenly over places and
+    batches. If the part is negative, the pose becomes more extreme than any captured one, and the network
+    learns the way back. Without such poses a character that leaned forward leaned more and more.
 
     share: share of the rows that are moved; 0 changes nothing. batch: largest number of this process's rows
     in a batch. first: the place of its first row in the whole batch.

@@ -1,8 +1,8 @@
 """Several processes that train one network together, and their communication.
 
-Each process has all the weights and finds the gradient on its own rows of a batch. The gradients are summed
-over the processes, so that all take the same step. They are started by torchrun. A single process does not
-communicate and does not start torch.distributed.
+Each process has all the weights and computes the gradient on its own rows of a batch. The gradients are
+summed over the processes, so that all take the same step. torchrun starts the processes. A single process
+does not communicate and does not start torch.distributed.
 """
 
 from __future__ import annotations
@@ -20,14 +20,14 @@ import torch.distributed
 from torch import Tensor
 
 from hobble.core.errors import HobbleError
-from hobble.database.stretches import Sharing, own_places
+from hobble.database.sharing import Sharing, own_places
 
 PATIENCE = timedelta(minutes=30)  # wait for the slowest process; a dead process is noticed at once
 
 
 @dataclass(frozen=True)
 class Processes:
-    """One process: number `rank`, from 0, of `count`; `local` is its number on its machine."""
+    """One of `count` processes. rank: its number, from 0. local: its number on its machine, from 0."""
 
     rank: int = 0
     count: int = 1
@@ -70,7 +70,7 @@ class Processes:
         return list(shared[0])
 
     def most_certain(self, text: str, certain: bool) -> str:
-        """The text of the first process that is certain of the cause; else the text of process 0."""
+        """The text of the first process that is `certain` of the cause; if none is, the text of process 0."""
         if self.alone:
             return text
         texts: list[Any] = [None] * self.count

@@ -1,4 +1,4 @@
-"""Roll-outs in training: input poses with the network's own errors, as in a running character."""
+"""Roll-outs in training: input poses get the network's own errors, as at run time."""
 
 from __future__ import annotations
 
@@ -12,16 +12,17 @@ from hobble.database.reader import Database
 class RollOut:
     """Adds the errors that the network would have accumulated to the pose in X; Y is unchanged.
 
-    A joint's next position is the mean of two: the predicted position, and the old one plus the predicted
-    velocity. Let d be its present error, and v and p the network's errors in velocity and position. In the
-    next frame its position is off by (d + v + p) / 2 and its velocity by v. (The turn of the root meanwhile,
-    a few hundredths of a radian, is ignored.)
+    At run time a joint's next position is the mean of two: the predicted position, and the old position plus
+    the predicted velocity. Let d be the present error of its position, and p and v the network's errors in
+    position and velocity. In the next frame its position is off by (d + v + p) / 2 and its velocity by v.
+    (The turn of the root between the frames, a few hundredths of a radian, is ignored.)
 
-    Each place in a batch carries its errors to the same place in the next batch, although the rows are
-    shuffled. So the errors have a realistic size and pattern over the joints. (With the errors of its own
-    past, the network would learn each row by heart, and held-out clips get worse.)
+    Each place in a batch carries its errors to the same place in the next batch, usually a row of another
+    clip, because rows are shuffled. The errors still have a realistic size and pattern over the joints. (If
+    each row got the errors of its own past, the network would learn it by heart, and the error on held-out
+    clips would grow.)
 
-    frames: length of a roll-out; its first pose is the recorded one, so 1 changes nothing. batch: largest
+    frames: length of a roll-out. Its first pose is the captured one, so 1 changes nothing. batch: largest
     number of this process's rows in a batch. first: the place of its first row in the whole batch.
     """
 
@@ -57,7 +58,7 @@ class RollOut:
             x[:, self.x_speed] += self.speed[: len(x)]
 
     def remember(self, error: Tensor) -> None:
-        """Advance by a frame. error: (B, Y) of the standardised output, prediction minus truth."""
+        """Advance the errors by a frame. error: (B, Y) standardised prediction minus truth of this batch."""
         if self.frames == 1:
             return
         rows = len(error)

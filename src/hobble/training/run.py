@@ -13,7 +13,7 @@ from hobble.models import model
 from hobble.models.model import Built
 from hobble.models.network import TERRAIN_SIDE
 from hobble.models.options import Options
-from hobble.training.built import run_built
+from hobble.training.build_network import run_built
 from hobble.training.checkpoint import State, pack
 from hobble.training.held_out import HeldOut
 from hobble.training.history import write_history
@@ -42,10 +42,11 @@ def run(
 ) -> None:
     """Train on the database folder and write the three files; see `hobble.training.train.train`.
 
-    Writes the weights at the end, as in the original, or with `training.keep: best` those with the lowest
-    held-out error; the checkpoint holds both. terrain_side: cm from the path to the side heights in the
-    database's rows. clips: name -> file of its rows in order, needed only for a network that is built, not
-    trained.
+    The three files are weights, history and checkpoint. The written weights are the last ones, as in the
+    original; with `training.keep: best` they are those with the lowest held-out error. The checkpoint holds
+    both. code: fingerprint of the training's source, see `hobble.training.start.recipe_hash`. terrain_side:
+    cm from the path to the points at its sides where the rows have ground heights. clips: name -> file of its
+    rows in order, needed only for a network that is built, not trained.
     """
     data = Database.open(database, training.memory_mb)
     if isinstance(model(network.kind), Built):
@@ -69,6 +70,20 @@ def run(
         start=start,
         code=code,
     )
+    _write(state, data, configuration, training, terrain_side, weights, history, checkpoint)
+
+
+def _write(
+    state: State,
+    data: Database,
+    configuration: str,
+    training: Training,
+    terrain_side: float,
+    weights: Path,
+    history: Path,
+    checkpoint: Path,
+) -> None:
+    """Measure the held-out error of the finished network, and write the three files."""
     checkpoint_arrays = pack(state)  # of the last state, before the best weights replace it
     facts = _facts(state, training) | {"terrain_side": terrain_side}
     if training.keep == "best" and state.best is not None:
@@ -98,7 +113,7 @@ def _facts(state: State, training: Training) -> dict[str, Any]:
 
 
 def passes_of(sections: int, each: int) -> float:
-    """The passes of so many sections, `each` of which are a pass; an integer if it is whole.
+    """The number of passes in so many sections. each: sections of a pass. A whole number is an integer.
 
     >>> passes_of(40, 4), passes_of(1, 4)
     (10, 0.25)

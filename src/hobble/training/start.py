@@ -31,20 +31,21 @@ log = logging.getLogger("hobble.training")
 
 NOT_IN_RECIPE_HASH = ("continues", "device", "keep", "patience", *Machines.model_fields)
 ADAM_KEYS = ("learning_rate", "beta1", "beta2", "l1")
+# The arrays that a run takes from its start checkpoint.
 START_ARRAYS = (
     "weights",
     "first",
     "second",
     "steps",
     "sections",
-)  # that a run takes from its start checkpoint
-BFLOAT16_FROM_BATCH = 256  # from this batch size on the products take most of the time
+)
+BFLOAT16_FROM_BATCH = 256  # from this batch size on, matrix products take most of the time
 
 
 def use_threads(threads: int, batch: int | None = None) -> None:
-    """Set the threads of PyTorch and numba, at most one for each core, and use deterministic algorithms.
+    """Set the number of threads of PyTorch and numba, at most the number of cores; be deterministic.
 
-    batch: rows of a batch; if given, one thread is used if a trial shows that it is faster.
+    batch: rows of a batch. If it is given, a trial decides whether one thread is faster.
     """
     threads = max(1, min(threads, cores(), numba.config.NUMBA_NUM_THREADS))  # type: ignore[attr-defined]
     if batch is not None:
@@ -52,7 +53,8 @@ def use_threads(threads: int, batch: int | None = None) -> None:
     torch.set_num_threads(threads)
     numba.set_num_threads(threads)
     torch.use_deterministic_algorithms(True)
-    # No memory is read before it is written, so it need not be filled.
+    # Deterministic algorithms fill new memory. That costs time and is not needed: none is read before it is
+    # written.
     torch.utils.deterministic.fill_uninitialized_memory = False  # type: ignore[attr-defined]
 
 
@@ -73,9 +75,10 @@ def recipe_hash(network: Options, training: Training, database: Database, code: 
 
 
 def run_name(recipe: str, start: Arrays | None) -> str:
-    """The name of a run: the recipe hash, combined with its start checkpoint if that has another recipe.
+    """The name of a run: the recipe hash, combined with the start checkpoint if that has another recipe.
 
-    A start with the same recipe does not change the name, because the run would reach that state by itself.
+    start: arrays of the start checkpoint. With the same recipe it does not change the name, because the run
+    would reach that state by itself.
     """
     if start is None or str(start.get("recipe")) == recipe:
         return recipe
@@ -94,12 +97,13 @@ def begin(
     start: Path | None,
     processes: Processes = ALONE,
 ) -> tuple[State, Path]:
-    """The state from the run's own checkpoint, else from `start`, else a new one; and that checkpoint's path.
+    """The state to begin with, and the path of the run's own checkpoint.
 
-    If the run's own checkpoint has more passes than `training.passes`, it is ignored. Raises InputError
-    for a checkpoint that is damaged or has a network of another shape, and for a start that is past
-    `training.passes` or has another number of sections. With several processes, the first one reads the
-    checkpoint and sends the state to the others.
+    The state comes from the run's own checkpoint, else from `start`, else it is new. If the run's own
+    checkpoint has more passes than `training.passes`, it is ignored. Raises InputError for a checkpoint that
+    is damaged or has a network of another shape, and for a start that is past `training.passes` or has
+    another number of sections. With several processes, the first one reads the checkpoint and sends the state
+    to the others.
     """
     begun = load_npz(start) if start is not None and processes.first else None
     state = fresh(database, network, training, processes)
@@ -125,7 +129,10 @@ def _restored(
     start: Path | None,
     begun: Arrays | None,
 ) -> tuple[State, Path]:
-    """Restore `state` from the run's checkpoint or the start, if any; and the path of that checkpoint."""
+    """Restore `state` from the run's own checkpoint or from the start, if there is one; see `begin`.
+
+    begun: the arrays of the start checkpoint. Returns the state and the path of the run's own checkpoint.
+    """
     state.recipe = run_name(recipe, begun)
     own = checkpoints / state.recipe / "checkpoint.npz"
     goal = training.all_sections
@@ -146,7 +153,7 @@ def _restored(
 
 
 def _check_start(state: State, training: Training, path: Path) -> None:
-    """Check that the start has as many sections a pass as the training, and no more passes."""
+    """Raise InputError if the start has other sections a pass, or more passes, than the training."""
     sections = int(max(row[1] for row in state.history)) if state.history else training.sections
     if sections != training.sections:
         raise InputError(
@@ -189,7 +196,8 @@ def device(wanted: str, processes: Processes = ALONE) -> torch.device:
 def step_for(network: Trainable, training: Training) -> TrainingStep:
     """The `TrainingStep` for the device, the precision and the batch size.
 
-    Sums are always float32. TF32, which rounds factors to 11 bits, is set for the whole process.
+    Sums are always float32. TF32 rounds the factors of products to 11 bits; it is switched on or off for the
+    whole process.
     """
     on_cpu = network.flat.device.type == "cpu"
     precision = training.precision

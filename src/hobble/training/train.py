@@ -1,4 +1,8 @@
-"""The training loop: passes, sections, batches; loss, step, log, checkpoint."""
+"""The training loop.
+
+A pass goes once through all training rows. It has sections, and a section has batches. Each batch is changed,
+then the network takes a step. After each section the training logs, measures and saves.
+"""
 
 from __future__ import annotations
 
@@ -24,6 +28,7 @@ from hobble.training.processes import ALONE, Processes
 from hobble.training.rollout import RollOut
 from hobble.training.schedule import learning_rate_share
 from hobble.training.start import begin, recipe_hash, step_for, use_threads
+from hobble.training.symmetric import Symmetry
 from hobble.training.update import update_for
 from hobble.training.version_poses import VersionPoses
 
@@ -41,7 +46,7 @@ def train(
     code: str | None = None,
     processes: Processes = ALONE,
 ) -> State:
-    """Train to `training.passes` passes over the database's training clips; returns where that ends.
+    """Train to `training.passes` passes over the database's training clips; returns the final state.
 
     network, training: these sections of a configuration. checkpoints: a folder with one subfolder for each
     run, named by the hash of everything that determines it; a run resumes from its own checkpoint there.
@@ -58,6 +63,8 @@ def train(
             "training.keep: best and training.patience need the held-out error, but no clip is held out. "
             "List some under held_out in the data set."
         )
+    if training.symmetric and network.asymmetric:
+        raise HobbleError(f"training.symmetric: {network.asymmetric}")
     pairs, sections = database.pairs(TRAIN), training.sections
     if pairs < sections:
         raise HobbleError(f"{pairs} training samples are fewer than training.sections, {sections}")
@@ -82,6 +89,9 @@ def _run(
     device, batch_size = state.network.flat.device, training.batch
     step = step_for(state.network, training)
     update = update_for(step, state.adam, batch_size, processes, _kept(database, training))
+    symmetry = Symmetry(state.network, database) if training.symmetric else None
+    if symmetry and not state.adam.steps:
+        symmetry.start()
     rows = rows_for(database, device, processes, training.stretches)
     places = processes.places(batch_size)
     others = OtherPoses(database, training.other_poses, len(places), device, places.start)
@@ -102,6 +112,8 @@ def _run(
         paces.begin()
         roll_out.begin()
         for batch in rows.batches(pass_index, section, sections, seed, batch_size):
+            # Play the motion slower or faster; move poses towards those of other channel values, then towards
+            # those of hurt or healthy versions of the clip; add the network's own errors.
             paces.play(batch.x, batch.y)
             others.mix(batch.x, batch.p)
             versions.mix(batch.x, batch.p, batch.clip)
@@ -109,8 +121,12 @@ def _run(
             rate = learning_rate_share(training, (state.samples + watch.seen) / pairs)
             watch.add(update(batch.x, batch.y, batch.p, rate, batch.total), batch)
             roll_out.remember(step.error)
+            if symmetry:
+                symmetry.after(state.adam.steps)
             if record:
                 record.bar.update(batch.total)
+        if symmetry:
+            symmetry.enforce()
         train_mse = watch.mean()
         processes.check_same(state.network.flat)
         state.sections, state.samples = turn + 1, state.samples + watch.samples

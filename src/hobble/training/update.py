@@ -1,4 +1,4 @@
-"""The update of one batch: gradient and optimiser; on CUDA as one captured graph."""
+"""The update of one batch: gradient and optimiser step; on CUDA as one captured graph."""
 
 from __future__ import annotations
 
@@ -11,15 +11,15 @@ from hobble.models.trainable import ALL_ROWS, TrainingStep
 from hobble.training.optimiser import Adam
 from hobble.training.processes import ALONE, Processes
 
-CAPTURED_UP_TO = 1024  # rows of a batch; with more, launches cost little compared with the products
+CAPTURED_UP_TO = 1024  # rows of a batch; with more, kernel launches cost little compared with the products
 WARM_UP = 3  # runs before the capture, in which libraries choose algorithms and allocate memory
 
 
 class Update:
     """Draws the dropout masks of a batch, finds the gradient and takes a step.
 
-    kept: blocks of inputs that are never dropped, such as channels. A dropped input has its mean value. With
-    dropped channels a hurt body would seem to be less hurt, and a network would trust its channels less.
+    kept: blocks of inputs that dropout never drops, such as channels. A dropped input gets its mean value. If
+    channels were dropped, a hurt body would seem less hurt, and the network would rely less on its channels.
     """
 
     def __init__(self, step: TrainingStep, adam: Adam, kept: Sequence[slice] = ()) -> None:
@@ -43,10 +43,11 @@ class Update:
 
 
 class SharedUpdate(Update):
-    """The update by several processes, each with its own rows of the batch, maybe none.
+    """The update by several processes. Each has its own rows of the batch, maybe none.
 
     The loss is a mean over the rows of the batch. So each process multiplies its gradient and loss by its
-    share of the rows, and the sum over the processes is that of the whole batch. One message holds both.
+    share of the rows. Summed over the processes, they are those of the whole batch. Gradient and loss are
+    sent together.
     """
 
     def __init__(
@@ -59,7 +60,7 @@ class SharedUpdate(Update):
         self.gradients = adam.network.views(self.sent[:-1])
 
     def __call__(self, x: Tensor, y: Tensor, p: Tensor, share: float, total: int | None = None) -> Tensor:
-        """As in `Update`; the loss is that of the whole batch."""
+        """See `Update.__call__`. The loss is that of the whole batch."""
         total = total or len(p)
         masks = self.masks(total, slice(self.own.start, self.own.stop))
         if len(p):
@@ -111,7 +112,7 @@ class CapturedUpdate(Update):
         return loss
 
     def __call__(self, x: Tensor, y: Tensor, p: Tensor, share: float, total: int | None = None) -> Tensor:
-        """As in `Update`."""
+        """See `Update.__call__`."""
         if len(p) != len(self.p):
             return super().__call__(x, y, p, share)
         self.x.copy_(x)

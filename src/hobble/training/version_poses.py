@@ -1,4 +1,4 @@
-"""Input poses moved between a clip and its hurt versions, so that a network learns what an injury changes."""
+"""Moves input poses between a clip and its hurt versions, so that a network learns what an injury changes."""
 
 from __future__ import annotations
 
@@ -9,33 +9,34 @@ import torch
 from torch import Tensor
 
 from hobble.core.quat import Array
+from hobble.database.chunk_window import ChunkWindow, empty_buffers
 from hobble.database.precision import widen
 from hobble.database.reader import Database
-from hobble.database.window import ChunkWindow, empty_buffers
 from hobble.rows.compose import lower_joints, without_terrain
 from hobble.training.even_spread import EvenSpread
 
 SPLIT = "train"
 TABLE_BYTES = 256 << 20  # memory for poses; if they need more, only every second (third, ...) row is kept
-CANDIDATES = 8  # rows with the nearest phases; of these the one whose path turns most alike is taken
-NEAR = 1 / 32  # of a cycle: largest difference in phase between two poses that are mixed
+CANDIDATES = 8  # number of rows with the nearest phases, among which the most similar path is chosen
+NEAR = 1 / 32  # largest difference in phase between two poses that are mixed, in cycles
 
 
 class VersionPoses:
     """Moves the pose in rows of X towards that of another version of the same clip. Y is unchanged.
 
-    A link hurts in few clips. A network that continues the walk that it sees takes the posture of these
-    clips for a part of the injury, and a character that walks as if at severity 10 stays so at 5. With these
-    rows it sees each clip's poses with and without the injury, and only the channels tell which one Y has.
+    Each link is hurt in few clips. A network that continues the walk that it sees takes the posture of these
+    clips for a part of the injury, and a character that walks as if at severity 10 does not change at 5. With
+    these rows the network sees each clip's poses with and without the injury, and only the channels tell
+    whether Y is hurt.
 
-    The pose of a hurt row moves along the line to the healthy clip at the same phase, and that of a healthy
-    row along the line to a hurt version. Of the rows with about that phase, the one whose path turns most
-    alike is taken. The pose moves by a part of the way between -1 and 1. The part depends only on the row's
-    place in the batch and on the number of the batch, so several processes get the same rows as one. The
-    parts are spread evenly. Rows of clips without versions stay.
+    The pose of a hurt row moves along the line to a pose of the healthy clip, and that of a healthy row along
+    the line to a pose of a hurt version. Among the rows with nearly the same phase, the one whose path turns
+    most alike is taken. The pose moves by a part of the way between -1 and 1. The parts are spread evenly. A
+    part depends only on the row's place in the batch and on the number of the batch, so several processes get
+    the same rows as one. Rows of clips without hurt versions are not changed.
 
     The parts have the mean 0. If all poses moved towards the other version, the network would learn that Y
-    is further from it than X is. Then a running character exaggerates.
+    is always further from the other version than X is. Then the character exaggerates at run time.
 
     share: share of the rows that are moved; 0 changes nothing. batch: largest number of this process's rows
     in a batch. first: the place of its first row in the whole batch.
@@ -53,7 +54,8 @@ class VersionPoses:
         hurt = np.array([name in sources for name in names])
         family = np.array([of_name.get(sources.get(name, name), -1) for name in names])
         family[~np.isin(family, family[hurt])] = -1
-        # Rows are sorted by this key, plus the phase. Negative: clips without versions.
+        # Rows are sorted by the key of their clip plus the phase. Clips without hurt versions have a negative
+        # key.
         self.own = np.where(family < 0, -2.0, 2.0 * (family + len(names) * hurt))
         self.other = np.where(family < 0, -2.0, 2.0 * (family + len(names) * ~hurt))
         self.pose, self.way = (layout.x_joint_position, layout.x_joint_velocity), layout.x_direction
@@ -65,7 +67,7 @@ class VersionPoses:
         self.batches = 0
 
     def begin(self) -> None:
-        """Start a section, which does not depend on the previous one."""
+        """Start again, so that a section does not depend on the previous one."""
         self.batches = 0
 
     def mix(self, x: Tensor, p: Tensor, clip: np.ndarray) -> None:
@@ -95,10 +97,10 @@ class VersionPoses:
 
 
 def _table(database: Database, own: Array) -> tuple[Array, Array, Array]:
-    """Key, pose, and directions of the training rows of clips with versions, sorted by key.
+    """Keys (n,), poses (n, D) and path directions (n, E) of the training rows of clips with hurt versions.
 
-    own: (clips,) key of each clip; negative ones are left out. The key of a row is that of its clip plus its
-    phase.
+    own: (clips,) key of each clip; clips with a negative key are left out. The key of a row is that of its
+    clip plus its phase. The rows are sorted by key.
     """
     manifest = database.manifest
     bare, into = without_terrain(database.layout), empty_buffers(manifest, SPLIT, 1)
@@ -123,7 +125,7 @@ def _table(database: Database, own: Array) -> tuple[Array, Array, Array]:
 def _of_chunk(
     window: ChunkWindow, own: Array, pose: np.ndarray, way: np.ndarray, database: Database, every: int
 ) -> tuple[Array, Array, Array]:
-    """The rows of one chunk, not sorted. Heights are above the first of the grounds fitted to the row."""
+    """The same for the rows of one chunk, not sorted. Heights are above the first terrain fit of each row."""
     key = own[window.clip] + window.phase
     kept = np.flatnonzero(key >= 0)[::every]
     x = widen(window.x[kept]).astype(np.float32)

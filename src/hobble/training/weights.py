@@ -14,7 +14,7 @@ from hobble.core.files import save_npz
 from hobble.core.skeleton import Skeleton
 from hobble.database.reader import Database
 from hobble.models.model import FinishedNetwork
-from hobble.models.seen import SeenInTraining
+from hobble.models.training_facts import TrainingFacts
 from hobble.rows.layout import CONTACTS, GAITS
 from hobble.training.batches import TRAIN
 
@@ -24,18 +24,18 @@ UNITS = "centimetres, 60 Hz frames, velocities per frame, right-handed, Y up, +Z
 def write_weights(
     path: Path, network: FinishedNetwork, database: Database, configuration: str, facts: Mapping[str, Any]
 ) -> None:
-    """Write the network's arrays, `Xmean`, `Xstd`, `Ymean`, `Ystd`, those of `SeenInTraining`, `meta` (JSON).
+    """Write the network's arrays, `Xmean`, `Xstd`, `Ymean`, `Ystd`, those of `TrainingFacts`, and `meta`.
 
     facts: numbers about the training, which are added to `meta`. Equal networks give equal bytes.
     """
     s = database.statistics
     arrays = {**network.arrays(), "Xmean": s.x_mean, "Xstd": s.x_std, "Ymean": s.y_mean, "Ystd": s.y_std}
-    arrays |= SeenInTraining.of(database.layout, database.each_row(TRAIN), s).arrays()
+    arrays |= TrainingFacts.of(database.layout, database.each_row(TRAIN), s).arrays()
     save_npz(path, **arrays, meta=np.array(meta(network, database, configuration, facts)))
 
 
 def meta(network: FinishedNetwork, database: Database, configuration: str, facts: Mapping[str, Any]) -> str:
-    """The file's meta as JSON: meaning of the columns and origin of the network."""
+    """The array `meta` of the file, as JSON: meaning of the columns and origin of the network."""
     rig = Skeleton.from_dict(database.skeleton)
     channels = [channel(name) for name, _ in database.layout.channels]
     return json.dumps(

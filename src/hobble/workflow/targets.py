@@ -11,7 +11,7 @@ from hobble.config.sections import PhaseMode
 from hobble.core.errors import HobbleError, InputError
 from hobble.workflow.clip_batches import dataset_of, rules_of_job
 from hobble.workflow.comparison import COMPARE
-from hobble.workflow.copies import refuse_copies
+from hobble.workflow.identical_clips import refuse_copies
 from hobble.workflow.project import Project
 
 if TYPE_CHECKING:
@@ -46,7 +46,7 @@ def notes(project: Project, targets: Iterable[str]) -> list[str]:
 def needed_datasets(project: Project, arguments: Sequence[str]) -> list[str]:
     """The data sets that a command line needs. arguments: of Snakemake, also of a job on another machine.
 
-    Includes the data sets of configurations whose networks are used or continued.
+    The data sets of configurations whose networks are used or continued are among them.
     """
     if rules := rules_of_job(arguments):
         return [name for name in dict.fromkeys(map(dataset_of, rules)) if name]
@@ -77,7 +77,7 @@ def datasets_of(project: Project, targets: Iterable[str]) -> list[str]:
 
 
 def targets_or_default(targets: Iterable[str]) -> list[str]:
-    """The targets, or what Snakemake makes without any."""
+    """The targets, or the target that Snakemake makes if none is given."""
     return list(targets) or ["results/holden/report.html"]
 
 
@@ -89,13 +89,28 @@ def _check_configuration(project: Project, name: str) -> None:
         project.catalogue.configuration(other)
     if model.training.continues:
         _check_continues(project, name, model)
+    if model.training.symmetric and not model.network_of:
+        _check_symmetric(project, name, model)
     _check_dataset(project, model.dataset)
     project.datasets.selected(model.dataset, model.channels)
     refuse_copies(project.clips, project.datasets, model.dataset, tuple(model.channels))
 
 
+def _check_symmetric(project: Project, name: str, model: Configuration) -> None:
+    """Check that the network can be symmetric and that the data set has mirrored clips."""
+    if model.network.asymmetric:
+        raise HobbleError(f"configuration {name}: training.symmetric: {model.network.asymmetric}")
+    if not project.catalogue.dataset(model.dataset).mirror:
+        raise HobbleError(
+            f"configuration {name}: training.symmetric: data set {model.dataset} has no mirrored clips, so "
+            "its left and right may differ. Write `mirror: true` there, or `symmetric: false`."
+        )
+
+
 def _check_continues(project: Project, name: str, model: Configuration) -> None:
-    """Check that a training can continue from another: same network and sections, and not fewer passes."""
+    """Check that a training can continue from another one: same channels, network and sections, and no fewer
+    passes.
+    """
     begun = model.training.continues
     if project.configurations.is_built(name):
         kind = model.network.kind

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from hobble.channels import channel
-from hobble.channels.injury.limp import page, together
+from hobble.channels.injury.limp import page, with_other_channel
 from hobble.channels.injury.limp import run as module
 from hobble.channels.injury.limp.captured_limps import VERSION, HurtSeconds, Limp, healthy_of
 from hobble.channels.injury.limp.crowd_walks import FigureWalk
@@ -150,11 +150,11 @@ def test_a_limp_is_compared_with_the_healthy_walk_of_the_same_mood(
     def row(link: str, figure: FigureWalk, healthy: FigureWalk) -> dict[str, Any]:
         return module._row(network, "walk", link, 10.0, figure, healthy)
 
-    monkeypatch.setattr(together, "walk_figures", walk_figures)
-    rows = together.limps_together(network, [LEFT_KNEE, RIGHT_KNEE], 2.0, 8.0, Runtime(), row)
+    monkeypatch.setattr(with_other_channel, "walk_figures", walk_figures)
+    rows = with_other_channel.limps_together(network, [LEFT_KNEE, RIGHT_KNEE], 2.0, 8.0, Runtime(), row)
     assert [r["column"] for r in rows] == [m for m in moods if m != "tired" for _ in range(2)]
     assert {r["speed_share"] for r in rows} == {0.6}
-    found = {r["column"]: r for r in together.named_together(rows)}
+    found = {r["column"]: r for r in with_other_channel.named_together(rows)}
     assert {name: r["named"] for name, r in found.items()} == {
         "old": 0.0,
         "happy": 1.0,
@@ -164,7 +164,7 @@ def test_a_limp_is_compared_with_the_healthy_walk_of_the_same_mood(
     assert [r["wrong_side"] for r in found.values()] == [0.0] * 4
     table = page.together_table("x", list(found.values()))
     assert [line[0] for line in table.rows] == list(found)
-    assert together.limps_together(hurtable, [LEFT_KNEE], 2.0, 8.0, Runtime(), row) == []
+    assert with_other_channel.limps_together(hurtable, [LEFT_KNEE], 2.0, 8.0, Runtime(), row) == []
 
 
 def clip(name: str, hurt: dict[str, float], limp: dict[str, float]) -> Limp:

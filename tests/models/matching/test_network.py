@@ -148,13 +148,13 @@ def test_javascript_finds_the_same_frames_as_python(made: Made, tmp_path: Path) 
     turning = [0, 3, 7]
     start = layout.y_joint_rotation.start
     rows = np.r_[np.arange(start), (start + 3 * np.array(turning)[:, None] + np.arange(3)).ravel()]
-    seen = np.arange(1, layout.x_size)
+    read = np.arange(1, layout.x_size)
     x, phase = sequence(network)
     spec = {
-        "network": {"kind": "matching", **network.page(seen, rows)},
-        "seen": seen.tolist(),
-        "xMean": packed(network.x_mean[seen]),
-        "xScale": packed(inverse(network.x_std)[seen].astype(np.float32)),
+        "network": {"kind": "matching", **network.page(read, rows)},
+        "inputColumns": read.tolist(),
+        "xMean": packed(network.x_mean[read]),
+        "xScale": packed(inverse(network.x_std)[read].astype(np.float32)),
         "yMean": packed(network.y_mean[rows]),
         "yStd": packed(network.y_std[rows]),
     }

@@ -1,4 +1,4 @@
-"""The diagnosis channel: three groups of diagnoses, 0 or 1. All are 0 for healthy people."""
+"""The diagnosis channel: a column, 0 or 1, for each of three groups of diagnoses. All are 0 if healthy."""
 
 from __future__ import annotations
 

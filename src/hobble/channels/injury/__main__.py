@@ -1,5 +1,6 @@
-"""Writes status files from a table: python -m hobble.channels.injury TABLE.csv FOLDER --skeleton
-SKELETON.yaml.
+"""Writes status files, which say what hurts in each clip, from a table of clips, links and severities.
+
+python -m hobble.channels.injury TABLE.csv FOLDER --skeleton SKELETON.yaml
 """
 
 from __future__ import annotations

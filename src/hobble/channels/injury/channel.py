@@ -17,13 +17,14 @@ ZERO = re.compile(r"\s*0+(\.0*)?\s*")
 
 
 def hurts(text: str) -> bool:
-    """Whether a status (`A-B[4];`) or a status file's text has a severity above 0."""
+    """Whether a text has a severity above 0. text: a status (`A-B[4];`) or the content of a status file."""
     return any(ZERO.fullmatch(severity) is None for severity in re.findall(r"\[([^\]]*)", text))
 
 
 class Injury(Channel):
-    """Severities from a status file beside the clip, or from a status in its entry, which holds for all
-    frames.
+    """Severities from a status file beside the clip.
+
+    A status in the clip's entry of the data set is used instead and holds for all frames.
     """
 
     name = "injury"
@@ -37,7 +38,7 @@ class Injury(Channel):
     targets = ("questionnaire",)
 
     def columns(self, rig: HasLinks) -> tuple[str, ...]:
-        """The links: "LeftUpLeg-LeftLeg"."""
+        """The links, with names such as "LeftUpLeg-LeftLeg"."""
         return tuple(f"{a}-{b}" for a, b in rig.links)
 
     def is_neutral(self, source: ClipSource) -> bool:

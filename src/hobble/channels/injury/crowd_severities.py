@@ -22,5 +22,5 @@ def hurt_links(network: Network) -> tuple[str, ...]:
 
 
 def severities(network: Network, each: Sequence[Mapping[str, float]]) -> dict[str, Array]:
-    """The values of the injury channel for figures that are given as link -> severity."""
+    """{"injury": (C, L) severities} of C figures; {} without such a channel. each: link -> severity."""
     return channel_values(network, INJURY, each)

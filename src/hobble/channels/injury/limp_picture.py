@@ -32,8 +32,8 @@ QUALITIES = (80, 65, 50, 35, 20)
 def write_limp_picture(network: Network, path: str | Path, runtime: Runtime) -> int:
     """Write an endless animated WebP of at most MOST_BYTES. Returns its size in bytes.
 
-    Both halves are asked for the same speed. Raises HobbleError if the network has no injury channel, or if
-    the picture is too large at the lowest quality.
+    The healthy and the hurt character have the same target speed. Raises HobbleError if the network has no
+    injury channel, or if the picture is too large at the lowest quality.
     """
     known = links(network)
     if network.skeleton is None or not known:
@@ -50,7 +50,10 @@ def write_limp_picture(network: Network, path: str | Path, runtime: Runtime) -> 
 
 
 def side_by_side(healthy: Sequence[Picture], hurt: Sequence[Picture]) -> list[Image.Image]:
-    """Two loops side by side, as long as `hurt`. The loop `healthy` plays a whole number of times."""
+    """The pictures of two loops side by side, as many as `hurt` has.
+
+    While `hurt` plays once, `healthy` plays a whole number of times, so that both loop without a jump.
+    """
     rounds = max(1, round(len(hurt) / len(healthy)))
     out = []
     for number, right in enumerate(hurt):

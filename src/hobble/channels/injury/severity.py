@@ -1,4 +1,4 @@
-"""Severities as frames x links, from a status file or from a status for the whole clip."""
+"""Severities of F frames and L links, from a status file or from a status for the whole clip."""
 
 from __future__ import annotations
 
@@ -13,11 +13,14 @@ from hobble.core.clip import Clip
 from hobble.core.errors import InputError
 from hobble.core.quat import Array
 
-FPS = 60.0  # of every clip
+FPS = 60.0  # frame rate of every clip
 
 
 def severity_matrix(status: Status, links: Sequence[str]) -> Array:
-    """(status.frames, L) float32 severities, one row for each frame of the clip's file."""
+    """(status.frames, L) float32 severities, one row for each frame of the clip's file.
+
+    If spells overlap, the later one counts.
+    """
     out = np.zeros((status.frames, len(links)), np.float32)
     column = {link: i for i, link in enumerate(links)}
     for spell in status.spells:
@@ -27,7 +30,7 @@ def severity_matrix(status: Status, links: Sequence[str]) -> Array:
 
 
 def odd_ranges(status: Status, path: str | Path) -> list[str]:
-    """A sentence for each range that starts at 0, goes past the clip's end or contradicts an earlier line."""
+    """A warning for each range that starts at 0, goes past the clip's end or contradicts an earlier line."""
     notes = []
     overlaps = _overlaps(status.spells)
     for i, spell in enumerate(status.spells):
@@ -69,11 +72,11 @@ def clip_severity(
 ) -> tuple[Array, list[str]]:
     """Severities (F, L) float32 of a clip, and warnings.
 
-    status_file: the file beside the clip. status: used instead of a file, severities for all frames
-    ("A-B[4];C-D[8]"). motion: the report of the motion stage, for `source_frames` and `source_fps`.
+    status_file: the file beside the clip. status: severities for all frames ("A-B[4];C-D[8]"), used instead
+    of the file. motion: the report of the motion stage, for `source_frames` and `source_fps`.
 
-    Raises InputError if either cannot be read, or if the file has another number of frames than the clip. A
-    difference of one frame is only a warning.
+    Raises InputError if the status or its file cannot be read, or if the status file counts other frames than
+    the clip's file has. A difference of one frame is only a warning.
     """
     links = clip.skeleton.link_names
     if not links:  # the skeleton has no links, so there are no columns
@@ -104,7 +107,10 @@ def clip_severity(
 
 
 def source_rows(frames: int, rows: int, motion: Mapping[str, Any]) -> Array:
-    """(frames,) index, from 0, of the source frame that each frame of a clip shows."""
+    """(frames,) index, from 0, of the source frame that each frame of a clip shows.
+
+    frames: of the clip. rows: frames of the source. motion: the report of the motion stage.
+    """
     once = np.arange(frames) % motion.get("cycle_frames", frames)  # a looped clip starts again
     at = once * (motion["source_fps"] / FPS) + motion.get("source_start", 0)
     return np.clip(np.floor(at + 1e-6).astype(int), 0, rows - 1)

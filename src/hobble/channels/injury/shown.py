@@ -19,7 +19,7 @@ WORDS = ChannelWords(
     says="that its {} hurts",
     on="hurt",
 )
-# Parts of the body with a slider and a key: label, roles of the two ends.
+# Parts of the body that have a slider on the page: label, roles of the joints at the two ends.
 PARTS = (
     ("left thigh", "left_hip", "left_knee"),
     ("left shank", "left_knee", "left_heel"),
@@ -31,7 +31,7 @@ PARTS = (
     ("left upper arm", "left_shoulder", "left_elbow"),
     ("right upper arm", "right_shoulder", "right_elbow"),
 )
-# Parts with a name but no slider.
+# Parts of the body with a name but no slider.
 OTHERS = (
     ("left forearm", "left_elbow", "left_wrist"),
     ("right forearm", "right_elbow", "right_wrist"),
@@ -49,9 +49,9 @@ PRESETS = {
     "Bad back": {"lower back": 8},
     "Knee and back": {"left thigh": 7, "left shank": 7, "lower back": 7},
 }
-SEVERITY = 8.0  # of the loops
-# Loops without colour, in which one or several parts hurt. The films of the questionnaire, in which the
-# injury begins during the film, are in `study/films.py`.
+SEVERITY = 8.0  # of the parts that hurt in the loops of STUDY
+# Looping pictures of walks: name -> parts that hurt. Injuries are not coloured in them. In the films of the
+# questionnaire (`study/films.py`) the injury begins during the film.
 STUDY: dict[str, tuple[str, ...]] = {
     "healthy": (),
     "left-thigh": ("left thigh",),
@@ -67,7 +67,7 @@ STUDY: dict[str, tuple[str, ...]] = {
     "right-leg": ("right thigh", "right shank", "right foot"),
     "thigh-and-back": ("left thigh", "lower back"),
 }
-# Parts that hurt in the scenarios: name -> roles of the two ends.
+# Scenarios (walks in which the severity rises): name -> roles of the joints at the two ends of the hurt part.
 HURT = {
     "left_knee": ("left_hip", "left_knee"),
     "right_knee": ("right_hip", "right_knee"),
@@ -78,7 +78,7 @@ HURT = {
 
 
 def shown(skeleton: Skeleton, links: Sequence[str], trained: Collection[str]) -> Shown:
-    """Sliders and presets of the parts that were hurt in training, and the region of each link."""
+    """Sliders and presets of the parts that were hurt in training, and the regions of the body."""
     parts = {label: links[i] for label, i in body_parts(skeleton, links, trained).items()}
     felt = {label: link for label, link in parts.items() if link in trained}
     presets = {
@@ -105,7 +105,7 @@ def loops(skeleton: Skeleton, links: Sequence[str], trained: Collection[str]) ->
 def sweeps(skeleton: Skeleton, links: Sequence[str], trained: Collection[str]) -> dict[str, str]:
     """The links that hurt in the scenarios: name -> link.
 
-    In each part it is the uppermost link that was hurt in training, or the uppermost of all.
+    It is the part's uppermost link that was hurt in training. If there is none, it is the uppermost of all.
     """
     out = {}
     for name, (upper, lower) in HURT.items():
@@ -136,8 +136,9 @@ def body_parts(skeleton: Skeleton, links: Sequence[str], hurt: Collection[str] =
 
 
 def links_between(skeleton: Skeleton, upper: str, lower: str) -> list[str]:
-    """Links from the joint of one role down to that of another, uppermost first; [] if the second is not
-    below the first.
+    """Links from the joint of the role `upper` down to that of `lower`, uppermost first.
+
+    It is empty if the skeleton lacks a role, or if the second joint is not below the first.
     """
     if any(skeleton.roles.get(role) not in skeleton.joints for role in (upper, lower)):
         return []
@@ -152,7 +153,7 @@ def links_between(skeleton: Skeleton, upper: str, lower: str) -> list[str]:
 
 
 def spoken(skeleton: Skeleton, link: str) -> str:
-    """The name of a link for readers, such as "left thigh", or its label if there is none."""
+    """The name of a link for readers, such as "left thigh". If there is none, it is the link's label."""
     for label, upper, lower in (*PARTS, *OTHERS):
         if link in links_between(skeleton, upper, lower):
             return label
@@ -165,7 +166,7 @@ def spoken(skeleton: Skeleton, link: str) -> str:
 
 
 def spoken_links(skeleton: Skeleton, links: Sequence[str]) -> list[str]:
-    """A name for each link. If several have the same name, the later ones add their label."""
+    """A name for each link. If several links have the same name, the label is added to the later ones."""
     out: list[str] = []
     for link in links:
         word = spoken(skeleton, link)

@@ -6,9 +6,9 @@ The first line has the number of frames of the clip's file. Each further line sa
     1-2500 RightUpLeg-RightLeg[10];
     500-2000 LeftShoulder-LeftArm[5];LeftUpLeg-LeftLeg[10];
 
-Frames count from 1 in the clip file's own rate, both ends included. A range from 0 starts at 1. A range past
-the end stops there. If lines overlap, the later line counts for the links that it names, from its first frame
-on.
+Frames are those of the clip's file, counted from 1, and both ends of a range are included. A range from 0
+starts at 1. A range past the end of the clip stops there. If lines overlap, the later line counts for the
+links that it names.
 """
 
 from __future__ import annotations
@@ -30,9 +30,9 @@ LINK = re.compile(r"\s*(.+?)\s*\[\s*([^\]]*?)\s*\]\s*")
 
 @dataclass(frozen=True)
 class InjurySpell:
-    """Links that hurt from frame `first` to `last`, both counted from 1 and included.
+    """Links that hurt from frame `first` to frame `last`, counted from 1, both included.
 
-    links: (link, severity) pairs. line: its line in the file, if it comes from one.
+    links: (link, severity) pairs. line: the spell's line in the file, if it comes from a file.
     """
 
     first: int
@@ -43,14 +43,14 @@ class InjurySpell:
 
 @dataclass(frozen=True)
 class Status:
-    """What hurts in a clip. frames: of its file. If spells overlap, the later one counts."""
+    """What hurts in a clip. frames: how many its file has. If spells overlap, the later one counts."""
 
     frames: int
     spells: tuple[InjurySpell, ...] = ()
 
 
 def read_status(path: str | Path, links: Sequence[str]) -> Status:
-    """Read a status file. links: the names that may hurt ("LeftUpLeg-LeftLeg").
+    """Read a status file. links: the names of the links that may hurt ("LeftUpLeg-LeftLeg").
 
     Raises InputError with the line for a grammar error, an unknown link, a severity outside 0..10, or a range
     that runs backwards.
@@ -76,9 +76,9 @@ def read_status(path: str | Path, links: Sequence[str]) -> Status:
 def parse_links(
     text: str, links: Sequence[str], path: str | Path, line: int | None = None
 ) -> tuple[tuple[str, float], ...]:
-    """The (link, severity) pairs of `A-B[4];C-D[8];`, as in status files and in a data set's `status`.
+    """The (link, severity) pairs of `A-B[4];C-D[8];`, as in status files and in a data set's entries.
 
-    Raises InputError with `path` and `line`.
+    Raises InputError with `path` and `line` if the text breaks this grammar or names an unknown link.
     """
     pairs = []
     for part in text.split(";"):

@@ -1,7 +1,7 @@
 """Makes status files from a short table, so that nobody has to type them.
 
-The table is CSV with the columns clip, link, severity, from, to. Frames count from 1 in the clip file's own
-rate. An empty `from` is the first frame, an empty `to` the last::
+The table is CSV with the columns clip, link, severity, from, to. Frames are those of the clip's file, counted
+from 1. An empty `from` means the first frame, an empty `to` the last::
 
     clip,link,severity,from,to
     walk_03,LeftUpLeg-LeftLeg,7,,
@@ -48,9 +48,9 @@ def skeleton_links(path: Path) -> list[str]:
 
 
 def read_table(path: str | Path, links: Sequence[str]) -> list[TableRow]:
-    """Read a table.
+    """Read a table. links: the names of the links that may hurt.
 
-    Raises InputError with the line for bad CSV, and for anything that a status file must not hold.
+    Raises InputError with the line for bad CSV, and for a link, severity or frame that is not valid.
     """
     path = Path(path)
     lines = io.StringIO(read_text(path), newline=None)  # lines of old Macintosh files end in \r
@@ -71,10 +71,10 @@ def read_table(path: str | Path, links: Sequence[str]) -> list[TableRow]:
 def statuses(
     rows: Sequence[TableRow], frames: Mapping[str, int], path: str | Path = "the table"
 ) -> dict[str, Status]:
-    """The status of each clip in the rows. frames: clip -> number of frames of its file.
+    """Clip -> its status, for the clips in the rows. frames: clip -> number of frames of its file.
 
-    Rows of one clip with the same range share a line. Raises InputError with the row's line for a clip that
-    is not in `frames`, and for a range that runs backwards or leaves the clip.
+    Rows of one clip with the same range become one spell. Raises InputError with the row's line for a clip
+    that is not in `frames`, and for a range that runs backwards or goes past the end of the clip.
     """
     spells: dict[str, dict[tuple[int, int], list[tuple[str, float]]]] = {}
     for row in rows:

@@ -1,4 +1,4 @@
-"""The mood channel: five moods from 0 to 1. All are 0 in a neutral clip."""
+"""The mood channel: a column from 0 to 1 for each of five moods. All are 0 in a neutral clip."""
 
 from __future__ import annotations
 
@@ -28,7 +28,11 @@ class Patterns(Section):
 
 
 class Mood(Channel):
-    """The mood of a whole clip, from a pattern of its name or from its entry ({sad: .5})."""
+    """The mood of a whole clip.
+
+    It comes from the clip's entry in the data set ({sad: .5}), else from the first pattern that fits the
+    clip's name.
+    """
 
     name = "mood"
     title = "Mood"

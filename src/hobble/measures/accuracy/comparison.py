@@ -10,14 +10,14 @@ import numpy as np
 from hobble.evaluation.comparison_rows import DifferenceOf, PublishedRow, SideBySide, pair, published_row
 from hobble.evaluation.configuration_results import ConfigurationResults
 from hobble.measures.accuracy.run import SPLITS, clip_rows
-from hobble.measures.given import Json, Row
+from hobble.measures.inputs import Json, Row
 
 NAME = "accuracy"
 WORDS = {"train": "training", "held_out": "held-out"}
 
 
 def compared(all_measured: Sequence[ConfigurationResults], published: Json) -> SideBySide:
-    """Errors of each configuration, eq. 3.2 of each pair, and the published errors with ours."""
+    """Errors of each configuration, the difference of each pair, and the published errors with ours."""
     return SideBySide(
         entries=[{"dataset": m.dataset, **m.found(NAME), "configuration": m.name} for m in all_measured],
         about={m.name: {"joints": m.found(NAME)["joints"]} for m in all_measured},
@@ -37,7 +37,10 @@ def tables(compared: Json) -> dict[str, list[Row]]:
 
 
 def accuracy_differences(all_measured: Sequence[ConfigurationResults]) -> list[DifferenceOf]:
-    """Eq. 3.2 of each pair: over each split, and for each clip that both were measured on."""
+    """The difference of each pair (eq. 3.2 of Segerstedt 2021).
+
+    It is given for each split, and for each clip that both were measured on.
+    """
     out: list[DifferenceOf] = []
     for a, b in combinations(all_measured, 2):
         ours, theirs = ({**_of_splits(m), **_clips(m)} for m in (a, b))

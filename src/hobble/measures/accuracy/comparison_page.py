@@ -9,9 +9,9 @@ from typing import Any
 from hobble.measures.accuracy.page import quantiles
 from hobble.report.charts import Chart, Trace, axis
 from hobble.report.compare_tables import difference_table
-from hobble.report.measured import Overview
+from hobble.report.comparison_charts import SPLITS, Compared, colours, dots, names
+from hobble.report.measure_sections import Overview
 from hobble.report.page_parts import PageSection, SectionPart
-from hobble.report.side_by_side import SPLITS, Compared, colours, dots, names
 from hobble.report.tables import Column
 
 # Which standard deviation eq. 3.2 divides by.

@@ -7,8 +7,8 @@ from typing import Any
 
 import numpy as np
 
-from hobble.measures.chosen import sampled_words
-from hobble.measures.given import Json
+from hobble.measures.clip_parts import sampled_words
+from hobble.measures.inputs import Json
 from hobble.report.charts import Chart, axis, mark
 from hobble.report.formats import duration, number
 from hobble.report.gather import Material
@@ -19,7 +19,7 @@ from hobble.report.tables import Column, Table
 
 INTRODUCTION = (
     "The network gets the captured input of a frame and predicts the next frame. The error is measured on "
-    "every frame of a gait cycle."
+    "every frame that belongs to a gait cycle."
 )
 COLOURS = {"train": "@muted", "held_out": "@accent"}
 NAMES = {"train": "training", "held_out": "held out"}
@@ -182,7 +182,7 @@ def published_table(found: Json, material: Material) -> Table:
 
 
 def section(found: Json, material: Material) -> PageSection:
-    """The charts and tables, and the view of captured and predicted motion. Empty if it was not measured."""
+    """Charts, tables, and the view of captured beside predicted motion. Empty without measured clips."""
     if not found.get("clips"):
         return PageSection("accuracy", [])
     return PageSection(
@@ -203,7 +203,7 @@ def section(found: Json, material: Material) -> PageSection:
 
 
 def caveat(material: Material) -> str:
-    """Why these errors and the published ones may not be compared."""
+    """A paragraph: why these errors must not be compared with the published ones."""
     seconds = sum(clip["seconds"] or 0.0 for clip in material.motion)
     return (
         "Do not compare these errors with the published ones as if the clips were the same. Ours are "
@@ -222,8 +222,8 @@ def sampled(found: Json) -> str:
         if (found.get(split) or {}).get("interval")
     ]
     return (
-        f" Measured on {sampled_words(found)}, and weighted to represent all of them. 95 % confidence "
-        f"intervals, of the means over all frames of all clips: {', '.join(widths)}."
+        f" Measured on {sampled_words(found)}, and weighted to represent all clips. 95 % confidence "
+        f"intervals of the means over all frames of all clips: {', '.join(widths)}."
     )
 
 
@@ -249,7 +249,10 @@ def _centimetres(error: float, split: str, material: Material) -> str:
     drawn = (lengths.get(1, {}).get(split) or {}).get("position_error_cm")
     if drawn is None:
         return f"{number(error)} cm per joint on average"
-    return f"{number(error)} cm per joint; {number(drawn)} cm for the pose that is drawn"
+    return (
+        f"{number(error)} cm per joint as predicted; {number(drawn)} cm as drawn (predicted position and "
+        "velocity averaged)"
+    )
 
 
 def hints(found: Json, material: Material) -> Iterator[Hint]:
@@ -265,8 +268,8 @@ def _generalisation(found: Json) -> Iterator[Hint]:
         yield Hint(
             "warn",
             "No clips were held out.",
-            "So the error below does not show how the network does on new clips. List a few clips under "
-            "held_out in the data set.",
+            "So the errors on this page do not show how well the network predicts new clips. List a few "
+            "clips under held_out in the data set.",
         )
         return
     ratio = held_out["mean"] / train["mean"] if train.get("mean") else float("nan")

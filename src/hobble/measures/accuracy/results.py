@@ -8,9 +8,9 @@ from hobble.measures.results import SampleSize
 
 
 class ErrorsOf(TypedDict):
-    """Relative error and position error over `frames` frames. mean, sd, p05 to p95: of the relative error.
+    """Errors over `frames` frames. mean, sd, p05 to p95 (percentiles): of the relative error.
 
-    All but `frames` are None, or the quantiles are missing, if there was no frame.
+    Without a frame, mean, sd and position error are None and the percentiles are missing.
     """
 
     frames: int
@@ -51,7 +51,10 @@ class ErrorsOfSplit(ErrorsOf):
 
 
 class Accuracy(TypedDict):
-    """accuracy.json. joints: how many were measured. excerpts: those of a sample; only in their table."""
+    """accuracy.json. joints: how many were measured.
+
+    sample, excerpts: only if a sample was measured; `excerpts` go to a table and not into the JSON.
+    """
 
     configuration: str
     joints: int

@@ -1,8 +1,8 @@
 """Errors of one-step predictions, per clip and over the training and held-out clips.
 
-Segerstedt (2021), eq. 3.1: the mean over frames and joints of |t - p| / |t|, Euclidean norms of joint
-positions in the root frame, with its standard deviation over the same. The network is given the true input
-of every frame.
+The relative error is eq. 3.1 of Segerstedt (2021): |t - p| / |t|, where t is the captured and p the predicted
+position of a joint relative to the root. Its mean and standard deviation are over frames and joints. The
+network gets the captured input of every frame.
 """
 
 from __future__ import annotations
@@ -20,24 +20,25 @@ from hobble.core.quat import Array
 from hobble.database.statistics import Moments
 from hobble.measures.accuracy import Options
 from hobble.measures.accuracy.results import Accuracy, ErrorsOf, ErrorsOfClip, ErrorsOfExcerpt, ErrorsOfSplit
-from hobble.measures.chosen import chosen, sample_of
-from hobble.measures.given import Given, Json, Outcome, Row
+from hobble.measures.clip_parts import clip_parts, sample_of
+from hobble.measures.inputs import Json, MeasureInputs, Outcome, Row
 from hobble.measures.joints import Joints
 from hobble.measures.results import SPLITS
-from hobble.measures.sample import Sample
+from hobble.measures.stratified_sample import Sample
 from hobble.models.load import load_network
 from hobble.models.network import Network
 from hobble.rows.clip_rows import ClipRows, expanded
 from hobble.rows.excerpts import Excerpt
 from hobble.rows.layout import RowLayout
 
-LEAST = 1e-3  # cm; a joint nearer to the root has no meaningful relative error
+LEAST = 1e-3  # cm; least distance from the root to divide by
 REFERENCE = "holden31"
-# What has a confidence interval.
+# The values that have a confidence interval.
 MEASURED: tuple[Literal["mean"], Literal["position_error_cm"]] = ("mean", "position_error_cm")
 QUANTILES = {"p05": 0.05, "p25": 0.25, "p50": 0.5, "p75": 0.75, "p95": 0.95}
 COLUMNS = ("clip", "split", "frames", "mean", "sd", "position_error_cm", *QUANTILES)
-# Bins of the relative error, each 2 % wide. Quantiles come from them, so that no single errors are stored.
+# Edges of the bins of the relative error, each 2 % above the last. Quantiles are read from the bins, so that
+# the errors of single frames need not be stored.
 EDGES = np.concatenate([[0.0], np.geomspace(1e-4, 1e2, 701)])
 
 log = logging.getLogger("hobble")
@@ -45,7 +46,10 @@ log = logging.getLogger("hobble")
 
 @dataclass(frozen=True)
 class Errors:
-    """Relative error and position error (cm) over `frames` frames, which have equal weights."""
+    """Relative error and position error (cm) over `frames` frames.
+
+    moments: of both errors. histogram: (bins,) weight of the relative errors between two EDGES.
+    """
 
     frames: int = 0
     moments: Moments = field(default_factory=lambda: Moments.nothing(2), repr=False)
@@ -61,7 +65,7 @@ class Errors:
         return self if weight == 1 else Errors(self.frames, self.moments * weight, self.histogram * weight)
 
     def quantile(self, share: float) -> float:
-        """The relative error that `share` of frames and joints stay below, to a hundredth of itself."""
+        """The relative error that `share` of frames and joints stay below, to about 1 % of its value."""
         below = np.concatenate([[0.0], np.cumsum(self.histogram)])
         return float(np.interp(share * below[-1], below, EDGES))
 
@@ -84,20 +88,20 @@ class Errors:
 
 
 def joint_errors(layout: RowLayout, truth: Array, predicted: Array, joints: Sequence[int]) -> Array:
-    """(n, joints, 2): |t - p| / |t| and |t - p| in cm, of outputs Y (n, Y)."""
+    """(n, joints, 2): relative error and distance in cm. truth, predicted: (n, Y) outputs in raw units."""
     block = layout.y_joint_position
     t = truth[:, block].reshape(len(truth), -1, 3)[:, joints].astype(np.float64)
     return relative_and_distance(t, predicted[:, block].reshape(len(truth), -1, 3)[:, joints])
 
 
 def relative_and_distance(truth: Array, predicted: Array) -> Array:
-    """(..., 2): |t - p| / |t| and |t - p| in cm, of positions (..., 3) in the root frame."""
+    """(..., 2): relative error and distance in cm, of positions (..., 3) relative to the root, cm."""
     distance = np.linalg.norm(truth - predicted, axis=-1)
     return np.stack([distance / np.maximum(np.linalg.norm(truth, axis=-1), LEAST), distance], axis=-1)
 
 
 def clip_errors(network: Network, rows: ClipRows, joints: Sequence[int]) -> Errors:
-    """The errors over every frame and fit of a clip, a batch at a time."""
+    """The errors over every frame of a clip. A frame with several terrain fits counts once, as their mean."""
     layout = network.layout
     total, histogram = Moments.nothing(2), np.zeros(len(EDGES) - 1)
     for pairs in expanded(rows, layout):
@@ -117,19 +121,19 @@ def measure(
     equivalents: Sequence[str] | None = None,
     sample: Sample | None = None,
 ) -> Accuracy:
-    """accuracy.json: `train` and `held_out` over their frames, and `clips`, one entry a clip in name order.
+    """accuracy.json: errors over the frames of each split, and of each clip, sorted by name.
 
     clips: name -> file of rows. equivalents: names of the joints to measure; all by default. sample: the
-    excerpts to measure in place of all clips; the result then has `sample` with their number, confidence
-    intervals, and the excerpts with their frames. `mean_of_clips` is the mean over clips, as in the published
-    tables. Raises InputError where rows and network differ.
+    excerpts to measure in place of all clips; the result then also has their number (`sample`), confidence
+    intervals, and the errors of each excerpt. `mean_of_clips` is the mean over clips, as in the published
+    tables. Raises InputError if rows and network have different layouts.
     """
     network = load_network(weights)
     joints = joint_indices(network, equivalents)
     of_clip: dict[str, Errors] = {}
     excerpts: dict[Excerpt, ErrorsOfExcerpt] = {}
     totals: dict[str, Errors] = dict.fromkeys(SPLITS, Errors())
-    for one in chosen(clips, sample):
+    for one in clip_parts(clips, sample):
         read = one.load()
         check_layout(one.path, read.rows, network)
         errors = clip_errors(network, read.rows, joints)
@@ -165,7 +169,7 @@ def _of_split(split: str, errors: Errors, entries: Sequence[ErrorsOfClip]) -> Er
 def _with_intervals(
     result: Accuracy, sample: Sample, excerpts: Mapping[Excerpt, ErrorsOfExcerpt]
 ) -> Accuracy:
-    """The result with the sample, and half the width of the 95 % confidence interval of each split.
+    """The result with the size of the sample, and half widths of 95 % confidence intervals of each split.
 
     excerpts: the errors of each excerpt that was measured.
     """
@@ -183,7 +187,7 @@ def _with_intervals(
 
 
 def equivalent_joints(skeleton: Json, of: str = REFERENCE) -> list[str] | None:
-    """Names of the joints that have a counterpart on the skeleton `of`; None (all) without such a map.
+    """Names of the joints that have a counterpart on the skeleton `of`; None (all joints) without such a map.
 
     skeleton: as config/skeletons/<name>.yaml holds it.
     """
@@ -191,9 +195,9 @@ def equivalent_joints(skeleton: Json, of: str = REFERENCE) -> list[str] | None:
     return None if counterparts is None else list(counterparts)
 
 
-def chosen_joints(given: Given, options: Joints) -> list[str] | None:
+def chosen_joints(inputs: MeasureInputs, options: Joints) -> list[str] | None:
     """Names of the joints that the options select; None for all."""
-    return equivalent_joints(given.skeleton) if options.joints == "equivalent" else None
+    return equivalent_joints(inputs.skeleton) if options.joints == "equivalent" else None
 
 
 def joint_indices(network: Network, names: Sequence[str] | None = None) -> list[int]:
@@ -202,10 +206,10 @@ def joint_indices(network: Network, names: Sequence[str] | None = None) -> list[
         return list(range(network.layout.joints))
     if network.skeleton is None:
         raise HobbleError("The network's file names no joints, so none can be chosen.")
-    chosen = [i for i, name in enumerate(network.skeleton.joints) if name in names]
-    if not chosen:
+    clip_parts = [i for i, name in enumerate(network.skeleton.joints) if name in names]
+    if not clip_parts:
         raise HobbleError(f"None of {', '.join(names)} is a joint of {network.skeleton.name}.")
-    return chosen
+    return clip_parts
 
 
 def check_layout(where: str | Path, rows: ClipRows, network: Network) -> None:
@@ -217,15 +221,20 @@ def check_layout(where: str | Path, rows: ClipRows, network: Network) -> None:
 
 
 def clip_rows(result: Accuracy) -> list[Row]:
-    """The entries of the clips as table rows with equal keys."""
+    """The entries of the clips as rows of a table. Each row has all COLUMNS."""
     return [{key: clip.get(key) for key in COLUMNS} for clip in result["clips"]]
 
 
-def run(given: Given, options: Options) -> Outcome:
+def run(inputs: MeasureInputs, options: Options) -> Outcome:
     """accuracy.json, and its clips and excerpts as tables."""
-    sample = sample_of(given, options)
+    sample = sample_of(inputs, options)
     result = measure(
-        given.weights, given.clips, given.splits, given.configuration, chosen_joints(given, options), sample
+        inputs.weights,
+        inputs.clips,
+        inputs.splits,
+        inputs.configuration,
+        chosen_joints(inputs, options),
+        sample,
     )
     excerpts = {"excerpts": result.pop("excerpts")} if sample else {}
     return Outcome(result, {"clips": clip_rows(result), **excerpts})

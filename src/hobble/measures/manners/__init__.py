@@ -1,6 +1,7 @@
-"""Measures whether a recogniser of captured clips sees moods and diagnoses, and how they change the walk.
+"""Measures whether moods and diagnoses can be recognised in generated walks, and how they change the walk.
 
-It measures every channel whose values are a manner of walking (`Channel.manner`).
+The recogniser is trained on captured clips. Every channel is measured whose values describe how a whole clip
+walks (`Channel.manner`); such a value is called a manner.
 """
 
 from hobble.measures.measure import Cost, Measure

@@ -12,8 +12,8 @@ from hobble.measures.manners.results import LeftOut
 from hobble.measures.manners.windows import NONE, MannerWindow, table
 
 # Shrinkages of the covariance towards its diagonal. The one that names most windows of left-out people right
-# is used. With fewer clips a larger one is better: .6 recognises 69 % of moods and 51 % of diagnoses, .02
-# 54 % and 63 %.
+# is used. A larger one is better if there are fewer clips: .6 recognises 69 % of moods (few clips) and 51 %
+# of diagnoses (many clips); .02 recognises 54 % of moods and 63 % of diagnoses.
 SHRINKAGES = (0.02, 0.1, 0.3, 0.6)
 
 
@@ -22,10 +22,11 @@ def left_out(
 ) -> LeftOut:
     """Recognise the windows of each person (or clip, with its mirror) after learning from all others.
 
-    The result is for the shrinkage that names most windows right; of equal ones, the largest. people: number
-    of persons, `people_of` those of each manner. right: share of windows named right, `by_manner` too.
-    presence_right: share of windows in which it says correctly whether there is any manner. A manner that
-    only one person has cannot be named.
+    people: clip -> person. The result is for the shrinkage that names most windows right; if several do, for
+    the largest. In the result, people: number of persons. people_of: number of persons with each manner.
+    right, by_manner: share of windows named right, of all and of each manner. presence_right: share of
+    windows in which the recogniser says correctly whether there is any manner. A manner that only one person
+    has is never recognised, because it cannot be learnt while this person is left out.
     """
     values = table(windows)
     manner, person = (
@@ -57,5 +58,5 @@ def _with_shrinkage(values: Array, manner: np.ndarray, person: np.ndarray, shrin
 
 
 def share(right: Sequence[bool] | np.ndarray) -> float | None:
-    """The share that is true; None if there are no values."""
+    """The share of values that are true, 0 to 1; None if there are no values."""
     return round(float(np.mean(right)), 5) if len(right) else None

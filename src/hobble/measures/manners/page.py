@@ -6,8 +6,8 @@ from collections.abc import Callable
 from typing import Literal
 
 from hobble.channels.shown import speaker
-from hobble.measures.chosen import captured_sampled
-from hobble.measures.given import Json
+from hobble.measures.clip_parts import captured_sampled
+from hobble.measures.inputs import Json
 from hobble.measures.manners.results import ChannelResult
 from hobble.measures.manners.windows import EFFECTS, NONE
 from hobble.report.charts import Chart
@@ -41,7 +41,7 @@ def section(found: Json, material: Material) -> PageSection:
 
 
 def summary(found: ChannelResult) -> str:
-    """What the classifier recognises, in generated walks and in captured ones of others."""
+    """A paragraph: how much the classifier recognises in generated walks, and in captured walks of others."""
     captured = found["captured"]
     text = (
         f"A classifier trained on captured clips finds the right {found['title'].lower()} in "
@@ -86,8 +86,8 @@ def together_chart(found: ChannelResult, say: Callable[[str], str] = str) -> Cha
     }
     words = (
         f"The share of windows in which the classifier names the right {found['title'].lower()} while the "
-        "value at the left is at its highest. The darker a field, the larger the share. "
-        f'Without the column "{NONE}" it is {_percent(manner / whole)} on average.'
+        "value named at the left is at its highest. The darker a field, the larger the share. "
+        f'The mean of all columns but "{NONE}" is {_percent(manner / whole)}.'
     )
     return Chart(
         f"{found['channel']}-together", "Two at once", words, [trace], layout, 120 + 20 * len(columns)

@@ -18,10 +18,11 @@ class LeftOut(TypedDict):
 
 
 class NamedWindows(TypedDict):
-    """The names of the windows of one figure.
+    """The names that the recogniser gives to the windows of a walk with no, one or two manners.
 
-    value: 0, .5 or 1; None for two manners. named: manner -> windows that got this name. between: of two
-    manners, position from the first (0) to the second (1).
+    value: of the manner: 0, .5 or 1; None for two manners. share: of windows named right. named: manner ->
+    number of windows that got this name. between: for two manners, where the walk lies between the walks with
+    the first alone (0) and with the second alone (1).
     """
 
     manners: list[str]
@@ -33,7 +34,10 @@ class NamedWindows(TypedDict):
 
 
 class CombinedResult(TypedDict):
-    """The names of the windows of a manner while `column` of the channel `other` is at its highest."""
+    """The names of the windows of a manner while `column` of the channel `other` is at its highest.
+
+    share: of windows named right. named: manner -> number of windows that got this name.
+    """
 
     channel: str
     manner: str
@@ -45,7 +49,10 @@ class CombinedResult(TypedDict):
 
 
 class Effect(TypedDict):
-    """What a manner adds to the neutral walk. captured: None without neutral clips."""
+    """How much a manner changes the quantity `effect` from the neutral walk, in the units of `MannerWindow`.
+
+    captured: None without neutral clips. generated: with a value of 1.
+    """
 
     channel: str
     manner: str
@@ -56,7 +63,10 @@ class Effect(TypedDict):
 
 
 class ChannelResult(TypedDict):
-    """The result for one channel. speed_asked: m/s. right_at_1: share of the windows of manners at 1."""
+    """The result for one channel, see `run.of_channel`.
+
+    speed_asked: m/s. right_at_1: share of windows named right, of all walks with one manner at 1.
+    """
 
     channel: str
     title: str

@@ -1,7 +1,7 @@
-"""Measures whether a recogniser of captured moods or diagnoses recognises the generated ones.
+"""Measures whether a recogniser that is trained on captured moods or diagnoses recognises the generated ones.
 
-Also compares the sizes of their effects, and whether they can be seen when values of another channel, such as
-injuries, are there too.
+Also compares how much captured and generated manners change the walk, and measures whether a manner is still
+recognised when another channel, such as injuries, has a value too.
 """
 
 from __future__ import annotations
@@ -16,8 +16,8 @@ from hobble.core.quat import Array
 from hobble.evaluation.captured import Captured
 from hobble.evaluation.crowd import FPS
 from hobble.gait.discriminant import Discriminant, learn
-from hobble.measures.chosen import captured_motion, sample_of, with_sample
-from hobble.measures.given import Given, Outcome, Row
+from hobble.measures.clip_parts import captured_motion, sample_of, with_sample
+from hobble.measures.inputs import MeasureInputs, Outcome, Row
 from hobble.measures.manners.left_out import left_out, share
 from hobble.measures.manners.results import ChannelResult, CombinedResult, Effect, Manners, NamedWindows
 from hobble.measures.manners.windows import (
@@ -36,7 +36,7 @@ from hobble.models.network import Network
 from hobble.runtime.options import Runtime
 
 PACES = (0.85, 1.0, 1.15)  # of the median speed of captured neutral walks; the same for every manner
-ASKED = 120.0  # cm a second, if there are no captured neutral walks
+ASKED = 120.0  # cm a second; target speed if there are no captured neutral walks
 HALF, FULL = 0.5, 1.0  # values of a manner
 REASON = "none of this network's inputs is a manner of walking"
 TOO_FEW = "there are walking clips of fewer than two manners"
@@ -51,8 +51,8 @@ def manners(
 ) -> Manners:
     """The content of manners.json. If it cannot be measured, `applies` is false and `reason` says why.
 
-    people: clip -> the person who walks in it, or the clip's own name if that is unknown. channels: a result
-    for each channel of manners, see `of_channel`.
+    people: clip -> the person who walks in it, or the clip's own name if the person is unknown. In the
+    result, channels: a result for each channel of manners, see `of_channel`.
     """
     names = [name for name in network.channels if channel(name).manner]
     if not names or network.skeleton is None:
@@ -76,46 +76,46 @@ def of_channel(
 ) -> ChannelResult | None:
     """The result for one channel; None with walks of fewer than two manners.
 
-    captured: see `left_out`. generated: for each manner and value the share of `windows` recognised with what
-    was learnt from the training clips. For two manners together: the share recognised as either, and how far
-    the walk is `between` the two single ones.
-    together: the same for each manner at 1 together with each column of another channel at its highest.
-    effects: of each manner, captured and generated, minus the neutral walk's.
+    captured: recognition of captured people, see `left_out`. generated: for each manner and value, the share
+    of windows that a recogniser trained on the training clips names right. For two manners at once, either
+    name is right, and `between` says to which of the two the walk is closer. together: recognition of each
+    manner at 1 while a column of another channel is at its highest value. effects: how much each manner
+    changes the walk from neutral, captured and generated.
     """
     known = [w for w in windows if splits[w.clip] == "train"]
-    seen = sorted({w.manner for w in known} - {NONE})
-    if len(seen) < 2:
+    found = sorted({w.manner for w in known} - {NONE})
+    if len(found) < 2:
         return None
     captured = left_out(windows, people)
     judge = learn(table(known), [w.manner for w in known], captured["shrinkage"])
     speed = float(np.median([w.values["speed"] for w in known if w.manner == NONE] or [ASKED])) / FPS
-    single = [{}, *({manner: value} for value in (HALF, FULL) for manner in seen)]
-    given = [*single, *(dict.fromkeys(pair, FULL) for pair in combinations(seen, 2))]
-    figures = [WalkerInputs({name: values}, speed * pace) for values in given for pace in PACES]
+    single = [{}, *({manner: value} for value in (HALF, FULL) for manner in found)]
+    combined = [*single, *(dict.fromkeys(pair, FULL) for pair in combinations(found, 2))]
+    figures = [WalkerInputs({name: values}, speed * pace) for values in combined for pace in PACES]
     walks = generated(network, figures, name, runtime)
     per = len(PACES)
     each = [[w for walk in walks[i : i + per] for w in walk] for i in range(0, len(walks), per)]
-    half, full = (dict(zip(seen, each[1 + k * len(seen) :], strict=False)) for k in (0, 1))
-    rows = [_named(judge, values, some) for values, some in zip(given, each, strict=True)]
-    for row, values, some in zip(rows, given, each, strict=True):
+    half, full = (dict(zip(found, each[1 + k * len(found) :], strict=False)) for k in (0, 1))
+    rows = [_named(judge, values, some) for values, some in zip(combined, each, strict=True)]
+    for row, values, some in zip(rows, combined, each, strict=True):
         if len(values) == 2:
             row["between"] = _between(_mean(some), *(_mean(full[manner]) for manner in values))
     right = [(row["share"], row["windows"]) for row in rows if row["value"] == FULL]
     return {
         "channel": name,
         "title": channel(name).title,
-        "manners": seen,
+        "manners": found,
         "speed_asked": round(speed * FPS / 100, 5),
         "captured": captured,
         "generated": rows,
         "right_at_1": _weighted(right),
-        "together": together(network, name, judge, seen, speed, runtime),
-        "effects": [_effect(name, m, e, known, each[0], half[m], full[m]) for m in seen for e in EFFECTS],
+        "together": together(network, name, judge, found, speed, runtime),
+        "effects": [_effect(name, m, e, known, each[0], half[m], full[m]) for m in found for e in EFFECTS],
     }
 
 
 def together(
-    network: Network, name: str, judge: Discriminant, seen: Sequence[str], speed: float, runtime: Runtime
+    network: Network, name: str, judge: Discriminant, found: Sequence[str], speed: float, runtime: Runtime
 ) -> list[CombinedResult]:
     """How often each manner at 1 is named while a column of another channel is at its highest value.
 
@@ -124,7 +124,7 @@ def together(
     others = [
         (other, column) for other in network.channels if other != name for column in network.trained(other)
     ]
-    cases = [(manner, other, column) for manner in (NONE, *seen) for other, column in others]
+    cases = [(manner, other, column) for manner in (NONE, *found) for other, column in others]
     if not cases:
         return []
     figures = [
@@ -149,11 +149,11 @@ def together(
     return rows
 
 
-def run(given: Given, options: SampleOptions) -> Outcome:
-    """manners.json, the effects and the figures with values of two channels as tables."""
-    sample = sample_of(given, options)
-    motion = captured_motion(given.clips, sample)
-    result = manners(load_network(given.weights), motion, given.splits, given.people, given.runtime)
+def run(inputs: MeasureInputs, options: SampleOptions) -> Outcome:
+    """manners.json, and two tables: `effects`, and `together` for walks with values of two channels."""
+    sample = sample_of(inputs, options)
+    motion = captured_motion(inputs.clips, sample)
+    result = manners(load_network(inputs.weights), motion, inputs.splits, inputs.people, inputs.runtime)
     found = result.get("channels", [])
     tables: dict[str, list[Row]] = {
         "effects": [row for one in found for row in one["effects"]],
@@ -190,7 +190,10 @@ def _effect(
     half: Sequence[MannerWindow],
     full: Sequence[MannerWindow],
 ) -> Effect:
-    """One effect. Windows: captured ones, and generated ones without a manner, with it at .5 and at 1."""
+    """One effect of one manner.
+
+    known: captured windows. plain, half, full: generated windows without the manner, with it at .5 and at 1.
+    """
     neutral = [w for w in known if w.manner == NONE]
     mine = [w for w in known if w.manner == manner]
     base = mean_effect(plain, effect)
@@ -205,7 +208,7 @@ def _effect(
 
 
 def _between(both: Array, first: Array, second: Array) -> float:
-    """Position of the mean features of `both` between those of the first (0) and the second manner (1)."""
+    """Where `both` lies between `first` (0) and `second` (1). All are (D,) mean features of walks."""
     way = second - first
     return round(float((both - first) @ way / max(float(way @ way), 1e-9)), 4)
 

@@ -1,4 +1,4 @@
-"""Windows of straight walking: of captured clips in one manner, and of generated walks in any."""
+"""Windows (short stretches) of straight walking, from captured clips and from generated walks."""
 
 from __future__ import annotations
 
@@ -21,18 +21,19 @@ from hobble.runtime.options import Runtime
 NONE = "none"  # the manner of a clip whose values are all 0
 WALK = GAITS.index("walk")
 WINDOW, STEP = 60, 15  # frames; a window is about a cycle
-AHEAD = 0.9  # least share of a window's speed that is forward
-LEAST_SPEED = 0.5  # of a window, cm a frame
+AHEAD = 0.9  # least forward share of a window's speed; with less it is no straight walk
+LEAST_SPEED = 0.5  # cm a frame; a slower window is no walk
 WARM_UP, USED = 4 * FPS, 6 * FPS  # frames of a generated walk that are skipped, and that are used
 EFFECTS = ("speed", "stride", "trunk", "arms", "head")
 
 
 @dataclass(frozen=True)
 class MannerWindow:
-    """A stretch of straight walking. manner: a column of the channel, or NONE. values: its features.
+    """A stretch of straight walking.
 
-    effects: speed (m/s), stride (cm), trunk and head (degrees forward), arms (degrees of swing, standard
-    deviation).
+    clip: empty for a generated walk. manner: a column of the channel, or NONE. values: its features by name.
+    effects: speed (m/s), stride (cm), trunk and head (degrees forward), arms (standard deviation of their
+    swing, degrees).
     """
 
     clip: str
@@ -43,16 +44,16 @@ class MannerWindow:
 
 @dataclass(frozen=True)
 class WalkerInputs:
-    """The inputs of a generated figure: channel -> column -> value, and a speed in cm a frame."""
+    """The inputs of a generated walk. channels: channel -> column -> value. speed: cm a frame."""
 
     channels: Mapping[str, Mapping[str, float]]
     speed: float
 
 
 def captured_windows(clip: Captured, network: Network, name: str) -> list[MannerWindow]:
-    """The windows of a captured stretch that walks straight in one manner at its highest value, or in none.
+    """The windows of a captured stretch that walk straight, with one manner at its highest value or none.
 
-    name: the channel. Windows with values of another channel are left out.
+    name: the channel of the manners. Windows with values of another channel are left out.
     """
     assert network.skeleton is not None
     columns, highest = network.channels[name], channel(name).highest
@@ -94,7 +95,7 @@ def generated(
 
 
 def table(windows: Sequence[MannerWindow]) -> Array:
-    """(n, D) features."""
+    """(n, D) features of n windows."""
     return np.array([list(w.values.values()) for w in windows])
 
 

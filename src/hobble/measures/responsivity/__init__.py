@@ -17,7 +17,7 @@ class Options(Section):
 
     laps: Positive = Field(19, description="laps in the phase mode of the runtime")
     laps_other_modes: Positive = Field(
-        3, description="most laps in each other phase mode, where the second lap and later ones are the same"
+        3, description="most laps in each other phase mode; fewer, to save time"
     )
     lap_seconds: Annotated[float, Field(ge=1, allow_inf_nan=False)] = Field(
         400.0, description="seconds after which a lap is stopped"
@@ -29,7 +29,7 @@ class Options(Section):
 
 
 def pieces(options: Options, runtime: Runtime, modes: Sequence[str]) -> tuple[str, ...]:
-    """The phase modes in which laps are run."""
+    """The phase modes in which laps are run. modes: those of the network."""
     return tuple(dict.fromkeys((*options.modes, runtime.mode))) if len(modes) > 1 else tuple(modes)
 
 

@@ -12,7 +12,7 @@ from hobble.evaluation.comparison_csv import flat
 from hobble.evaluation.comparison_rows import DifferenceOf, PublishedRow, SideBySide, pair, published_row
 from hobble.evaluation.configuration_results import ConfigurationResults
 from hobble.evaluation.series import StraightLine, line
-from hobble.measures.given import Json, Row
+from hobble.measures.inputs import Json, Row
 
 NAME = "responsivity"
 STEPS = ("prepare", "input", "insert", "predict", "output", "update", "total")
@@ -20,9 +20,10 @@ COUNTS = ("true", "table_6_1", "table_6_1_as_printed")
 
 
 class Sizes(TypedDict):
-    """The computations that Table 6.1 counts, None without layers, and the bytes that each mode keeps.
+    """The size of a network.
 
-    exact: the mode without loss.
+    computations: the counts of `parameter_counts` by name, each None for a network without layers.
+    weights_bytes: phase mode -> bytes of weights in memory. exact: the phase mode that approximates nothing.
     """
 
     computations: dict[str, int | None]
@@ -31,9 +32,9 @@ class Sizes(TypedDict):
 
 
 class TimeLine(StraightLine):
-    """A line of milliseconds over computations through the points `x`, `y`; None without such a line.
+    """A straight line of milliseconds `y` over computations `x`. Its slope is None if none could be fitted.
 
-    For the other keys see `fits`.
+    whose: "hobble" or "published". mode: phase mode; None for published times. For the other keys see `fits`.
     """
 
     whose: str
@@ -75,10 +76,6 @@ def by_mode(measured: ConfigurationResults) -> list[Json]:
 
 
 def _sizes(measured: ConfigurationResults) -> Sizes:
-    """Computations as Table 6.1 counts them, None without layers, and bytes that each mode keeps in memory.
-
-    exact: the mode without loss.
-    """
     found = measured.found(NAME)
     counts = found["parameters"]
     return {
@@ -89,7 +86,7 @@ def _sizes(measured: ConfigurationResults) -> Sizes:
 
 
 def time_differences(all_measured: Sequence[ConfigurationResults]) -> list[DifferenceOf]:
-    """Eq. 3.2 of the frame times of each pair, in the modes that both were run in."""
+    """The difference of the frame times of each pair (eq. 3.2 of Segerstedt), in the modes that both have."""
     out: list[DifferenceOf] = []
     for a, b in combinations(all_measured, 2):
         theirs = {entry["mode"]: entry for entry in by_mode(b)}
@@ -108,12 +105,12 @@ def time_differences(all_measured: Sequence[ConfigurationResults]) -> list[Diffe
 
 
 def fits(all_measured: Sequence[ConfigurationResults], published: Json) -> list[TimeLine]:
-    """Lines of milliseconds a frame over computations: of ours for each mode and step, and as published.
+    """Straight lines of milliseconds per frame over computations: ours for each mode and step, and published.
 
-    `computations` says which of the counts, `step` what of a frame: the mean of `total`, as published, or of
-    `predict`, or the `median` of the total, which a busy machine moves least. Slope in milliseconds per
-    computation. Configurations that read another's network, and those of one size, are points like any other;
-    what has no layers is none.
+    computations: which of COUNTS. step: which time. "total" is the mean over whole frames, as published;
+    "predict" is the mean of that step; "median" is the median over whole frames, which other programs on the
+    machine change least. slope: milliseconds per computation. Each configuration is a point, also if it uses
+    the network of another one or has the same size. A network without layers is left out.
     """
     out = []
     entries = [(m, entry) for m in all_measured if m.found(NAME)["parameters"] for entry in by_mode(m)]

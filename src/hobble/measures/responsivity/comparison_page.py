@@ -6,16 +6,16 @@ from collections.abc import Iterator
 from typing import Any
 
 from hobble.report.charts import Chart, Trace, axis, line
+from hobble.report.comparison_charts import Compared, colours, dots, names
 from hobble.report.formats import number, size
-from hobble.report.measured import Overview
+from hobble.report.measure_sections import Overview
 from hobble.report.page_parts import PageSection, SectionPart
-from hobble.report.side_by_side import Compared, colours, dots, names
 from hobble.report.tables import Column
 from hobble.report.verdicts import Verdict, best
 
 
 def section(compared: Compared) -> PageSection:
-    """Times of the laps, and time over the size of the network."""
+    """Two charts: the times of the laps, and the time of a frame over the size of the network."""
     parts = [SectionPart(10, lap_lines(compared)), SectionPart(20, fit_chart(compared))]
     return PageSection("speed", parts, title="Speed and response", at=30, nav="Speed")
 
@@ -32,7 +32,7 @@ def columns(compared: Compared) -> Iterator[Overview]:
 
 
 def verdicts(compared: Compared) -> Iterator[Verdict]:
-    """Which configuration stays closest to the path, is smoothest, fastest and smallest."""
+    """Which configuration stays closest to the path, and which is smoothest, fastest and smallest."""
     exact = in_exact_mode(compared)
     whole = {name: e for name, e in exact.items() if e["waypoints_reached"] == e["waypoints"]}
     astray = [name for name in exact if name not in whole]

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from hobble.measures.given import Json
+from hobble.measures.inputs import Json
 from hobble.measures.responsivity.lap_charts import (
     lap_chart,
     lap_median,
@@ -21,7 +21,7 @@ from hobble.report.page_parts import KeyFigures, PageSection, Paragraph, Section
 from hobble.report.published import cited
 from hobble.report.summary import Hint, KeyFigure, placed
 from hobble.report.tables import Column, Table
-from hobble.runtime.controller import FASTEST_TURN
+from hobble.runtime.network_rows import FASTEST_TURN
 
 FEWEST_STEPS = 10  # with fewer steps, the mean foot slide is not shown
 FRAME_BUDGET_MS = 1000 / 60
@@ -102,7 +102,7 @@ def _few(steps: int | None) -> bool:
 
 
 def track_figures(found: Json) -> list[KeyFigure]:
-    """A few numbers on how the character followed the track."""
+    """Key figures: how well the character followed the track."""
     if not isinstance(found.get("laps"), list):
         return []
     spread = (found.get("milliseconds") or {}).get("spread") or {}
@@ -220,8 +220,7 @@ def _track(found: Json) -> Iterator[Hint]:
         yield Hint(
             "warn",
             f"The character reached {reached} of {total} waypoints.",
-            "It circles or stops before a waypoint that it does not reach. See the laps under Speed and "
-            "response.",
+            "It circles around a waypoint or stops before it. See the laps under Speed and response.",
         )
     drawn, predicted = (found.get(key) for key in ("largest_turn_degrees", "predicted_turn_degrees"))
     if drawn is not None and drawn > 60:

@@ -6,7 +6,10 @@ from typing import TypedDict
 
 
 class Spread(TypedDict):
-    """Of a frame's total: standard deviation, median, 99th percentile. whole_call: mean of a whole call."""
+    """Spread of the total of a frame's steps, ms: standard deviation, median and 99th percentile.
+
+    whole_call: mean time of a call of `next_pose`, ms. It includes what is done between the steps.
+    """
 
     sd: float
     median: float
@@ -15,7 +18,7 @@ class Spread(TypedDict):
 
 
 class Steps(TypedDict):
-    """Milliseconds of each step of a frame."""
+    """Milliseconds of each step of a frame. See `hobble.runtime.controller` for what each step does."""
 
     prepare: float
     input: float
@@ -26,17 +29,21 @@ class Steps(TypedDict):
 
 
 class Milliseconds(Steps):
-    """Means of the steps and of their `total`. sd: standard deviations of the steps. spread: of the total,
-    and the mean of a whole call.
-    """
+    """Mean time of each step and of their `total`, ms. sd: standard deviation of each step, ms."""
 
     total: float
     sd: Steps
     spread: Spread
 
 
-class Lap(TypedDict):
-    """One lap. Distances in cm from the line between waypoints; turns in degrees."""
+class LapWalk(TypedDict):
+    """How one lap of the track went.
+
+    path_overshoot_cm, path_distance_cm: the largest and the mean distance from the line between waypoints.
+    foot_slide_cm: mean slide of a toe in a stance. steps: number of stances. largest_turn_degrees: largest
+    turn of a joint in one frame as drawn; predicted_turn_degrees: the same as predicted by the network.
+    turns_held_back: frames in which the runtime limited a turn.
+    """
 
     lap: int
     finished: bool
@@ -50,11 +57,19 @@ class Lap(TypedDict):
     largest_turn_degrees: float
     predicted_turn_degrees: float
     turns_held_back: int
+
+
+class Lap(LapWalk):
+    """One lap, and the times of its first frames."""
+
     milliseconds: Milliseconds
 
 
 class Run(TypedDict):
-    """The path of a lap: `x`, `z`, m, and `off_cm` from the line between waypoints."""
+    """The path of a lap, stored every `seconds_between`.
+
+    x, z: m. off_cm: largest distance from the line between waypoints since the place before.
+    """
 
     lap: int
     seconds_between: float
@@ -64,7 +79,11 @@ class Run(TypedDict):
 
 
 class OfMode(TypedDict):
-    """All laps of one phase mode. waypoints: how many there are in all laps."""
+    """All laps of one phase mode.
+
+    waypoints: how many there are in all laps. foot_slide_cm is the mean over laps; path_overshoot_cm and both
+    turns are the largest of all laps. See `Lap`.
+    """
 
     mode: str
     laps: list[Lap]
@@ -88,7 +107,7 @@ class LapsOfMode(TypedDict):
 
 
 class Track(TypedDict):
-    """The track. x, z: m. metres: its length."""
+    """The track. x, z: places of the waypoints, m. metres: its length. gaits: one for each waypoint."""
 
     waypoints: int
     metres: float
@@ -98,10 +117,11 @@ class Track(TypedDict):
 
 
 class Responsivity(OfMode):
-    """responsivity.json. The values of the runtime's own mode are at the top, `modes` has those of all.
+    """responsivity.json. The values of the configured phase mode are at the top, `modes` has those of all.
 
-    runs: the paths of the first laps in the own mode. parameters: see `parameter_counts`; None for a network
-    without layers. stored: mode -> numbers kept in memory, of `bytes_each`. exact: the mode without loss.
+    runs: the paths of the first laps in the configured mode. parameters: see `parameter_counts`; None for a
+    network without layers. stored: mode -> how many numbers it keeps in memory, of `bytes_each` bytes. exact:
+    the mode that evaluates the network without approximation. laps_other_modes: laps in each other mode.
     """
 
     configuration: str

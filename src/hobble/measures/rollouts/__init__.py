@@ -13,7 +13,7 @@ from hobble.measures.sample_options import SampleOptions
 
 
 def _at_least_one(lengths: tuple[int, ...]) -> tuple[int, ...]:
-    """At least one length: of none there is nothing to measure."""
+    """Returns the lengths. Raises ValueError if there are none."""
     if not lengths:
         raise ValueError("must name at least one number of frames")
     return lengths

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from hobble.evaluation.comparison_rows import SideBySide
 from hobble.evaluation.configuration_results import ConfigurationResults
 from hobble.measures.accuracy.run import SPLITS
-from hobble.measures.given import Json, Row
+from hobble.measures.inputs import Json, Row
 
 NAME = "rollouts"
 

@@ -6,9 +6,9 @@ from collections.abc import Iterator
 from functools import partial
 
 from hobble.report.charts import Chart, Trace, axis, line, log_axis
+from hobble.report.comparison_charts import SPLITS, Compared, colours
 from hobble.report.formats import number
 from hobble.report.page_parts import PageSection, SectionPart
-from hobble.report.side_by_side import SPLITS, Compared, colours
 from hobble.report.verdicts import Verdict, best
 
 SECOND = 60  # frames

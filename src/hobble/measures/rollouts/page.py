@@ -5,8 +5,8 @@ from __future__ import annotations
 from typing import Any
 
 from hobble.measures.accuracy.page import COLOURS, NAMES
-from hobble.measures.chosen import sampled_words
-from hobble.measures.given import Json
+from hobble.measures.clip_parts import sampled_words
+from hobble.measures.inputs import Json
 from hobble.report.charts import Chart, axis, line, log_axis
 from hobble.report.gather import Material
 from hobble.report.page_parts import PageSection, SectionPart
@@ -24,7 +24,7 @@ def sampled(found: Json) -> str:
 
 
 def _whiskers(found: Json, split: str) -> dict[str, Any]:
-    """Half the width of the confidence interval of each length that has a mean."""
+    """Error bars: half the width of the confidence interval of each length that has a mean."""
     entries = [entry[split] for entry in found["lengths"]]
     known = [entry for entry in entries if entry.get("position_error_cm") is not None]
     widths = [(entry.get("interval") or {}).get("position_error_cm", 0.0) for entry in known]
@@ -51,9 +51,10 @@ def rollout_chart(found: Json) -> Chart | None:
         "Error when the network continues from its own poses",
         "Mean distance between a joint and its captured position when the network continues from its own "
         "poses, as at run time, for this many frames (60 frames are one second). If the line flattens, the "
-        "character stays stable. This chart measures the pose as drawn, halfway between two places of a "
-        "joint: the predicted one, and the previous one plus the predicted velocity. The charts above "
-        "measure only the predicted place, so their error of one frame has another value." + sampled(found),
+        "character stays stable. This chart measures the pose as drawn. There a joint is halfway between its "
+        "predicted position and its last position plus the predicted velocity. The charts above measure only "
+        "the predicted position, so their error differs from this chart's error after one frame."
+        + sampled(found),
         traces,
         {
             "xaxis": log_axis("frames", [x for trace in traces for x in trace["x"]]),

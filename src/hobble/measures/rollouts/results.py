@@ -8,11 +8,12 @@ from hobble.measures.results import SampleSize
 
 
 class ErrorsOf(TypedDict):
-    """Errors over `frames` frames of roll-outs, None if there were none.
+    """Errors over `frames` frames of roll-outs. They are None if there were no frames.
 
-    mean, sd: of the relative error. last_cm, last_phase: position error, and phase error in cycles, in the
-    last frame of the `ended` roll-outs that reached their full length. interval: half width of the 95 %
-    confidence interval of `position_error_cm`, for a split of which only a sample was measured.
+    mean, sd: of the relative error. ended: number of roll-outs that reached their full length. last_cm,
+    last_phase: mean position error, and mean phase error in cycles, in the last frame of these roll-outs.
+    interval: half width of the 95 % confidence interval of `position_error_cm`, if only a sample was
+    measured.
     """
 
     frames: int
@@ -42,7 +43,7 @@ class OfLength(TypedDict):
 
 
 class RollOutsFound(TypedDict):
-    """rollouts.json. joints: how many were measured. mode: how the phase was looked up."""
+    """rollouts.json. joints: how many were measured. mode: the network's phase mode."""
 
     configuration: str
     joints: int

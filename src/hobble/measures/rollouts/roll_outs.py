@@ -1,8 +1,8 @@
 """Roll-outs: a network continues from its own poses, with the path and the other inputs of a clip.
 
-Roll-outs of many stretches and lengths go at once, because a network predicts many poses faster than one. The
-prediction of each has the same bits in any crowd. A short roll-out is the beginning of a longer one from the
-same frame, so only the longest from each frame is computed.
+Many roll-outs are computed together (a crowd), because a network predicts many poses at once faster than one
+by one. The result of a roll-out does not depend on the others, to the last bit. A short roll-out is the
+beginning of a longer one from the same frame, so only the longest from each frame is computed.
 """
 
 from __future__ import annotations
@@ -24,11 +24,12 @@ BATCH = 256  # poses predicted at once; with more, their inputs do not fit the c
 
 @dataclass(frozen=True)
 class RollOutInputs:
-    """The inputs and targets of F consecutive frames of a clip, on one terrain fit.
+    """The inputs and targets of F consecutive frames of a clip, on the first terrain fit of each frame.
 
-    x: (F, X) with the captured joints; y: (F, Y) targets; both in raw units, with heights minus `mean` (F,).
-    phase: (F,). turn: (F,) and velocity: (F, 2) of the root until the next frame. moving: (F,) the share of
-    the predicted movement that is applied, see `hobble.character.rule.moving`.
+    x: (F, X) inputs with the captured joints. y: (F, Y) targets. Both are in raw units, with joint heights
+    minus `mean` (F,), the mean ground height. phase: (F,) in cycles. turn: (F,) radians and velocity: (F, 2)
+    cm, of the root until the next frame. moving: (F,) the share of the predicted movement that is applied,
+    see `hobble.character.rule.moving`.
     """
 
     x: Array
@@ -40,7 +41,7 @@ class RollOutInputs:
     moving: Array
 
 
-def inputs(rows: ClipRows, chosen: np.ndarray, layout: RowLayout) -> RollOutInputs:
+def inputs_of_clip(rows: ClipRows, chosen: np.ndarray, layout: RowLayout) -> RollOutInputs:
     """The inputs of the rows `chosen` (F,), on the first fit of each, in the network's `layout`."""
     fit = rows.first_fit[chosen]
     x, y, *_ = pairs(rows, layout, chosen, fit)
@@ -59,32 +60,32 @@ def inputs(rows: ClipRows, chosen: np.ndarray, layout: RowLayout) -> RollOutInpu
 
 @dataclass(frozen=True)
 class RollOuts:
-    """Roll-outs over `length` frames of a stretch, from its frames `starts` (n,), which rise."""
+    """Roll-outs over `length` frames of the stretch `given`. starts: (n,) their first frames, ascending."""
 
-    given: RollOutInputs
+    inputs: RollOutInputs
     starts: np.ndarray
     length: int
 
 
 class Crowd:
-    """All roll-outs of some groups, frame by frame. Iterate over `frames` once, then read `phases`.
+    """Computes all roll-outs of some groups together. Iterate over `frames` once, then call `phases`.
 
-    First frame, end and the rest are those of the R longest roll-outs from each frame. of: for each group,
-    which of the R are its roll-outs (n,).
+    It computes R roll-outs: the longest from each start frame. The arrays `first`, `stop`, `phase`, `place`,
+    `speed` and `memory` have a row for each of them. of: for each group, the rows (n,) of its roll-outs.
     """
 
     def __init__(self, predictor: Predictor, groups: Sequence[RollOuts]) -> None:
         self.predictor, self.groups = predictor, groups
-        stretches = list({id(group.given): group.given for group in groups}.values())
-        begins = np.cumsum([0, *(len(given.x) for given in stretches)])
-        begin = {id(given): int(at) for given, at in zip(stretches, begins[:-1], strict=True)}
+        stretches = list({id(group.inputs): group.inputs for group in groups}.values())
+        begins = np.cumsum([0, *(len(inputs.x) for inputs in stretches)])
+        begin = {id(inputs): int(at) for inputs, at in zip(stretches, begins[:-1], strict=True)}
         self.x, self.y, self.mean, phase, self.turn, self.velocity, self.moving = (
-            np.concatenate([getattr(given, name) for given in stretches])
+            np.concatenate([getattr(inputs, name) for inputs in stretches])
             for name in ("x", "y", "mean", "phase", "turn", "velocity", "moving")
         )
-        firsts = [begin[id(group.given)] + group.starts for group in groups]
+        firsts = [begin[id(group.inputs)] + group.starts for group in groups]
         stops = [
-            begin[id(group.given)] + np.minimum(group.starts + group.length, len(group.given.x))
+            begin[id(group.inputs)] + np.minimum(group.starts + group.length, len(group.inputs.x))
             for group in groups
         ]
         self.first, each = np.unique(np.concatenate(firsts), return_inverse=True)
@@ -100,11 +101,12 @@ class Crowd:
         self.memory = np.zeros((len(self.first), predictor.network.memory))
 
     def frames(self) -> Iterator[tuple[np.ndarray, Array, dict[int, np.ndarray]]]:
-        """For each age, of the roll-outs not yet over: frames (n,), joints (n, J, 3), and places by group.
+        """Yield, for each number of frames since the start, the n roll-outs that are not yet over.
 
-        frames: indices into `y`. Joints are in the root frame of that frame, with heights minus its mean.
-        Places say which of the n are those of a group, and only groups with a roll-out at this age have any.
-        They are its first roll-outs, because later ones end earlier.
+        Each item has three parts. (n,): frames, as indices into `y`. (n, J, 3): joints in the root
+        coordinates of that frame, heights minus its mean, cm. Group index -> which of the n belong to the
+        group; a group whose roll-outs are all over is left out. Those of a group are its first ones, because
+        roll-outs that start later reach the end of the stretch after fewer frames.
         """
         place = np.full(len(self.first), -1)
         for age in range(max((group.length for group in self.groups), default=0)):
@@ -127,15 +129,15 @@ class Crowd:
         return self._phases
 
     def _advanced(self, alive: np.ndarray, at: np.ndarray, own: bool) -> Array:
-        """The joints of the roll-outs `alive` (n,) at frames `at` (n,), which become their state.
+        """Predict the roll-outs `alive` (n,) at frames `at` (n,), update their state, return their joints.
 
-        own: whether the input has the roll-out's own pose, not that of the clip.
+        own: whether the input pose is the roll-out's own (else the captured one).
         """
         layout = self.predictor.network.layout
         row = self.x[at]
         if own:
-            # The predicted pose, still in the last frame's root. Heights are made relative to this frame's
-            # mean.
+            # Joint heights are relative to the mean ground height of the last frame. Make them relative to
+            # that of this frame.
             lower = self.place[alive]
             lower[..., 1] += (self.mean[at - 1] - self.mean[at])[:, None]
             row[:, layout.x_joint_position] = lower.reshape(len(at), -1)
@@ -151,7 +153,7 @@ class Crowd:
         return place
 
     def _predicted(self, row: Array, alive: np.ndarray) -> Array:
-        """Y (n, Y) of X (n, X), a batch at a time. Brings what the network remembers up to date."""
+        """Predict Y (n, Y) for X (n, X), a batch at a time, and update the network's `memory`."""
         y = np.empty((len(row), self.predictor.network.layout.y_size), np.float32)
         for first in range(0, len(row), BATCH):
             part = slice(first, first + BATCH)
@@ -162,7 +164,7 @@ class Crowd:
         return y
 
     def _carried(self, place: Array, at: np.ndarray) -> Array:
-        """Joints (n, J, 3) moved from the root frame of frames at - 1 to that of frames `at`."""
+        """Joints (n, J, 3) converted from the root coordinates of frames at - 1 to those of frames `at`."""
         out = place.copy()
         level = place[..., ::2] - self.velocity[at - 1][:, None]
         out[..., ::2] = rotate_by_yaw(level, self.turn[at - 1][:, None])

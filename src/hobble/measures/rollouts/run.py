@@ -24,13 +24,13 @@ from hobble.measures.accuracy.run import (
     joint_indices,
     relative_and_distance,
 )
-from hobble.measures.chosen import Chosen, Loaded, chosen, sample_of
-from hobble.measures.given import Given, Outcome, Row
+from hobble.measures.clip_parts import ClipPart, LoadedPart, clip_parts, sample_of
+from hobble.measures.inputs import MeasureInputs, Outcome, Row
 from hobble.measures.results import SPLITS
 from hobble.measures.rollouts import Options
 from hobble.measures.rollouts.results import ErrorsOf, RollOutsFound
-from hobble.measures.rollouts.roll_outs import Crowd, RollOuts, inputs
-from hobble.measures.sample import Sample
+from hobble.measures.rollouts.roll_outs import Crowd, RollOuts, inputs_of_clip
+from hobble.measures.stratified_sample import Sample
 from hobble.models.load import load_network
 from hobble.models.network import Network, Predictor
 from hobble.rows.clip_rows import ClipRows
@@ -38,18 +38,18 @@ from hobble.rows.excerpts import Excerpt
 from hobble.rows.layout import RowLayout
 
 LENGTHS = (1, 10, 60, 300)  # frames
-OVERLAP = 4  # roll-outs of one length that contain each frame
-AT_ONCE = 6000  # frames of clips whose roll-outs go at once, which takes about 100 MB
+OVERLAP = 4  # number of roll-outs of one length that contain a frame
+AT_ONCE = 6000  # frames of clips whose roll-outs are computed together, which takes about 100 MB
 
 log = logging.getLogger("hobble")
 
 
 @dataclass(frozen=True)
 class RollOutErrors:
-    """Relative error and position error (cm) over `frames` frames of roll-outs.
+    """Errors over `frames` frames of `starts` roll-outs.
 
-    last: position error and phase error (cycles) in the last frame, over the `ended` roll-outs that reached
-    their full length.
+    moments: of relative error and position error (cm). last: of position error (cm) and phase error (cycles)
+    in the last frame of the `ended` roll-outs that reached their full length.
     """
 
     frames: int = 0
@@ -68,13 +68,13 @@ class RollOutErrors:
         )
 
     def weighing(self, weight: float) -> RollOutErrors:
-        """The same, with each frame counted `weight` times."""
+        """The same errors with each frame counted `weight` times."""
         if weight == 1:
             return self
         return RollOutErrors(self.frames, self.starts, self.moments * weight, self.last * weight, self.ended)
 
     def to_dict(self, phase: bool = True) -> ErrorsOf:
-        """Plain data, with None if there were no frames, or if no roll-out reached its full length.
+        """Plain data. A value without frames, or without roll-outs that reached their full length, is None.
 
         phase: whether the network uses the phase. If not, the phase error has no meaning and is None.
         """
@@ -95,30 +95,30 @@ def clip_roll_outs(
 ) -> dict[int, RollOutErrors]:
     """Length -> errors of roll-outs over every frame of the clip.
 
-    No roll-out begins at the first frame of a stretch, because the movement of the root to it is unknown.
-    Each frame is in OVERLAP roll-outs of a length, or in one if they are one frame long.
+    No roll-out begins at the first frame of a stretch, because the root's movement before it is unknown.
+    Each frame is in OVERLAP roll-outs of each length, or in one if the roll-outs are one frame long.
     """
-    groups = _groups(Loaded(rows, 0, len(rows)), predictor.network.layout, lengths)
+    groups = _groups(LoadedPart(rows, 0, len(rows)), predictor.network.layout, lengths)
     return _errors(predictor, [groups], joints, lengths)[0]
 
 
-def _groups(read: Loaded, layout: RowLayout, lengths: Sequence[int]) -> list[RollOuts]:
-    """The roll-outs that begin in the chosen rows. They may end after them."""
+def _groups(read: LoadedPart, layout: RowLayout, lengths: Sequence[int]) -> list[RollOuts]:
+    """The roll-outs that begin in the chosen rows. They may end after these rows."""
     out = []
     for stretch in unbroken(read.rows.frame):
         first, stop = np.searchsorted(stretch, (read.first, read.stop))
-        given = inputs(read.rows, stretch, layout)
+        inputs = inputs_of_clip(read.rows, stretch, layout)
         for length in lengths:
             starts = np.arange(max(1, first), stop, max(1, length // OVERLAP))
             if len(starts):
-                out.append(RollOuts(given, starts, length))
+                out.append(RollOuts(inputs, starts, length))
     return out
 
 
 def _errors(
     predictor: Predictor, clips: Sequence[list[RollOuts]], joints: Sequence[int], lengths: Sequence[int]
 ) -> list[dict[int, RollOutErrors]]:
-    """Length -> errors, for each clip's roll-outs. All go at once."""
+    """For each clip: length -> errors. The roll-outs of all clips are computed together."""
     out = [{length: RollOutErrors() for length in lengths} for _ in clips]
     owners = [(found, group) for found, groups in zip(out, clips, strict=True) for group in groups]
     if not owners:
@@ -142,13 +142,17 @@ def _errors(
 
 
 def _of_group(group: RollOuts, moments: Moments, end: Array, phase: Array) -> RollOutErrors:
-    """The errors of a group. end: (n', joints, 2) in the last frame; phase: (n,) after it."""
-    frames = int(np.minimum(group.length, len(group.given.x) - group.starts).sum())
-    # The phase is already that of the next frame, so that one has to be in the stretch too.
-    ended = int(np.searchsorted(group.starts, len(group.given.x) - group.length))
+    """The errors of a group of n roll-outs.
+
+    end: (n', joints, 2) errors in the last frame, of those that reach their full length. phase: (n,) after
+    the last frame.
+    """
+    frames = int(np.minimum(group.length, len(group.inputs.x) - group.starts).sum())
+    # The phase is already that of the frame after the last, so that frame has to be in the stretch too.
+    ended = int(np.searchsorted(group.starts, len(group.inputs.x) - group.length))
     if not ended:
         return RollOutErrors(frames, len(group.starts), moments)
-    truth = group.given.phase[group.starts[:ended] + group.length]
+    truth = group.inputs.phase[group.starts[:ended] + group.length]
     off = np.abs(np.mod(phase[:ended] - truth + 0.5, 1.0) - 0.5)
     last = np.stack([end[:ended, :, 1].mean(axis=1), off], axis=1)
     return RollOutErrors(frames, len(group.starts), moments, Moments.of(last), ended)
@@ -164,12 +168,12 @@ def measure_roll_outs(
     mode: str = "cubic",
     sample: Sample | None = None,
 ) -> RollOutsFound:
-    """The content of rollouts.json: for each of `lengths`, the splits and the clips in name order.
+    """The content of rollouts.json: for each of `lengths`, errors of the splits and of the clips, by name.
 
-    clips: name -> file of rows. equivalents: names of the joints to measure. mode: how the phase is looked
-    up. sample: measure only the roll-outs that begin in these excerpts; the result then has their number in
-    `sample` and 95 % confidence intervals in `interval`. Raises InputError if rows and network have different
-    layouts.
+    clips: name -> file of rows. equivalents: names of the joints to measure; all by default. mode: the
+    network's phase mode. sample: measure only the roll-outs that begin in these excerpts; the result then has
+    their number in `sample` and half widths of 95 % confidence intervals in `interval`. Raises InputError if
+    rows and network have different layouts.
     """
     network = load_network(weights)
     predictor = network.predictor(mode)
@@ -178,7 +182,7 @@ def measure_roll_outs(
     total = {length: dict.fromkeys(SPLITS, RollOutErrors()) for length in lengths}
     of_clip: dict[int, dict[str, RollOutErrors]] = {length: {} for length in lengths}
     excerpts: dict[int, dict[Excerpt, float | None]] = {length: {} for length in lengths}
-    for some in _together(chosen(clips, sample), network, lengths):
+    for some in _together(clip_parts(clips, sample), network, lengths):
         for one, errors in zip(some, _errors(predictor, list(some.values()), joints, lengths), strict=True):
             for length, found in errors.items():
                 weighed, known = found.weighing(one.weight), of_clip[length]
@@ -208,13 +212,13 @@ def measure_roll_outs(
 
 
 def _together(
-    every: Iterable[Chosen], network: Network, lengths: Sequence[int]
-) -> Iterator[dict[Chosen, list[RollOuts]]]:
-    """The roll-outs of clips or excerpts, as many at a time as have AT_ONCE frames together."""
-    some: dict[Chosen, list[RollOuts]] = {}
+    every: Iterable[ClipPart], network: Network, lengths: Sequence[int]
+) -> Iterator[dict[ClipPart, list[RollOuts]]]:
+    """Yield the roll-outs of clips or excerpts in groups of about AT_ONCE frames."""
+    some: dict[ClipPart, list[RollOuts]] = {}
     frames = 0
     for one in every:
-        # Two cycles share a frame, so that some frames have two rows.
+        # Twice as many rows as frames, because a frame that two cycles share has two rows.
         read = one.load(before=2, after=2 * max(lengths))
         check_layout(one.path, read.rows, network)
         some[one] = _groups(read, network.layout, lengths)
@@ -232,10 +236,10 @@ def _with_intervals(
     excerpts: Mapping[int, Mapping[Excerpt, float | None]],
     splits: Mapping[str, str],
 ) -> RollOutsFound:
-    """The result with what was drawn, and the half widths of the 95 % intervals of each split and length.
+    """The result with the size of the sample, and half widths of 95 % intervals of each split and length.
 
-    excerpts: length -> position error of each excerpt. One too short for any roll-out counts as the others of
-    its split.
+    excerpts: length -> position error of each excerpt, cm; None if it is too short for a roll-out. Such an
+    excerpt counts with the mean of its split.
     """
     for entry in result["lengths"]:
         for split in SPLITS:
@@ -251,7 +255,7 @@ def _with_intervals(
 
 
 def roll_out_rows(result: RollOutsFound) -> list[Row]:
-    """The clips' entries, and those of the splits with an empty `clip`, as flat rows."""
+    """The entries of the splits (with an empty `clip`) and of the clips, as rows of a table."""
     rows: list[Row] = []
     for entry in result["lengths"]:
         for split in SPLITS:
@@ -260,16 +264,16 @@ def roll_out_rows(result: RollOutsFound) -> list[Row]:
     return rows
 
 
-def run(given: Given, options: Options) -> Outcome:
+def run(inputs: MeasureInputs, options: Options) -> Outcome:
     """rollouts.json, and its rows as a table."""
     result = measure_roll_outs(
-        given.weights,
-        given.clips,
-        given.splits,
-        given.configuration,
-        chosen_joints(given, options),
+        inputs.weights,
+        inputs.clips,
+        inputs.splits,
+        inputs.configuration,
+        chosen_joints(inputs, options),
         options.rollouts,
-        given.runtime.mode,
-        sample_of(given, options),
+        inputs.runtime.mode,
+        sample_of(inputs, options),
     )
     return Outcome(result, {"lengths": roll_out_rows(result)})

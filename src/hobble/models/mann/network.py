@@ -24,8 +24,11 @@ MOST_EXPERTS = 64
 
 @dataclass(frozen=True)
 class Mann(Network):
-    """weights: per layer (K, out, in) float32; biases: per layer (K, out); gate_weights: (out, in) and
-    gate_biases: (out,) of the gating network; columns: (G,) columns of X that the gating network gets."""
+    """A mode-adaptive network of K experts.
+
+    weights: per layer (K, out, in) float32; biases: per layer (K, out). gate_weights: per layer of the gating
+    network (out, in); gate_biases: (out,). columns: (G,) columns of X that the gating network gets.
+    """
 
     kind: ClassVar[str] = "mann"
     phase: ClassVar[bool] = False

@@ -13,7 +13,7 @@ from hobble.models.stack import Stack, StackPredictor, blend_layers, exp_below_0
 if TYPE_CHECKING:
     from hobble.models.mann.network import Mann
 
-NEGLIGIBLE = 1e-7  # smaller shares are below single precision next to a share near 1
+NEGLIGIBLE = 1e-7  # a smaller share changes nothing in single precision beside shares near 1
 
 
 class MannPredictor(StackPredictor):
@@ -41,12 +41,12 @@ def _evaluate(
     gate_weights: Any, gate_numbers: Any, gate_plan: Any, columns: Any,
     weights: Any, numbers: Any, plan: Any, experts: int, z: Any, out: Any,
 ) -> None:  # fmt: skip
-    seen = np.empty((z.shape[0], len(columns)), np.float32)
+    gate_z = np.empty((z.shape[0], len(columns)), np.float32)
     for c in range(z.shape[0]):
         for i in range(len(columns)):
-            seen[c, i] = z[c, columns[i]]
+            gate_z[c, i] = z[c, columns[i]]
     shares = np.empty((z.shape[0], experts), np.float32)
-    blend_layers(gate_weights, gate_numbers, gate_plan, np.ones((z.shape[0], 1), np.float32), seen, shares)
+    blend_layers(gate_weights, gate_numbers, gate_plan, np.ones((z.shape[0], 1), np.float32), gate_z, shares)
     for c in range(z.shape[0]):
         _softmax(shares[c])
     blend_layers(weights, numbers, plan, shares, z, out)

@@ -1,11 +1,11 @@
 """Loss and gradient of one batch, written out as three large products for each layer of experts.
 
 h: inputs of a layer with a 1 appended; W: weights and biases of all experts, (K out, in + 1); a: outputs of
-all experts, (B, K out); c: shares, (B, K):
+all experts, (B, K out); c: shares, (B, K). d: gradient of the loss by what follows; ' means transposed:
 
-    a = h W'    out = sum_k c_k a_k    da = c_k dout    dW = da' h    dh = da W    dc_k = dout . a_k
+    a = h W'    out = sum_k c_k a_k    da_k = c_k dout    dW = da' h    dh = da W    dc_k = dout . a_k
 
-Blending the experts' outputs, not their weights, gives the gradient of the shares without another product.
+The experts' outputs are blended, not their weights. So the gradient of the shares needs no further product.
 The first layer needs no gradient of its inputs.
 """
 
@@ -18,7 +18,7 @@ from hobble.models.mann.trainable import TrainableMann, with_one
 from hobble.models.products import product
 from hobble.models.trainable import ALL_ROWS
 
-Kept = tuple[Tensor, Tensor]
+Kept = tuple[Tensor, Tensor]  # a layer's masked inputs with a 1, and the slopes; see `MannStep.prepared`
 
 
 class MannStep:
@@ -26,7 +26,7 @@ class MannStep:
 
     network: the network in training, read at every call. dropout: share of units dropped before each layer of
     the gate and of the experts, inputs included. half: round the factors of the experts' products to
-    bfloat16. gradients, error: as in `hobble.models.trainable.TrainingStep`.
+    bfloat16. gradients, error: see `hobble.models.trainable.TrainingStep`.
     """
 
     def __init__(self, network: TrainableMann, dropout: float, half: bool = False) -> None:
@@ -42,7 +42,7 @@ class MannStep:
         self.widths = (*network.gate_sizes[:-1], *network.sizes[:-1])
 
     def __call__(self, x: Tensor, y: Tensor, p: Tensor, masks: list[Tensor]) -> Tensor:
-        """Find `gradients` for x (B, X) and y (B, Y); returns the mean squared error, a scalar tensor.
+        """Compute `gradients` for x (B, X) and y (B, Y). Returns the mean squared error, a scalar tensor.
 
         masks: one for each layer, from `masks`. p is ignored.
         """
@@ -80,13 +80,14 @@ class MannStep:
         return list((drawn < self.keep).to(flat.dtype).mul_(1.0 / self.keep).split(self.widths, dim=1))
 
     def multiplied(self, name: str, a: Tensor, b: Tensor) -> Tensor:
-        """a @ b.T. name: of the product within the step."""
+        """a @ b.T. name: a name for this product, which other classes use for buffers."""
         return product(a, b)
 
     def prepared(self, number: int, x: Tensor, mask: Tensor) -> Kept:
         """Layer `number`'s masked inputs x (B, n) with a 1 appended, and the slopes (B, n).
 
-        The slope is the derivative of the ELU at x times the mask. It follows from x: below 0 it is x + 1.
+        x is the result of an ELU. A slope is the derivative of that ELU times the mask. It follows from x:
+        the derivative is x + 1 where x is below 0, else 1.
         """
         return with_one(x * mask).to(self.factors.dtype), mask * torch.clamp(x + 1, max=1)
 
@@ -105,7 +106,7 @@ class MannStep:
         return (c[:, :, None] * d[:, None, :]).flatten(1).to(self.factors.dtype)
 
     def sloped(self, number: int, d: Tensor, slope: Tensor) -> Tensor:
-        """The gradient (B, n) before layer `number`'s ELU, from d (B, n + 1) of its inputs and the 1."""
+        """The gradient (B, n) before the ELU of layer `number`'s inputs, from d (B, n + 1) after it."""
         return d[:, :-1].to(slope.dtype) * slope
 
     def _gate(self, x: Tensor, masks: list[Tensor]) -> tuple[Tensor, list[Kept]]:

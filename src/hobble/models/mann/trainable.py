@@ -21,8 +21,8 @@ class TrainableMann(Trainable):
 
     A layer of experts is stored as (K * out, 1, in + 1), expert after expert. One product gives the outputs
     of all experts, which are then blended.
-    sizes: units of an expert, from input to output; gate_sizes: units of the gate, the last is K, the number
-    of experts; columns: the columns of X that the gate gets.
+    sizes: units of an expert, from input to output. gate_sizes: units of the gate; the last number is K, the
+    number of experts. columns: the columns of X that the gate gets.
     """
 
     kind: ClassVar[str] = "mann"
@@ -106,7 +106,7 @@ class TrainableMann(Trainable):
 
 
 def shapes(sizes: tuple[int, ...], gate_sizes: tuple[int, ...]) -> list[tuple[int, int, int]]:
-    """(out, 1, in + 1) of the gate's layers, (K * out, 1, in + 1) of the experts'."""
+    """(out, 1, in + 1) of each layer of the gate, then (K * out, 1, in + 1) of each layer of the experts."""
     gate = [(out, 1, size + 1) for size, out in pairwise(gate_sizes)]
     return gate + [(gate_sizes[-1] * out, 1, size + 1) for size, out in pairwise(sizes)]
 

@@ -1,4 +1,4 @@
-"""Motion matching (Clavet 2016; features after Holden et al. 2020): plays the clips, without a network."""
+"""Motion matching: plays the clips, without a network (Clavet 2016; features after Holden et al. 2020)."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Build the tables that motion matching searches, from the rows of clips in their order."""
+"""Builds the tables that motion matching searches, from the rows of clips in their order."""
 
 from __future__ import annotations
 
@@ -24,9 +24,9 @@ from hobble.rows.layout import RowLayout
 class Tables:
     """R frames of clips, in runs of consecutive frames.
 
-    features: (R, n) float32, weighted; y: (R, Y) float32 raw; phase: (R,); remaining: (R,) int32, how many
-    frames follow in the run; columns: (n,) of X, weights: (n,) of the features. every, halflife: from
-    the options.
+    features: (R, n) float32, weighted. y: (R, Y) float32, raw units. phase: (R,) in cycles. remaining: (R,)
+    int32, how many frames follow in the run. columns: (n,) the columns of X that are features. weights: (n,)
+    their factors. every, halflife: see `MatchingOptions`.
     """
 
     kind: ClassVar[str] = "matching"
@@ -104,7 +104,7 @@ def build(
 
 
 def on_mean_ground(rows: ClipRows, layout: RowLayout) -> tuple[Array, Array]:
-    """Raw x (R, X) and y (R, Y) float32, each row once, on the mean of its terrain fits."""
+    """x (R, X) and y (R, Y), float32, raw units. Each row is there once, on the mean of its terrain fits."""
     x = np.empty((len(rows), layout.x_size), np.float32)
     y = rows.y.astype(np.float32)
     if not len(rows):
@@ -118,10 +118,10 @@ def on_mean_ground(rows: ClipRows, layout: RowLayout) -> tuple[Array, Array]:
 
 
 def in_runs(rows: ClipRows) -> tuple[NDArray[np.int64], NDArray[np.int32]]:
-    """Row numbers (R',) with each frame once, and how many frames follow each in its run (R',).
+    """Indices (R',) of rows with each frame once, and how many frames follow each of them in its run (R',).
 
-    Adjacent cycles share a frame, which the file has twice. The later row is kept: the next cycle begins with
-    it.
+    Adjacent cycles share a frame, which the file has twice. The later row is kept, because the next cycle
+    begins with it.
     """
     frame = rows.frame
     one = np.flatnonzero(np.diff(frame, append=-1) != 0)

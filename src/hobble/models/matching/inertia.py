@@ -5,7 +5,7 @@ are stored as offsets and added to the following poses. They decay like a critic
 Inertialization, GDC 2018; closed form after Holden, Spring-It-On, 2021). So no joint jumps, and each frame
 reads only one pose.
 
-Rotations are axis times half the angle, as in Y. Units: root frame, cm, per frame.
+A rotation is a vector: its axis times half its angle, as in Y. Units: root coordinates, cm, per frame.
 """
 
 from __future__ import annotations
@@ -16,11 +16,12 @@ import numpy as np
 
 from hobble.core.compiled import njit
 
+# Indices in the memory: 1 + the last row shown, frames since the last search, first of the offsets.
 ROW, SINCE, OFFSETS = (
     0,
     1,
     2,
-)  # indices in the memory: 1 + the last row shown, frames since the search, offsets
+)
 OFFSETS_PER_JOINT = 12  # offsets of position, velocity, rotation and rotation speed, three numbers each
 FASTEST_PULL = 0.002  # cycles a frame: largest correction of the phase toward the clip's phase
 
@@ -48,12 +49,12 @@ def find_following(memory: Any, remaining: Any, every: int, before: Any, followi
 
 # Groups of arrays for `show_rows`.
 #
-# frames (R, Y), to be multiplied by scale (Y,); phases (R,).
+# frames (R, Y); scale (Y,), their factors; phases (R,).
 Table = tuple[Any, Any, Any]
 # For each character: before, following and due from `find_following`, and the row to show (C,).
 Choice = tuple[Any, Any, Any, Any]
-# How many joints there are; first columns (4,) of joint positions, velocities, rotations and of the change of
-# phase; the halflife of offsets in frames.
+# Number of joints; (4,) first columns in Y of joint positions, velocities, rotations and of the change of
+# phase; half-life of the offsets in frames.
 Shape = tuple[int, Any, float]
 
 
@@ -61,8 +62,8 @@ Shape = tuple[int, Any, float]
 def show_rows(memory: Any, table: Table, choice: Choice, phase: Any, shape: Shape, out: Any) -> None:
     """Write the row to show plus the offsets of each character into `out` (C, Y), and update the memory.
 
-    memory: (C, M). phase: (C,). A row other than the following one starts a transition. It must not be the
-    first of its run, because the rotation speed is the turn since the row before it.
+    memory: (C, M). phase: (C,). A row other than the following one starts a transition. This row must not be
+    the first of its run, because its rotation speed is the turn since the row before.
     """
     frames, scale, phases = table
     before, following, due, shown = choice
@@ -118,7 +119,7 @@ def _start_transition(
 
 @njit(forceinline=True, cache=False)
 def _decay(o: Any, damping: float) -> None:
-    """One frame of x'' = -2 d x' - d^2 x, for position and velocity, and for rotation and its speed."""
+    """Advance the offsets by a frame of x'' = -2 d x' - d^2 x: positions and rotations with their speeds."""
     fade = np.exp(-damping)
     for k in range(0, len(o), 6):
         for i in range(k, k + 3):
@@ -142,7 +143,7 @@ def _add(o: Any, joints: int, at: Any, y: Any) -> None:
 
 @njit(forceinline=True, cache=False)
 def _exp(v: Any, at: int, q: Any) -> None:
-    """The quaternion of an axis times half the angle."""
+    """Write into q the quaternion of the vector v[at : at + 3], an axis times half an angle."""
     half = np.sqrt(v[at] * v[at] + v[at + 1] * v[at + 1] + v[at + 2] * v[at + 2])
     scale = np.sin(half) / half if half > 1e-8 else 1.0
     q[0], q[1], q[2], q[3] = np.cos(half), v[at] * scale, v[at + 1] * scale, v[at + 2] * scale
@@ -150,7 +151,7 @@ def _exp(v: Any, at: int, q: Any) -> None:
 
 @njit(forceinline=True, cache=False)
 def _log(a: Any, b: Any, v: Any, at: int) -> None:
-    """The axis times half the angle of the product a b, along the shorter way."""
+    """Write into v[at : at + 3] the axis times half the angle of the product a b, along the shorter way."""
     w = a[0] * b[0] - a[1] * b[1] - a[2] * b[2] - a[3] * b[3]
     x = a[0] * b[1] + a[1] * b[0] + a[2] * b[3] - a[3] * b[2]
     y = a[0] * b[2] - a[1] * b[3] + a[2] * b[0] + a[3] * b[1]
@@ -164,14 +165,14 @@ def _log(a: Any, b: Any, v: Any, at: int) -> None:
 
 @njit(forceinline=True, cache=False)
 def _between(a: Any, b: Any, v: Any) -> None:
-    """The rotation from b to a, as axis times half the angle of a b^-1. b is replaced by its inverse."""
+    """Write into v the rotation from b to a: axis times half the angle of a b^-1. b becomes its inverse."""
     b[1], b[2], b[3] = -b[1], -b[2], -b[3]
     _log(a, b, v, 0)
 
 
 @njit(forceinline=True, cache=False)
 def _step(now: Any, earlier: Any, turn: int, v: Any) -> None:
-    """The turn of a joint from one row to the next, as axis times half the angle."""
+    """Write into v the turn of a joint from the row `earlier` to the row `now`. turn: its first column."""
     q, p = np.empty(4), np.empty(4)
     _exp(now, turn, q)
     _exp(earlier, turn, p)

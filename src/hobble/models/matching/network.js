@@ -1,5 +1,5 @@
-// Motion matching: plays a run of the clips, searches every few frames, hides the transitions. The same as `predictor.py` and
-// `inertia.py` in Python. memory: an array of `spec.network.memory` numbers, zeros at first.
+// Motion matching: plays a run of the clips, searches every few frames, smooths the transitions. It computes the same as `predictor.py`
+// and `inertia.py` in Python. memory: an array of `spec.network.memory` numbers for each character, zeros at first.
 import { bytes } from "../../report/web/numbers.js";
 import { createScales, floats } from "../layers.js";
 
@@ -28,9 +28,9 @@ export const createNetwork = (spec) => {
   const features = floats(spec.network.features), weights = floats(spec.network.weights), n = columns.length;
   const phases = floats(spec.network.phases), remaining = new Int32Array(bytes(spec.network.remaining));
   const starts = new Int32Array(bytes(spec.network.start)), { inputs } = createScales(spec);
-  const seen = Int32Array.from(spec.seen), query = new Float32Array(n), out = new Float32Array(width);
+  const columnsOfX = Int32Array.from(spec.inputColumns), query = new Float32Array(n), out = new Float32Array(width);
   const [position, velocity, change] = at, damping = 2 * Math.LN2 / halflife;
-  if (inputs !== seen.length) throw new Error("the inputs are not those that are seen");
+  if (inputs !== columnsOfX.length) throw new Error("the columns of X do not fit the network");
 
   const frame = (row, into = new Float32Array(width)) => {
     for (let i = 0, from = row * width; i < width; i++) into[i] = values[from + i] * scale[i];
@@ -46,7 +46,7 @@ export const createNetwork = (spec) => {
     return sum;
   };
   const searched = (x, following) => {
-    for (let i = 0; i < n; i++) query[i] = x[seen[columns[i]]] * weights[i];
+    for (let i = 0; i < n; i++) query[i] = x[columnsOfX[columns[i]]] * weights[i];
     let best = -1, least = following < 0 ? Infinity : distance(following, Infinity);
     for (const row of starts) {
       const d = distance(row, least);

@@ -22,16 +22,18 @@ from hobble.models.packing import packed, packed_columns
 
 MOST_ROWS = 1 << 24  # the page keeps row numbers in float32, which is exact up to here
 MOST_WEIGHT = 1e9
-MOST_FRAMES = 1_000_000  # frames
-FEWEST_LEFT = 20  # a search finds only rows followed by at least this many frames of their run
+MOST_FRAMES = 1_000_000  # largest `every` and half-life, in frames
+FEWEST_LEFT = 20  # a search finds only rows that at least this many frames of their run follow
 MOST_ON_PAGE = 5500  # rows, about 5.5 MB of text; a page with several characters should stay below 20 MB
 
 
 @dataclass(frozen=True)
 class Matching(Network):
-    """features: (R, n) float32; frames: (R, Y) float32 raw; phases: (R,) float32; remaining: (R,) how many
-    frames follow in the run; columns: (n,) of X and weights: (n,) of the features. every: frames between two
-    searches; halflife: of the inertialisation, frames.
+    """Motion matching over R frames of clips, in runs of consecutive frames.
+
+    features: (R, n) float32, weighted. frames: (R, Y) float32, raw units. phases: (R,) float32. remaining:
+    (R,) how many frames follow in the run. columns: (n,) the columns of X that are features. weights: (n,)
+    their factors. every: frames between two searches. halflife: of the offsets of a transition, frames.
     """
 
     kind: ClassVar[str] = "matching"
@@ -108,9 +110,10 @@ class Matching(Network):
 
     @cached_property
     def starts(self) -> NDArray[np.int64]:
-        """Rows that a search may find: not near the end of a run, and not its first row (no rotation speed).
+        """Indices of the rows that a search may find: not near the end of a run, and not its first row.
 
-        If all runs are too short, all rows but the first of each run; if there are none, all rows.
+        The first row of a run has no rotation speed. If all runs are too short, these are all rows but the
+        first of each run; if there are no such rows, they are all rows.
         """
         begins = np.r_[True, self.remaining[:-1] == 0]
         found = np.flatnonzero((self.remaining >= FEWEST_LEFT) & ~begins)
@@ -142,18 +145,18 @@ class Matching(Network):
         return f"motion matching over {len(self.frames):,} frames of clips"
 
     def queries(self, z: Array) -> Array:
-        """Features (n, F) float32 of standardised inputs z (n, X)."""
+        """The weighted features (C, n) float32 of standardised inputs z (C, X)."""
         raw = z[:, self.columns] * self.x_std[self.columns] + self.x_mean[self.columns]
         return np.ascontiguousarray(raw * self.weights, np.float32)
 
     def nearest(self, queries: Array) -> NDArray[np.int64]:
-        """The rows (n,) whose features are nearest to queries (n, F)."""
+        """The rows (C,) whose features are nearest to queries (C, n)."""
         return self.starts[self.tree.query(queries)[1]]
 
     def predict(self, x: Array, phase: Array) -> Array:
-        """The nearest frame for each row of x (n, X); the phase is ignored.
+        """Y (C, Y) of the nearest frame for each row of x (C, X); the phase is ignored.
 
-        This searches for each row, without the runs and transitions of a character.
+        Each row is searched on its own, without the runs and transitions of a character.
         """
         return self.frames[self.nearest(self.queries(standardised(self, x)))]
 

@@ -16,14 +16,14 @@ class MatchingOptions(Options):
     """Motion matching.
 
     Holden et al. 2020 use weights of .75 for feet, 1 for path and 1.5 for facing, and search every ten
-    frames. With these, feet slide 4.8 cm a step and the character leaves the path by 2.3 m; with the defaults
-    it is 1.3 cm and 1.4 m (on `synthetic`).
+    frames. With their values, feet slide 4.8 cm a step and the character leaves the path by up to 2.3 m; with
+    the defaults here, it is 1.3 cm and 1.4 m (on the data set `synthetic`).
     """
 
     kind: Literal["matching"] = "matching"
     every: Positive = Field(5, description="frames between two searches")
     halflife: PositiveFloat = Field(
-        4.0, description="frames after which half of the offset of a transition is gone"
+        4.0, description="frames in which the offset of a transition falls to half"
     )
     path: Weight = Field(6.0, description="weight of the path ahead")
     facing: Weight = Field(4.0, description="weight of the facing ahead")
@@ -32,4 +32,7 @@ class MatchingOptions(Options):
     hip_velocity: Weight = 2.0
     gait: Weight = Field(2.0, description="weight of the present gait")
     ground: Weight = Field(0.5, description="weight of the heights ahead")
-    channels: Weight = Field(50.0, description="weight of the channel values; high, since they have to match")
+    channels: Weight = Field(
+        50.0,
+        description="weight of the channel values; high, because a found frame has to match them",
+    )

@@ -1,6 +1,6 @@
-"""Motion matching at run time: play a run of a clip, search every few frames, smooth the transitions.
+"""Motion matching at run time: plays a run of a clip, searches every few frames, smooths the transitions.
 
-Clavet, Motion Matching and the Road to Next-Gen Animation, GDC 2016.
+After Clavet, Motion Matching and the Road to Next-Gen Animation, GDC 2016.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ from hobble.models.stack import standardise
 if TYPE_CHECKING:
     from hobble.models.matching.network import Matching
 
-SURROUNDING = 20  # no transition to a row within this many frames of the next one (Holden et al. 2020)
+SURROUNDING = 20  # no transition to a row within this many rows of the following one (Holden et al. 2020)
 
 
 class MatchingPredictor:
@@ -63,7 +63,7 @@ class MatchingPredictor:
         show_rows(memory, table, choice, phase, (network.layout.joints, self._at, network.halflife), out)
 
     def _searched(self, queries: Array, following: NDArray[np.int64]) -> NDArray[np.int64]:
-        """The rows (n,) to show for queries (n, F): the following row, unless another row is nearer."""
+        """The rows (C,) to show for queries (C, n): the following row (C,), unless another row is nearer."""
         network = self.network
         apart = queries - network.features[following]
         known = np.where(following >= 0, np.sqrt(np.square(apart).sum(axis=1)), np.inf)

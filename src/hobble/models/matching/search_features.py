@@ -17,13 +17,13 @@ from hobble.models.matching.options import MatchingOptions
 from hobble.rows.layout import GAITS, RowLayout
 
 FEET = ("left_heel", "right_heel")
-LEAST_SPREAD = 1e-6  # a group of columns with a smaller spread gets weight 0
+LEAST_SPREAD = 1e-6  # a group of columns with a smaller standard deviation gets weight 0
 
 
 def groups(
     layout: RowLayout, skeleton: Skeleton, options: MatchingOptions
 ) -> list[tuple[str, list[int], float]]:
-    """(name, columns of X, weight) of each group of features. A group has one scale."""
+    """(name, columns of X, weight) of each group of features. The columns of a group get the same factor."""
     samples, now = layout.samples, layout.samples // 2
     ahead = sorted({now + max(0, round(layout.future * part / 3) - 1) for part in (1, 2, 3)})
     joint, speed = layout.x_joint_position.start, layout.x_joint_velocity.start

@@ -17,7 +17,8 @@ import numpy as np
 
 from hobble.core.quat import Array
 
-# Rows: four neighbouring control points; columns: powers of t, 0 at the second point and 1 at the third.
+# Rows: four neighbouring control points. Columns: powers 0 to 3 of t, which is 0 at the second point and 1 at
+# the third.
 CATMULL_ROM = 0.5 * np.array([[0, -1, 2, -1], [2, 0, -5, 3], [0, 1, 4, -3], [0, 0, -1, 1]], float)
 BINS = 50  # the original's constant mode stores its weights at this many phases
 
@@ -67,5 +68,6 @@ def weights_at(points: Array, phase: Array) -> Array:
 
 def binned(phase: Array) -> Array:
     """Phases (n,) rounded down to the 50 bins of the original's constant mode."""
-    # In single precision, as in the original. In double precision, 0.24 stored as float32 falls into bin 11.
+    # In single precision, as in the original. In double precision, 0.24 stored as float32 would fall into bin
+    # 11, not 12.
     return np.minimum(np.floor(np.asarray(phase, np.float32) * np.float32(BINS)), BINS - 1) / BINS

@@ -1,4 +1,4 @@
-"""The step on a CPU: compiled loops over rows for everything but the products."""
+"""The training step on a CPU: compiled loops over rows for everything but the matrix products."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from hobble.models.pfnn.step import PfnnStep
 
 
 class FusedPfnnStep(FusedBase, PfnnStep):
-    """As `PfnnStep`, but several times faster outside the products, with buffers reused for every batch."""
+    """Like `PfnnStep`, but several times faster outside the products, with buffers reused for every batch."""
 
     def coefficients(self, p: Tensor) -> Tensor:
         """Spline coefficients (B, K) of phases (B,)."""
@@ -40,7 +40,7 @@ class FusedPfnnStep(FusedBase, PfnnStep):
 
 @njit
 def _coefficients(p: Any, c: Any) -> None:
-    """As `hobble.models.pfnn.trainable.coefficients`."""
+    """Write what `hobble.models.pfnn.trainable.coefficients` returns into c (B, K)."""
     points = c.shape[1]
     c[:] = 0
     for row in range(len(p)):
@@ -55,7 +55,7 @@ def _coefficients(p: Any, c: Any) -> None:
 
 @njit(parallel=True, error_model="numpy")
 def _expand(x: Any, c: Any, mask: Any, e: Any, slope: Any) -> None:
-    """e (B, K (n + 1)) and slope (B, n) of x (B, n)."""
+    """Write e (B, K (n + 1)) and slope (B, n) of x (B, n), see `PfnnStep.expanded`."""
     rows, width = x.shape
     half = e.itemsize == 2
     one = slope.dtype.type(1)
@@ -76,7 +76,7 @@ def _expand(x: Any, c: Any, mask: Any, e: Any, slope: Any) -> None:
 
 @njit(parallel=True, error_model="numpy")
 def _contract(de: Any, c: Any, slope: Any, d: Any) -> None:
-    """d (B, n): the sum of de (B, K (n + 1)) over the control points, times the slope."""
+    """Write d (B, n): the sum over the control points of de (B, K (n + 1)) times c (B, K), times slope."""
     rows, width = d.shape
     half = de.itemsize == 2
     for row in numba.prange(rows):

@@ -1,11 +1,11 @@
-// The phase-functioned network: a prediction from a row of inputs and a phase. As Python's `Predictor` in
-// cubic mode it blends the outputs of the four control points around the phase, and not their weights.
+// The phase-functioned network: a prediction from a row of inputs and a phase. Like `PfnnPredictor` in Python in
+// cubic mode, it blends the outputs of the four control points around the phase, not their weights.
 import { floats, unpacked } from "../layers.js";
 
 export const createNetwork = (spec) => {
   const layers = spec.network.layers.map(unpacked);
   const K = spec.network.layers[0].points, mean = floats(spec.xMean), inverse = floats(spec.xScale);
-  const seen = Int32Array.from(spec.seen), yMean = floats(spec.yMean), yStd = floats(spec.yStd), z = new Float32Array(mean.length);
+  const columnsOfX = Int32Array.from(spec.inputColumns), yMean = floats(spec.yMean), yStd = floats(spec.yStd), z = new Float32Array(mean.length);
   const index = new Int32Array(4), share = new Float64Array(4);
 
   const around = (phase) => {
@@ -32,9 +32,9 @@ export const createNetwork = (spec) => {
     }
     return out;
   };
-  // x: raw inputs; those without weight are ignored. Returns raw outputs in an array that the next call overwrites.
+  // x: raw inputs; those that the network does not read are ignored. Returns raw outputs in an array that the next call overwrites.
   return (x, phase) => {
-    for (let c = 0; c < z.length; c++) z[c] = (x[seen[c]] - mean[c]) * inverse[c];
+    for (let c = 0; c < z.length; c++) z[c] = (x[columnsOfX[c]] - mean[c]) * inverse[c];
     around(phase);
     let h = z;
     layers.forEach((one, l) => { h = layer(one, h, l === layers.length - 1); });

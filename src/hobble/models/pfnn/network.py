@@ -77,7 +77,7 @@ class Pfnn(Network):
         )
 
     def predict(self, x: Array, phase: Array, constant: bool = False) -> Array:
-        """As in `Network`. constant: use the weights of the phase's bin, as the original's constant mode."""
+        """As in `Network`. constant: use the weights at the phase's bin, as the original's constant mode."""
         z = standardised(self, x)
         y = forward(self.weights, self.biases, z, binned(phase) if constant else phase)
         return y * self.y_std + self.y_mean

@@ -17,7 +17,7 @@ __all__ = ["OPSET", "TOLERANCE", "check_onnx", "export_onnx", "write_checked"]
 
 
 def export_onnx(path: str | Path, network: Pfnn, mode: str = "cubic") -> None:
-    """Write the network in one phase mode. Raises as `onnx_file.export`, and ValueError for an unknown mode.
+    """Write the network in one phase mode, see `onnx_file.export`. Raises ValueError for an unknown mode.
 
     cubic blends the outputs of all control points, which is exact; linear and constant use tables of weights.
     """
@@ -50,7 +50,7 @@ def _body(network: Pfnn, mode: str) -> onnx_file.Body:
 
 
 def _lookup(g: Graph, mode: str, points: int) -> tuple[str, str]:
-    """The points that a phase blends, (batch, n), and their shares (batch, n, 1); for cubic, all points."""
+    """The points (batch, n) that a phase blends, and their shares (batch, n, 1); all points for cubic."""
     one = g.constant(1.0)
     # A phase of exactly 1 is the end of the cycle, not its start, as in `PfnnPredictor`.
     wrapped = g("Where", g("Equal", "phase", one), "phase", g("Sub", "phase", g("Floor", "phase")))

@@ -1,6 +1,6 @@
-"""Evaluating the network at a phase: three modes, float32 or int16 storage, one character or a crowd.
+"""Evaluates the network at a phase: three modes, float32 or int16 storage, one character or a crowd.
 
-A mode says at which phases weights are stored, and in which shares the outputs there are blended.
+A mode says at which phases weights are stored, and how the outputs of the stored phases are blended.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from hobble.models.stack import Stack, StackPredictor, blend_layers
 if TYPE_CHECKING:
     from hobble.models.pfnn.network import Pfnn
 
-MODES = {"constant": 50, "linear": 10, "cubic": None}  # mode: stored phases; None: the control points
+MODES = {"constant": 50, "linear": 10, "cubic": None}  # mode: number of stored phases; None: control points
 BLENDED = {"constant": 1, "linear": 2, "cubic": 4}  # mode: how many of the stored phases it blends
 
 
@@ -71,7 +71,7 @@ def _evaluate(
 
 @njit(forceinline=True, cache=False)
 def _share(phase: float, blended: int, points: int, shares: Any) -> None:
-    """Write the shares of the points (`blended` of them: 1, 2 or 4) at `phase` into zeros (points,)."""
+    """Write the shares of the `blended` (1, 2 or 4) points around `phase` into zeros (points,)."""
     # A phase of exactly 1 is the end of the cycle, not its start; in constant mode their weights differ.
     wrapped = phase if phase == 1.0 else phase - np.floor(phase)
     # In single precision, as in the original: .04 * 50 is 2, not just below it.

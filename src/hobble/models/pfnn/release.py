@@ -1,4 +1,4 @@
-"""Read and write the original release's folder of .bin files, which its ports to other languages can play.
+"""Reads and writes the original release's folder of .bin files, which its ports to other languages can play.
 
 W0_000.bin .. W2_049.bin and b0_000.bin .. b2_049.bin hold the weights at phases i / 50. Xmean.bin, Xstd.bin,
 Ymean.bin and Ystd.bin hold the statistics. All are raw little-endian float32, row-major (out, in).
@@ -25,8 +25,9 @@ if TYPE_CHECKING:
 PHASES = 50
 CONTROL_POINTS = 4
 MOST_COLUMNS = 1 << 16  # of a row; also units of a layer
-MOST_WEIGHTS = 1 << 21  # in one file of a layer, which has fifty; the original's have 262,144
-# For single precision weights near 1. If the weights are not on our spline, the residual is far larger.
+MOST_WEIGHTS = 1 << 21  # in one of the fifty files of a layer; the original's files have 262,144
+# Rounding of single precision weights near 1 stays below it. Weights that are not on our spline differ far
+# more.
 LARGEST_RESIDUAL = 1e-4
 
 
@@ -87,7 +88,7 @@ def _control_points(folder: Path, name: str, phases: Array) -> Array:
 
 
 def _read(path: Path, size: int | None = None) -> Array:
-    """`size` float32 numbers, or without `size` all of the file, up to MOST_COLUMNS."""
+    """The float32 numbers of a file. size: how many there must be; None: any number up to MOST_COLUMNS."""
     data = read_bytes(path, 4 * (MOST_COLUMNS if size is None else size))
     if len(data) % 4 or not data or (size is not None and len(data) != 4 * size):
         raise InputError(path, f"{len(data)} bytes" + (f", expected {4 * size}" if size else ""))

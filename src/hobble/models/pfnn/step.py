@@ -1,12 +1,12 @@
 """Loss and gradient of one batch, written out as three large products for each layer.
 
-e: inputs of a layer with a 1 appended, times each of the K spline coefficients, (B, K (in + 1)); W: weights
-and biases, (out, K (in + 1)):
+e: inputs x of a layer with a 1 appended, times each of the K spline coefficients c, (B, K (in + 1)); W:
+weights and biases, (out, K (in + 1)). d: gradient of the loss by what follows; ' means transposed:
 
     a = e W'        dW = da' e        de = da W        dx = sum_k c_k de_k
 
-This equals blending the weights for each sample, since sum_k c_k (W_k x) = (sum_k c_k W_k) x, at a fraction
-of the memory traffic.
+The result equals that of weights blended for each sample, because sum_k c_k (W_k x) = (sum_k c_k W_k) x. It
+takes a fraction of the memory traffic.
 """
 
 from __future__ import annotations
@@ -41,7 +41,7 @@ class PfnnStep:
         self.input_mask = 0
 
     def __call__(self, x: Tensor, y: Tensor, p: Tensor, masks: list[Tensor]) -> Tensor:
-        """Find `gradients` for x (B, X), y (B, Y), p (B,); returns the mean squared error, a scalar tensor.
+        """Compute `gradients` for x (B, X), y (B, Y), p (B,). Returns the mean squared error, a scalar.
 
         masks: one for each layer, from `masks`.
         """
@@ -78,7 +78,7 @@ class PfnnStep:
         return list((drawn < self.keep).to(flat.dtype).mul_(1.0 / self.keep).split(widths, dim=1))
 
     def multiplied(self, name: str, a: Tensor, b: Tensor) -> Tensor:
-        """a @ b.T. name: of the product within the step."""
+        """a @ b.T. name: a name for this product, which other classes use for buffers."""
         return product(a, b)
 
     def coefficients(self, p: Tensor) -> Tensor:
@@ -88,11 +88,12 @@ class PfnnStep:
     def expanded(self, number: int, x: Tensor, c: Tensor, mask: Tensor) -> tuple[Tensor, Tensor]:
         """Layer `number`'s masked inputs x (B, n), expanded to (B, K (n + 1)), and the slopes (B, n).
 
-        The slope is the derivative of the ELU at x times the mask. It follows from x: below 0 it is x + 1.
+        x is the result of an ELU. A slope is the derivative of that ELU times the mask. It follows from x:
+        the derivative is x + 1 where x is below 0, else 1.
         """
         return expand(x * mask, c).to(self.factors.dtype), mask * torch.clamp(x + 1, max=1)
 
     def contracted(self, number: int, de: Tensor, c: Tensor, slope: Tensor) -> Tensor:
-        """The gradient (B, n) before layer `number`'s ELU, from de (B, K (n + 1)) of the expanded inputs."""
+        """The gradient (B, n) before the ELU of layer `number`'s inputs, from de (B, K (n + 1)) after it."""
         parts = de.to(c.dtype).view(len(c), c.shape[1], -1)[:, :, :-1]
         return torch.bmm(c[:, None, :], parts)[:, 0, :] * slope

@@ -10,9 +10,11 @@ import numpy as np
 import torch
 from torch import Tensor
 
+from hobble.models.layer_mirror import LayerMirror, layer_mirrors
 from hobble.models.pfnn.network import formula
 from hobble.models.products import product
 from hobble.models.trainable import Trainable, TrainingStep, uniform_start
+from hobble.rows.mirror_columns import ColumnMirror
 
 
 @dataclass(frozen=True)
@@ -51,6 +53,10 @@ class TrainablePfnn(Trainable):
                 x = torch.nn.functional.elu(x)
             x = product(expand(x, c), layer.flatten(1))
         return x
+
+    def mirrors(self, inputs: ColumnMirror, outputs: ColumnMirror) -> list[LayerMirror]:
+        """As in `Trainable`. Half a cycle is half of the control points."""
+        return layer_mirrors(inputs, outputs, self.sizes[1:-1], self.control_points // 2)
 
     def step(self, dropout: float, half: bool) -> TrainingStep:
         """Compiled loops on a CPU, PyTorch elsewhere."""

@@ -1,4 +1,4 @@
-// One feed-forward network, whose inputs are the row, and the sine and cosine of the phase. See `network.py`.
+// A feed-forward network. Its inputs are the row, the sine and the cosine of the phase. See `network.py`.
 import { createLayers, createScales } from "../layers.js";
 
 export const createNetwork = (spec) => {

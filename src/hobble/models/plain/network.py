@@ -23,7 +23,10 @@ PHASE_COLUMNS = 2  # inputs after the columns of X: sine and cosine of the phase
 
 @dataclass(frozen=True)
 class Plain(Network):
-    """weights: per layer (out, in) float32; biases: (out,). The first layer gets X and PHASE_COLUMNS more."""
+    """A feed-forward network. weights: per layer (out, in) float32; biases: (out,).
+
+    The first layer gets X and PHASE_COLUMNS more inputs.
+    """
 
     kind: ClassVar[str] = "plain"
 
@@ -105,7 +108,7 @@ class PlainPredictor(StackPredictor):
 
 @njit(error_model="numpy")
 def _evaluate(weights: Any, numbers: Any, plan: Any, z: Any, phase: Any, out: Any) -> None:
-    """phase: the columns (C, PHASE_COLUMNS) after those of z."""
+    """Write Y (C, Y) into `out`. phase: (C, PHASE_COLUMNS) the inputs after those in z (C, X)."""
     inputs = np.empty((z.shape[0], z.shape[1] + phase.shape[1]), np.float32)
     for c in range(z.shape[0]):
         for i in range(z.shape[1]):

@@ -17,6 +17,11 @@ class PlainOptions(Options):
     units: Annotated[int, Field(gt=0, le=8192)] = 512
 
     @property
+    def asymmetric(self) -> str:
+        """As in `Options`."""
+        return ""
+
+    @property
     def hidden(self) -> tuple[int, ...]:
         """As in `Options`."""
         return (self.units,) * self.hidden_layers

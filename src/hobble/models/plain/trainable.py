@@ -1,4 +1,4 @@
-"""The plain network in training. Its step is that of `pfnn` with one set of weights."""
+"""The plain network in training. Its training step is that of `pfnn` with one control point."""
 
 from __future__ import annotations
 
@@ -10,19 +10,24 @@ import numpy as np
 import torch
 from torch import Tensor
 
+from hobble.models.layer_mirror import LayerMirror, layer_mirrors
 from hobble.models.pfnn.fused import FusedPfnnStep
 from hobble.models.pfnn.step import PfnnStep as BlendedStep
 from hobble.models.plain.network import PHASE_COLUMNS
 from hobble.models.products import product
 from hobble.models.trainable import ALL_ROWS, Trainable, TrainingStep, uniform_start
+from hobble.rows.mirror_columns import ColumnMirror
 
 
 @dataclass(frozen=True)
 class TrainablePlain(Trainable):
-    """units: of each layer, the columns of X first. The first layer has PHASE_COLUMNS more inputs."""
+    """A plain network in training.
+
+    units: of each layer, the columns of X first. The first layer has PHASE_COLUMNS more inputs.
+    """
 
     kind: ClassVar[str] = "plain"
-    control_points: ClassVar[int] = 1  # the step's name for sets of weights
+    control_points: ClassVar[int] = 1  # sets of weights, under the name that the step of `pfnn` reads
 
     units: tuple[int, ...]
 
@@ -54,6 +59,16 @@ class TrainablePlain(Trainable):
                 x = torch.nn.functional.elu(x)
             x = product(torch.cat([x, torch.ones_like(x[:, :1])], dim=1), layer.flatten(1))
         return x
+
+    def mirrors(self, inputs: ColumnMirror, outputs: ColumnMirror) -> list[LayerMirror]:
+        """As in `Trainable`. Half a cycle later, sine and cosine of the phase have the other sign."""
+        phase = np.arange(PHASE_COLUMNS)
+        with_phase = ColumnMirror(
+            np.append(inputs.source, len(inputs.source) + phase),
+            np.append(inputs.sign, -np.ones(PHASE_COLUMNS)),
+            np.append(inputs.shift, np.zeros(PHASE_COLUMNS)),
+        )
+        return layer_mirrors(with_phase, outputs, self.units[1:-1], 0)
 
     def step(self, dropout: float, half: bool) -> TrainingStep:
         """Compiled loops on a CPU, PyTorch elsewhere."""
@@ -91,13 +106,13 @@ class _WithPhase:
         return super().__call__(with_phase(x, p), y, p, masks)  # type: ignore[misc]
 
     def masks(self, rows: int, own: slice = ALL_ROWS) -> list[Tensor]:
-        """As in `TrainingStep`, but the phase is never dropped, as it never is in `pfnn`."""
+        """As in `TrainingStep`, but dropout never drops the phase, because it cannot do so in `pfnn`."""
         masks: list[Tensor] = super().masks(rows, own)  # type: ignore[misc]
         masks[0][:, -PHASE_COLUMNS:] = 1
         return masks
 
     def coefficients(self, p: Tensor) -> Tensor:
-        """(B, 1) of ones."""
+        """(B, 1) ones, the coefficients of the only set of weights."""
         return torch.ones_like(p[:, None])
 
 

@@ -25,24 +25,24 @@ export const createActor = (view, spec, { place = [0, 0], tint = null, ghost = f
   const sole = (j) => { const [x, z] = [rig.places[3 * j], rig.places[3 * j + 2]]; return [x, floor(x, z), z]; };
 
   // Runs one frame. values: Map from `keyed(channel, column)` to its value. A missing column has the value 0.
-  actor.frame = ({ velocity, ahead, gait }, values) => {
+  actor.frame = ({ velocity, facing, gait }, values) => {
     const c = actor.character, before = performance.now();
     spec.channels.forEach((one) => one.columns.forEach((column, l) => { c.channelTargets[one.first + l] = (values.get(keyed(one, column)) || 0) / one.scale; }));
-    c.frame(velocity, ahead, gait, floor);
-    rig.take(c.pose, c.turns);
+    c.frame(velocity, facing, gait, floor);
+    rig.take(c.posePosition, c.poseRotation);
     actor.milliseconds += .05 * (performance.now() - before - actor.milliseconds);
     actor.frames.push(Float32Array.from([...rig.places.subarray(0, 3), ...rig.turns]));
     if (actor.frames.length > KEPT) actor.frames.shift();
     trail.forEach((print) => { print.age++; });
     trail = trail.filter((print) => print.age < 360);
     spec.legs.forEach(([, , heel, toe], f) => {
-      const down = c.lock[f] === 1;
+      const down = c.footLock[f] === 1;
       if (down && !stood[f]) trail.push({ from: sole(heel), to: sole(toe), age: 0, side: f });
       stood[f] = down;
     });
     lab.add(rig.places, [0, 1].map((f) => c.contacts[2 * f] > .5 || c.contacts[2 * f + 1] > .5));
     actor.watch?.add(rig.places);
-    if (!c.pose.every(Number.isFinite)) { actor.falls++; actor.start(floor); } // after too little training, predictions may grow without end
+    if (!c.posePosition.every(Number.isFinite)) { actor.falls++; actor.start(floor); } // after too little training, predictions may grow without end
   };
   const drawGround = (withPath) => {
     if (withPath === null) return;

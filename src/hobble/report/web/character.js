@@ -5,8 +5,8 @@ import { createFeet } from "./feet.js";
 import { bytes } from "./numbers.js";
 import { createRows } from "./rows.js";
 import { createState } from "./state.js";
+import { createTargets } from "./targets.js";
 import { createTrajectory } from "./trajectory.js";
-import { createWishes } from "./wishes.js";
 
 // Characters of one network share it. It remembers nothing between two predictions.
 const predictors = new WeakMap();
@@ -16,7 +16,7 @@ const predictor = (spec) => {
 };
 
 export const createCharacter = (spec, place = [0, 0], heading = 0) => {
-  const c = createState(spec, place, heading), wishes = createWishes(spec, c), path = createTrajectory(spec, c);
+  const c = createState(spec, place, heading), targets = createTargets(spec, c), path = createTrajectory(spec, c);
   const rows = createRows(spec, c), feet = createFeet(spec, c), predict = predictor(spec), { min, max } = Math;
   const x = new Float32Array(spec.x.size);
   // Inputs and outputs are clipped to the range seen in training.
@@ -35,14 +35,14 @@ export const createCharacter = (spec, place = [0, 0], heading = 0) => {
       else if (typeof value !== "function") c[name] = structuredClone(value);
     }
     for (let t = 0; t < c.px.length; t++) { c.px[t] += by[0]; c.pz[t] += by[1]; }
-    for (const points of [c.joints, c.pose]) for (let j = 0; j < points.length; j += 3) { points[j] += by[0]; points[j + 2] += by[1]; }
-    for (const hold of c.hold) { hold[0] += by[0]; hold[1] += by[1]; }
-    for (const point of c.shown.flat()) { point[0] += by[0]; point[2] += by[1]; }
+    for (const points of [c.jointPosition, c.posePosition]) for (let j = 0; j < points.length; j += 3) { points[j] += by[0]; points[j + 2] += by[1]; }
+    for (const hold of c.footHold) { hold[0] += by[0]; hold[1] += by[1]; }
+    for (const point of c.legShown.flat()) { point[0] += by[0]; point[2] += by[1]; }
     c.root = [c.root[0] + by[0], c.root[1], c.root[2] + by[1]];
   };
-  c.frame = (velocity, ahead, gait, ground) => {
-    const [strafe, direction] = wishes.facing(velocity, ahead), share = wishes.shares(velocity, direction, gait);
-    velocity = wishes.hold(velocity, share);
+  c.frame = (velocity, facing, gait, ground) => {
+    const [strafe, direction] = targets.facing(velocity, facing), share = targets.shares(velocity, direction, gait);
+    velocity = targets.hold(velocity, share);
     path.steer(velocity, direction, strafe, share);
     path.sample(ground);
     changeChannels();

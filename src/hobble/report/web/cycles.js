@@ -43,12 +43,12 @@ export const landings = (forward, fps) => {
   return found.filter((i) => i > 0);
 };
 
-const cycle = (seen, a, other, b) => {
-  const { fps, curves, hips } = seen, seconds = (b - a) / fps, part = (values) => values.slice(a, b);
+const cycle = (walk, a, other, b) => {
+  const { fps, curves, hips } = walk, seconds = (b - a) / fps, part = (values) => values.slice(a, b);
   const speed = Math.hypot(hips[b][0] - hips[a][0], hips[b][1] - hips[a][1]) / seconds;
   const apart = (f) => curves.ankle_forward_R[f] - curves.ankle_forward_L[f];
-  const standing = (side) => mean(part(seen.ankleSpeed[side]).map((v) => Number(v < STANDING_SPEED * speed)));
-  const width = mean([a, other].map((f) => seen.across.L[f] - seen.across.R[f]));
+  const standing = (side) => mean(part(walk.ankleSpeed[side]).map((v) => Number(v < STANDING_SPEED * speed)));
+  const width = mean([a, other].map((f) => walk.across.L[f] - walk.across.R[f]));
   const scalars = [seconds, speed, (other - a) / (b - a), standing("R"), standing("L"), apart(a), -apart(other), width];
   const sampled = (values) => Array.from({ length: SAMPLES }, (_, k) => {
     const t = a + (b - a) * k / SAMPLES, f = Math.min(Math.floor(t), b - 1);
@@ -57,15 +57,15 @@ const cycle = (seen, a, other, b) => {
   return { start: a, end: b, scalars, curves: CURVES.map((name) => sampled(curves[name])) };
 };
 
-const cycles = (seen) => {
-  const [right, left] = ["R", "L"].map((side) => landings(seen.curves[`ankle_forward_${side}`], seen.fps)), out = [];
+const cycles = (walk) => {
+  const [right, left] = ["R", "L"].map((side) => landings(walk.curves[`ankle_forward_${side}`], walk.fps)), out = [];
   for (let i = 1; i < right.length; i++) {
     const [a, b] = [right[i - 1], right[i]], between = left.filter((f) => a < f && f < b);
-    if (between.length !== 1 || b - a < SHORTEST * seen.fps || b - a > LONGEST * seen.fps) continue;
+    if (between.length !== 1 || b - a < SHORTEST * walk.fps || b - a > LONGEST * walk.fps) continue;
     let travel = 0;
-    for (let f = a; f < b; f++) travel += Math.hypot(seen.hips[f + 1][0] - seen.hips[f][0], seen.hips[f + 1][1] - seen.hips[f][1]);
-    const straight = Math.abs(seen.heading[b] - seen.heading[a]) <= STRAIGHT;
-    if (travel >= LEAST_TRAVEL && straight && mean(seen.ahead.slice(a, b)) >= AHEAD) out.push(cycle(seen, a, between[0], b));
+    for (let f = a; f < b; f++) travel += Math.hypot(walk.hips[f + 1][0] - walk.hips[f][0], walk.hips[f + 1][1] - walk.hips[f][1]);
+    const straight = Math.abs(walk.heading[b] - walk.heading[a]) <= STRAIGHT;
+    if (travel >= LEAST_TRAVEL && straight && mean(walk.ahead.slice(a, b)) >= AHEAD) out.push(cycle(walk, a, between[0], b));
   }
   return out;
 };
@@ -73,8 +73,8 @@ const cycles = (seen) => {
 // The cycles in which a figure walks straight ahead: of the right leg, and of the left as seen in a mirror.
 export const measureWalk = (spec, frames, fps = 60) => {
   if (frames.length < SHORTEST * fps) return { right: [], left: [] };
-  const seen = signals(spec, frames, fps);
-  return { right: cycles(seen), left: cycles(mirroredSignals(seen)) };
+  const walk = signals(spec, frames, fps);
+  return { right: cycles(walk), left: cycles(mirroredSignals(walk)) };
 };
 
 const ofCycles = (some) => {

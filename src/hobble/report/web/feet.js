@@ -6,7 +6,7 @@ import { at4, between, multiply, rotate } from "./turns.js";
 export const createFeet = (spec, c) => {
   const { constants: k } = spec, { atan2, sin, cos, hypot, min, max, abs, sqrt } = Math;
 
-  const joint = (j) => c.pose.subarray(3 * j, 3 * j + 3);
+  const joint = (j) => c.posePosition.subarray(3 * j, 3 * j + 3);
   // How deep a foot is in the ground, cm; negative if it is above.
   const soleDepth = (f, ground) => {
     const [heel, toe] = [2, 3].map((i) => {
@@ -24,56 +24,56 @@ export const createFeet = (spec, c) => {
       wanted += stands * (max(rise - k.bodyFree, 0) + min(rise + k.bodyFree, 0));
       weight += stands;
     }
-    if (weight > k.bodyFrom) c.raised += k.bodyMix * (wanted / weight - c.raised);
+    if (weight > k.bodyMinContact) c.bodyLift += k.bodyMix * (wanted / weight - c.bodyLift);
     const [hx, hy, hz] = joint(hips), above = hy - ground(hx, hz), [low, high] = spec.bounds.hips;
-    c.raised = min(max(c.raised, low - above), high - above);
-    for (let j = 1; j < c.pose.length; j += 3) c.pose[j] += c.raised;
+    c.bodyLift = min(max(c.bodyLift, low - above), high - above);
+    for (let j = 1; j < c.posePosition.length; j += 3) c.posePosition[j] += c.bodyLift;
   };
   const placeFoot = (f, ground) => {
     const [hip, knee, heel, toe] = spec.legs[f], point = joint(toe);
     const [a, b] = holdFoot(f, point), deep = soleDepth(f, ground);
-    const rise = max(deep, 0) + (c.step[f] ? 0 : c.lock[f] * min(deep + k.floating, 0));
-    c.lift[f] += min(max(k.heightMix * (rise - c.lift[f]), -k.fastestLift), k.fastestLift);
-    const shift = [a, c.lift[f], b];
-    if (c.step[f]) {
-      shift[1] += max(4 * k.stepHeight * c.step[f] * (1 - c.step[f]) - max(-deep, 0), 0);
+    const rise = max(deep, 0) + (c.footStep[f] ? 0 : c.footLock[f] * min(deep + k.floating, 0));
+    c.footLift[f] += min(max(k.heightMix * (rise - c.footLift[f]), -k.fastestLift), k.fastestLift);
+    const shift = [a, c.footLift[f], b];
+    if (c.footStep[f]) {
+      shift[1] += max(4 * k.stepHeight * c.footStep[f] * (1 - c.footStep[f]) - max(-deep, 0), 0);
       c.contacts[2 * f] = c.contacts[2 * f + 1] = 0;
     }
-    const by = c.lock[f] > 0 ? raiseHeel(joint(hip), joint(knee), joint(heel), point, shift) : [1, 0, 0, 0];
+    const by = c.footLock[f] > 0 ? raiseHeel(joint(hip), joint(knee), joint(heel), point, shift) : [1, 0, 0, 0];
     const before = Array.from(joint(heel));
-    bend(joint(hip), joint(knee), joint(heel), shift, hip, knee, c.added[f], c.shown[f]);
+    bend(joint(hip), joint(knee), joint(heel), shift, hip, knee, c.footAdded[f], c.legShown[f]);
     carryFoot(f, before, by);
     holdToesBack(f);
-    c.shown[f] = [knee, heel, toe].map((j) => { // above the body's own height, because the whole body may rise in a frame
+    c.legShown[f] = [knee, heel, toe].map((j) => { // above the body's own height, because the whole body may rise in a frame
       const [x, y, z] = joint(j);
-      return [x, y - c.height - c.raised, z];
+      return [x, y - c.rootHeight - c.bodyLift, z];
     });
-    c.missed[f] = c.lock[f] === 1 ? hypot(c.hold[f][0] - point[0], c.hold[f][1] - point[2]) : 0;
+    c.footMissed[f] = c.footLock[f] === 1 ? hypot(c.footHold[f][0] - point[0], c.footHold[f][1] - point[2]) : 0;
   };
   // Hold a foot from its landing until the network lifts it, or until it has to step. Returns how far [x, z] to move it.
   const holdFoot = (f, point) => {
-    let away = [c.hold[f][0] - point[0], c.hold[f][1] - point[2]];
+    let away = [c.footHold[f][0] - point[0], c.footHold[f][1] - point[2]];
     if (!spec.footLocking) {
-      c.lock[f] = c.step[f] = 0;
+      c.footLock[f] = c.footStep[f] = 0;
       return [0, 0];
     }
     const far = hypot(...away);
-    if (c.lock[f] < 1 && far > k.tooFarAlone) { // a foot in the air goes along with the network's
+    if (c.footLock[f] < 1 && far > k.tooFarAlone) { // a foot in the air goes along with the network's
       away = away.map((v) => v * k.tooFarAlone / far);
-      c.hold[f] = [point[0] + away[0], point[2] + away[1]];
+      c.footHold[f] = [point[0] + away[0], point[2] + away[1]];
     }
-    if (c.step[f] > 0 && (c.step[f] += 1 / k.stepFrames) > 1 - 1e-6) c.step[f] = c.lock[f] = 0;
-    if (c.step[f] === 0) {
-      const alone = c.lock[1 - f] !== 1; // the other foot is in the air
-      if (c.contacts[2 * f + 1] < k.lockAt) c.lock[f] = max(0, c.lock[f] - k.release);
-      else if (c.lock[f] < 1) {
-        away = within(away.map((v) => v * c.lock[f]), point, c.shown[f][2]);
-        c.hold[f] = [point[0] + away[0], point[2] + away[1]];
-        c.lock[f] = 1;
-      } else if (far >= (alone ? k.tooFarAlone : k.tooFar) || c.missed[f] > (alone ? k.missedAlone : k.missed)) c.step[f] = 1 / k.stepFrames;
+    if (c.footStep[f] > 0 && (c.footStep[f] += 1 / k.stepFrames) > 1 - 1e-6) c.footStep[f] = c.footLock[f] = 0;
+    if (c.footStep[f] === 0) {
+      const alone = c.footLock[1 - f] !== 1; // the other foot is in the air
+      if (c.contacts[2 * f + 1] < k.lockAt) c.footLock[f] = max(0, c.footLock[f] - k.release);
+      else if (c.footLock[f] < 1) {
+        away = within(away.map((v) => v * c.footLock[f]), point, c.legShown[f][2]);
+        c.footHold[f] = [point[0] + away[0], point[2] + away[1]];
+        c.footLock[f] = 1;
+      } else if (far >= (alone ? k.tooFarAlone : k.tooFar) || c.footMissed[f] > (alone ? k.missedAlone : k.missed)) c.footStep[f] = 1 / k.stepFrames;
     }
-    if (c.step[f] > 0) c.lock[f] = 1 - c.step[f] * c.step[f] * (3 - 2 * c.step[f]);
-    return within(away.map((v) => c.lock[f] * v), point, c.shown[f][2]);
+    if (c.footStep[f] > 0) c.footLock[f] = 1 - c.footStep[f] * c.footStep[f] * (3 - 2 * c.footStep[f]);
+    return within(away.map((v) => c.footLock[f] * v), point, c.legShown[f][2]);
   };
   // The movement [x, z] of a toe, changed so that it gets no further than spec.bounds.fastest from where it was shown.
   const within = (by, point, shown) => {
@@ -82,7 +82,7 @@ export const createFeet = (spec, c) => {
   };
   // Moves a point to where it is spec.bounds.fastest from where it was shown, if it is further. Returns whether it did.
   const holdBack = (point, shown) => {
-    const to = [point[0] - shown[0], point[1] - shown[1] - c.height - c.raised, point[2] - shown[2]];
+    const to = [point[0] - shown[0], point[1] - shown[1] - c.rootHeight - c.bodyLift, point[2] - shown[2]];
     const share = 1 - spec.bounds.fastest / hypot(...to);
     if (!(share > 0)) return false;
     for (let i = 0; i < 3; i++) point[i] -= share * to[i];
@@ -90,9 +90,9 @@ export const createFeet = (spec, c) => {
   };
   const holdToesBack = (f) => {
     const toe = spec.legs[f][3], before = Array.from(joint(toe));
-    if (!holdBack(joint(toe), c.shown[f][2])) return;
+    if (!holdBack(joint(toe), c.legShown[f][2])) return;
     const moved = minus(joint(toe), before);
-    for (const j of spec.toes[f]) if (j !== toe) for (let i = 0; i < 3; i++) c.pose[3 * j + i] += moved[i];
+    for (const j of spec.toes[f]) if (j !== toe) for (let i = 0; i < 3; i++) c.posePosition[3 * j + i] += moved[i];
   };
   // If the leg of a held foot would stretch too far, its heel rises. Returns the turn of the foot about its toe.
   const raiseHeel = (hip, knee, heel, toe, shift) => {
@@ -119,12 +119,12 @@ export const createFeet = (spec, c) => {
     const [, , heel, toe] = spec.legs[f], now = joint(heel);
     const place = (point) => rotate(by, minus(point, before)).map((v, i) => v + now[i]);
     const moved = minus(place(joint(toe)), joint(toe));
-    c.turns.set(multiply(by, at4(c.turns, heel)), 4 * heel);
+    c.poseRotation.set(multiply(by, at4(c.poseRotation, heel)), 4 * heel);
     for (const j of spec.carried[f]) {
-      if (spec.toes[f].includes(j)) for (let i = 0; i < 3; i++) c.pose[3 * j + i] += moved[i];
+      if (spec.toes[f].includes(j)) for (let i = 0; i < 3; i++) c.posePosition[3 * j + i] += moved[i];
       else {
-        c.pose.set(place(joint(j)), 3 * j);
-        c.turns.set(multiply(by, at4(c.turns, j)), 4 * j);
+        c.posePosition.set(place(joint(j)), 3 * j);
+        c.poseRotation.set(multiply(by, at4(c.poseRotation, j)), 4 * j);
       }
     }
   };
@@ -139,7 +139,7 @@ export const createFeet = (spec, c) => {
   // Like `reach`, but adds at most mostAdded to the network's own turn of thigh and shank. `shown`: knee and heel in the last frame.
   const bend = (hip, knee, heel, shift, h, n, added, shown) => {
     const thigh = minus(knee, hip), shank = minus(heel, knee);
-    reach(hip, knee, heel, shift, rotate(at4(c.turns, h), spec.ahead));
+    reach(hip, knee, heel, shift, rotate(at4(c.poseRotation, h), spec.ahead));
     const late = [[thigh, minus(knee, hip)], [shank, minus(heel, knee)]].map(([a, b], i) => approach(added[i], between(a, b)));
     if (late[0] || late[1]) {
       const [t, s] = [rotate(added[0], thigh), rotate(added[1], shank)];
@@ -153,8 +153,8 @@ export const createFeet = (spec, c) => {
       added[0] = between(thigh, minus(knee, hip));
       added[1] = between(shank, minus(heel, knee));
     }
-    c.turns.set(multiply(added[0], at4(c.turns, h)), 4 * h);
-    c.turns.set(multiply(added[1], at4(c.turns, n)), 4 * n);
+    c.poseRotation.set(multiply(added[0], at4(c.poseRotation, h)), 4 * h);
+    c.poseRotation.set(multiply(added[1], at4(c.poseRotation, n)), 4 * n);
   };
   // Moves the heel by `shift`. `ahead`: the direction in which a straight knee bends.
   const reach = (hip, knee, heel, shift, ahead) => {

@@ -11,18 +11,18 @@ const MOST_AHEAD = 120; // cm that the transparent one may get ahead before it i
 const FADE = 24; // frames in which it fades out, and in
 const SPEED = 2.5; // target speed, cm per frame
 
-const createHero = (spec, asked) => {
+const createHero = (spec, opening) => {
   const section = find("hero"), canvas = find("hero-view"), line = find("hero-line"), still = find("hero-walk");
   const one = firstShown(spec), labels = one ? Object.keys(one.sliders) : [];
   const values = new Map(), neutralValues = new Map(), flat = () => 0, hero = { frames: 0 };
   let drawn;
   hero.shown = new Promise((done) => { drawn = done; }); // when it has moved, or has its first picture if it rests
-  let part = labels.includes(asked.part) ? asked.part : labels[0];
+  let part = labels.includes(opening.part) ? opening.part : labels[0];
   let last = null, due = 0, shown = 0, fade = 1, leaving = false, camera = null, walks = !matchMedia("(prefers-reduced-motion: reduce)").matches;
 
   // Both have the same target direction, which turns slowly from side to side.
   const heading = () => .5 * Math.sin(hero.frames / 700);
-  const wish = () => ({ velocity: [SPEED * Math.sin(heading()), SPEED * Math.cos(heading())], ahead: null, gait: "walk" });
+  const target = () => ({ velocity: [SPEED * Math.sin(heading()), SPEED * Math.cos(heading())], facing: null, gait: "walk" });
   const view = createView(canvas, { yaw: .62, pitch: .1, distance: 460, nearest: 240, furthest: 800 }, (now) => {
     if (walks) advance(now);
     draw(now);
@@ -35,9 +35,9 @@ const createHero = (spec, asked) => {
 
   const step = () => {
     hero.frames++;
-    main.frame(wish(), values);
+    main.frame(target(), values);
     if (!ghost) return;
-    ghost.frame(wish(), neutralValues);
+    ghost.frame(target(), neutralValues);
     const [sin, cos] = [Math.sin(heading()), Math.cos(heading())], [a, b] = [main.character.root, ghost.character.root];
     const [dx, dz] = [b[0] - a[0], b[2] - a[2]], along = dx * sin + dz * cos, across = dx * cos - dz * sin;
     if (!leaving && (Math.abs(along) > MOST_AHEAD || Math.abs(across - GHOST_OFFSET) > 70)) leaving = true;
@@ -45,7 +45,7 @@ const createHero = (spec, asked) => {
     if (leaving && fade === 0) {
       const [x, z] = aside();
       ghost.character.follow(ghost.character, [a[0] + x - b[0], a[2] + z - b[2]]);
-      ghost.rig.take(ghost.character.pose, ghost.character.turns);
+      ghost.rig.take(ghost.character.posePosition, ghost.character.poseRotation);
       leaving = false;
     }
   };
@@ -107,13 +107,13 @@ const createHero = (spec, asked) => {
       chip.textContent = label;
       chip.addEventListener("click", () => {
         part = label;
-        if (!dial.value) dial.set(asked.value);
+        if (!dial.value) dial.set(opening.value);
         hurt();
       });
       find("hero-parts").append(chip);
       return chip;
     });
-    const dial = createDial(find("hero-dial"), { value: asked.value, changed: hurt });
+    const dial = createDial(find("hero-dial"), { value: opening.value, changed: hurt });
     Object.assign(hero, { dial, chips });
     hurt();
   }
@@ -125,13 +125,13 @@ const createHero = (spec, asked) => {
   rest();
 
   // The page has the states of figures that walk already, because to predict their first steps would take long here.
-  const [walking, beside] = asked.walked ?? [];
+  const [walking, healthy] = opening.walked ?? [];
   view.compile();
   main.start(flat);
   ghost?.start(flat);
   if (walking) main.character.follow(walking);
-  if (ghost && beside) ghost.character.follow(beside, [walking.root[0] - beside.root[0] + GHOST_OFFSET, walking.root[2] - beside.root[2]]);
-  for (const actor of [main, ghost]) actor?.rig.take(actor.character.pose, actor.character.turns);
+  if (ghost && healthy) ghost.character.follow(healthy, [walking.root[0] - healthy.root[0] + GHOST_OFFSET, walking.root[2] - healthy.root[2]]);
+  for (const actor of [main, ghost]) actor?.rig.take(actor.character.posePosition, actor.character.poseRotation);
   glide(1);
   showPace();
   section.classList.add("ready");

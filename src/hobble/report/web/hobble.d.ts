@@ -4,7 +4,7 @@ import type * as Three from "three";
 /** The content of character.json: the network, the skeleton, the body. */
 export interface CharacterData { spec: object; body: object }
 
-export interface Wish {
+export interface Target {
   /** How far to go in this frame, [x, z] in cm: 2.5 walks, 7 jogs. */
   velocity?: [number, number];
   /** Where to look, [x, z], of any length; null looks where it goes. */
@@ -33,7 +33,7 @@ export interface Character {
   /** Sets values of a channel, by column. Columns that are not named go back to 0. Throws RangeError for an unknown name or a bad value. */
   setChannel(channel: string, values?: Record<string, number>): void;
   /** Runs one frame, a sixtieth of a second. */
-  step(wish?: Wish): Character;
+  step(target?: Target): Character;
 }
 
 export interface Figure { mesh: Three.SkinnedMesh; pose(character: Character): void }

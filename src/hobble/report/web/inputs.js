@@ -9,7 +9,7 @@ export const groundSamples = (c, spec) => {
   for (let s = 0; s < c.ground.length / 3; s++) {
     const i = s * step, a = side * c.dz[i], b = side * c.dx[i];
     [[a, -b], [0, 0], [-a, b]].forEach(([x, z], k) => {
-      out.push({ place: [c.px[i] + x, c.ground[3 * s + k], c.pz[i] + z], above: c.ground[3 * s + k] - c.height });
+      out.push({ place: [c.px[i] + x, c.ground[3 * s + k], c.pz[i] + z], above: c.ground[3 * s + k] - c.rootHeight });
     });
   }
   return out;
@@ -18,8 +18,8 @@ export const groundSamples = (c, spec) => {
 // Lines from where the joints are to where they would be in AHEAD frames.
 export const jointVelocities = (c) => {
   const out = [];
-  for (let j = 0; j < c.velocities.length; j += 3) {
-    const v = [c.velocities[j], c.velocities[j + 1], c.velocities[j + 2]], from = [c.pose[j], c.pose[j + 1], c.pose[j + 2]];
+  for (let j = 0; j < c.jointVelocity.length; j += 3) {
+    const v = [c.jointVelocity[j], c.jointVelocity[j + 1], c.jointVelocity[j + 2]], from = [c.posePosition[j], c.posePosition[j + 1], c.posePosition[j + 2]];
     if (Math.hypot(...v) >= LEAST) out.push({ from, to: from.map((p, i) => p + AHEAD * v[i]) });
   }
   return out;

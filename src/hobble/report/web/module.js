@@ -14,7 +14,7 @@ export const createCharacter = (data, { place = [0, 0], heading = 0 } = {}) => {
     for (const [label, l] of Object.entries(one.sliders)) character.parts[label] = { channel: one.name, column: one.columns[l] };
   }
   const read = () => Object.assign(character, { contacts: [...c.contacts], phase: c.phase, root: [...c.root] });
-  rig.take(c.pose, c.turns);
+  rig.take(c.posePosition, c.poseRotation);
   read();
 
   // Sets the values of a channel. values: column -> value; columns that are not named go back to 0.
@@ -31,7 +31,7 @@ export const createCharacter = (data, { place = [0, 0], heading = 0 } = {}) => {
   character.step = ({ velocity = [0, 0], facing = null, gait = null, ground = FLAT } = {}) => {
     if (gait !== null && !spec.gaits.includes(gait)) throw new RangeError(`no gait ${gait}; there are: ${spec.gaits.join(", ")}`);
     c.frame(velocity, facing, gait, ground);
-    rig.take(c.pose, c.turns);
+    rig.take(c.posePosition, c.poseRotation);
     read();
     return character;
   };

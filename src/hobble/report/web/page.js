@@ -14,8 +14,8 @@ export const startPage = () => {
     button.textContent = `Theme: ${name}`;
     recolour();
   };
-  const asked = new URLSearchParams(location.search).get("theme");
-  let theme = [asked, remembered()].find((name) => themes.includes(name)) || "auto";
+  const requested = new URLSearchParams(location.search).get("theme");
+  let theme = [requested, remembered()].find((name) => themes.includes(name)) || "auto";
   if (theme !== "auto") show(theme);
   button.addEventListener("click", () => {
     theme = themes[(themes.indexOf(theme) + 1) % themes.length];

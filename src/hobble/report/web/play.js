@@ -17,13 +17,13 @@ const SIDE = 95; // cm between two figures
 const createPlay = (stage, playables) => {
   const canvas = find("play-view"), ground = find("play-ground"), chosen = [find("play-first"), find("play-second")];
   const names = Object.keys(playables), player = { actors: [] };
-  let panels = [], sliders, last = null, due = 0, shown = 0, ready = false, wish = null;
+  let panels = [], sliders, last = null, due = 0, shown = 0, ready = false, target = null;
   const land = () => GROUNDS.get(ground.value), floor = (x, z) => land().height(x, z);
 
   const view = createView(canvas, START, (now) => {
     move(now);
     const middle = [0, 1, 2].map((i) => player.actors.reduce((sum, { rig }) => sum + rig.places[i], 0) / player.actors.length);
-    const [vx, vz] = wish ? wish.velocity : [0, 0], goes = wish && !wish.ahead && Math.hypot(vx, vz) > .5;
+    const [vx, vz] = target ? target.velocity : [0, 0], goes = target && !target.facing && Math.hypot(vx, vz) > .5;
     const eye = chase.follow(now, middle, goes ? [vx, vz] : null);
     view.aim([eye[0], eye[1] - 8, eye[2]]);
     view.land.around(eye, land(), ground.value);
@@ -37,8 +37,8 @@ const createPlay = (stage, playables) => {
     due = Math.min(4, due + (last === null ? 1 : (now - last) * .06));
     last = now;
     for (; due >= 1; due--) {
-      wish = steering.wish();
-      player.actors.forEach((actor) => actor.frame(wish, sliders.values));
+      target = steering.target();
+      player.actors.forEach((actor) => actor.frame(target, sliders.values));
     }
   };
   view.onHidden = () => { last = null; chase.rest(); steering.release(); };
@@ -54,7 +54,7 @@ const createPlay = (stage, playables) => {
     start();
   };
   const start = () => {
-    player.actors.forEach((actor) => { actor.start(floor); actor.rig.take(actor.character.pose, actor.character.turns); });
+    player.actors.forEach((actor) => { actor.start(floor); actor.rig.take(actor.character.posePosition, actor.character.poseRotation); });
     chase.reset();
     view.ask();
   };
@@ -127,10 +127,10 @@ const createPlay = (stage, playables) => {
 
   steering.listen((event) => sliders.key(event));
   sliders = createSliders(Object.values(playables), () => { if (ready) view.ask(); });
-  const asked = restore();
+  const linked = restore();
   ready = true;
   cast();
-  if (asked) find("play").scrollIntoView();
+  if (linked) find("play").scrollIntoView();
   addEventListener("hashchange", () => { // somebody pasted a link into the open page
     if (!restore()) return;
     cast();

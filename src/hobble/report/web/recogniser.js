@@ -1,5 +1,5 @@
 // Recognises a limp by comparing a walk with the healthy walk of the same figure: what hurts, on which side, how likely.
-// The same as `hobble.gait.features` and `hobble.gait.graded` in Python. The page has the statistics of people's limps.
+// The same as `hobble.gait.features` and `hobble.gait.limp_grade` in Python. The page has the statistics of people's limps.
 import { measureWalk, profile } from "./cycles.js";
 import { bytes } from "./numbers.js";
 
@@ -68,7 +68,7 @@ export const createGrader = (learnt) => {
     return sum;
   };
   return (walk, healthyWalk) => {
-    const seen = features(walk, healthyWalk), x = learnt.features.map((name) => seen[name]);
+    const found = features(walk, healthyWalk), x = learnt.features.map((name) => found[name]);
     const squares = densities.map((density) => square(density, x)), scores = densities.map(({ top }, i) => top - .5 * squares[i]);
     const best = Math.max(...scores), likely = scores.map((score) => Math.exp(score - best)), whole = likely.reduce((a, b) => a + b);
     const sides = learnt.kinds.map(() => 0), strengths = learnt.kinds.map(() => 0);

@@ -16,17 +16,17 @@ export const createRows = (spec, c) => {
       x[X.direction + s] = c.dx[i] * co - c.dz[i] * si;
       x[X.direction + S + s] = c.dx[i] * si + c.dz[i] * co;
       for (let g = 0; g < G; g++) x[X.gait + g * S + s] = c.gait[i * G + g];
-      for (let side = 0; side < 3; side++) x[X.terrain + side * S + s] = c.ground[3 * s + side] - c.height;
+      for (let side = 0; side < 3; side++) x[X.terrain + side * S + s] = c.ground[3 * s + side] - c.rootHeight;
     }
     [px, pz, co, si] = [c.px[M - 1], c.pz[M - 1], c.dz[M - 1], c.dx[M - 1]];
     for (let j = 0; j < 3 * J; j += 3) {
-      const a = c.joints[j] - px, b = c.joints[j + 2] - pz, p = X.joint_position + j, v = X.joint_velocity + j;
+      const a = c.jointPosition[j] - px, b = c.jointPosition[j + 2] - pz, p = X.joint_position + j, v = X.joint_velocity + j;
       x[p] = a * co - b * si;
-      x[p + 1] = c.joints[j + 1] - c.height;
+      x[p + 1] = c.jointPosition[j + 1] - c.rootHeight;
       x[p + 2] = a * si + b * co;
-      x[v] = c.velocities[j] * co - c.velocities[j + 2] * si;
-      x[v + 1] = c.velocities[j + 1];
-      x[v + 2] = c.velocities[j] * si + c.velocities[j + 2] * co;
+      x[v] = c.jointVelocity[j] * co - c.jointVelocity[j + 2] * si;
+      x[v + 1] = c.jointVelocity[j + 1];
+      x[v + 2] = c.jointVelocity[j] * si + c.jointVelocity[j + 2] * co;
     }
     columns.forEach((at, l) => { x[at] = c.channelValues[l]; });
   };
@@ -34,18 +34,18 @@ export const createRows = (spec, c) => {
   // A joint's next place is the mean of two: its old place plus its predicted velocity, and its predicted place.
   const moveJoints = (y) => {
     const si = c.dx[M], co = c.dz[M];
-    const climbed = c.height - c.root[1];
-    c.raised += min(max(climbed, -k.mostClimb), k.mostClimb) - climbed;
-    c.root = [c.px[M], c.height, c.pz[M]];
+    const climbed = c.rootHeight - c.root[1];
+    c.bodyLift += min(max(climbed, -k.mostClimb), k.mostClimb) - climbed;
+    c.root = [c.px[M], c.rootHeight, c.pz[M]];
     for (let j = 0; j < 3 * J; j += 3) {
       const p = Y.joint_position + j, v = Y.joint_velocity + j;
       const velocity = [y[v] * co + y[v + 2] * si, y[v + 1], y[v + 2] * co - y[v] * si];
       const point = [y[p] * co + y[p + 2] * si + c.root[0], y[p + 1] + c.root[1], y[p + 2] * co - y[p] * si + c.root[2]];
-      const move = point.map((v, i) => .5 * (c.joints[j + i] + velocity[i] + v) - c.joints[j + i]);
+      const move = point.map((v, i) => .5 * (c.jointPosition[j + i] + velocity[i] + v) - c.jointPosition[j + i]);
       const far = hypot(move[0], move[1] - climbed, move[2]), share = min(1, spec.bounds.fastest / max(far, 1e-9));
       for (let i = 0; i < 3; i++) {
-        c.velocities[j + i] = velocity[i];
-        c.joints[j + i] += i === 1 ? climbed + share * (move[1] - climbed) : share * move[i];
+        c.jointVelocity[j + i] = velocity[i];
+        c.jointPosition[j + i] += i === 1 ? climbed + share * (move[1] - climbed) : share * move[i];
       }
     }
   };
@@ -62,7 +62,7 @@ export const createRows = (spec, c) => {
   const turnJoints = (y) => {
     const yaw = atan2(c.dx[M], c.dz[M]), halfCos = cos(yaw / 2), halfSin = sin(yaw / 2), slowest = cos(k.fastestTurn / 2);
     for (let n = 0; n < spec.turning.length; n++) {
-      const o = 4 * spec.turning[n], old = c.rotations;
+      const o = 4 * spec.turning[n], old = c.jointRotation;
       turned(y, Y.joint_rotation + 3 * n, halfCos, halfSin);
       const near = old[o] * q[0] + old[o + 1] * q[1] + old[o + 2] * q[2] + old[o + 3] * q[3];
       let keep = 0, take = 1;
@@ -78,7 +78,7 @@ export const createRows = (spec, c) => {
   const takeOutputs = (y) => {
     moveJoints(y);
     turnJoints(y);
-    c.pose.set(c.joints);
+    c.posePosition.set(c.jointPosition);
     setDrawnTurns(c);
     for (let i = 0; i < 4; i++) c.contacts[i] = y[Y.contacts + i];
   };

@@ -101,16 +101,16 @@ const unwrapped = (angles) => {
   });
 };
 
-// The same walk seen in a mirror: left and right swapped.
-export const mirroredSignals = (seen) => {
+// The same walk, as in a mirror: left and right swapped.
+export const mirroredSignals = (walk) => {
   const curves = {}, other = { L: "R", R: "L" };
-  for (const limb of LIMBS) for (const side of SIDES) curves[`${limb}_${side}`] = seen.curves[`${limb}_${other[side]}`];
-  for (const name of MIDDLE) curves[name] = SIGNED.includes(name) ? seen.curves[name].map((v) => -v) : seen.curves[name];
+  for (const limb of LIMBS) for (const side of SIDES) curves[`${limb}_${side}`] = walk.curves[`${limb}_${other[side]}`];
+  for (const name of MIDDLE) curves[name] = SIGNED.includes(name) ? walk.curves[name].map((v) => -v) : walk.curves[name];
   return {
-    ...seen, curves,
-    heading: seen.heading.map((v) => -v),
-    hips: seen.hips.map(([x, z]) => [-x, z]),
-    ankleSpeed: { L: seen.ankleSpeed.R, R: seen.ankleSpeed.L },
-    across: { L: seen.across.R.map((v) => -v), R: seen.across.L.map((v) => -v) },
+    ...walk, curves,
+    heading: walk.heading.map((v) => -v),
+    hips: walk.hips.map(([x, z]) => [-x, z]),
+    ankleSpeed: { L: walk.ankleSpeed.R, R: walk.ankleSpeed.L },
+    across: { L: walk.across.R.map((v) => -v), R: walk.across.L.map((v) => -v) },
   };
 };

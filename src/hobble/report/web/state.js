@@ -1,4 +1,5 @@
-// The state of one character, at first in a frame of the clips. Fields and units as in `hobble.runtime.controller`.
+// The state of one character, at first in a frame of the clips. Fields and units as in `hobble.runtime.character` and
+// `hobble.runtime.controller`, in camel case; the path is px, pz (position) and dx, dz (direction).
 import { bytes } from "./numbers.js";
 import { at3, at4, multiply } from "./turns.js";
 
@@ -6,8 +7,8 @@ import { at3, at4, multiply } from "./turns.js";
 export const createDrawnTurns = (spec) => {
   const still = spec.parents.flatMap((p, j) => (p < 0 || spec.turning.includes(j) ? [] : [[j, p]]));
   return (c) => {
-    c.turns.set(c.rotations);
-    for (const [j, p] of still) for (let i = 0; i < 4; i++) c.turns[4 * j + i] = c.turns[4 * p + i];
+    c.poseRotation.set(c.jointRotation);
+    for (const [j, p] of still) for (let i = 0; i < 4; i++) c.poseRotation[4 * j + i] = c.poseRotation[4 * p + i];
   };
 };
 
@@ -17,12 +18,13 @@ export const createState = (spec, place, heading) => {
   const filled = (n, value = 0) => new Float64Array(n).fill(value), L = spec.channels.flatMap(({ columns }) => columns).length;
   const c = {
     px: filled(T, place[0]), pz: filled(T, place[1]), dx: filled(T, sin(heading)), dz: filled(T, cos(heading)),
-    gait: filled(T * gaits.length), ground: filled(S * 3), height: 0, phase: 0, root: [place[0], 0, place[1]], placed: false,
-    joints: filled(3 * J), velocities: filled(3 * J), rotations: filled(4 * J), pose: filled(3 * J), turns: filled(4 * J),
+    gait: filled(T * gaits.length), ground: filled(S * 3), rootHeight: 0, phase: 0, root: [place[0], 0, place[1]], placed: false,
+    jointPosition: filled(3 * J), jointVelocity: filled(3 * J), jointRotation: filled(4 * J),
+    posePosition: filled(3 * J), poseRotation: filled(4 * J),
     channelValues: filled(L), channelTargets: filled(L), memory: filled(spec.network.memory ?? 0),
-    velocity: [0, 0], direction: [sin(heading), cos(heading)], strafe: 0, correction: [0, 0],
-    lock: [0, 0], hold: [[0, 0], [0, 0]], step: [0, 0], missed: [0, 0], lift: [0, 0], raised: 0,
-    added: [0, 1].map(() => [[1, 0, 0, 0], [1, 0, 0, 0]]), shown: [], contacts: [0, 0, 0, 0],
+    smoothedVelocity: [0, 0], smoothedDirection: [sin(heading), cos(heading)], strafe: 0, correction: [0, 0],
+    footLock: [0, 0], footHold: [[0, 0], [0, 0]], footStep: [0, 0], footMissed: [0, 0], footLift: [0, 0], bodyLift: 0,
+    footAdded: [0, 1].map(() => [[1, 0, 0, 0], [1, 0, 0, 0]]), legShown: [], contacts: [0, 0, 0, 0],
   };
   startInClip(spec, c, place, heading);
   return c;
@@ -38,16 +40,16 @@ const startInClip = (spec, c, place, heading) => {
     c.dx[t] = ahead[2 * t] * co + ahead[2 * t + 1] * si;
     c.dz[t] = ahead[2 * t + 1] * co - ahead[2 * t] * si;
   }
-  for (let j = 0; j < 3 * J; j += 3) for (const [from, to, a, b] of [[joints, c.joints, ...place], [velocities, c.velocities, 0, 0]]) {
+  for (let j = 0; j < 3 * J; j += 3) for (const [from, to, a, b] of [[joints, c.jointPosition, ...place], [velocities, c.jointVelocity, 0, 0]]) {
     to[j] = from[j] * co + from[j + 2] * si + a;
     to[j + 1] = from[j + 1];
     to[j + 2] = from[j + 2] * co - from[j] * si + b;
   }
   c.gait.set(at("gait"));
   c.phase = spec.start.phase;
-  c.pose.set(c.joints);
-  c.shown = spec.legs.map(([, ...below]) => below.map((j) => at3(c.joints, j)));
+  c.posePosition.set(c.jointPosition);
+  c.legShown = spec.legs.map(([, ...below]) => below.map((j) => at3(c.jointPosition, j)));
   const rotations = at("joint_rotation"), facing = [cos(heading / 2), 0, sin(heading / 2), 0];
-  for (let j = 0; j < J; j++) c.rotations.set(multiply(facing, at4(rotations, j)), 4 * j);
+  for (let j = 0; j < J; j++) c.jointRotation.set(multiply(facing, at4(rotations, j)), 4 * j);
   createDrawnTurns(spec)(c);
 };

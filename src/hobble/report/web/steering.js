@@ -1,4 +1,4 @@
-// Where the character is asked to go: keys, a gamepad, or a thumb on the disc.
+// Where the character has to go: keys, a gamepad, or a thumb on the disc.
 import { find } from "./base.js";
 
 // Keys by their place on the keyboard, not by letter, so that WASD is in the same place on every layout.
@@ -20,8 +20,8 @@ export const createSteering = (stage, orbit) => {
   };
   for (const name of Object.keys(on)) find(`play-${name}`).addEventListener("click", () => steering.toggle(name));
 
-  // The wish now, relative to the camera: velocity [x, z], facing [x, z] or null, gait or null.
-  steering.wish = () => {
+  // The target now, relative to the camera: velocity [x, z], facing [x, z] or null, gait or null.
+  steering.target = () => {
     let [right, ahead] = [stick.x, -stick.y], fast = on.jog || held.has("ShiftLeft") || held.has("ShiftRight"), look = on.strafe;
     for (const code of held) if (CODES[code]) { right += CODES[code][0]; ahead += CODES[code][1]; }
     const pad = [...(navigator.getGamepads ? navigator.getGamepads() : [])].find((p) => p && p.connected);
@@ -38,7 +38,7 @@ export const createSteering = (stage, orbit) => {
     const gait = on.crouch ? "crouch" : fast ? "jog" : "walk", { yaw } = orbit;
     const forward = [-Math.sin(yaw), -Math.cos(yaw)], side = [-forward[1], forward[0]];
     const velocity = [0, 1].map((i) => SPEED[gait] * (ahead * forward[i] + right * side[i]));
-    return { velocity, ahead: look ? forward : null, gait: gait === "walk" && !size ? null : gait };
+    return { velocity, facing: look ? forward : null, gait: gait === "walk" && !size ? null : gait };
   };
   steering.release = () => held.clear();
 

@@ -6,8 +6,8 @@ export const createTrajectory = (spec, c) => {
   const { atan2, sin, cos, hypot, floor, min, max, abs, sqrt } = Math;
 
   // Steering, as in `_ask_velocity` and `_ask_turn` of hobble.runtime.trajectory: the error of the velocity over half of
-  // the past is added to the wish, and a steady error is added up in `correction`.
-  const ask = ([x, z], speed, [goingX, goingZ]) => {
+  // the past is added to the target, and a steady error is added up in `correction`.
+  const askVelocity = ([x, z], speed, [goingX, goingZ]) => {
     const a = x - goingX, b = z - goingZ, more = [spec.steering * a, spec.steering * b];
     if (speed < k.still) c.correction = [0, 0];
     else {
@@ -23,32 +23,32 @@ export const createTrajectory = (spec, c) => {
     return [x + more[0] * limit, z + more[1] * limit];
   };
 
-  // Turn the path ahead toward the wish.
+  // Turn the path ahead toward the target.
   const steer = (velocity, direction, strafe, gait) => {
     const speed = hypot(...velocity), span = floor(M / 2);
-    let asked = velocity, wished = atan2(...direction);
+    let corrected = velocity, targetYaw = atan2(...direction);
     if (spec.steering > 0) {
       if (speed >= k.still) {
-        const off = wrap(wished - atan2(c.dx[M], c.dz[M])), room = max(k.furthestTurn - abs(off), 0);
-        wished += min(max(.5 * spec.steering * off, -room), room);
+        const off = wrap(targetYaw - atan2(c.dx[M], c.dz[M])), room = max(k.furthestTurn - abs(off), 0);
+        targetYaw += min(max(.5 * spec.steering * off, -room), room);
       }
-      asked = ask(velocity, speed, [(c.px[M] - c.px[M - span]) / span, (c.pz[M] - c.pz[M - span]) / span]);
+      corrected = askVelocity(velocity, speed, [(c.px[M] - c.px[M - span]) / span, (c.pz[M] - c.pz[M - span]) / span]);
     }
-    for (let i = 0; i < 2; i++) c.velocity[i] += k.targetMix * (asked[i] - c.velocity[i]);
-    let now = atan2(...c.direction);
-    now += k.targetMix * wrap(wished - now);
-    c.direction = [sin(now), cos(now)];
+    for (let i = 0; i < 2; i++) c.smoothedVelocity[i] += k.targetMix * (corrected[i] - c.smoothedVelocity[i]);
+    let now = atan2(...c.smoothedDirection);
+    now += k.targetMix * wrap(targetYaw - now);
+    c.smoothedDirection = [sin(now), cos(now)];
     c.strafe += k.targetMix * (strafe - c.strafe);
     for (let g = 0; g < G; g++) c.gait[M * G + g] += k.gaitMix * (gait[g] - c.gait[M * G + g]);
-    const biasPosition = .5 + .5 * c.strafe, biasDirection = 2 - 1.5 * c.strafe, goal = atan2(...c.direction);
+    const biasPosition = .5 + .5 * c.strafe, biasDirection = 2 - 1.5 * c.strafe, goal = atan2(...c.smoothedDirection);
     let oldX = c.px[M], oldZ = c.pz[M];
     for (let i = M + 1; i < T; i++) {
       const left = 1 - (i - M) / M, stepX = c.px[i] - oldX, stepZ = c.pz[i] - oldZ;
       let share = 1 - left ** biasPosition;
       oldX = c.px[i];
       oldZ = c.pz[i];
-      c.px[i] = c.px[i - 1] + stepX + share * (c.velocity[0] - stepX);
-      c.pz[i] = c.pz[i - 1] + stepZ + share * (c.velocity[1] - stepZ);
+      c.px[i] = c.px[i - 1] + stepX + share * (c.smoothedVelocity[0] - stepX);
+      c.pz[i] = c.pz[i - 1] + stepZ + share * (c.smoothedVelocity[1] - stepZ);
       share = 1 - left ** biasDirection;
       let yaw = atan2(c.dx[i], c.dz[i]);
       yaw += share * wrap(goal - yaw);
@@ -60,41 +60,41 @@ export const createTrajectory = (spec, c) => {
 
   // Sample the ground beside and under the path.
   const sample = (ground) => {
-    c.height = 0;
+    c.rootHeight = 0;
     for (let s = 0; s < S; s++) {
       const i = s * step, a = k.side * c.dz[i], b = k.side * c.dx[i];
       c.ground[3 * s] = ground(c.px[i] + a, c.pz[i] - b);
       c.ground[3 * s + 1] = ground(c.px[i], c.pz[i]);
       c.ground[3 * s + 2] = ground(c.px[i] - a, c.pz[i] + b);
-      c.height += c.ground[3 * s + 1] / S;
+      c.rootHeight += c.ground[3 * s + 1] / S;
     }
     if (!c.placed) { // the ground at the start may have any height
-      for (let j = 1; j < c.joints.length; j += 3) c.joints[j] += c.height;
-      c.root[1] = c.height;
+      for (let j = 1; j < c.jointPosition.length; j += 3) c.jointPosition[j] += c.rootHeight;
+      c.root[1] = c.rootHeight;
       c.placed = true;
     }
   };
 
-  // The movement [a, b] of the root without half of what goes against the wish, or without half of it while the character
+  // The movement [a, b] of the root without half of what goes against the target, or without half of it while the character
   // turns on the spot.
-  const limited = (a, b, wish) => {
-    const loss = spec.steering > 0 && !spec.rooted ? k.unwishedLoss : 0, squared = wish[0] ** 2 + wish[1] ** 2;
+  const limited = (a, b, target) => {
+    const loss = spec.steering > 0 && !spec.rooted ? k.backwardLoss : 0, squared = target[0] ** 2 + target[1] ** 2;
     if (squared < k.still ** 2) return [(1 - loss) * a, (1 - loss) * b];
-    const against = loss * min(0, a * wish[0] + b * wish[1]) / squared;
-    return [a - against * wish[0], b - against * wish[1]];
+    const against = loss * min(0, a * target[0] + b * target[1]) / squared;
+    return [a - against * target[0], b - against * target[1]];
   };
-  // With motion matching, change the movement a little toward the wish, because clips have only some directions and speeds:
-  // across the wish by a share of the movement, and along it by half of that.
-  const pulled = ([a, b], wish) => {
-    const most = spec.steering > 0 && spec.rooted ? k.pull * hypot(a, b) : 0, size = hypot(...wish);
-    const ahead = size >= k.still ? wish.map((v) => v / size) : [0, 0], lack = [wish[0] - a, wish[1] - b];
+  // With motion matching, change the movement a little toward the target, because clips have only some directions and speeds:
+  // across the target by a share of the movement, and along it by half of that.
+  const pulled = ([a, b], target) => {
+    const most = spec.steering > 0 && spec.rooted ? k.pull * hypot(a, b) : 0, size = hypot(...target);
+    const ahead = size >= k.still ? target.map((v) => v / size) : [0, 0], lack = [target[0] - a, target[1] - b];
     const along = lack[0] * ahead[0] + lack[1] * ahead[1], across = lack.map((v, i) => v - along * ahead[i]);
     const share = min(1, most / max(hypot(...across), 1e-9)), more = min(max(along, -k.pullAhead * most), k.pullAhead * most);
     return [a + more * ahead[0] + share * across[0], b + more * ahead[1] + share * across[1]];
   };
 
   // Go on by a frame: the root moves as the outputs say, and so does the path ahead.
-  const advance = (y, wish) => {
+  const advance = (y, target) => {
     for (let i = 0; i < M; i++) {
       c.px[i] = c.px[i + 1];
       c.pz[i] = c.pz[i + 1];
@@ -104,7 +104,7 @@ export const createTrajectory = (spec, c) => {
     }
     const moving = spec.rooted ? 1 : max(0, 1 - c.gait[M * G]) ** .25, [vx, vz] = [y[Y.root_velocity], y[Y.root_velocity + 1]];
     let yaw = atan2(c.dx[M], c.dz[M]);
-    const [a, b] = pulled(limited(moving * (vx * cos(yaw) + vz * sin(yaw)), moving * (vz * cos(yaw) - vx * sin(yaw)), wish), wish);
+    const [a, b] = pulled(limited(moving * (vx * cos(yaw) + vz * sin(yaw)), moving * (vz * cos(yaw) - vx * sin(yaw)), target), target);
     c.px[M] += a;
     c.pz[M] += b;
     yaw -= moving * y[Y.turn];

@@ -17,7 +17,7 @@ export const views = [];
 // of bodies that darken the ground under them.
 const LEVELS = [{ scale: 2, shadow: 768, balls: 24 }, { scale: 1, shadow: 512, balls: 16 }, { scale: .8, shadow: 0, balls: 12 }];
 const SLOW = 50, PATIENCE = 24; // ms; after this many pictures that took longer, the quality goes down a level
-const asked = new URLSearchParams(location.search).get("quality");
+const requested = new URLSearchParams(location.search).get("quality");
 let level = 0, slow = 0;
 
 let renderer = null;
@@ -34,7 +34,7 @@ const shared = (first) => {
       const gl = renderer.getContext(), info = gl.getExtension("WEBGL_debug_renderer_info");
       const card = info ? String(gl.getParameter(info.UNMASKED_RENDERER_WEBGL)) : "";
       // Without a graphics card the processor draws, so start with the lowest quality.
-      if (asked !== "high" && (asked === "low" || /swiftshader|llvmpipe|software|basic render/i.test(card))) level = LEVELS.length - 1;
+      if (requested !== "high" && (requested === "low" || /swiftshader|llvmpipe|software|basic render/i.test(card))) level = LEVELS.length - 1;
     } catch { renderer = false; } // no WebGL: a message is drawn in place of the picture
   }
   return renderer;
@@ -101,7 +101,7 @@ export const createView = (canvas, home, draw) => {
     // Lower the quality if pictures keep coming slowly.
     slow = now - drawnAt > SLOW && now - drawnAt < 1000 ? slow + 1 : Math.max(0, slow - 2);
     drawnAt = now;
-    if (slow > PATIENCE && level + 1 < LEVELS.length && !asked) { level++; slow = 0; }
+    if (slow > PATIENCE && level + 1 < LEVELS.length && !requested) { level++; slow = 0; }
     view.marks.clear();
     view.over.clear();
     draw(now, view);

@@ -2,9 +2,9 @@
 
 hobble injury TABLE.csv FOLDER
 
-TABLE.csv has the columns clip, link, severity, from, to. The last two are frames of the clip's file, counted
-from 1; empty means its first and last frame. The files NAME_injuries.txt are written beside the clips in
-FOLDER, where the workflow reads them.
+TABLE.csv has the columns clip, link, severity, from, to. `from` and `to` are frames of the clip's file,
+counted from 1. If they are empty, they are its first and its last frame. A file CLIP_injuries.txt is written
+beside each clip in FOLDER, where the workflow reads it.
 """
 
 from __future__ import annotations

@@ -1,6 +1,4 @@
-"""Measures the limp of each link: its size next to people's and captured limps, and whether recognisers see
-it.
-"""
+"""Measures the limp of each link: its size beside people's limps, and whether recognisers see it."""
 
 from __future__ import annotations
 

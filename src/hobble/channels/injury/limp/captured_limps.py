@@ -1,4 +1,4 @@
-"""Captured clips that limp: their cycles and injuries, and whether the motion was generated."""
+"""The walking of captured clips, hurt or healthy, and for how long each link hurts in the training clips."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from hobble.evaluation.crowd import FPS
 from hobble.gait.cycles import WalkCycles, joined, measure
 from hobble.gait.people import people
 from hobble.gait.profile import Profile, profile
-from hobble.measures.chosen import Chosen
+from hobble.measures.clip_parts import ClipPart
 from hobble.rows.clip_rows import ClipRows
 
 VERSION = re.compile(r"_hurt[1-9](_mirror)?$")  # end of the name of a generated hurt version
@@ -27,7 +27,10 @@ PERFORMER = re.compile(r"^([^_]+)_")  # "105" in "105_25"
 
 @dataclass(frozen=True)
 class Limp:
-    """The walking of one clip. hurt: link -> severity, if they are constant. speed: cm a frame."""
+    """The walking of one captured clip whose severities do not change.
+
+    hurt: link -> severity, of links that hurt. walk: its cycles. speed: mean, cm a frame.
+    """
 
     clip: str
     hurt: Mapping[str, float]
@@ -38,7 +41,7 @@ class Limp:
     def performer(self) -> str:
         """The part of the clip's name before the first underscore.
 
-        A mirrored clip has a performer of its own.
+        A mirrored clip counts as another performer, because left and right are swapped.
         """
         found = PERFORMER.match(self.clip)
         name = found[1] if found else self.clip
@@ -47,18 +50,22 @@ class Limp:
 
 @dataclass
 class HurtSeconds:
-    """Seconds in which each link hurts in training, in captured motion and in generated hurt versions."""
+    """Link -> seconds in which it hurts in the training clips.
+
+    captured: in captured motion. made: in hurt versions that were generated from healthy clips.
+    """
 
     captured: dict[str, float] = field(default_factory=dict)
     made: dict[str, float] = field(default_factory=dict)
 
 
 def limps(
-    read: Iterable[Chosen], splits: Mapping[str, str], links: Sequence[str], skeleton: Skeleton
+    read: Iterable[ClipPart], splits: Mapping[str, str], links: Sequence[str], skeleton: Skeleton
 ) -> tuple[list[Limp], HurtSeconds]:
     """The walks of all captured clips, and the seconds for which each link hurts in the training clips.
 
-    read: what is read of the clips, sorted by clip. Of a sample, the seconds are estimates.
+    read: the parts of the clips to read, sorted by clip. If they are only a sample, the seconds are
+    estimates. splits: clip -> "train" or "held_out".
     """
     found, hurt_seconds = [], HurtSeconds()
     for clip, some in groupby(read, key=lambda one: one.clip):
@@ -76,15 +83,20 @@ def limps(
 
 
 def _add_seconds(kept: dict[str, float], links: Sequence[str], severity: Array | None, weight: float) -> None:
-    """Add the seconds for which each link hurts. severity: (R, links). weight: that of each row."""
+    """Add the seconds for which each link hurts to `kept`.
+
+    severity: (R, links). weight: how many rows of the clip each row stands for.
+    """
     for link, column in zip(links, () if severity is None else severity.T, strict=False):
         if column.any():
             kept[link] = round(kept.get(link, 0.0) + float(np.sum(column > 0)) * weight / FPS, 2)
 
 
 def healthy_of(limp: Limp, every: Sequence[Limp]) -> tuple[Profile, str]:
-    """The healthy walk to compare a clip with, and whose it is: the performer's, else the data set's, else
-    people's.
+    """The healthy walk to compare a clip with, and whose it is.
+
+    It is the performer's ("performer"). If the data set has none, it is that of all its healthy clips ("data
+    set"), and if there are none, the mean walk of the people in `hobble.gait.people` ("people").
     """
     well = [one for one in every if not one.hurt and len(one.walk)]
     own = [one for one in well if one.performer == limp.performer]
@@ -95,7 +107,7 @@ def healthy_of(limp: Limp, every: Sequence[Limp]) -> tuple[Profile, str]:
 
 
 def _walked(clip: str, seen: Sequence[ClipRows], links: Sequence[str], skeleton: Skeleton) -> list[Limp]:
-    """The walking of a clip with constant severities; an empty list if there is no whole cycle of it.
+    """The walking of a clip, in a list. It is empty if severities change or no whole cycle is walked.
 
     seen: the clip's rows, or excerpts of them.
     """
@@ -109,7 +121,7 @@ def _walked(clip: str, seen: Sequence[ClipRows], links: Sequence[str], skeleton:
     for rows in seen:
         turn = rows.y[:, rows.layout.y_turn][:, 0].astype(float)
         for part in captured(rows):
-            if part.gait.mean(axis=0).argmax() != 1:
+            if part.gait.mean(axis=0).argmax() != 1:  # not a walk
                 continue
             yaw = np.concatenate([[0.0], -np.cumsum(turn[part.rows])[:-1]])
             walks.append(measure(skeleton, _placed(part.local, part.root, yaw), FPS))
@@ -122,7 +134,7 @@ def _walked(clip: str, seen: Sequence[ClipRows], links: Sequence[str], skeleton:
 
 
 def _placed(local: Array, root: Array, yaw: Array) -> Array:
-    """(F, J, 3) positions in the world. local: in a root frame at `root` (F, 3) that faces `yaw` (F,)."""
+    """(F, J, 3) positions in the world. local: (F, J, 3) seen from `root` (F, 3), turned by `yaw` (F,)."""
     out = local.copy()
     out[..., ::2] = rotate_by_yaw(local[..., ::2], yaw[:, None])
     return out + root[:, None]

@@ -1,4 +1,4 @@
-"""Walks of one crowd in which every link hurts at every severity, and the cycles of each figure."""
+"""Lets a crowd of figures walk, each with its own injury, and measures the cycles of each figure."""
 
 from __future__ import annotations
 
@@ -22,8 +22,10 @@ STANDING = 0.1  # cm a frame; slower figures stand
 
 @dataclass(frozen=True)
 class FigureWalk:
-    """The walk of one figure: its number of `frames`, its cycles, their profile (or None) and its speed, cm a
-    frame.
+    """The walk of one figure.
+
+    walk: its cycles. profile: their profile, None without a cycle. speed: mean, cm a frame. frames: its
+    length.
     """
 
     walk: WalkCycles = field(repr=False)
@@ -41,9 +43,10 @@ def walk_figures(
     runtime: Runtime,
     others: Mapping[str, Sequence[Mapping[str, float]]] | None = None,
 ) -> list[FigureWalk]:
-    """Let figures walk straight ahead. each: link -> severity of each figure. speeds: wanted, cm a frame.
+    """Let figures walk straight ahead for `seconds`.
 
-    others: other channel -> column -> value of each figure.
+    each: link -> severity, for each figure. speeds: target speeds, cm a frame. others: name of another
+    channel -> column -> value, for each figure.
     """
     assert network.skeleton is not None
     count, frames = len(each), max(4, round(seconds * FPS))

@@ -7,17 +7,29 @@ from typing import Any
 
 from hobble.channels.injury.response.page import in_words
 from hobble.channels.shown import speaker
-from hobble.measures.chosen import captured_sampled
-from hobble.measures.given import Json
+from hobble.measures.clip_parts import captured_sampled
+from hobble.measures.inputs import Json
 from hobble.report.charts import Chart, Trace, axis, line
 from hobble.report.formats import number
 from hobble.report.gather import Material
 from hobble.report.page_parts import PageSection, Paragraph, SectionPart
 from hobble.report.tables import Column, Table
 
+# The effects in the chart and in the table of captured limps.
 SHOWN = ("speed", "stance", "step_hurt", "knee_hurt", "hip_hurt", "lean", "pelvis_drop", "arm_hurt")
 MOST_NAMED = 8  # links that a sentence lists
+RECOGNISERS = (
+    "Two recognisers judge each walk, four seconds at a time. The linear one learnt from people's strong "
+    "limps, the graded one also from milder versions of them."
+)
+# Columns of a table; shares of the windows of four seconds.
+RECOGNISED = (
+    Column.number("share in which the linear recogniser finds a limp"),
+    Column.number("share in which the graded recogniser finds one on the hurt side"),
+    Column.number("share in which the graded one names the wrong side"),
+)
 COLOURS = {"hip": "@g1", "thigh": "@g2", "shank": "@g3", "foot": "@g4", "back": "@g5"}  # of parts; arms: @g0
+# Part of the body -> the impairment of people that is most like its limp.
 IMPAIRMENTS = {
     "hip": "trendelenburg",
     "pelvis": "trendelenburg",
@@ -29,9 +41,7 @@ IMPAIRMENTS = {
 
 
 def section(found: Json, material: Material) -> PageSection:
-    """Charts of sizes, tables, the comparison with held-out captured limps, and where the training data came
-    from.
-    """
+    """Where the training data came from, the chart of sizes, the recognition, and all tables."""
     if not found.get("applies"):
         return PageSection("injury", [])
     name, say, found = material.name, speaker(material.network["skeleton"]), in_words(found, material)
@@ -40,6 +50,7 @@ def section(found: Json, material: Material) -> PageSection:
         [
             SectionPart(1, Paragraph(provenance(found["hurt_seconds"], say) + captured_sampled(found))),
             SectionPart(2, size_chart(found)),
+            SectionPart(3, Paragraph(RECOGNISERS)),
             SectionPart(
                 3,
                 Table(
@@ -59,16 +70,18 @@ def section(found: Json, material: Material) -> PageSection:
 
 def provenance(hurt_seconds: Mapping[str, Mapping[str, float]], say: Callable[[str], str] = str) -> str:
     """Which injuries of the training data were captured and which were generated from healthy clips."""
-    parts = []
-    for kind, words in (("captured", "in captured clips"), ("made", "in clips generated from healthy ones")):
+    sentences = []
+    for kind, words in (("captured", "were captured"), ("made", "were generated from healthy clips")):
         if some := hurt_seconds[kind]:
             names = f": {', '.join(map(say, sorted(some)))}" if len(some) <= MOST_NAMED else ""
-            parts.append(f"{len(some)} {words} ({number(sum(some.values()), 3)} s{names})")
-    return f"Links hurt in training: {'; '.join(parts)}." if parts else "No link was hurt in training."
+            links = f"{len(some)} links" if len(some) != 1 else "one link"
+            seconds = number(sum(some.values()), 3)
+            sentences.append(f"Injuries of {links} in training {words} ({seconds} s in all{names}).")
+    return " ".join(sentences) or "No link was hurt in training."
 
 
 def size_chart(found: Json) -> Chart:
-    """Each effect over severity, for a chosen effect: a line for each link, and people's mean."""
+    """The chosen effect over severity: a line for each link, and the means over people."""
     options: dict[str, list[Trace]] = {}
     rows = [row for row in found["sizes"] if row["gait"] == "walk"]
     for effect in SHOWN:
@@ -116,9 +129,7 @@ def _named(rows: Sequence[Mapping[str, Any]]) -> tuple[list[Column], list[list[A
     columns = [
         Column.number("severity"),
         Column.count("walks"),
-        Column.number("share called impaired by the recogniser of strong limps"),
-        Column.number("share named by the recogniser of mild limps"),
-        Column.number("share with the wrong side"),
+        *RECOGNISED,
     ]
     return columns, [[r["severity"], r["walks"], r["impaired"], r["named"], r["wrong_side"]] for r in rows]
 
@@ -155,11 +166,14 @@ def held_out_table(name: str, rows: Sequence[Mapping[str, Any]], say: Callable[[
 
 
 def size_table(name: str, rows: Sequence[Mapping[str, Any]]) -> Table | None:
-    """Every walk with its effects and its recognised limp."""
+    """Every walk with its effects and the limp that is recognised."""
     texts = ("gait", "link", "part", "side", "called", "graded")
     if not rows:
         return None
-    columns = [Column(k) if k in texts else Column.number(k.replace("_", " ")) for k in rows[0]]
+    words = {"called": "linear recogniser", "graded": "graded recogniser"}
+    words |= dict(zip(("impaired", "named", "wrong_side"), (c.label for c in RECOGNISED), strict=True))
+    named = {key: words.get(key, key.replace("_", " ")) for key in rows[0]}
+    columns = [Column(word) if key in texts else Column.number(word) for key, word in named.items()]
     return Table(f"{name}-limp-sizes", columns, [list(row.values()) for row in rows], "Sizes of all effects")
 
 
@@ -171,9 +185,7 @@ def together_table(name: str, rows: Sequence[Mapping[str, Any]]) -> Table | None
         Column("with"),
         Column.count("walks"),
         Column.number("speed, share of the same walk without injury"),
-        Column.number("share that a classifier of strong limps calls impaired"),
-        Column.number("share recognised by the recogniser of mild limps"),
-        Column.number("share with the wrong side"),
+        *RECOGNISED,
     ]
     keys = ("column", "walks", "speed_share", "impaired", "named", "wrong_side")
     title = "Is the limp of a hurt leg (severity 10) recognised if another channel is high too?"
@@ -181,7 +193,7 @@ def together_table(name: str, rows: Sequence[Mapping[str, Any]]) -> Table | None
 
 
 def captured_table(name: str, rows: Sequence[Mapping[str, Any]], say: Callable[[str], str]) -> Table | None:
-    """Captured limps with the same effects."""
+    """The SHOWN effects of captured limps."""
     if not rows:
         return None
     columns = [

@@ -1,8 +1,8 @@
-"""Measures the limp of each link in sizes, and compares it with people's and captured limps.
+"""Measures the size of each link's limp, and compares it with people's and captured limps.
 
-A rank correlation says nothing about size: it is 1 even for a change of 2 %. So each effect is given with its
-size at severities 3, 5, 7 and 10, relative to the same network's healthy character. The recognisers are those
-of `hobble.gait`, which learnt from real people only.
+A rank correlation says nothing about size: it is 1 even for a change of 2 %. So the size of each effect is
+measured at severities 3, 5, 7 and 10, relative to the healthy character of the same network. Two recognisers
+of `hobble.gait` judge the walks, the linear and the graded one. They learnt from real people only.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from hobble.channels.injury.crowd_severities import links as links_of
 from hobble.channels.injury.limp import Options
 from hobble.channels.injury.limp.captured_limps import HurtSeconds, Limp, healthy_of, limps
 from hobble.channels.injury.limp.crowd_walks import FigureWalk, walk_figures
-from hobble.channels.injury.limp.together import limps_together, named_together
+from hobble.channels.injury.limp.with_other_channel import limps_together, named_together
 from hobble.core.errors import HobbleError
 from hobble.core.skeleton import Skeleton
 from hobble.evaluation.spearman import spearman
@@ -28,8 +28,8 @@ from hobble.gait.people import people
 from hobble.gait.profile import Profile, profile
 from hobble.gait.recogniser import RIGHT, SIDES, examples
 from hobble.hurt.body_parts import part_of_link
-from hobble.measures.chosen import chosen, sample_of, with_sample
-from hobble.measures.given import Given, Outcome
+from hobble.measures.clip_parts import clip_parts, sample_of, with_sample
+from hobble.measures.inputs import MeasureInputs, Outcome
 from hobble.models.load import load_network
 from hobble.models.network import Network
 from hobble.runtime.options import Runtime
@@ -37,7 +37,7 @@ from hobble.runtime.options import Runtime
 NO_SEVERITIES = "this network has no severity inputs"
 NO_CYCLE = "its healthy character does not walk a whole cycle"
 SEVERITIES = (3.0, 5.0, 7.0, 10.0)
-SPEEDS = {"walk": 2.0, "jog": 7.0}  # cm a frame; 2 is 1.2 m/s, as people walk
+SPEEDS = {"walk": 2.0, "jog": 7.0}  # target speeds, cm a frame; 2 is 1.2 m/s, as people walk
 FIRST_SEVERITIES = (5.0, 10.0)  # of an injury to which a second one is added
 SECOND_SEVERITIES = (0.0, 5.0, 10.0)
 LEG = ("hip", "thigh", "shank", "foot")
@@ -57,36 +57,24 @@ def limp(
 ) -> dict[str, Any]:
     """The content of limp.json. If nothing can be measured, `applies` is false and `reason` says why.
 
-    every: the walks of the data set's captured clips. hurt_seconds: for which each link hurts in training.
-    links: links to hurt, by default all.
+    every: the walks of the data set's captured clips. hurt_seconds: seconds for which each link hurts in
+    training. splits: clip -> "train" or "held_out". seconds: length of each walk. links: links to hurt, by
+    default all.
 
-    `sizes`: a row for each gait, link and severity with EFFECTS, as if the link's side were hurt, and the
-    recognised limp. `trends`: Spearman's rho of each effect with severity, and its size at 10. `named`:
-    shares of windows by severity, over the links of the legs. `people`: mean and spread of each effect.
-    `captured`: effects of captured clips. `held_out_limps`: see `compare_held_out`. `second`: see
-    `second_injuries`.
-    `together`: effects on hurt legs with a value of another channel, and `named_together`, see
-    `hobble.channels.injury.limp.together`.
+    `sizes`: a row for each gait, link and severity with the EFFECTS (the link's side counts as the hurt side)
+    and the recognised limp. `trends`: Spearman's rho of each effect with severity, and its size at 10.
+    `named`: how hurt legs are recognised, by severity. `people`: mean and standard deviation of each effect
+    of people's impairments. `captured`: effects of captured clips. `held_out_limps`: see `compare_held_out`.
+    `second`: see `second_injuries`. `together` and `named_together`: limps while another channel has a value,
+    see `hobble.channels.injury.limp.with_other_channel`.
     """
     head: dict[str, Any] = {"configuration": configuration}
     if not links_of(network) or network.skeleton is None:
         return {**head, "applies": False, "reason": NO_SEVERITIES}
     links = list(links or links_of(network))
-    rows: list[dict[str, Any]] = []
-    for gait, speed in SPEEDS.items():
-        cases = [(link, s) for link in links for s in SEVERITIES]
-        figures = walk_figures(
-            network, [{}, *({link: s} for link, s in cases)], speed, gait, seconds, runtime
-        )
-        healthy = figures[0]
-        if healthy.profile is None:
-            if gait == "walk":
-                return {**head, "applies": False, "reason": NO_CYCLE}
-            continue
-        rows += [
-            _row(network, gait, *case, figure, healthy)
-            for case, figure in zip(cases, figures[1:], strict=True)
-        ]
+    rows = _sizes(network, links, seconds, runtime)
+    if rows is None:
+        return {**head, "applies": False, "reason": NO_CYCLE}
     return {
         **head,
         "applies": True,
@@ -109,10 +97,29 @@ def limp(
     }
 
 
+def _sizes(
+    network: Network, links: Sequence[str], seconds: float, runtime: Runtime
+) -> list[dict[str, Any]] | None:
+    """The row of each gait, link and severity; None if the healthy character does not walk a whole cycle."""
+    rows: list[dict[str, Any]] = []
+    cases = [(link, severity) for link in links for severity in SEVERITIES]
+    injuries = [{}, *({link: severity} for link, severity in cases)]
+    for gait, speed in SPEEDS.items():
+        healthy, *hurt = walk_figures(network, injuries, speed, gait, seconds, runtime)
+        if healthy.profile is None:
+            if gait == "walk":
+                return None
+            continue
+        rows += [
+            _row(network, gait, *case, figure, healthy) for case, figure in zip(cases, hurt, strict=True)
+        ]
+    return rows
+
+
 def _together(
     network: Network, links: Sequence[str], seconds: float, runtime: Runtime
 ) -> dict[str, list[dict[str, Any]]]:
-    """The rows of hurt legs with values of another channel, and their recognition."""
+    """Rows of walks with a hurt leg and a value of another channel, and how they are recognised."""
     assert network.skeleton is not None
     skeleton = network.skeleton
     legs = [link for link in links if part_of_link(skeleton, _pair(skeleton, link)).name in LEG]
@@ -137,7 +144,13 @@ def _pair(skeleton: Skeleton, link: str) -> tuple[str, str]:
 def _row(
     network: Network, gait: str, link: str, severity: float, figure: FigureWalk, healthy: FigureWalk
 ) -> dict[str, Any]:
-    """The row of one walk: its case, its effects (None without a cycle) and the recognised limp."""
+    """The row of one walk: gait, link and severity, the effects, and how the walk is recognised.
+
+    called, graded: label and side by the linear and by the graded recogniser. The others are shares of
+    windows. impaired: the linear recogniser finds a limp. named: the graded one finds a limp and does not
+    name the other side. wrong_side: it names the other side. All are None if the figure does not walk a whole
+    cycle.
+    """
     assert network.skeleton is not None
     assert healthy.profile is not None
     part = part_of_link(network.skeleton, _pair(network.skeleton, link))
@@ -187,7 +200,7 @@ def _trends(rows: Sequence[Mapping[str, Any]]) -> list[dict[str, Any]]:
 
 
 def _named(rows: Sequence[Mapping[str, Any]]) -> list[dict[str, Any]]:
-    """How walks with a hurt leg are recognised, by severity."""
+    """How walks with a hurt leg are recognised, by severity: means over the walks."""
     out = []
     for severity in SEVERITIES:
         legs = [r for r in rows if r["gait"] == "walk" and r["severity"] == severity and r["part"] in LEG]
@@ -200,7 +213,7 @@ def _named(rows: Sequence[Mapping[str, Any]]) -> list[dict[str, Any]]:
 
 
 def _of_clip(skeleton: Skeleton, one: Limp, every: Sequence[Limp]) -> dict[str, Any]:
-    """The effects of a captured clip relative to a healthy walk."""
+    """The effects of a captured clip relative to a healthy walk (`healthy_of`)."""
     healthy, whose = healthy_of(one, every)
     side = hurt_side(skeleton, max(one.hurt, key=lambda link: one.hurt[link]))
     sizes = _rounded_values(effects(profile(one.walk), healthy, side))
@@ -208,7 +221,11 @@ def _of_clip(skeleton: Skeleton, one: Limp, every: Sequence[Limp]) -> dict[str, 
 
 
 def distance(walk: Profile, healthy: Profile, other: Profile, other_healthy: Profile) -> float:
-    """How different two bodies' changes from their healthy walks are, in people's spreads per feature."""
+    """How much the limps of two bodies differ. The limp is what changes from the body's own healthy walk.
+
+    It is the root mean square over the features. The difference in a feature is divided by the standard
+    deviation of that feature over people's walks.
+    """
     known = examples(people(), range(people().count))[0]
     spread = known.std(axis=0)
     a, b = (np.array(list(features(*pair).values())) for pair in ((walk, healthy), (other, other_healthy)))
@@ -221,8 +238,8 @@ def compare_held_out(
     """Whether the hurt character comes nearer to captured limps that were held out of training.
 
     Each clip is compared with the character with the clip's severities, and with the healthy character. Both
-    are asked for 1.2 m/s, the likely speed of the performer's healthy walk. `hurt` and `healthy` are
-    distances. `nearer` should be true.
+    have a target speed of 1.2 m/s, which is likely for the performer's healthy walk. `hurt` and `healthy`:
+    the `distance` of the clip from each. `nearer`: whether the hurt one is nearer, as it should be.
     """
     limps = [one for one in every if one.hurt and splits.get(one.clip) == "held_out"]
     if not limps:
@@ -247,10 +264,10 @@ def compare_held_out(
 def second_injuries(
     network: Network, links: Sequence[str], seconds: float, runtime: Runtime
 ) -> list[dict[str, Any]]:
-    """Each link in addition to a right thigh at severities 5 and 10.
+    """Speeds with each link hurt in addition to a right thigh at severities 5 and 10.
 
-    `speed_share`: of the healthy walk's speed. `from_first`: the share of the speed with the first injury
-    alone. A second injury must not make the walk faster, so it should be at most 1.
+    `speed_share`: speed as a share of the healthy walk's. `from_first`: speed as a share of that with the
+    first injury alone. A second injury must not make the walk faster, so it should be at most 1.
     """
     assert network.skeleton is not None
     first = next((link for link in links if _is_part_on_side(network.skeleton, link, "thigh", "right")), None)
@@ -279,22 +296,22 @@ def _is_part_on_side(skeleton: Skeleton, link: str, part: str, side: str) -> boo
     return found.name == part and hurt_side(skeleton, link) == side
 
 
-def run(given: Given, options: Options) -> Outcome:
+def run(inputs: MeasureInputs, options: Options) -> Outcome:
     """limp.json and its tables."""
-    network = load_network(given.weights)
+    network = load_network(inputs.weights)
     if network.skeleton is None:
-        raise HobbleError(f"{given.weights} has no skeleton")
+        raise HobbleError(f"{inputs.weights} has no skeleton")
     # Without severities there is nothing to measure.
-    sample = sample_of(given, options)
-    read = chosen(given.clips, sample) if links_of(network) else ()
-    every, hurt_seconds = limps(read, given.splits, links_of(network), network.skeleton)
+    sample = sample_of(inputs, options)
+    read = clip_parts(inputs.clips, sample) if links_of(network) else ()
+    every, hurt_seconds = limps(read, inputs.splits, links_of(network), network.skeleton)
     result = limp(
         network,
         every,
         hurt_seconds,
-        given.splits,
-        configuration=given.configuration,
-        runtime=given.runtime,
+        inputs.splits,
+        configuration=inputs.configuration,
+        runtime=inputs.runtime,
         seconds=options.limp_seconds,
     )
     tables = {name: result.get(name, []) for name in ("sizes", "trends", "named", "second", "together")}

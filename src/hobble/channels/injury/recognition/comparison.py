@@ -7,13 +7,13 @@ from collections.abc import Sequence
 from hobble.channels.injury.recognition.run import rows
 from hobble.evaluation.comparison_rows import PublishedRow, SideBySide, published_row
 from hobble.evaluation.configuration_results import ConfigurationResults
-from hobble.measures.given import Json, Row
+from hobble.measures.inputs import Json, Row
 
 NAME = "recognition"
 
 
 def compared(all_measured: Sequence[ConfigurationResults], published: Json) -> SideBySide:
-    """The result of each configuration, and the share that people recognised."""
+    """The result of each configuration, beside the share of hurt parts that people recognised."""
     return SideBySide(
         entries=[{**m.found(NAME), "configuration": m.name} for m in all_measured],
         against_published=[row for m in all_measured for row in _against_people(m, published["recognition"])],

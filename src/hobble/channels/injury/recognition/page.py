@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from hobble.measures.chosen import captured_sampled
-from hobble.measures.given import Json
+from hobble.measures.clip_parts import captured_sampled
+from hobble.measures.inputs import Json
 from hobble.report.charts import Chart, Trace
 from hobble.report.gather import Material
 from hobble.report.page_parts import PageSection, SectionPart
@@ -15,7 +15,7 @@ def section(found: Json, material: Material) -> PageSection:
 
 
 def recognition_chart(found: Json) -> Chart | None:
-    """Confusion tables of the classifier that recognises the hurt part."""
+    """Confusion tables of the classifier that recognises the hurt part. None if nothing was measured."""
     if not found.get("applies"):
         return None
     generated, captured = found["generated"], found["captured"]

@@ -6,7 +6,7 @@ from typing import NotRequired, TypedDict
 
 
 class OfSeverity(TypedDict):
-    """The share of the windows, or of the walks, of one severity that is named right."""
+    """How many windows, or walks, there are of one severity, and the share `right` that is recognised."""
 
     severity: float
     windows: NotRequired[int]
@@ -15,7 +15,11 @@ class OfSeverity(TypedDict):
 
 
 class Judged(TypedDict):
-    """How windows, or whole walks, were named. confusion: what hurts -> what was recognised -> how many."""
+    """How windows, or whole walks, were recognised.
+
+    right: share in which the links that hurt are named. right_without_side: share in which the part of the
+    body is named, on either side. confusion: what hurts -> what was recognised -> how many.
+    """
 
     windows: NotRequired[int]
     walks: NotRequired[int]
@@ -26,20 +30,28 @@ class Judged(TypedDict):
 
 
 class OfGenerated(Judged):
-    """Generated windows. by_walk: with one answer for a whole walk."""
+    """How windows of generated walks were recognised. by_walk: with one answer for each whole walk."""
 
     by_walk: Judged
 
 
 class OfCaptured(TypedDict):
-    """Captured windows: a quarter of every stretch left out in turn, and the held-out clips."""
+    """How captured windows were recognised.
+
+    cross_validated: those of training clips, with each quarter of every stretch left out of learning in turn.
+    held_out: those of the held-out clips.
+    """
 
     cross_validated: Judged
     held_out: Judged
 
 
 class Recognition(TypedDict):
-    """recognition.json. It has only the first keys and `reason` if `applies` is false. See `recognition`."""
+    """recognition.json. If `applies` is false, it has only the first three keys and `reason`.
+
+    people: share that people recognised in a published study. chance: share that a random guess gets right.
+    See `recognition`.
+    """
 
     configuration: str
     people: float

@@ -1,8 +1,8 @@
 """Measures whether a classifier that learnt from captured motion recognises the hurt part of generated walks.
 
-It learns windows of the training clips, labelled with the link that hurts. Its accuracy on other captured
-windows is the upper limit. Its accuracy on generated walks is compared with that of people who saw animated
-figures (Ferre 2019).
+It learns from windows of the training clips and the link that hurts in each. Its accuracy on other captured
+windows is the most that can be expected. Its accuracy on generated walks is compared with that of people who
+saw animated figures (Ferre 2019).
 """
 
 from __future__ import annotations
@@ -26,8 +26,8 @@ from hobble.evaluation.crowd import run as run_walks
 from hobble.evaluation.gait_features import features
 from hobble.gait.discriminant import Discriminant, learn
 from hobble.hurt.body_parts import part_of_link
-from hobble.measures.chosen import captured_motion, sample_of, with_sample
-from hobble.measures.given import Given, Outcome, Row
+from hobble.measures.clip_parts import captured_motion, sample_of, with_sample
+from hobble.measures.inputs import MeasureInputs, Outcome, Row
 from hobble.measures.sample_options import SampleOptions
 from hobble.models.load import load_network
 from hobble.models.network import Network
@@ -36,22 +36,25 @@ from hobble.runtime.options import Runtime
 INJURY = "injury"  # the channel
 HEALTHY = "healthy"
 WINDOW = 60  # frames, about a cycle; windows of 75 or 90 are recognised less well
-STEP = 15
-FOLDS = 4  # of the cross-validation: quarters of each stretch
-GENERATED = (3.0, 5.0, 7.0, 10.0)  # severities
-SPEEDS = (1.8, 2.2, 2.6)  # cm a frame asked for
+STEP = 15  # frames from the start of one window to the start of the next
+FOLDS = 4  # the cross-validation leaves out each quarter of a stretch in turn
+GENERATED = (3.0, 5.0, 7.0, 10.0)  # severities of the generated walks
+SPEEDS = (1.8, 2.2, 2.6)  # their target speeds, cm a frame
 WARM_UP, USED = 4 * FPS, 6 * FPS  # frames of a generated walk that are skipped, and that are used
 AHEAD = 0.9  # a window counts as walking if at least this share of the root's speed is forward
-LEAST_SPEED = 0.5  # of a walking window, cm a frame
-Plain = Callable[[str], tuple[str, ...]]  # see `sides_of`
+LEAST_SPEED = 0.5  # cm a frame; a slower window does not count as walking
+Plain = Callable[[str], tuple[str, ...]]  # class -> parts of the body without their side; see `sides_of`
 REASON = "this network has no severity inputs"
 TOO_FEW = "fewer than two parts hurt in the captured clips, or no clip walks"
 
 
 @dataclass(frozen=True)
 class InjuryWindow:
-    """A stretch of walking: its clip, the link that hurts (or HEALTHY), its highest severity, features and
-    fold.
+    """A second of walking.
+
+    clip: its clip, or the name of a generated walk. hurt: its class, that is the links that hurt, joined by
+    " and ", or HEALTHY. severity: the highest. values: the features of `hobble.evaluation.gait_features`.
+    part: which quarter of a captured stretch it is in, for the cross-validation.
     """
 
     clip: str
@@ -72,14 +75,13 @@ def recognition(
 ) -> Recognition:
     """How well a classifier of captured clips recognises generated walks: the content of recognition.json.
 
-    motion: the captured clips. splits: clip -> "train" or "held_out". people: the published share.
+    motion: the captured clips. splits: clip -> "train" or "held_out". people: share of hurt parts that people
+    recognised in a published study.
 
-    `classes`: what the classifier can recognise. `captured`: results on captured clips, `cross_validated` (a
-    quarter of every stretch left out in turn) and `held_out`. `generated`: windows of walks with each class's
-    link at severities 3, 5, 7 and 10. `by_walk`: the same with one answer for a whole walk. All have
-    `windows` (or `walks`), the share `right`, `right_without_side`, `by_severity`, and the `confusion`:
-    counts of hurt -> recognised. If the network or the clips do not allow the measurement, `applies` is false
-    and `reason` says why.
+    `classes`: what the classifier can recognise. `captured`: results on captured clips. `generated`: results
+    on walks with the links of each class at severities 3, 5, 7 and 10. For their keys see
+    `hobble.channels.injury.recognition.results`. If the network or the clips do not allow the measurement,
+    `applies` is false and `reason` says why.
     """
     refused: Recognition = {"configuration": configuration, "people": people, "applies": False}
     if not links_of(network) or network.skeleton is None:
@@ -108,7 +110,7 @@ def recognition(
 
 
 def walking_windows(clip: Captured, network: Network) -> list[InjuryWindow]:
-    """The windows of a captured stretch that walk straight ahead with constant severities."""
+    """The windows of a captured stretch in which the figure walks ahead and the hurt links stay the same."""
     assert network.skeleton is not None
     walk = clip.gait[:, network.gaits.index("walk")]
     hurts = clip.channels[INJURY] > 0
@@ -132,7 +134,10 @@ def walking_windows(clip: Captured, network: Network) -> list[InjuryWindow]:
 def generated(
     network: Network, classes: Sequence[str], healthy: bool, runtime: Runtime
 ) -> list[InjuryWindow]:
-    """Windows of generated walks, each class at each severity and speed."""
+    """Windows of generated walks, with the links of each class hurt at each severity and speed.
+
+    healthy: whether to add healthy walks.
+    """
     assert network.skeleton is not None
     cases = [(name, s, v) for name, s, v in product(classes, GENERATED, SPEEDS)]
     cases += [(HEALTHY, 0.0, v) for v in SPEEDS] if healthy else []
@@ -153,9 +158,9 @@ def generated(
 
 
 def sides_of(skeleton: Skeleton) -> Plain:
-    """A function from a class to the same class without left and right, as people were asked.
+    """A function that returns the parts of the body of a class, without left and right.
 
-    For one link, "LeftLeg-LeftFoot", it gives the parts of the body that the link is in, ("shank",).
+    For the class "LeftLeg-LeftFoot" it returns ("shank",), for HEALTHY ().
     """
     pairs = dict(zip(skeleton.link_names, skeleton.links, strict=True))
 
@@ -168,7 +173,7 @@ def sides_of(skeleton: Skeleton) -> Plain:
 
 
 def table(windows: Sequence[InjuryWindow]) -> Array:
-    """(n, D) features."""
+    """(n, D) features of n windows."""
     return np.array([list(w.values.values()) for w in windows])
 
 
@@ -190,19 +195,19 @@ def rows(result: Recognition) -> list[Row]:
     ]
 
 
-def run(given: Given, options: SampleOptions) -> Outcome:
+def run(inputs: MeasureInputs, options: SampleOptions) -> Outcome:
     """recognition.json, and all its confusion tables as one table."""
     # Generated hurt versions are left out: the classifier would learn the generator's table of injuries.
-    clips = {clip: file for clip, file in given.clips.items() if not VERSION.search(clip)}
-    facts = [file for file in given.facts if file.stem in clips]
-    sample = sample_of(replace(given, facts=facts), options)
+    clips = {clip: file for clip, file in inputs.clips.items() if not VERSION.search(clip)}
+    facts = [file for file in inputs.facts if file.stem in clips]
+    sample = sample_of(replace(inputs, facts=facts), options)
     result = recognition(
-        load_network(given.weights),
+        load_network(inputs.weights),
         captured_motion(clips, sample),
-        given.splits,
-        configuration=given.configuration,
-        runtime=given.runtime,
-        people=given.published["recognition"]["share"],
+        inputs.splits,
+        configuration=inputs.configuration,
+        runtime=inputs.runtime,
+        people=inputs.published["recognition"]["share"],
     )
     right = f"named right: {result['generated']['right']} of generated windows" if result["applies"] else ""
     return Outcome(with_sample(result, sample), {"confusion": rows(result)}, right or result["reason"])
@@ -213,7 +218,7 @@ def _values(skeleton: Skeleton, local: Array, contacts: Array, root: Array, span
 
 
 def _cross_validated(windows: Sequence[InjuryWindow], sided: Plain) -> Judged:
-    """The classes of windows, each quarter judged by a classifier that learnt from the other three."""
+    """How windows are recognised if a classifier judges each quarter and learns from the other three."""
     judged: list[InjuryWindow] = []
     named: list[str] = []
     for part in range(FOLDS):
@@ -247,7 +252,10 @@ def _confusion(
     sided: Plain,
     what: str = "windows",
 ) -> Judged:
-    """Counts of hurt -> recognised: a row for each class that hurts, a column for each known class."""
+    """How windows were recognised. named: the recognised class of each window.
+
+    what: "windows", or "walks" if each window stands for a whole walk.
+    """
     counts = {h: dict.fromkeys(classes, 0) for h in sorted({w.hurt for w in windows})}
     right: dict[float, list[bool]] = {}
     for w, name in zip(windows, named, strict=True):

@@ -21,11 +21,11 @@ from hobble.models.network import Network
 from hobble.runtime.options import Runtime
 
 FIRST = 7.0  # severity of the first injury, to which a second one is added
-SECOND = (0.0, 5.0, 10.0)
-DIVIDED = (0.0, 2.5, 5.0, 7.5, 10.0)
-SCALES = (1.0, 2.0, 5.0)
-INTO_A_JOG = (0.0, 5.0, 10.0)
-JOGGING = 0.9  # a figure jogs from this share of its final speed on
+SECOND = (0.0, 5.0, 10.0)  # severities of the second injury
+DIVIDED = (0.0, 2.5, 5.0, 7.5, 10.0)  # severities that are divided
+SCALES = (1.0, 2.0, 5.0)  # their divisors
+INTO_A_JOG = (0.0, 5.0, 10.0)  # severities of figures that change from walking to jogging
+JOGGING = 0.9  # a figure jogs once it has this share of its final speed
 
 
 def _frames(share: float, seconds: float) -> int:
@@ -52,13 +52,14 @@ def _speed(network: Network, walks: Walks, stretch: int, figure: int) -> float:
 def second_injuries(
     network: Network, links: Sequence[str], seconds: float, runtime: Runtime
 ) -> list[SecondInjury]:
-    """Every link hurt more and more, in addition to a first one at severity 7, while walking.
+    """Walks with a first link at severity 7 and every other link as a second one at severities 0, 5 and 10.
 
     The first is one link of each part of the body (`one_of_each_part`), because all 30 would take longer than
     everything else that is measured. `from_first_cm`: distance of the walk with the second at 10 from the
-    walk with the first alone. `share`: the same as a share of the second's effect on a healthy body.
+    walk with the first alone. `share`: this distance as a share of the second's effect on a healthy body.
     `from_second_cm`: distance of the walk with both from the walk with the second alone; 0 if the second
-    hides the first. `spearman`: of the distance from the first with the second's severity.
+    hides the first. `spearman`: rank correlation between the second's severity and the distance from the walk
+    with the first alone.
     """
     assert network.skeleton is not None
     firsts = one_of_each_part(network.skeleton, links)
@@ -99,8 +100,8 @@ def second_injuries(
 def _effect_of_one(walks: Walks, last: int, figure: int) -> tuple[Array, float, float]:
     """What one injury does to a figure that is healthy in stretch 1 and hurt in stretch `last`.
 
-    The mean cycle in `last`; the distance of the walk from that cycle, cm; the effect: how much further the
-    hurt walk is from the healthy cycle than the healthy walk is, cm.
+    Returns the mean cycle of the hurt walk; the mean distance of the hurt walk from it, cm; and the effect:
+    how much farther the hurt walk is from the mean healthy cycle than the healthy walk is, cm.
     """
     healthy, cycle = _cycle(walks, 1, figure), _cycle(walks, last, figure)
     effect = _distance_from_cycle(walks, last, figure, healthy) - _distance_from_cycle(
@@ -119,11 +120,11 @@ def one_of_each_part(skeleton: Skeleton, links: Sequence[str]) -> list[str]:
 
 
 def into_a_jog(network: Network, links: Sequence[str], seconds: float, runtime: Runtime) -> list[IntoAJog]:
-    """From walking to jogging with each link at severities 0, 5 and 10.
+    """A change from walking to jogging, with each link at severities 5 and 10 and without injury.
 
     `kept`: distance of the jog from the healthy jog, as a share of the distance of the walk from the healthy
-    walk. It is 0 if the jog shows no injury. `reach_seconds`: from the command to nine tenths of the jog's
-    speed.
+    walk. It is 0 if the jog shows no injury. `reach_seconds`: time until the figure has nine tenths of the
+    jog's speed.
     """
     each = [(link, s) for link, s in product(links, INTO_A_JOG) if s > 0]
     figures: list[tuple[str | None, float]] = [(None, 0.0), *each]
@@ -167,7 +168,7 @@ def into_a_jog(network: Network, links: Sequence[str], seconds: float, runtime: 
 def divided_severities(
     network: Network, links: Sequence[str], seconds: float, runtime: Runtime
 ) -> list[Divided]:
-    """The walk with severities divided by 1, 2 and 5: how much of each link's effect remains."""
+    """How much of each link's effect remains if severities are divided by 1, 2 or 5 (`runtime.scales`)."""
     gait = ["walk"] * len(links)
     script = [CrowdTarget(_frames(WALK_IN, seconds), gait, severities(network, [{}] * len(links)))]
     script += [

@@ -7,7 +7,7 @@ from typing import Any
 
 from hobble.evaluation.comparison_rows import SideBySide
 from hobble.evaluation.configuration_results import ConfigurationResults
-from hobble.measures.given import Json
+from hobble.measures.inputs import Json
 
 NAME = "injury"
 KEPT = ("applies", "reason", "summary")

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from typing import Any
 
+from hobble.report.comparison_charts import Compared
 from hobble.report.page_parts import PageSection, Paragraph, SectionPart
-from hobble.report.side_by_side import Compared
 from hobble.report.tables import Column, Table
 
 INTRODUCTION = (
@@ -13,7 +13,7 @@ INTRODUCTION = (
     "mean over the links that were hurt in training. ρ is Spearman's rank correlation: 1 means that the "
     "measure always rises with severity, −1 that it always falls, 0 that it does neither."
 )
-# Keys of the injury summary -> words.
+# Keys of a `Summary` in injury.json -> words.
 INJURY = {
     "from_healthy_cm": "distance from the healthy pose at severity 10, cm per joint",
     "speed_share": "share of the healthy speed at severity 10",

@@ -7,14 +7,15 @@ from typing import Any
 
 import numpy as np
 
-from hobble.measures.given import Json
+from hobble.measures.inputs import Json
 from hobble.report.formats import number
 from hobble.report.summary import Hint
 
 
 def injury_hints(found: Json) -> Iterator[Hint]:
-    """Whether and how much each link changes the walk, and whether the walk recovers, relative to a healthy
-    walk's drift.
+    """Whether and how much each link changes the walk, and whether the walk recovers.
+
+    Changes are compared with the drift of a healthy walk.
     """
     responses = [r for r in found.get("responses") or () if r["gait"] == "walk"]
     walks = [r for r in responses if r.get("trained", True)]
@@ -68,7 +69,10 @@ def _span(low: float, high: float) -> str:
 
 
 def _unhurt(responses: Sequence[Mapping[str, Any]], key: str) -> float:
-    """The values of links that were never hurt in training. They show how far a healthy walk drifts."""
+    """The mean of `key` over links that were never hurt in training: how far a healthy walk drifts.
+
+    0 if all links were hurt.
+    """
     values = [r[key] for r in responses if not r.get("trained", True) and r.get(key) is not None]
     return float(np.mean(values)) if values else 0.0
 

@@ -8,7 +8,7 @@ from typing import Any
 from hobble.channels.injury.response import page_cases as cases
 from hobble.channels.injury.response.hints import injury_hints
 from hobble.channels.shown import speaker
-from hobble.measures.given import Json
+from hobble.measures.inputs import Json
 from hobble.report.charts import Chart, ChartGroup, Trace, axis, line
 from hobble.report.gather import Material
 from hobble.report.page_parts import ChartPair, PageSection, SectionPart
@@ -58,7 +58,7 @@ PANELS: tuple[Panel, ...] = (
 
 
 def section(found: Json, material: Material) -> PageSection:
-    """Charts and tables. Empty for a network without severities."""
+    """The charts and tables of injury.json. Empty for a network without severities."""
     parts = _parts(in_words(found, material), material.name) if found.get("applies") else []
     return PageSection("injury", parts, title="Injury response", at=20)
 
@@ -69,7 +69,7 @@ def hints(found: Json, material: Material) -> Iterator[Hint]:
 
 
 def in_words(found: Json, material: Material) -> dict[str, Any]:
-    """The same results with spoken names of links."""
+    """The results with names for readers in place of the labels of links."""
     say = speaker(material.network["skeleton"])
 
     def named(value: Any, key: str = "") -> Any:
@@ -109,9 +109,10 @@ def curves(
     back: Sequence[Mapping[str, Any]] = (),
     untrained: Collection[str] = (),
 ) -> ChartGroup:
-    """A small chart for each measure over severity, for a chosen gait and link.
+    """A small chart of each measure over severity, for a chosen gait and link.
 
-    Dotted: falling severity. Links in `untrained` come last and are marked.
+    rows, back: injury.json's rows of rising and of falling severity; the latter are dotted. untrained: links
+    that come last and are marked.
     """
 
     def label_of(row: Mapping[str, Any]) -> str:
@@ -125,17 +126,16 @@ def curves(
     for row in back:
         healing.setdefault(label_of(row), []).append(row)
     charts = [_panel(panel, rows, sweeps, healing) for panel in PANELS]
-    return ChartGroup(
-        "sweeps",
-        "One link at rising severity",
-        "Each point is a separate walk, healthy for the first quarter and measured over the last half. "
-        "Dotted lines: the same while severity falls again. A smooth curve means that the walk changes "
-        "gradually. A gap between left and right is a limp. A jump between neighbours means that the network "
-        "switches between two gaits. Pose distances are means over joints at the same phase. Links that were "
-        "never hurt in training show how much a healthy walk varies.",
-        charts,
-        "Link and gait",
+    caption = (
+        "The character walks on while the severity of one link rises from 0 to 10 and falls again, step by "
+        "step. Each point is measured at the end of a step, over whole gait cycles. Dotted lines: falling "
+        "severity. A smooth curve means that the walk changes gradually. A gap between left and right is a "
+        "limp. A jump between neighbours means that the network switches between two gaits. Pose distances "
+        "are means over joints at the same phase."
     )
+    if untrained:
+        caption += " Links that were never hurt in training show how much a healthy walk varies."
+    return ChartGroup("sweeps", "One link at rising severity", caption, charts, "Link and gait")
 
 
 def _panel(
@@ -180,7 +180,8 @@ def y_range(
 ) -> list[float] | None:
     """The range of the vertical axis, the same for all links of a gait, so that they can be compared.
 
-    It spans at least `span`, so that noise looks small.
+    columns: those that the chart shows. span: least length of the range, so that noise looks small.
+    from_zero: whether it starts at 0. None if no row has a value.
     """
     found = [row[c] for row in rows if row["gait"] == gait for c in columns if row.get(c) is not None]
     if not found:
@@ -193,16 +194,17 @@ def y_range(
 def overview(responses: Sequence[Mapping[str, Any]]) -> list[Chart]:
     """Effect of severity 10 on pose and speed, for each link."""
     charts = []
-    for name, key, title, label, least, caption in (
+    untrained = any(not r.get("trained", True) for r in responses)
+    for name, key, title, label, least, caption, of_hollow in (
         (
             "injury-pose",
             "from_healthy_cm",
             "Change of the pose",
             "cm per joint at severity 10",
             2.0,
-            "Distance from the healthy walk at the same phase, mean over joints. Hollow dots are links that "
-            "were never hurt in training. They have no effect, so they show how much healthy walks differ. A "
-            "filled dot as far left as the hollow ones means that this link has no effect either.",
+            "Distance from the healthy walk at the same phase, mean over joints.",
+            "They have no effect, so they show how much healthy walks differ. A filled dot as far left as "
+            "the hollow ones means that this link has no effect either.",
         ),
         (
             "injury-speed",
@@ -210,10 +212,12 @@ def overview(responses: Sequence[Mapping[str, Any]]) -> list[Chart]:
             "Remaining speed",
             "share of the healthy speed",
             1.0,
-            "Speed at severity 10, divided by the healthy speed. Hollow dots are links that were never hurt "
-            "in training.",
+            "Speed at severity 10, divided by the healthy speed.",
+            "",
         ),
     ):
+        if untrained:
+            caption = f"{caption} Hollow dots are links that were never hurt in training. {of_hollow}".strip()
         traces: list[Trace] = []
         for gait, colour in GAIT_COLOURS.items():
             for hurt in (True, False):
@@ -248,7 +252,7 @@ def overview(responses: Sequence[Mapping[str, Any]]) -> list[Chart]:
 
 
 def response_table(name: str, responses: Sequence[Mapping[str, Any]]) -> Table:
-    """A row per gait and link."""
+    """A row for each gait and link."""
     columns = [
         Column("gait"),
         Column("link"),
@@ -280,7 +284,7 @@ def response_table(name: str, responses: Sequence[Mapping[str, Any]]) -> Table:
         ]
         for r in responses
     ]
-    title = "Every link at severity 10, and its rank correlation with severity (Spearman's ρ)"
+    title = "Every link at severity 10, and the rank correlation of its effects with severity (Spearman's ρ)"
     return Table(f"{name}-injury-responses", columns, rows, title)
 
 

@@ -39,8 +39,8 @@ def second_chart(rows: Sequence[Mapping[str, Any]]) -> Chart | None:
         "second-injury",
         "A second injury in addition to a first",
         "Rows: the first injury, at severity 7, one link of each part of the body. Columns: the second, at "
-        "10. The cell says how much the second changes the walk, in centimetres and as a share of its effect "
-        "on a healthy body. A pale field means that the first injury hides the second.",
+        "10. The cell says how much the second changes the walk, in centimetres or as a share of its effect "
+        "on a healthy body. A pale cell means that the first injury hides the second.",
         layout={
             "xaxis": {"type": "category", "tickangle": -50, "automargin": True},
             "yaxis": {"type": "category", "autorange": "reversed", "automargin": True},
@@ -65,7 +65,7 @@ def second_table(name: str, rows: Sequence[Mapping[str, Any]]) -> Table | None:
 
 
 def divided_chart(rows: Sequence[Mapping[str, Any]]) -> Chart | None:
-    """The effect of divided severities."""
+    """How far the walk of a chosen link is from the healthy walk, with a line for each divisor."""
     options: dict[str, list[Trace]] = {}
     scales = sorted({row["scale"] for row in rows})
     for link in dict.fromkeys(row["link"] for row in rows):
@@ -80,8 +80,8 @@ def divided_chart(rows: Sequence[Mapping[str, Any]]) -> Chart | None:
     return Chart(
         "divided",
         "Divided severities",
-        "Distance of the pose from the healthy walk. Each line divides the severities by another number "
-        "before the network gets them.",
+        "Distance of the pose from the healthy walk. One line for each divisor: the severities are divided "
+        "by it before the network gets them.",
         layout={"xaxis": axis("severity", dtick=2), "yaxis": axis("cm per joint", rangemode="tozero")},
         choose="Link",
         options=options,
@@ -107,12 +107,17 @@ def jog_chart(rows: Sequence[Mapping[str, Any]], untrained: Collection[str] = ()
         traces.append(line("never hurt in training", list(found), means, "@muted", dash="dot", width=1.4))
     if not traces:
         return None
+    caption = "Distance of the jog from the healthy jog."
+    if found:
+        caption += (
+            " The dotted line is the mean of links that were never hurt in training, so it shows how much "
+            "two healthy jogs differ. If the line of a link is not above it, the injury does not show in the "
+            "jog."
+        )
     return Chart(
         "into-a-jog",
         "From a hurt walk into a jog",
-        "Distance of the jog from the healthy jog. The dotted line is the mean of links that were never hurt "
-        "in training, so it shows how much two healthy jogs differ. If the line of a link is not above it, "
-        "the injury does not show in the jog.",
+        caption,
         traces,
         {
             "xaxis": axis("severity", dtick=1),

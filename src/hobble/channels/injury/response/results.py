@@ -8,10 +8,11 @@ Number = float | None  # None if it cannot be measured
 
 
 class SweepRow(TypedDict):
-    """The walk of one link at one severity: the measures of `gait_measures`, and distances of the pose, cm.
+    """The walk at one severity of one link: the measures of `gait_measures`, and distances of the pose, cm.
 
-    direction: "rising" or "falling". from_healthy, from_worst, from_rising: from the healthy walk, from that
-    at severity 10, and from that at the same severity while it rose. largest_acceleration: of a joint.
+    direction: "rising" or "falling" severity. from_healthy: distance from the healthy walk. from_worst: from
+    the walk at severity 10. from_rising: from the walk at the same severity while it rose.
+    largest_acceleration: of any joint, cm per frame squared.
     """
 
     gait: str
@@ -39,7 +40,7 @@ class SweepRow(TypedDict):
 
 
 class Response(TypedDict):
-    """How one link's walk responds to severity. See `Sweep.response`."""
+    """How the walk responds to the severity of one link. See `SeveritySweep.response`."""
 
     spearman: dict[str, Number]
     spearman_falling: dict[str, Number]
@@ -56,8 +57,10 @@ class Response(TypedDict):
 class LinkResponse(Response):
     """The response of one link in one gait.
 
-    trained: whether it was hurt in training. clip_acceleration: largest of a joint in captured motion, cm per
-    frame squared; `clip_acceleration_of` says in which: "link" or "gait".
+    trained: whether the link was hurt in training. clip_acceleration: largest acceleration of a joint in
+    captured motion, cm per frame squared. clip_acceleration_of: which captured motion that is, "link" if the
+    link hurts in it, "gait" if it is all motion in that gait. clip_acceleration_share: the character's
+    largest acceleration as a share of it.
     """
 
     gait: str
@@ -120,7 +123,10 @@ class Divided(TypedDict):
 
 
 class InjuryResponse(TypedDict):
-    """injury.json. It has only the first two keys and `reason` if `applies` is false."""
+    """injury.json. If `applies` is false, it has only the first two keys and `reason`.
+
+    See `hobble.channels.injury.response.run.injury_response`.
+    """
 
     configuration: str
     applies: bool

@@ -15,8 +15,8 @@ from hobble.channels.injury.response.results import InjuryResponse, LinkResponse
 from hobble.channels.injury.response.sweep import SEVERITIES, sweeps
 from hobble.evaluation.captured import Captured
 from hobble.evaluation.crowd import SPEEDS
-from hobble.measures.chosen import captured_motion, sample_of, with_sample
-from hobble.measures.given import Given, Outcome, Row
+from hobble.measures.clip_parts import captured_motion, sample_of, with_sample
+from hobble.measures.inputs import MeasureInputs, Outcome, Row
 from hobble.models.load import load_network
 from hobble.models.network import Network
 from hobble.runtime.options import Runtime
@@ -38,40 +38,17 @@ def injury_response(
     """The content of injury.json: a sweep of each of `links` (default: all).
 
     motion: the captured clips, whose largest accelerations are compared with the character's. seconds: time
-    at each severity. `rows`: one for each gait, link and rising severity. `falling`: the same for falling
-    severity. `responses`: for each gait and link (see `SeveritySweep.response`). `second`, `into_a_jog`,
-    `divided`: see `cases`. `summary`: means over the links that were hurt in training (`trained`) and over
-    the others. `applies` is false for a network without severities.
+    at each severity. `rows`: one for each gait, link and rising severity. `falling`: one for each gait, link
+    and falling severity. `responses`: one for each gait and link (see `SeveritySweep.response`). `second`,
+    `into_a_jog`, `divided`: see `hobble.channels.injury.response.cases`. `trained`: the links that were hurt
+    in training. `summary`: means over these. `summary_untrained`: means over the others. `applies` is false
+    for a network without severities.
     """
     if not links_of(network):
         return {"configuration": configuration, "applies": False, "reason": NO_SEVERITIES}
     links = list(links or links_of(network))
     trained = [link for link in links if link in hurt_links(network)]
-    largest = largest_accelerations(motion, network)
-    rows: list[SweepRow] = []
-    falling: list[SweepRow] = []
-    responses: list[LinkResponse] = []
-    for sweep in sweeps(network, links, GAITS, seconds, runtime):
-        gait = sweep.gait
-        for figure, link in enumerate(links):
-            found = sweep.rows(figure)
-            rows += found[: len(SEVERITIES)]
-            falling += found[len(SEVERITIES) :]
-            response = sweep.response(figure, found)
-            clips = largest.get((gait, link), largest.get((gait, None)))
-            responses.append(
-                {
-                    "gait": gait,
-                    "link": link,
-                    "trained": link in trained,
-                    **response,
-                    "clip_acceleration": clips,
-                    "clip_acceleration_of": "link" if (gait, link) in largest else "gait" if clips else None,
-                    "clip_acceleration_share": round(response["largest_acceleration"] / clips, 5)
-                    if clips
-                    else None,
-                }
-            )
+    rows, falling, responses = _sweeps(network, links, trained, motion, seconds, runtime)
     return {
         "configuration": configuration,
         "applies": True,
@@ -91,12 +68,48 @@ def injury_response(
     }
 
 
+def _sweeps(
+    network: Network,
+    links: Sequence[str],
+    trained: Sequence[str],
+    motion: Iterable[Captured],
+    seconds: float,
+    runtime: Runtime,
+) -> tuple[list[SweepRow], list[SweepRow], list[LinkResponse]]:
+    """`rows`, `falling` and `responses` of `injury_response`."""
+    largest = largest_accelerations(motion, network)
+    rows: list[SweepRow] = []
+    falling: list[SweepRow] = []
+    responses: list[LinkResponse] = []
+    for sweep in sweeps(network, links, GAITS, seconds, runtime):
+        gait = sweep.gait
+        for figure, link in enumerate(links):
+            found = sweep.rows(figure)
+            rows += found[: len(SEVERITIES)]
+            falling += found[len(SEVERITIES) :]
+            response = sweep.response(figure, found)
+            clips = largest.get((gait, link), largest.get((gait, None)))
+            share = round(response["largest_acceleration"] / clips, 5) if clips else None
+            responses.append(
+                {
+                    "gait": gait,
+                    "link": link,
+                    "trained": link in trained,
+                    **response,
+                    "clip_acceleration": clips,
+                    "clip_acceleration_of": "link" if (gait, link) in largest else "gait" if clips else None,
+                    "clip_acceleration_share": share,
+                }
+            )
+    return rows, falling, responses
+
+
 def largest_accelerations(
     motion: Iterable[Captured], network: Network
 ) -> dict[tuple[str, str | None], float]:
-    """(gait, link) -> largest joint acceleration (cm per frame squared) in captured motion.
+    """(gait, link) -> largest joint acceleration (cm per frame squared) in captured motion with that injury.
 
-    (gait, None): the largest in that gait with any or no injury.
+    (gait, None): the largest in that gait with any injury or none.
     """
     out: dict[tuple[str, str | None], float] = {}
     for clip in motion:
@@ -114,7 +127,7 @@ def largest_accelerations(
 
 
 def _summary(responses: Sequence[LinkResponse]) -> dict[str, Summary]:
-    """Means over links, by gait; {} without links."""
+    """Gait -> means over links; {} without links."""
     out: dict[str, Summary] = {}
     for gait in GAITS:
         some = [r for r in responses if r["gait"] == gait]
@@ -140,14 +153,14 @@ def _mean(values: Sequence[float | None]) -> float | None:
     return round(float(np.mean(known)), 5) if known else None
 
 
-def run(given: Given, options: Options) -> Outcome:
+def run(inputs: MeasureInputs, options: Options) -> Outcome:
     """injury.json, and its sweeps as tables."""
-    sample = sample_of(given, options)
+    sample = sample_of(inputs, options)
     result = injury_response(
-        load_network(given.weights),
-        captured_motion(given.clips, sample),
-        configuration=given.configuration,
-        runtime=given.runtime,
+        load_network(inputs.weights),
+        captured_motion(inputs.clips, sample),
+        configuration=inputs.configuration,
+        runtime=inputs.runtime,
         seconds=options.seconds,
     )
     tables: dict[str, Sequence[Row]] = {

@@ -1,8 +1,8 @@
 """Measures one gait while the severity of one link rises and falls.
 
-There is a figure for each link. It walks healthy until it has its speed, then at severities 0, 1, ..., 10, 9,
-..., 0, for the same time each. A second crowd is hurt at once and healed at once, which shows how fast the
-walk follows.
+There is a figure for each link. It walks healthy until it has reached its speed. Then the severity of its
+link is 0, 1, ..., 10, 9, ..., 0, each for the same time (a stretch). In a second crowd each figure is hurt at
+severity 10 at once and healed at once, to see how fast the walk follows.
 """
 
 from __future__ import annotations
@@ -24,17 +24,18 @@ from hobble.runtime.options import Runtime
 
 SEVERITIES = np.arange(11.0)
 STEPS = [*SEVERITIES, *SEVERITIES[-2::-1]]
-WALK_IN = 0.75  # stretches until a figure has its speed
-HURT = 2  # stretches for which a figure is hurt at once, and then healed
+WALK_IN = 0.75  # length of the first part, in which figures reach their speed, in stretches
+HURT = 2  # for how many stretches the figures of the second crowd are hurt, and then healed
 # Columns of a row that are not measures of the walk.
 NAMES = ("gait", "link", "direction", "severity")
 
 
 class SeveritySweep:
-    """The walks of one gait, a figure for each of `links`.
+    """The walks of one gait, with a figure for each of `links`.
 
-    steps: the severities. walks: the figures' way through them, after a stretch in which they begin to walk.
-    at_once: the figures hurt at once and healed at once. See `sweeps`.
+    steps: the severities in the order of the stretches. walks: the motion of the figures, with a first
+    stretch in which they reach their speed. at_once: the motion of the figures that are hurt at once and
+    healed at once. See `sweeps`.
     """
 
     def __init__(
@@ -45,11 +46,7 @@ class SeveritySweep:
         self.walks, self.at_once = walks, at_once
 
     def rows(self, figure: int) -> list[SweepRow]:
-        """One row for each step.
-
-        It has the gait's measures, the distances of the pose from the healthy and the fully hurt walk (cm,
-        mean over joints at the same phase) and the largest acceleration of a joint.
-        """
+        """One row for each of `steps`. Distances are means over joints at the same phase. See `SweepRow`."""
         walks = self.walks
         spans = [walks.measured(1 + step, figure) for step in range(len(self.steps))]
         cycles = [mean_cycle(walks.local[s, figure], walks.phase[s, figure]) for s in spans]
@@ -66,7 +63,7 @@ class SeveritySweep:
             row |= gait_measures(self.skeleton, local, walks.contacts[span, figure], walks.root[span, figure])
             row["from_healthy"] = float(np.mean(distance_to_cycle(local, phase, cycles[0])))
             row["from_worst"] = float(np.mean(distance_to_cycle(local, phase, cycles[worst])))
-            # Distance of the walk from that at the same severity while it rose.
+            # The cycle at the same severity while the severity rose.
             same = cycles[step if step <= worst else 2 * worst - step]
             row["from_rising"] = float(np.mean(distance_to_cycle(local, phase, same)))
             row["largest_acceleration"] = float(walks.acceleration[span, figure].max())
@@ -75,13 +72,15 @@ class SeveritySweep:
         return rows
 
     def response(self, figure: int, rows: Sequence[SweepRow]) -> Response:
-        """How the measures respond to severity.
+        """How the walk responds to severity.
 
-        Spearman's rho for rising and falling severity (None if a measure is constant). At severity 10:
-        distance from healthy (cm, minus the healthy walk's own) and share of the speed. After healing: the
-        remaining distance. The distance between falling and rising severity. Seconds to settle when hurt, and
-        healed, at once. The largest joint acceleration of the whole sweep, and its share of the healthy
-        walk's.
+        spearman, spearman_falling: rank correlation of each measure with rising and with falling severity,
+        None if the measure is constant. Distances are in cm, minus the distance of the healthy walk from its
+        own mean cycle: from_healthy_cm at severity 10, after_healing_cm at the end, hysteresis_cm the largest
+        between the walks at the same rising and falling severity. speed_share: speed at severity 10, share of
+        healthy. settle_seconds, heal_seconds: until the walk no longer changes after being hurt or healed at
+        once. largest_acceleration: of any joint in the whole sweep; acceleration_share: relative to the
+        healthy walk's.
         """
         worst = len(SEVERITIES) - 1
         rising, falling = rows[: worst + 1], rows[worst:]
@@ -125,7 +124,7 @@ class SeveritySweep:
 def sweeps(
     network: Network, links: Sequence[str], gaits: Sequence[str], seconds: float, runtime: Runtime
 ) -> Iterator[SeveritySweep]:
-    """The sweep of each gait, `seconds` at each severity. The figures of all gaits go in one crowd."""
+    """The sweep of each gait, with `seconds` at each severity. The figures of all gaits are in one crowd."""
     assert network.skeleton is not None
     names = [gait for gait in gaits for _ in links]
 

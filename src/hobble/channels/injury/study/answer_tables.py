@@ -1,7 +1,7 @@
 """Makes the tables of the study from people's answers: III to XV for the thirteen films, XVI for all.
 
-We know only how many tables Quentin Ferre had, and that 82 % of hurt parts were named. That there is one for
-each film and one for all films is our assumption.
+Of Quentin Ferre's tables we only know how many there are, and that 82 % of hurt parts were named. We assume
+one table for each film and one for all films.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ Rows = list[dict[str, Any]]
 
 
 def tables(study: Study, people: Sequence[Sequence[FilmAnswer]]) -> dict[str, Rows]:
-    """Numeral -> rows. people: each person's answers. The last table is of all films together."""
+    """Numeral -> rows of that table. people: each person's answers. The last table is for all films."""
     of = {film.number: [a for some in people for a in some if a.film == film.number] for film in study.films}
     named = [*NUMERALS, *(f"XVI+{i}" for i in range(1, len(study.films)))]
     out = {named[i]: film_rows(study, film, of[film.number]) for i, film in enumerate(study.films)}
@@ -32,8 +32,9 @@ def tables(study: Study, people: Sequence[Sequence[FilmAnswer]]) -> dict[str, Ro
 
 
 def film_rows(study: Study, film: ShownFilm, answers: Sequence[FilmAnswer]) -> Rows:
-    """For each part how many people ticked it in one film: `people` and their `share`. hurts: whether it
-    hurt.
+    """A row for each part in one film.
+
+    hurts: whether it hurts. people: how many people ticked it. share: their share.
     """
     return [
         {
@@ -62,9 +63,10 @@ def summary_rows(study: Study, of: Mapping[int, Sequence[FilmAnswer]]) -> Rows:
 def scores(answers: Sequence[tuple[ShownFilm, FilmAnswer]]) -> dict[str, Any]:
     """How well people answered. answers: pairs of a film and an answer.
 
-    seen: share of the hurt parts that were ticked. seen_without_side: the same if left and right are not
-    distinguished. wrong: mean number of ticked parts that do not hurt. exact: share of the answers that tick
-    exactly the hurt parts. fluid: mean of the marks from 1 to 5. fluid_sd: their standard deviation.
+    seen: share of the hurt parts that were ticked. wrong: mean number of ticked parts that do not hurt.
+    exact: share of the answers that tick exactly the hurt parts. seen_without_side, exact_without_side: seen
+    and exact if left and right are not distinguished. fluid: mean of the marks from 1 to 5 for how fluid the
+    motion is. fluid_sd: their standard deviation.
     """
     seen = sum(part in a.parts for film, a in answers for part in film.parts)
     sides = [({without_side(p) for p in f.parts}, {without_side(p) for p in a.parts}) for f, a in answers]

@@ -15,7 +15,7 @@ FLUID = range(1, 6)
 
 @dataclass(frozen=True)
 class ShownFilm:
-    """A film of the questionnaire, and the parts that hurt in it."""
+    """A film of the questionnaire. kind: as in `Film`. parts: the parts that hurt in it."""
 
     number: int
     kind: str
@@ -26,7 +26,8 @@ class ShownFilm:
 class Study:
     """The films of a questionnaire.
 
-    name: also in each file of answers, to check that they belong together. parts: those that people can tick.
+    name: identifies the questionnaire; it is also in each file of answers, to check that they belong
+    together. configuration: whose network made the films. parts: the parts that people can tick.
     """
 
     name: str
@@ -37,7 +38,7 @@ class Study:
 
 @dataclass(frozen=True)
 class FilmAnswer:
-    """One person's answer to one film."""
+    """One person's answer to a film. parts: those ticked. fluid: how fluid the motion is, 1 to 5."""
 
     film: int
     parts: tuple[str, ...]

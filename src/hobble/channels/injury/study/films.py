@@ -1,10 +1,10 @@
-"""The thirteen films.
+"""The thirteen films of the questionnaire.
 
-A healthy character walks, then something begins to hurt; in some films the gait changes, too.
+A healthy character walks, then something begins to hurt. In some films the gait changes, too.
 
 Quentin Ferre (2019) showed four films with one hurt part, five with several and four with a change of gait,
-each with the transition from healthy to hurt. We do not know which parts hurt in each. In his clips thigh,
-shank and forearm hurt, so they do here.
+each with the transition from healthy to hurt. We do not know which parts hurt in each. In his clips, thigh,
+shank and forearm hurt, so these hurt here, too.
 """
 
 from __future__ import annotations
@@ -28,16 +28,22 @@ FPS = 60
 SEVERITY = 10.0  # as in the study
 SPEEDS = {"walk": 2.5, "jog": 6.0}  # target speeds, cm a frame
 WARM_UP = 4.0  # seconds of walking before a film begins
-HEALTHY, HURT, CHANGED = 3.0, 7.0, 5.0  # seconds of the parts of a film; a gait changes half-way
+# Seconds before the injury, seconds with it, and more seconds with it if the gait changes. The gait changes
+# in the middle of the film.
+HEALTHY, HURT, CHANGED = 3.0, 7.0, 5.0
 ONE, SEVERAL, GAIT = "one part", "several parts", "change of gait"
-# Parts that people can tick: those that hurt in some film, on both sides, and others that never hurt.
+# Parts that people can tick: those that hurt in some film, on both sides, and some that hurt in none.
 SIDED = ("thigh", "shank", "foot", "upper arm", "forearm")
 PARTS = (*(f"{side} {part}" for part in SIDED for side in ("left", "right")), "lower back", "neck")
 
 
 @dataclass(frozen=True)
 class Film:
-    """One film. number: from 1, in the order of the tables. gaits: the first and the last."""
+    """One film.
+
+    number: from 1, in the order of the tables. kind: ONE, SEVERAL or GAIT. parts: those that hurt. gaits: at
+    the beginning and at the end.
+    """
 
     number: int
     kind: str
@@ -69,10 +75,10 @@ FILMS = (
 
 @dataclass(frozen=True)
 class FilmMotion:
-    """What a film shows at 60 Hz.
+    """The motion of a film at 60 Hz, F frames of J joints in the world.
 
-    positions: (F, J, 3) cm. rotations: (F, J, 4). from_healthy: mean distance (cm) of the joints from those
-    of the healthy character, while it hurts.
+    positions: (F, J, 3) cm. rotations: (F, J, 4) quaternions. from_healthy: mean distance, cm, of the joints
+    from those of a healthy character, from the beginning of the injury on.
     """
 
     positions: Array
@@ -86,10 +92,10 @@ def without_side(part: str) -> str:
 
 
 def part_links(network: Network, parts: Sequence[str]) -> list[str]:
-    """The link that stands for each part: its uppermost link that was hurt in training, else its uppermost
-    link.
+    """The link that stands for each part.
 
-    Raises HobbleError if the network has no injury channel, or the skeleton has no such part.
+    It is the part's uppermost link that was hurt in training. If there is none, it is the uppermost of all.
+    Raises HobbleError if the network has no injury channel, or if the skeleton has no such part.
     """
     known, hurt = links_of(network), hurt_links(network)
     if network.skeleton is None or not known:
@@ -107,7 +113,7 @@ def part_links(network: Network, parts: Sequence[str]) -> list[str]:
 
 
 def act(network: Network, film: Film, runtime: Runtime) -> FilmMotion:
-    """The character in a film. It walks straight ahead. The injury begins after HEALTHY seconds."""
+    """The motion of a film. The character goes straight ahead. The injury begins after HEALTHY seconds."""
     severities = dict.fromkeys(part_links(network, film.parts), SEVERITY)
     hurt, well = _walked(network, film, severities, runtime), _walked(network, film, {}, runtime)
     begun = round(HEALTHY * FPS)
@@ -116,7 +122,7 @@ def act(network: Network, film: Film, runtime: Runtime) -> FilmMotion:
 
 
 def hurts_and_gait(film: Film, frame: int) -> tuple[bool, str]:
-    """Whether it hurts at a frame of a film, and the target gait."""
+    """Whether the parts of a film hurt at a frame, and the target gait."""
     hurts = frame >= HEALTHY * FPS
     changed = frame >= (HEALTHY + HURT) * FPS - CHANGED * FPS / 2
     return hurts, film.gaits[1] if changed else film.gaits[0]

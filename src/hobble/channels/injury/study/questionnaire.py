@@ -46,10 +46,11 @@ def write_questionnaire(
     size: int = SIZE,
     threads: int = 1,
 ) -> dict[str, Any]:
-    """Write questionnaire.html and films.json, which has the right answers. Returns the latter's content.
+    """Write questionnaire.html and films.json. films.json has the right answers; its content is returned.
 
-    Nothing on the page says what hurts in a film. threads: how many films are drawn at once; the files do not
-    depend on it. Raises HobbleError if the network has no injury channel.
+    Nothing on the page says what hurts in a film. size: width and height of the films, pixels. threads: how
+    many films are drawn at once; the files do not depend on it. Raises HobbleError if the network has no
+    injury channel.
     """
     folder = Path(folder)
     for film in films:
@@ -102,7 +103,7 @@ def _row(network: Network, film: Film, motion: FilmMotion) -> dict[str, Any]:
 
 
 def doubts(solution: dict[str, Any]) -> list[str]:
-    """Warnings about films in which nobody can see the injury."""
+    """Warnings about films in which nobody can see the injury, and about links never hurt in training."""
     same = [str(row["film"]) for row in solution["films"] if row["from_healthy_cm"] < VISIBLE]
     never = sorted({link for row in solution["films"] for link in row["untrained"]})
     out = [f"film {', '.join(same)}: nobody can see the injury (less than {VISIBLE} cm)."] if same else []

@@ -23,8 +23,8 @@ Buffers = Mapping[str, np.ndarray]
 class ChunkWindow:
     """The rows of some chunks, in memory one after another.
 
-    chunks: their numbers in the split. rows: of each chunk. first: (R,) index of each row's first fit in
-    `fits`. The other fields are the arrays of the chunks.
+    chunks: their numbers in the split. rows: number of rows of each chunk. first: (R,) index of each row's
+    first fit in `fits`. The other fields are the arrays of the chunks.
     """
 
     chunks: Sequence[int]
@@ -40,7 +40,7 @@ class ChunkWindow:
 
 
 def empty_buffers(manifest: Manifest, split: str, count: int) -> dict[str, np.ndarray]:
-    """Empty arrays that are large enough for any `most` chunks of a split, in the order of the tables."""
+    """Empty arrays that are large enough for any `count` chunks of a split, in the order of the file."""
     chunks = manifest.chunks[split]
     rows = sum(sorted(chunk.rows for chunk in chunks)[-count:])
     fits = sum(sorted(chunk.fits for chunk in chunks)[-count:])
@@ -67,9 +67,9 @@ def load_chunks(
 ) -> ChunkWindow:
     """Read the chunks numbered `some` of a split, one after another, directly into the arrays `into`.
 
-    folder: of the chunks. shards: what changes them to rows of the whole database. verified: files whose
-    checksum was checked before and is not checked again; files that pass are added. Raises InputError with
-    the file's name if one is damaged.
+    folder: of the chunks. shards: converts them to rows of the whole database. verified: files whose checksum
+    was checked before and is not checked again; files that pass are added. Raises InputError, which names the
+    file, if one is damaged.
     """
     wanted = [manifest.chunks[split][i] for i in some]
     all_rows, all_fits = sum(c.rows for c in wanted), sum(c.fits for c in wanted)

@@ -16,44 +16,32 @@ from hobble.runtime.options import Runtime
 
 FRAMES = 120  # of walking before the page opens: two seconds, enough to reach the speed and to begin to limp
 
-# The fields of character.js with the name that the same array has in the Python state.
-ARRAYS = {
-    "gait": "gait",
-    "ground": "ground",
-    "joints": "joint_position",
-    "velocities": "joint_velocity",
-    "rotations": "joint_rotation",
-    "channelValues": "channel_values",
-    "channelTargets": "channel_targets",
-    "memory": "memory",
-}
-SMALL = {
-    "height": "root_height",
-    "phase": "phase",
-    "velocity": "smoothed_velocity",
-    "direction": "smoothed_direction",
-    "strafe": "strafe",
-    "correction": "correction",
-    "lock": "foot_lock",
-    "hold": "foot_hold",
-    "step": "foot_step",
-    "missed": "foot_missed",
-    "lift": "foot_lift",
-    "raised": "body_lift",
-    "added": "foot_added",
-    "shown": "leg_shown",
-    "placed": "placed",
-}
+# Fields of the state, which are flat lists in the page. Its names are those of Python in camel case.
+FLAT = (
+    "gait",
+    "ground",
+    "joint_position",
+    "joint_velocity",
+    "joint_rotation",
+    "channel_values",
+    "channel_targets",
+    "memory",
+)
+# Fields that are nested lists or numbers there.
+NESTED = (
+    *("root_height", "phase", "smoothed_velocity", "smoothed_direction", "strafe", "correction", "placed"),
+    *("foot_lock", "foot_hold", "foot_step", "foot_missed", "foot_lift", "foot_added"),
+    *("leg_shown", "body_lift"),
+)
 
 
-def opened(
+def opening_walk(
     network: Network, runtime: Runtime, playable: Mapping[str, Any], measured: Iterable[Mapping[str, Any]]
 ) -> dict[str, Any]:
     """The result of `hero.opening`, with the states of its one or two figures under `walked`.
 
     They have walked straight on for `FRAMES` frames on flat ground. The first has the value of the slider.
-    The second is there if there is a slider, and has no value. Names and units are those of character.js,
-    with flat lists for its arrays.
+    The second is there if there is a slider, and has no value. Names and units are those of state.js.
     """
     found, one = opening(playable, measured), first_shown(playable)
     if one is None:
@@ -66,12 +54,18 @@ def opened(
 def _state(network: Network, runtime: Runtime, channels: Mapping[str, Mapping[str, float]]) -> dict[str, Any]:
     *_, (animation, pose) = walk_straight(network, runtime, FRAMES, channels)
     state = animation.state
-    out = {name: _plain(np.ravel(getattr(state, field)[0])) for name, field in ARRAYS.items()}
-    out |= {name: _plain(getattr(state, field)[0]) for name, field in SMALL.items()}
+    out = {_camel_case(name): _plain(np.ravel(getattr(state, name)[0])) for name in FLAT}
+    out |= {_camel_case(name): _plain(getattr(state, name)[0]) for name in NESTED}
     for axis, (place, facing) in enumerate((("px", "dx"), ("pz", "dz"))):
         out[place], out[facing] = _plain(state.position[0, :, axis]), _plain(state.direction[0, :, axis])
-    out["pose"], out["turns"] = _plain(np.ravel(pose.positions)), _plain(np.ravel(pose.rotations))
+    out["posePosition"] = _plain(np.ravel(pose.positions))
+    out["poseRotation"] = _plain(np.ravel(pose.rotations))
     return out | {"contacts": _plain(pose.contacts), "root": _plain(pose.root)}
+
+
+def _camel_case(name: str) -> str:
+    first, *others = name.split("_")
+    return first + "".join(map(str.title, others))
 
 
 def _plain(values: ArrayLike | Array) -> Any:

@@ -8,14 +8,14 @@ from hobble.core import quat
 from hobble.core.quat import Array
 from hobble.core.skeleton import Skeleton
 
-APART = 0.1  # cm; joints nearer to each other count as one place
+APART = 0.1  # cm; joints closer together than this count as one place
 
 
 def fitted_rotations(skeleton: Skeleton, positions: Array) -> Array:
-    """World rotations (F, J, 4) with which the bones best point to the joint positions (F, J, 3).
+    """World rotations (F, J, 4) with which the bones point as well as possible to the positions (F, J, 3).
 
-    A joint with one joint below turns by the shortest way from its parent's rotation; one with several by the
-    best fit to all of them (Kabsch, 1976).
+    A joint with one joint below it starts at its parent's rotation and turns the shortest way. A joint with
+    several gets the best fit to all of them (Kabsch, 1976).
     """
     out = np.tile(quat.IDENTITY, (*positions.shape[:2], 1))
     for j, parent in enumerate(skeleton.parents):
@@ -35,7 +35,7 @@ def fitted_rotations(skeleton: Skeleton, positions: Array) -> Array:
 
 
 def _reached(skeleton: Skeleton, joint: int) -> list[tuple[int, Array]]:
-    """The nearest descendants at another place, with their rest vectors from the joint."""
+    """The nearest descendants at another place, each with the vector (3,) from the joint to it at rest."""
     out: list[tuple[int, Array]] = []
     for child in skeleton.children(joint):
         offset = np.asarray(skeleton.offsets[child], float)

@@ -10,15 +10,15 @@ from hobble.rows.compose import lower_joints, without_terrain
 from hobble.rows.layout import RowLayout
 
 
-def split_rows(
+def standardise_rows(
     layout: RowLayout, statistics: Statistics, x: Array, y: Array, fits: Array, count: np.ndarray
 ) -> tuple[Array, Array, Array]:
     """Standardised x, y and fits from raw ones.
 
     x: (R, x columns) X without the terrain. y: (R, Y). fits: (S, fit columns) heights, then their mean, which
-    is to be subtracted from joint heights. count: (R,) fits of each row. In the result, the mean over a row's
-    fits is subtracted from its joint heights. A fit's last column (the lift, cm) is its own mean minus the
-    mean over the fits. That is a small number, which half precision stores well.
+    is to be subtracted from joint heights. count: (R,) number of fits of each row. In the result, the mean
+    over all fits of a row is subtracted from its joint heights. A fit's last column, the lift (cm), is the
+    fit's mean minus that mean over all fits. It is a small number, which half precision stores well.
     """
     s, terrain = statistics, layout.x_terrain
     of_row = np.repeat(np.arange(len(count)), count)

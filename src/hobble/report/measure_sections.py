@@ -22,7 +22,7 @@ from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
-from hobble.measures.given import Json
+from hobble.measures.inputs import Json
 from hobble.measures.registry import MEASURES
 from hobble.report.gather import Material
 from hobble.report.page_parts import PageSection, joined

@@ -13,7 +13,7 @@ import pytest
 ASK = """
 import os
 os.setgroups([]); os.setgid(54321); os.setuid(54321)
-from hobble.workflow.account import ensure_user_name
+from hobble.workflow.user_account import ensure_user_name
 ensure_user_name()
 import getpass
 print(getpass.getuser())
@@ -27,7 +27,7 @@ def test_a_user_without_a_name_is_called_by_the_number() -> None:
         key: value for key, value in os.environ.items() if key not in ("USER", "LOGNAME", "LNAME", "USERNAME")
     }
     said = subprocess.run(
-        [sys.executable, "-c", "import getpass, pwd, hobble.workflow.account\n" + ASK],
+        [sys.executable, "-c", "import getpass, pwd, hobble.workflow.user_account\n" + ASK],
         env=names, capture_output=True, text=True, check=True,
     )  # fmt: skip
     assert said.stdout == "54321\n"
@@ -44,8 +44,8 @@ def test_in_another_users_checkout_only_a_dry_run_starts(closed: str) -> None:
         folder.chmod(0o755)
 
         def said(*arguments: str) -> str:
-            check = f"account.check_may_write({arguments!r}, Path({checkout!r}, '.snakemake'))"
-            code = f"from pathlib import Path\nfrom hobble.workflow import account\n{ASK}\n{check}"
+            check = f"user_account.check_may_write({arguments!r}, Path({checkout!r}, '.snakemake'))"
+            code = f"from pathlib import Path\nfrom hobble.workflow import user_account\n{ASK}\n{check}"
             return subprocess.run([sys.executable, "-c", code], capture_output=True, text=True).stderr
 
         assert f"{folder}: cannot be written by the user 54321" in said("-c2", "results/x")

@@ -7,7 +7,7 @@ from itertools import accumulate, chain, pairwise, product
 import numpy as np
 import pytest
 
-from hobble.database.stretches import SampleRange, Sharing
+from hobble.database.sharing import SampleRange, Sharing
 
 
 def read(sharing: Sharing) -> list[list[int]]:

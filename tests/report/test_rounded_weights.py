@@ -15,7 +15,7 @@ import pytest
 from hobble.core.quat import Array
 from hobble.models.network import Network
 from hobble.models.pfnn.network import Pfnn
-from hobble.report.rounded import GROUP, has_weights, rounded, rounding_error
+from hobble.report.rounded_weights import GROUP, has_weights, rounded, rounding_error
 from hobble.runtime.animation import ProceduralAnimation
 
 FRAMES = 60
@@ -38,7 +38,7 @@ def network_of_8_bits(network: Network, character: dict[str, Any]) -> Pfnn:
     small = [weights_of(layer)[0] for layer in rounded(character)["network"]["layers"]]
     start = network.layout.y_joint_rotation.start
     turns = start + 3 * np.asarray(character["turning"])[:, None] + np.arange(3)
-    kept[0][..., character["seen"]] = small[0]
+    kept[0][..., character["inputColumns"]] = small[0]
     for own, theirs in zip(kept[1:-1], small[1:-1], strict=True):
         own[...] = theirs
     kept[-1][:, np.concatenate([np.arange(start), turns.ravel()])] = small[-1]
@@ -52,7 +52,7 @@ def test_a_rounded_weight_errs_by_at_most_half_a_step_of_its_group(
     assert isinstance(network, Pfnn)
     layer = rounded(character)["network"]["layers"][0]
     found, factors = weights_of(layer)
-    exact = network.weights[0][:, :, character["seen"]]
+    exact = network.weights[0][:, :, character["inputColumns"]]
     assert np.all(np.abs(found - exact) <= 0.505 * factors + 1e-12)
     assert np.abs(found - exact).max() > 0
     assert len(layer["weights"]) < 0.51 * len(character["network"]["layers"][0]["weights"])
@@ -72,7 +72,7 @@ def test_the_page_moves_as_python_does_with_the_same_weights(
       const c = Hobble.character({json.dumps(rounded(character))}), out = [];
       for (let f = 0; f < {FRAMES}; f++) {{
         c.frame([.4, 2.4], null, "walk", () => 0);
-        out.push(Array.from(c.pose));
+        out.push(Array.from(c.posePosition));
       }}
       return out;
     }})()""")

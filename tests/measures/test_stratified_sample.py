@@ -14,7 +14,7 @@ from hobble.measures.accuracy import page
 from hobble.measures.accuracy.run import measure
 from hobble.measures.rollouts.page import rollout_chart
 from hobble.measures.rollouts.run import measure_roll_outs
-from hobble.measures.sample import LEAST, Sample, Stratum, drawn
+from hobble.measures.stratified_sample import LEAST, Sample, Stratum, draw_sample
 from hobble.rows.clip_rows import save_clip_rows
 from hobble.rows.excerpts import LONGEST, Excerpt, Kind, excerpts, load_excerpt
 from hobble.rows.facts import Facts, facts, load_facts, save_facts
@@ -58,13 +58,13 @@ def estimate(sample: Sample, split: str, values: dict[Excerpt, float]) -> float:
 def test_with_few_frames_all_clips_are_measured():
     clips, splits, _ = population(0)
     rows = sum(one.rows for one in clips)
-    assert drawn(clips, splits, rows) is None
-    assert drawn(clips, splits, rows - 1) is not None
+    assert draw_sample(clips, splits, rows) is None
+    assert draw_sample(clips, splits, rows - 1) is not None
 
 
 def test_the_sample_has_the_requested_size_and_every_kind_of_clip():
     clips, splits, _ = population(1)
-    sample = drawn(clips, splits, 300_000)
+    sample = draw_sample(clips, splits, 300_000)
     assert sample is not None
     of_excerpt = {excerpt: kind for one in clips for excerpt, kind in one.excerpts.items()}
     measured = dict.fromkeys(("train", "held_out"), 0)
@@ -82,7 +82,7 @@ def test_the_sample_has_the_requested_size_and_every_kind_of_clip():
 
 def test_of_two_long_clips_only_excerpts_are_drawn():
     clips, splits, _ = population(4, 24, (600_000, 600_001))
-    sample = drawn(clips, splits, 100_000)
+    sample = draw_sample(clips, splits, 100_000)
     assert sample is not None
     assert sum(one.rows for one in sample.weights) == pytest.approx(100_000, rel=0.3)
     assert max(one.rows for one in sample.weights) <= LONGEST
@@ -96,8 +96,8 @@ def test_of_two_long_clips_only_excerpts_are_drawn():
 def test_an_additional_clip_hardly_changes_the_sample():
     clips, splits, _ = population(2)
     more = [*clips, Facts("another", 900, (Kind("walk", 3.0, ()),))]
-    before = drawn(clips, splits, 300_000)
-    after = drawn(more, {**splits, "another": "train"}, 300_000)
+    before = draw_sample(clips, splits, 300_000)
+    after = draw_sample(more, {**splits, "another": "train"}, 300_000)
     assert before is not None
     assert after is not None
     changed = before.weights.keys() ^ after.weights.keys()
@@ -114,7 +114,7 @@ def test_the_interval_contains_the_true_mean_about_as_often_as_stated(split, lon
     inside, off = [], []
     for seed in range(80):
         clips, splits, values = population(seed, 48, (20_000, 60_000)) if long else population(seed)
-        sample = drawn(clips, splits, 200_000)
+        sample = draw_sample(clips, splits, 200_000)
         assert sample is not None
         own = [one for one in values if splits[one.clip] == split]
         truth = np.average([values[one] for one in own], weights=[one.rows for one in own])

@@ -28,11 +28,12 @@ MIN_STANDING_SHARE = 0.005  # if fewer rows stand, the start frame is not a stan
 
 
 @dataclass(frozen=True)
-class SeenInTraining:
-    """x_low, x_high, start_x (X,), y_low, y_high, start_y (Y,): raw units, float32.
+class TrainingFacts:
+    """Facts of the training rows, in raw units, float32.
 
-    fastest: largest speed of any joint in any row, cm a frame. start_x, start_y, start_phase: the row to
-    start from, which is the stillest standing one, or the row nearest to the mean if standing is rare.
+    x_low, x_high (X,), y_low, y_high (Y,): smallest and largest value of each column. fastest: largest speed
+    of any joint in any row, cm a frame. start_x (X,), start_y (Y,), start_phase: the row from which a
+    character starts: the stillest standing row, or the row nearest to the mean if standing is rare.
     """
 
     x_low: Array = field(repr=False)
@@ -50,11 +51,11 @@ class SeenInTraining:
         return {**of_rows, "start_phase": np.float64(self.start_phase), "fastest": np.float64(self.fastest)}
 
     @classmethod
-    def of(cls, layout: RowLayout, parts: Iterable[Any], statistics: Any) -> SeenInTraining:
+    def of(cls, layout: RowLayout, parts: Iterable[Any], statistics: Any) -> TrainingFacts:
         """From all rows, as `Database.each_row` gives them, and their statistics.
 
-        Only the ground depends on the fit of a row. So a row is composed with its highest and its lowest
-        ground instead of with each fit. A row to start from has its first fit.
+        Only the ground differs between the terrain fits of a row. So a row is composed with its highest and
+        with its lowest ground instead of with each fit. The start row is composed with its first fit.
         """
         s = statistics
         stand = layout.x_gait.start + GAITS.index("stand") * layout.samples + layout.samples // 2
@@ -90,7 +91,7 @@ class SeenInTraining:
     @classmethod
     def read(
         cls, path: str | Path, arrays: Mapping[str, Any], x_size: int, y_size: int
-    ) -> SeenInTraining | None:
+    ) -> TrainingFacts | None:
         """From a file's arrays; None if it has none, as the original release. Raises InputError."""
         if not any(name in arrays for name in (*ARRAYS, "start_phase", "fastest")):
             return None
@@ -114,7 +115,7 @@ class SeenInTraining:
 
 
 def _raw(layout: RowLayout, part: Any, ground: Array, lift: Array, s: Any) -> tuple[Array, Array]:
-    """x (n, X) and y (n, Y) in raw units, of rows with these heights and mean heights of the ground."""
+    """x (n, X) and y (n, Y) in raw units. ground: heights of the ground; lift: (n, 1) their mean."""
     x, y = np.empty((len(part.x), layout.x_size), np.float32), part.y.copy()
     compose(layout, part.x, ground, lift, x, y, s.x_std, s.y_std)
     return x * s.x_std + s.x_mean, y * s.y_std + s.y_mean

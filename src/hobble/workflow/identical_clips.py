@@ -6,7 +6,7 @@ from collections import defaultdict
 from itertools import combinations
 from pathlib import Path
 
-from hobble.database.sides import refuse_both_sides
+from hobble.database.split_check import refuse_both_sides
 from hobble.workflow.checksums import file_sha256
 from hobble.workflow.clips import Clips, original
 from hobble.workflow.datasets import Datasets

@@ -14,9 +14,8 @@ from hobble.models.network import Network
 from hobble.runtime.options import Runtime
 
 SEVERITY = 10.0
-RowOf = Callable[
-    [str, FigureWalk, FigureWalk], dict[str, Any]
-]  # link, hurt walk, healthy walk -> its effects
+# Link, hurt walk, walk without injury -> row with the effects of the injury.
+RowOf = Callable[[str, FigureWalk, FigureWalk], dict[str, Any]]
 
 
 def limps_together(
@@ -24,8 +23,9 @@ def limps_together(
 ) -> list[dict[str, Any]]:
     """A row for each trained column of another channel and each of the links `legs` at severity 10.
 
-    The effects are relative to the walk with the same column and no injury. speed: asked for, cm a frame.
-    Columns with which the character does not walk a whole cycle are left out.
+    The column, such as "sad", has its highest value. The effects are relative to the walk with that value and
+    no injury. If the character does not walk a whole cycle then, the column is left out. speed: target speed,
+    cm a frame. row_of: makes a row.
     """
     names = [name for name in network.channels if name != INJURY]
     found = [(name, column) for name in names for column in network.trained(name)]
@@ -49,9 +49,9 @@ def limps_together(
 
 
 def named_together(rows: Sequence[dict[str, Any]]) -> list[dict[str, Any]]:
-    """For each column the shares of windows that are called impaired, and recognised with the right side.
+    """For each column the means of `impaired`, `named`, `wrong_side` and `speed_share` over its rows.
 
-    walks: of how many walks the recognisers say something; very slow ones may have no window of whole cycles.
+    walks: how many walks the recognisers judge; very slow walks may have no window with enough cycles.
     """
     out = []
     for other, column in dict.fromkeys((row["channel"], row["column"]) for row in rows):

@@ -1,14 +1,14 @@
 """A stratified sample of a large data set, with weights and confidence intervals.
 
-What is drawn are excerpts of clips (`hobble.rows.excerpts`), so that a long clip is not measured as a whole.
-They are put into strata by split, gait, speed (the slow, middle and fast third of a gait) and channel. Of
-each stratum some are drawn, in proportion to its rows; each split gets half of the rows that are to be
-measured, since the held-out clips are few. The excerpts drawn from a stratum represent all of its rows
-(Cochran, Sampling Techniques, 1977, chapters 5 and 6: stratified sampling, ratio estimates).
+The sample consists of excerpts of clips (`hobble.rows.excerpts`), so that no long clip is measured as a
+whole. The excerpts are put into strata by split, gait, speed (the slow, middle and fast third of a gait) and
+channel. Each stratum gets a share of the sample in proportion to its rows. Each split gets half of the
+measured rows, because there are few held-out clips. The excerpts drawn from a stratum represent all of its
+rows (Cochran, Sampling Techniques, 1977, chapters 5 and 6: stratified sampling, ratio estimates).
 
-The excerpts of a stratum are drawn one by one, whichever clips they are from. So the confidence interval
-holds although excerpts of one clip resemble each other. It says how far the mean of the sample may be from
-the mean over all rows of these clips. It does not say how much other clips would differ.
+Each excerpt is drawn on its own, whichever clip it is from. So the confidence interval holds although
+excerpts of one clip resemble each other. It says how far the mean of the sample may be from the mean over all
+rows of these clips. It does not say how much other clips would differ.
 """
 
 from __future__ import annotations
@@ -25,14 +25,14 @@ from hobble.measures.results import SampleSize
 from hobble.rows.excerpts import Excerpt, Kind
 from hobble.rows.facts import Facts
 
-LEAST = 2  # excerpts drawn from a stratum, because the variance needs at least two
-SPEEDS = 3  # strata of a gait by speed
-SURE = 1.96  # standard errors on each side of a 95 % confidence interval
+LEAST = 2  # fewest excerpts drawn from a stratum, because the variance needs two
+SPEEDS = 3  # ranges of speed into which each gait is divided
+SURE = 1.96  # half the width of a 95 % confidence interval, in standard errors
 
 
 @dataclass(frozen=True)
 class Stratum:
-    """Similar excerpts. count, rows: their number and total rows. drawn: those in the sample."""
+    """Similar excerpts. count: how many. rows: rows of all of them. drawn: the excerpts in the sample."""
 
     split: str
     count: int
@@ -54,7 +54,7 @@ class Sample:
 
     @property
     def weights(self) -> dict[Excerpt, float]:
-        """Excerpt in the sample -> number of rows that each of its rows represents. By clip and place."""
+        """Excerpt in the sample -> number of rows that each of its rows represents, by clip and place."""
         return dict(sorted((one, stratum.weight) for stratum in self.strata for one in stratum.drawn))
 
     @property
@@ -99,7 +99,7 @@ def _variance(stratum: Stratum, values: Mapping[Excerpt, float]) -> float:
     return float((1 - n / stratum.count) * (off**2).sum() / (n - 1) / n)
 
 
-def drawn(facts: Iterable[Facts], splits: Mapping[str, str], frames: int) -> Sample | None:
+def draw_sample(facts: Iterable[Facts], splits: Mapping[str, str], frames: int) -> Sample | None:
     """A sample of about `frames` rows; None if all clips together have no more.
 
     The same clips give the same sample, and one more clip changes it only a little.
@@ -143,7 +143,7 @@ def _strata(every: Mapping[Excerpt, Kind], splits: Mapping[str, str]) -> dict[tu
 
 
 def shuffle_key(name: str) -> bytes:
-    """Sort names by this for an order that looks random, is always the same, and stays if one is added."""
+    """A key for sorting names. The order looks random but is always the same; a new name only joins in."""
     return hashlib.sha256(name.encode()).digest()
 
 

@@ -12,7 +12,7 @@ MOST_NAMED = 10
 def refuse_both_sides(where: str, pairs: Iterable[tuple[str, str, str]], splits: Mapping[str, str]) -> None:
     """Raise HobbleError with every pair of clips where one is in training and the other is held out.
 
-    where: the data set's name for messages. pairs: (clip, clip, what they are: "the same file", ...).
+    where: the data set's name for messages. pairs: (clip, clip, how they are alike, such as "the same file").
     splits: clip -> "train" or "held_out"; other clips are ignored.
     """
     alike, lacking = [], []
@@ -27,6 +27,6 @@ def refuse_both_sides(where: str, pairs: Iterable[tuple[str, str, str]], splits:
     names = ", ".join(f'"{name}"' for name in dict.fromkeys(lacking))
     raise HobbleError(
         f"{where}: {'; '.join(alike[:MOST_NAMED])}{more}: the first of each pair is held out and the second "
-        f"is trained on, so what is held out would have been learnt. Add to held_out: [{names}], or take one "
-        "of each pair out of the data set."
+        f"is trained on, so the network would learn what is held out. Add to held_out: [{names}], or take "
+        "one of each pair out of the data set."
     )

@@ -17,7 +17,7 @@ import numpy as np
 
 @dataclass(frozen=True)
 class SampleRange:
-    """Samples `start` to `stop` of a section; each batch gets `share` of them.
+    """A stretch: samples `start` to `stop` - 1 of a section; each batch gets `share` of them.
 
     low, high: this process reads samples low to high - 1 of each `share` samples; others read the rest.
     """
@@ -46,7 +46,7 @@ class SampleRange:
 class Sharing:
     """A section of `total` samples in batches of `batch`, as one process sees it.
 
-    stretches: at most `batch`. own: the places in a batch, from 0, that this process fills.
+    stretches: their number, at most `batch`. own: the places in a batch, from 0, that this process fills.
     """
 
     total: int
@@ -56,7 +56,10 @@ class Sharing:
 
     @classmethod
     def of(cls, total: int, batch: int, stretches: int = 1, rank: int = 0, processes: int = 1) -> Sharing:
-        """Of process `rank`, from 0, of `processes`. Their parts of a batch differ by 1 at most."""
+        """The sharing as process `rank` (from 0) of `processes` sees it.
+
+        Their parts of a batch differ by 1 at most.
+        """
         return cls(total, batch, stretches, own_places(batch, rank, processes))
 
     def sizes(self) -> Iterator[tuple[int, int]]:

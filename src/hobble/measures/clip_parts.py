@@ -1,4 +1,4 @@
-"""The rows that a measurement reads: whole clips, or the excerpts of a sample."""
+"""The parts of clips that a measurement reads: whole clips, or the excerpts of a sample."""
 
 from __future__ import annotations
 
@@ -8,36 +8,36 @@ from pathlib import Path
 from typing import Any
 
 from hobble.evaluation.captured import Captured, captured
-from hobble.measures.given import Given, Json
-from hobble.measures.sample import Sample, drawn
+from hobble.measures.inputs import Json, MeasureInputs
 from hobble.measures.sample_options import SampleOptions
+from hobble.measures.stratified_sample import Sample, draw_sample
 from hobble.rows.clip_rows import ClipRows, load_clip_rows
 from hobble.rows.excerpts import LONGEST, Excerpt, load_excerpt
 from hobble.rows.facts import load_facts
 
 
 @dataclass(frozen=True)
-class Chosen:
-    """Rows of a clip: all of them, or those of `excerpt`. weight: the number of rows that each represents."""
+class ClipPart:
+    """Rows of a clip: all of them, or those of `excerpt`. weight: how many rows each row stands for."""
 
     clip: str
     path: Path
     weight: float = 1.0
     excerpt: Excerpt | None = None
 
-    def load(self, before: int = 0, after: int = 0) -> Loaded:
+    def load(self, before: int = 0, after: int = 0) -> LoadedPart:
         """Read the rows, and up to `before` and `after` rows of the same clip around them."""
         if self.excerpt is None:
             rows = load_clip_rows(self.path)
-            return Loaded(rows, 0, len(rows))
+            return LoadedPart(rows, 0, len(rows))
         rows = load_excerpt(self.path, self.excerpt, before, after)
         first = min(before, self.excerpt.first)
-        return Loaded(rows, first, first + self.excerpt.rows)
+        return LoadedPart(rows, first, first + self.excerpt.rows)
 
 
 @dataclass(frozen=True)
-class Loaded:
-    """Rows of a clip. Those from `first` to `stop` were chosen; the others come before and after them."""
+class LoadedPart:
+    """Rows read from a clip's file. The chosen ones are rows[first:stop]; the others lie around them."""
 
     rows: ClipRows = field(repr=False)
     first: int
@@ -45,38 +45,38 @@ class Loaded:
 
     @property
     def frames(self) -> list[int]:
-        """The first and last frame of the chosen rows (at least one row)."""
+        """The frames of the first and the last chosen row. There must be at least one chosen row."""
         return [int(self.rows.frame[at]) for at in (self.first, self.stop - 1)]
 
 
-def chosen(clips: Mapping[str, str | Path], sample: Sample | None) -> Iterator[Chosen]:
+def clip_parts(clips: Mapping[str, str | Path], sample: Sample | None) -> Iterator[ClipPart]:
     """What to measure, sorted by clip and place. clips: name -> file of rows. sample: None for all clips."""
     if sample is None:
         for name in sorted(clips):
-            yield Chosen(name, Path(clips[name]))
+            yield ClipPart(name, Path(clips[name]))
     else:
         for one, weight in sample.weights.items():
-            yield Chosen(one.clip, Path(clips[one.clip]), weight, one)
+            yield ClipPart(one.clip, Path(clips[one.clip]), weight, one)
 
 
 def captured_motion(clips: Mapping[str, str | Path], sample: Sample | None) -> Iterator[Captured]:
-    """The unbroken stretches of all clips, or of the excerpts of a sample, with one in memory at a time."""
-    for one in chosen(clips, sample):
+    """The unbroken stretches of all clips, or of a sample's excerpts. They are loaded one after another."""
+    for one in clip_parts(clips, sample):
         yield from captured(one.load().rows)
 
 
-def sample_of(given: Given, options: SampleOptions) -> Sample | None:
+def sample_of(inputs: MeasureInputs, options: SampleOptions) -> Sample | None:
     """The excerpts to measure; None for all clips."""
-    return drawn(map(load_facts, given.facts), given.splits, options.sample_frames)
+    return draw_sample(map(load_facts, inputs.facts), inputs.splits, options.sample_frames)
 
 
 def with_sample(result: Json, sample: Sample | None) -> Json:
-    """The result, and the size of the sample if it was measured on one."""
+    """The result, with a key `sample` (the size of the sample) if only a sample was measured."""
     return result if sample is None else {**result, "sample": sample.to_dict()}
 
 
 def captured_sampled(found: Mapping[str, Any]) -> str:
-    """A sentence that only a sample of the captured motion was read; empty if all of it was."""
+    """A sentence which says that only a sample of the captured motion was read; empty if all of it was."""
     words = sampled_words(found)
     return f" Only a part of the clips was read: {words}." if words else ""
 

@@ -1,4 +1,4 @@
-"""A network that is built from the clips without training, such as motion matching."""
+"""Builds a network from the clips without training, such as motion matching."""
 
 from __future__ import annotations
 
@@ -39,7 +39,7 @@ def run_built(
     checkpoint: Path,
     terrain_side: float,
 ) -> None:
-    """Build it and write the same three files as a training.
+    """Build a network and write the same three files as a training.
 
     clips: name -> file of its rows in order; all training clips of the database have to be there. The history
     has one row, since every frame is read once. The checkpoint only names what was built; training cannot

@@ -19,14 +19,14 @@ Row = Mapping[str, object]  # of a CSV table: column -> number, text or None
 
 
 @dataclass(frozen=True)
-class Given:
-    """The inputs of a measurement of one configuration. It gets only those listed in its `Measure.inputs`.
+class MeasureInputs:
+    """The inputs of a measurement of one configuration: only those listed in its `Measure.inputs`.
 
     clips: clip -> its file of rows. facts: files of `hobble.rows.facts` of the same clips. splits: clip ->
     "train" or "held_out". people: clip -> the person who walks in it; each clip without a known person counts
-    as another person. runtime: the keys in its `Measure.runtime`, and defaults for the others.
-    pieces: piece -> its JSON, if the pieces ran as separate jobs.
-    files: other inputs by name, such as the JSON of another measurement.
+    as a person of its own. runtime: the values of the keys in `Measure.runtime`; the other keys have
+    defaults. pieces: name of a piece -> its JSON file, if the pieces ran as separate jobs. files: name ->
+    file of each other input, such as the JSON of another measurement.
     """
 
     configuration: str
@@ -60,7 +60,7 @@ class Given:
         return yaml.safe_load(self.file("published").read_text(encoding="utf-8"))
 
     def measured_pieces(self) -> dict[str, Json]:
-        """Piece -> what was measured, of those that ran as jobs of their own."""
+        """Name -> result of each piece that ran as a job of its own."""
         return {name: read_json(path) for name, path in self.pieces.items()}
 
     def measured(self, name: str) -> Json:

@@ -1,13 +1,13 @@
-// Wishes as `ProceduralAnimation.next_pose` takes them: velocity [x, z], facing [x, z] or null, gait or null. And the limits
+// Targets as `ProceduralAnimation.next_pose` takes them: velocity [x, z], facing [x, z] or null, gait or null. And the limits
 // of a hurt body, as in `hobble.runtime.limits`: a highest speed, and a walk instead of a jog if the body cannot jog.
 import { wrap } from "./numbers.js";
 
-export const createWishes = (spec, c) => {
+export const createTargets = (spec, c) => {
   const { gaits, constants: k } = spec, M = spec.window, G = gaits.length, { atan2, hypot, min, max, abs } = Math;
 
   const facing = (velocity, ahead) => {
     const going = hypot(...velocity) >= k.still;
-    if (!ahead) return [0, going ? velocity : c.direction];
+    if (!ahead) return [0, going ? velocity : c.smoothedDirection];
     const aside = abs(wrap(atan2(...velocity) - atan2(...ahead)));
     return [going ? min(1, aside / k.strafeFrom) : 1, ahead];
   };
@@ -50,7 +50,7 @@ export const createWishes = (spec, c) => {
     const each = gaits.map((_, g) => allowed(g)), walk = gaits.indexOf("walk"), jog = gaits.indexOf("jog");
     let hurry = 1;
     if (each[jog] < k.lameBelow) {
-      hurry += (k.hurried - 1) * gait[jog];
+      hurry += (k.hurryFactor - 1) * gait[jog];
       gait[walk] += gait[jog];
       gait[jog] = 0;
     }

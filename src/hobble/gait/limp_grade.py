@@ -1,10 +1,9 @@
 """Recognises limps, also mild ones: what hurts, the side, and the strength relative to people's strong limps.
 
 An impairment is a direction in which people's walks differ from their normal walks. At strength s the mean of
-the features is s times the mean over people. Their spread is s times the spread over people, plus the spread
-of healthy walks. So mild limps are modelled as part of the way from people's normal to their impaired walks,
-without a generator of limps. Impairments that the data cannot distinguish share a label:
-see PARTS.
+the features is s times their mean over people. The covariance is s^2 times that over people, plus that of
+healthy walks. So a mild limp is modelled as part of the way from a person's normal to their impaired walk,
+without a generator of limps. Impairments that the data cannot distinguish share a label (PARTS).
 """
 
 from __future__ import annotations
@@ -26,8 +25,8 @@ from hobble.gait.recogniser import RIGHT, SIDES, examples
 HEALTHY = Path(__file__).with_name("healthy.npz")
 GUARDED_ARM, LEANING = "guarded_arm", "leaning_trunk"
 WAYS = {"forward": (1, 0), "backward": (-1, 0), "to the left": (0, 1), "to the right": (0, -1)}
-# label -> the parts of the body that it can mean. Pain in thigh, shank or foot looks alike in people's data.
-# Pain anywhere in an arm is recognised by the arm's swing only.
+# label -> the parts of the body that may hurt. Pain in thigh, shank or foot looks the same in people's data.
+# Pain anywhere in an arm is recognised only by the swing of the arm.
 PARTS: Mapping[str, tuple[str, ...]] = {
     NORMAL: (),
     "antalgic": ("thigh", "shank", "foot"),
@@ -38,7 +37,7 @@ PARTS: Mapping[str, tuple[str, ...]] = {
     GUARDED_ARM: ("shoulder", "upper arm", "forearm", "hand"),
     LEANING: ("back",),
 }
-STRENGTHS = np.array([0.15, 0.3, 0.45, 0.6, 0.8, 1.0, 1.2])  # relative to people's, all equally likely
+STRENGTHS = np.array([0.15, 0.3, 0.45, 0.6, 0.8, 1.0, 1.2])  # 1 is that of people; all are equally likely
 HEALTHY_SPREAD = 2.5  # factor on the measured covariance, because an unmeasured figure may vary more
 SHRINKAGE = 0.5  # of both covariances towards their diagonals
 
@@ -47,10 +46,11 @@ SHRINKAGE = 0.5  # of both covariances towards their diagonals
 class Grade:
     """What hurts. label: a key of PARTS. side: "right", "left" or None.
 
-    strength: 0 for normal; 1 is as much as the people who imitated the impairment. distance: from the nearest
-    known walk, in spreads per feature. For people who were left out it is 0.7 on average and at most 1.5;
-    beyond that the label is less reliable. probabilities: of each label, both sides together. sides: of each
-    label and side (or direction of the lean).
+    strength: 0 for normal; 1 is as much as in the people who imitated the impairment. distance: from the
+    nearest known walk, in standard deviations (root mean square over the features). For people who were left
+    out of the learning it is 0.7 on average and at most 1.5; beyond that the label is less reliable.
+    probabilities: of each label, both sides together. sides: probability of each (label, side or direction of
+    the lean).
     """
 
     label: str
@@ -67,7 +67,7 @@ class Grade:
 
     @property
     def impaired(self) -> bool:
-        """Whether an impairment is likelier than none."""
+        """Whether an impairment is more likely than none."""
         return self.probabilities[NORMAL] < 0.5
 
 
@@ -75,8 +75,8 @@ class Grade:
 class Grader:
     """The known walks.
 
-    kinds: (label, side or direction of the lean) -> mean (D,) at strength 1 and covariance (D, D) over
-    people. healthy: (D, D) covariance of healthy walks.
+    kinds: (label, side or direction of the lean) -> mean (D,) and covariance (D, D) of the D features at
+    strength 1, over people. healthy: (D, D) covariance of healthy walks.
     """
 
     kinds: Mapping[tuple[str, str], tuple[Array, Array]] = field(repr=False)
@@ -84,7 +84,11 @@ class Grader:
 
     @cached_property
     def _densities(self) -> tuple[Array, Array, Array]:
-        """Mean, whitening, log of the peak density: of a healthy walk, then of each kind at each strength."""
+        """Normal distributions, n = 1 + kinds * strengths: of a healthy walk, then of each kind and strength.
+
+        Means (n, D), whitening matrices (n, D, D), and log of the peak density times prior (n,), up to a
+        common term.
+        """
         each = [(s * mean, s**2 * spread) for mean, spread in self.kinds.values() for s in STRENGTHS]
         means, spreads = zip((np.zeros(len(self.healthy)), 0 * self.healthy), *each, strict=True)
         factors = np.linalg.cholesky(self.healthy + np.array(spreads))
@@ -115,7 +119,7 @@ class Grader:
 
 
 def learn_grader(known: People, whose: Iterable[int], healthy: Array) -> Grader:
-    """Learn from walks of people and the covariance (D, D) of healthy walks."""
+    """Learn from the walks of some people (`whose`) and the covariance (D, D) of healthy walks."""
     values, classes = examples(known, whose)
     names = list(features(known.normal(), known.normal()))
     labels = np.array(classes)
@@ -140,7 +144,7 @@ def grader() -> Grader:
 
 
 def healthy_covariance() -> Array:
-    """(D, D) mean square of the features of healthy walks, relative to the same person's others."""
+    """(D, D) covariance of the features of healthy walks, relative to other healthy walks of the person."""
     known = load_npz(HEALTHY)
     return np.average(known["covariances"], axis=0, weights=known["clips"])
 

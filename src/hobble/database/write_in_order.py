@@ -1,4 +1,4 @@
-"""Pass 2 of the shuffle: sort the buckets, standardise them and write chunks."""
+"""Second step of the shuffle: sort the rows of each bucket, standardise them and write chunks."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from hobble.database.buckets import Buckets
 from hobble.database.chunks import Chunk, write_chunk
 from hobble.database.plan import Plan
 from hobble.database.precision import narrow
-from hobble.database.split import split_rows
+from hobble.database.standardise import standardise_rows
 from hobble.database.statistics import Statistics
 from hobble.rows.compose import x_columns
 
@@ -19,7 +19,7 @@ from hobble.rows.compose import x_columns
 def write_chunks(
     work: Path, split: str, buckets: Buckets, plan: Plan, statistics: Statistics, dtype: str
 ) -> Iterator[Chunk]:
-    """Write each bucket, sorted and standardised, as chunks of `chunk_rows` rows."""
+    """Write each bucket, sorted and standardised, as chunks of `plan.chunk_rows` rows to folder `work`."""
     columns, number = x_columns(plan.layout), 0
     for frames, fits, index in buckets.drain():
         ends = np.cumsum(index["count"])
@@ -28,7 +28,7 @@ def write_chunks(
             count = index["count"][part]
             fit_part = slice(int(ends[start] - count[0]), int(ends[part.stop - 1]))
             raw = frames[part, :columns], frames[part, columns:], fits[fit_part]
-            x, y, ground = split_rows(plan.layout, statistics, *raw, count)
+            x, y, ground = standardise_rows(plan.layout, statistics, *raw, count)
             arrays = {
                 "x": narrow(x, dtype),
                 "y": narrow(y, dtype),

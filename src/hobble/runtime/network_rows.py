@@ -1,0 +1,175 @@
+"""The rows X and Y of the network: a character's state as inputs, and outputs as its next pose.
+
+The first axis of every array is the C characters.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numba.extending import register_jitable
+
+from hobble.character import rule
+from hobble.core.compiled import njit
+from hobble.runtime.trajectory import Trajectory
+
+joint_place = register_jitable(rule.joint_place)
+# Radians a frame (1500 degrees a second). No joint of a walking or running person turns as fast, but a
+# predicted joint can: if clips have rotations half a turn apart, as in hands, their mean may be any rotation.
+# A new target may also change the next pose at once.
+FASTEST_TURN = np.radians(25)
+# Largest rise or fall of the body with the mean height of the path, cm a frame. When a new target turns the
+# path around on a hill, that height may change by 20 cm at once, while the ground under the feet stays.
+MOST_CLIMB = 5.0
+
+# Groups of arrays for compiled functions, which unpack them into names.
+#
+# The pose that the network predicted last: position, velocity (C, J, 3); rotation (C, J, 4), world.
+Joints = tuple[Any, Any, Any]
+# The copy of the pose that the caller gets: root (C, 3), yaw (C,), position (C, J, 3), rotation (C, J, 4).
+Drawn = tuple[Any, Any, Any, Any]
+
+
+@njit
+def write_inputs(
+    path: Trajectory,
+    ground: Any,
+    height: Any,
+    pose: Joints,
+    channel_values: Any,
+    columns: tuple[Any, Any],
+    step: int,
+    x: Any,
+) -> None:
+    """Write the state into the network's input rows x (C, X), in raw units.
+
+    ground: (C, samples, 3) heights. height: (C,) mean ground height along the path. columns: the first column
+    of each block of BODY, and the column of each of channel_values (C, K). step: frames between two samples.
+    """
+    position, direction, gait = path
+    joints, velocities, _ = pose
+    at, channel_at = columns
+    middle, samples = position.shape[1] // 2, ground.shape[1]
+    for c in range(x.shape[0]):
+        px, pz = position[c, middle]
+        cos, sin = direction[c, middle, 1], direction[c, middle, 0]
+        for s in range(samples):
+            dx, dz = position[c, s * step, 0] - px, position[c, s * step, 1] - pz
+            x[c, at[0] + s] = dx * cos - dz * sin
+            x[c, at[0] + samples + s] = dx * sin + dz * cos
+            dx, dz = direction[c, s * step]
+            x[c, at[1] + s] = dx * cos - dz * sin
+            x[c, at[1] + samples + s] = dx * sin + dz * cos
+            for g in range(gait.shape[2]):
+                x[c, at[2] + g * samples + s] = gait[c, s * step, g]
+            for side in range(3):
+                x[c, at[5] + side * samples + s] = ground[c, s, side] - height[c]
+        px, pz = position[c, middle - 1]
+        cos, sin = direction[c, middle - 1, 1], direction[c, middle - 1, 0]
+        for j in range(joints.shape[1]):
+            dx, dz = joints[c, j, 0] - px, joints[c, j, 2] - pz
+            k = at[3] + 3 * j
+            x[c, k], x[c, k + 1], x[c, k + 2] = (
+                dx * cos - dz * sin,
+                joints[c, j, 1] - height[c],
+                dx * sin + dz * cos,
+            )
+            dx, dz = velocities[c, j, 0], velocities[c, j, 2]
+            k = at[4] + 3 * j
+            x[c, k], x[c, k + 1], x[c, k + 2] = dx * cos - dz * sin, velocities[c, j, 1], dx * sin + dz * cos
+        for k in range(channel_values.shape[1]):
+            x[c, channel_at[k]] = channel_values[c, k]
+
+
+@njit
+def take_outputs(
+    y: Any,
+    first: int,
+    path: Trajectory,
+    heights: tuple[Any, Any],
+    pose: Joints,
+    fastest: float,
+    drawn: Drawn,
+) -> None:
+    """Turn the prediction y (C, Y) into the world poses `pose` and `drawn`.
+
+    first: first column of the joints. heights: (C,) mean ground height along the path, and (C,) lift of the
+    body, see `feet.carry_body`. A new joint position is the mean of two: the predicted position, and the old
+    position plus the predicted velocity. In a frame no joint moves by more than `fastest` cm, apart from the
+    change of the ground's height, and no joint turns by more than FASTEST_TURN.
+    """
+    position, direction, _ = path
+    joints, velocities, rotations = pose
+    root, yaw, pose_position, pose_rotation = drawn
+    height, lift = heights
+    middle, count = position.shape[1] // 2, joints.shape[1]
+    for c in range(y.shape[0]):
+        sin, cos = direction[c, middle, 0], direction[c, middle, 1]
+        climbed = height[c] - root[c, 1]
+        lift[c] += min(max(climbed, -MOST_CLIMB), MOST_CLIMB) - climbed
+        root[c, 0], root[c, 1], root[c, 2] = position[c, middle, 0], height[c], position[c, middle, 1]
+        yaw[c] = np.arctan2(sin, cos)
+        half_cos, half_sin = np.cos(yaw[c] / 2), np.sin(yaw[c] / 2)
+        for j in range(count):
+            p = first + 3 * j
+            v, r = p + 3 * count, p + 6 * count
+            velocities[c, j, 0] = y[c, v] * cos + y[c, v + 2] * sin
+            velocities[c, j, 1] = y[c, v + 1]
+            velocities[c, j, 2] = y[c, v + 2] * cos - y[c, v] * sin
+            new_x = y[c, p] * cos + y[c, p + 2] * sin + root[c, 0]
+            new_z = y[c, p + 2] * cos - y[c, p] * sin + root[c, 2]
+            _move_joint(
+                joints[c, j], velocities[c, j], new_x, y[c, p + 1] + root[c, 1], new_z, climbed, fastest
+            )
+            _turn_joint(rotations[c, j], y[c, r], y[c, r + 1], y[c, r + 2], half_cos, half_sin)
+            for k in range(3):
+                pose_position[c, j, k] = joints[c, j, k]
+            for k in range(4):
+                pose_rotation[c, j, k] = rotations[c, j, k]
+
+
+@njit
+def _move_joint(
+    place: Any, velocity: Any, x: float, y: float, z: float, climbed: float, fastest: float
+) -> None:
+    """Move a joint from `place` (3,) towards x, y, z, where the network predicts it, by `fastest` at most.
+
+    velocity: (3,) predicted. climbed: change of the ground's height, which does not count.
+    """
+    sx = joint_place(place[0] + velocity[0], x) - place[0]
+    sy = joint_place(place[1] + velocity[1], y) - place[1]
+    sz = joint_place(place[2] + velocity[2], z) - place[2]
+    step = np.sqrt(sx * sx + (sy - climbed) ** 2 + sz * sz)
+    if step > fastest:
+        sx, sy, sz = sx * fastest / step, climbed + (sy - climbed) * fastest / step, sz * fastest / step
+    place[0] += sx
+    place[1] += sy
+    place[2] += sz
+
+
+@njit
+def _turn_joint(rotation: Any, x: float, y: float, z: float, half_cos: float, half_sin: float) -> None:
+    """Turn a joint from `rotation` (4,) to the predicted one, by FASTEST_TURN at most.
+
+    x, y, z: the predicted axis times half the angle, relative to the root. half_cos, half_sin: of half the
+    root's yaw.
+    """
+    half = np.sqrt(x * x + y * y + z * z)
+    scale = np.sin(half) / half if half > 1e-8 else 1.0
+    w, x, y, z = np.cos(half), x * scale, y * scale, z * scale
+    w, x, y, z = (
+        half_cos * w - half_sin * y,
+        half_cos * x + half_sin * z,
+        half_cos * y + half_sin * w,
+        half_cos * z - half_sin * x,
+    )
+    dot = rotation[0] * w + rotation[1] * x + rotation[2] * y + rotation[3] * z
+    keep, take = 0.0, 1.0
+    if abs(dot) < np.cos(FASTEST_TURN / 2):
+        # Turn by FASTEST_TURN along the shorter way (slerp).
+        half = np.arccos(abs(dot))
+        keep = np.sin(half - FASTEST_TURN / 2) / np.sin(half)
+        take = np.sin(FASTEST_TURN / 2) / np.sin(half) * (1.0 if dot >= 0 else -1.0)
+    rotation[0], rotation[1] = keep * rotation[0] + take * w, keep * rotation[1] + take * x
+    rotation[2], rotation[3] = keep * rotation[2] + take * y, keep * rotation[3] + take * z

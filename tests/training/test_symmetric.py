@@ -1,0 +1,122 @@
+"""A network that is kept symmetric gives mirrored outputs for mirrored inputs."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+import torch
+
+from hobble.core.errors import HobbleError
+from hobble.core.skeleton import Skeleton
+from hobble.database.merge import write_database
+from hobble.database.reader import Database
+from hobble.models.mann.options import MannOptions
+from hobble.models.options import Options
+from hobble.models.pfnn.options import PfnnOptions
+from hobble.models.plain.options import PlainOptions
+from hobble.models.trainable import Trainable
+from hobble.rows.mirror_columns import mirror_of_x, mirror_of_y
+from hobble.training.start import fresh
+from hobble.training.symmetric import Symmetry
+from hobble.training.train import train
+from training.conftest import SPLITS, Recipe, clip_rows, figure
+
+NETWORKS = [
+    PfnnOptions(units=24),
+    PfnnOptions(units=25, hidden_layers=1, control_points=6),
+    PlainOptions(kind="plain", units=24),
+]
+
+
+@pytest.fixture
+def data(tmp_path: Path) -> Database:
+    """Rows of a figure with a left and a right link."""
+    clips = {}
+    for name, rows, seed in (("walk", 230, 1), ("turn", 70, 3)):
+        made = clip_rows(name, rows, 1, seed)
+        skeleton = replace(figure(), links=(("Hips", "LeftLeg"), ("Hips", "RightLeg"))).to_dict()
+        injury = np.random.default_rng(seed).uniform(0, 10, (rows, 2)).astype(np.float32)
+        layout = replace(made.layout, channels=(("injury", 2),))
+        clips[name] = replace(made, layout=layout, skeleton=skeleton, channels={"injury": injury})
+    path = tmp_path / "paired"
+    write_database(path, clips, SPLITS, channels=["injury"], joint_weight=0.1)
+    return Database.open(path, 64)
+
+
+def apart(network: Trainable, data: Database) -> float:
+    """How far the output for mirrored inputs is from the mirrored output, in standard deviations."""
+    skeleton, s = Skeleton.from_dict(data.skeleton), data.statistics
+    x_mirror = mirror_of_x(data.layout, skeleton).standardised(s.x_mean, s.x_std)
+    y_mirror = mirror_of_y(data.layout, skeleton).standardised(s.y_mean, s.y_std)
+    assert max(np.abs(x_mirror.shift).max(), np.abs(y_mirror.shift).max()) > 0.05, (
+        "the means are not symmetric"
+    )
+    x = np.random.default_rng(4).normal(size=(40, data.layout.x_size)).astype(np.float32)
+    p = torch.linspace(0, 0.99, 40)
+    y = network(torch.from_numpy(x), p).numpy()
+    image = network(torch.from_numpy(x_mirror(x).astype(np.float32)), (p + 0.5) % 1).numpy()
+    assert y.std() > 0.01
+    return float(np.abs(y_mirror(y) - image).max())
+
+
+@pytest.mark.parametrize("network", NETWORKS, ids=str)
+def test_a_network_trained_so_mirrors_its_output(
+    data: Database, network: Options, training: Recipe, tmp_path: Path
+) -> None:
+    recipe = training | {"rollout": 3, "batch": 64}
+    free = train(data, network=network, training=recipe, checkpoints=tmp_path)
+    kept = train(data, network=network, training=recipe | {"symmetric": True}, checkpoints=tmp_path)
+    assert apart(kept.network, data) < 1e-5
+    assert apart(free.network, data) > 1e-2
+
+
+@pytest.mark.parametrize("network", NETWORKS, ids=str)
+def test_new_weights_are_symmetric_and_as_large_as_before(
+    data: Database, network: Options, training: Recipe
+) -> None:
+    made = fresh(data, network, training).network
+    spread = [float(layer[:, :, :-1].std()) for layer in made.layers]
+    Symmetry(made, data).start()
+    assert apart(made, data) < 1e-5
+    assert [float(layer[:, :, :-1].std()) for layer in made.layers] == pytest.approx(spread, rel=0.05)
+
+
+@pytest.mark.parametrize("network", NETWORKS, ids=str)
+def test_a_symmetric_network_stays_as_it_is(data: Database, network: Options, training: Recipe) -> None:
+    made = fresh(data, network, training).network
+    symmetry = Symmetry(made, data)
+    made.flat.normal_(0, 0.1, generator=torch.Generator().manual_seed(2))
+    before = made.flat.clone()
+    symmetry.enforce()
+    once = made.flat.clone()
+    symmetry.enforce()
+    assert float((once - before).abs().max()) > 0.05
+    torch.testing.assert_close(made.flat, once, atol=1e-7, rtol=0)
+
+
+def test_a_training_that_goes_on_ends_with_the_same_bytes(
+    data: Database, network: PfnnOptions, training: Recipe, tmp_path: Path
+) -> None:
+    recipe = training | {"symmetric": True, "batch": 32}
+    straight = train(data, network=network, training=recipe, checkpoints=tmp_path / "a")
+    train(data, network=network, training=recipe | {"passes": 1}, checkpoints=tmp_path / "b")
+    resumed = train(data, network=network, training=recipe, checkpoints=tmp_path / "b")
+    assert torch.equal(straight.network.flat, resumed.network.flat)
+
+
+@pytest.mark.parametrize(
+    ("network", "message"),
+    [
+        (MannOptions(kind="mann", units=12, experts=2), "of kind mann cannot treat left and right alike"),
+        (PfnnOptions(units=12, control_points=5), "an even number of network.control_points, not 5"),
+    ],
+    ids=str,
+)
+def test_networks_that_cannot_be_symmetric_are_refused(
+    data: Database, network: Options, training: Recipe, tmp_path: Path, message: str
+) -> None:
+    with pytest.raises(HobbleError, match=message):
+        train(data, network=network, training=training | {"symmetric": True}, checkpoints=tmp_path)
