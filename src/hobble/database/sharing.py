@@ -56,7 +56,10 @@ class PassSharing:
 
     @classmethod
     def of(cls, total: int, batch: int, stretches: int = 1, rank: int = 0, processes: int = 1) -> PassSharing:
-        """As process `rank` (from 0) of `processes` sees it. Their parts of a batch differ by 1 at most."""
+        """The sharing as process `rank` (from 0) of `processes` sees it.
+
+        Their parts of a batch differ by 1 at most.
+        """
         return cls(total, batch, stretches, own_places(batch, rank, processes))
 
     def sizes(self) -> Iterator[tuple[int, int]]:
