@@ -1,1 +1,1 @@
-"""The embedded data set: a procedural walker, healthy or hurt, written like a user's folder."""
+"""The data set `synthetic`: clips of a procedural walker, written like a user's folder of clips."""
