@@ -118,10 +118,10 @@ def _origin(material: Material) -> dict[str, Any]:
 def _sections(
     material: Material, found: Mapping[str, Any], clips: frozenset[str], terrain: list[str]
 ) -> dict[str, dict[str, Any]]:
-    """Charts and tables by section, None if there is nothing to show.
+    """Section -> name -> chart or table, None if there is nothing to show.
 
     found: from `coverage.seconds_of_data`. clips: names of the clips that are shown one by one. terrain:
-    their fits.
+    files of their terrain fits.
     """
     costs, data, training = cost_section, data_section, training_section
     return {
