@@ -13,8 +13,9 @@ import pytest
 from hobble.core.files import read_json, write_json
 from hobble.evaluation.csv_tables import write_csv
 from hobble.measures.inputs import MeasureInputs
-from hobble.measures.responsivity import Options, pieces
+from hobble.measures.responsivity import Options, pieces, times
 from hobble.measures.responsivity import run as module
+from hobble.measures.responsivity.laps import held_back, starts_of, walk_laps
 from hobble.measures.responsivity.run import lap_rows, parameter_counts, responsivity
 from hobble.runtime.controller import STEPS
 from hobble.runtime.options import Runtime
@@ -59,10 +60,9 @@ def test_only_turns_that_were_limited_count_as_held_back() -> None:
     taken = rng.normal(size=(5, 4, 4))
     taken /= np.linalg.norm(taken, axis=-1, keepdims=True)
     predicted = -taken  # the same rotations
-    assert module._held_back(predicted, taken) == 0
+    assert not held_back(predicted, taken).any()
     predicted[2, 1] = predicted[2, 2]
-    assert module._held_back(predicted, taken) == 1
-    assert module._held_back(predicted[:0], taken[:0]) == 0
+    assert held_back(predicted, taken).tolist() == [False, False, True, False, False]
 
 
 def test_the_turns_of_a_steady_figure_are_not_limited(steady) -> None:
@@ -72,38 +72,90 @@ def test_the_turns_of_a_steady_figure_are_not_limited(steady) -> None:
 
 
 def test_a_lap_that_is_never_finished_ends_after_its_time(steady) -> None:
-    result = run(steady, ASIDE, seconds=8.0)
+    result = run(steady, ASIDE, laps=2, seconds=8.0)
     for lap in result["laps"]:
         assert lap["frames"] == 480
         assert lap["seconds"] == 8.0
         assert not lap["finished"]
-        # It passes the first waypoint after 200 frames of 1.5 cm. It never reaches the second one, aside.
-        assert lap["waypoints_reached"] == 1
-        past = 480 * 1.5 - 400
-        assert lap["path_overshoot_cm"] == pytest.approx(past * 3 / np.sqrt(3**2 + 1), abs=30)
-    assert result["waypoints_reached"] == 2
-    assert result["waypoints"] == 6
-    for lap, run_of in zip(result["laps"], result["runs"], strict=True):
-        # It glides along z from the third waypoint, a quarter of a second from place to place.
-        assert len(run_of["x"]) == 480 / 15
-        np.testing.assert_allclose(run_of["x"], 0, atol=0.02)
-        np.testing.assert_allclose(np.diff(run_of["z"])[2:], 15 * 0.015, atol=0.02)
-        assert max(run_of["off_cm"]) == pytest.approx(lap["path_overshoot_cm"], abs=25)
-    # The second lap begins where the first did.
-    np.testing.assert_allclose(
-        result["laps"][0]["path_distance_cm"], result["laps"][1]["path_distance_cm"], atol=1e-6
-    )
+    # The first passes the first waypoint after 200 frames of 1.5 cm. It never reaches the second one, aside.
+    # The second starts at the first waypoint, faces the second one and glides straight toward it.
+    first, second = result["laps"]
+    assert (first["waypoints_reached"], second["waypoints_reached"]) == (1, 0)
+    past = 480 * 1.5 - 400
+    assert first["path_overshoot_cm"] == pytest.approx(past * 3 / np.sqrt(3**2 + 1), abs=30)
+    assert second["path_overshoot_cm"] == pytest.approx(0, abs=1e-3)
+    assert (result["waypoints_reached"], result["waypoints"]) == (1, 6)
+    run_of = result["runs"][0]
+    # It glides along z from the third waypoint, a quarter of a second from place to place.
+    assert len(run_of["x"]) == 480 / 15
+    np.testing.assert_allclose(run_of["x"], 0, atol=0.02)
+    np.testing.assert_allclose(np.diff(run_of["z"])[2:], 15 * 0.015, atol=0.02)
+    assert max(run_of["off_cm"]) == pytest.approx(first["path_overshoot_cm"], abs=25)
+
+
+def test_laps_begin_at_one_waypoint_after_another_and_in_later_rounds_further_ahead() -> None:
+    """A square of 30 m: with ten laps there are three rounds, which start 0, 10/3 and 20/3 m ahead."""
+    corners = ((0.0, 3000.0), (3000.0, 3000.0), (3000.0, 0.0), (0.0, 0.0))
+    square = [Waypoint(place, "walk", 2.5) for place in corners]
+    starts = starts_of(square, 10)
+    assert starts.waypoints.tolist() == [3, 0, 1, 2, 3, 0, 1, 2, 3, 0]
+    np.testing.assert_allclose(starts.places[:4], [corners[n] for n in (3, 0, 1, 2)])
+    np.testing.assert_allclose(starts.places[4:6], [[1000 / 3, 0], [0, 3000 - 1000 / 3]])
+    np.testing.assert_allclose(starts.places[8:], [[2000 / 3, 0], [0, 3000 - 2000 / 3]])
+    # The first faces the waypoint after its own, the fifth its own.
+    np.testing.assert_allclose(starts.facing[[0, 4]], [[0, 3000], [-3000, 0]])
+
+
+def test_on_a_short_way_a_figure_does_not_start_before_the_waypoint_behind_it() -> None:
+    near = [Waypoint(place, "walk", 2.5) for place in ((0.0, 300.0), (0.0, 0.0))]
+    places = starts_of(near, 6).places
+    np.testing.assert_allclose(places[:, 1], [0, 300, 100, 200, 200, 100])
+
+
+def test_the_way_to_the_waypoint_where_a_lap_begins_does_not_belong_to_it(steady) -> None:
+    """Of three laps on a line of 40 m, the third starts 5 m ahead of its waypoint. It glides by, so it counts
+    from within a metre of it."""
+    line = (Waypoint((0.0, 4000.0), "walk", 1.5), Waypoint((0.0, 0.0), "walk", 1.5))
+    (*_, (lap, path)) = walk_laps(steady, RUNTIME, 3, 300, line)
+    assert (lap["frames"], lap["waypoints_reached"]) == (300, 0)
+    assert path["z"][0] == pytest.approx(1.0, abs=0.03)
+    # The last place that is kept is 285 frames later. The next waypoint is behind it, so it glides at half
+    # the speed.
+    assert path["z"][-1] == pytest.approx(1.0 - 0.5 * 0.015 * 285, abs=0.03)
+
+
+def test_a_figure_that_misses_its_first_waypoint_has_its_lap_from_the_start(steady) -> None:
+    line = (Waypoint((0.0, 4000.0), "walk", 1.5), Waypoint((0.0, 0.0), "walk", 1.5))
+    (*_, (lap, path)) = walk_laps(steady, RUNTIME, 3, 50, line)
+    assert (lap["frames"], lap["finished"], lap["waypoints_reached"]) == (50, False, 0)
+    assert path["z"][0] == pytest.approx(5.0, abs=0.02)
+
+
+def test_a_lap_is_the_same_alone_and_in_a_crowd(network) -> None:
+    alone = walk_laps(network, RUNTIME, 1, 200, AHEAD)
+    assert walk_laps(network, RUNTIME, 5, 200, AHEAD)[0] == alone[0]
+
+
+def test_no_more_frames_are_timed_than_a_lap_may_take_or_its_part_of_all(
+    steady, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(times, "OF_LAP", 8)
+    monkeypatch.setattr(times, "OF_ALL", 20)
+    for laps, longest, expected in ((2, 100, 8), (4, 100, 5), (2, 3, 3)):
+        found = times.timed_frames(steady, RUNTIME, laps, longest, AHEAD)
+        assert [len(each) for each in found] == [expected] * laps
+        assert (np.array(found) > 0).all()
 
 
 def test_everything_but_the_times_is_reproducible(network) -> None:
     first, second = run(network, AHEAD, seconds=3.0), run(network, AHEAD, seconds=3.0)
     assert without_times(first) == without_times(second)
     assert "milliseconds" not in json.dumps(without_times(first))
-    times = first["laps"][0]["milliseconds"]
-    assert set(times) == {*STEPS, "total", "sd", "spread"}
-    assert set(times["sd"]) == set(STEPS)
-    assert times["total"] == pytest.approx(sum(times[step] for step in STEPS), abs=1e-4)
-    assert times["spread"]["whole_call"] > times["total"] > 0
+    measured = first["laps"][0]["milliseconds"]
+    assert set(measured) == {*STEPS, "total", "sd", "spread"}
+    assert set(measured["sd"]) == set(STEPS)
+    assert measured["total"] == pytest.approx(sum(measured[step] for step in STEPS), abs=1e-4)
+    assert measured["spread"]["whole_call"] > measured["total"] > 0
     json.dumps(first, allow_nan=False)
 
 
@@ -175,8 +227,8 @@ def test_a_network_with_one_mode_has_one_piece() -> None:
 def test_known_times_of_steps_give_known_medians() -> None:
     """Two frames: steps of 1 to 6 ms, and of twice that. The whole call takes 1 ms more."""
     steps = np.arange(1.0, 7.0)
-    times = np.array([[*steps, 22.0], [*(2 * steps), 43.0]]) / 1000
-    found = module._milliseconds(times)
+    seconds = np.array([[*steps, 22.0], [*(2 * steps), 43.0]]) / 1000
+    found = times.milliseconds(seconds)
     assert [found[step] for step in STEPS] == pytest.approx(1.5 * steps)
     assert [found["sd"][step] for step in STEPS] == pytest.approx(0.5 * steps)
     assert found["total"] == pytest.approx(31.5)
@@ -184,16 +236,14 @@ def test_known_times_of_steps_give_known_medians() -> None:
 
 
 def test_a_lap_is_timed_step_by_step(steady) -> None:
-    """Means and deviations over laps are those of all their frames."""
+    """Means and deviations over laps are those of all their frames, which are equally many in each lap."""
     result = run(steady, NEAR)
     laps, whole = result["laps"], result["milliseconds"]
-    frames = np.array([lap["frames"] for lap in laps])
     for step in STEPS:
         means = np.array([lap["milliseconds"][step] for lap in laps])
-        assert whole[step] == pytest.approx((frames @ means) / frames.sum(), abs=1e-5)
+        assert whole[step] == pytest.approx(means.mean(), abs=1e-5)
         squares = np.array([lap["milliseconds"]["sd"][step] ** 2 for lap in laps]) + means**2
-        expected = (frames @ squares) / frames.sum() - whole[step] ** 2
-        assert whole["sd"][step] == pytest.approx(max(expected, 0) ** 0.5, abs=1e-4)
+        assert whole["sd"][step] == pytest.approx(max(squares.mean() - whole[step] ** 2, 0) ** 0.5, abs=1e-4)
 
 
 def test_results_become_rows_of_a_table(steady, tmp_path) -> None:

@@ -9,7 +9,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Protocol
 
-# Methods import numpy themselves, because the list of clips is read without it.
+# Methods import numpy themselves: the list of clips is read at planning, which should not wait for numpy.
 if TYPE_CHECKING:
     from hobble.core.clip import Clip
     from hobble.core.quat import Array
@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 
 
 class HasLinks(Protocol):
-    """A skeleton, as far as the columns of a channel may depend on it: a clip's, or a skeleton file."""
+    """What the columns of a channel may depend on: the links of a clip's skeleton or of a skeleton file."""
 
     @property
     def links(self) -> Sequence[tuple[str, str]]:

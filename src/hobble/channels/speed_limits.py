@@ -33,7 +33,7 @@ SLOWEST = 0.1  # least share of the healthy speed
 
 @dataclass(frozen=True)
 class Limits:
-    """Speed limits of a channel with L labels, in G gaits. A label names a column of the channel, as a link.
+    """Speed limits of a channel with L labels in G gaits. A label names a column, such as a link or a mood.
 
     levels: (K,) values from 0 to the channel's highest. speeds: (G, L, K) highest speeds, cm a frame, for
     each gait, label and level; a higher level is never faster. usual: (G,) usual speeds of a healthy body, cm
@@ -187,8 +187,9 @@ class LimitLearner:
     def learn(self) -> Limits | None:
         """The limits, or None if no cycle has a value above 0.
 
-        The share of the healthy speed is first expected to fall in a straight line with a label's value, the
-        line of least squares over all gaits. In each gait the curve then goes from this line to its cycles.
+        For each label, the share of the healthy speed is fitted as a function of the value in three steps: a
+        straight line through the cycles of all gaits, a curve through these cycles that is drawn towards the
+        line, and for each gait a curve through its own cycles that is drawn towards that curve (`_fitted`).
         """
         levels = np.linspace(0, self.highest, LEVELS)
         healthy = self._healthy()

@@ -15,7 +15,8 @@ from hobble.core.skeleton import Skeleton
 def write_bvh(path: str | Path, clip: Clip, order: str = "ZYX", decimals: int = 5) -> None:
     """Write a clip in centimetres. The root has six channels, every other joint three rotation channels.
 
-    If the clip has joint translations, every joint has six channels. order: of the rotation channels.
+    If the clip has joint translations, every joint has six channels. order: the sequence of the rotation
+    channels.
     """
     moving = clip.translations is not None
     lines = ["HIERARCHY", *_hierarchy(clip.skeleton, 0, order, moving, 0)]

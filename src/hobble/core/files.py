@@ -229,7 +229,7 @@ def check_header(file: IO[bytes], size: int) -> None:
         shape, _, dtype = HEADER_READERS[np.lib.format.read_magic(file)](file)
     except OSError:
         raise
-    except (Exception, MemoryError):  # MemoryError means that the header is nested too deeply; it is short
+    except (Exception, MemoryError):  # Python raises MemoryError for a header that is nested too deeply
         raise ValueError("an array whose header cannot be understood") from None
     count = 1
     for length in shape:

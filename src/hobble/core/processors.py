@@ -9,7 +9,7 @@ from pathlib import Path
 
 TOPOLOGY = Path("/sys/devices/system/cpu")
 CPUINFO = Path("/proc/cpuinfo")
-# Values of ONEDNN_MAX_CPU_ISA, which limits oneDNN's instructions, that exclude those for bfloat16.
+# ONEDNN_MAX_CPU_ISA limits the instructions that oneDNN uses. These values exclude those for bfloat16.
 WITHOUT_BFLOAT16 = ("SSE41", "AVX", "AVX2", "AVX2_VNNI", "AVX512_CORE", "AVX512_CORE_VNNI")
 
 

@@ -14,7 +14,7 @@ from hobble.core.errors import HobbleError
 from hobble.core.quat import Array
 
 SIDE_WORDS = (("Left", "Right"), ("left", "right"), ("LEFT", "RIGHT"))
-# L_Leg, leg.r and Bip01 L Leg; LLeg and rLeg
+# The letter of the side: apart, as in L_Leg, leg.r and Bip01 L Leg, or first, as in LLeg and rLeg.
 SIDE_LETTER = re.compile(r"(?<![^_. -])[LRlr](?![^_. -])|^[LRlr](?=[A-Z])")
 OTHER_LETTER = str.maketrans("LRlr", "RLrl")
 PAIRED_NAMES = "the same except for Left and Right, or L and R, as in LeftLeg, L_Leg, Leg.L, LLeg"

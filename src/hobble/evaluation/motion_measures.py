@@ -58,10 +58,13 @@ def skating(toes: Array, standing_height: float) -> Array:
 
 def largest_turn(rotations: Array) -> float:
     """Largest turn of any joint from one frame to the next, degrees. rotations: (F, J, 4) in the world."""
-    if len(rotations) < 2:
-        return 0.0
+    return float(turns_between(rotations).max(initial=0.0))
+
+
+def turns_between(rotations: Array) -> Array:
+    """(F - 1, ...) largest turn of any joint since the frame before, degrees. rotations: (F, ..., J, 4)."""
     dot = np.abs(np.sum(rotations[1:] * rotations[:-1], axis=-1, dtype=float))
-    return float(np.degrees(2 * np.arccos(np.minimum(1.0, dot.min()))))
+    return np.asarray(np.degrees(2 * np.arccos(np.minimum(1.0, dot.min(axis=-1)))))
 
 
 def acceleration(positions: Array) -> Array:

@@ -34,10 +34,11 @@ def clip_rows(
     """The rows of a clip's locomotion cycles, one cycle after another. See `ClipRows` for their form.
 
     labels, terrain: arrays of these stages, see docs/artefacts.md. channels: name -> values (F, columns).
-    window: frames of the trajectory to each side. step: frames between two samples of it. facing_sigma: of
-    the Gaussian that smooths the facing direction, frames. Past the ends of the clip the root moves on
-    (`continued`) and the gait of the last frame is repeated. Raises InputError if the files do not belong
-    together, or if the clip has no frame before or after a cycle.
+    window: frames of the trajectory before and after the row's frame. step: frames between two samples of the
+    trajectory. facing_sigma: sigma of the Gaussian that smooths the facing direction, frames. Past the ends
+    of the clip the root moves on (`continued`), and the gait of the first or the last frame is repeated.
+    Raises InputError if the files do not belong together, or if the clip has no frame before or after a
+    cycle.
     """
     skeleton = clip.skeleton
     columns = tuple((name, values.shape[1]) for name, values in channels.items())
@@ -84,9 +85,9 @@ def clip_rows(
 
 
 def cycle_frames(cycles: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Frames (R,) and cycle numbers (R,) of the rows of cycles (C, 2), the first and last frame of each.
+    """Frame (R,) and cycle number (R,) of each row. cycles: (C, 2) first and last frame of each cycle.
 
-    Both ends belong to a cycle, so a frame between two cycles has two rows.
+    Both ends belong to a cycle. So the frame in which one cycle ends and the next begins has two rows.
 
     >>> cycle_frames(np.array([[60, 62], [62, 63]]))
     (array([60, 61, 62, 62, 63]), array([0, 0, 0, 1, 1]))

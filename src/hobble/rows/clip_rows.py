@@ -61,7 +61,10 @@ class ClipRows:
         return np.cumsum(self.fits) - self.fits
 
     def check(self, where: str | Path) -> None:
-        """Check shapes, fits and finite values. Raises InputError, which names `where`."""
+        """Check shapes and numbers of fits, and that all values are finite.
+
+        Raises InputError, which names `where`.
+        """
         layout, rows, fits = self.layout, len(self.p), int(np.sum(self.fits))
         expected = {
             "x": (rows, body_columns(layout)),
@@ -148,7 +151,7 @@ def save_clip_rows(path: str | Path, rows: ClipRows) -> None:
 
 
 class Outline(NamedTuple):
-    """The small part of a clip's rows that a merge of clips reads first. See `ClipRows`."""
+    """The small part of a clip's rows that is read before clips are merged. See `ClipRows` for the fields."""
 
     layout: RowLayout
     skeleton: Mapping[str, Any]

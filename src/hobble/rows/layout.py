@@ -20,9 +20,10 @@ BODY = ("position", "direction", "gait", "joint_position", "joint_velocity", "te
 class RowLayout:
     """The columns of X (inputs) and Y (outputs) of the network. Each block of columns is a slice.
 
-    joints: number of joints. window: frames of the trajectory to each side. step: frames between two samples
-    of the trajectory. channels: (name, number of columns) of each channel. order: names of the blocks of X in
-    column order; empty for BODY, then the channels. Raises ValueError if `order` is not exactly these blocks.
+    joints: number of joints. window: frames of the trajectory before and after the present frame. step:
+    frames between two samples of it. channels: (name, number of columns) of each channel. order: names of the
+    blocks of X in column order; empty for BODY, then the channels. Raises ValueError if `order` is not
+    exactly these blocks.
 
     With 31 joints, window 60 and step 10, X has 342 columns (372 with a channel of 30) and Y has 311. Joint
     blocks hold x, y, z of joint 0, then of joint 1, and so on. Trajectory blocks hold x of every sample, then

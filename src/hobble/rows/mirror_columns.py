@@ -1,4 +1,4 @@
-"""How a row's columns change with its motion's mirror: left and right swap, some signs change."""
+"""How the columns of a row change if the motion is mirrored: left and right swap, some signs change."""
 
 from __future__ import annotations
 
@@ -13,14 +13,15 @@ from hobble.core.skeleton import Skeleton
 from hobble.rows.layout import CONTACTS, SIDES, RowLayout
 
 POINT = (-1, 1, 1)  # signs of x, y, z of a point or a velocity
-ROTATION = (1, -1, -1)  # of a rotation's axis: a mirror changes the sense of every turn, too
+ROTATION = (1, -1, -1)  # signs of x, y, z of axis times angle; a mirror also reverses every turn
 
 
 @dataclass(frozen=True)
 class ColumnMirror:
-    """The mirrored row has row[source] * sign + shift. Mirroring twice gives the same row.
+    """Mirrors rows of C columns: the mirrored row is row[source] * sign + shift.
 
-    source: (C,) int. sign: (C,) 1 or -1. shift: (C,) 0 in raw units.
+    Mirroring twice gives the same row. source: (C,) int, the column that each column is taken from. sign:
+    (C,) 1 or -1. shift: (C,), 0 for rows in raw units.
     """
 
     source: np.ndarray = field(repr=False)
@@ -32,7 +33,7 @@ class ColumnMirror:
         return values[..., self.source] * self.sign + self.shift
 
     def standardised(self, mean: Array, std: Array) -> ColumnMirror:
-        """The same for rows (v - mean) / std. `shift` makes up for a mean that is not symmetric.
+        """The mirror of standardised rows (v - mean) / std. `shift` makes up for means that differ.
 
         Raises HobbleError if a column and its mirror are divided by different numbers.
         """
@@ -47,7 +48,7 @@ class ColumnMirror:
 
 
 def mirror_of_x(layout: RowLayout, skeleton: Skeleton) -> ColumnMirror:
-    """The mirror of the inputs, in raw units. The phase, which is no column, moves by half a cycle.
+    """The mirror of the inputs, in raw units. The phase is not a column; the caller moves it by half a cycle.
 
     Raises HobbleError if the joints or links of the skeleton do not pair left and right.
     """
@@ -84,22 +85,22 @@ def _other(contact: str) -> str:
 
 
 class _Columns:
-    """The mirror of a table of `count` columns, block by block. At first every column stays."""
+    """Collects the mirror of `count` columns, block by block. A block that is not set stays as it is."""
 
     def __init__(self, count: int, skeleton: Skeleton) -> None:
         self.source, self.sign, self.swapped = np.arange(count), np.ones(count), skeleton.mirror_joints
 
     def trajectory(self, block: slice) -> None:
-        """x of every sample, then z of every sample: x changes its sign."""
+        """Set a block of x of every sample, then z of every sample: x changes its sign."""
         self.sign[block.start : (block.start + block.stop) // 2] = -1
 
     def joints(self, block: slice, signs: tuple[int, int, int]) -> None:
-        """x, y, z of every joint: left and right joints swap, and the numbers get `signs`."""
+        """Set a block of x, y, z of every joint: left and right joints swap, and the numbers get `signs`."""
         self.swap(block, self.swapped)
         self.sign[block] = np.tile(signs, len(self.swapped))
 
     def swap(self, block: slice, order: np.ndarray) -> None:
-        """The block has parts of equal length. The mirrored part i is part order[i]."""
+        """Set a block of parts of equal length: the mirrored part i is part order[i]."""
         columns = np.arange(block.start, block.stop).reshape(len(order), -1)
         self.source[block] = columns[order].ravel()
 

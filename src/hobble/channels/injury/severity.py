@@ -107,7 +107,10 @@ def clip_severity(
 
 
 def source_rows(frames: int, rows: int, motion: Mapping[str, Any]) -> Array:
-    """(frames,) index, from 0, of the source frame that each frame of a clip shows."""
+    """(frames,) index, from 0, of the source frame that each frame of a clip shows.
+
+    frames: of the clip. rows: frames of the source. motion: the report of the motion stage.
+    """
     once = np.arange(frames) % motion.get("cycle_frames", frames)  # a looped clip starts again
     at = once * (motion["source_fps"] / FPS) + motion.get("source_start", 0)
     return np.clip(np.floor(at + 1e-6).astype(int), 0, rows - 1)

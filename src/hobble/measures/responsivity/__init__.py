@@ -17,7 +17,7 @@ class Options(Section):
 
     laps: Positive = Field(19, description="laps in the phase mode of the runtime")
     laps_other_modes: Positive = Field(
-        3, description="most laps in each other phase mode; all laps after the first are alike"
+        3, description="most laps in each other phase mode; fewer, to save time"
     )
     lap_seconds: Annotated[float, Field(ge=1, allow_inf_nan=False)] = Field(
         400.0, description="seconds after which a lap is stopped"

@@ -53,18 +53,18 @@ def lap_chart(found: Json, material: Material) -> Chart | None:
     counts = [max(len(trace["x"]) for trace in traces) for traces in options.values()]
     laps = max(counts)
     fewer = (
-        f" The other phase modes ran {min(counts)} laps, because from the second lap on all laps are alike."
+        f" In the other phase modes there are only {min(counts)} laps, to save time."
         if min(counts) < laps
         else ""
     )
     return Chart(
         "laps",
         "Milliseconds per frame, lap by lap",
-        "Each bar is one lap of the track. Its segments are the steps of a frame, averaged over the lap. "
-        "Prepare: the target, the path and the ground; input: write the network's input; insert: standardise "
-        "it; predict: evaluate the network; output: turn its output into a pose; update: move on by a frame. "
-        "A diamond is the median of whole frames: a few frames that another program delayed raise the bar "
-        "but not the diamond. At 60 Hz, a frame may take 16.7 ms." + fewer,
+        "Each bar is one lap of the track. Its segments are the steps of a frame, averaged over the first "
+        "seconds of the lap. Prepare: the target, the path and the ground; input: write the network's input; "
+        "insert: standardise it; predict: evaluate the network; output: turn its output into a pose; update: "
+        "move on by a frame. A diamond is the median of whole frames: a few frames that another program "
+        "delayed raise the bar but not the diamond. At 60 Hz, a frame may take 16.7 ms." + fewer,
         layout={
             "barmode": "stack",
             "xaxis": axis("lap", dtick=1 if laps < 25 else None),

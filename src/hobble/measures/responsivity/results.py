@@ -36,8 +36,8 @@ class Milliseconds(Steps):
     spread: Spread
 
 
-class Lap(TypedDict):
-    """One lap of the track.
+class LapWalk(TypedDict):
+    """How one lap of the track went.
 
     path_overshoot_cm, path_distance_cm: the largest and the mean distance from the line between waypoints.
     foot_slide_cm: mean slide of a toe in a stance. steps: number of stances. largest_turn_degrees: largest
@@ -57,6 +57,11 @@ class Lap(TypedDict):
     largest_turn_degrees: float
     predicted_turn_degrees: float
     turns_held_back: int
+
+
+class Lap(LapWalk):
+    """One lap, and the times of its first frames."""
+
     milliseconds: Milliseconds
 
 

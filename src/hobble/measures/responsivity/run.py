@@ -1,39 +1,29 @@
-"""Laps of the waypoint track: the time of each step of a frame, and how closely the track is followed."""
+"""Laps of the waypoint track: how closely it is followed, and the time of each step of a frame.
+
+All laps are walked at the same time by a crowd (`laps`). For the times, one character alone walks the
+beginning of each lap again (`times`).
+"""
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from itertools import pairwise
-from time import perf_counter
 from typing import Any
 
 import numpy as np
 
-from hobble.core.quat import Array
-from hobble.evaluation.motion_measures import foot_slide, largest_turn
 from hobble.measures.inputs import MeasureInputs, Outcome, Row
 from hobble.measures.responsivity import Options
-from hobble.measures.responsivity.results import (
-    Lap,
-    LapsOfMode,
-    Milliseconds,
-    OfMode,
-    Responsivity,
-    Run,
-    Spread,
-    Steps,
-)
+from hobble.measures.responsivity.laps import FPS, walk_laps
+from hobble.measures.responsivity.results import Lap, LapsOfMode, OfMode, Responsivity, Spread
+from hobble.measures.responsivity.times import milliseconds, timed_frames
 from hobble.models.load import load_network
 from hobble.models.network import Network
-from hobble.runtime.animation import ProceduralAnimation, world_rotations
 from hobble.runtime.controller import STEPS
 from hobble.runtime.options import Runtime
 from hobble.runtime.waypoints import TRACK, Waypoint
 
-FPS = 60
 RUNS = 5  # laps whose path is stored
-EVERY = 15  # frames between two stored places of a path
-WARM_UP = 60  # frames before the first lap that are not measured, because compiled code is loaded in them
 
 
 def responsivity(
@@ -48,12 +38,11 @@ def responsivity(
     track: Sequence[Waypoint] = TRACK,
     done: Mapping[str, LapsOfMode] | None = None,
 ) -> Responsivity:
-    """Run the track of Segerstedt 2021: `laps` laps in the runtime's phase mode, fewer in other `modes`.
+    """Laps of the track of Segerstedt 2021: `laps` in the runtime's phase mode, fewer in other `modes`.
 
     laps_other_modes: laps in each other mode; by default, and at most, `laps`. modes: by default all modes of
     the network. done: mode -> its laps, if they have already been run (`laps_of_mode`). A lap that takes
-    longer than `lap_seconds` of simulated time ends without its remaining waypoints, and the next lap starts
-    from the beginning of the track.
+    longer than `lap_seconds` of simulated time ends without its remaining waypoints.
 
     The result is described in docs/artefacts.md. `modes` has the laps and the summary of each mode; those of
     the runtime's own mode are also at the top level. Only the values under "milliseconds" depend on the
@@ -98,18 +87,13 @@ def laps_of_mode(
     track: Sequence[Waypoint] = TRACK,
 ) -> LapsOfMode:
     """All laps in the mode of `runtime`. For the arguments see `responsivity`."""
-    animation = ProceduralAnimation(network, waypoints=track, **dict(runtime))
-    for _ in range(WARM_UP):
-        animation.next_pose()
-    animation.reset()
-    results, times, runs = [], [], []
-    for number in range(1, laps + 1):
-        lap, seconds, run = _lap(animation, number, int(lap_seconds * FPS))
-        results.append(lap)
-        times.append(seconds)
-        runs.append(run)
-        if not lap["finished"]:
-            animation.reset()
+    longest = int(lap_seconds * FPS)
+    times = timed_frames(network, runtime, laps, longest, track)
+    walked = walk_laps(network, runtime, laps, longest, track)
+    results: list[Lap] = [
+        {**lap, "milliseconds": milliseconds(seconds)}
+        for (lap, _), seconds in zip(walked, times, strict=True)
+    ]
     entry: OfMode = {
         "mode": runtime.mode,
         "laps": results,
@@ -122,9 +106,9 @@ def laps_of_mode(
         "largest_turn_degrees": max(lap["largest_turn_degrees"] for lap in results),
         "predicted_turn_degrees": max(lap["predicted_turn_degrees"] for lap in results),
         "turns_held_back": sum(lap["turns_held_back"] for lap in results),
-        "milliseconds": _milliseconds(np.concatenate(times)),
+        "milliseconds": milliseconds(np.concatenate(times)),
     }
-    return {"laps": entry, "runs": runs[:RUNS]}
+    return {"laps": entry, "runs": [run for _, run in walked[:RUNS]]}
 
 
 def parameter_counts(sizes: Sequence[int]) -> dict[str, int]:
@@ -182,108 +166,6 @@ def run(inputs: MeasureInputs, options: Options) -> Outcome:
     )
     says = [f"{m['mode']}: {m['waypoints_reached']} of {m['waypoints']} waypoints" for m in result["modes"]]
     return Outcome(result, {"laps": lap_rows(result)}, "; ".join(says))
-
-
-def _lap(animation: ProceduralAnimation, number: int, longest: int) -> tuple[Lap, Array, Run]:
-    """One lap; its times (F, steps + 1), seconds, the last of the whole call; and its path, see `_run`.
-
-    longest: frames after which the lap is stopped.
-    """
-    follower, skeleton = animation.follower, animation.skeleton
-    assert follower is not None
-    toes = [skeleton.role("left_toe"), skeleton.role("right_toe")]
-    start = int(follower.reached[0])
-    goal = start + len(follower.track)
-    positions, rotations, contacts, off = [], [], [], []
-    turned, yaws, taken, places = [], [], [], []
-    times: list[tuple[float, ...]] = []
-    while follower.reached[0] < goal and len(times) < longest:
-        before = perf_counter()
-        pose = animation.next_pose()
-        whole = perf_counter() - before
-        times.append((*animation.seconds, whole))
-        positions.append(pose.positions[toes])
-        rotations.append(pose.rotations.astype(np.float32))
-        turns, yaw = animation.predicted_turns
-        turned.append(turns[0])
-        yaws.append(yaw[0])
-        taken.append(animation.state.joint_rotation[0].copy())
-        contacts.append(pose.contacts)
-        off.append(follower.off_path[0])
-        places.append(np.array(pose.root)[[0, 2]])
-    slide = foot_slide(np.array(positions), np.array(contacts))
-    seconds = np.array(times)
-    predicted = world_rotations(np.array(turned), np.array(yaws))
-    lap: Lap = {
-        "lap": number,
-        "finished": bool(follower.reached[0] >= goal),
-        "frames": len(times),
-        "seconds": round(len(times) / FPS, 3),
-        "waypoints_reached": int(follower.reached[0]) - start,
-        "path_overshoot_cm": round(float(np.max(off)), 3),
-        "path_distance_cm": round(float(np.mean(off)), 3),
-        "foot_slide_cm": round(float(slide.mean()), 4) if len(slide) else None,
-        "steps": len(slide),
-        "largest_turn_degrees": round(largest_turn(np.array(rotations)), 3),
-        "predicted_turn_degrees": round(largest_turn(predicted), 3),
-        "turns_held_back": _held_back(predicted, np.array(taken)),
-        "milliseconds": _milliseconds(seconds),
-    }
-    return lap, seconds, _run(number, np.array(places), np.array(off))
-
-
-def _run(number: int, places: Array, off: Array) -> Run:
-    """The path of a lap, with a place every EVERY frames.
-
-    places: (F, 2), cm. off: (F,) distance from the line between waypoints, cm. A stored place has the largest
-    distance since the stored place before it.
-    """
-    kept = range(0, len(places), EVERY)
-    return {
-        "lap": number,
-        "seconds_between": EVERY / FPS,
-        "x": np.round(places[kept, 0] / 100, 2).tolist(),
-        "z": np.round(places[kept, 1] / 100, 2).tolist(),
-        "off_cm": [round(float(off[max(0, f - EVERY + 1) : f + 1].max()), 1) for f in kept],
-    }
-
-
-def _held_back(predicted: Array, taken: Array) -> int:
-    """Number of frames in which the runtime limited the turn of a joint.
-
-    predicted, taken: (F, J, 4) quaternions before and after the limit.
-    """
-    same = np.abs(np.sum(predicted * taken, axis=-1)) > 1 - 1e-6
-    return int((~same).any(axis=1).sum()) if len(predicted) else 0
-
-
-def _milliseconds(seconds: Array) -> Milliseconds:
-    ms = 1000 * seconds
-    total = ms[:, : len(STEPS)].sum(axis=1)
-    return {
-        **_of_steps(ms.mean(axis=0)),
-        "total": round(float(total.mean()), 6),
-        "sd": _of_steps(ms.std(axis=0)),
-        "spread": {
-            "sd": round(float(total.std()), 6),
-            "median": round(float(np.median(total)), 6),
-            "p99": round(float(np.percentile(total, 99)), 6),
-            "whole_call": round(float(ms[:, -1].mean()), 6),
-        },
-    }
-
-
-def _of_steps(values: Array) -> Steps:
-    """Names the values of the steps. values: in the order of STEPS; later ones are ignored."""
-    prepare, inputs, insert, predict, output, update = (round(float(v), 6) for v in values[: len(STEPS)])
-    return {
-        "prepare": prepare,
-        "input": inputs,
-        "insert": insert,
-        "predict": predict,
-        "output": output,
-        "update": update,
-    }
 
 
 def _closed(track: Sequence[Waypoint]) -> list[tuple[Waypoint, Waypoint]]:

@@ -170,7 +170,10 @@ def size_table(name: str, rows: Sequence[Mapping[str, Any]]) -> Table | None:
     texts = ("gait", "link", "part", "side", "called", "graded")
     if not rows:
         return None
-    columns = [Column(k) if k in texts else Column.number(k.replace("_", " ")) for k in rows[0]]
+    words = {"called": "linear recogniser", "graded": "graded recogniser"}
+    words |= dict(zip(("impaired", "named", "wrong_side"), (c.label for c in RECOGNISED), strict=True))
+    named = {key: words.get(key, key.replace("_", " ")) for key in rows[0]}
+    columns = [Column(word) if key in texts else Column.number(word) for key, word in named.items()]
     return Table(f"{name}-limp-sizes", columns, [list(row.values()) for row in rows], "Sizes of all effects")
 
 

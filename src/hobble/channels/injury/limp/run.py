@@ -146,9 +146,10 @@ def _row(
 ) -> dict[str, Any]:
     """The row of one walk: gait, link and severity, the effects, and how the walk is recognised.
 
-    called, graded: label and side by the linear and by the graded recogniser. impaired: share of the windows
-    in which the linear one finds a limp. named, wrong_side: shares in which the graded one finds a limp, not
-    on the wrong side or on the wrong side. All are None if the figure does not walk a whole cycle.
+    called, graded: label and side by the linear and by the graded recogniser. The others are shares of
+    windows. impaired: the linear recogniser finds a limp. named: the graded one finds a limp and does not
+    name the other side. wrong_side: it names the other side. All are None if the figure does not walk a whole
+    cycle.
     """
     assert network.skeleton is not None
     assert healthy.profile is not None
@@ -220,7 +221,7 @@ def _of_clip(skeleton: Skeleton, one: Limp, every: Sequence[Limp]) -> dict[str, 
 
 
 def distance(walk: Profile, healthy: Profile, other: Profile, other_healthy: Profile) -> float:
-    """How much two changes differ, each that of a walk from the same body's healthy walk.
+    """How much the limps of two bodies differ. The limp is what changes from the body's own healthy walk.
 
     It is the root mean square over the features. The difference in a feature is divided by the standard
     deviation of that feature over people's walks.

@@ -49,11 +49,9 @@ def limps_together(
 
 
 def named_together(rows: Sequence[dict[str, Any]]) -> list[dict[str, Any]]:
-    """For each column the means over its walks of shares of windows, and of the share of the speed.
+    """For each column the means of `impaired`, `named`, `wrong_side` and `speed_share` over its rows.
 
-    impaired: the linear recogniser finds a limp. named: the graded one finds a limp on the hurt side.
-    wrong_side: it names the other side. walks: how many walks the recognisers judge; very slow walks may have
-    no window with enough cycles.
+    walks: how many walks the recognisers judge; very slow walks may have no window with enough cycles.
     """
     out = []
     for other, column in dict.fromkeys((row["channel"], row["column"]) for row in rows):

@@ -58,8 +58,8 @@ def second_injuries(
     everything else that is measured. `from_first_cm`: distance of the walk with the second at 10 from the
     walk with the first alone. `share`: this distance as a share of the second's effect on a healthy body.
     `from_second_cm`: distance of the walk with both from the walk with the second alone; 0 if the second
-    hides the first. `spearman`: rank correlation of the distance from the walk with the first alone with the
-    second's severity.
+    hides the first. `spearman`: rank correlation between the second's severity and the distance from the walk
+    with the first alone.
     """
     assert network.skeleton is not None
     firsts = one_of_each_part(network.skeleton, links)

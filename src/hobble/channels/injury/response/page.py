@@ -180,7 +180,8 @@ def y_range(
 ) -> list[float] | None:
     """The range of the vertical axis, the same for all links of a gait, so that they can be compared.
 
-    It spans at least `span`, so that noise looks small.
+    columns: those that the chart shows. span: least length of the range, so that noise looks small.
+    from_zero: whether it starts at 0. None if no row has a value.
     """
     found = [row[c] for row in rows if row["gait"] == gait for c in columns if row.get(c) is not None]
     if not found:

@@ -39,8 +39,8 @@ def second_chart(rows: Sequence[Mapping[str, Any]]) -> Chart | None:
         "second-injury",
         "A second injury in addition to a first",
         "Rows: the first injury, at severity 7, one link of each part of the body. Columns: the second, at "
-        "10. The cell says how much the second changes the walk, in centimetres and as a share of its effect "
-        "on a healthy body. A pale field means that the first injury hides the second.",
+        "10. The cell says how much the second changes the walk, in centimetres or as a share of its effect "
+        "on a healthy body. A pale cell means that the first injury hides the second.",
         layout={
             "xaxis": {"type": "category", "tickangle": -50, "automargin": True},
             "yaxis": {"type": "category", "autorange": "reversed", "automargin": True},

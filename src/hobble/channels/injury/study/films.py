@@ -113,7 +113,7 @@ def part_links(network: Network, parts: Sequence[str]) -> list[str]:
 
 
 def act(network: Network, film: Film, runtime: Runtime) -> FilmMotion:
-    """The character in a film. It walks straight ahead. The injury begins after HEALTHY seconds."""
+    """The motion of a film. The character goes straight ahead. The injury begins after HEALTHY seconds."""
     severities = dict.fromkeys(part_links(network, film.parts), SEVERITY)
     hurt, well = _walked(network, film, severities, runtime), _walked(network, film, {}, runtime)
     begun = round(HEALTHY * FPS)
