@@ -42,7 +42,7 @@ def render(
     scenes: from `scenes.scenes`; playable: from `playable.playable`; compared: from
     `captured_and_predicted.comparisons`. A part without data is left out. bundle: the page's scripts, from
     `bundle.bundle`. hero: from `opening_walk.opening_walk`; without it the figures at the top start from a
-    stand.
+    standing pose.
 
     The template escapes every value. Data for the scripts is JSON without any "<".
     """
