@@ -1,6 +1,6 @@
-"""Finds a world that is tilted against its figure, by the ground under the feet and by how the body leans.
+"""Recognises a file with a tilted world, by the ground under the feet and by the lean of the body.
 
-Both show the tilt. On a real slope the ground is tilted and the body is not.
+In a tilted world both are tilted alike. On a real slope the ground is tilted and the body is not.
 """
 
 from __future__ import annotations
@@ -16,18 +16,22 @@ from hobble.core.skeleton import Skeleton
 from hobble.motion.orient import unit
 from hobble.motion.rig import leg_length
 
-LEAST = 6.0  # degrees: a smaller tilt is not told from the errors of the ground's fit
+LEAST = 6.0  # degrees; a smaller tilt cannot be distinguished from errors of the fitted ground
 AGREE = 0.6  # body and ground agree if they differ by less than this share of the tilt
-EVEN = 2.5  # cm, median: if standing feet are further than this from the fitted plane, they show no plane
-# Degrees by which trunk, legs and the line across the body all lean to the same side. In 172 clips of CMU,
-# styles, patients, Ferre et al. and the original release it is 7.5 at most, with a hurt leg.
+EVEN = 2.5  # cm; if the median distance of standing feet from the fitted plane is larger, they show no plane
+# If trunk, legs and the line across the body all lean to the same side by more degrees, the world is tilted.
+# In 172 clips of CMU, styles, patients, Ferre et al. and the original release it is 7.5 at most, with a hurt
+# leg.
 ASIDE = 8.0
 LEAN = 4.0  # degrees: how far a walking body leans forward
-WIDE = 0.4  # leg lengths, standard deviation: axes along which feet spread further are tried without others
-NARROW = 0.05  # leg lengths: with less spread than this, there is no slope to see
-SLOW = 0.3  # leg lengths a second: the ball of a standing foot is slower
-FEWEST = 10  # positions of standing feet
-FITS = 12  # rounds of the fit of the ground, which minimises the sum of distances
+# The spread of feet along an axis of the ground is their standard deviation in leg lengths. The slope along
+# axes with a spread above WIDE is tried first, then along those above NARROW. With less spread no slope
+# shows.
+WIDE = 0.4
+NARROW = 0.05
+SLOW = 0.3  # leg lengths a second; the ball of a standing foot is slower
+FEWEST = 10  # fewest positions of standing feet
+FITS = 12  # rounds of fitting the ground, which minimise the sum of distances
 
 
 def tilt(clip: Clip) -> float | None:
@@ -72,8 +76,9 @@ def standing_balls(clip: Clip) -> Array:
 
 
 def _plane(level: Array, height: Array) -> tuple[Array, float]:
-    """Slope (2,) of the ground through points at `level` (N, 2) and `height` (N,), and their median distance
-    from it.
+    """Slope (2,) of the plane through points, and their median distance from it, cm.
+
+    level: (N, 2) positions on the ground, cm. height: (N,) cm.
     """
     points = np.column_stack([level, np.ones(len(level))])
     weight = np.ones(len(level))
@@ -93,7 +98,7 @@ def _parts(skeleton: Skeleton, p: Array) -> tuple[Array, Array, Array]:
 
 
 def _leaning(skeleton: Skeleton, p: Array) -> Array:
-    """(2,) x and z of the body's mean direction upward, without the lean of a walk."""
+    """(2,) x and z of the mean unit vector up the body, without the forward lean of a walk."""
     trunk, legs, across = _parts(skeleton, p)
     ahead = unit(np.cross(across, [0.0, 1.0, 0.0]))
     return np.asarray((unit(trunk + legs) - np.sin(np.radians(LEAN)) * ahead)[:, [0, 2]].mean(axis=0))
