@@ -21,7 +21,7 @@ LEAST = 0.1  # least length of a limb, as a share of the size of the body, which
 
 @dataclass(frozen=True)
 class LimbPair:
-    """Two equal chains of joints below the joint `hub`, from the trunk outward. length: that of each chain."""
+    """Two equal chains of joints below joint `hub`, from the trunk outward. length: that of each chain."""
 
     hub: int
     chains: tuple[tuple[int, ...], tuple[int, ...]]

@@ -1,4 +1,4 @@
-"""Paths between joints in the tree of a rig. Argument `parents`: the parent of each joint, -1 for the root."""
+"""Paths between joints in the tree of a rig. Argument `parents`: each joint's parent, -1 for the root."""
 
 from __future__ import annotations
 
