@@ -50,7 +50,7 @@ class Spine:
 
     @property
     def neck(self) -> Array:
-        """(3,) direction from the chest to the next joint above: the neck, or the head if there is no neck."""
+        """(3,) direction from the chest to the next joint above: the neck, or the head if it has none."""
         chest = min(int(np.searchsorted(self.shares, 1.0 - 1e-6)), len(self.shares) - 2)
         return unit(self.points[chest + 1] - self.points[chest])
 
