@@ -16,13 +16,13 @@ from hobble.measures.inputs import MeasureInputs
 from hobble.measures.measure import Measure
 from hobble.measures.registry import MEASURES
 from hobble.measures.rollouts.roll_outs import RollOutInputs, inputs_of_clip
-from hobble.measures.rollouts.run import clip_roll_outs, measure_roll_outs, roll_out_rows
+from hobble.measures.rollouts.run import measure_roll_outs, roll_out_rows
 from hobble.models.network import Network
 from hobble.models.pfnn.predictor import PfnnPredictor
 from hobble.rows.clip_rows import ClipRows, save_clip_rows
 from hobble.rows.layout import RowLayout
 from hobble.runtime.animation import ProceduralAnimation
-from tests.measures.whole_roll_outs import roll_out
+from tests.measures.whole_roll_outs import clip_roll_outs, roll_out
 
 
 def hills(x: np.ndarray, z: np.ndarray) -> np.ndarray:

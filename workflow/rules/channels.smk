@@ -1,5 +1,5 @@
 def channels_of(batch):
-    """The channels whose values are read for a batch: those of hurt versions are made with them."""
+    """The channels whose values are read for a batch. The severities of hurt versions are made with the versions."""
     there = datasets.channel_sources.channels(batch.dataset)
     return [name for name in there if not (batch.hurt and name == clips.hurt_channel)]
 
@@ -23,7 +23,7 @@ def channel_files(batch):
 for batch in filter(channels_of, [*batches_of_clips, *batches_of_versions]):
 
     rule:
-        """The values of the data set's channels in each frame of clips and their mirrors."""
+        """The values of the data set's channels in each frame of the clips and their mirrors."""
         name:
             batch.rule("channel_clips")
         input:

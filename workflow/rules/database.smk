@@ -9,7 +9,7 @@ for batch in [*batches_of_clips, *batches_of_versions]:
         input:
             clip=batch.of_names("motion/{clip}.npz"),
             labels=batch.of_names("labels/{clip}.npz"),
-            # Those of the first clip, then those of the second, ...
+            # All channels of the first clip, then all of the second, ...
             channels=[
                 f"results/datasets/{batch.dataset}/channels/{channel}/{name}.npz"
                 for name in batch.names
@@ -52,7 +52,7 @@ for batch in [*batches_of_clips, *batches_of_versions]:
 
 
 def clips_of(dataset, channels, file, shard=None):
-    """That file of each clip of a database, or of one of its shards."""
+    """The path `file` for each clip of a database, or of one of its shards."""
     names = (
         datasets.selected(dataset, channels_of_folder(channels))
         if shard is None
@@ -62,7 +62,10 @@ def clips_of(dataset, channels, file, shard=None):
 
 
 def compared(w, file):
-    """That file of the clips that must not be one motion on both sides of the split; of one shard, if asked."""
+    """The path `file` for each clip that is compared with others, so that no motion is on both sides of the split.
+
+    If the rule makes a shard, only clips of this shard are in the list.
+    """
     names = datasets.compared(w.dataset, channels_of_folder(w.channels))
     if hasattr(w, "shard"):
         own = datasets.in_shard(w.dataset, channels_of_folder(w.channels), int(w.shard))

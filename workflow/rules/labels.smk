@@ -59,7 +59,7 @@ rule look_page:
         reports=lambda w: for_listed_clips(w.dataset, "motion/{clip}.json"),
         labels=lambda w: for_listed_clips(w.dataset, "labels/{clip}.json"),
         contacts=lambda w: for_listed_clips(w.dataset, "labels/{clip}.npz"),
-        # Not shown, but read and checked, so that this page is the check of a folder of clips.
+        # Channels are not shown. They are inputs because the page is the check of a folder: they are read and checked.
         channels=lambda w: [
             file
             for channel in datasets.channel_sources.channels(w.dataset)

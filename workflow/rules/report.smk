@@ -55,7 +55,7 @@ rule configuration:
 rule pipeline_summary:
     """The cost of each stage: seconds and memory from its benchmark files, bytes from its artefacts."""
     input:
-        # All that it sums up, so that it runs last.
+        # Not read: these inputs only make this rule run after all that it sums up.
         expand(rules.measure.output.json, measure=MEASURES, allow_missing=True),
         rules.generate.output.scenarios,
     output:
@@ -180,7 +180,7 @@ rule stimuli:
 
 
 rule questionnaire:
-    """A page that shows thirteen films of the character and asks what hurts, and the right answers."""
+    """A page that shows thirteen films of the character and asks what hurts. The right answers are in films.json."""
     input:
         weights=lambda w: configurations.network(w.configuration, "weights.npz"),
         template=keep_local(package.templates()),

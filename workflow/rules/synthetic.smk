@@ -1,7 +1,7 @@
 for batch in batches_of_walker:
 
     rule:
-        """Clips of the embedded walker, in the same form as a user's clips."""
+        """Synthetic clips of a walker, in the same form as a user's clips."""
         name:
             batch.rule("synthetic_clips")
         input:

@@ -28,7 +28,7 @@ rule training:
     params:
         configuration=lambda w: w.configuration,
         network=lambda w: configurations.section(w.configuration, "network"),
-        # Without the machines, because they do not change the result.
+        # The keys about machines are left out, because they do not change the result.
         training=lambda w: configurations.section(
             w.configuration, "training", *Recipe.model_fields
         ),

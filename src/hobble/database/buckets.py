@@ -1,4 +1,4 @@
-"""Buckets, to shuffle more rows than fit in memory: files of rows, each for a part of the final order."""
+"""Buckets: files of rows, each for a part of the new order. They shuffle more rows than fit in memory."""
 
 from __future__ import annotations
 

@@ -27,13 +27,14 @@ from hobble.rows.layout import RowLayout
 Item = TypeVar("Item")
 Part = tuple[ChunkWindow, np.ndarray, np.ndarray]
 BLOCK_ROWS = 4096
-BLOCKS = 3  # in memory at a time: one being made, one waiting, one in use
+BLOCKS = 3  # blocks in memory at a time: one being made, one waiting, one in use
 
 
 class Block(NamedTuple):
-    """n composed rows: x (n, X) and y (n, Y), standardised float32; p (n,) phase 0 to 1, float32.
+    """n rows as a network gets them: x (n, X) and y (n, Y), standardised float32; p (n,) phase 0 to 1.
 
-    clip: (n,) index into `Database.clips`; frame: (n,) frame of the clip at 60 Hz.
+    They are composed of frame, channels and a terrain fit (`hobble.rows.compose`). clip: (n,) index into
+    `Database.clips`; frame: (n,) frame of the clip at 60 Hz.
     """
 
     x: Array
@@ -44,7 +45,7 @@ class Block(NamedTuple):
 
 
 class RawRows(NamedTuple):
-    """n rows that are not composed, standardised float32: x (n, X without terrain), y (n, Y), p (n,) phase.
+    """n rows before composing, standardised float32: x (n, X without terrain), y (n, Y), p (n,) phase.
 
     fits: (m, columns) of all terrain fits of these rows: heights, then the lift in cm (see
     `hobble.database.split`). first: (n,) index of each row's first fit.

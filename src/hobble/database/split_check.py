@@ -27,6 +27,6 @@ def refuse_both_sides(where: str, pairs: Iterable[tuple[str, str, str]], splits:
     names = ", ".join(f'"{name}"' for name in dict.fromkeys(lacking))
     raise HobbleError(
         f"{where}: {'; '.join(alike[:MOST_NAMED])}{more}: the first of each pair is held out and the second "
-        f"is trained on, so what is held out would have been learnt. Add to held_out: [{names}], or take one "
-        "of each pair out of the data set."
+        f"is trained on, so the network would learn what is held out. Add to held_out: [{names}], or take "
+        "one of each pair out of the data set."
     )

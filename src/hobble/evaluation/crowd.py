@@ -37,8 +37,8 @@ class Walks:
     """The motion of C figures over F frames and S stretches (one for each `CrowdTarget`).
 
     local: (F, C, J, 3) joint positions in root coordinates, cm, float32. contacts: (F, C, 4). phase: (F, C).
-    root: (F, C, 3) its position, cm. acceleration: (F, C) the largest of any joint, cm per frame squared, 0
-    in the first and last frame. starts: (S + 1,) first frame of each stretch, then F.
+    root: (F, C, 3) positions of the root in the world, cm. acceleration: (F, C) the largest of any joint, cm
+    per frame squared, 0 in the first and last frame. starts: (S + 1,) first frame of each stretch, then F.
     """
 
     local: Array = field(repr=False)

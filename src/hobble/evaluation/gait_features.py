@@ -14,8 +14,9 @@ SIDES = ("left", "right")
 def features(skeleton: Skeleton, local: Array, contacts: Array, root: Array) -> dict[str, float]:
     """The measures of the gait (`gait_measures`), and mean and standard deviation of the limbs' angles.
 
-    local: (F, J, 3) joint positions in root coordinates, cm. contacts: (F, 4). root: (F, 3) its positions in
-    the world, cm. Returns degrees, cm and shares. Step lengths and asymmetries are 0 if there is no step.
+    local: (F, J, 3) joint positions in root coordinates, cm. contacts: (F, 4). root: (F, 3) positions of the
+    root in the world, cm. Returns degrees, cm and shares. Step lengths and asymmetries are 0 if there is no
+    step.
     """
     measured = gait_measures(skeleton, local, contacts, root)
     out = {name: value if value is not None else 0.0 for name, value in measured.items()}

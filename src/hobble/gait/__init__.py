@@ -1,3 +1,1 @@
-"""Compares a walk with a healthy one: its cycles, the sizes of effects, and which limp of people it
-resembles.
-"""
+"""Compares a walk with a healthy one: its cycles, the sizes of effects, and the impairment it resembles."""

@@ -30,7 +30,7 @@ SCALARS = (
 SLOW = 0.35  # share of the walking speed; an ankle that is slower stands
 SHORTEST, LONGEST = 0.4, 3.5  # s, a cycle
 LEAST_TRAVEL = 0.2  # leg lengths that the hips travel in a cycle; less is standing
-LEAST_SWING = 0.12  # leg lengths that an ankle moves forward, and back, in a step at least
+LEAST_SWING = 0.12  # leg lengths that an ankle moves at least in a step, forward and then back
 LEAST_TURN = 0.4  # the same as a share of the ankle's range; smaller movements are no step
 STRAIGHT = 25.0  # degrees that the path turns at most in a cycle; people were measured on straight paths
 AHEAD = 0.7  # least mean cosine between facing and travel; below it the walk is backward or sideways
@@ -78,8 +78,8 @@ class WalkCycles:
 def measure(skeleton: Skeleton, positions: Array, fps: float = 60.0) -> WalkCycles:
     """Find and measure the cycles in which a figure walks straight ahead.
 
-    positions: (F, J, 3) world, cm, Y up. Frames of standing, turning, and walking backward or
-    sideways give no cycle. Between the two landings of a cycle the other foot must land exactly once. A clip
+    positions: (F, J, 3) in the world, cm, Y up. Frames of standing, turning, and walking backward or sideways
+    give no cycle. Between the two landings of a cycle the other foot must land exactly once. A clip that is
     shorter than a cycle has none.
     """
     if len(positions) < SHORTEST * fps:

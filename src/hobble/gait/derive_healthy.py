@@ -40,7 +40,7 @@ OTHERS = {
     "08": ("08_03", "08_04", "08_09", "08_11"),
     "16": ("16_11", "16_13", "16_17", "16_23", "16_25"),
 }
-SECONDS = 4.0  # length of a window  # length of a window
+SECONDS = 4.0  # length of a window
 
 
 def healthy_windows(

@@ -8,7 +8,7 @@ from hobble.core.skeleton import Skeleton
 
 LEFT, RIGHT = 0, 1
 SIDES = ("left", "right")
-# (role, part): joints up to the one with this role, included, belong to the part.
+# (role, part): links from the joint of the row before down to the joint with this role belong to the part.
 LEG = (("hip", "hip"), ("knee", "thigh"), ("heel", "shank"))
 ARM = (("shoulder", "shoulder"), ("elbow", "upper arm"), ("wrist", "forearm"))
 
@@ -25,7 +25,7 @@ class BodyPart:
 
 
 def part_of_link(skeleton: Skeleton, link: tuple[str, str]) -> BodyPart:
-    """The part of the body of a link (parent joint, child joint)."""
+    """The part of the body that a link (parent joint, child joint) belongs to."""
     child = skeleton.index(link[1])
     for side, word in enumerate(SIDES):
         for first, table, last in (("hip", LEG, "foot"), ("shoulder", ARM, "hand")):
@@ -54,6 +54,6 @@ def ancestors(skeleton: Skeleton, joint: int) -> list[int]:
 
 
 def _chain(skeleton: Skeleton, joint: int, above: int) -> list[int]:
-    """The joints from `joint` up to the one below `above`. Empty if `above` is no ancestor."""
+    """The joints from `joint` up to the one below `above`. Empty if `above` is not an ancestor."""
     path = ancestors(skeleton, joint)
     return path[: path.index(above)] if above in path else []

@@ -14,10 +14,10 @@ from hobble.hurt.body_parts import LEFT, RIGHT, part_of_link
 
 HIGHEST = 10.0
 POWER = 0.75  # strength = (severity / 10) ** POWER: .41 at 3, .59 at 5, .77 at 7
-LEAST_RATIO = 0.02
+LEAST_RATIO = 0.02  # smaller ratios are raised to this
 SETTLING = 0.3  # seconds: sigma of the Gaussian that smooths changes of severity
 LEAST_SEVERITY = 0.05  # smaller severities count as 0
-TOGETHER = 3.0  # exponent by which injuries add: 1 gives the sum, infinity the maximum
+TOGETHER = 3.0  # how the effects of several injuries add: p of a p-norm (1: sum, infinity: maximum)
 WHOLE = ("speed", "stride", "back", "head", "forward", "nod")  # changes of the whole body
 SIDED = (
     *(
@@ -38,10 +38,12 @@ SIDED = (
     ),
     *("upper", "fore", "carry"),
 )
-OTHER = "_sound"
+OTHER = "_sound"  # names of changes of the side that is not hurt end with this
 FLIPPED = np.array([1.0, -1.0, -1.0, -1.0, -1.0])  # signs of CURVES in a mirror
-# Signs of the factors of a curve (mean, then cosine and sine of one and two cycles) shifted by half a cycle.
+# Signs of a curve's factors (mean, then cosine and sine of both harmonics) when it is shifted by half a
+# cycle.
 LATER = np.array([1.0, -1.0, -1.0, 1.0, 1.0])
+# How a hurt part of an arm makes a person hold this arm; see GUARDS of `hobble.hurt.upper_body`.
 GUARD = {"shoulder": "upper", "upper arm": "upper", "forearm": "fore", "hand": "carry"}
 
 
@@ -49,9 +51,9 @@ GUARD = {"shoulder": "upper", "upper arm": "upper", "forearm": "fore", "hand": "
 class Effects:
     """The changes of each of F frames of a clip, named as in `hobble.hurt.amounts`.
 
-    body: name -> (F,). sided: name -> (F, 2), left and right. curves: (F, 5, 5). strength: (F,) of the worst
-    link, 0 to 1. shown: (F, L) severities that the frames show. They follow the requested ones over about a
-    second.
+    body: name -> (F,). sided: name -> (F, 2), left and right. curves: (F, 5, 5) factors of the CURVES.
+    strength: (F,) of the worst link, 0 to 1. shown: (F, L) severities of the L links that the frames show.
+    They follow the requested severities over about a second.
     """
 
     body: dict[str, Array] = field(repr=False)
@@ -61,7 +63,7 @@ class Effects:
     shown: Array = field(repr=False)
 
     def ratio(self, name: str) -> Array:
-        """(F,) or (F, 2) factor for a ratio."""
+        """(F,), or (F, 2) left and right: the factor that a change of RATIOS stands for."""
         return np.maximum(1.0 + (self.body[name] if name in self.body else self.sided[name]), LEAST_RATIO)
 
 
@@ -78,7 +80,7 @@ def effects(skeleton: Skeleton, severity: Array, fps: float) -> Effects:
     parts: dict[tuple[str, int | None], Array] = {}
     for link, column in zip(skeleton.links, strength.T, strict=True):
         where = part_of_link(skeleton, link)
-        # Links of one part, such as fingers, count once, as much as the worst.
+        # Several links of one part, such as fingers, count as one link: the worst.
         key = (where.name, where.side)
         parts[key] = np.maximum(parts.get(key, 0.0), column)
     for (part, side), own in parts.items():

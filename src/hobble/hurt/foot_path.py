@@ -1,4 +1,7 @@
-"""Moves the feet, on the source's frames: shorter steps, less roll over the toe, a lower or wider swing."""
+"""Moves the feet: shorter steps, less roll over the toe, a lower or wider swing.
+
+All arrays have the frames of the healthy clip (the source).
+"""
 
 from __future__ import annotations
 
@@ -19,21 +22,21 @@ from hobble.hurt.interpolate import smoothstep
 from hobble.hurt.shortened_path import ShortenedPath
 
 SIGN = (1.0, -1.0)  # +X is the figure's left
-# Radians of pitch over which the ratio changes from that of the heel strike to that of the push-off.
+# Radians of pitch over which the ratio changes from `strike` to `push`.
 LEVEL = np.radians(8.0)
-SHORT = 12.0  # cm: progress of a shorter swing is measured by time, not by distance
-CLEARANCE = 1.3  # cm: height of a swinging toe joint above its stance, unless it is lower in the source
-EVEN = 4.0  # cm: with this height between two stances the swing is not lowered
-JOGGING = 0.65  # in a jog, the change of a step is smaller by this share
-ENDS = 0.22  # share of the swing over which its lower height is blended in and out
+SHORT = 12.0  # cm: in swings shorter than this, progress is measured mainly by time, else by distance
+CLEARANCE = 1.3  # cm: least height of a swinging toe joint above its stance, unless the source's is lower
+EVEN = 4.0  # cm: the swing is lowered less, the more two stances differ in height; at this, by a factor of e
+JOGGING = 0.65  # in a jog, the change of a step's length is smaller by this share
+ENDS = 0.22  # share of the swing, at both ends, over which its lower height is blended in and out
 
 
 @dataclass(frozen=True)
 class HurtFoot:
     """One foot over F source frames.
 
-    ankle, ball: (F, 3) heel and toe joint. turn: (F, 4) of the foot in the world. toes: (F, 4) local, of the
-    toe joint.
+    ankle, ball: (F, 3) positions of the heel and the toe joint, cm. turn: (F, 4) rotation of the foot in the
+    world. toes: (F, 4) local rotation of the toe joint.
     """
 
     ankle: Array = field(repr=False)
@@ -56,7 +59,7 @@ def rolled_foot(source: HealthyClip, effects: Effects, side: int) -> HurtFoot:
     raised = pitch - flat
     heel_up = smoothstep(-raised / LEVEL)
     push, strike = (effects.ratio(name)[:, side] for name in ("push", "strike"))
-    # Toes that point down without a push-off reach for the ground before landing. That is reduced, too.
+    # Toes also point down before landing, when they reach for the ground. This is reduced like a push-off.
     share = strike + (push - strike) * heel_up
     tilt = quat.from_axis_angle(axis, raised * (share - 1))
     new_along = quat.rotate(tilt, along)
@@ -68,10 +71,10 @@ def rolled_foot(source: HealthyClip, effects: Effects, side: int) -> HurtFoot:
 
 
 def _not_risen(source: HealthyClip, ball: Array, push: Array, side: int) -> Array:
-    """(F,) cm by which a foot that does not push off is lower.
+    """(F,) cm by which a foot with less push-off is lower.
 
-    A healthy foot rolls over its toes, so its ball rises before it leaves the ground. ball: (F,) its height.
-    push: (F,) ratio of the push-off. The difference fades over the swing.
+    A healthy foot rolls over its toes, so its ball rises before the foot leaves the ground. ball: (F,) height
+    of the ball. push: (F,) ratio of the push-off. The difference fades over the swing.
     """
     lower, stances = np.zeros(len(ball)), source.stances[side]
     for stance, following in itertools.zip_longest(stances, stances[1:]):
@@ -101,14 +104,14 @@ def _middle(values: Array, stance: SourceStance) -> Array:
 
 
 def places(foot: HurtFoot, stances: list[SourceStance]) -> list[Array]:
-    """Where the ankle is in each stance, (3,) each."""
+    """(3,) for each stance: where the ankle is."""
     return [_middle(foot.ankle, stance) for stance in stances]
 
 
 def move_foot(
     source: HealthyClip, effects: Effects, path: ShortenedPath, foot: HurtFoot, side: int
 ) -> HurtFoot:
-    """The foot's path for the body's new path."""
+    """The path of a foot (`foot`, from `rolled_foot`) that follows the body's new path."""
     stances = source.stances[side]
     old = places(foot, stances)
     new = [
@@ -150,7 +153,7 @@ def move_foot(
 
 
 def _way(ankle: Array) -> Array:
-    """(n, 1) share of its horizontal distance from first to last that a swinging foot has covered."""
+    """(n, 1) share of the swing's horizontal distance that the foot has covered in each frame."""
     level = ankle * [1, 0, 1]
     way = level[-1] - level[0]
     time = smoothstep(np.linspace(0.0, 1.0, len(ankle)))
@@ -160,12 +163,12 @@ def _way(ankle: Array) -> Array:
 def _moved(
     place: Array, when: float, source: HealthyClip, effects: Effects, path: ShortenedPath, side: int
 ) -> Array:
-    """A footprint after the change.
+    """The new place (3,) of a footprint at `place` in source frame `when`.
 
-    It moves with the body; the hurt foot lands less far ahead, both wider apart.
+    It moves with the body. The hurt foot lands less far ahead, and both feet land wider apart.
     """
     at = min(round(when), len(source) - 1)
-    # Only frames around it are read: there are thousands of footprints in a long clip.
+    # Only the frames around it are read, because a long clip has thousands of footprints.
     near = slice(max(at - 1, 0), at + 2)
     speed = np.gradient(source.path[near], axis=0)[at - near.start] if len(source) > 1 else np.zeros(2)
     step = effects.sided["step"][near] * (1 - JOGGING * source.jog[near])[:, None]
@@ -177,7 +180,7 @@ def _moved(
 
 
 def smooth_above(values: Array, frames: int) -> Array:
-    """A smooth curve that is nowhere below `values`: their running maximum, averaged over an equal window."""
+    """(F,) a smooth curve that is nowhere below `values` (F,): their running maximum, smoothed."""
     wide = maximum_filter1d(values, 4 * frames + 1, mode="nearest")
     kernel = np.convolve(np.ones(2 * frames + 1), np.ones(2 * frames + 1))
     return np.convolve(np.pad(wide, 2 * frames, mode="edge"), kernel / kernel.sum(), mode="valid")

@@ -18,11 +18,11 @@ from hobble.labels.options import LabelOptions
 from hobble.labels.phase import phase_of_footsteps
 
 UP = np.array([0.0, 1.0, 0.0])
-CYCLE = 1.1  # seconds: cycle of clips that have none
-LONGEST_CYCLE = 2.5
+CYCLE = 1.1  # seconds: assumed length of a cycle in clips without one
+LONGEST_CYCLE = 2.5  # seconds
 LEAST_SWING = 6  # frames
-PATH = 0.25  # seconds: sigma of the Gaussian that makes a path of the root's positions
-FACING = 0.2
+PATH = 0.25  # seconds: sigma of the Gaussian that smooths the hips' positions to a path
+FACING = 0.2  # seconds: sigma of the Gaussian that smooths the heading
 
 
 @dataclass(frozen=True)
@@ -42,11 +42,11 @@ class SourceStance:
 class HealthyClip:
     """A healthy clip of F frames and its measurements. Pairs are left and right.
 
-    stances: of each foot in order, at least one. up: (F, 2) whether a foot swings. swing: (F, 2) from 0 to 1
-    and back to 0 over a swing. phase: (F,) cycles, unwrapped, 0 as the right foot lands. walking: (F,) 0 to
-    1, whether the phase is known. jog: (F,) share. cycle: (F,) frames of a cycle around each frame. path: (F,
-    2) horizontal path of the root, x and z. heading: (F, 4) turn about Y of the pelvis. leg: cm from hip to
-    ankle of a straight leg.
+    stances: those of each foot in order, at least one. up: (F, 2) whether a foot swings. swing: (F, 2) rises
+    from 0 to 1 and falls back to 0 over a swing. phase: (F,) cycles, unwrapped; whole numbers as the right
+    foot lands. walking: (F,) from 0 to 1, where 1 means that the phase is known. jog: (F,) share. cycle: (F,)
+    length in frames of the cycle around each frame. path: (F, 2) horizontal path of the hips, x and z, cm.
+    heading: (F, 4) rotation about Y of the pelvis. leg: cm from hip to ankle of a straight leg.
     """
 
     clip: Clip
@@ -67,7 +67,7 @@ class HealthyClip:
 
 
 def read_source(clip: Clip, labels: Labels) -> HealthyClip:
-    """Measure a healthy clip. labels: as `hobble.labels` makes them."""
+    """Measure a healthy clip with its labels."""
     frames, skeleton = len(clip), clip.skeleton
     options = LabelOptions()
     found = find_swings(clip, options)
@@ -107,7 +107,7 @@ def read_source(clip: Clip, labels: Labels) -> HealthyClip:
 
 
 def _in_the_air(start: int, end: int, touches: np.ndarray) -> tuple[int, int]:
-    """A swing without frames at its ends in which the labels have the foot on the ground."""
+    """The swing without those frames at its ends in which the labels have the foot in contact (`touches`)."""
     while end - start > LEAST_SWING and touches[start]:
         start += 1
     while end - start > LEAST_SWING and touches[end - 1]:
@@ -121,7 +121,10 @@ def _length(clip: Clip, side: str) -> float:
 
 
 def _cycles(stances: tuple[list[SourceStance], list[SourceStance]], frames: int, fps: float) -> Array:
-    """(frames,) frames from a foot's landing to its next, around each frame. Landings of both feet count."""
+    """(frames,) length of the cycle around each frame: frames from a foot's landing to its next.
+
+    The cycles of both feet count; the lengths are interpolated between their middles.
+    """
     middles, lengths = [], []
     for own in stances:
         for a, b in itertools.pairwise(own[1:]):

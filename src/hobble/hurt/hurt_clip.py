@@ -24,16 +24,17 @@ from hobble.hurt.timing import Timing, retime
 from hobble.hurt.upper_body import change_body
 from hobble.labels.clip_labels import Labels
 
-# Radians. In people's recordings the sound knee is bent by 8 to 10 degrees while a stiff leg swings.
+# Radians of knee flexion. In the recordings the sound knee is bent by 8 to 10 degrees while a stiff leg
+# swings.
 STRAIGHT = np.radians(9.0)
 
 
 @dataclass(frozen=True)
 class HurtClip:
-    """A hurt clip of N frames with its severities (N, L) and its labels.
+    """A hurt clip of N frames with its labels, and the severities (N, L) of its L links.
 
     when: (N,) the source frame, with fractions, that the body shows in each frame. The severities are those
-    that the motion shows: a change of the requested severity sets in over about a second.
+    that the motion shows: after a change of the requested severity they follow over about a second.
     """
 
     clip: Clip
@@ -53,18 +54,19 @@ def hurt_clip(
 ) -> HurtClip:
     """The clip as a person with these severities would walk it.
 
-    severity: (F, L), 0 to 10, of the skeleton's links. labels: of the clip. flat: whether its ground is flat;
-    on other ground, rises shrink with the steps. zero, margins: as in the section `labels`.
+    severity: (F, L), 0 to 10, of the skeleton's L links. labels: of the clip. flat: whether its ground is
+    flat; on other ground, climbs get lower as steps get shorter. zero, margins: `phase_zero` and `margins` of
+    the section `labels`.
 
-    The clip gets longer if the cadence falls. The path keeps its shape, but is shortened with the steps.
-    Without any severity the clip is returned unchanged. Raises HobbleError for severities of another shape or
-    range, and for joints with positions of their own.
+    The clip gets longer if the cadence falls. The path keeps its shape, but gets shorter with the steps. If
+    all severities are 0, the clip is returned unchanged. Raises HobbleError for severities of another shape
+    or range, and for a clip whose bones change their length.
     """
     severity = np.asarray(severity, float)
     if severity.shape != (len(clip), len(clip.skeleton.links)):
         raise HobbleError(
-            f"clip {clip.name}: severities {severity.shape} for {len(clip)} frames and "
-            f"{len(clip.skeleton.links)} links"
+            f"clip {clip.name}: the severities have shape {severity.shape}, but there are {len(clip)} frames "
+            f"and {len(clip.skeleton.links)} links"
         )
     if not np.isfinite(severity).all() or severity.min(initial=0) < 0 or severity.max(initial=0) > HIGHEST:
         raise HobbleError(f"clip {clip.name}: a severity is not in 0..10")
@@ -103,7 +105,7 @@ def _assembled(
     feet: list[HurtFoot],
     name: str,
 ) -> Clip:
-    """Body, hips and legs at the new frames."""
+    """The hurt motion at the new frames: body, height of the hips, and legs."""
     clip, skeleton = source.clip, source.clip.skeleton
     world = turns_at(change_body(source, changes), timing.body)
     shift = np.stack(
@@ -142,9 +144,10 @@ def _from_root(source: HealthyClip, world: Array, side: int) -> Array:
 
 
 def _reach(leg: Leg, changes: Effects, source: HealthyClip, timing: Timing, side: int) -> Array:
-    """(N,) cm from hip to ankle of a standing leg.
+    """(N,) desired distance from hip to ankle of a standing leg, cm.
 
-    Its knee bends more if it is spared, and less while a stiff leg swings, which lifts the hips.
+    The knee bends more if the leg is spared (`crouch`). It bends less while the other leg swings stiffly
+    (`vault`), which lifts the hips.
     """
     own, other = timing.legs[:, side], timing.legs[:, 1 - side]
     crouch = np.radians(changes.sided["crouch"][:, side]) * (1 - source.swing[:, side])

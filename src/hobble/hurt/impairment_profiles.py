@@ -32,8 +32,8 @@ class Profile:
     Ratios: speed, stride (time), step_hurt, step_sound (length of the step onto either foot), knee (range of
     the hurt knee), arm_hurt, arm_sound (swing). strike: cycles by which the sound foot lands later.
     stance_hurt, stance_sound: cycles by which a stance is longer. width: leg lengths by which steps are
-    wider. curves: for each of CURVES degrees as a mean and, for each harmonic, the factors of cosine and
-    sine. The cycle starts with the hurt foot's landing; the sound foot lands half a cycle later.
+    wider. curves: for each of CURVES its change in degrees: the mean, then the factors of cosine and sine of
+    each harmonic. A cycle starts as the hurt foot lands; the sound foot lands half a cycle later.
     """
 
     speed: float
@@ -114,9 +114,9 @@ def _profile(data: Any, gait: int, normal: int) -> Profile:
 
 
 def _harmonics(curve: Array, strike: Array) -> Array:
-    """(5,) mean over people of each one's factors.
+    """(5,) factors of a curve (people, 50), mean over people.
 
-    Time is warped so that the other foot lands at .5, not at `strike`.
+    Each person's time is warped so that the other foot lands at .5 and not at `strike` (people,).
     """
     steps = curve.shape[-1]
     phase = np.arange(steps) / steps

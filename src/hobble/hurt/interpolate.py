@@ -9,14 +9,14 @@ from hobble.core.quat import Array
 
 
 def at_frames(values: Array, when: Array) -> Array:
-    """(N, ...) values (F, ...), interpolated at the frames `when` (N,)."""
+    """(N, ...): values (F, ...) interpolated at the frames `when` (N,)."""
     before, share = _between(len(values), when)
     share = share.reshape(-1, *[1] * (values.ndim - 1))
     return values[before] * (1 - share) + values[np.minimum(before + 1, len(values) - 1)] * share
 
 
 def turns_at(rotations: Array, when: Array) -> Array:
-    """(N, ..., 4) rotations (F, ..., 4), interpolated at the frames `when` (N,)."""
+    """(N, ..., 4): rotations (F, ..., 4) interpolated at the frames `when` (N,)."""
     before, share = _between(len(rotations), when)
     share = share.reshape(-1, *[1] * (rotations.ndim - 2))
     return quat.slerp(rotations[before], rotations[np.minimum(before + 1, len(rotations) - 1)], share)

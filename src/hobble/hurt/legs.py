@@ -1,4 +1,4 @@
-"""Sets the height of the hips so that the standing leg keeps its bend, and bends legs to reach the feet."""
+"""Sets the height of the hips so that the standing leg has the desired bend, and places the knees."""
 
 from __future__ import annotations
 
@@ -16,16 +16,18 @@ from hobble.hurt.body_parts import SIDES
 from hobble.hurt.foot_path import smooth_above
 from hobble.hurt.interpolate import at_frames, turns_at
 
-BENT = np.radians([6.0, 18.0])  # radians of knee flexion; above them the bend shows where the knee points
-STRETCH = (0.985, 0.9985)  # leg lengths: limits of the distance hip-ankle
+# Radians of knee flexion. Below the first the bend is too small to tell where the knee points, above the
+# second it is large enough.
+BENT = np.radians([6.0, 18.0])
+STRETCH = (0.985, 0.9985)  # leg lengths: limits of `Leg.longest`
 
 
 @dataclass(frozen=True)
 class Leg:
     """A leg of the source, over F frames.
 
-    reach: (F,) cm from hip to ankle. thigh, shank: (F, 4), and hinge: (F, 3), the axis of the knee, in the
-    pelvis's frame. upper, lower: bone lengths.
+    reach: (F,) cm from hip to ankle. thigh, shank: (F, 4) rotations, and hinge: (F, 3) axis of the knee, in
+    the coordinates of the pelvis. upper, lower: lengths of thigh and shank, cm.
     """
 
     reach: Array = field(repr=False)
@@ -37,7 +39,7 @@ class Leg:
 
     @property
     def longest(self) -> float:
-        """The largest distance from hip to ankle that is used."""
+        """The largest distance from hip to ankle that is allowed, cm."""
         length = self.upper + self.lower
         return float(np.clip(self.reach.max(), STRETCH[0] * length, STRETCH[1] * length))
 
@@ -73,13 +75,13 @@ def read_leg(clip: Clip, side: int) -> Leg:
 
 
 def _forward(clip: Clip, side: int, thigh: Array) -> Array:
-    """(3,) direction of the foot in the thigh's frame, for a knee that never bends."""
+    """(3,) mean direction of the foot in the coordinates of the thigh, for a knee that never bends."""
     heel, toe = (clip.skeleton.role(f"{SIDES[side]}_{r}") for r in ("heel", "toe"))
     return np.mean(quat.rotate(quat.inv(thigh), clip.positions[:, toe] - clip.positions[:, heel]), axis=0)
 
 
 def knee_flexion(reach: Array, upper: float, lower: float) -> Array:
-    """(...) radians of knee flexion, 0 straight, from the distance of hip and ankle."""
+    """(...) radians of knee flexion, 0 if straight. reach: (...) distance from hip to ankle."""
     cosine = (reach**2 - upper**2 - lower**2) / (2 * upper * lower)
     return np.arccos(np.clip(cosine, -1.0, 1.0))
 
@@ -99,8 +101,9 @@ def hips_height(
 ) -> Array:
     """(N,) heights of the root.
 
-    root: (N, 3) before the change. hips: (N, 3) of each leg relative to the root. ankles: (N, 3). reaches:
-    (N,) desired cm between hip and ankle of a standing leg. stands: (N,) 0 to 1.
+    root: (N, 3) before the change. For each leg: hips: (N, 3) position of the hip joint relative to the root.
+    ankles: (N, 3). reaches: (N,) desired distance from hip to ankle while the leg stands, cm. stands: (N,) 0
+    to 1. longest: `Leg.longest`.
     """
     needed = np.zeros(len(root))
     weight = np.full(len(root), 1e-9)
@@ -124,7 +127,8 @@ def place_leg(
 ) -> tuple[Array, Array]:
     """World rotations (N, 4) of thigh and shank that put the ankle in its place.
 
-    when: (N,) source frames that give the knee's direction. pelvis: (N, 4). hip, ankle: (N, 3) in the world.
+    when: (N,) source frames from which the direction of the knee is taken. pelvis: (N, 4) world rotations.
+    hip, ankle: (N, 3) in the world.
     """
     bones = [skeleton.offsets[skeleton.role(f"{SIDES[side]}_{r}")] for r in ("knee", "heel")]
     thigh, shank = (quat.mul(pelvis, turns_at(own, when)) for own in (leg.thigh, leg.shank))
@@ -134,13 +138,16 @@ def place_leg(
 
 
 def _turned(world: Array, hinge: Array, bone: Array, along: Array) -> Array:
-    """World rotations (N, 4), turned so that the local `bone` lies along `along`. The knee keeps its axis."""
+    """World rotations (N, 4), turned so that the bone (`bone` at rest) points along `along`.
+
+    The knee keeps its axis `hinge`.
+    """
     turn = _frame(along, hinge) @ np.swapaxes(_frame(quat.rotate(world, bone), hinge), -1, -2)
     return quat.mul(quat.from_matrix(turn), world)
 
 
 def _frame(along: Array, hinge: Array) -> Array:
-    """(N, 3, 3) columns: the hinge orthogonal to the bone, along the bone, and across both."""
+    """(N, 3, 3) unit vectors as columns: the hinge made orthogonal to the bone, the bone, and across both."""
     y = along / np.linalg.norm(along, axis=-1, keepdims=True)
     x = hinge - y * np.sum(hinge * y, axis=-1, keepdims=True)
     x = x / np.maximum(np.linalg.norm(x, axis=-1, keepdims=True), 1e-9)

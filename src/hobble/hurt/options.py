@@ -19,7 +19,7 @@ class Hurt(Section):
     links: tuple[Link, ...] = Field((), description="links to hurt, named as in status files; empty: all")
     severities: Annotated[tuple[Severity, ...], Field(min_length=1)] = Field(
         (3.0, 5.0, 7.0, 10.0),
-        description="an injury has the highest in one half of its time and another in the other half",
+        description="an injury has the highest in half of its time and one of the others in the other half",
     )
     versions: Annotated[int, Field(ge=0, le=9)] = Field(1, description="hurt versions of each healthy clip")
     at_once: Annotated[int, Field(ge=1, le=30)] = Field(2, description="links hurt at once, at most")

@@ -1,4 +1,4 @@
-"""Moves the labels of the source to the times of the hurt clip."""
+"""Moves the labels of the healthy clip to the times of the hurt clip."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from hobble.labels.phase import dropped_frames, find_cycles, phase_of_footsteps
 
 
 def relabel(labels: Labels, timing: Timing, zero: str, margins: str) -> Labels:
-    """Contacts, footsteps, phase and gait at the new frames. A limping walk is still a walk.
+    """Contacts, footsteps, phase and gait at the new frames. A limping walk still has the gait "walk".
 
     zero: the foot that lands at phase 0. margins: which cycles are kept, as in `hobble.labels.phase`.
     """

@@ -1,4 +1,4 @@
-"""Decides what hurts when in the hurt versions of a data set. Every link has its turn, legs more often."""
+"""Decides what hurts, and when, in the hurt versions of a data set. Every link comes up, legs more often."""
 
 from __future__ import annotations
 
@@ -13,11 +13,12 @@ from hobble.core.skeleton import Skeleton
 from hobble.hurt.body_parts import part_of_link
 from hobble.hurt.options import Hurt
 
-# Entries of each link of a part in the deck. Parts that change the motion little have 1.
+# Part -> how often each of its links is in the deck (see `severities`). Parts that change the motion little
+# are in it once.
 OFTEN = {"hip": 3, "thigh": 3, "shank": 3, "foot": 3, "back": 2}
-GOLDEN = (math.sqrt(5) - 1) / 2
+GOLDEN = (math.sqrt(5) - 1) / 2  # its multiples, modulo 1, spread evenly
 TOGETHER = 0.25  # share of the stretches with several hurt links, if that is allowed
-SHORTEST = 0.4  # of `seconds`: a shorter rest of a clip belongs to the stretch before
+SHORTEST = 0.4  # share of `seconds`: a rest of a clip that is shorter belongs to the stretches before
 
 
 def severities(skeleton: Skeleton, frames: int, fps: float, options: Hurt, clip: str, turn: int) -> Array:
@@ -46,12 +47,10 @@ def severities(skeleton: Skeleton, frames: int, fps: float, options: Hurt, clip:
 
 
 def _deck(skeleton: Skeleton, options: Hurt) -> list[tuple[int, float, float]]:
-    """(column, severity, next severity) in the order of the data set.
+    """The deck of the data set: (column of a link, severity in the first half, severity in the second).
 
-    Links with large effects occur more often.
-
-    One of the two severities is the highest, from which a network learns most. The other alternates between
-    the rest.
+    Links with large effects occur more often. One of the two severities is the highest, from which a network
+    learns most. The other alternates between the rest.
     """
     names = list(skeleton.link_names)
     if odd := [link for link in options.links if link not in names]:
@@ -72,7 +71,7 @@ def _deck(skeleton: Skeleton, options: Hurt) -> list[tuple[int, float, float]]:
 
 
 def _stretches(frames: int, length: float) -> list[int]:
-    """Lengths of about `length` with the sum `frames`."""
+    """Lengths of stretches, about `length` frames each. Their sum is `frames`."""
     count = max(1, math.floor(frames / length + 1 - SHORTEST))
     edges = np.round(np.linspace(0, frames, count + 1)).astype(int)
     return [int(n) for n in np.diff(edges)]

@@ -1,4 +1,4 @@
-"""Shortens the source's path by as much as the steps."""
+"""Shortens the path of the healthy clip (the source) by as much as its steps get shorter."""
 
 from __future__ import annotations
 
@@ -12,14 +12,14 @@ from hobble.core.smooth import gaussian
 from hobble.hurt.effects import Effects
 from hobble.hurt.healthy_clip import HealthyClip
 
-SLOPE = 0.3  # seconds: sigma of the Gaussian over the heights of the ground under the feet
+SLOPE = 0.3  # seconds: sigma of the Gaussian that smooths the heights of the ground under the feet
 
 
 @dataclass(frozen=True)
 class ShortenedPath:
-    """Old and new horizontal path (F, 2) and height of the ground (F,) at each source frame.
+    """Old and new horizontal path (F, 2) and height of the ground (F,) at each source frame, cm.
 
-    Flat ground stays at 0. On other ground, rises shrink like the path, so that slopes stay.
+    Flat ground stays at 0. On other ground, heights shrink like the path, so that slopes keep their angle.
     """
 
     old: Array = field(repr=False)
@@ -28,7 +28,7 @@ class ShortenedPath:
     new_ground: Array = field(repr=False)
 
     def moved(self, point: Array, when: float) -> Array:
-        """(3,) a point of source frame `when`, moved to the new world."""
+        """(3,) where a point (3,) of source frame `when` is after the path has moved."""
         first = min(int(when), len(self.old) - 1)
         near = slice(first, first + 2)  # reading all frames for each footprint would take long
         moved = self.new[near] - self.old[near]
@@ -37,9 +37,9 @@ class ShortenedPath:
 
 
 def shorten(source: HealthyClip, effects: Effects, slower: Array, ground: Array | None) -> ShortenedPath:
-    """The path at the speed of `effects`.
+    """The path of a body with the speed of `effects`.
 
-    slower: (F,) factor of the stride time. ground: (F,) height of the ground below the body, None if flat.
+    slower: (F,) factor of the stride time. ground: (F,) height of the ground below the body; None if flat.
     """
     share = effects.ratio("speed") * slower
     flat = np.zeros(len(source))
@@ -52,10 +52,10 @@ def shorten(source: HealthyClip, effects: Effects, slower: Array, ground: Array 
 
 
 def ground_below(source: HealthyClip, heights: list[list[tuple[float, float]]]) -> Array:
-    """(F,) cm: the ground below the body, from the standing feet.
+    """(F,) height of the ground below the body, cm, from the heights of the standing feet.
 
-    heights: (middle, height) of each foot's stances. They are relative to each foot's median, so that legs of
-    different length make no waves.
+    heights: (middle frame, height) of each foot's stances. Heights are used relative to the foot's median, so
+    that legs of different length make no waves.
     """
     points = sorted((when, y - float(np.median([h for _, h in own]))) for own in heights for when, y in own)
     line = np.interp(np.arange(len(source)), [p[0] for p in points], [p[1] for p in points])
@@ -63,6 +63,6 @@ def ground_below(source: HealthyClip, heights: list[list[tuple[float, float]]]) 
 
 
 def _shrunk(values: Array, share: Array) -> Array:
-    """The curve with its first value and all changes multiplied by `share`."""
+    """The curve, with the same first value, in which all changes are multiplied by `share`."""
     steps = np.diff(values, axis=0) * (share[1:] + share[:-1]) / 2
     return values[:1] + np.concatenate([np.zeros_like(values[:1]), np.cumsum(steps, axis=0)])

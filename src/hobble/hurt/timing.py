@@ -1,4 +1,4 @@
-"""Times of the hurt clip: the source frame that the body and each leg show in each new frame."""
+"""Times of the hurt clip: the frame of the healthy clip (source) that body and legs show in a new frame."""
 
 from __future__ import annotations
 
@@ -13,17 +13,17 @@ from hobble.hurt.effects import Effects
 from hobble.hurt.healthy_clip import HealthyClip
 
 LEAST_SHARE = 0.57  # the time between two events of a leg shrinks at most to this share
-JOG_STRIDE = 0.15  # a jog takes on only this share of a longer stride time, because flight cannot last longer
-JOG_SHIFT = 0.6  # a jog, whose stances are short, takes on only this share of the shifts of landings
-MOST_SHIFT = 0.3  # cycles
+JOG_STRIDE = 0.15  # a jog gets only this share of a longer stride time, because flight cannot last longer
+JOG_SHIFT = 0.6  # a jog gets only this share of the shifts of landings, because its stances are short
+MOST_SHIFT = 0.3  # cycles: shifts come close to this, but do not exceed it
 
 
 @dataclass(frozen=True)
 class Timing:
-    """Source frames, with fractions, that show in each of N new frames.
+    """Source frames, with fractions, that are shown in each of N new frames.
 
-    body: (N,). legs: (N, 2) left and right. begins: (F,) the new frame in which each source frame would show
-    if only the cadence changed. slower: (F,) factor of the stride time.
+    body: (N,). legs: (N, 2) left and right. begins: (F,) the new frame that would show each of the F source
+    frames if only the cadence changed. slower: (F,) factor of the stride time.
     """
 
     body: Array = field(repr=False)

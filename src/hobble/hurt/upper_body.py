@@ -1,4 +1,4 @@
-"""Changes trunk, pelvis, head and arms: adds people's curves and holds a hurt arm."""
+"""Changes trunk, pelvis, head and arms: adds the curves of impaired people, and holds a hurt arm."""
 
 from __future__ import annotations
 
@@ -16,13 +16,14 @@ from hobble.hurt.impairment_profiles import HARMONICS
 
 X, Y, Z = np.eye(3)
 PELVIS = 0.35  # the pelvis tilts by this share of the trunk's lean
-PELVIS_CALM = 0.7  # of the movement that a stiff back loses, the pelvis loses this share
+PELVIS_CALM = 0.7  # the pelvis loses this share of the movement that a stiff back loses
 MEAN = 0.5  # seconds: sigma of the Gaussian that gives a joint's mean posture
-LOOK = {"neck": 0.5, "head": 0.85}  # neck and head take back this share of the trunk's lean
+LOOK = {"neck": 0.5, "head": 0.85}  # share of the trunk's lean that neck and head undo, to look ahead
 MOST_GUARD = 0.93  # a held arm loses up to this share of its movement
-# Directions of upper arm and forearm of a held left arm: forward, left and up in the heading's frame. `fore`
-# is the mean of Ferre et al.'s jog with a hurt forearm (Injured_Jog_LLA): across the belly. A hurt upper arm
-# is nearer to the body, with the forearm ahead. With a hurt hand the forearm is only carried.
+# How a hurt left arm is held: directions of upper arm and forearm (forward, left, up), relative to the
+# heading. `fore`, for a hurt forearm, lies across the belly: the mean of the jog with a hurt forearm by Ferre
+# et al. (Injured_Jog_LLA). `upper`, for a hurt upper arm, is closer to the body, with the forearm ahead.
+# `carry`, for a hurt hand, only carries the forearm in front of the body.
 GUARDS = {
     "upper": ((0.10, 0.16, -0.98), (0.80, -0.58, 0.10)),
     "fore": ((0.28, 0.17, -0.85), (0.26, -0.86, -0.41)),
@@ -32,7 +33,7 @@ HAND = 0.75  # strength of `carry` for a hurt hand
 
 
 def change_body(source: HealthyClip, effects: Effects) -> Array:
-    """World rotations (F, J, 4) of the source's frames, changed. Those of the legs are still the source's."""
+    """The changed world rotations (F, J, 4) of the source's frames. The legs do not change here."""
     skeleton = source.clip.skeleton
     local = _stiffened(source, effects)
     world = _world(skeleton, local)
@@ -67,7 +68,7 @@ def _stiffened(source: HealthyClip, effects: Effects) -> Array:
     ratios = [([skeleton.role("hips")], pelvis), (back, effects.ratio("back")), (neck, effects.ratio("head"))]
     for side in (LEFT, RIGHT):
         arm = _between(skeleton, f"{SIDES[side]}_wrist", "chest")
-        ratios.append((arm[1:], effects.ratio("arm")[:, side]))  # without the hand
+        ratios.append((arm[1:], effects.ratio("arm")[:, side]))  # all of the arm but the hand
     for joints, ratio in ratios:
         for j in joints:
             mean = quat.normalize(gaussian(quat.continuous(local[:, j]), MEAN * source.clip.fps))
@@ -76,13 +77,16 @@ def _stiffened(source: HealthyClip, effects: Effects) -> Array:
 
 
 def _between(skeleton: Skeleton, role: str, above: str) -> list[int]:
-    """The joints from the one of `role` up to the one below that of `above`."""
+    """The joints from the one with `role` up to the one below the joint with role `above`."""
     path = ancestors(skeleton, skeleton.role(role))
     return path[: path.index(skeleton.role(above))]
 
 
 def _shares(skeleton: Skeleton) -> list[tuple[str, float]]:
-    """For each joint its position between pelvis and chest, or between chest and head."""
+    """For each joint how far it is from the pelvis to the chest, ("pelvis", 0 to 1), or on to the head.
+
+    ("head", 0 to 1) is the way from the chest to the head. Limbs have the value of the joint they hang from.
+    """
     out: list[tuple[str, float]] = [("pelvis", 0.0)] * len(skeleton.joints)
     back = _between(skeleton, "chest", "hips")[::-1]
     neck = _between(skeleton, "head", "chest")[::-1]
@@ -115,7 +119,10 @@ def _turns(source: HealthyClip, effects: Effects) -> tuple[Array, Array, Array]:
 
 
 def _lean(source: HealthyClip, turn: Array, roll: Array, forward: Array) -> Array:
-    """(F, 4) world rotation by degrees to the left, left side up, and forward, in the heading's frame."""
+    """(F, 4) world rotation that turns to the left, raises the left side (roll) and leans forward.
+
+    All angles are (F,) degrees relative to the heading.
+    """
     yaw, roll_, pitch = (
         quat.from_axis_angle(axis, np.radians(angle)) for axis, angle in ((Y, turn), (Z, roll), (X, forward))
     )

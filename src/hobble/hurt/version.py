@@ -16,16 +16,16 @@ from hobble.labels.clip_labels import LabelReport, Labels
 from hobble.labels.phase import find_cycles
 from hobble.labels.read_files import whole_frame
 
-NEAR = 0.5  # severities that differ less from a requested one count as it
+NEAR = 0.5  # a severity that differs by at most this from a requested one counts as that one
 WHOLE = 6.0  # seconds: versions of shorter clips are not cut, because they might lose all cycles
 
 
 def hurt_version(
     clip: Clip, labels: Labels, report: LabelReport, options: Hurt, *, name: str, turn: int, ground: str
 ) -> tuple[HurtClip, LabelReport]:
-    """The version `name` of a healthy clip, and its labels' report.
+    """The version `name` of a healthy clip, and the report of its labels.
 
-    turn: its number among all versions, from 0.
+    turn: number of the version among all versions of the data set, from 0.
     """
     severity = severities(clip.skeleton, len(clip), clip.fps, options, name, turn)
     flat = ground == "flat"
@@ -39,7 +39,7 @@ def hurt_version(
 
 
 def settled(hurt: HurtClip, severities: Sequence[float], report: LabelReport) -> HurtClip:
-    """The clip without the cycles in which a link has another severity than 0 or one of `severities`.
+    """The clip without the cycles in which some link's severity is neither 0 nor one of `severities`.
 
     Their footsteps are marked as unused, so that the mirrored clip lacks them, too.
     """
@@ -54,7 +54,7 @@ def settled(hurt: HurtClip, severities: Sequence[float], report: LabelReport) ->
 
 
 def cut(hurt: HurtClip, frames: int, report: LabelReport) -> HurtClip:
-    """The first `frames` of a hurt clip, or all of it if it has fewer."""
+    """The first `frames` frames of a hurt clip, or all of it if it has fewer."""
     if frames >= len(hurt.clip):
         return hurt
     clip, labels = hurt.clip, hurt.labels

@@ -21,10 +21,8 @@ class Labels:
     """Labels of F frames at 60 Hz.
 
     contacts: (F, 4) bool, in the order of CONTACT_ROLES. phase: (F,) in 0..1. phase_known: (F,) bool. gait:
-    (F, 6) shares in the order of GAITS. footsteps: (N, 3): the frame in which the right foot lands, the next
-    frame in which the left foot lands, and 1 if the step must not be used, else 0. A landing is nan if
-    unknown; a row of nan ends a bout of walking. cycles: (C, 2) int, first and last frame of each cycle kept,
-    inclusive.
+    (F, 6) shares in the order of GAITS. footsteps: (N, 3) landings, see `hobble.labels.phase`. cycles: (C, 2)
+    int, first and last frame, inclusive, of each cycle that is used.
     """
 
     contacts: np.ndarray = field(repr=False)
@@ -40,7 +38,11 @@ class Labels:
 
 @dataclass(frozen=True)
 class LabelReport:
-    """Where the labels of a clip come from, and warnings."""
+    """Where the labels of a clip come from, and warnings.
+
+    phase_source, gait_source: "file" or "automatic". phase_zero, margins: as in the section `labels`.
+    cycles_dropped: number of cycles that are not used.
+    """
 
     clip: str
     phase_source: str
@@ -63,6 +65,6 @@ def save_labels(path: str | Path, labels: Labels) -> None:
 
 
 def load_labels(path: str | Path) -> Labels:
-    """Read a file of `save_labels`."""
+    """Read a file that `save_labels` wrote."""
     data = load_npz(path)
     return Labels(**{f.name: data[f.name] for f in fields(Labels)})

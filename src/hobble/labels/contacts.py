@@ -14,15 +14,19 @@ from hobble.labels.options import LabelOptions
 
 FEET = ((0, 1), (2, 3))  # heel and toe of the left and of the right foot, in the order of CONTACT_ROLES
 
-# A joint comes into contact below the first limit and stays in contact below the second. Heights are above
-# the joint's own stance, in leg lengths. A speed limit is in leg lengths a frame, or a share of the adjacent
-# swing's top speed if that is more. The share finds the stance of a dragged leg. The limits were set on the
-# walks and runs of `cmu`, where a foot is then down for 55 to 65 % of a walking cycle and for less than half
-# of a jogging cycle.
+# A joint comes into contact below the first limit of a pair and stays in contact below the second. Heights
+# are above the joint's own stance, in leg lengths. The limit of speed is the larger one of SPEEDS, leg
+# lengths a frame, and SHARES of the top speed of the adjacent swing, which finds the stance of a dragged leg.
+# The limits were set on the walks and runs of `cmu`: there a foot is down for 55 to 65 % of a walking cycle
+# and for less than half of a jogging cycle.
 HEEL_HEIGHTS, TOE_HEIGHTS = (0.015, 0.02), (0.02, 0.035)
 SPEEDS, SHARES = (0.010, 0.020), (0.18, 0.30)
-ON_TIPTOE = 0.03  # leg lengths: a heel is in the air if it is this much higher above its toe than when flat
-DRAWN_UP, STRETCHED = 0.55, 0.8  # heights of hips over heels, in leg lengths
+# Leg lengths: a heel is in the air if it is this much higher above its toe than in the clip's flattest
+# stances.
+ON_TIPTOE = 0.03
+# Heights of a hip above its heel, leg lengths. A foot is held up if its leg is below the first and the other
+# leg is above the second.
+DRAWN_UP, STRETCHED = 0.55, 0.8
 
 
 def contacts(clip: Clip, options: LabelOptions) -> np.ndarray:
@@ -35,8 +39,8 @@ def contacts(clip: Clip, options: LabelOptions) -> np.ndarray:
 def still_joints(clip: Clip, threshold: float) -> np.ndarray:
     """(F, 4) bool: whether a joint moves less than the root of `threshold` (cm2) to the next frame.
 
-    This is the rule of the original. It ignores height, and depends on the size of the
-    body and on capture noise. The last frame repeats the one before it.
+    This is the rule of the original. It ignores height, and depends on the size of the body and on the noise
+    of the capture. The last frame repeats the one before it.
     """
     feet = foot_positions(clip)
     still = np.sum(np.diff(feet, axis=0) ** 2, axis=-1) < threshold
@@ -48,9 +52,9 @@ def still_joints(clip: Clip, threshold: float) -> np.ndarray:
 def stance(clip: Clip, options: LabelOptions) -> np.ndarray:
     """(F, 4) bool: whether a joint is slow and near the height of its stance.
 
-    Between two swings a foot has one stance. Its height is the lowest of the joint's slow frames there, so
-    the rule needs no floor and works on slopes and stairs. Two pairs of limits (hysteresis) keep a stance in
-    one piece from landing to toe-off. All limits are relative to leg length.
+    Between two swings a foot has one stance. Its height is the joint's lowest height in slow frames there. So
+    the rule needs no floor and works on slopes and stairs. Two limits each for height and speed (hysteresis)
+    keep a stance in one piece from landing to toe-off. All limits are relative to leg length.
     """
     leg = clip.skeleton.leg_length
     height, speed = foot_positions(clip)[..., 1] / leg, _centred_speeds(clip) / leg
@@ -68,7 +72,7 @@ def stance(clip: Clip, options: LabelOptions) -> np.ndarray:
 
 
 def _lifted(clip: Clip) -> np.ndarray:
-    """(F, 4) bool: joints of a foot that is held up, while its leg is bent and the other one is straight."""
+    """(F, 4) bool: joints of a foot that is held up: its leg is drawn up, and the other leg is stretched."""
     sides = ("left", "right")
     hips, heels = (
         clip.positions[:, [clip.skeleton.role(f"{s}_{r}") for s in sides], 1] for r in ("hip", "heel")
@@ -80,10 +84,11 @@ def _lifted(clip: Clip) -> np.ndarray:
 def _find_stances(
     height: Array, speed: Array, edges: np.ndarray, heights: tuple[float, float], down: np.ndarray
 ) -> Array:
-    """Fill `down` (F,) from a joint's height and speed (F,) in leg lengths. Returns each stance's height.
+    """Find the S stances of a joint and mark their frames in `down` (F,). Returns their heights (S,).
 
-    edges: (S + 1,) the clip's ends and the fastest frame of each swing; there is one stance between two of
-    them. heights: limits above a stance, for landing and for leaving.
+    height, speed: (F,) of the joint, in leg lengths. edges: (S + 1,) the clip's ends and the fastest frame of
+    each swing; there is one stance between two of them. heights: limits of the height above a stance, for
+    landing and for staying.
     """
     lands, stays = np.zeros(len(speed), bool), np.zeros(len(speed), bool)
     levels = []
@@ -105,7 +110,7 @@ def _stretches_with(stays: np.ndarray, lands: np.ndarray) -> np.ndarray:
 
 
 def _centred_speeds(clip: Clip) -> Array:
-    """(F, 4) speeds centred on each frame, cm a frame, so that landing and toe-off are treated alike."""
+    """(F, 4) speeds, cm a frame: mean of the steps before and after a frame, to treat both ends alike."""
     feet = foot_positions(clip)
     if len(feet) < 2:
         return np.zeros(feet.shape[:2])

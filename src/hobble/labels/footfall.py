@@ -1,8 +1,8 @@
-"""Finds where each foot lands, from the motion alone: a foot that swings and then rests.
+"""Finds when each foot lands, from the motion alone: a landing is the end of a swing.
 
-A foot is down while its heel or its toe rests, that is while it is slower than a limit. The limit is relative
-to unit speeds of heel and toe (options) and to the foot's own swings. So it fits a slow shuffle, a jog whose
-feet never quite rest, and a dragged leg.
+A foot is down while its heel or its toe is slower than a limit. The limit depends on unit speeds of heel and
+toe (see the options) and on the swings of the foot. So it suits a slow shuffle, a jog in which the feet never
+quite rest, and a dragged leg.
 """
 
 from __future__ import annotations
@@ -21,14 +21,14 @@ from hobble.labels.options import LabelOptions
 RIGHT, LEFT = 0, 1
 END_OF_BOUT = (np.nan, -1)
 
-# Set on the hand-made labels of the original release and on generated walks with exact landings.
-SLOWEST_REST = 0.35  # of the unit speed: a foot slower than this always rests
-REST_OF_SWING = 0.12  # of the speed of the slower adjacent swing: a foot slower than this rests, too
-DIP_OF_SWING = 0.35  # of the lower of two peaks: a dip at most this fast separates two swings
-LEAST_PATH = 6.0  # cm: a shorter way of the toe is no swing
-SAME_SWING = 12  # frames: swings separated by a shorter rest are one
-LESSER_SWING = 0.4  # of the longer of two successive swings of a foot: a shorter one is no separate step
-LONGEST_REST = 60  # frames: a longer rest ends a bout of walking
+# These were set on the hand-made labels of the original release and on generated walks with exact landings.
+SLOWEST_REST = 0.35  # unit speeds: a foot slower than this always rests
+REST_OF_SWING = 0.12  # share of the speed of the slower adjacent swing: a foot slower than this rests, too
+DIP_OF_SWING = 0.35  # share of the lower of two peaks: a dip that is at most this fast separates two swings
+LEAST_PATH = 6.0  # cm: if the toe moves less than this, it is no swing
+SAME_SWING = 12  # frames: two swings with a rest of at most this between them are one
+LESSER_SWING = 0.4  # share of the longer of two successive swings of a foot: a shorter one is no step
+LONGEST_REST = 60  # frames: a longer rest of both feet ends a bout of walking
 SETTLING = 8.0  # cm, see `landings`
 LAST_FRAMES = 2  # a swing that ends in the last frames may not have landed
 
@@ -37,7 +37,7 @@ LAST_FRAMES = 2  # a swing that ends in the last frames may not have landed
 class Swing:
     """A foot in the air from frame `start` until it is down at frame `end`.
 
-    path: distance of its toe, cm. peak: the toe's highest speed, cm a frame.
+    foot: RIGHT or LEFT. path: length of the toe's path, cm. peak: the toe's highest speed, cm a frame.
     """
 
     foot: int
@@ -53,7 +53,7 @@ def foot_positions(clip: Clip) -> Array:
 
 
 def foot_speeds(clip: Clip) -> Array:
-    """(F, 4) speeds in cm a frame to the next frame, in the order of CONTACT_ROLES."""
+    """(F, 4) speed of each joint from a frame to the next, cm a frame, in the order of CONTACT_ROLES."""
     feet = foot_positions(clip)
     if len(feet) < 2:
         return np.zeros(feet.shape[:2])
@@ -78,27 +78,19 @@ def find_swings(clip: Clip, options: LabelOptions) -> list[Swing]:
 
 
 def relative_speeds(clip: Clip, options: LabelOptions) -> Array:
-    """(F, 2) the slower of heel and toe of the left and of the right foot, in their unit speeds."""
+    """(F, 2) speed of the left and the right foot: the lower one of heel and toe, each in its unit speed."""
     speed = foot_speeds(clip)
     units = 2 * np.array([options.heel_speed, options.toe_speed] * 2)
     relative = (speed / units).reshape(-1, 2, 2).min(axis=2)
     return np.stack([median_of_three(side) for side in relative.T], axis=1)
 
 
-def feet_up(swings: list[Swing], frames: int) -> np.ndarray:
-    """(frames, 2) bool: whether the right and the left foot are in a swing."""
-    up = np.zeros((frames, 2), bool)
-    for swing in swings:
-        up[swing.start : swing.end, swing.foot] = True
-    return up
-
-
 def landings(swings: list[Swing], frames: int, shortest_step: float) -> list[tuple[float, int]]:
     """Alternating landings (frame, foot). END_OF_BOUT separates bouts of walking.
 
-    shortest_step: a landing at most so many frames (at 120 Hz) after one of the other foot is left out. The
-    frame is that of first contact, plus the time that the toe needs for SETTLING cm at its top speed. So
-    landings after slow swings are later, because people mark the frame in which the weight comes down.
+    shortest_step: a landing at most so many frames (at 120 Hz) after one of the other foot is left out. A
+    landing is the frame of first contact, plus the time that the toe needs for SETTLING cm at its top speed.
+    So it is later after a slow swing, as in hand-made labels: people mark when the weight comes down.
     """
     out: list[tuple[float, int]] = []
     resting_since = -1
@@ -116,7 +108,10 @@ def landings(swings: list[Swing], frames: int, shortest_step: float) -> list[tup
 
 
 def _times_up(relative: Array, valley_factor: float) -> np.ndarray:
-    """(n, 2) first frame up and first frame down again of a foot with the `relative` speed (F,)."""
+    """(n, 2) first frame up, and first frame down again, of each swing of a foot.
+
+    relative: (F,) a column of `relative_speeds`.
+    """
     peaks = swing_peaks(relative)
     up = relative >= _rest_limit(relative, peaks, valley_factor)
     edges = np.flatnonzero(np.diff(np.concatenate([[False], up, [False]]))).reshape(-1, 2)
@@ -142,7 +137,7 @@ def swing_peaks(relative: Array) -> np.ndarray:
 
 
 def _local_highs(values: Array, least: float) -> np.ndarray:
-    """Frames of local highs of at least `least` in `values` (F,); the middle of a plateau."""
+    """Frames of local highs of at least `least` in `values` (F,). For a plateau it is its middle."""
     steps = np.diff(np.concatenate([[0.0], values, [0.0]]))
     moves = np.flatnonzero(steps)
     tops = np.flatnonzero((steps[moves[:-1]] > 0) & (steps[moves[1:]] < 0))
@@ -151,7 +146,10 @@ def _local_highs(values: Array, least: float) -> np.ndarray:
 
 
 def _rest_limit(relative: Array, peaks: np.ndarray, valley_factor: float) -> Array:
-    """(F,) the relative speed below which the foot is down: a share of the slower adjacent swing."""
+    """(F,) the relative speed below which the foot is down; it depends on the slower adjacent swing.
+
+    peaks: as of `swing_peaks`.
+    """
     frames = len(relative)
     limit = np.full(frames, SLOWEST_REST)
     for a, b in itertools.pairwise([0, *peaks, frames]):

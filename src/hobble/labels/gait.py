@@ -20,9 +20,10 @@ STANDING_SPEED = 0.0019  # leg lengths a frame; a slower figure stands
 CROUCHED_HEAD = 0.8
 CROUCHED_HIPS = 0.85
 
-# Log odds of jog against walk. They were fitted to the hand-made labels of the original release and of Ferre
-# et al., and to the descriptions of `cmu`. All measures have no unit, so they hold for any size of body.
-JOG_SPRING = 3.7  # hips lowest over the standing foot (spring), not between two steps (pendulum)
+# Weights of measures in the log odds of jog against walk. They were fitted to the hand-made labels of the
+# original release and of Ferre et al., and to the descriptions of `cmu`. No measure has a unit, so the
+# weights hold for any size of body.
+JOG_SPRING = 3.7  # `_spring`: 1 if the hips are lowest over the standing foot, -1 if they are highest there
 JOG_FLIGHT = 9.0  # share of the time without a foot down
 JOG_DOUBLE_SUPPORT = -9.0  # share of the time with both feet down
 JOG_BOUNCE = 12.5  # vertical acceleration of the hips, g, at most MOST_BOUNCE, because happy walks bounce
@@ -30,22 +31,22 @@ MOST_BOUNCE = 0.5
 JOG_FROUDE = 6.0  # per Froude number above FASTEST_WALK
 FASTEST_WALK = 0.5  # Froude number of the fastest walk that people keep up for long
 JOG_CONSTANT = -3.2
-# A figure walks if both feet are down for this share of the time, one is always down, and the hips do not
-# clearly spring. Bounce does not matter then, as in happy walks.
+# A figure walks if both feet are down for at least this share of the time, and flight and spring are below
+# these limits. Then bounce does not matter, as in happy walks.
 LEAST_DOUBLE_SUPPORT = 0.1
 NO_FLIGHT = 0.01
 CLEAR_SPRING = 0.5
-# A slow figure with little flight and little spring walks, too. In the happy walks of `styles` flight is at
-# most .06, in its slowest run .16. With a limit of .25 for the spring, slow jogs of the original release
-# would be walks.
+# A slow figure (Froude number) with little flight and little spring walks, too. In the happy walks of
+# `styles` flight is at most .06, in its slowest run .16. With a limit of .25 for the spring, slow jogs of the
+# original release would count as walks.
 SLOW, SOME_FLIGHT, SOME_SPRING = 0.35, 0.1, 0.2
 MOST_ODDS_OF_A_WALK = -1.0
 CERTAIN_ODDS = 2.0  # log odds that count as full evidence
-DATA_SET_ODDS = 1.0  # log odds for the main gait of the clip in the data set
+DATA_SET_ODDS = 1.0  # log odds that are added for the clip's main gait, which the data set tells
 SWITCH_COST = 18.0  # frames of full evidence that a change of gait costs
 FADE_FRAMES = 31
-LONGEST_START = 180  # frames: a shorter doubtful walk between standing and jogging counts as jog
-CLEARLY_WALKING = -4.0  # log odds in the second half of such a walk
+LONGEST_START = 180  # frames: a doubtful walk from standing to a jog counts as jog if it is at most this long
+CLEARLY_WALKING = -4.0  # log odds: with a lower median in its second half such a walk is not doubtful
 # Frames. Any other walk between standing and jogging that is shorter is split: half counts as standing, half
 # as jogging.
 LONGEST_PASSAGE = 75
@@ -65,9 +66,9 @@ def overwrite_crouch(gait: Array, clip: Clip) -> Array:
 def automatic_gait(clip: Clip, down: np.ndarray, dominant: str | None) -> Array:
     """Gait shares (F, 6) with the sum 1.
 
-    down: (F, 4) contacts by `contacts.stance`. dominant: the clip's main gait; it decides if walk and jog are
-    about equally likely. Jumps and bumps are not recognised: if `dominant` is one of them, all frames have it
-    except those that stand.
+    down: (F, 4) contacts by `contacts.stance`. dominant: the clip's main gait; it decides between walk and
+    jog if both are about equally likely. Jumps and bumps are not recognised: if `dominant` is one of them,
+    all frames get it, except those in which the figure stands.
     """
     odds = jog_odds(clip, down) + {"jog": DATA_SET_ODDS, "walk": -DATA_SET_ODDS}.get(dominant or "", 0.0)
     gait = _likeliest_path(_evidence(clip, odds), SWITCH_COST)
@@ -100,7 +101,7 @@ def jog_odds(clip: Clip, down: np.ndarray) -> Array:
 
 
 def _evidence(clip: Clip, odds: Array) -> Array:
-    """(F, 4) evidence for each of the first four gaits compared with walking, -1 to 1."""
+    """(F, 4) evidence, -1 to 1, for each of the first four GAITS compared with walking."""
     speed = _speed(clip) / clip.skeleton.leg_length
     stand = np.clip((STANDING_SPEED - speed) / STANDING_SPEED, -1.0, 1.0)
     head, hips = _relative_heights(clip)
@@ -119,7 +120,7 @@ def _speed(clip: Clip) -> Array:
 
 
 def _bounce(clip: Clip) -> Array:
-    """(F,) root mean square of the hips' vertical acceleration over half a second, g."""
+    """(F,) root mean square of the hips' vertical acceleration over half a second, in units of gravity."""
     if len(clip) < 3:
         return np.zeros(len(clip))
     height = gaussian(clip.positions[:, clip.skeleton.role("hips"), 1], 2.0)
@@ -143,7 +144,7 @@ def _spring(clip: Clip) -> Array:
 
 
 def _relative_heights(clip: Clip) -> tuple[Array, Array]:
-    """(F,) heights of head and hips above the lowest foot, in lengths of the bones below."""
+    """(F,) heights of head and hips above the lowest foot, each divided by the length of the bones below."""
     skeleton, y = clip.skeleton, clip.positions[..., 1]
     toes = y[:, [skeleton.role("left_toe"), skeleton.role("right_toe")]]
     floor = lowest(toes, 61).mean(axis=1)
@@ -158,7 +159,10 @@ def _relative_heights(clip: Clip) -> tuple[Array, Array]:
 
 
 def _likeliest_path(evidence: Array, switch: float) -> Array:
-    """(F,) the sequence of gaits with most evidence (F, G), minus `switch` for each change (Viterbi)."""
+    """(F,) the sequence of gaits with the most evidence, minus `switch` for each change (Viterbi).
+
+    evidence: (F, G) of G gaits.
+    """
     frames, gaits = evidence.shape
     if not frames:
         return np.zeros(0, int)
@@ -177,9 +181,9 @@ def _likeliest_path(evidence: Array, switch: float) -> Array:
 
 
 def _without_passages(gait: Array, odds: Array) -> Array:
-    """Gaits (F,) without short walks between standing and jogging.
+    """Gaits (F,) without short walks between standing and jogging (LONGEST_START, LONGEST_PASSAGE).
 
-    odds: (F,) of `jog_odds`. The start of a jog is part of it, unless it is clearly a walk.
+    odds: (F,) of `jog_odds`.
     """
     out = gait.copy()
     edges = np.concatenate([[0], np.flatnonzero(np.diff(gait)) + 1, [len(gait)]])
@@ -196,5 +200,5 @@ def _without_passages(gait: Array, odds: Array) -> Array:
 
 
 def _fade(gait: Array, count: int) -> Array:
-    """Shares (F, count) of gaits (F,) with a linear fade of FADE_FRAMES at every change."""
+    """(F, count) shares of gaits (F,), with a linear fade of FADE_FRAMES at every change."""
     return np.clip(mean(np.eye(count)[gait], FADE_FRAMES), 0.0, 1.0)

@@ -42,9 +42,9 @@ def label_clip(
     """Label a clip.
 
     files: hand-made files beside its source. `.phase` has priority over `_footsteps.txt`, `.gait` over
-    `_gait.txt`. motion: the report of the motion stage, for `source_fps` and `source_frames`. gait: the
-    clip's main gait, if known. ground: "flat", ... options: the section `labels` of the data set. Raises
-    InputError for an invalid file.
+    `_gait.txt`. motion: the report of the motion stage; `source_fps`, `source_frames`, `source_start` and
+    `loops` are read. gait: the clip's main gait, if known. ground: "flat", or another kind of ground.
+    options: the section `labels` of the data set. Raises InputError for an invalid file.
     """
     given = _by_kind(files) if options.files else {}
     warnings: list[str] = []
@@ -93,7 +93,10 @@ def _no_cycle(margins: str) -> str:
 
 
 def mirror_labels(labels: Labels, report: LabelReport, clip: Clip) -> tuple[Labels, LabelReport]:
-    """Labels of the mirrored clip: contacts swapped, phase half a cycle later, cycles of the other foot."""
+    """Labels of the mirrored clip: left and right contacts are swapped, and the phase is half a cycle later.
+
+    clip: the mirrored clip. Its cycles begin where the other foot landed before.
+    """
     footsteps = mirrored_footsteps(labels.footsteps)
     cycles, dropped = find_cycles(footsteps, len(labels), report.phase_zero, report.margins)
     mirrored = Labels(
@@ -141,7 +144,7 @@ def _by_kind(files: Iterable[str | Path]) -> dict[str, Path]:
 def _phase(
     clip: Clip, given: Mapping[str, Path], time: SourceTime, swings: list[Swing], shortest_step: int
 ) -> tuple[Array, np.ndarray, Array]:
-    """Phase (0 as the right foot lands), where it is known, and footsteps."""
+    """Phase (F,), 0 as the right foot lands; bool (F,), where it is known; and footsteps (N, 3)."""
     frames = len(clip)
     if "footsteps" in given:
         footsteps = label_files.read_footsteps(given["footsteps"], time)

@@ -1,4 +1,4 @@
-"""The label picture of a clip, as small arrays for the report."""
+"""The data of a picture of a clip's labels, as small arrays for the report."""
 
 from __future__ import annotations
 
@@ -15,10 +15,11 @@ POINTS = 400
 
 
 def label_picture(labels: Labels, clip: Clip, points: int = POINTS) -> dict[str, Any]:
-    """Footfalls, phase, gait and speed over time, with at most `points` values each.
+    """Contacts, landings, phase, gait and speed over time. Curves have at most `points` values.
 
-    `contacts`: for each joint a list of [from, to) in seconds. `seconds`: the times of `phase` (None if
-    unknown), `gait` (a list for each) and `speed` (m/s). `landings`: seconds of each foot's landings.
+    `contacts`: for each joint a list of [from, to) in seconds. `landings`: seconds of each foot's landings.
+    `seconds`: the times of the curves `phase` (None if unknown), `gait` (a curve for each gait) and `speed`
+    (m/s).
     """
     frames = len(labels)
     at = np.unique(np.linspace(0, max(frames - 1, 0), min(frames, points)).round().astype(int))

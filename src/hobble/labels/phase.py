@@ -18,16 +18,16 @@ from hobble.core.quat import Array
 from hobble.labels.read_files import whole_frame
 
 BREAK = (np.nan, np.nan, 1.0)
-IDLE_RATE = 0.0017  # cycles a frame, a tenth of the usual rate, as at run time for a standing character
-FASTEST = 0.25
+IDLE_RATE = 0.0017  # cycles a frame: a tenth of the usual rate, the same as for a standing character
+FASTEST = 0.25  # cycles a frame: a larger change of a hand-made phase is a jump, not movement
 MARGINS = {"extend": 1, "drop": 60}  # least number of frames before a cycle; one more is needed after it
 
 
 def phase_of_footsteps(footsteps: Array, frames: int) -> tuple[Array, np.ndarray]:
     """Phase (frames,) in 0..1, 0 as the right foot lands, and bool (frames,) where it is known.
 
-    It is known and linear between the landings of a bout. Elsewhere it advances by about IDLE_RATE, or a
-    little faster so that it meets the next landing.
+    It is known and linear between the landings of a bout of walking. Elsewhere it advances by about
+    IDLE_RATE, or a little faster, to have the right value at the next landing.
     """
     when, value, joined = _landings(footsteps)
     frame = np.arange(frames)
@@ -55,7 +55,7 @@ def dropped_frames(footsteps: Array, frames: int) -> np.ndarray:
 
 
 def footsteps_of_phase(phase: Array) -> tuple[Array, np.ndarray]:
-    """Footsteps (N, 3) where a hand-made phase (F,) passes 0 and .5, and bool (F,) where the phase moves."""
+    """Footsteps (N, 3) at which a hand-made phase (F,) passes 0 and .5, and bool (F,): where it moves."""
     step = np.diff(phase) % 1.0
     moving = np.concatenate([[False], (step > 0) & (step < FASTEST), [False]])
     edges = np.flatnonzero(np.diff(moving))
@@ -98,9 +98,9 @@ def rows_of_landings(events: list[tuple[float, int]]) -> Array:
 def find_cycles(footsteps: Array, frames: int, zero: str, margins: str) -> tuple[np.ndarray, int]:
     """First and last frame (C, 2) of each cycle between landings of the foot `zero`, and the number left out.
 
-    Cycles in marked rows are left out, and cycles too near an end of the clip. With `margins` "drop", as in
-    the original, a cycle is too near if it starts before frame 60 or ends within 61 frames of the clip's end.
-    With "extend", it is too near if there is no frame before it or less than two after.
+    Cycles in marked rows are left out, and so are cycles too near an end of the clip. With `margins` "drop",
+    as in the original, a cycle is too near if it starts before frame 60 or ends within 61 frames of the
+    clip's end. With "extend", it is too near if there is no frame before it or less than two after.
     """
     margin = MARGINS[margins]
     own = 0 if zero == "right" else 1

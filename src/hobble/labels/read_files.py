@@ -25,7 +25,8 @@ TO_GAIT = {"run": "jog", "crawl": "crouch", "unknown": "bump"}
 class SourceTime:
     """How frames of the clip's source file relate to frames of the clip.
 
-    frames: number in the source file. fps: its rate. first: its frame, from 0, that is frame 0 of the clip.
+    frames: number of frames of the source file. fps: its rate. first: the frame of the source file, from 0,
+    that is frame 0 of the clip.
     """
 
     frames: int
@@ -34,7 +35,7 @@ class SourceTime:
 
     @property
     def ratio(self) -> float:
-        """Source frames per 60 Hz frame, at the rate of the resampling."""
+        """Source frames per frame of the clip (60 Hz)."""
         return self.fps / 60.0
 
     def to_clip(self, number: float) -> float:
@@ -42,7 +43,7 @@ class SourceTime:
         return (number - 1 - self.first) / self.ratio
 
     def at_clip_frames(self, frames: int) -> Array:
-        """(frames,) source rows of the clip's frames, from 0 and not rounded."""
+        """(frames,) the source frame, from 0 and not rounded, of each frame of the clip."""
         return np.arange(frames) * self.ratio + self.first
 
 
@@ -52,11 +53,10 @@ def whole_frame(frame: float) -> int:
 
 
 def read_phase(path: Path, time: SourceTime, frames: int) -> Array:
-    """(frames,) phase at 60 Hz of a file with one value per source frame.
+    """(frames,) phase at 60 Hz from a file with one value for each source frame.
 
-    Interpolated along the shorter way round.
-
-    Raises InputError for a value that is not a number in 0..1, or for a wrong number of rows.
+    Between two values it is interpolated the shorter way round. Raises InputError for a value that is not a
+    number in 0..1, or for a wrong number of rows.
     """
     rows = _matrix(path, time, 1)[:, 0]
     before, after, share = _between(rows, time, frames)
@@ -65,20 +65,18 @@ def read_phase(path: Path, time: SourceTime, frames: int) -> Array:
 
 
 def read_gait(path: Path, time: SourceTime, frames: int) -> Array:
-    """(frames, 6) gait shares of a file with the 8 columns FILE_GAITS. Raises like `read_phase`."""
+    """(frames, 6) gait shares from a file with the 8 columns FILE_GAITS. Raises like `read_phase`."""
     rows = _matrix(path, time, len(FILE_GAITS))
     before, after, share = _between(rows, time, frames)
     return _six(before + share[:, None] * (after - before))
 
 
 def read_footsteps(path: Path, time: SourceTime) -> Array:
-    """(N, 3) footsteps (see `Labels`) of a file with lines `right left [*]`.
+    """(N, 3) footsteps (see `hobble.labels.phase`) from a file with lines `right left [*]`.
 
-    The last may hold only `right`.
-
-    Such a last line counts as marked with `*`, because the original makes no rows of the cycle that ends
-    there. Its landing still gives the phase before it. Raises InputError with the line if frames are not
-    numbers, do not rise, or are past the clip's end.
+    The last line may hold only `right`. Then it counts as marked with `*`, because the original does not use
+    the cycle that ends there. Its landing still determines the phase before it. Raises InputError, which
+    names the line, if frames are not numbers, do not rise, or are past the clip's end.
     """
     steps: list[tuple[float, float, float]] = []
     last, ended = 0.0, False
@@ -104,10 +102,11 @@ def read_footsteps(path: Path, time: SourceTime) -> Array:
 
 
 def read_gait_keys(path: Path, time: SourceTime, frames: int) -> Array:
-    """(frames, 6) gait shares of a file with lines `frame gait`, with linear fades between different gaits.
+    """(frames, 6) gait shares from a file with lines `frame gait` (keys).
 
-    A fade ends one frame before its second key, as in the original's `.gait` files. Raises InputError with
-    the line if a frame is not a number or does not rise, or for a gait that is not in FILE_GAITS.
+    Between two keys with different gaits the shares fade linearly. A fade ends one frame before its second
+    key, as in the original's `.gait` files. Raises InputError, which names the line, if a frame is not a
+    number or does not rise, or for an unknown gait.
     """
     names = (*FILE_GAITS, "bump")
     keys: list[tuple[float, int]] = []
@@ -174,7 +173,7 @@ def _matrix(path: Path, time: SourceTime, columns: int) -> Array:
 
 
 def _between(rows: Array, time: SourceTime, frames: int) -> tuple[Array, Array, Array]:
-    """For each frame of the clip the rows before and after it, and its position between them (0..1)."""
+    """For each frame of the clip the rows before and after it, and its position between these (0..1)."""
     at = np.clip(time.at_clip_frames(frames), 0, len(rows) - 1)
     nearest = np.round(at)
     at = np.where(np.abs(at - nearest) < 1e-6, nearest, at)

@@ -18,7 +18,7 @@ HALF_FADE = 15  # frames at 60 Hz on each side of a change of gait in which the 
 
 
 def write_label_files(footsteps: Path, gait: Path, phase: Path, labels: Labels, time: SourceTime) -> None:
-    """Write the three files of a clip. time: how its frames relate to those of its source file."""
+    """Write the three files of a clip. time: how the clip's frames relate to those of its source file."""
     write_text(footsteps, footsteps_text(labels, time))
     write_text(gait, gait_text(labels, time))
     write_text(phase, phase_text(labels, time))
@@ -27,8 +27,8 @@ def write_label_files(footsteps: Path, gait: Path, phase: Path, labels: Labels, 
 def footsteps_text(labels: Labels, time: SourceTime) -> str:
     """Lines `right left`: the frames in which the feet land.
 
-    A `*` marks a line that is not used for cycles: one marked in the labels, or the last of a bout of
-    walking, because the format has no other way to end a bout.
+    A `*` marks a line that is not used for cycles: one that is marked in the labels, or the last one of a
+    bout of walking, because the format has no other way to end a bout.
     """
     lines = []
     rows = labels.footsteps

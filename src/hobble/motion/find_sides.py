@@ -12,9 +12,7 @@ from hobble.motion.names import side_of, side_of_pair
 from hobble.motion.orient import unit
 
 
-def left_leg(
-    rig: MovingRig, pair: LimbPair, leg: list[tuple[int, int, int]], legs: list, arm: list, head: int
-) -> tuple[int, bool]:
+def left_leg(rig: MovingRig, pair: LimbPair, leg: list[tuple[int, int, int]], head: int) -> tuple[int, bool]:
     """Which of the two legs (0 or 1) is the left one, and whether names say so.
 
     leg: hip, knee and ankle of both chains of `pair`. head: the joint of the head. If names do not tell, up

@@ -6,13 +6,13 @@ from collections.abc import Iterable, Sequence
 from pathlib import Path
 
 from hobble.measures.stratified_sample import shuffle_key
-from hobble.report.gather import Material
+from hobble.report.gather import ReportMaterial
 
 MOST = 150  # most clips with curves of their labels, a row of the table, and views of their ground
 MOST_SAMPLED = 600  # most clips whose rows are counted frame by frame
 
 
-def shown(material: Material, most: int = MOST) -> frozenset[str]:
+def shown(material: ReportMaterial, most: int = MOST) -> frozenset[str]:
     """Names of at most `most` clips, or of all clips if there are no more.
 
     The clips are put into kinds by split, by main gait, and by whether a channel has a value in them. The

@@ -1,1 +1,1 @@
-"""The embedded data set: a procedural walker, healthy or hurt, written like a user's folder."""
+"""Makes synthetic clips: motion of a procedural walker, written like the files in a user's folder."""

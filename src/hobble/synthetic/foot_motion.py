@@ -18,17 +18,20 @@ from hobble.synthetic.style import Style
 X_AXIS = np.array([1.0, 0.0, 0.0])
 HEEL = np.array([0.0, -4.2, -3.0])  # approximate back of the sole, from the ankle
 READY = 0.95  # share of the swing after which the foot is pitched for its landing
-KICK = 0.68  # below 1 the foot is highest in the first half of the swing
+KICK = 0.68  # at less than 1 the foot is highest in the first half of the swing
 FOLLOW = 0.45  # share of its pitch rate that the foot keeps as it leaves
 SPEED_LEFT = 0.36  # speed of the foot as it lands, as a share of its mean speed
-EARLY = 0.81  # below 1 the foot covers more than half of its distance in the first half of the swing
+EARLY = 0.81  # at less than 1 the foot covers more than half of its distance in the first half of the swing
 RISE, SETTLE = 0.36, 0.3  # shares of the swing in which the foot rises to its clearance and comes down again
 SOLE_HEIGHT = 2.0  # cm: a joint of the swinging foot stays at least this plus the clearance above the ground
 
 
 @dataclass(frozen=True)
 class FootPoses:
-    """One foot over F frames in the world: ankle (F, 3), foot (F, 4), toes (F, 4)."""
+    """One foot over F frames, in the world.
+
+    ankle: (F, 3) position, cm. foot, toes: (F, 4) rotations.
+    """
 
     ankle: Array
     foot: Array
@@ -36,7 +39,7 @@ class FootPoses:
 
 
 def move_foot(steps: list[PlannedStance], style: Style, side: int, ground: Ground) -> FootPoses:
-    """The path of one foot through its stances. Frames before the first and after the last one stay 0."""
+    """The path of one foot through its stances. Frames before the first and after the last stance stay 0."""
     frames = len(style.duty)
     turns = np.tile(quat.IDENTITY, (frames, 1))
     foot = FootPoses(np.zeros((frames, 3)), turns, turns.copy())
@@ -59,9 +62,11 @@ def _frames(start: float, end: float) -> np.ndarray:
 
 @dataclass(frozen=True)
 class _Roll:
-    """A stance and the foot's pitch in it: down from its landing, flat, then up over the toe.
+    """A stance, and the pitch of the foot in it: the toe comes down, the foot is flat, then the heel goes up.
 
-    rest: (F,) radians, the pitch of a standing foot; one array for all stances.
+    land, off: radians of pitch as the foot lands and as it leaves. rest: (F,) radians, the pitch of a
+    standing foot; one array for all stances. flat, heel_off: shares of the stance after which the toe is down
+    and the heel leaves. power: of the heel's rise over time.
     """
 
     step: PlannedStance
@@ -98,17 +103,17 @@ class _Roll:
         return np.asarray(rest + landing + ((self.off - rest) * rise**self.power if leaves else 0.0))
 
     def toe(self, pitch: Array) -> Array:
-        """(3,) the toe joint.
+        """(3,) position of the toe joint.
 
-        It stands while the heel is up, and moves on an arc about the ankle while the toe is up.
+        It stands still while the heel is up, and moves on an arc about the ankle while the toe is up.
         """
         turned = quat.mul(self.step.turn, quat.from_axis_angle(X_AXIS, -np.maximum(pitch, 0.0)))
         return self.step.ankle + quat.rotate(turned, FOOT)
 
     def ankle(self, pitch: Array) -> Array:
-        """(..., 3) the ankle.
+        """(..., 3) position of the ankle.
 
-        It stands while the toe is up, and moves on an arc about the toe joint while the heel is up.
+        It stands still while the toe is up, and moves on an arc about the toe joint while the heel is up.
         """
         turned = quat.mul(self.step.turn, quat.from_axis_angle(X_AXIS, -np.minimum(pitch, 0)))
         return self.step.ankle + quat.rotate(self.step.turn, FOOT) - quat.rotate(turned, FOOT)
@@ -134,7 +139,7 @@ def _swing(foot: FootPoses, here: _Roll, there: _Roll, style: Style, side: int, 
     rotation = quat.mul(turn, quat.from_axis_angle(X_AXIS, -pitch))
     bend = np.minimum(pitch, 0) * (1 - 0.4 * bump)
     toes = quat.mul(rotation, quat.from_axis_angle(X_AXIS, bend))
-    # The toe joint starts at rest and the ground stops it. The ankle follows from toe joint and pitch.
+    # The toe joint starts at rest, and still moves as it lands. Its position and the pitch give the ankle.
     going = _hermite(0.0, 0.0, 1.0, SPEED_LEFT / EARLY, u**EARLY)
     share = np.stack([going, _ease(u), going], axis=1)
     toe = here.toe(p0) + (there.toe(p1) - here.toe(p0)) * share
@@ -158,7 +163,7 @@ def _lack(toe: Array, rotation: Array, toes: Array, clearance: Array, ground: Gr
 
 
 def smooth_above(values: Array, frames: int) -> Array:
-    """A smooth curve that is nowhere below `values`: their running maximum, averaged over an equal window."""
+    """(F,) a smooth curve that is nowhere below `values` (F,): their running maximum, smoothed."""
     wide = maximum_filter1d(values, 4 * frames + 1, mode="nearest")
     kernel = np.convolve(np.ones(2 * frames + 1), np.ones(2 * frames + 1))
     return np.convolve(np.pad(wide, 2 * frames, mode="edge"), kernel / kernel.sum(), mode="valid")
@@ -171,6 +176,6 @@ def _ease(u: Array) -> Array:
 
 
 def _hermite(a: Array | float, da: Array | float, b: Array | float, db: Array | float, u: Array) -> Array:
-    """Cubic from a to b with slopes da and db."""
+    """The cubic curve from a (at u = 0) to b (at u = 1) with slopes da and db there."""
     u2, u3 = u * u, u * u * u
     return a * (2 * u3 - 3 * u2 + 1) + da * (u3 - 2 * u2 + u) + b * (3 * u2 - 2 * u3) + db * (u3 - u2)

@@ -15,19 +15,20 @@ from hobble.synthetic.style import LEFT, RIGHT, SIGN, Style
 
 ANKLE_HEIGHT = 7.0  # cm, of the ankle joint above the sole; the toe joint is 4.5 cm lower
 FOOT = np.array([0.0, -4.5, 13.5])  # from ankle to toe joint in a flat foot
-STAY = (7.0, np.radians(12.0))  # cm and radians: a standing figure does not take smaller steps
+STAY = (7.0, np.radians(12.0))  # cm and radians: a standing figure takes no step that is smaller than both
 APART = 8.0  # cm: least sideways distance between the ankles
 STILL = 12.0  # cm/s: a slower figure stands
-# Points along the foot that must be on one step, cm from the ankle, with some room in front of the toes.
+# Points along the foot that must be on one step of stairs, cm from the ankle, with room in front of the toes.
 SOLE = np.array([-11.0, -5.0, 0.0, 6.0, 13.5, 20.5, 27.0, 32.0, 37.0])
 SHIFTS = sorted(np.arange(-20.0, 21.0, 2.0), key=abs)  # cm by which a foot may be moved away from an edge
 
 
 @dataclass(frozen=True)
 class PlannedStance:
-    """A foot on the ground from frame `land` to frame `leave` (with fractions, of the padded path).
+    """A foot on the ground from frame `land` to frame `leave` (of the padded path, with fractions).
 
-    ankle: (3,) of the flat foot. turn: (4,) its world rotation. swings: whether it was lifted to get here.
+    ankle: (3,) position of the ankle while the foot is flat, cm. turn: (4,) world rotation of the flat foot.
+    swings: whether the foot swung to this place.
     """
 
     land: float
@@ -38,7 +39,7 @@ class PlannedStance:
 
 
 def phase_curve(style: Style, fps: float, start: float) -> Array:
-    """(F,) growing cycles. The right foot lands at whole numbers."""
+    """(F,) phase in cycles, not wrapped. The right foot lands at whole numbers."""
     return start + np.cumsum(style.frequency) / fps
 
 
@@ -59,8 +60,8 @@ def stances(
     out: tuple[list[PlannedStance], list[PlannedStance]] = ([], [])
     for land, side in sorted(events):
         here = value_at(phase, land)
-        # How long a foot stands depends on the speed at the time of leaving, so a foot leaves sooner if the
-        # walker has become faster.
+        # How long a foot stands depends on the speed as it leaves. So it leaves sooner if the walker has
+        # become faster.
         leave = np.interp(here, leaving[side], frames)
         middle = np.interp((here + value_at(phase, leave)) / 2, phase, frames)
         before, other = (out[s][-1] if out[s] else None for s in (side, 1 - side))
@@ -82,7 +83,10 @@ def _footprint(
     other: PlannedStance | None,
     rng: np.random.Generator,
 ) -> tuple[Array, Array]:
-    """The place of a foot: under the body in mid-stance, but never across the other foot."""
+    """The place of a foot: near the body's place in mid-stance, but never across the other foot.
+
+    Returns the ankle's position (3,) and the foot's world rotation (4,). middle: frame of mid-stance.
+    """
 
     def value(curve: Array) -> float:
         return float(value_at(curve, middle))
@@ -103,7 +107,7 @@ def _footprint(
 
 
 def _planted(ground: Ground, place: Array, yaw: float) -> tuple[Array, Array]:
-    """The flat foot, all of it on one step: ankle position and world rotation."""
+    """Put a flat foot on the ground, all of it on one step of stairs: ankle position and world rotation."""
     ahead = np.array([np.sin(yaw), np.cos(yaw)])
 
     def heights(along: Array) -> Array:

@@ -1,4 +1,4 @@
-"""Makes one clip of the embedded data set: motion, footsteps and gait keys from a plan."""
+"""Makes one synthetic clip: motion, footsteps and gait labels from a plan."""
 
 from __future__ import annotations
 
@@ -31,7 +31,8 @@ SHORTEST = 60  # frames at 60 Hz: least length of a clip, so that a foot lands i
 class GeneratedWalk:
     """A generated clip and its labels. Frames count from 0 at the clip's rate.
 
-    right, left: frames in which a foot lands. gait: (frame, label) keys. ground: the kind of ground.
+    right, left: frames in which a foot lands. gait: (frame, label), as in `gait_keys`. ground: the heights
+    that the clip was planned for.
     """
 
     clip: Clip
@@ -44,7 +45,9 @@ class GeneratedWalk:
 def generate(
     clip: str, skeleton: Skeleton, frames: int, recipe: str | None, fps: float, seed: int
 ) -> GeneratedWalk:
-    """Walk a recipe for `frames` frames at 60 Hz, written at `fps`. Equal arguments give equal motion.
+    """Walk a recipe for as long as `frames` frames at 60 Hz. The clip has rate `fps`.
+
+    recipe: a key of RECIPES; None: "walk-straight". Equal arguments give equal motion.
 
     Raises HobbleError for an unknown recipe.
     """
@@ -57,7 +60,7 @@ def generate(
 def walk(
     clip: str, skeleton: Skeleton, segments: list[Segment], total: int, ground: str, fps: float, seed: int
 ) -> GeneratedWalk:
-    """Walk a plan for `total` frames at `fps`, on a kind of ground of `make_ground`."""
+    """Walk a plan (`segments`) for `total` frames at `fps`. ground: a kind of ground of `make_ground`."""
     path = walk_path(segments, total, fps)
     style = healthy_style(path)
     phase = phase_curve(style, fps, generator(seed, clip, "phase").random())

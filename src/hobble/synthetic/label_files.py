@@ -1,4 +1,4 @@
-"""The text files beside a clip: footsteps and gait keys."""
+"""The text of the label files of a clip: footsteps and gaits."""
 
 from __future__ import annotations
 
@@ -9,8 +9,9 @@ import numpy as np
 
 
 def footsteps_text(right: Sequence[int], left: Sequence[int]) -> str:
-    """Lines `a b`: the right foot lands, then the left. Frames count from 0 in the arguments, from 1 in the
-    file.
+    """Lines `right left`: the frame in which the right foot lands, then the next landing of the left foot.
+
+    Frames count from 0 in the arguments, from 1 in the file.
     """
     lines = []
     lefts = np.asarray(left)

@@ -8,11 +8,11 @@ from pydantic import Field
 
 from hobble.core.section import Section
 
-WRITES = ("_footsteps.txt", "_gait.txt")  # beside each clip
+WRITES = ("_footsteps.txt", "_gait.txt")  # endings of the label files that are written for each clip
 
 
 class Synthetic(Section):
-    """The embedded data set: its size and its seed."""
+    """Synthetic clips: their size and their seed."""
 
     frames: Annotated[int, Field(ge=600, le=1_000_000_000)] = Field(
         20_000, description="frames at 60 Hz of all clips together"

@@ -1,4 +1,4 @@
-"""The ground for which the walk is planned: flat, sloping, stepped or uneven heights over x and z."""
+"""The ground for which a walk is planned: flat, slopes, steps or uneven. Heights depend on x and z."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ Ground = Callable[[Array, Array], Array]  # x, z in cm -> heights in cm
 
 
 def make_ground(kind: str, rng: np.random.Generator) -> Ground:
-    """The ground of one clip. kind: "flat", "slopes", "steps" or "uneven". The first steps go along +Z."""
+    """The ground of one clip. kind: "flat", "slopes", "steps" or "uneven". Slopes and steps are along Z."""
     return {"flat": lambda _: flat, "slopes": _slopes, "steps": _steps, "uneven": _uneven}[kind](rng)
 
 
@@ -54,7 +54,7 @@ def _waves(
 
 
 def _steps(rng: np.random.Generator) -> Ground:
-    """Steps up and down across the path, 7 to 16 cm high and 62 to 130 cm deep, in flights of up to four."""
+    """Steps up and down along Z, 7 to 16 cm high and 62 to 130 cm deep, in flights of up to four."""
     count = 400
     edges = np.cumsum(rng.uniform(62, 130, count))
     edges -= edges[count // 2]

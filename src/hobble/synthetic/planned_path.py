@@ -12,12 +12,15 @@ from hobble.core.quat import Array
 from hobble.synthetic.recipes import CROUCH, JOG, STAND, WALK, Segment
 
 GAITS = (STAND, WALK, JOG, CROUCH)
-BLEND = 0.30  # seconds: sigma of the change between segments, which takes about a second
+BLEND = 0.30  # seconds: sigma of the Gaussian that blends segments; a change takes about a second
 
 
 @dataclass(frozen=True)
 class PlannedPath:
-    """F frames at `fps`. The clip is frames `first` to F - `first`; the padding lets steps begin and end.
+    """A path of F frames at `fps`.
+
+    The clip is frames `first` to F - `first`. The padding is there so that steps can begin and end outside
+    it.
 
     position: (F, 2) x and z in cm. facing: (F,) radians, positive to the left. velocity: (F, 2) cm/s to the
     left and forward, relative to facing. gait: (F, 4) shares of GAITS.
@@ -40,7 +43,7 @@ class PlannedPath:
 
 
 def walk_path(segments: Sequence[Segment], frames: int, fps: float) -> PlannedPath:
-    """Integrate the plan."""
+    """The path of a plan (`segments`) for a clip of `frames` frames, with padding."""
     first = margin(fps)
     total = frames + 2 * first
     which = _segment_of_frame(segments, frames, fps)
@@ -82,7 +85,10 @@ def _segment_of_frame(segments: Sequence[Segment], frames: int, fps: float) -> n
 
 
 def gait_keys(segments: Sequence[Segment], frames: int, fps: float) -> list[tuple[int, str]]:
-    """(frame, label) keys, frames from 0. Labels fade linearly while the motion changes its gait."""
+    """The gait labels as keys (frame, label), frames from 0. Labels fade linearly between two keys.
+
+    A fade lasts as long as the change of the motion.
+    """
     which = _segment_of_frame(segments, frames, fps)
     labels = [segments[i].gait for i in which]
     half = round(1.6 * BLEND * fps)

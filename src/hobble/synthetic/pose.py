@@ -15,11 +15,11 @@ from hobble.synthetic.planned_path import PlannedPath
 from hobble.synthetic.style import LEFT, RIGHT, SIGN, Style
 
 X, Y, Z = np.eye(3)
-TWIST = 12.0  # degrees of an upper arm inward
+TWIST = 12.0  # degrees by which an upper arm is turned inward about its axis
 STRETCH = {
     True: 0.9975,
     False: 0.98,
-}  # longest distance hip-ankle, leg lengths, on flat and other ground
+}  # longest distance from hip to ankle, leg lengths. True: on flat ground, False: on other ground
 SMOOTH = {True: 0.03, False: 0.06}  # seconds over which the hips come down so that the legs reach the ground
 
 
@@ -61,7 +61,7 @@ def _wave(phase: Array, peak: Array | float, times: int = 1) -> Array:
 
 
 def _centre(style: Style, side: int) -> Array:
-    """Phase of the middle of a foot's stance."""
+    """(F,) phase in the middle of a foot's stance."""
     return style.duty[:, side] / 2 + (0.5 if side == LEFT else 0.0)
 
 
@@ -88,7 +88,7 @@ def _root(
     hips: Array,
     noise: Array,
 ) -> Array:
-    """Hip positions: along the path, with sway and bob, and low enough that no leg is fully straight."""
+    """(F, 3) hip positions: along the path, with sway and bob, and so low that no leg is fully straight."""
     sway = style.sway * (_wave(phase, _centre(style, LEFT)) - _wave(phase, _centre(style, RIGHT))) / 2
     sway = sway + 0.3 * noise[:, 3]
     x = path.position[:, 0] + sway * np.cos(path.facing)
@@ -109,7 +109,7 @@ def _root(
 def _too_high(
     skeleton: Skeleton, root: Array, hips: Array, foot: FootPoses, side: str, stretch: float
 ) -> Array:
-    """(F,) cm by which the distance hip-ankle exceeds this share of the leg length."""
+    """(F,) cm by which the hip joint is too high for a distance of `stretch` leg lengths to the ankle."""
     joint = root + quat.rotate(hips, skeleton.offsets[skeleton.index(f"{side}UpLeg")])
     upper, lower = leg_lengths(skeleton, side)
     away = joint - foot.ankle
@@ -141,7 +141,7 @@ def _trunk(
 
 
 def _leg(skeleton: Skeleton, world: Array, root: Array, foot: FootPoses, side: int) -> None:
-    """Two-bone inverse kinematics. The knee points between the directions of pelvis and foot."""
+    """Set a leg by inverse kinematics. The knee points between the directions of pelvis and foot."""
     name = ("Left", "Right")[side]
     hips = world[:, 0]
     hip = root + quat.rotate(hips, skeleton.offsets[skeleton.index(f"{name}UpLeg")])
@@ -157,7 +157,10 @@ def _leg(skeleton: Skeleton, world: Array, root: Array, foot: FootPoses, side: i
 
 
 def _bone(up: Array, side_axis: Array) -> Array:
-    """World rotation of a bone that hangs down (-Y at rest) and bends about its X axis."""
+    """(F, 4) world rotation of a bone that hangs down (-Y) at rest and bends about its X axis.
+
+    up, side_axis: (F, 3) directions of the bone's Y and (approximately) X axis.
+    """
     y = up / np.linalg.norm(up, axis=-1, keepdims=True)
     x = side_axis - y * np.sum(y * side_axis, axis=-1, keepdims=True)
     x = x / np.linalg.norm(x, axis=-1, keepdims=True)

@@ -1,4 +1,4 @@
-"""Recipes of clips: sequences of segments, each with a gait, a velocity, a turn and a time."""
+"""Recipes of clips: sequences of segments, each with a gait, a velocity, a turn and a length."""
 
 from __future__ import annotations
 
@@ -84,10 +84,10 @@ GROUND = {"slopes": "slopes", "steps": "steps", "uneven": "uneven"}  # all other
 
 
 def plan(recipe: str, frames: float, fps: float, seed: int, clip: str) -> list[Segment]:
-    """The segments of a clip of `frames` frames, each varied by the clip's own generator.
+    """The segments of a clip of `frames` frames, each varied at random (the same in every run).
 
-    The recipe is repeated as often as fits best, at three quarters of its time or more. Turns of every other
-    repetition are mirrored. Raises HobbleError for an unknown recipe.
+    The recipe is repeated as often as fits best, with its times stretched or shortened, to three quarters at
+    least. Every other repetition is mirrored. Raises HobbleError for an unknown recipe.
     """
     if recipe not in RECIPES:
         raise HobbleError(f"clip {clip}: there is no recipe {recipe!r}. There are: {', '.join(RECIPES)}.")

@@ -15,13 +15,13 @@ from hobble.synthetic.planned_path import GAITS, PlannedPath
 
 LEFT, RIGHT = 0, 1
 
-# name: for each gait (value at the gait's reference speed, change per m/s). Degrees, centimetres, shares.
-REFERENCE_SPEED = (0.0, 1.3, 2.8, 0.8)
+REFERENCE_SPEED = (0.0, 1.3, 2.8, 0.8)  # m/s, of the gaits in GAITS
+# name -> for each gait (value at the gait's reference speed, change per m/s). Degrees, centimetres, shares.
 TABLE: dict[str, tuple[tuple[float, float], ...]] = {
     "duty": ((0.64, 0), (0.604, -0.06), (0.365, -0.05), (0.64, -0.06)),  # share of the cycle on the ground
-    "land_pitch": ((0, 0), (16, 6), (15, 2), (-24, 0)),  # of the foot as it lands, + toe up
-    "off_pitch": ((-15, 0), (-53, -13), (-49, -1), (-58, -8)),  # as it leaves
-    "rest_pitch": ((0, 0), (0, 0), (0, 0), (-24, 0)),  # while it stands
+    "land_pitch": ((0, 0), (16, 6), (15, 2), (-24, 0)),  # pitch of the foot as it lands, + toe up
+    "off_pitch": ((-15, 0), (-53, -13), (-49, -1), (-58, -8)),  # pitch of the foot as it leaves
+    "rest_pitch": ((0, 0), (0, 0), (0, 0), (-24, 0)),  # pitch of the foot while it stands
     "flat": ((0.15, 0), (0.14, 0), (0.30, 0), (0.15, 0)),  # share of stance until the toe is down
     "heel_off": ((0.6, 0), (0.32, -0.03), (0.30, 0), (0.48, 0)),  # share of stance when the heel leaves
     "roll": ((2.8, 0), (3.2, 0), (2.6, 0), (1.9, 0)),  # power of the heel's rise: slow at first, then fast
@@ -32,16 +32,16 @@ TABLE: dict[str, tuple[tuple[float, float], ...]] = {
         (4, 0),
     ),  # height of the swinging foot above the line from where it leaves to where it lands
     "clearance": ((1, 0), (2.5, 0), (3, 0), (2, 0)),  # least height of the swinging sole
-    "behind": ((4, 0), (9.9, 5.5), (7.5, 3), (10, 5)),  # of an ankle behind the body in mid-stance
-    "width": ((9.5, 0), (5.5, 0), (3.5, 0), (9.5, 0)),  # of an ankle from the path
+    "behind": ((4, 0), (9.9, 5.5), (7.5, 3), (10, 5)),  # distance of an ankle behind the body in mid-stance
+    "width": ((9.5, 0), (5.5, 0), (3.5, 0), (9.5, 0)),  # distance of an ankle from the path
     "toe_out": ((8, 0), (6, 0), (3, 0), (10, 0)),
-    "height": ((94.6, 0), (94.8, -1.0), (94.5, -0.8), (65, 0)),  # of the hips above the ground
-    "bob": ((0, 0), (1.3, 1.2), (-2.0, 0.3), (0.8, 0)),  # + highest in mid-stance, - lowest
+    "height": ((94.6, 0), (94.8, -1.0), (94.5, -0.8), (65, 0)),  # height of the hips above the ground
+    "bob": ((0, 0), (1.3, 1.2), (-2.0, 0.3), (0.8, 0)),  # of the hips, + highest in mid-stance, - lowest
     "sway": ((1.6, 0), (2.2, -0.8), (0.8, 0), (2.5, 0)),
     "pelvis_yaw": ((0.3, 0), (9, 2), (6, 1), (5, 0)),
     "pelvis_list": ((1.0, 0), (6, 1), (4, 0), (3, 0)),
     "pelvis_tilt": ((3, 0), (7, 1), (6, 1), (34, 0)),
-    "lean": ((1, 0), (3, 2), (10, 2), (79, 0)),  # of the trunk, forward
+    "lean": ((1, 0), (3, 2), (10, 2), (79, 0)),  # lean of the trunk, forward
     "chest_yaw": ((0.3, 0), (4, 2), (9, 2), (4, 0)),
     "arm_swing": ((0.8, 0), (17, 12), (27, 4), (9, 0)),
     "arm_mean": ((1, 0), (-1, 0), (-8, 0), (14, 0)),  # + forward
@@ -60,15 +60,16 @@ SIDED: tuple[str, ...] = (
     "arm_swing",
 )
 SIDED += ("arm_mean", "elbow", "elbow_swing", "abduction")
-SPIN = 0.6  # relative rise of the cadence when turning by a radian a second or more
+SPIN = 0.6  # relative rise of the cadence of a figure that turns in place by a radian a second or more
 SIGN = (1.0, -1.0)  # +X is the figure's left
 
 
 @dataclass(frozen=True)
 class Style:
-    """How the figure moves in each of F frames: (F,), or (F, 2) left and right. See TABLE.
+    """How the figure moves in each of F frames. For all names but `frequency` see TABLE.
 
-    frequency: cycles a second. The left foot lands half a cycle after the right one.
+    Arrays are (F,), or (F, 2), left and right, for the names in SIDED. frequency: cycles a second. The left
+    foot lands half a cycle after the right foot.
     """
 
     duty: Array
@@ -130,7 +131,7 @@ def _frequencies(speed: Array) -> Array:
 
 
 def _directed(style: Style, path: PlannedPath) -> Style:
-    """Changes backward and sideways steps: toe first, little roll, wider, quicker, less arm swing."""
+    """The style for steps backward and sideways: toe first, little roll, wider, quicker, less arm swing."""
     speed = np.maximum(path.speed, 1e-6)
     moving = np.clip(path.speed / 30, 0, 1)
     ahead = np.where(moving > 0, path.velocity[:, 1] / speed, 1.0) * moving + (1 - moving)

@@ -1,4 +1,4 @@
-"""The terrain of one clip: ground heights at the trajectory samples under each cycle, for each fit."""
+"""The terrain of one clip: for each fit of a cycle, the ground heights at the samples of the trajectory."""
 
 from __future__ import annotations
 
@@ -26,14 +26,16 @@ log = logging.getLogger("hobble.terrain")
 
 @dataclass(frozen=True)
 class ClipFits:
-    """The terrain fits of a clip with C cycles and R rows. Row r has fits[r] fits.
+    """The terrain fits of a clip with C cycles and R rows. A row is a frame of a cycle.
 
-    frame, cycle, fits: (R,). heights: (sum of fits, 36) cm in the clip's world, for 12 samples to the left,
-    in the centre and to the right; the fits of a row are consecutive.
-    patch, error: (C, 10) patch of each fit and its error; -1 and 0 on flat ground.
+    frame, cycle, fits: (R,) the row's frame, its cycle, and how many fits it has. heights: (sum of fits, 36)
+    cm in the clip's world, for 12 samples to the left, in the centre and to the right; the fits of a row are
+    consecutive.
+    patch, error: (C, 10) index of the patch of each fit, and its error; -1 and 0 on flat ground.
     foot_error: (C, 10, 2) mean and largest distance of a foot in contact from the ground, cm.
     foot_below: (C, 10) how far the lowest foot, in contact or not, is below the ground, cm; at least 0.
     heel_height, toe_height: height of these joints above their soles, cm.
+    pictures: of some cycles, for the report.
     """
 
     frame: np.ndarray = field(repr=False)
@@ -100,7 +102,7 @@ def clip_fits(
 
 
 def _warn_if_off_ground(name: str, fits: ClipFits, deepest: float | None) -> None:
-    """Log a warning if the feet are far from the ground."""
+    """Log a warning if feet are further than `deepest` from the ground (on average) or below it."""
     if deepest is None or not len(fits.patch):
         return
     mean, below = float(fits.foot_error[..., 0].mean()), float(fits.foot_below.max())
@@ -114,8 +116,9 @@ def _standing_feet(
 ) -> Feet:
     """The soles of a clip, and which of them stand on the ground.
 
-    On flat ground a heel in contact that is more than `held_up` above its toe does not count. If a cycle has
-    no contact at all, the lowest 5 % of its sole positions count.
+    On flat ground a joint in contact does not count if it is more than `held_up` above the other joint of its
+    foot and that is in contact, too. If a cycle has no contact at all, the lowest 5 % of its sole positions
+    count.
     """
     counted = np.zeros(len(clip), bool)
     for start, end in cycles:
@@ -144,14 +147,14 @@ def _standing_feet(
 
 
 def _fitted_frames(start: int, end: int, window: int, frames: int) -> slice:
-    """The frames that a cycle is fitted to: start to end inclusive, plus the window, within the clip."""
+    """The frames that the ground is fitted to: the cycle, inclusive, and `window` frames on each side."""
     return slice(max(start - window, 0), min(end + window + 1, frames))
 
 
 def _fit_ground(
     feet: Feet, around: slice, samples: Array, patches: Patches, kind: str, options: Fitting
 ) -> Ground:
-    """The fits of one cycle. around: its frames, with the window on both sides."""
+    """The fits of one cycle. around: the frames of `_fitted_frames`."""
     soles, contacts = feet.soles[around], feet.contacts[around]
     smoothing, deepest = options.smoothing, options.deepest
     if kind == "flat":
@@ -194,7 +197,11 @@ def sample_points(root: RootFrames, side: float) -> Array:
 
 
 def heights_under(ground: Ground, samples: Array, start: int, end: int, offsets: np.ndarray) -> Array:
-    """Heights (rows of the cycle * fits, 3 * samples). Each point of the path is looked up only once."""
+    """Heights (rows of the cycle * fits, 3 * samples), cm. Each point of the path is looked up only once.
+
+    samples: from `sample_points`. start, end: first and last frame of the cycle, as indices into `samples`.
+    offsets: frames of the samples of a row, relative to its frame.
+    """
     first, last = start + offsets[0], end + offsets[-1]
     points = samples[:, first : last + 1]
     heights = ground.at(points.reshape(-1, 2)).reshape(-1, 3, points.shape[1])
@@ -230,7 +237,7 @@ def _check(clip: Clip, cycles: np.ndarray, contacts: Mask) -> None:
 
 
 def save_fits(path: str | Path, fits: ClipFits) -> None:
-    """Write the fits as one npz. The pictures are in picture0_x, picture0_z, ..., picture1_x."""
+    """Write the fits as one npz file. Its arrays picture0_x, picture0_z, ..., picture1_x are the pictures."""
     arrays = {f.name: np.asarray(getattr(fits, f.name)) for f in fields(fits) if f.name != "pictures"}
     for k, picture in enumerate(fits.pictures):
         arrays |= {f"picture{k}_{f.name}": np.asarray(getattr(picture, f.name)) for f in fields(picture)}

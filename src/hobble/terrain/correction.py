@@ -1,7 +1,8 @@
 """Corrects the chosen patch so that the ground meets the feet.
 
-First, as in the original, a surface of radial basis functions is fitted to the residual at the contacts and
-added. Then the ground is lowered around feet that are still below it.
+First, as in the original, a surface of radial basis functions is fitted to the distances that are left
+between feet in contact and the ground (the residual), and is added to the ground. Then the ground is lowered
+around feet that are still below it.
 """
 
 from __future__ import annotations
@@ -13,7 +14,7 @@ import numpy as np
 from hobble.core.quat import Array
 from hobble.terrain.soles import Mask
 
-WALL_STEEPNESS = 2.0  # of the walls of a pit, cm per cm
+WALL_STEEPNESS = 2.0  # least steepness of the walls of a pit, cm per cm
 MAX_REFITS = 8  # a surface that leaves too much residual is fitted again with a quarter of the smoothing
 
 
@@ -30,9 +31,9 @@ class Stances:
 
 
 def gather_stances(soles: Array, contacts: Mask, longest: int) -> Stances:
-    """Average the sole of each joint over each run of contact frames; longer runs are cut.
+    """Average the sole of each joint over each run of frames in contact.
 
-    soles: (T, 4, 3). contacts: (T, 4) bool. longest: most frames of one point.
+    soles: (T, 4, 3). contacts: (T, 4) bool. longest: most frames of one point; longer runs are cut.
     """
     frame, joint = np.nonzero(contacts)
     order = np.lexsort((frame, joint))
@@ -81,11 +82,11 @@ def fit_surfaces(
 ) -> list[Surface]:
     """One surface for each row of `residual` (K, N) at N points, regularised by `smoothing`.
 
-    A point with count m has the diagonal smoothing / m and the weight m in the mean distance. This gives
-    exactly the surface of m points at one place.
-    most: if a surface leaves more than this on average at the points (cm), for example under feet that stand
-    half a metre beside a beam, it is fitted again with less smoothing. standing: the average is over only the
-    first `standing` points.
+    A point with count m has smoothing / m on the diagonal of the system, and the weight m in the mean
+    distance. This gives exactly the surface of m points at one place.
+    most: if the mean distance that a surface leaves at the points exceeds this (cm), it is fitted again with
+    less smoothing. An example is feet that stand half a metre beside a beam. standing: number of points, from
+    the first, over which this mean is taken; None: all.
     """
     apart = distances(points.place, points.place)
     spread = float(points.count @ apart @ points.count / points.count.sum() ** 2)
@@ -117,7 +118,7 @@ class Pits:
     steepness: Array = field(repr=False)
 
     def of(self, ground: Array, points: Array) -> Array:
-        """Heights (M,) of the ground at points (M, 2), lowered to the cones where it is above them."""
+        """(M,) the heights `ground` (M,) at points (M, 2), lowered to the cones where they are above them."""
         from hobble.terrain.kernels import lowest_cone
 
         if not len(self.places):
@@ -127,9 +128,9 @@ class Pits:
 
 
 def dig_pits(soles: Array, standing: Stances, depth: float) -> Pits:
-    """Pits that leave soles (N, 3) no more than `depth` cm below the ground.
+    """Pits in which soles (N, 3) are `depth` cm below the ground.
 
-    Their walls are steep enough not to lower the ground under other standing feet, such as on a step.
+    Their walls are so steep that they do not lower the ground under other standing feet, such as on a step.
     """
     places, heights = soles[:, [0, 2]], soles[:, 1] + depth
     apart = np.maximum(distances(places, standing.place), 1e-3)

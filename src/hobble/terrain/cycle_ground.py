@@ -21,19 +21,20 @@ from hobble.terrain.correction import (
 from hobble.terrain.patches import Patches
 from hobble.terrain.soles import Mask
 
-STANCE_PIECE = 8  # most frames of a stance that become one point
-COVERED_PIECE = 4  # the same for feet below the ground
+STANCE_PIECE = 8  # most frames of a stance that are averaged to one point
+COVERED_PIECE = 4  # most frames of a foot below the ground that are averaged to one point
 BEAM_SIDE_CM = (35.0, 50.0)  # distances from the path at which there must be no ground next to a beam
-PATH_CLEARANCE_CM = 25.0  # points beside the path that are closer than this to any part of it are left out
+PATH_CLEARANCE_CM = 25.0  # points next to the path that are closer than this to any part of it are left out
 
 
 @dataclass(frozen=True)
 class Ground:
     """The ground of K fits of one cycle.
 
-    patches: None for flat ground. chosen, error: (K,) the patches and their errors, best first.
-    centre: (2,) x and z of the middle of the patches. level: (K,) height added to each patch, cm.
-    surfaces: for each fit, the surface that is added to meet the feet. dug: for each fit, the pits in it.
+    patches: all patches; None for flat ground. chosen, error: (K,) indices of the fitted patches and their
+    errors, best first. centre: (2,) x and z of the middle of the patches, cm. level: (K,) height that is
+    added to each patch, cm. surfaces: for each fit, the surface that is added to meet the feet. dug: for each
+    fit, the pits in it.
     """
 
     patches: Patches | None = field(repr=False)
@@ -56,7 +57,7 @@ class Ground:
         return heights
 
     def above(self, soles: Array) -> Array:
-        """(K, ...) height of the ground above each sole (..., 3), cm. Negative: the sole is above it."""
+        """(K, ...) height of the ground above each sole (..., 3), cm; negative if the sole is higher."""
         heights = self.at(soles[..., [0, 2]].reshape(-1, 2))
         return heights.reshape(-1, *soles.shape[:-1]) - soles[..., 1]
 
@@ -75,12 +76,12 @@ def fit_cycle(
 ) -> Ground:
     """Fit the ground under one cycle and its window.
 
-    soles: (T, 4, 3) of heels and toes, cm. contacts: (T, 4) bool, at least one true. path: (T, 2) x and z of
-    the root. sides: (T, 2) unit vectors to the left. kind: "rocky", "jumpy" or "beam"; the last two add terms
-    to the error. smoothing: of the residual's radial basis functions. deepest: how far a foot may be below
-    the ground, cm; None for no limit.
+    soles: (T, 4, 3) of heels and toes in T frames, cm. contacts: (T, 4) bool, at least one true. path: (T, 2)
+    x and z of the root. sides: (T, 2) unit vectors to its left. kind: "rocky", "jumpy" or "beam"; "jumpy" and
+    "beam" add terms to the error. fits: their number. smoothing: see `fit_surfaces`. deepest: how far a foot
+    may be below the ground, cm; None: no limit.
     """
-    from hobble.terrain.search import (  # loads compiled code, which flat clips don't need
+    from hobble.terrain.search import (  # here, because it loads compiled code, which flat clips do not need
         FootPoints,
         best_patches,
     )
@@ -123,9 +124,9 @@ def flat_ground(
 def meet_feet(plain: Ground, soles: Array, contacts: Mask, smoothing: float, deepest: float | None) -> Ground:
     """Correct the ground so that it meets the feet in contact.
 
-    A surface is fitted to the residual at the contacts, smooth but with at most deepest / 2 left on average.
-    Feet that are then more than deepest / 2 below the ground are added to its points, and it is fitted again.
-    Feet that are still more than `deepest` below the ground get pits.
+    A smooth surface is fitted to the residual at the contacts. It leaves at most deepest / 2 on average. If
+    feet are then more than deepest / 2 below the ground, they are added to the points and the surface is
+    fitted again. Feet that are still more than `deepest` below the ground get pits.
     """
     standing = gather_stances(soles, contacts, STANCE_PIECE)
     residual = standing.height - plain.at(standing.place)
@@ -144,7 +145,7 @@ def meet_feet(plain: Ground, soles: Array, contacts: Mask, smoothing: float, dee
 
 
 def _dug(ground: Ground, soles: Array, standing: Stances, deepest: float) -> list[Pits]:
-    """For each fit, pits under the feet more than `deepest` below it, so that they are deepest / 2 below."""
+    """For each fit, pits for feet that are more than `deepest` below it; then they are deepest / 2 below."""
     return [dig_pits(soles[covered], standing, deepest / 2) for covered in ground.above(soles) > deepest]
 
 
@@ -158,7 +159,10 @@ def _refitted(
 
 
 def beam_side_points(patches: Patches, path: Array, sides: Array, centre: Array) -> Array:
-    """(N, 4) points beside the path, where a beam has no ground, and their points on the path, in cells."""
+    """(N, 4) points next to the path, where there is no ground next to a beam.
+
+    Columns: u and v of the point, then of its point on the path, in cells from the middle of the patch.
+    """
     off = np.concatenate([path + sign * d * sides for d in BEAM_SIDE_CM for sign in (1, -1)])
     on = np.tile(path, (2 * len(BEAM_SIDE_CM), 1))
     free = distances(off, path).min(axis=1) > PATH_CLEARANCE_CM

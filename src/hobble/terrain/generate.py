@@ -16,7 +16,7 @@ CELLS = 400
 
 
 def generate(kind: str, seed: int, cell: float) -> Array:
-    """Heights (400, 400) of one kind of ground, cm. cell: width of a cell, cm. Equal seeds, equal ground."""
+    """(400, 400) heights of one kind of ground, cm. cell: width of a cell, cm. Equal seeds, equal ground."""
     rng = np.random.default_rng([zlib.crc32(kind.encode()), seed])
     return KINDS[kind](rng, cell)
 
@@ -42,7 +42,7 @@ def hills(rng: np.random.Generator, cell: float) -> Array:
 
 
 def stairs(rng: np.random.Generator, cell: float) -> Array:
-    """Lanes side by side with flights of 3 to 5 steps up, a landing, the flight down again, and so on."""
+    """Lanes side by side. In each, a flight of 3 to 5 steps goes up or down, the next one back, and so on."""
     heights = np.zeros((CELLS, CELLS))
     along = np.arange(CELLS) * cell
     lane = 0
@@ -67,7 +67,7 @@ def stairs(rng: np.random.Generator, cell: float) -> Array:
 
 
 def slope(rng: np.random.Generator, cell: float) -> Array:
-    """Ramps of 2 to 12 degrees that change every 1 to 4 m, tilted sideways by up to 5 degrees."""
+    """Ramps of 2 to 12 degrees. They change every 1 to 4 m and are tilted sideways by up to 5 degrees."""
     along = np.arange(CELLS) * cell
     knots, levels = [0.0], [0.0]
     while knots[-1] < along[-1]:

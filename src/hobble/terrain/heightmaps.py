@@ -1,4 +1,4 @@
-"""Heightmaps: from files, from matplotlib's real elevation model, or generated."""
+"""Heightmaps: from files, from matplotlib's elevation model of a real landscape, or generated."""
 
 from __future__ import annotations
 
@@ -16,9 +16,9 @@ from hobble.core.untrusted import printable, read_text
 from hobble.terrain import options
 from hobble.terrain.generate import generate
 
-MAX_CELLS = 1 << 26  # of a map: 8192 x 8192, 512 MB, 322 x 322 m with cells of 3.9 cm
-MAX_TEXT_BYTES = 1 << 28  # of a map as text
-MAX_LINE_LETTERS = 1 << 20  # of a line of such a map
+MAX_CELLS = 1 << 26  # cells of a map: 8192 x 8192, 512 MB, 322 x 322 m with cells of 3.9 cm
+MAX_TEXT_BYTES = 1 << 28  # size of a map as text
+MAX_LINE_LETTERS = 1 << 20  # length of a line of a map as text
 MAX_HEIGHT = 1e7  # cm (100 km); the runtime has the same limit
 
 ESRI_HEADER = {
@@ -37,7 +37,7 @@ GDAL_NODATA = 42113  # the TIFF tag with the value that means "no data", as text
 
 @dataclass(frozen=True)
 class TerrainMap:
-    """Heights (rows, columns), cm, nan in holes. cell: width of a cell, cm."""
+    """A heightmap. heights: (rows, columns) cm, nan in holes. cell: width of a cell, cm."""
 
     name: str
     heights: Array = field(repr=False)
@@ -53,9 +53,9 @@ def heightmaps(
 ) -> list[TerrainMap]:
     """The heightmaps that a data set lists.
 
-    entries: may have their own `cell` and `height_scale`. files: the files of the entries of kind `file`, in
-    the same order. cell: width of a cell, cm. height_scale: factor that makes cm of the heights in files.
-    Raises InputError for a file that cannot be used.
+    files: the files of the entries of kind `file`, in the order of the entries. cell: width of a cell, cm.
+    height_scale: factor that converts the heights in files to cm. An entry may have its own `cell` and
+    `height_scale`. Raises InputError for a file that cannot be used.
     """
     given = iter(files)
     out = []
@@ -82,7 +82,7 @@ def heightmaps(
 
 
 def elevation(cell: float) -> Array:
-    """The elevation model of a real landscape from matplotlib's sample data, reduced in size, cm.
+    """Heights (rows, columns), cm, of a real landscape in matplotlib's sample data, reduced in size.
 
     One cell of 3 arc seconds is 92.6 m north to south and 74.3 m east to west at 36.6 degrees north. The
     columns are resampled so that cells are square. Then lengths and heights are scaled by the same factor so
@@ -105,8 +105,8 @@ def read_heights(path: str | Path) -> Array:
     """Heights (rows, columns) from a file, in the file's unit; nan in holes.
 
     .txt .csv .dat .asc: rows of numbers separated by spaces, commas or semicolons, with or without the header
-    of an ESRI grid. .npy. .npz: its only 2D array, or the array called `heights` or `elevation`.
-    .png .tif .tiff: grey values of up to 32 bits. The "no data" value of a GeoTIFF or grid marks a hole.
+    of an ESRI grid. .npy: one 2D array. .npz: its only 2D array, or the one called `heights` or `elevation`.
+    .png .tif .tiff: grey values of up to 32 bits. The "no data" value of a GeoTIFF or ESRI grid marks a hole.
     Raises InputError if the file cannot be used.
     """
     path = Path(path)
@@ -173,7 +173,7 @@ def _image(path: Path) -> Array:
     from PIL import Image
 
     try:
-        # Only these formats: for others Pillow may start programs, such as Ghostscript for PostScript.
+        # Only these formats, because for others Pillow may start programs, such as Ghostscript.
         with Image.open(path, formats=IMAGE_FORMATS[path.suffix.lower()]) as image:
             if image.width * image.height > MAX_CELLS:
                 raise InputError(path, f"{image.width} x {image.height} cells, more than {MAX_CELLS}")

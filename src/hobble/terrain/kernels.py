@@ -1,8 +1,12 @@
-"""Compiled loops: heights, extents and errors of patches, and sums over distances.
+"""Compiled loops: heights and errors of patches, and sums over distances.
 
-A patch is a view of a heightmap. Its cell (u, v), counted from the middle of the patch along the world's x
-and z, is at row, column = A (u, v, 1) of the map. All maps are stored one after another in one float32 array.
-`starts` and `shapes` say where. All arguments are plain arrays, so one compiled version serves all data sets.
+A patch is a view of a heightmap. Its cell (u, v) is counted from the middle of the patch along the world's x
+and z. The affine map A (2, 3) of the patch gives its place in the heightmap: row, column = A (u, v, 1).
+
+Functions that other modules call have these arguments. heights: all heightmaps, one after another, in one
+float32 array. starts, shapes: where each map begins, and its rows and columns. which, affine: map and A of
+each patch. All arguments are plain arrays, so one compiled version serves all data sets. Helpers get the
+heights of one map, its rows and columns, and `a`, the two rows of A.
 
 Everything is in one file because numba renews its cache only if the file of the called function changes. Only
 functions that other modules call are cached, and helpers are inlined in them. Separately compiled helpers
@@ -15,9 +19,9 @@ import numpy as np
 
 from hobble.core.compiled import njit
 
-DOWN_WEIGHT = 0.1
-JUMP_HEIGHT = 5.0
-BEAM_HEIGHT = 40.0
+DOWN_WEIGHT = 0.1  # weight of the error at feet in contact
+JUMP_HEIGHT = 5.0  # cm; in jumps the ground should not be further than this below a foot in the air
+BEAM_HEIGHT = 40.0  # cm; next to a beam the ground should be at least this far below it
 FAST = {"reassoc", "contract", "nsz", "nnan"}  # allows vectorised sums; heights are never nan
 ONE = np.uint32(1)
 
@@ -45,7 +49,10 @@ def map_of(heights, starts, shapes, m):
 
 @njit
 def view_heights(heights, starts, shapes, which, affine, mean, points):
-    """Heights (P, N) of P patches at the same points (N, 2), in cells from the middle, inside the patch."""
+    """Heights (P, N) of P patches, each at the same points.
+
+    points: (N, 2) in cells from the middle of a patch, inside it. mean: (P,) heights to subtract.
+    """
     out = np.empty((len(which), len(points)), np.float32)
     for p in range(len(which)):
         cells, rows, columns = map_of(heights, starts, shapes, which[p])
@@ -130,8 +137,9 @@ def lowest_cone(x, z, place_x, place_z, heights, steepness):
 
 @njit(fastmath=FAST, forceinline=True, cache=False)
 def _down_means(heights, rows, columns, a, points):
-    """Heights d of the patch above feet in contact: the first of them, and the means of d - first and of its
-    square. These are small numbers, so single precision is enough.
+    """The first height d of the patch above feet in contact, and the means of d - first and of its square.
+
+    d - first is a small number, so single precision is enough. points: u, v and height of each foot.
     """
     u, v, foot = points
     (ru, rv, r0), (cu, cv, c0) = a
@@ -149,7 +157,10 @@ def _down_means(heights, rows, columns, a, points):
 
 @njit(fastmath=FAST, forceinline=True, cache=False)
 def _up_sum(heights, rows, columns, a, offset, points, jumps):
-    """Sum of squared heights of the ground above feet in the air; for jumps also of ground too far below."""
+    """Sum of squared heights of the ground above feet in the air. For jumps, ground far below counts, too.
+
+    offset: mean height of the patch above the feet in contact, which is subtracted.
+    """
     u, v, foot = points
     (ru, rv, r0), (cu, cv, c0) = a
     lowest = -np.float32(JUMP_HEIGHT) if jumps else -np.float32(1e9)
@@ -208,7 +219,7 @@ def _map_to_cells(a):
 
 @njit
 def view_errors(heights, starts, shapes, which, affine, tables, jumps):
-    """The error (P,) of every view. tables: see `hobble.terrain.search`."""
+    """The error (P,) of every view. tables: as `_columns` of `hobble.terrain.search` returns them."""
     out = np.empty(len(which))
     for p in range(len(which)):
         cells, rows, columns = map_of(heights, starts, shapes, which[p])

@@ -10,7 +10,7 @@ from hobble.core.section import Finite, Inside, Positive, PositiveFloat, Section
 
 
 class HeightmapOptions(Section):
-    """One source of ground: generated, matplotlib's real elevation model, or a file."""
+    """One source of ground: generated, matplotlib's elevation model of a real landscape, or a file."""
 
     kind: Literal["fractal", "hills", "stairs", "slope", "boxes", "beams", "elevation", "file"]
     path: Inside | None = Field(None, description="for kind: file; relative to the mocap folder")
@@ -39,9 +39,9 @@ class Drawing(Section):
     patches: Positive = 20_000
     cell: PositiveFloat = Field(3.937007874, description="width of a cell, cm")
     size: Annotated[int, Field(gt=0, le=2048)] = Field(128, description="width of a patch, cells")
-    height_scale: PositiveFloat = Field(3.0, description="factor that makes cm of the heights in files")
+    height_scale: PositiveFloat = Field(3.0, description="factor that converts the heights in files to cm")
     highest: PositiveFloat = Field(
-        50.0, description="patches with a height further than this from their mean are dropped, cm"
+        50.0, description="patches with a height that is further than this from their mean are dropped, cm"
     )
     seed: int = 1
 
@@ -74,7 +74,7 @@ class Fitting(Section):
         1.0, description="how far a foot may be below the ground, cm; null: no limit, as in the original"
     )
     bend_flat: bool = Field(
-        True, description="correct flat ground where feet are more than `deepest` off; false: keep it level"
+        True, description="correct flat ground if feet are more than `deepest` from it; false: keep it level"
     )
     flat_level: Literal["zero", "feet"] = Field(
         "zero",
@@ -83,8 +83,8 @@ class Fitting(Section):
     )
     held_up: PositiveFloat | None = Field(
         2.0,
-        description="on flat ground a heel this far above its toe in contact does not count as contact, cm; "
-        "null: no such rule, as in the original",
+        description="on flat ground a heel in contact does not count if it is more than this above its toe, "
+        "which is in contact, too (cm), and the other way round; null: no such rule, as in the original",
     )
 
 

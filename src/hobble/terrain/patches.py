@@ -1,7 +1,8 @@
 """Patches of ground: views of a few heightmaps, drawn at random.
 
 A patch does not store its cells. It stores which heightmap it is from, the affine map from its cells to those
-of the heightmap, and its mean height, which is subtracted. 20,000 patches take 1 MB; their cells took 600 MB.
+of the heightmap, and its mean height, which is subtracted. 20,000 patches take 1 MB; their cells would take
+600 MB.
 """
 
 from __future__ import annotations
@@ -18,7 +19,7 @@ from hobble.core.quat import Array
 from hobble.terrain.heightmaps import TerrainMap
 
 VIEWS_PER_DRAW = 1_000
-HOLE_HEIGHT = 1e9
+HOLE_HEIGHT = 1e9  # cm, so that no view with a hole passes
 FEWEST_PASSING = 1 / 1_000  # share of a map's random views that have to pass
 
 
@@ -27,10 +28,10 @@ class Patches:
     """P views of M heightmaps.
 
     heights: all maps one after another, row by row, cm, float32. starts: (M,) index of each map's first cell.
-    shapes: (M, 2) rows and columns. names: (M,). which: (P,) map of each view. affine: (P, 2, 3); row, column
-    of the map = affine (u, v, 1), where (u, v) is a cell counted from the middle of the patch, u along the
-    world's x, v along z. mean: (P,) height to subtract, cm. cell: width of a patch's cell, cm. size: width of
-    a patch, cells.
+    shapes: (M, 2) rows and columns. names: (M,) of the maps. which: (P,) map of each view. affine: (P, 2, 3)
+    such that row, column of the map = affine (u, v, 1), where (u, v) is a cell counted from the middle of the
+    patch, u along the world's x and v along z. mean: (P,) height to subtract, cm. cell: width of a patch's
+    cell, cm. size: width of a patch, cells.
     """
 
     heights: Array = field(repr=False)
@@ -145,9 +146,9 @@ def load_patches(path: str | Path) -> Patches:
 
 
 def _with_holes_marked(heightmap: TerrainMap, cell: float) -> Array:
-    """Heights in which holes (nan) and the cells around them are HOLE_HEIGHT, so that no view of them passes.
+    """The map's heights, with HOLE_HEIGHT in holes (nan) and in the cells around them.
 
-    The cells around a hole count because a coarse patch could skip the hole itself.
+    The cells around a hole get it, too, because the cells of a coarse patch could skip the hole itself.
     """
     holes = np.isnan(heightmap.heights)
     if not holes.any():

@@ -45,9 +45,9 @@ def find_soles(
     """The soles of a clip. A height of "auto" is found from the clip or its skeleton.
 
     frames: (N,) the frames to look at. On flat ground, which is at height 0, "auto" is the median height of
-    the joints in contact. It is up to `deepest` cm less if that keeps all feet within `deepest` below the
-    ground. On other ground the toe joint is `sole` cm above its sole, and the heel joint is higher by the
-    difference in the rest pose.
+    the joints in contact, or up to `deepest` cm less if this keeps all feet within `deepest` below the
+    ground. On other ground the toe joint is `sole` cm above its sole, and the heel joint is as much higher as
+    in the rest pose.
     """
     joints = clip.positions[:, [clip.skeleton.role(role) for role in FOOT_ROLES]].copy()
     found: list[float] = []
@@ -64,14 +64,14 @@ def find_soles(
 
 
 def held_above_other(feet: Feet, least: float) -> Mask:
-    """(F, 4) whether a joint is more than `least` cm above the other joint of its foot, which has contact."""
+    """(F, 4) whether a joint is over `least` cm above the other joint of its foot, which is in contact."""
     other = [1, 0, 3, 2]
     height = feet.soles[..., 1]
     return (height - height[:, other] > least) & feet.contacts[:, other]
 
 
 def _flat_height(heights: Array, down: Array, deepest: float | None) -> float:
-    """The median height in contact, or up to `deepest` less if that keeps every foot above -deepest."""
+    """The median height in contact, or up to `deepest` less if then every sole is above -deepest."""
     median = float(np.median(heights[down]))
     wanted = float(heights.min()) + (deepest or 0.0)
     return wanted if deepest is not None and median - deepest <= wanted < median else median

@@ -28,7 +28,7 @@ DISK_ERRORS = (errno.ENOSPC, errno.EDQUOT, errno.EROFS)
 class JobPiece:
     """A piece of the work of a job: usually a clip and its mirror.
 
-    name: the clip. params: those of the rule and those of this clip. input: name -> file, or a list of files
+    name: the clip. params: those of the rule and those of this clip. input: name -> file, or -> list of files
     if the rule says how many each clip has. output: name -> file.
     """
 
@@ -49,9 +49,9 @@ class JobPiece:
 def pieces(snakemake: Any) -> list[JobPiece]:
     """The pieces of a job.
 
-    params.per_clip: for each piece its own params, with the name as `clip`. params.files_per_clip, optional:
-    name of an input -> how many files each piece has. Other inputs and outputs have a file for each piece, or
-    one for all. A name without files is left out.
+    params.per_clip: for each piece its own params, in which `clip` is its name. params.files_per_clip
+    (optional): name of an input -> how many of its files each piece has. Other inputs and outputs have one
+    file for each piece, or one for all pieces. A name without files is left out.
     """
     special = ("per_clip", "files_per_clip")
     common = {name: value for name, value in snakemake.params.items() if name not in special}
@@ -75,8 +75,9 @@ def pieces(snakemake: Any) -> list[JobPiece]:
 def make_each(snakemake: Any, make: Callable[[JobPiece, logging.Logger], None]) -> None:
     """Call `make` for each piece of a job, unless its files are kept from an earlier try and undamaged.
 
-    If a piece fails, its error is reported and the others are made, unless the disk is full. Then the process
-    ends with status 1. Snakemake deletes the outputs of such a job; the next try takes what is kept.
+    If a piece fails, its error is reported and the other pieces are made (not if the disk is full). At the
+    end the process exits with status 1. Snakemake deletes the outputs of such a job; the next try takes the
+    kept files.
     """
     with reporting(snakemake) as report:
         checksums.forget(snakemake.output)
@@ -106,7 +107,7 @@ def _make_piece(
     digests: _Digests,
     report: JobLog,
 ) -> bool:
-    """Make a piece or take what is kept of it. Returns whether it was kept."""
+    """Make a piece, or take its kept files. Returns whether they were kept."""
     outputs, began = list(piece.output.values()), time.monotonic()
     with checked(piece.files, outputs):
         mark = fingerprint(piece.params, digests.of(piece.files), outputs)
@@ -119,7 +120,7 @@ def _make_piece(
 
 
 class _Digests:
-    """Names and SHA-256 of files. A file that several pieces read is read once."""
+    """Names and SHA-256 of files. A file that several pieces need is read only once."""
 
     def __init__(self) -> None:
         self.known: dict[tuple[str, checksums.Stamp], str] = {}
@@ -145,7 +146,7 @@ def _as_list(files: Any) -> list[str]:
 
 
 def _distributed(files: list[str], pieces: int, counts: list[int] | None = None) -> list[Any]:
-    """The file or files of each piece; [] if no piece has any."""
+    """For each piece its file or, with `counts`, its list of files; [] if there are no files at all."""
     if counts is not None:
         assert sum(counts) == len(files), f"{files} are not {counts}"
         starts = [sum(counts[:n]) for n in range(pieces)]

@@ -13,7 +13,7 @@ from hobble.core.errors import HobbleError, InputError
 if TYPE_CHECKING:
     from hobble.workflow.clips import Clips
 
-NO_CHANNEL = "plain"  # folder of the database of networks without channels
+NO_CHANNEL = "plain"  # name of the folder of a database without channels
 
 
 class ChannelSources:
@@ -28,9 +28,9 @@ class ChannelSources:
         return tuple(name for name in NAMES if name in given or channel(name).Options is None)
 
     def files(self, dataset: str, clip: str, name: str) -> list[str]:
-        """The files that channel `name` reads for a clip: tables, and the file beside the clip.
+        """The files that channel `name` reads for a clip: the file beside the clip, and the channel's tables.
 
-        The file beside the clip is not read if the clip's entry has a value.
+        The file beside the clip is not read if the clip's entry in the data set has a value.
         """
         one, made = channel(name), self.catalogue.dataset(dataset).synthetic is not None
         in_entry = self._value(dataset, clip, name) is not None and not made
@@ -38,7 +38,7 @@ class ChannelSources:
         return [*files, *self._tables(dataset, name)]
 
     def source(self, dataset: str, clip: str, name: str) -> dict[str, Any]:
-        """The fields of a `ClipSource` for channel `name` and a clip as plain data, without `files`."""
+        """The fields of the `ClipSource` of a clip and channel `name`, as plain data, without `files`."""
         return {
             "clip": self.clips.original(clip),
             "entry": self.clips.entry(dataset, clip).model_dump(
@@ -59,7 +59,10 @@ class ChannelSources:
         return one.is_neutral(one.source(self.source(dataset, clip, name), files))
 
     def check(self, dataset: str) -> None:
-        """Check what clip entries and options say about channels. Raises HobbleError if it is wrong."""
+        """Check what the data set's clip entries and options say about channels.
+
+        Raises HobbleError if something is wrong.
+        """
         model = self.catalogue.dataset(dataset)
         rig = self.catalogue.skeleton(model.skeleton)
         for clip, entry in self.clips.listed(dataset).items():

@@ -21,7 +21,7 @@ OWN_CHECKSUM = {".npz"}
 BLOCK_BYTES = 1 << 20
 CLOCK_TICK = 0.02  # seconds; the resolution of file times is finer than this
 
-Stamp = tuple[int, int, int]
+Stamp = tuple[int, int, int]  # modification time, size and inode of a file
 
 
 def record_of(path: Path) -> Path | None:
@@ -68,7 +68,7 @@ def verify(paths: Iterable[str]) -> None:
 
 
 def stamps(paths: Iterable[str]) -> Mapping[str, Stamp]:
-    """Modification time, size and inode of each file."""
+    """The stamp of each file that exists."""
     out = {}
     for path in map(str, paths):
         if os.path.isfile(path):
@@ -88,7 +88,7 @@ def check_unchanged(before: Mapping[str, Stamp]) -> None:
 
 
 def _files(path: Path) -> list[Path]:
-    """The file itself, or the files in the folder without hidden ones, which are Snakemake's."""
+    """The file itself, or the files in the folder. Hidden files are left out: they are Snakemake's."""
     if not path.is_dir():
         return [path]
     return sorted(file for file in path.iterdir() if file.is_file() and not file.name.startswith("."))

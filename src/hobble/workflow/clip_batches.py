@@ -15,18 +15,18 @@ from dataclasses import dataclass
 
 from hobble.workflow.clips import DATASETS, MIRROR_SUFFIX, Clips, original
 
-SMALLEST = 12  # batches of a data set with more clips than this
-LARGEST = 32  # clips in a batch, on average
-JOB_OPTION = "--target-jobs"  # of Snakemake's own command of a job: <rule>:<wildcards>
-MARK = "__"  # between the parts of the name of a batch's rule
+SMALLEST = 12  # least number of batches of a data set that has more clips than this
+LARGEST = 32  # most clips in a batch, on average
+JOB_OPTION = "--target-jobs"  # in the command of a job that Snakemake starts; <rule>:<wildcards> follow
+MARK = "__"  # separates the parts of the name of a batch's rule
 
 
 @dataclass(frozen=True)
 class ClipBatch:
     """Some clips of a data set that one job makes after another, or the hurt versions of these clips.
 
-    number: from 0. label: the batch's name in logs: the clip's, if every clip has a batch of its own.
-    mirrored: whether each clip has a mirror.
+    number: from 0. label: the batch's name in logs, which is the clip's name if every clip has a batch of its
+    own. mirrored: whether each clip has a mirror. hurt: whether the clips are hurt versions.
     """
 
     dataset: str
@@ -66,7 +66,7 @@ class ClipBatch:
         return self._paths(file, self.names)
 
     def of_originals(self, file: str) -> list[str]:
-        """Path of a file of the clip from which each hurt version is made."""
+        """Path of a file, for the clip from which each hurt version is made."""
         return self._paths(file, tuple(map(original, self.clips)))
 
     def _paths(self, file: str, names: Sequence[str]) -> list[str]:
@@ -75,7 +75,10 @@ class ClipBatch:
 
 
 def family_of(rule: str) -> str:
-    """The rule without data set and number: motion_clips of motion_clips__cmu__3. Other rules stay."""
+    """The name of a rule without data set and number: motion_clips__cmu__3 -> motion_clips.
+
+    Other names are returned unchanged.
+    """
     return rule.partition(MARK)[0]
 
 
@@ -110,7 +113,7 @@ class Batches:
 
     @functools.cache  # noqa: B019
     def hurt_of(self, dataset: str) -> tuple[ClipBatch, ...]:
-        """For each batch that has hurt versions, the batch of these."""
+        """The batches of hurt versions: one for each batch with clips that have hurt versions."""
         versions = defaultdict(list)
         for version in self.clips.hurt_versions(dataset):
             versions[original(version)].append(version)
@@ -132,10 +135,10 @@ class Batches:
         datasets: Iterable[str],
         arguments: Sequence[str],
     ) -> list[ClipBatch]:
-        """The batches of these data sets that a run needs. of: data set -> its batches. arguments: of the
-        command line.
+        """The batches of these data sets that a run needs.
 
-        A job on another machine is a run of one rule. Only its batch is needed then.
+        of: function data set -> its batches. arguments: of the command line. A job on another machine is a
+        run of one rule, which needs only the batch of this rule.
         """
         rules = rules_of_job(arguments)
         found = [batch for dataset in datasets for batch in of(dataset)]
@@ -143,7 +146,7 @@ class Batches:
 
 
 def rules_of_job(arguments: Sequence[str]) -> list[str]:
-    """The rules of a job that Snakemake starts on another machine, from its command line; else none."""
+    """The rules of a job that Snakemake starts on another machine, from its command line; else []."""
     if JOB_OPTION not in arguments:
         return []
     after = arguments[arguments.index(JOB_OPTION) + 1 :]
@@ -152,7 +155,7 @@ def rules_of_job(arguments: Sequence[str]) -> list[str]:
 
 
 def batch_count(clips: int) -> int:
-    """The number of batches of a data set with so many clips. Up to SMALLEST clips have one each."""
+    """The number of batches of a data set with so many clips. Up to SMALLEST clips have a batch each."""
     count = min(clips, SMALLEST)
     while clips > count * LARGEST:
         count *= 2

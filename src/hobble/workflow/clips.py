@@ -29,7 +29,7 @@ from hobble.workflow.sources import joint_names, nearest_rig, read_checksums
 DATASETS = "results/datasets"
 MIRROR_SUFFIX = "_mirror"
 HURT_SUFFIX = re.compile(r"_hurt([1-9])$")  # at the end of the name of a hurt version
-MAX_NOTES = 10
+MAX_NOTES = 10  # notes on a folder that are shown
 LABEL_FILES = (".phase", ".gait", "_footsteps.txt", "_gait.txt")
 
 
@@ -47,16 +47,16 @@ class Clips:
 
     @functools.cache  # noqa: B019 - one project lives as long as the process
     def of(self, dataset: str) -> dict[str, ClipEntry]:
-        """The entries of a data set's clips by name, with hurt versions, without mirrors.
+        """Name -> entry of the clips and hurt versions of a data set, without mirrors.
 
-        Raises HobbleError if there are no clips.
+        Raises HobbleError if a name is reserved, InputError if there are no clips.
         """
         own = self.listed(dataset)
         return {**own, **{version: own[original(version)] for version in self.hurt_versions(dataset)}}
 
     @functools.cache  # noqa: B019
     def listed(self, dataset: str) -> dict[str, ClipEntry]:
-        """The entries of the clips that the data set lists or that are in its folder."""
+        """Name -> entry of the clips that the data set lists or, if it lists none, that are in its folder."""
         listed = self.catalogue.dataset(dataset).clips or dict.fromkeys(self._scanned(dataset))
         if odd := [name for name in listed if name.endswith(MIRROR_SUFFIX)]:
             raise HobbleError(
@@ -84,7 +84,7 @@ class Clips:
 
     @functools.cache  # noqa: B019
     def hurt_versions(self, dataset: str) -> dict[str, int]:
-        """Name of each hurt version of the healthy clips -> its number among them, from 0."""
+        """Name of each hurt version -> its number among all hurt versions, from 0."""
         options = self.catalogue.dataset(dataset).hurt
         healthy = (
             [
@@ -105,7 +105,7 @@ class Clips:
         return {name: turn for turn, name in enumerate(names)}
 
     def hurt(self, dataset: str, clip: str) -> Hurt:
-        """The section `hurt` of a data set that has it, with the values of the clip's entry."""
+        """The section `hurt` of a data set, which must have it, as changed by the clip's entry."""
         options, amount = self.catalogue.dataset(dataset).hurt, self.entry(dataset, clip).hurt
         assert options is not None
         if amount is None:
@@ -114,7 +114,7 @@ class Clips:
         return options.model_copy(update={"versions": versions, "longest": amount / max(versions, 1)})
 
     def entry(self, dataset: str, clip: str) -> ClipEntry:
-        """The entry of a clip; for a mirror or a hurt version, that of its original."""
+        """The entry of a clip. For a mirror or a hurt version it is the entry of its original."""
         clips = self.listed(dataset)
         name = original(clip)
         if name not in clips:
@@ -181,7 +181,7 @@ class Clips:
     def side_files(self, dataset: str, clip: str, suffixes: Iterable[str]) -> list[str]:
         """The files beside a clip that have its name and one of `suffixes`.
 
-        Files of the embedded walker need not exist yet, because a rule makes them.
+        Files of synthetic clips need not exist yet, because a rule makes them.
         """
         made = self.catalogue.dataset(dataset).synthetic is not None
         if made:
@@ -205,7 +205,7 @@ class Clips:
 
     @functools.cache  # noqa: B019
     def rig_files(self, dataset: str, clip: str) -> list[str]:
-        """The skeleton file of the clip's rig, if this is not the skeleton of the data set."""
+        """The skeleton file of the clip's rig, in a list; [] if it is the skeleton of the data set."""
         model = self.catalogue.dataset(dataset)
         if model.synthetic is not None:
             name: str | None = self.catalogue.dataset(model.source or dataset).skeleton
@@ -227,7 +227,7 @@ class Clips:
         return self.catalogue.dataset(dataset).labels.files
 
     def _scanned(self, dataset: str) -> list[str]:
-        """The clips in the user's folder, without mirrors of clips that are there too."""
+        """The clips in the user's folder, without mirrors of clips that are there, too."""
         folder, files = self.folder(dataset), self._files(dataset)
         for name in sorted(files):
             if not is_valid_clip_name(name):

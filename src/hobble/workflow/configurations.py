@@ -1,4 +1,4 @@
-"""Answers the rules' questions about a configuration: its sections, its clips, the paths of its inputs."""
+"""What the rules ask about a configuration: its sections, its clips, the paths of its inputs."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ class Configurations:
         self.catalogue, self.datasets = catalogue, datasets
 
     def section(self, configuration: str, name: str, *keys: str) -> dict[str, Any]:
-        """Plain values of one section of a configuration: of `keys`, or of all keys."""
+        """Key -> value of one section of a configuration as plain data, for `keys` or for all keys."""
         values = getattr(self.catalogue.configuration(configuration), name).model_dump(mode="json")
         return {key: values[key] for key in keys} if keys else values
 
@@ -36,7 +36,7 @@ class Configurations:
         }
 
     def digest(self, configuration: str) -> str:
-        """A hash of `resolved`. As a parameter of a rule it is short enough for a dry run to print."""
+        """A hash of `resolved`, which is short enough to be printed as a param of a rule in a dry run."""
         text = json.dumps(self.resolved(configuration), sort_keys=True)
         return hashlib.sha256(text.encode()).hexdigest()[:16]
 
@@ -60,7 +60,7 @@ class Configurations:
         return [f"{root}/{pattern.format(clip=clip)}" for clip in self.splits(configuration)]
 
     def owner(self, configuration: str) -> str:
-        """The configuration that trains its network: itself, or that of `network_of`."""
+        """The configuration that trains its network: itself, or the one that `network_of` names."""
         return self.catalogue.configuration(configuration).network_of or configuration
 
     def kind(self, configuration: str) -> str:
@@ -72,7 +72,7 @@ class Configurations:
         return model(self.catalogue.configuration(self.owner(configuration)).network.kind)
 
     def network(self, configuration: str, file: str) -> str:
-        """Path of a file of its network."""
+        """Path of `file` in the folder of its network."""
         return f"results/{self.owner(configuration)}/network/{file}"
 
     def database(self, configuration: str) -> str:

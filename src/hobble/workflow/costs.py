@@ -9,7 +9,7 @@ from hobble.workflow.clips import DATASETS
 from hobble.workflow.configurations import Configurations
 from hobble.workflow.kept_files import FOLDER
 
-# Stages of a data set, and of each the rules that have a job for each batch of clips.
+# Stage of a data set -> its rules that have a job for each batch of clips.
 BATCH_RULES = {
     "synthetic": ("synthetic_clips",),
     "motion": ("motion_clips", "hurt_clips"),
@@ -24,11 +24,11 @@ Places = dict[str, list[str]]
 
 
 def stages(configurations: Configurations, batches: Batches, name: str) -> dict[str, Places]:
-    """Where the costs of each stage of configuration `name` are found.
+    """Where to find the costs of configuration `name`: stage -> kind of place -> paths or names.
 
-    Stage -> `benchmarks`, `files`: folders; `batches`: names of the benchmark files of the present batches (a
-    folder may also have old ones, from before a clip was added); `made`: folders in which finished clips are
-    kept.
+    `benchmarks`, `files`: folders of benchmark files and of artefacts. `batches`: names of the benchmark
+    files of the present batches (a folder may also have old files, from before a clip was added). `made`:
+    folders in which finished clips are kept.
     """
     dataset = configurations.dataset(name)
     source = configurations.catalogue.dataset(dataset).source or dataset

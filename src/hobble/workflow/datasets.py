@@ -1,4 +1,4 @@
-"""Answers the rules' questions about a data set: its options, its clip entries, the clips for training."""
+"""What the rules ask about a data set: its options, its clip entries, the clips for training."""
 
 from __future__ import annotations
 
@@ -28,12 +28,12 @@ class Datasets:
         self.catalogue, self.clips, self.channel_sources = catalogue, clips, clips.channel_sources
 
     def options(self, dataset: str, section: str, *keys: str) -> dict[str, Any]:
-        """Plain values of one section of a data set: of `keys`, or of all keys."""
+        """Key -> value of one section of a data set as plain data, for `keys` or for all keys."""
         values = getattr(self.catalogue.dataset(dataset), section).model_dump(mode="json")
         return {key: values[key] for key in keys} if keys else values
 
     def part(self, dataset: str, section: str, model: type[Section]) -> dict[str, Any]:
-        """Plain values of a section, only the keys that `model` has. A rule depends on no others."""
+        """Key -> value of a section as plain data, for the keys of `model` only, which a rule depends on."""
         return self.options(dataset, section, *model.model_fields)
 
     def motion_options(self, dataset: str, clip: str) -> dict[str, Any]:
@@ -50,16 +50,17 @@ class Datasets:
         return round(synthetic.frames * self.clips.entry(dataset, clip).share / total)
 
     def walkers(self, names: Iterable[str]) -> list[str]:
-        """The data sets that make the embedded walker's clips for the data sets `names`."""
+        """The data sets from which the data sets `names` get synthetic clips."""
         models = {name: self.catalogue.dataset(name) for name in names}
         made = [model.source or name for name, model in models.items() if model.synthetic is not None]
         return list(dict.fromkeys(made))
 
     def selected(self, dataset: str, channels: Sequence[str]) -> dict[str, str]:
-        """Clip -> "train" or "held_out", for the clips whose other channels are all 0.
+        """Clip -> "train" or "held_out", for the clips that a network can learn from.
 
-        channels: the channels of the network. A mirror is on the same side as its original. Raises
-        HobbleError if the data set lacks one of `channels`, or if no clip is left for training.
+        channels: the channels of the network. Clips with other channels that are not 0 are left out. A mirror
+        is on the same side as its original. Raises HobbleError if the data set lacks one of `channels`, or if
+        no clip is left for training.
         """
         there = self.channel_sources.channels(dataset)
         if lacking := [name for name in channels if name not in there]:
@@ -85,9 +86,9 @@ class Datasets:
         return splits
 
     def compared(self, dataset: str, channels: Sequence[str]) -> list[str]:
-        """The clips that the merge compares, so that no motion is in both parts of the split.
+        """The clips that are compared with each other, so that no motion is in both parts of the split.
 
-        These are the original clips from files. Empty if nothing is held out or the clips are synthetic.
+        Mirrors and hurt versions are not among them. [] if nothing is held out or the clips are synthetic.
         """
         if self.catalogue.dataset(dataset).synthetic is not None:
             return []
@@ -108,7 +109,7 @@ class Datasets:
         return found
 
     def in_shard(self, dataset: str, channels: Sequence[str], shard: int) -> dict[str, str]:
-        """As `selected`, only the clips of a shard, from 0."""
+        """As `selected`, for the clips of one shard only. shard: its number, from 0."""
         return self._splits_by_shard(dataset, tuple(channels))[shard]
 
     def sources(self, chosen: Iterable[str]) -> dict[str, str]:

@@ -1,6 +1,6 @@
-"""Makes the virtual environment: python environment.py .venv. Needs only Python 3.11 or later.
+"""Makes the virtual environment: python environment.py .venv. It needs only Python 3.11 or later.
 
-Shows pip's work as one line: what is downloaded and how far it is.
+It shows one line of progress: what pip downloads, and how much of it is there.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ BYTES = {"kB": 1e3, "MB": 1e6, "GB": 1e9}
 
 
 class ProgressLine:
-    """The line of progress. On a terminal it is overwritten, in a file there is a new line now and then."""
+    """The line of progress. On a terminal it is overwritten; in a file a new line is written now and then."""
 
     def __init__(self, stream: TextIO) -> None:
         self.stream, self.live = stream, stream.isatty()
@@ -85,7 +85,7 @@ def install(python: Path, arguments: list[str], line: ProgressLine) -> None:
 
 
 def is_sound(python: Path) -> bool:
-    """Whether this is the interpreter of an environment with pip, of the Python that runs this."""
+    """Whether `python` has pip and is of the same version as the Python that runs this."""
     version = "import sys, pip; print(sys.version)"
     try:
         found = subprocess.run([python, "-c", version], capture_output=True, text=True, check=True).stdout
@@ -102,7 +102,7 @@ def main(folder: Path) -> None:
     print(f"This downloads packages and takes {DISK_SPACE} of disk, and a few minutes with a fast network.")
     began = time.monotonic()
     python, line = folder / "bin" / "python", ProgressLine(sys.stdout)
-    # venv copies the interpreter again, which fails while one of its programs runs.
+    # Not again in a sound environment: venv copies the interpreter, which fails while it is in use.
     if not is_sound(python):
         venv.create(folder, with_pip=True)
     install(python, ["--quiet", "--upgrade", "pip>=25"], line)  # older versions do not print progress

@@ -29,7 +29,7 @@ NOT_HASHED = {"__future__", "collections.abc", "logging", "typing", "warnings"}
 
 
 def fingerprint(script: Path, source: Path, modules: Iterable[str] = ()) -> str:
-    """Hash `script` and all modules under `source` that it imports, directly or through others.
+    """Hash `script` and all modules in folder `source` that it imports, directly or through others.
 
     modules: full names of modules that the script imports dynamically.
     """
@@ -63,7 +63,7 @@ class _Module:
     """The parts of a module that count.
 
     digest: hash of its code. texts: its string constants (name, value), which count if code other than
-    messages uses them. names: the names that its code uses. imports: project files.
+    messages uses them. names: the names that its code uses. imports: the project files that it imports.
     """
 
     digest: bytes

@@ -23,8 +23,8 @@ BUG = "This is a bug in Hobble, not a fault in your data. Please report it with 
 def job(snakemake: Any) -> Iterator[logging.Logger]:
     """Run a script with logging, checks of its files, and clear errors.
 
-    Inputs that differ from what their jobs wrote, or that change while the job runs, raise HobbleError.
-    Otherwise as `reporting`.
+    It is an error if an input differs from what its job wrote, or changes while this job runs. For the rest
+    see `reporting`.
     """
     with reporting(snakemake) as report:
         checksums.forget(getattr(snakemake, "output", ()))
@@ -75,16 +75,16 @@ class JobLog:
         to_file.setFormatter(logging.Formatter("%(asctime)s %(levelname)s %(message)s"))
         self.terminal = logging.StreamHandler(sys.stderr)
         self.terminal.setLevel(logging.WARNING)
-        # On a terminal, first clear the line of progress.
+        # A message on a terminal first clears the line of progress.
         wiped = "\r\x1b[K" if sys.stderr.isatty() else ""
         self.terminal.setFormatter(logging.Formatter(f"{wiped}{rule}: %(message)s"))
         self.logger.handlers = [to_file, self.terminal]
         logging.captureWarnings(True)
 
     def error(self, error: Exception) -> None:
-        """Say what went wrong. A HobbleError is its message.
+        """Say what went wrong. For a HobbleError this is its message.
 
-        Others are one line on the terminal, and their traceback is in the log.
+        Of other errors, the terminal shows one line, and the log has the traceback.
         """
         if isinstance(error, HobbleError):
             self.logger.error("%s", error)

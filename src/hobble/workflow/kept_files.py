@@ -3,7 +3,7 @@
 Snakemake deletes the outputs of a job before it runs and after it fails. So each finished file gets a second
 name (a hard link, which takes no space) in results/datasets/<dataset>/.made/<rule>/, and for each clip a
 record is written there: a fingerprint of all that the files depend on, their checksums and the seconds that
-they took. The folder can be deleted at any time. It costs only time then.
+they took. The folder can be deleted at any time. This costs only the time to make the files again.
 """
 
 from __future__ import annotations

@@ -84,7 +84,7 @@ def _stop(number: int, frame: FrameType | None) -> None:
 
 
 def end_children(pid: int, grace: float = GRACE_SECONDS) -> None:
-    """End all descendants of a process with SIGTERM, and after `grace` seconds with SIGKILL."""
+    """End all descendants of a process with SIGTERM. Those that run after `grace` seconds get SIGKILL."""
     import psutil  # a dependency of Snakemake; imported here because it is slow to import
 
     with contextlib.suppress(psutil.NoSuchProcess):
@@ -112,7 +112,7 @@ def _runs(process: Any) -> bool:
 def ends_with_run() -> Iterator[None]:
     """Within this context the job ends cleanly on SIGINT and SIGTERM, and soon after its run ends."""
     before = {}
-    with contextlib.suppress(ValueError):  # not in the main thread, as in a test
+    with contextlib.suppress(ValueError):  # a test may not run in the main thread, which alone sets signals
         for number in (signal.SIGINT, signal.SIGTERM):
             before[number] = signal.signal(number, _exit)
     done = threading.Event()
@@ -128,14 +128,15 @@ def ends_with_run() -> Iterator[None]:
 
 
 def _exit(number: int, frame: FrameType | None) -> None:
-    # Ctrl-C brings two signals, of the terminal and of Snakemake. The second would end the clean-up.
+    # Ctrl-C brings two signals: from the terminal and from Snakemake. The second would interrupt the
+    # clean-up.
     for each in (signal.SIGINT, signal.SIGTERM):
         signal.signal(each, _disregard)
     raise SystemExit(128 + number)  # not caught by `except Exception`, and runs every `finally`
 
 
 def _disregard(number: int, frame: FrameType | None) -> None:
-    """In place of SIG_IGN: with that, Python prints a traceback if both signals came at once."""
+    """Ignore a signal. With SIG_IGN instead, Python prints a traceback if two signals come at once."""
 
 
 def _exit_with_run(run: str, done: threading.Event) -> None:
@@ -155,7 +156,7 @@ def _is_alive(pid: int, began: str) -> bool:
     except ProcessLookupError:
         return False
     except OSError:
-        return True  # another user's
+        return True  # it is another user's process
     return _start_time(pid) == began
 
 

@@ -1,8 +1,8 @@
 """Lets a run read and write its locks while another run in the same folder ends.
 
-A run that ends removes the whole folder of locks. Snakemake makes the folder only once, before it plans.
-Later it lists the files in it and opens each. If the folder went in between, a second run ended with a
-FileNotFoundError instead of doing its work.
+A run that ends removes the whole folder of locks. Snakemake makes the folder only once, before it plans, and
+reads the files in it later. If another run removes the folder in between, Snakemake alone would end with a
+FileNotFoundError.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ _write = FilePersistence._write_locks
 
 
 def _read_locks(self: FilePersistence) -> Iterator[tuple[str, str]]:
-    """Kind ("input" or "output") and path of each locked file. A lock file that is gone has none."""
+    """Kind ("input" or "output") and path of each locked file. Lock files that are gone are left out."""
     for kind in ("input", "output"):
         for file in Path(self._lockdir).glob(f"*.{kind}.lock"):
             with suppress(FileNotFoundError):
@@ -26,9 +26,9 @@ def _read_locks(self: FilePersistence) -> Iterator[tuple[str, str]]:
 
 
 def _write_locks(self: FilePersistence, kind: str, paths: Iterable[str]) -> None:
-    """Write locks as Snakemake does, but make the folder first. If it is gone again, try ten times.
+    """Write locks as Snakemake does, but make the folder first. If the folder is removed again, try again.
 
-    Raises OSError if the locks still cannot be written.
+    Raises OSError if the locks still cannot be written after ten times.
     """
     paths = list(paths)
     for _ in range(10):

@@ -1,4 +1,4 @@
-"""What the script of a measurement and that of its pieces share: the inputs and the options of the job."""
+"""Finds a job's measurement and its inputs, for the scripts of the rules `measure` and `measure_piece`."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ LISTS = ("clips", "facts", "pieces")  # inputs of several files
 
 
 def measure_of(job: Any) -> Measure:
-    """The job's measurement, imported by name, so that adding another one does not run this one again."""
+    """The job's measurement. It is imported by name, so that a new measurement does not re-run the others."""
     return importlib.import_module(job.params.package).MEASURE
 
 

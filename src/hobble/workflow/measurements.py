@@ -34,7 +34,7 @@ class Measurements:
         return {need: self._input(configuration, need) for need in measure(name).inputs}
 
     def pieces(self, configuration: str, name: str) -> list[str]:
-        """Files of the measurement's pieces that run as jobs of their own; [] if it has fewer than two."""
+        """Files of the measurement's pieces, each made by a job; [] if there are fewer than two pieces."""
         one = measure(name)
         if one.pieces is None:
             return []
@@ -62,10 +62,10 @@ class Measurements:
         return self.configurations.splits(configuration) if "clips" in measure(name).inputs else {}
 
     def people(self, configuration: str, name: str) -> dict[str, str]:
-        """Clip -> the person who walks in it, if the measurement has to know, else {}.
+        """Clip -> the person who walks in it, if the measurement needs this, else {}.
 
-        A clip whose entry names nobody counts as a person of its own, together with its mirror and its hurt
-        versions.
+        A clip whose entry names nobody counts as a person of its own. Its mirror and its hurt versions count
+        as the same person.
         """
         if not measure(name).people:
             return {}

@@ -1,7 +1,8 @@
-"""Finds the rule of a file that a rule makes by its full name, without asking every rule.
+"""Finds the rule that makes a file by the file's full name, without trying every rule.
 
-The rules of batches have no wildcards. For each file of a clip, Snakemake compares the name with patterns of
-many rules, one regular expression after another. With tens of thousands of files that is a third of planning.
+The rules of batches have no wildcards. But for each file of a clip, Snakemake tries the patterns of many
+rules, one regular expression after another. With tens of thousands of files this is a third of the time for
+planning.
 """
 
 from __future__ import annotations
@@ -32,10 +33,10 @@ class NamedOutputs(OutputIndex):  # type: ignore[misc]
         super().__init__(patterns)
 
     def match_producers(self, targetfile: str) -> set[Rule]:
-        """The rules that make a file: those that name it, else those with a pattern that matches."""
+        """The rules that make a file: those that name it, or else those whose pattern matches."""
         return self._rules.get(str(targetfile)) or super().match_producers(targetfile)
 
 
 def use() -> None:
-    """Let Snakemake plan with it."""
+    """Make Snakemake plan with `NamedOutputs`."""
     dag.OutputIndex = NamedOutputs

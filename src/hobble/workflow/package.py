@@ -25,16 +25,16 @@ class Package:
         return fingerprint(path, self.base / "src", modules)
 
     def templates(self) -> list[str]:
-        """The pages' templates. A change in them makes only the pages again."""
+        """The templates of the pages, with their styles. If one changes, only the pages are made again."""
         kinds = {".j2", ".css", ".js", ".yaml"}
         files = [str(path) for path in (self.folder / "report").iterdir() if path.suffix in kinds]
         return sorted([*files, self.published()])
 
     def web(self, suffix: str) -> list[str]:
-        """The page's files with this suffix: ".js" for its scripts, ".json" for the list of packages."""
+        """The page's files with this suffix, such as ".js" (its scripts) or ".json" (its npm packages)."""
         files = [*(self.folder / "report" / "web").iterdir(), *self.folder.glob("models/**/*.js")]
         return sorted(str(path) for path in files if path.suffix == suffix)
 
     def published(self) -> str:
-        """The file of published figures that the report shows beside ours."""
+        """The file of published figures that the report shows next to ours."""
         return str(self.folder / "evaluation" / "published.yaml")

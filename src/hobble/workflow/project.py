@@ -25,8 +25,8 @@ class Project:
     """The configurations and data sets of one checkout, with the overrides of one command line.
 
     base: the folder of the Snakefile. config: Snakemake's config. Its `mocap` is the folder with the user's
-    clips, `compare` lists the configurations to compare, and all other keys override every configuration.
-    Raises HobbleError if a configuration has a reserved name, or if `mocap` is not a name.
+    clips, `compare` lists the configurations to compare, and all other keys override those of every
+    configuration. Raises HobbleError if a configuration has a reserved name, or if `mocap` is not a name.
     """
 
     def __init__(self, base: Path, config: Mapping[str, Any]) -> None:

@@ -27,14 +27,14 @@ ENGINE_MB = 400  # Snakemake runs twice in a cluster job: once for SLURM's step,
 PYTHON_MB = 400  # Python with numpy, scipy and the package
 MEMORY_MARGIN = 1.5  # requested memory / measured memory
 TIME_MARGIN = 10  # requested time / measured time, for an old and busy machine
-MEASURED_JOINTS = 31  # of the figure in the measurements
-CLIP_SECONDS = 0.1  # least time for a clip
-ASSUMED_FRAMES = 20_000  # of a clip that is not downloaded yet
+MEASURED_JOINTS = 31  # joints of the figure with which the factors were measured
+CLIP_SECONDS = 0.1  # time for a clip besides that for its frames
+ASSUMED_FRAMES = 20_000  # frames of a clip that is not downloaded yet
 VISITS_PER_PASS = 10  # how often a pass of training uses a row
 HEADER_BYTES = 1 << 20  # the motion of a BVH file begins within this many bytes
-SHARD_MB = 10  # of a shard's job, for a thousand frames of its longest clip
-ROW_BYTES = 24  # of a shard's job, for each of its rows: the place in the order
-EXCERPT_THOUSANDS = 2.0  # of frames that a measurement of a sample reads at once
+SHARD_MB = 10  # memory of a shard's job for each thousand frames of its longest clip
+ROW_BYTES = 24  # memory of a shard's job for each of its rows, which holds the row's place in the order
+EXCERPT_THOUSANDS = 2.0  # thousands of frames that a measurement of a sample reads at once
 WEEK_MINUTES = 7 * 24 * 60  # longest time that a job requests
 
 
@@ -49,11 +49,14 @@ class Demands:
         return _megabytes(rate * max(self._thousands_of(batch)), attempt)
 
     def batch_minutes(self, batch: ClipBatch, rate: float, attempt: int = 1, least: int = 1) -> int:
-        """Minutes (at least `least`) for a job of a batch that takes `rate` seconds for 1,000 frames."""
+        """Minutes, at least `least`, for a job of a batch that takes `rate` seconds for a thousand frames."""
         return _minutes(sum(rate * some + CLIP_SECONDS for some in self._thousands_of(batch)), attempt, least)
 
     def memory_of_longest(self, dataset: str, rate: float, rows: float = 0.0, attempt: int = 1) -> int:
-        """MB for a job that reads clip after clip and keeps `rows` bytes for each frame of all clips."""
+        """MB for a job that reads clip after clip (`rate` MB for a thousand frames of the longest clip).
+
+        rows: bytes that it keeps for each frame of all clips.
+        """
         longest = max(self.thousands(dataset, clip) for clip in self.project.clips.of(dataset))
         return _megabytes(rate * longest + rows * self.all_thousands(dataset) / 1e3, attempt)
 
@@ -67,12 +70,12 @@ class Demands:
         return _minutes(rate * self._shard_thousands(dataset), attempt, least=5)
 
     def _shard_thousands(self, dataset: str) -> float:
-        """Thousands of frames of the largest shard. Of several, it may have twice as many as the average."""
+        """Thousands of frames of the largest shard, which may have twice as many as the average shard."""
         shards = self.project.datasets.shards(dataset)
         return self.all_thousands(dataset) * min(1.0, 2 / shards if shards > 1 else 1.0)
 
     def minutes_of_all(self, dataset: str, rate: float, attempt: int = 1, least: int = 1) -> int:
-        """Minutes for a job that takes `rate` seconds for a thousand frames, over all clips and mirrors."""
+        """Minutes for a job that reads all clips and mirrors, `rate` seconds for a thousand frames."""
         return _minutes(rate * self.all_thousands(dataset), attempt, least)
 
     def measure_memory(self, configuration: str, name: str, attempt: int = 1) -> int:
@@ -90,7 +93,7 @@ class Demands:
         return self.evaluation_minutes(configuration, rate, attempt, cost.minutes)
 
     def _measured_share(self, configuration: str, name: str) -> float:
-        """The share of a data set's frames that a measurement reads: all, or those of a sample."""
+        """The share of a data set's frames that a measurement reads: 1, or less if it reads a sample."""
         if "sample_frames" not in measure(name).options.model_fields:
             return 1.0
         section = self.project.configurations.section(configuration, "evaluation", "sample_frames")
@@ -110,8 +113,8 @@ class Demands:
     def training_memory(self, configuration: str, attempt: int = 1) -> int:
         """MB on each machine for a training.
 
-        Each process holds PyTorch, its part of the database, the weights and the optimiser state. If the
-        network is built and not trained, the process holds up to three copies of all rows.
+        Each process holds PyTorch, its part of the database, the weights and the optimiser's state. If the
+        network is built instead of trained, the process also holds up to three copies of all rows.
         """
         training = self.project.configurations.section(configuration, "training")
         needed = 500 + training["memory_mb"] + 32e-6 * self.parameters(configuration)
@@ -121,9 +124,10 @@ class Demands:
         return _megabytes(self.machines(configuration).each * needed, attempt)
 
     def training_minutes(self, configuration: str, attempt: int = 1) -> int:
-        """Minutes for a training, at most a week. After a kill it continues from its last checkpoint.
+        """Minutes for a training, at most a week. If it is killed, it continues from its last checkpoint.
 
-        Based on 6.4e9 products of weights a second (10,700 samples of 342-512-512-311 on two cores).
+        This assumes 6.4e9 products of weights a second: 10,700 samples of a network with layers of 342, 512,
+        512 and 311 on two cores.
         """
         training = self.project.configurations.section(configuration, "training")
         dataset = self.project.configurations.dataset(configuration)
@@ -139,14 +143,14 @@ class Demands:
         return self.project.catalogue.configuration(configuration).training
 
     def training_threads(self, configuration: str) -> int:
-        """Threads of a training job: 2 (for each GPU, if SLURM gives GPUs), or 1 for each CPU process."""
+        """Threads of a training job: one for each process, at least 2; with GPUs 2, meant for each GPU."""
         machines = self.machines(configuration)
         return 2 if machines.gpus else max(2, machines.processes)
 
     def gpus(self, configuration: str) -> int:
-        """GPUs on one machine for a training: `gpus`, or 1 for `device: cuda`.
+        """GPUs that a training on one machine requests: `gpus`, or 1 for `device: cuda`.
 
-        `auto` may use a GPU but does not request one.
+        `device: auto` may use a GPU but does not request one.
         """
         machines = self.machines(configuration)
         if machines.gpus:
@@ -161,7 +165,7 @@ class Demands:
     # Sizes
 
     def thousands(self, dataset: str, clip: str) -> float:
-        """Thousands of frames of a clip, scaled by the number of joints / 31."""
+        """Thousands of frames of a clip, multiplied by its number of joints / MEASURED_JOINTS."""
         return self._frames(dataset, original(clip)) / 1e3 * self._joints(dataset) / MEASURED_JOINTS
 
     def _thousands_of(self, batch: ClipBatch) -> list[float]:
@@ -203,9 +207,9 @@ class Demands:
 
 
 def bvh_seconds(path: Path) -> float | None:
-    """Estimated length of a BVH file in seconds, from its size, frame time and first row, or None.
+    """Estimated length of a BVH file in seconds, from its size, frame time and first row.
 
-    The frame count in the header is not used, because it may be wrong.
+    None if it cannot be estimated. The frame count in the header is not used, because it may be wrong.
     """
     try:
         size = os.path.getsize(path)

@@ -22,8 +22,9 @@ MEMORY_LINE = re.compile(r"took (\d+) MB of memory at most")
 class JobResources:
     """What one job requests and, if it has run, what it used.
 
-    requested_mb, used_mb: MB of memory; the used memory comes from the log and excludes Snakemake's own.
-    requested_s, used_s: seconds; the used time comes from the benchmark file. None if the run has no record.
+    requested_mb, used_mb: memory, MB; the used memory comes from the log and excludes Snakemake's own.
+    requested_s, used_s: seconds; the used time comes from the benchmark file. A used amount is None if the
+    run has no record of it.
     """
 
     rule: str
@@ -45,7 +46,7 @@ class JobResources:
 
 
 def planned_jobs(plan: str) -> Iterator[JobResources]:
-    """The jobs in the text of a dry run. Raises KeyError for a job without memory or time."""
+    """The jobs in the text of a dry run. Raises KeyError for a job that requests no memory or time."""
     for rule, block in JOB_BLOCK.findall(plan):
         of = dict(line.strip().split(": ", 1) for line in block.splitlines())
         asks = dict(part.split("=", 1) for part in of["resources"].split(", "))

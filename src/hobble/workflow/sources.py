@@ -25,7 +25,7 @@ def joint_names(path: Path) -> set[str]:
 
 
 def nearest_rig(joints: set[str], known: Mapping[str, Collection[str]], target: str) -> str | None:
-    """The known skeleton that has the most of these joints, or None if `target` has as many."""
+    """The known skeleton (name -> joints) that has the most of `joints`; None if `target` has as many."""
     best, nearest = len(joints & set(known[target])), None
     for name in sorted(known):
         if len(joints & set(known[name])) > best:
@@ -36,7 +36,7 @@ def nearest_rig(joints: set[str], known: Mapping[str, Collection[str]], target: 
 def read_checksums(path: Path) -> dict[str, str]:
     """Clip -> SHA-256, from a file with lines `<hash>  <clip>.bvh`, as `sha256sum *.bvh` writes them.
 
-    Raises InputError with the number of a wrong line.
+    Raises InputError, which names the line, if a line has another form.
     """
     out: dict[str, str] = {}
     for number, line in enumerate(read_text(path).splitlines(), 1):

@@ -46,7 +46,7 @@ def notes(project: Project, targets: Iterable[str]) -> list[str]:
 def needed_datasets(project: Project, arguments: Sequence[str]) -> list[str]:
     """The data sets that a command line needs. arguments: of Snakemake, also of a job on another machine.
 
-    Includes the data sets of configurations whose networks are used or continued.
+    The data sets of configurations whose networks are used or continued are among them.
     """
     if rules := rules_of_job(arguments):
         return [name for name in dict.fromkeys(map(dataset_of, rules)) if name]
@@ -77,7 +77,7 @@ def datasets_of(project: Project, targets: Iterable[str]) -> list[str]:
 
 
 def targets_or_default(targets: Iterable[str]) -> list[str]:
-    """The targets, or what Snakemake makes without any."""
+    """The targets, or the target that Snakemake makes if none is given."""
     return list(targets) or ["results/holden/report.html"]
 
 
@@ -108,7 +108,9 @@ def _check_symmetric(project: Project, name: str, model: Configuration) -> None:
 
 
 def _check_continues(project: Project, name: str, model: Configuration) -> None:
-    """Check that a training can continue from another: same network and sections, and not fewer passes."""
+    """Check that a training can continue from another one: same channels, network and sections, and no fewer
+    passes.
+    """
     begun = model.training.continues
     if project.configurations.is_built(name):
         kind = model.network.kind

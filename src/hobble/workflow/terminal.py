@@ -37,7 +37,7 @@ JOB_HINT = re.compile(r"^ *\(check individual jobs above for details\)\n", re.M)
 
 @dataclass(frozen=True)
 class Job:
-    """The names of a job that are printed. about: its wildcards, or its data set and batch."""
+    """The names of a job that are printed. about: its wildcards, or its data set and batch. log: its file."""
 
     rule: str
     about: str
@@ -52,7 +52,8 @@ class Job:
 class Terminal:
     """The output of one run.
 
-    live: overwrite the line of progress, as on a terminal. Otherwise print a line every PROGRESS_SECONDS.
+    live: whether to overwrite the line of progress, as on a terminal, instead of printing a line every
+    PROGRESS_SECONDS. now: returns the time in seconds.
     """
 
     def __init__(
@@ -95,7 +96,7 @@ class Terminal:
         else:
             self._line(f"{count}.")
 
-    # One method for each of Snakemake's events, named after it
+    # One method for each event of Snakemake. `take` finds it by the name of the event.
 
     def _run_info(self, data: Mapping[str, Any]) -> None:
         stats = data.get("stats") or {}
@@ -175,14 +176,14 @@ def _job(data: Mapping[str, Any]) -> Job:
 
 
 def _table(rules: Mapping[str, int]) -> str:
-    """How many jobs of each rule there are, in Snakemake's form."""
+    """A table of the number of jobs of each rule, in Snakemake's form."""
     width = max(map(len, [*rules, "total"]))
     lines = [f"{rule:<{width}}  {n:>7}" for rule, n in [*rules.items(), ("total", sum(rules.values()))]]
     return "\n".join(["Job stats:", f"{'job':<{width}}    count", f"{'-' * width}  -------", *lines])
 
 
 def _folded(found: re.Match[str]) -> str:
-    """The rules of batches in a list of rules, each stage once."""
+    """A list of rules without data sets and numbers of batches, each name once."""
     return ", ".join(dict.fromkeys(family_of(rule) for rule in found[0].split(", ")))
 
 

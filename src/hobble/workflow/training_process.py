@@ -1,6 +1,7 @@
 """One process of a training. torchrun starts it as: python -m hobble.workflow.training_process JOB.json
 
-The file has the arguments of `hobble.training.train.train`, the number of threads and the log, as plain data.
+The file holds the arguments of `hobble.training.train.train`, the number of threads and the path of the log,
+as plain data.
 """
 
 from __future__ import annotations
@@ -21,7 +22,7 @@ FORMAT = "%(asctime)s %(levelname)s %(message)s"
 def main(job_file: Path) -> int:
     """Train together with the other processes. Returns the exit status.
 
-    After a HobbleError the status is 1, and the message is in a file error-<rank> beside `job_file`.
+    After a HobbleError the status is 1, and the message is in the file error-<rank> beside `job_file`.
     """
     rank = int(os.environ["RANK"])
     job = json.loads(job_file.read_text(encoding="utf-8"))

@@ -1,4 +1,4 @@
-"""Starts a training in several processes with torchrun; on several machines SLURM's srun starts torchrun."""
+"""Starts a training in several processes with torchrun. On several machines, SLURM's srun starts torchrun."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ GRACE_SECONDS = 10.0  # time for torchrun to end its processes
 
 
 def on_machines(training: Training, machines: Machines, gpus: bool) -> Training:
-    """The training options for these machines. With several processes, all use CPUs or each has a GPU."""
+    """The training options for these machines. gpus: with several processes, whether each uses a GPU."""
     device = training.device if machines.count == 1 else "cuda" if gpus else "cpu"
     own = {"nodes": machines.nodes, **({"gpus": machines.each} if gpus else {"processes": machines.each})}
     return Training.model_validate({**training.model_dump(), **own, "device": device})

@@ -1,4 +1,4 @@
-"""Checks who runs the workflow: a user without a name, as in a container, or one who may not write here."""
+"""Handles users who have no name, as in a container, or who may not write in this folder."""
 
 from __future__ import annotations
 
@@ -10,14 +10,14 @@ from pathlib import Path
 
 from hobble.core.errors import InputError
 
-OWN = Path(".snakemake")  # Snakemake's folder, inside the folder where it runs
+OWN = Path(".snakemake")  # Snakemake's own folder, in the folder where it runs
 DRY_RUN = re.compile(r"-[a-zA-Z]*n[a-zA-Z]*|--dry-?run")
 
 
 def ensure_user_name() -> None:
-    """Set USER, which jobs inherit, to the number of the user where the system knows no name.
+    """If the user has no name, set the variable USER to the user's number. Jobs inherit it.
 
-    Snakemake and PyTorch ask for the name.
+    Snakemake and PyTorch need a name.
     """
     try:
         getpass.getuser()
@@ -26,7 +26,7 @@ def ensure_user_name() -> None:
 
 
 def check_may_write(arguments: Sequence[str], own: Path = OWN) -> None:
-    """Raise InputError where Snakemake could not take its lock, as in another user's checkout.
+    """Raise InputError if Snakemake cannot write its lock here, as in another user's checkout.
 
     arguments: of the command line. A dry run is allowed, because it writes nothing.
     """

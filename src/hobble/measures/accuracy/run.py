@@ -19,7 +19,13 @@ from hobble.core.errors import HobbleError, InputError
 from hobble.core.quat import Array
 from hobble.database.statistics import Moments
 from hobble.measures.accuracy import Options
-from hobble.measures.accuracy.results import Accuracy, ErrorsOf, ErrorsOfClip, ErrorsOfExcerpt, ErrorsOfSplit
+from hobble.measures.accuracy.results import (
+    Accuracy,
+    ErrorNumbers,
+    ErrorsOfClip,
+    ErrorsOfExcerpt,
+    ErrorsOfSplit,
+)
 from hobble.measures.clip_parts import clip_parts, sample_of
 from hobble.measures.inputs import Json, MeasureInputs, Outcome, Row
 from hobble.measures.joints import Joints
@@ -69,7 +75,7 @@ class Errors:
         below = np.concatenate([[0.0], np.cumsum(self.histogram)])
         return float(np.interp(share * below[-1], below, EDGES))
 
-    def to_dict(self) -> ErrorsOf:
+    def to_dict(self) -> ErrorNumbers:
         """Plain data, with quantiles of the relative error; None values if there was no frame."""
         if not self.frames:
             return {"frames": 0, "mean": None, "sd": None, "position_error_cm": None}

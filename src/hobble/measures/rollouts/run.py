@@ -28,12 +28,11 @@ from hobble.measures.clip_parts import ClipPart, LoadedPart, clip_parts, sample_
 from hobble.measures.inputs import MeasureInputs, Outcome, Row
 from hobble.measures.results import SPLITS
 from hobble.measures.rollouts import Options
-from hobble.measures.rollouts.results import ErrorsOf, RollOutsFound
+from hobble.measures.rollouts.results import RollOutNumbers, RollOutsFound
 from hobble.measures.rollouts.roll_outs import Crowd, RollOuts, inputs_of_clip
 from hobble.measures.stratified_sample import Sample
 from hobble.models.load import load_network
 from hobble.models.network import Network, Predictor
-from hobble.rows.clip_rows import ClipRows
 from hobble.rows.excerpts import Excerpt
 from hobble.rows.layout import RowLayout
 
@@ -73,7 +72,7 @@ class RollOutErrors:
             return self
         return RollOutErrors(self.frames, self.starts, self.moments * weight, self.last * weight, self.ended)
 
-    def to_dict(self, phase: bool = True) -> ErrorsOf:
+    def to_dict(self, phase: bool = True) -> RollOutNumbers:
         """Plain data. A value without frames, or without roll-outs that reached their full length, is None.
 
         phase: whether the network uses the phase. If not, the phase error has no meaning and is None.
@@ -88,18 +87,6 @@ class RollOutErrors:
             "last_cm": float(self.last.mean[0]) if ended else None,
             "last_phase": float(self.last.mean[1]) if ended and phase else None,
         }
-
-
-def clip_roll_outs(
-    predictor: Predictor, rows: ClipRows, joints: Sequence[int], lengths: Sequence[int]
-) -> dict[int, RollOutErrors]:
-    """Length -> errors of roll-outs over every frame of the clip.
-
-    No roll-out begins at the first frame of a stretch, because the root's movement before it is unknown.
-    Each frame is in OVERLAP roll-outs of each length, or in one if the roll-outs are one frame long.
-    """
-    groups = _groups(LoadedPart(rows, 0, len(rows)), predictor.network.layout, lengths)
-    return _errors(predictor, [groups], joints, lengths)[0]
 
 
 def _groups(read: LoadedPart, layout: RowLayout, lengths: Sequence[int]) -> list[RollOuts]:
