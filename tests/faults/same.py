@@ -11,7 +11,6 @@ from typing import Any
 
 import numpy as np
 
-TIMED_COLUMNS = ("seconds", "milliseconds")
 TIMED = {
     "responsivity.json": {"milliseconds"},
 }

@@ -8,7 +8,7 @@ from hobble.core import quat
 from hobble.core.clip import Clip
 from hobble.hurt.hurt_clip import HurtClip
 from hobble.labels.clip_labels import CONTACT_ROLES, Labels
-from hobble.labels.footfall import feet_up, find_swings
+from hobble.labels.footfall import Swing, find_swings
 from hobble.labels.options import LabelOptions as Options
 
 SIDES = ("left", "right")
@@ -34,7 +34,7 @@ def measures(clip: Clip, labels: Labels) -> dict[str, float]:
     ahead = np.cross(left, [0.0, 1.0, 0.0])
     trunk = role["neck"] - hips
     # By the motion alone: contacts are those that the generator knows.
-    up = feet_up(find_swings(clip, Options()), len(clip))
+    up = _feet_up(find_swings(clip, Options()), len(clip))
     out["forward"] = _degrees(np.sum(trunk * ahead, axis=1), trunk[:, 1])[inside].mean()
     out["left"] = _degrees(np.sum(trunk * left, axis=1), trunk[:, 1])[inside].mean()
     for i, side in enumerate(SIDES):
@@ -112,3 +112,11 @@ def effects(healthy: dict[str, float], hurt: HurtClip, side: str) -> dict[str, f
         "lean": float(np.hypot(seen["forward"] - healthy["forward"], seen["left"] - healthy["left"])),
         "arm": seen[f"arm_{side}"] / healthy[f"arm_{side}"],
     }
+
+
+def _feet_up(swings: list[Swing], frames: int) -> np.ndarray:
+    """(frames, 2) bool: whether the right and the left foot are in a swing."""
+    up = np.zeros((frames, 2), bool)
+    for swing in swings:
+        up[swing.start : swing.end, swing.foot] = True
+    return up

@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from hobble.labels.footfall import SETTLING, feet_up, find_swings, foot_speeds, landings
+from hobble.labels.footfall import SETTLING, find_swings, foot_speeds, landings
 from hobble.labels.options import LabelOptions
 from hobble.labels.phase import find_cycles, phase_of_footsteps, rows_of_landings
 
@@ -66,15 +66,6 @@ def test_only_a_long_pause_separates_two_bouts_of_walking(walker, pause, bouts):
     assert len(events) - (bouts - 1) == len(found(clip)[1])
     cycles, _ = find_cycles(rows_of_landings(events), len(paused), "right", "drop")
     assert any(a < both_down < b for a, b in cycles) == (bouts == 1)
-
-
-def test_feet_up_marks_the_frames_of_swings(walker):
-    clip = walker()
-    swings, _ = found(clip)
-    up = feet_up(swings, len(clip))
-    assert up.shape == (600, 2)
-    assert not up.all(axis=1).any()
-    assert up[:, 0].sum() == sum(s.end - s.start for s in swings if s.foot == 0)
 
 
 @pytest.mark.parametrize("frames", [1, 2, 3, 30])

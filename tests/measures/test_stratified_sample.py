@@ -16,7 +16,7 @@ from hobble.measures.rollouts.page import rollout_chart
 from hobble.measures.rollouts.run import measure_roll_outs
 from hobble.measures.stratified_sample import LEAST, Sample, Stratum, draw_sample
 from hobble.rows.clip_rows import save_clip_rows
-from hobble.rows.excerpts import LONGEST, Excerpt, Kind, excerpts, load_excerpt
+from hobble.rows.excerpts import LONGEST, Excerpt, ExcerptKind, excerpts, load_excerpt
 from hobble.rows.facts import Facts, facts, load_facts, save_facts
 from hobble.rows.layout import GAITS
 
@@ -43,7 +43,7 @@ def population(
         own = rng.normal(0, 0.2)
         kinds = []
         for one in excerpts(name, length):
-            kinds.append(Kind(gait, float(speed * rng.uniform(0.9, 1.1)), ("injury",) if hurt else ()))
+            kinds.append(ExcerptKind(gait, float(speed * rng.uniform(0.9, 1.1)), ("injury",) if hurt else ()))
             values[one] = (2 if gait == "jog" else 1) + hurt + 0.1 * speed + own + rng.normal(0, 0.2)
         clips.append(Facts(name, length, tuple(kinds)))
     return clips, {one.clip: "held_out" if i % 12 == 0 else "train" for i, one in enumerate(clips)}, values
@@ -95,7 +95,7 @@ def test_of_two_long_clips_only_excerpts_are_drawn():
 
 def test_an_additional_clip_hardly_changes_the_sample():
     clips, splits, _ = population(2)
-    more = [*clips, Facts("another", 900, (Kind("walk", 3.0, ()),))]
+    more = [*clips, Facts("another", 900, (ExcerptKind("walk", 3.0, ()),))]
     before = draw_sample(clips, splits, 300_000)
     after = draw_sample(more, {**splits, "another": "train"}, 300_000)
     assert before is not None

@@ -1,12 +1,18 @@
-"""All poses of the roll-outs of one stretch, for tests that compare them one by one."""
+"""Roll-outs of one clip alone, for tests: the errors of all, or all poses of those of a stretch."""
 
 from __future__ import annotations
+
+from collections.abc import Sequence
 
 import numpy as np
 
 from hobble.core.quat import Array
+from hobble.measures.clip_parts import LoadedPart
+from hobble.measures.rollouts import run as module
 from hobble.measures.rollouts.roll_outs import Crowd, RollOutInputs, RollOuts
+from hobble.measures.rollouts.run import RollOutErrors
 from hobble.models.network import Predictor
+from hobble.rows.clip_rows import ClipRows
 
 
 def roll_out(
@@ -19,3 +25,14 @@ def roll_out(
     """
     crowd = Crowd(predictor, [RollOuts(inputs, starts, length)])
     return [place for _, place, _ in crowd.frames()], crowd.phase
+
+
+def clip_roll_outs(
+    predictor: Predictor, rows: ClipRows, joints: Sequence[int], lengths: Sequence[int]
+) -> dict[int, RollOutErrors]:
+    """Length -> errors of roll-outs over every frame of the clip.
+
+    No roll-out begins at the first frame of a stretch, because the root's movement before it is unknown.
+    """
+    groups = module._groups(LoadedPart(rows, 0, len(rows)), predictor.network.layout, lengths)
+    return module._errors(predictor, [groups], joints, lengths)[0]

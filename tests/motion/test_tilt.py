@@ -10,6 +10,7 @@ import pytest
 from hobble.core import quat
 from hobble.core.clip import Clip
 from hobble.core.errors import InputError
+from hobble.motion.balance import balance
 from hobble.motion.tilt import tilt
 
 X, Z = np.eye(3)[0], np.eye(3)[2]
@@ -35,11 +36,51 @@ def test_the_size_of_the_tilt_is_found(walk):
     assert tilt(turned(walk, Z, 20.0)) == pytest.approx(20.0, abs=3.0)
 
 
-@pytest.mark.parametrize("degrees", [-8.0, 8.0])
+def sloped(clip: Clip, degrees: float) -> Clip:
+    """The clip on ground that goes up: each joint is moved upward by its own way ahead."""
+    at = clip.positions + clip.positions[..., 2:] * [0.0, np.tan(np.radians(degrees)), 0.0]
+    parents = [max(p, 0) for p in clip.skeleton.parents]
+    none = np.broadcast_to(quat.IDENTITY, clip.rotations.shape)
+    return replace(clip, rotations=none, root=at[:, 0], translations=at - at[:, parents])
+
+
+# The made-up walk balances 5 degrees forward of its feet, so on 8 degrees down it would look tilted.
+@pytest.mark.parametrize("degrees", [-14.0, 8.0])
 def test_a_real_slope_is_no_tilt(walk, degrees):
-    """On a slope the feet go up and the body stays upright."""
-    slope = np.tan(np.radians(degrees))
-    assert tilt(replace(walk, root=walk.root + np.outer(walk.root[:, 2], [0.0, slope, 0.0]))) is None
+    assert tilt(sloped(walk, degrees)) is None
+
+
+@pytest.mark.parametrize("degrees", [-6.0, 6.0, 10.0])
+def test_a_tilt_to_the_side_shows_in_the_balance_alone(walk, degrees):
+    """Both feet on one line show no ground."""
+    legs = [walk.skeleton.role(f"{side}_hip") for side in ("left", "right")]
+    line = walk.skeleton.offsets.copy()
+    line[legs, 0] = 0.0
+    narrow = replace(walk, skeleton=replace(walk.skeleton, offsets=line))
+    assert tilt(narrow) is None
+    assert tilt(turned(narrow, Z, degrees)) == pytest.approx(abs(degrees), abs=1.0)
+
+
+def test_balance_turns_with_the_world_and_stays_on_a_slope(walk):
+    plain = balance(walk)
+    assert abs(plain.aside) < 0.5
+    assert balance(turned(walk, Z, 6.0)).aside == pytest.approx(plain.aside - 6.0, abs=0.5)
+    assert balance(sloped(walk, 6.0)).up == pytest.approx(plain.up, abs=0.02)
+
+
+def test_a_figure_that_does_not_step_shows_no_balance(walk):
+    still = replace(walk, rotations=walk.rotations[:1].repeat(60, 0), root=walk.root[:1].repeat(60, 0))
+    assert balance(still) is None
+
+
+@pytest.mark.shared
+@pytest.mark.parametrize("name", ["07_01", "16_11", "105_16", "105_03"])
+@pytest.mark.parametrize("degrees", [-8.0, 8.0])
+def test_a_captured_walk_tilted_to_the_side_is_refused(shared, make, name, degrees):
+    clip, _ = make(shared / f"mocap/cmu/{name}.bvh")
+    ahead = clip.root[-1] - clip.root[0]
+    assert tilt(clip) is None
+    assert tilt(turned(clip, ahead / np.linalg.norm(ahead), degrees)) == pytest.approx(8.0, abs=2.5)
 
 
 def test_a_trunk_that_leans_aside_is_no_tilt(walk):

@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from hobble.core import quat
 from hobble.core.bvh import write_bvh
 from hobble.core.clip import Clip
 from hobble.core.errors import InputError
@@ -18,11 +19,12 @@ from hobble.motion.options import ClipMotion
 from hobble.motion.read import read_bvh
 from hobble.motion.rig import load_skeleton
 from tests.motion.other_rigs import PLAIN, rigged
-from tests.motion.scramble import outcome
+from tests.motion.scramble import compare, outcome
 
 SKELETONS = Path(__file__).parents[2] / "config/skeletons"
 STYLES = ("walk_normal_001", "walk_old_001", "dash_angry_001", "walk-back_tired_001", "walk-left_happy_001")
 PATIENTS = ("A1_Cycle1", "A11_Cycle2", "B1_Cycle1", "D4_Cycle2")
+X = np.array([1.0, 0.0, 0.0])
 LIMBS = {"arm": ("shoulder", "elbow", "wrist"), "leg": ("hip", "knee", "heel")}
 
 
@@ -147,3 +149,61 @@ def test_feet_that_were_animated_are_as_steep_in_a_run_as_in_a_walk(shared, make
             x, y, z = rest[role(f"{side}_toe")] - rest[role(f"{side}_heel")]
             assert np.degrees(np.arctan2(-y, np.hypot(x, z))) == pytest.approx(39.6, abs=0.5), (name, side)
         assert source.unsure == []
+
+
+@pytest.fixture(scope="module")
+def standing(holden31) -> Clip:
+    """Five seconds on both feet."""
+    still = np.broadcast_to(quat.IDENTITY, (300, len(holden31.joints), 4)).copy()
+    return Clip("stands", holden31, 60.0, still, np.tile([0.0, 95.5, 0.0], (300, 1)))
+
+
+def bent(clip: Clip, joints: tuple[str, ...], angles: np.ndarray) -> Clip:
+    """The clip with joints bent forward by angles (F,), radians."""
+    rotations = clip.rotations.copy()
+    for name in joints:
+        rotations[:, clip.skeleton.index(name)] = quat.from_axis_angle(X, angles)
+    return replace(clip, rotations=rotations)
+
+
+def rewritten(clip: Clip, rest: str, tmp_path, make) -> tuple[Clip, Clip, dict[str, str], dict]:
+    """Results for the clip and for the clip on another rig, the joints' names there, and its report."""
+    rig = PLAIN.replace("spine|hips|Spine", "low|hips|LowerBack\nspine|low|Spine")
+    other, names = rigged(clip, rig, rest=rest)
+    write_bvh(tmp_path / "plain.bvh", clip, decimals=6)
+    write_bvh(tmp_path / "other.bvh", other, decimals=8)
+    made, report = make(tmp_path / "other.bvh")
+    return make(tmp_path / "plain.bvh")[0], made, names, report
+
+
+@pytest.mark.parametrize("rest", ["own", "a pose", "one axis", "twisted"])
+def test_a_bow_does_not_tilt_the_pelvis(standing, tmp_path, make, rest):
+    bow = bent(standing, ("LowerBack", "Spine"), 0.7 * (1 - np.cos(np.arange(300) / 30)) / 2)
+    first, second, names, _ = rewritten(bow, rest, tmp_path, make)
+    assert compare(first, second, names).mean() < 0.7
+
+
+def squat(clip: Clip, tiptoe: float) -> Clip:
+    """A squat in one place, the trunk bent forward, the heels raised by an angle."""
+    depth = 0.9 + 0.1 * np.sin(np.arange(300) / 20)
+    out = bent(clip, ("LowerBack", "Spine"), 0.4 + 0 * depth)
+    for joint, angle in (("UpLeg", -depth), ("Leg", 2 * depth), ("Foot", tiptoe - depth)):
+        out = bent(out, (f"Left{joint}", f"Right{joint}"), angle)
+    low = out.positions[:, clip.skeleton.role("left_toe"), 1]
+    return replace(out, root=out.root - np.outer(low - 2.0, [0.0, 1.0, 0.0]))
+
+
+def test_in_a_squat_the_zero_pose_shows_the_pelvis(standing, tmp_path, make):
+    first, second, names, report = rewritten(squat(standing, 0.5), "own", tmp_path, make)
+    assert compare(first, second, names).mean() < 0.1
+    assert report["unsure"] == []
+
+
+def test_a_squat_on_a_rig_without_a_standing_zero_pose_is_noted(standing, tmp_path, make):
+    *_, report = rewritten(squat(standing, 0.0), "one axis", tmp_path, make)
+    assert "never upright" in " ".join(report["unsure"])
+
+
+def test_a_squat_on_tiptoe_without_a_standing_zero_pose_is_refused(standing, tmp_path, make):
+    with pytest.raises(InputError, match="squats, perhaps on tiptoe"):
+        rewritten(squat(standing, 0.5), "one axis", tmp_path, make)

@@ -6,6 +6,7 @@ import fcntl
 import hashlib
 import importlib.util
 import sys
+from collections.abc import Iterator
 from pathlib import Path
 from types import ModuleType
 from typing import Any
@@ -18,7 +19,7 @@ from hobble.models.load import load_network
 from hobble.models.network import Network
 from hobble.report.bundle import WEB, bundle, install
 from hobble.report.captured_and_predicted import comparisons
-from hobble.report.gather import Material, gather
+from hobble.report.gather import ReportMaterial, gather
 from hobble.report.opening_walk import opening_walk
 from hobble.report.page import render
 from hobble.report.playable import playable
@@ -68,12 +69,12 @@ def inputs(
 
 
 @pytest.fixture(scope="session")
-def material(inputs: dict[str, Any]) -> Material:
+def material(inputs: dict[str, Any]) -> ReportMaterial:
     return gather(**inputs["gather"])
 
 
 @pytest.fixture(scope="session")
-def play(inputs: dict[str, Any], material: Material) -> dict[str, Any]:
+def play(inputs: dict[str, Any], material: ReportMaterial) -> dict[str, Any]:
     return scenes(inputs["scenarios"], material.network["skeleton"], material.network["channels"])
 
 
@@ -90,7 +91,7 @@ def character(network: Network, examples: ModuleType) -> dict[str, Any]:
 
 @pytest.fixture(scope="session")
 def hero(
-    network: Network, character: dict[str, Any], material: Material, examples: ModuleType
+    network: Network, character: dict[str, Any], material: ReportMaterial, examples: ModuleType
 ) -> dict[str, Any]:
     """The figures at the top of the page."""
     return opening_walk(network, examples.RUNTIME, character, material.measured.values())
@@ -134,7 +135,7 @@ def script(modules: Path | None, tmp_path_factory: pytest.TempPathFactory) -> st
 
 @pytest.fixture(scope="session")
 def page(
-    material: Material,
+    material: ReportMaterial,
     play: dict[str, Any],
     character: dict[str, Any],
     compared: dict[str, Any],
@@ -143,3 +144,9 @@ def page(
 ) -> str:
     """The report of the examples."""
     return render(material, play, character, compared, script, hero)
+
+
+@pytest.fixture(scope="module")
+def tab(page: str, tools: ModuleType, tmp_path_factory: pytest.TempPathFactory) -> Iterator[Any]:
+    """The example's page, open in a browser."""
+    yield from tools.opened(page, tmp_path_factory.mktemp("play"))

@@ -147,3 +147,8 @@ def rows(path: Path, skeleton: Skeleton, frames: int = 200, links: bool = True) 
         ),
     )
     return str(path)
+
+
+def hills(x: Any, z: Any) -> Any:
+    """The ground that is called "rolling" in the page."""
+    return 14 * np.sin(x / 170) * np.cos(z / 140) + 8 * np.sin((x + z) / 260)

@@ -3,14 +3,12 @@
 from __future__ import annotations
 
 import itertools
-from collections.abc import Iterator
 from pathlib import Path
-from types import ModuleType
 from typing import Any
 
 import pytest
 
-from hobble.report.gather import Material
+from hobble.report.gather import ReportMaterial
 
 INK = """(() => {{
   const canvas = document.getElementById("{0}"), copy = document.createElement("canvas");
@@ -22,12 +20,6 @@ INK = """(() => {{
   for (let i = 3; i < pixels.length; i += 4) sum += pixels[i] > 0;
   return sum / (copy.width * copy.height);
 }})()"""
-
-
-@pytest.fixture(scope="module")
-def tab(page: str, tools: ModuleType, tmp_path_factory: pytest.TempPathFactory) -> Iterator[Any]:
-    """The page, opened in a browser. Each test leaves it in a usable state for the next."""
-    yield from tools.opened(page, tmp_path_factory.mktemp("browser"))
 
 
 def show(tab: Any, what: str) -> None:
@@ -139,7 +131,7 @@ def test_a_point_about_a_clip_opens_it_where_it_is_worst(tab: Any) -> None:
     assert tab.run("Hobble.openClip('none of these')") is False
 
 
-def test_choosers_change_their_pictures(tab: Any, material: Material) -> None:
+def test_choosers_change_their_pictures(tab: Any, material: ReportMaterial) -> None:
     choose(tab, "sweeps-choice", 2)
     drawn = "document.querySelector('[data-chart=\"sweep-speed\"]').data[0].y[0]"
     assert tab.run(drawn) == pytest.approx(material.measured["injury"]["rows"][22]["speed"])
@@ -147,7 +139,7 @@ def test_choosers_change_their_pictures(tab: Any, material: Material) -> None:
     assert "left thigh" in text(tab, "strip")
 
 
-def test_tables_sort_and_become_csv(tab: Any, material: Material) -> None:
+def test_tables_sort_and_become_csv(tab: Any, material: ReportMaterial) -> None:
     table = "document.querySelector('table[data-csv=\"example-accuracy\"]')"
     ranked = [
         row["clip"] for row in sorted(material.measured["accuracy"]["clips"], key=lambda row: row["mean"])

@@ -21,13 +21,13 @@ from hobble.models.load import load_network
 from hobble.report import compare_sections as parts
 from hobble.report import compare_tables as tables
 from hobble.report.compare_page import render_compared
-from hobble.report.gather import PUBLISHED, Material
+from hobble.report.gather import PUBLISHED, ReportMaterial
 from hobble.report.playable import playable
 from hobble.report.rounded_weights import rounded
 
 
 @pytest.fixture(scope="module")
-def compared(material: Material) -> dict[str, Any]:
+def compared(material: ReportMaterial) -> dict[str, Any]:
     """Two configurations: the example, and one with half of its error and twice its time."""
     resolved = {
         "configuration": {
@@ -112,7 +112,7 @@ def test_boxes_are_at_the_quantiles_with_published_means(compared: dict[str, Any
 
 
 def test_training_is_drawn_over_passes_seconds_and_samples(
-    compared: dict[str, Any], material: Material
+    compared: dict[str, Any], material: ReportMaterial
 ) -> None:
     chart = parts.training_curves(compared)
     assert chart is not None
@@ -152,7 +152,7 @@ def test_published_figures_are_shown_with_ours(compared: dict[str, Any]) -> None
 
 
 def test_frame_times_are_medians_and_measures_have_names(
-    compared: dict[str, Any], material: Material
+    compared: dict[str, Any], material: ReportMaterial
 ) -> None:
     median = material.measured["responsivity"]["milliseconds"]["spread"]["median"]
     table = tables.configuration_table(compared)

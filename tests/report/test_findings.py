@@ -9,22 +9,22 @@ import pytest
 from hobble.measures.responsivity.page import track_figures
 from hobble.report.coverage import TURNS
 from hobble.report.findings import hints, key_figures
-from hobble.report.gather import Material
+from hobble.report.gather import ReportMaterial
 
 
-def changed(material: Material, **changes: Any) -> Material:
+def changed(material: ReportMaterial, **changes: Any) -> ReportMaterial:
     """The material with other measurements, or with other fields."""
     fields = {key: value for key, value in changes.items() if hasattr(material, key)}
     found = {key: value for key, value in changes.items() if key not in fields}
     return replace(material, measured={**material.measured, **found}, **fields)
 
 
-def heads(material: Material, **changes: Any) -> dict[str, str]:
+def heads(material: ReportMaterial, **changes: Any) -> dict[str, str]:
     """Title of each hint -> its kind."""
     return {hint.head: hint.kind for hint in hints(changed(material, **changes))}
 
 
-def accuracy(material: Material, held_out: float | None, train: float = 0.04) -> dict[str, Any]:
+def accuracy(material: ReportMaterial, held_out: float | None, train: float = 0.04) -> dict[str, Any]:
     return {**material.measured["accuracy"], "train": {"mean": train}, "held_out": {"mean": held_out}}
 
 
@@ -43,17 +43,17 @@ def history(losses: list[float]) -> dict[str, list[float | None]]:
     [(0.1, "warn", "2.5 times the"), (0.041, "good", "does not overfit"), (0.052, "fact", "1.30 times")],
 )
 def test_the_gap_to_held_out_clips_gives_the_right_hint(
-    material: Material, held_out: float, kind: str, words: str
+    material: ReportMaterial, held_out: float, kind: str, words: str
 ) -> None:
     found = heads(material, accuracy=accuracy(material, held_out))
     assert [k for head, k in found.items() if words in head] == [kind]
 
 
-def test_missing_held_out_clips_get_a_warning(material: Material) -> None:
+def test_missing_held_out_clips_get_a_warning(material: ReportMaterial) -> None:
     assert heads(material, accuracy=accuracy(material, None))["No clips were held out."] == "warn"
 
 
-def test_a_rising_falling_or_flat_curve_gives_the_right_hint(material: Material) -> None:
+def test_a_rising_falling_or_flat_curve_gives_the_right_hint(material: ReportMaterial) -> None:
     rising = history([1.0, 0.5, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8])
     assert "The held-out error was lowest in pass 2 and has risen since." in heads(material, history=rising)
     falling = history([1.0, 0.9, 0.8, 0.7, 0.6, 0.5, 0.4, 0.3])
@@ -71,7 +71,7 @@ def test_a_rising_falling_or_flat_curve_gives_the_right_hint(material: Material)
 
 
 @pytest.mark.parametrize("losses", [[0.3] * 8, [1.0, 0.9, 0.8, 0.7, 0.6, 0.5, 0.4, 0.3]])
-def test_only_one_hint_advises_on_more_passes(material: Material, losses: list[float]) -> None:
+def test_only_one_hint_advises_on_more_passes(material: ReportMaterial, losses: list[float]) -> None:
     """The advice to train longer depends on the curve.
 
     A small gap to the held-out clips is about the network's size.
@@ -82,7 +82,7 @@ def test_only_one_hint_advises_on_more_passes(material: Material, losses: list[f
     assert said[0].startswith("More passes ")
 
 
-def test_missed_waypoints_flips_and_ineffective_links_are_reported(material: Material) -> None:
+def test_missed_waypoints_flips_and_ineffective_links_are_reported(material: ReportMaterial) -> None:
     missed = {**material.measured["responsivity"], "largest_turn_degrees": 175.0}
     found = heads(material, responsivity=missed)
     assert found["The character reached 113 of 114 waypoints."] == "warn"
@@ -96,7 +96,7 @@ def swept(link: str, trained: bool, pose: float, left: float, rho: float = 1.0) 
     return {"gait": "walk", "link": link, "trained": trained, **measures}
 
 
-def test_links_never_hurt_in_training_only_show_the_drift_of_the_walk(material: Material) -> None:
+def test_links_never_hurt_in_training_only_show_the_drift_of_the_walk(material: ReportMaterial) -> None:
     drift = swept("never", False, 10.0, 7.0)
     like_it = {"responses": [drift, swept("hurt", True, 11.0, 6.5, 0.3)]}
     found = heads(material, injury=like_it)
@@ -112,7 +112,7 @@ def test_links_never_hurt_in_training_only_show_the_drift_of_the_walk(material: 
     assert texts[head] == "Severity 10 of it changes the walk by 11.0 cm per joint."
 
 
-def test_the_time_of_a_frame_is_a_median(material: Material) -> None:
+def test_the_time_of_a_frame_is_a_median(material: ReportMaterial) -> None:
     times = {"predict": 0.17, "total": 0.17, "spread": {"median": 0.025, "p99": 0.163}}
     slow = changed(
         material, name="holden", responsivity={**material.measured["responsivity"], "milliseconds": times}
@@ -126,7 +126,7 @@ def test_the_time_of_a_frame_is_a_median(material: Material) -> None:
     )
 
 
-def test_problems_come_first_and_data_comes_before_training(material: Material) -> None:
+def test_problems_come_first_and_data_comes_before_training(material: ReportMaterial) -> None:
     falling = history([1.0, 0.9, 0.8, 0.7, 0.6, 0.5, 0.4, 0.3])
     found = hints(changed(material, history=falling))
     kinds = [hint.kind for hint in found]
@@ -139,7 +139,7 @@ def test_problems_come_first_and_data_comes_before_training(material: Material) 
     assert found[-1].head.endswith("of the time.")
 
 
-def test_a_limited_turn_is_reported(material: Material) -> None:
+def test_a_limited_turn_is_reported(material: ReportMaterial) -> None:
     lap = material.measured["responsivity"]
     limited = {**lap, "largest_turn_degrees": 25.0, "predicted_turn_degrees": 170.0, "turns_held_back": 3}
     assert heads(material, responsivity=limited)[
@@ -151,21 +151,21 @@ def test_a_limited_turn_is_reported(material: Material) -> None:
     assert "largest turn drawn: 25.0°" in figure.note
 
 
-def test_errors_of_the_prediction_and_of_the_drawn_pose_are_shown(material: Material) -> None:
+def test_errors_of_the_prediction_and_of_the_drawn_pose_are_shown(material: ReportMaterial) -> None:
     one = {"length": 1, "held_out": {"position_error_cm": 0.51}, "train": {"position_error_cm": 0.4}}
     found = changed(material, rollouts={"lengths": [one]})
     figure = next(f for f in key_figures(found) if f.label == "Error on held-out clips")
     assert "cm per joint as predicted; 0.510 cm as drawn" in figure.note
 
 
-def test_key_figures_show_the_published_values(material: Material) -> None:
+def test_key_figures_show_the_published_values(material: ReportMaterial) -> None:
     figures = {f.label: f for f in key_figures(changed(material, name="holden"))}
     assert "published for HOLDEN: 4.39 %" in figures["Error on held-out clips"].note
     assert "published mean 0.376 ms" in figures["Time per frame"].note
     assert figures["Network"].note.startswith("parameters per phase; layers of 372–16–16–311")
 
 
-def test_key_figures_without_results(material: Material) -> None:
+def test_key_figures_without_results(material: ReportMaterial) -> None:
     bare = changed(
         material, accuracy={}, responsivity={}, injury={}, pipeline={}, history={}, motion=[], labels=[]
     )
@@ -173,7 +173,7 @@ def test_key_figures_without_results(material: Material) -> None:
     assert [hint.head for hint in hints(bare)] == ["No clips were held out."]
 
 
-def test_missing_data_comes_before_longer_training(material: Material) -> None:
+def test_missing_data_comes_before_longer_training(material: ReportMaterial) -> None:
     """If nobody stands in the clips and the error still falls, the hint on the clips comes first."""
     labels = [{"clip": "a", "seconds": {"walk": 30.0}, "curves": {}}]
     falling = history([0.5 * 0.9**k for k in range(20)])
@@ -185,7 +185,7 @@ def test_missing_data_comes_before_longer_training(material: Material) -> None:
     assert not any("Nobody stands" in head for head in heads(material, labels=standing, history=falling))
 
 
-def test_clips_without_turns_are_reported(material: Material) -> None:
+def test_clips_without_turns_are_reported(material: ReportMaterial) -> None:
     """A hundred seconds straight on, and some that turn by 50 degrees a second."""
     middles = (TURNS[:-1] + TURNS[1:]) / 2
 

@@ -12,11 +12,11 @@ import pytest
 
 from hobble.core.skeleton import Skeleton
 from hobble.report import coverage, data_section, shown_clips
-from hobble.report.gather import Material
+from hobble.report.gather import ReportMaterial
 from hobble.report.page import render
 
 
-def of_many(material: Material, copies: int) -> Material:
+def of_many(material: ReportMaterial, copies: int) -> ReportMaterial:
     """The same data set with `copies` copies of each clip under other names."""
 
     def copied(reports: list[dict]) -> list[dict]:
@@ -27,11 +27,11 @@ def of_many(material: Material, copies: int) -> Material:
     return replace(material, splits=splits, **many)
 
 
-def test_few_clips_are_all_shown(material: Material) -> None:
+def test_few_clips_are_all_shown(material: ReportMaterial) -> None:
     assert shown_clips.shown(material) == {report["clip"] for report in material.labels}
 
 
-def test_every_kind_of_clip_is_shown(material: Material) -> None:
+def test_every_kind_of_clip_is_shown(material: ReportMaterial) -> None:
     many = of_many(material, 50)
     some = shown_clips.shown(many, most=40)
     assert len(some) == 40
@@ -45,7 +45,9 @@ def test_every_kind_of_clip_is_shown(material: Material) -> None:
     assert len(shown_clips.shown(replace(many, labels=[*many.labels, more]), most=40) - some) <= 1
 
 
-def test_the_page_does_not_grow_with_the_clips(material: Material, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_the_page_does_not_grow_with_the_clips(
+    material: ReportMaterial, monkeypatch: pytest.MonkeyPatch
+) -> None:
     """With smaller limits, so that a test need not make hundreds of clips."""
     choose = shown_clips.shown
     monkeypatch.setattr(data_section, "MOST_BARS", 20)
@@ -87,7 +89,7 @@ def test_seconds_are_estimated_from_random_excerpts_of_clips(
     assert few["estimate"] == " Estimated from 4 of 8 clips and 75 % of their frames."
 
 
-def test_many_remarks_are_grouped_by_kind(material: Material, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_many_remarks_are_grouped_by_kind(material: ReportMaterial, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(data_section, "MOST_REMARKS", 3)
     sentences = ["frames 1-3 held", "frames 20-31 held", "frames 4-5 held", "no foot down for 2.5 s"]
     motion = [{**material.motion[0], "clip": f"c{i}", "repairs": [s]} for i, s in enumerate(sentences)]

@@ -11,7 +11,7 @@ import pytest
 
 from hobble.core.skeleton import Skeleton
 from hobble.report import templates
-from hobble.report.gather import Material, gather
+from hobble.report.gather import ReportMaterial, gather
 from hobble.report.page import render
 
 SECTIONS = [
@@ -102,13 +102,13 @@ def test_ids_are_unique_and_controls_are_labelled(outline: Outline) -> None:
     assert labels <= set(ids)
 
 
-def test_cells_of_tables_hold_unrounded_numbers(page: str, material: Material) -> None:
+def test_cells_of_tables_hold_unrounded_numbers(page: str, material: ReportMaterial) -> None:
     row = material.measured["accuracy"]["clips"][0]
     assert f'data-v="{row["mean"]}"' in page
 
 
 def test_equal_inputs_give_equal_pages(
-    material: Material,
+    material: ReportMaterial,
     play: dict[str, Any],
     character: dict[str, Any],
     compared: dict[str, Any],
@@ -152,6 +152,6 @@ def test_a_network_without_injuries_has_a_page(
     assert 'id="play"' not in text
 
 
-def test_our_scripts_cannot_end_their_element(material: Material) -> None:
+def test_our_scripts_cannot_end_their_element(material: ReportMaterial) -> None:
     with pytest.raises(ValueError, match="bundle"):
         render(material, bundle="'</SCRIPT>'")

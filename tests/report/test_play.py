@@ -1,10 +1,8 @@
-"""The network in the page gives the same numbers as in Python, and keys, clicks and buttons work."""
+"""Play in the page: keys, clicks, buttons, addresses and the camera work."""
 
 from __future__ import annotations
 
-import base64
 import json
-from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
 from types import ModuleType
@@ -12,127 +10,13 @@ from typing import Any
 
 import numpy as np
 import pytest
-import yaml
 
-from hobble.channels.injury.shown import PARTS, body_parts
-from hobble.core import quat
 from hobble.core.skeleton import Skeleton, forward_kinematics
-from hobble.figure.mesh import body
-from hobble.models.load import load_network
 from hobble.models.network import Network
 from hobble.motion.decode import decode, frame_rate
 from hobble.motion.read import read_bvh
-from hobble.report import opening_walk, straight_walk
-from hobble.report.formats import embedded
-from hobble.report.playable import playable
 from hobble.runtime.animation import ProceduralAnimation
-from hobble.runtime.export import jointed
-
-FRAMES = 120
-
-
-def test_parts_are_the_links_of_their_roles(holden31: Skeleton) -> None:
-    names = {label: holden31.link_names[i] for label, i in body_parts(holden31, holden31.link_names).items()}
-    assert names["left thigh"] == "LeftUpLeg-LeftLeg"
-    assert names["right foot"] == "RightFoot-RightToeBase"
-    assert names["lower back"] == "Hips-LowerBack"
-    assert set(names) == {label for label, *_ in PARTS}
-    assert body_parts(holden31, ()) == {}
-    links = holden31.link_names
-    back = body_parts(holden31, links, {"LowerBack-Spine", "Spine1-Neck"})["lower back"]
-    assert links[back] == "LowerBack-Spine", "the one that was hurt in training"
-
-
-def test_weights_are_kept_to_a_part_in_sixty_thousand(network: Network, character: dict[str, Any]) -> None:
-    layer, kept = character["network"]["layers"][0], network.weights[0][:, :, character["inputColumns"]]
-    integers = np.frombuffer(base64.b64decode(layer["weights"]), "<i2").reshape(kept.shape)
-    scale = np.frombuffer(base64.b64decode(layer["scale"]), "<f4").reshape(kept.shape[:2])
-    error = np.abs(integers * scale[..., None] - kept)
-    assert np.all(error <= 0.501 * scale[..., None])
-    turning = character["turning"]
-    assert character["network"]["layers"][-1]["rows"] == network.layout.y_joint_rotation.start + 3 * len(
-        turning
-    )
-
-
-def test_inputs_without_effect_are_left_out(examples: ModuleType, holden31: Skeleton, tmp_path: Path) -> None:
-    examples.weights(tmp_path / "weights.npz", holden31)
-    network = load_network(tmp_path / "weights.npz")
-    x_std = network.x_std.copy()
-    unread = network.layout.x_joint_position.start + 3 * holden31.index("LThumb")
-    x_std[unread] *= 1e10
-    read = playable(replace(network, x_std=x_std), examples.RUNTIME)["inputColumns"]
-    assert sorted(set(range(network.layout.x_size)) - set(read)) == [unread]
-
-
-def target_at(frame: int) -> dict[str, Any]:
-    """The target in each frame: walk ahead, turn, strafe, stop, turn on the spot, crouch; hurt in the last
-    two thirds.
-    """
-    angle = 0.03 * max(0, frame - 20)
-    velocity, facing, gait = [2.5 * np.sin(angle), 2.5 * np.cos(angle)], None, "walk"
-    if 40 <= frame < 60:
-        facing = [0.0, 1.0]
-    if 60 <= frame < 90:
-        velocity, facing, gait = [0.0, 0.0], [1.0, 0.2], None
-    if frame >= 90:
-        velocity, gait = [2.0, 0.0], "crouch"
-    return {"velocity": velocity, "facing": facing, "gait": gait, "hurt": frame >= 40}
-
-
-def hills(x: Any, z: Any) -> Any:
-    """The ground that is called "rolling" in the page."""
-    return 14 * np.sin(x / 170) * np.cos(z / 140) + 8 * np.sin((x + z) / 260)
-
-
-@pytest.fixture(scope="module")
-def tab(page: str, tools: ModuleType, tmp_path_factory: pytest.TempPathFactory) -> Iterator[Any]:
-    yield from tools.opened(page, tmp_path_factory.mktemp("play"))
-
-
-def test_the_page_moves_as_python_does(
-    tab: Any, network: Network, character: dict[str, Any], examples: ModuleType
-) -> None:
-    animation = ProceduralAnimation(network, storage="int16", **dict(examples.RUNTIME))
-    expected = []
-    for frame in range(FRAMES):
-        target = target_at(frame)
-        injury = {"LeftUpLeg-LeftLeg": 7.0, "Hips-LowerBack": 3.0} if target["hurt"] else None
-        pose = animation.next_pose(
-            target["velocity"], target["facing"], target["gait"], injury=injury, terrain=hills
-        )
-        world, places = jointed(network.skeleton, pose.positions[None], pose.rotations[None])
-        expected.append(
-            (pose.positions, pose.phase, pose.channels["injury"], pose.rotations, places[0], world[0])
-        )
-    links = network.channels["injury"]
-    script = f"""(() => {{
-      const spec = Hobble.material.playable.example, c = Hobble.character(spec), rig = Hobble.rig(spec);
-      const hills = (x, z) => 14 * Math.sin(x / 170) * Math.cos(z / 140) + 8 * Math.sin((x + z) / 260);
-      const targets = {json.dumps([target_at(f) for f in range(FRAMES)])};
-      return targets.map(({{ velocity, facing, gait, hurt }}) => {{
-        if (hurt) {{
-          c.channelTargets[{links.index("LeftUpLeg-LeftLeg")}] = 7;
-          c.channelTargets[{links.index("Hips-LowerBack")}] = 3;
-        }}
-        c.frame(velocity, facing, gait, hills);
-        rig.take(c.posePosition, c.poseRotation);
-        const made = [c.posePosition, c.phase, c.channelValues, c.poseRotation, rig.places, rig.turns];
-        return made.map((v) => (v.length ? Array.from(v) : v));
-      }});
-    }})()"""
-    found, turning = tab.run(script), character["turning"]
-    for frame, ((positions, phase, severity, turns, places, world), (x, p, s, q, at, w)) in enumerate(
-        zip(expected, found, strict=True)
-    ):
-        assert np.abs(np.reshape(x, (-1, 3)) - positions).max() < 1e-3, frame
-        assert np.degrees(quat.angle(np.reshape(q, (-1, 4)), turns))[turning].max() < 0.01, frame
-        assert np.abs(np.reshape(at, (-1, 3)) - places)[turning].max() < 1e-2, frame
-        assert np.degrees(quat.angle(np.reshape(w, (-1, 4)), world))[turning].max() < 0.02, frame
-        assert abs(p - phase) < 1e-6
-        np.testing.assert_allclose(s, severity, atol=1e-9)
-    travelled = np.linalg.norm(expected[-1][0][0] - expected[0][0][0])
-    assert travelled > 50, "the example should go somewhere"
+from tests.report.example_motion import hills
 
 
 def show(tab: Any) -> None:
@@ -167,25 +51,6 @@ def test_the_top_of_the_page_shows_a_hurt_and_a_healthy_figure(tab: Any) -> None
     assert max(tab.run(f"{of}({hero}.ghost)")) == 0.0
     tab.press("Home")
     assert "at 0 they walk alike." in tab.run(line)
-
-
-def test_the_figures_at_the_top_move_as_the_python_runtime_does(
-    tab: Any, network: Network, examples: ModuleType, character: dict[str, Any], hero: dict[str, Any]
-) -> None:
-    """The page has their states at the moment when it opens. Both go on alike for half a second."""
-    (one,) = [c for c in character["channels"] if c["name"] == "injury"]
-    column = one["columns"][one["sliders"][hero["part"]]]
-    for i, values in enumerate(({column: 7.0}, {})):
-        animation = ProceduralAnimation(network, **dict(examples.RUNTIME))
-        for _ in range(opening_walk.FRAMES + 30):
-            pose = animation.next_pose(straight_walk.AHEAD, None, "walk", injury=values)
-        seen = tab.run(f"""(() => {{
-          const c = Hobble.character(Hobble.material.playable.example);
-          c.follow(Hobble.material.hero.walked[{i}]);
-          for (let f = 0; f < 30; f++) c.frame({json.dumps(straight_walk.AHEAD)}, null, "walk", () => 0);
-          return Array.from(c.posePosition);
-        }})()""")
-        np.testing.assert_allclose(np.reshape(seen, (-1, 3)), pose.positions, atol=0.05)
 
 
 def test_keys_move_the_figure(tab: Any) -> None:
@@ -310,25 +175,6 @@ def test_presets_set_the_sliders_and_the_address(tab: Any) -> None:
     tab.run("Hobble.player.steering.toggle('crouch', false)")
 
 
-def test_the_page_moves_the_body_as_python_does(tab: Any, holden31: Skeleton) -> None:
-    """Corners of the body for random rotations of the bones, equal to a tenth, because the page stores
-    integers.
-    """
-    mesh, rng = body(holden31), np.random.default_rng(3)
-    places = mesh.positions + rng.normal(0, 2, mesh.positions.shape)
-    turns = quat.normalize(mesh.rotations + rng.normal(0, 0.2, mesh.rotations.shape))
-    script = f"""(() => {{
-      const {{ figure }} = Hobble.player.actors[0];
-      figure.places.set({places.ravel().tolist()});
-      figure.turns.set({turns.ravel().tolist()});
-      figure.pose(() => [1, 2, 3]);
-      return Array.from(figure.corners());
-    }})()"""
-    found = np.reshape(tab.run(script), (-1, 3))
-    assert np.abs(found - mesh.posed(places, turns)).max() < 0.3
-    assert np.abs(found - mesh.posed(places, turns)).mean() < 0.03
-
-
 def test_the_saved_bvh_is_the_motion_that_was_played(
     tab: Any, character: dict[str, Any], examples: ModuleType, holden31: Skeleton, tmp_path: Path
 ) -> None:
@@ -436,31 +282,6 @@ def test_the_camera_turns_behind_the_figure_at_any_frame_rate(tab: Any) -> None:
     assert 0 < slow[1] < 40
 
 
-def test_the_gait_lab_measures_steps_and_knees(tab: Any, examples: ModuleType, holden31: Skeleton) -> None:
-    made = examples.walker(holden31, 180, 2.2)
-    legs = [
-        [holden31.role(f"{side}_{part}") for part in ("hip", "knee", "heel", "toe")]
-        for side in ("left", "right")
-    ]
-    places = np.round(made["positions"], 4).reshape(180, -1).tolist()
-    down = (made["contacts"][:, ::2] > 0.5).tolist()
-    found = tab.run(f"""(() => {{
-      const lab = Hobble.lab({json.dumps(legs)}), down = {json.dumps(down)};
-      {json.dumps(places)}.forEach((at, f) => lab.add(at, down[f]));
-      return [lab.knees, lab.steps, lab.stance];
-    }})()""")
-    for f, (hip, knee, heel, _) in enumerate(legs):
-        a, b = (made["positions"][:, j] - made["positions"][:, i] for i, j in ((hip, knee), (knee, heel)))
-        cosine = (a * b).sum(-1) / np.linalg.norm(a, axis=-1) / np.linalg.norm(b, axis=-1)
-        assert found[0][f] == pytest.approx(np.degrees(np.arccos(np.clip(cosine, -1, 1))), abs=0.2)
-        lands = 1 + np.flatnonzero(np.diff(made["contacts"][:, 2 * f]) > 0.5)
-        other = np.flatnonzero(np.diff(made["contacts"][:, 2 - 2 * f], prepend=0) > 0.5)
-        at, before = lands[-1], other[other < lands[-1]][-1]
-        step = made["positions"][at, heel] - made["positions"][before, legs[1 - f][2]]
-        assert found[1][f] == pytest.approx(np.hypot(step[0], step[2]), abs=0.01)
-    assert found[2] == np.array(down).T.tolist()
-
-
 def test_the_saved_picture_has_a_sky(tab: Any) -> None:
     show(tab)
     least = """new Promise((done) => requestAnimationFrame(() => {
@@ -479,30 +300,3 @@ def test_the_saved_picture_has_a_sky(tab: Any) -> None:
 def test_playing_prints_no_console_message_and_makes_no_request(tab: Any) -> None:
     assert tab.console == []
     assert all(url.startswith(("file:", "data:", "blob:", "about:")) for url in tab.requests)
-
-
-def test_the_largest_network_leaves_room_in_the_page(
-    examples: ModuleType, root: Path, tmp_path: Path, page: str
-) -> None:
-    """With 191 joints, two layers of 512, plotly.js and everything else the page stays under 20 MB."""
-    data = yaml.safe_load((root / "config/skeletons/ava191.yaml").read_text())
-    skeleton = Skeleton.from_dict({"name": "ava191", **{k: v for k, v in data.items() if k != "maps"}})
-    examples.weights(tmp_path / "weights.npz", skeleton, units=512)
-    network = load_network(tmp_path / "weights.npz")
-    x_std = network.x_std.copy()
-    for block in (
-        network.layout.x_joint_position,
-        network.layout.x_joint_velocity,
-    ):  # as training weighs them
-        x_std[block].reshape(-1, 3)[[skeleton.index(name) for name in skeleton.unseen]] *= 1e10
-    spec = playable(replace(network, x_std=x_std), examples.RUNTIME)
-    assert len(embedded(spec)) < 13e6
-    assert len(page) < 6e6
-
-
-def test_a_network_without_links_can_still_be_played(
-    examples: ModuleType, holden31: Skeleton, tmp_path: Any
-) -> None:
-    examples.weights(tmp_path / "weights.npz", holden31, links=False)
-    spec = playable(load_network(tmp_path / "weights.npz"), examples.RUNTIME)
-    assert spec["channels"] == []

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Iterator
 from dataclasses import replace
 from types import ModuleType
 from typing import Any
@@ -19,11 +18,6 @@ from hobble.gait.people import people
 from hobble.gait.profile import profile
 from hobble.models.network import Network
 from hobble.report.pack_recogniser import healthy_walk, learnt, playable_with_recogniser, words
-
-
-@pytest.fixture(scope="module")
-def tab(page: str, tools: ModuleType, tmp_path_factory: pytest.TempPathFactory) -> Iterator[Any]:
-    yield from tools.opened(page, tmp_path_factory.mktemp("recogniser"))
 
 
 @pytest.fixture(scope="module")

@@ -8,15 +8,10 @@ from typing import Any
 import numpy as np
 import pytest
 
-from hobble.channels.injury.recognition.page import recognition_chart
-from hobble.channels.injury.response import page as injury_page
-from hobble.channels.injury.response import page_cases
 from hobble.core.errors import InputError
 from hobble.core.skeleton import Skeleton
 from hobble.evaluation.csv_tables import read_numbers
 from hobble.measures.accuracy import page as accuracy_page
-from hobble.measures.responsivity import lap_charts
-from hobble.measures.responsivity import page as responsivity_page
 from hobble.report import (
     cost_section,
     coverage,
@@ -25,15 +20,13 @@ from hobble.report import (
     terrain_section,
     training_section,
 )
-from hobble.report.charts import Chart, ChartGroup
-from hobble.report.gather import Material, describe_network
+from hobble.report.charts import Chart
+from hobble.report.gather import ReportMaterial, describe_network
 from hobble.report.ground_pictures import ground_pictures
-from hobble.report.page_parts import ChartPair
-from hobble.report.summary import KeyFigure
 from hobble.rows.clip_rows import load_clip_rows, save_clip_rows
 
 
-def test_sections_of_a_pass_are_spread_evenly_on_the_axis(material: Material) -> None:
+def test_sections_of_a_pass_are_spread_evenly_on_the_axis(material: ReportMaterial) -> None:
     x = training_section.passes_axis(material)
     assert (x[0], x[9], x[10], x[-1]) == (pytest.approx(0.1), 1.0, pytest.approx(1.1), 20.0)
 
@@ -53,7 +46,7 @@ def test_empty_cells_of_the_history_are_read_and_words_refused(tmp_path: Path) -
             read_numbers(path)
 
 
-def test_a_learning_curve_needs_no_held_out_clips(material: Material) -> None:
+def test_a_learning_curve_needs_no_held_out_clips(material: ReportMaterial) -> None:
     nothing = {**material.history, "held_out_mse": [None] * 200}
     chart = training_section.learning_curve(replace(material, history=nothing))
     assert [trace["name"] for trace in chart.traces] == ["training"]
@@ -66,7 +59,7 @@ def test_a_file_that_holds_no_weights_is_refused(tmp_path: Path) -> None:
         describe_network(path)
 
 
-def test_bars_show_every_clip_of_its_split(material: Material) -> None:
+def test_bars_show_every_clip_of_its_split(material: ReportMaterial) -> None:
     chart = accuracy_page.clip_bars(material.found("accuracy"), material)
     assert chart is not None
     bars = {trace["name"]: dict(zip(trace["y"], trace["x"], strict=True)) for trace in chart.traces}
@@ -77,13 +70,13 @@ def test_bars_show_every_clip_of_its_split(material: Material) -> None:
     assert set(chart.layout["yaxis"]["categoryarray"]) == set(bars["held out"]) | set(bars["training"])
 
 
-def test_boxes_only_where_there_are_quantiles(material: Material) -> None:
+def test_boxes_only_where_there_are_quantiles(material: ReportMaterial) -> None:
     assert accuracy_page.clip_boxes(material.found("accuracy")) is not None
     clips = [{k: v for k, v in row.items() if k != "p50"} for row in material.measured["accuracy"]["clips"]]
     assert accuracy_page.clip_boxes({"clips": clips}) is None
 
 
-def test_gait_seconds_add_up(material: Material) -> None:
+def test_gait_seconds_add_up(material: ReportMaterial) -> None:
     chart = data_section.gait_chart(material)
     assert chart is not None
     drawn = sum(sum(trace["y"]) for trace in chart.traces)
@@ -115,7 +108,7 @@ def test_turns_speeds_and_severities_are_counted_in_seconds(
     assert chart.traces[0]["z"][0][6] == pytest.approx(hurt, abs=0.02)
 
 
-def test_strips_show_the_injured_parts(material: Material) -> None:
+def test_strips_show_the_injured_parts(material: ReportMaterial) -> None:
     strips = {strip["clip"]: strip for strip in data_section.strips(material, shown_clips.shown(material))}
     assert len(strips) == 8, "a mirror says the same again"
     (row,) = strips["hurt_left_knee"]["status"]
@@ -124,7 +117,7 @@ def test_strips_show_the_injured_parts(material: Material) -> None:
     assert strips["jog"]["status"] == []
 
 
-def test_stages_are_listed_with_published_values_of_the_same_configuration(material: Material) -> None:
+def test_stages_are_listed_with_published_values_of_the_same_configuration(material: ReportMaterial) -> None:
     """A published time or size is shown only for its own configuration."""
     nothing, patches = [None, None], [1680, 606.0e6]
     known = {
@@ -143,72 +136,6 @@ def test_stages_are_listed_with_published_values_of_the_same_configuration(mater
         assert {row[0]: row[-2:] for row in table.rows} == {
             stage["stage"]: theirs.get(stage["stage"], nothing) for stage in material.pipeline["stages"]
         }
-
-
-def test_the_steps_of_a_frame_are_in_their_order(material: Material) -> None:
-    chart = lap_charts.lap_chart(material.found("responsivity"), material)
-    assert chart is not None
-    traces = next(iter(chart.options.values()))
-    assert [t["name"] for t in traces] == [
-        "prepare",
-        "input",
-        "insert",
-        "predict",
-        "output",
-        "update",
-        "median",
-    ]
-    times = material.measured["responsivity"]["laps"][0]["milliseconds"]
-    assert sum(trace["y"][0] for trace in traces[:-1]) == pytest.approx(times["total"])
-    assert traces[-1]["y"][0] == times["spread"]["median"]
-
-
-def test_a_row_of_the_table_of_laps_reads_as_a_sentence(material: Material) -> None:
-    table = responsivity_page.lap_table(material.found("responsivity"), "example")
-    assert table is not None
-    labels = [column.label for column in table.columns]
-    assert labels[:5] == ["lap", "finished", "waypoints reached", "seconds", "frames"]
-    assert not [label for label in labels if "_" in label]
-    assert [shown for *_, shown in table.cells[0][:5]] == ["1", "yes", "6", "113.3", "6,800"]
-    assert [shown for *_, shown in table.cells[3][:3]] == ["4", "no", "5"]
-
-
-def test_feet_with_little_contact_have_no_slide(material: Material) -> None:
-    def slide(steps: int) -> KeyFigure:
-        laps = [{**lap, "steps": steps} for lap in material.measured["responsivity"]["laps"][:2]]
-        found = {**material.measured["responsivity"], "laps": laps, "foot_slide_cm": 0.0}
-        figures = responsivity_page.track_figures(found)
-        return next(figure for figure in figures if figure.label == "Foot slide")
-
-    assert (slide(4).value, slide(4).unit) == ("–", "")
-    assert "8 steps" in slide(4).note
-    assert (slide(5).value, slide(5).unit) == ("0", "cm")
-
-
-def test_links_never_hurt_in_training_are_told_from_the_others(material: Material) -> None:
-    responses = [
-        {**r, "trained": r["link"].startswith("Left")} for r in material.measured["injury"]["responses"]
-    ]
-    rows = [
-        {"link": link, "severity": v, "jog_from_healthy_cm": 0.1 * v}
-        for link in {r["link"]: None for r in responses}
-        for v in (5.0, 10.0)
-    ]
-    injury = {**material.measured["injury"], "responses": responses, "into_a_jog": rows}
-    parts = [part.content for part in injury_page.section(injury, material).parts]
-    (curves,) = [content for content in parts if isinstance(content, ChartGroup)]
-    overview, (_, into_a_jog) = [content.charts for content in parts if isinstance(content, ChartPair)]
-    never = {"right shank", "lower back"}
-    for chart in overview:
-        hollow = [t for t in chart.traces if t["name"].endswith(", never hurt in training")]
-        assert [set(t["y"]) for t in hollow] == [never, never]
-        assert set(chart.layout["yaxis"]["categoryarray"][: len(never)]) == never
-    marked = [o.endswith("(never hurt in training)") for o in curves.charts[0].options]
-    assert marked == sorted(marked)
-    assert sum(marked) == 2 * len(never)
-    names = [trace["name"] for trace in into_a_jog.traces]
-    assert not never & set(names)
-    assert names[-1] == "never hurt in training"
 
 
 def test_ground_profiles_hold_the_present_height_under_the_root(tmp_path: Path) -> None:
@@ -231,7 +158,7 @@ def test_a_damaged_terrain_file_is_named(tmp_path: Path) -> None:
         terrain_section.read_fits(path)
 
 
-def test_flat_clips_have_no_ground_to_show(material: Material) -> None:
+def test_flat_clips_have_no_ground_to_show(material: ReportMaterial) -> None:
     section = terrain_section.section(material.terrain)
     assert len(section["table"].rows) == 6
     assert "hurt_back" not in section["charts"][0].options
@@ -250,51 +177,6 @@ def test_examples_are_seeded(examples: ModuleType, holden31: Any, tmp_path: Path
     for name in ("a", "b"):
         examples.scenarios(tmp_path / f"{name}.npz", holden31)
     assert (tmp_path / "a.npz").read_bytes() == (tmp_path / "b.npz").read_bytes()
-
-
-def test_confusions_are_shares_of_each_injury() -> None:
-    confusion = {"knee": {"knee": 3, "back": 1}, "back": {"knee": 0, "back": 2}}
-    part = {"confusion": confusion, "right": 5 / 6}
-    found = {"applies": True, "classes": ["knee", "back"], "chance": 0.5, "people": 0.82}
-    chart = recognition_chart({**found, "generated": part, "captured": {}})
-    assert chart is not None
-    assert list(chart.options) == ["generated walks, by window: 83 % right"]
-    (trace,) = next(iter(chart.options.values()))
-    assert trace["z"] == [[0.75, 0.25], [None, 1.0]]
-    assert "50 %" in chart.caption
-    assert "82 %" in chart.caption
-    assert recognition_chart({"applies": False}) is None
-
-
-def test_every_pair_of_injuries_is_drawn_as_it_is_measured() -> None:
-    rows = [
-        {"first": "a-b", "second": "c-d", "from_first_cm": 2.0, "share": 0.5, "from_second_cm": 1.0},
-        {"first": "c-d", "second": "a-b", "from_first_cm": 0.0, "share": None, "from_second_cm": 0.0},
-    ]
-    chart = page_cases.second_chart(rows)
-    assert chart is not None
-    far, share = (traces[0] for traces in chart.options.values())
-    assert (far["y"], far["x"], far["z"]) == (["a-b", "c-d"], ["c-d", "a-b"], [[2.0, None], [None, 0.0]])
-    assert share["z"] == [[0.5, None], [None, None]]
-    assert page_cases.second_chart([]) is None
-
-
-def test_runs_are_drawn_over_the_track_in_red_where_they_left_it() -> None:
-    track = {"x": [0.0, 10.0, 10.0], "z": [0.0, 0.0, 5.0], "gaits": ["walk", "jog", "crouch"]}
-    near = {"lap": 1, "x": [0.0, 5.0], "z": [0.0, 0.1], "off_cm": [0.0, 10.0]}
-    far = {"lap": 2, "x": [0.0, 5.0, 9.0], "z": [0.0, -2.0, 0.0], "off_cm": [0.0, 200.0, 3.0]}
-    chart = lap_charts.track_chart({"track": track, "runs": [near, far]})
-    assert chart is not None
-    by_name = {trace["name"]: trace for trace in chart.traces}
-    assert by_name["track"]["x"] == [0.0, 10.0, 10.0, 0.0], "it is closed"
-    assert by_name["waypoints"]["text"] == ["0, walk", "1, jog", "2, crouch"]
-    left = by_name["more than 100 cm off"]
-    assert (left["x"], left["y"], left["customdata"]) == ([5.0], [-2.0], [[200.0, 2]])
-    assert "The largest distance from the track was 200 cm" in chart.caption
-    kept = lap_charts.track_chart({"track": track, "runs": [near]})
-    assert kept is not None
-    assert "The largest distance from the track was 10 cm" in kept.caption
-    assert lap_charts.track_chart({"track": {"waypoints": 6}}) is None
 
 
 def test_each_clip_on_other_bones_has_one_bar_and_mirrors_none(material):

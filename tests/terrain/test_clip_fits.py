@@ -18,14 +18,8 @@ from hobble.terrain.cycle_ground import fit_cycle
 from hobble.terrain.heightmaps import heightmaps
 from hobble.terrain.options import HeightmapOptions
 from hobble.terrain.patches import Patches, draw_patches
-from hobble.terrain.soles import IS_HEEL, Feet, find_soles, heel_above_toe, held_above_other
-
-GROUNDS = {
-    "level": lambda x, z: np.zeros_like(z),
-    "slope": lambda x, z: 0.2 * z + 0.05 * x,
-    "waves": lambda x, z: 12 * np.sin(z / 70) + 5 * np.sin(x / 9),
-    "steps": lambda x, z: 15 * np.clip(np.floor(z / 60) % 6, 0, 4),
-}
+from hobble.terrain.soles import IS_HEEL, find_soles, heel_above_toe
+from tests.terrain.grounds import GROUNDS
 
 
 @pytest.mark.parametrize("kind", ["rocky", "jumpy", "beam"])
@@ -103,78 +97,6 @@ def test_left_heights_are_on_the_left_of_the_figure(made: SimpleNamespace) -> No
     left, centre, _ = sample_points(root_frames(walk.clip, 20.0), 25.0)
     heel = walk.clip.positions[:, walk.clip.skeleton.role("left_heel")][:, [0, 2]]
     assert np.all(np.sum((left - centre) * (heel - centre), axis=1) > 0)
-
-
-def test_flat_ground_is_zero_and_one_fit(made: SimpleNamespace, patches: Patches) -> None:
-    walk = made.walk(GROUNDS["level"])
-    fits = clip_fits(walk.clip, walk.labels, patches, "flat", made.options(), made.database())
-    assert np.all(fits.fits == 1)
-    assert fits.heights.shape == (len(fits.frame), 36)
-    assert np.all(fits.heights == 0)
-    assert np.all(fits.patch == -1)
-    assert fits.foot_error.shape == (len(walk.labels["cycles"]), 10, 2)
-    assert fits.foot_error.max() < 0.01
-
-
-@pytest.mark.parametrize("bent", [True, False])
-def test_an_uneven_floor_is_adapted_only_if_configured(
-    made: SimpleNamespace, patches: Patches, caplog: pytest.LogCaptureFixture, bent: bool
-) -> None:
-    walk = made.walk(GROUNDS["waves"])
-    options = made.options(bend_flat=bent)
-    fits = clip_fits(walk.clip, walk.labels, patches, "flat", options, made.database())
-    assert np.all(fits.fits == 1)
-    assert np.any(fits.heights != 0) is np.bool_(bent)
-    assert (fits.foot_error[..., 0].max() < 1) is np.bool_(bent)
-    assert (fits.foot_below.max() <= 1) is np.bool_(bent)
-    assert ("figure: feet in contact are" in caplog.text) is not bent
-
-
-def test_a_foot_below_a_flat_floor_makes_only_a_local_pit(made: SimpleNamespace, patches: Patches) -> None:
-    walk = made.walk(GROUNDS["level"])
-    contacts = walk.labels["contacts"]
-    frame = np.flatnonzero(~contacts[:, 1] & (np.arange(420) > 100))[5]
-    feet = walk.clip.positions[:, -4:].copy()
-    feet[frame, 1, 1] = 2.5 - 4
-    clip = made.figure(feet, walk.clip.root)
-    fits = clip_fits(clip, walk.labels, patches, "flat", made.options(), made.database())
-    assert np.all(fits.heights == 0)
-    assert fits.foot_error.max() < 0.01
-    assert 0 < fits.foot_below.max() <= 1
-    options = made.options(bend_flat=False)
-    as_it_is = clip_fits(clip, walk.labels, patches, "flat", options, made.database())
-    assert as_it_is.foot_below.max() == pytest.approx(4)
-
-
-def test_a_heel_held_up_over_its_standing_toe_is_not_on_a_flat_floor(
-    made: SimpleNamespace, patches: Patches
-) -> None:
-    """Like a crouch on the balls of the feet: heels that do not move are labelled as contacts."""
-    walk = made.walk(GROUNDS["level"])
-    feet = walk.clip.positions[:, -4:].copy()
-    feet[:, [0, 2], 1] += 5
-    clip = made.figure(feet, walk.clip.root)
-    fits = clip_fits(clip, walk.labels, patches, "flat", made.options(), made.database())
-    assert np.all(fits.heights == 0)
-    assert fits.foot_error.max() < 0.01
-
-
-def test_a_heel_is_held_up_only_over_a_toe_that_stands() -> None:
-    soles = np.zeros((2, 4, 3))
-    soles[:, 0, 1] = 5.0
-    contacts = np.array([[True, True, True, True], [True, False, True, True]])
-    up = held_above_other(Feet(soles, contacts, 0.0, 0.0), 2.0)
-    assert up.tolist() == [[True, False, False, False], [False] * 4]
-
-
-def test_flat_ground_can_be_at_the_height_of_the_feet_as_in_the_original(
-    made: SimpleNamespace, patches: Patches
-) -> None:
-    walk = made.walk(lambda x, z: np.full_like(z, 3.0))
-    for level, expected in (("zero", 0.0), ("feet", 3.0)):
-        options = made.options(flat_level=level, deepest=None)
-        fits = clip_fits(walk.clip, walk.labels, patches, "flat", options, made.database())
-        assert np.allclose(fits.heights, expected, atol=1e-5)
 
 
 def test_the_same_clip_gives_the_same_bytes(made: SimpleNamespace, patches: Patches, tmp_path: Path) -> None:

@@ -134,8 +134,8 @@ def test_a_factor_of_one_changes_nothing(data: Database, factor: float) -> None:
     x, y = x.float(), y.float()
     before = x.clone(), y.clone()
     OtherPaces(data, factor, ROWS, CPU).play(x, y)
-    told = data.layout.x_channel("injury")
-    assert torch.equal(x[:, told], before[0][:, told]), "channels keep their bits"
+    injury = data.layout.x_channel("injury")
+    assert torch.equal(x[:, injury], before[0][:, injury]), "channels keep their bits"
     assert (torch.equal(x, before[0]) and torch.equal(y, before[1])) == (factor == 1.0)
 
 
@@ -171,8 +171,8 @@ def test_training_plays_other_paces_and_keeps_channels_only_if_asked(
 
     def drawn(self: Update, *rest: Any) -> Any:
         masks = of_update(self, *rest)
-        told = data.layout.x_channel("injury")
-        dropped.append(float((masks[0][:, told] != 1).float().mean()))
+        injury = data.layout.x_channel("injury")
+        dropped.append(float((masks[0][:, injury] != 1).float().mean()))
         assert (masks[0] == 0).any(), "other inputs are dropped"
         return masks
 
@@ -183,9 +183,9 @@ def test_training_plays_other_paces_and_keeps_channels_only_if_asked(
         settings |= {"other_paces": factor, "keep_channels": keep}
         train(data, network=network, training=settings, checkpoints=tmp_path / str(factor))
     half = len(given) // 2
-    told = data.layout.x_channel("injury")
+    injury = data.layout.x_channel("injury")
     for without, other in zip(given[:half], given[half:], strict=True):
-        assert torch.equal(without[:, told], other[:, told])
+        assert torch.equal(without[:, injury], other[:, injury])
         assert (without != other).any(dim=1).all()
     assert min(dropped[:half]) > 0
     assert max(dropped[half:]) == 0

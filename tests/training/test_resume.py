@@ -3,10 +3,6 @@
 from __future__ import annotations
 
 import json
-import signal
-import subprocess
-import sys
-import time
 from pathlib import Path
 from typing import Any
 
@@ -18,134 +14,12 @@ from hobble.core.errors import InputError
 from hobble.core.files import load_npz, save_npz
 from hobble.database.reader import Database
 from hobble.rows.layout import CONTACTS, GAITS, RowLayout
-from hobble.training import checkpoint
-from hobble.training import run as run_module
 from hobble.training.checkpoint import State, pack
 from hobble.training.run import run
 from hobble.training.start import recipe_hash
 from hobble.training.train import train
 
 Settings = dict[str, Any]
-HURRIED = {"schedule": "cosine", "warm_up": 0.3, "rollout": 4, "batch": 256}
-
-PROCESS = """
-import json, sys
-from pathlib import Path
-from hobble.database.reader import Database
-from hobble.models import network_options
-from hobble.training.options import Training
-from hobble.training.train import train
-sections = json.loads(sys.argv[3])
-typed = {"network": network_options(sections["network"]), "training": Training(**sections["training"])}
-train(Database.open(sys.argv[1], 64), checkpoints=Path(sys.argv[2]), threads=2, **typed)
-"""
-
-
-def test_a_training_killed_at_any_moment_ends_with_the_same_bits(
-    small_database: Path, data: Database, network: Settings, training: Settings, tmp_path: Path
-) -> None:
-    settings = {"network": network, "training": training | {"passes": 15}}
-    plain = {name: section.model_dump(mode="json") for name, section in settings.items()}
-    killed = tmp_path / "killed"
-    command = [sys.executable, "-c", PROCESS, str(small_database), str(killed), json.dumps(plain)]
-    for wait in (0.02, 0.0):
-        before = _sections(killed)
-        process = subprocess.Popen(command)
-        while process.poll() is None and _sections(killed) == before:
-            time.sleep(0.005)
-        time.sleep(wait)
-        process.send_signal(signal.SIGKILL)
-        assert process.wait() == -signal.SIGKILL
-        assert before < _sections(killed) < 45
-    (next(killed.iterdir()) / ".checkpoint.npz.1.part").write_bytes(b"what a kill leaves")
-    final = train(data, **settings, checkpoints=killed, threads=2)
-    undisturbed = train(data, **settings, checkpoints=tmp_path / "undisturbed", threads=2)
-    assert torch.equal(final.network.flat, undisturbed.network.flat)
-    assert torch.equal(final.adam.second, undisturbed.adam.second)
-    assert final.best is not None
-    assert undisturbed.best is not None
-    assert torch.equal(final.best, undisturbed.best)
-    assert len(final.history) == 45
-    assert not list(killed.rglob("*.part"))
-
-
-def _sections(folder: Path) -> int:
-    paths = list(folder.glob("*/checkpoint.npz"))
-    return int(load_npz(paths[0])["sections"]) if paths else 0
-
-
-@pytest.mark.parametrize(
-    ("recipe", "written", "number"),
-    [({}, False, 0), ({}, True, 5), (HURRIED, True, 1), (HURRIED, False, 3)],
-)
-def test_a_training_killed_at_any_write_ends_with_the_same_bits(
-    data: Database,
-    network: Settings,
-    training: Settings,
-    tmp_path: Path,
-    monkeypatch: pytest.MonkeyPatch,
-    recipe: Settings,
-    written: bool,
-    number: int,
-) -> None:
-    """Killed while a checkpoint is half written, and right after it has got its name."""
-    arguments: Settings = {"network": network, "training": training | recipe, "threads": 1}
-    count = iter(range(100))
-
-    def dying(path: Path, **arrays: np.ndarray) -> None:
-        if next(count) != number:
-            return save_npz(path, **arrays)
-        if written:
-            save_npz(path, **arrays)
-        else:
-            path.parent.mkdir(parents=True, exist_ok=True)
-            path.with_name(f".{path.name}.1.part").write_bytes(b"half of it")
-        raise SystemExit
-
-    with monkeypatch.context() as patch:
-        patch.setattr(checkpoint, "save_npz", dying)
-        with pytest.raises(SystemExit):
-            train(data, **arguments, checkpoints=tmp_path / "killed")
-    final = train(data, **arguments, checkpoints=tmp_path / "killed")
-    whole = train(data, **arguments, checkpoints=tmp_path / "whole")
-    assert _numbers(final) == _numbers(whole)
-    assert not list(tmp_path.rglob("*.part"))
-
-
-def _numbers(state: State) -> dict[str, bytes]:
-    """All results of a run except times."""
-    arrays = pack(state)
-    arrays["history"][:, 3] = 0
-    return {name: array.tobytes() for name, array in arrays.items() if name != "seconds"}
-
-
-@pytest.mark.parametrize("last", ["write_weights", "write_history", "save_npz"])
-def test_a_training_killed_while_writing_its_results_ends_with_the_same_bits(
-    small_database: Path,
-    network: Settings,
-    training: Settings,
-    tmp_path: Path,
-    monkeypatch: pytest.MonkeyPatch,
-    last: str,
-) -> None:
-    """Snakemake removes the files of the killed job, and the same command makes them again."""
-
-    def go(folder: Path) -> dict[str, np.ndarray]:
-        files = {name: folder / name for name in ("weights", "history", "checkpoint")}
-        settings: Settings = {"network": network, "training": training, "start": None, "code": None}
-        run(small_database, configuration="c", checkpoints=folder / "c", threads=1, **settings, **files)
-        return load_npz(files["weights"]) | load_npz(files["checkpoint"])
-
-    def dying(*_: Any, **__: Any) -> None:
-        raise SystemExit
-
-    with monkeypatch.context() as patch:
-        patch.setattr(run_module, last, dying)
-        with pytest.raises(SystemExit):
-            go(tmp_path / "killed")
-    killed, whole = go(tmp_path / "killed"), go(tmp_path / "whole")
-    for name in set(whole) - {"history", "seconds"}:
-        assert np.array_equal(killed[name], whole[name]), name
 
 
 def test_more_passes_resume_and_fewer_start_again(

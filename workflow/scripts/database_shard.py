@@ -1,4 +1,4 @@
-"""Creates a shard of a database from the rows of its clips, and notes what the merge needs of them."""
+"""Creates a shard of a database from the rows of its clips, with what the merge needs to find equal clips."""
 
 from pathlib import Path
 

@@ -1,4 +1,4 @@
-"""Creates the original release's folder of .bin files from a trained network."""
+"""Creates a folder of .bin files, like those of the original release, from a trained network."""
 
 from hobble.models.load import load_network
 from hobble.workflow.job import job

@@ -1,4 +1,4 @@
-"""Creates the generated motion of each scripted scenario (npz and BVH) from a trained network."""
+"""Generates the motion of each scripted scenario (npz and BVH) with a trained network."""
 
 from hobble.models.load import load_network
 from hobble.runtime.options import Runtime

@@ -1,4 +1,4 @@
-"""Creates clips of the embedded data set (BVH, footsteps, gait) from their recipes and a skeleton."""
+"""Creates synthetic clips (BVH, footsteps, gait) from their recipes and a skeleton."""
 
 from pathlib import Path
 

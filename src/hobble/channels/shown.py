@@ -41,7 +41,7 @@ class ChannelWords:
 
 
 @dataclass(frozen=True)
-class Shown:
+class ChannelDisplay:
     """How a channel is shown.
 
     spoken: a name for each column. sliders: label -> column, for the sliders that are there at the start.
@@ -70,14 +70,14 @@ def words(name: str) -> ChannelWords:
     return found if isinstance(found, ChannelWords) else ChannelWords()
 
 
-def shown(name: str, skeleton: Skeleton, columns: Sequence[str], trained: Collection[str]) -> Shown:
+def shown(name: str, skeleton: Skeleton, columns: Sequence[str], trained: Collection[str]) -> ChannelDisplay:
     """How a channel is shown. By default there is a slider for each column that was above 0 in training.
 
     columns: all labels of the channel. trained: the labels that were above 0 in training.
     """
     if own := _from_module(name, "shown"):
         return own(skeleton, columns, trained)
-    return Shown(tuple(columns), {column: column for column in columns if column in trained})
+    return ChannelDisplay(tuple(columns), {column: column for column in columns if column in trained})
 
 
 def sweeps(

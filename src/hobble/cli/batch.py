@@ -14,7 +14,7 @@ from tqdm import tqdm
 
 from hobble.core.clip_files import find_clips, only_file
 from hobble.core.errors import HobbleError, InputError
-from hobble.motion.rig import Target, load_skeleton
+from hobble.motion.rig import TargetSkeleton, load_skeleton
 
 
 def add_folders(parser: argparse.ArgumentParser, out: str) -> None:
@@ -81,7 +81,7 @@ def skeleton_file(name: str) -> Path:
     return path
 
 
-def skeleton(name: str) -> Target:
+def skeleton(name: str) -> TargetSkeleton:
     """The skeleton as a target of retargeting. Raises InputError if its file is missing or wrong."""
     path = skeleton_file(name)
     return load_skeleton(path, path.stem)

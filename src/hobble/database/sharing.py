@@ -43,7 +43,7 @@ class SampleRange:
 
 
 @dataclass(frozen=True)
-class Sharing:
+class PassSharing:
     """A section of `total` samples in batches of `batch`, as one process sees it.
 
     stretches: their number, at most `batch`. own: the places in a batch, from 0, that this process fills.
@@ -55,7 +55,7 @@ class Sharing:
     own: range
 
     @classmethod
-    def of(cls, total: int, batch: int, stretches: int = 1, rank: int = 0, processes: int = 1) -> Sharing:
+    def of(cls, total: int, batch: int, stretches: int = 1, rank: int = 0, processes: int = 1) -> PassSharing:
         """The sharing as process `rank` (from 0) of `processes` sees it.
 
         Their parts of a batch differ by 1 at most.

@@ -44,7 +44,7 @@ class SteadyTarget:
     frames: int
 
 
-class Worst(TypedDict):
+class WorstMotion(TypedDict):
     """The worst values of some frames. A value is None if there was nothing to measure. See `stability`."""
 
     frames: int
@@ -59,11 +59,11 @@ class Worst(TypedDict):
     stable: bool
 
 
-class Stability(Worst):
+class Stability(WorstMotion):
     """The worst values of all frames, and of each kind of target."""
 
     minutes: float
-    kinds: dict[str, Worst]
+    kinds: dict[str, WorstMotion]
 
 
 def stretches(minutes: float, seed: int = 1) -> Iterator[SteadyTarget]:
@@ -127,9 +127,9 @@ def stability(
     }
 
 
-def _worst(parts: list[dict[str, Array]]) -> Worst:
+def _worst(parts: list[dict[str, Array]]) -> WorstMotion:
     one = {key: np.concatenate([part[key] for part in parts]) for key in parts[0]}
-    out: Worst = {
+    out: WorstMotion = {
         "frames": len(one["hips"]),
         "finite": bool(one["finite"].all() and np.isfinite(one["turn"]).all()),
         "hips_lowest_cm": round(float(one["hips"].min()), 2),

@@ -37,7 +37,7 @@ def bind(skeleton: Skeleton) -> BindPose:
     toe.
     """
     bones = _bones(skeleton)
-    aims = _aims(skeleton, bones)
+    aims = _aims(bones)
     count = len(skeleton.joints)
     rotations, positions = np.tile(quat.IDENTITY, (count, 1)), np.zeros((count, 3))
     upright = {bones[f"{side}_heel"] for side in SIDES}
@@ -53,7 +53,7 @@ def bind(skeleton: Skeleton) -> BindPose:
             if np.linalg.norm(bone) > SHORTEST:
                 rotations[j] = quat.mul(quat.between(bone, wanted), rotations[j])
     at = {role: positions[skeleton.role(role)] for role in skeleton.roles if _has_role(skeleton, role)}
-    return BindPose(positions, rotations, bones, _filled(at, positions, skeleton))
+    return BindPose(positions, rotations, bones, _filled(at))
 
 
 def _has_role(skeleton: Skeleton, role: str) -> bool:
@@ -101,7 +101,7 @@ def _reach(skeleton: Skeleton, joint: int, below: int) -> Array:
     return skeleton.offsets[steps].sum(axis=0) if steps else np.zeros(3)
 
 
-def _aims(skeleton: Skeleton, bones: dict[str, int]) -> dict[int, tuple[int, Array]]:
+def _aims(bones: dict[str, int]) -> dict[int, tuple[int, Array]]:
     """Joint -> (the joint below it, the direction (3,) in which the bone between them should point)."""
     out = {}
     for side, sign in zip(SIDES, (1.0, -1.0), strict=True):
@@ -116,7 +116,7 @@ def _aims(skeleton: Skeleton, bones: dict[str, int]) -> dict[int, tuple[int, Arr
     return out
 
 
-def _filled(at: dict[str, Array], positions: Array, skeleton: Skeleton) -> dict[str, Array]:
+def _filled(at: dict[str, Array]) -> dict[str, Array]:
     """Positions of all roles; those that the skeleton lacks are estimated from the others."""
     at = dict(at)
     middle = (at["left_shoulder"] + at["right_shoulder"]) / 2

@@ -85,14 +85,6 @@ def relative_speeds(clip: Clip, options: LabelOptions) -> Array:
     return np.stack([median_of_three(side) for side in relative.T], axis=1)
 
 
-def feet_up(swings: list[Swing], frames: int) -> np.ndarray:
-    """(frames, 2) bool: whether the right and the left foot are in a swing."""
-    up = np.zeros((frames, 2), bool)
-    for swing in swings:
-        up[swing.start : swing.end, swing.foot] = True
-    return up
-
-
 def landings(swings: list[Swing], frames: int, shortest_step: float) -> list[tuple[float, int]]:
     """Alternating landings (frame, foot). END_OF_BOUT separates bouts of walking.
 

@@ -22,7 +22,7 @@ from typing import Any
 import numpy as np
 
 from hobble.measures.results import SampleSize
-from hobble.rows.excerpts import Excerpt, Kind
+from hobble.rows.excerpts import Excerpt, ExcerptKind
 from hobble.rows.facts import Facts
 
 LEAST = 2  # fewest excerpts drawn from a stratum, because the variance needs two
@@ -129,7 +129,9 @@ def _share(of_split: Mapping[str, int], split: str, frames: int) -> float:
     return max(0.5, 1 - others / frames) if others else 1.0
 
 
-def _strata(every: Mapping[Excerpt, Kind], splits: Mapping[str, str]) -> dict[tuple[Any, ...], list[Excerpt]]:
+def _strata(
+    every: Mapping[Excerpt, ExcerptKind], splits: Mapping[str, str]
+) -> dict[tuple[Any, ...], list[Excerpt]]:
     """Stratum -> its excerpts."""
     by_gait: dict[str, list[float]] = {}
     for kind in every.values():

@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from copy import copy
 from itertools import pairwise
 
 import numpy as np
+from numpy.typing import NDArray
 
 from hobble.core import quat
 from hobble.core.quat import Array
@@ -47,6 +49,22 @@ class BodySample:
         self.seconds = seconds
         self.hips_left = self.line(body.legs["right"][0], body.legs["left"][0])
         self.chest_left = self.line(body.arms["right"][1], body.arms["left"][1])
+
+    def part(self, frames: NDArray[np.bool_]) -> BodySample:
+        """The sample with some of its frames alone. frames: (S,)."""
+        out = copy(self)
+        out.at, out.turned, out.speeds = self.at[frames], self.turned[frames], self.speeds[frames]
+        out.hips_left, out.chest_left = self.hips_left[frames], self.chest_left[frames]
+        return out
+
+    def in_zero_pose(self) -> BodySample:
+        """The zero pose as a sample of one frame."""
+        out = self.part(np.arange(len(self.at)) == 0)
+        out.at, out.turned = self.rest[None], np.broadcast_to(quat.IDENTITY, out.turned.shape)
+        body = self.body
+        out.hips_left = out.line(body.legs["right"][0], body.legs["left"][0])
+        out.chest_left = out.line(body.arms["right"][1], body.arms["left"][1])
+        return out
 
     def line(self, start: int, end: int) -> Array:
         """(S, 3) unit vectors from joint to joint."""

@@ -27,7 +27,7 @@ from hobble.motion.options import ClipMotion
 from hobble.motion.read import Bvh
 from hobble.motion.rig import (
     RigMatch,
-    Target,
+    TargetSkeleton,
     clean_names,
     find_hips,
     leg_length,
@@ -65,7 +65,7 @@ class FileMotion:
     unsure: list[str] = field(default_factory=list)
 
 
-def load_source(file: Bvh, target: Target, maps: str | Path, options: ClipMotion) -> FileMotion:
+def load_source(file: Bvh, target: TargetSkeleton, maps: str | Path, options: ClipMotion) -> FileMotion:
     """A file's motion, checked and, if allowed, repaired.
 
     maps: the folder of the skeleton files. A rig with a skeleton file and an equal rest pose is taken as that
@@ -111,7 +111,7 @@ def _on_known_rig(
 
 
 def _on_unknown_rig(
-    file: Bvh, target: Target, known: RigMatch | None, repairs: list[str], options: ClipMotion
+    file: Bvh, target: TargetSkeleton, known: RigMatch | None, repairs: list[str], options: ClipMotion
 ) -> FileMotion:
     """The source of a file on any other rig. Its parts and a standing rest pose are found."""
     rig = rig_of(file)

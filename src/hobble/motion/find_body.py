@@ -43,7 +43,7 @@ def find_body(names: Sequence[str], parents: Sequence[int], positions: Array) ->
     leg = [joints_of(rig, legs, "leg", k) for k in (0, 1)]
     arm = [joints_of(rig, arms, "arm", k) for k in (0, 1)]
     head, neck = find_head(rig, legs, arms)
-    first, sided = left_leg(rig, legs, leg, leg, arm, head)
+    first, sided = left_leg(rig, legs, leg, head)
     across_first = left_arm(rig, leg, first, arm, arms)
     hips = common(parents, [leg[0][0], leg[1][0]])
     hips = parents[hips] if hips in (leg[0][0], leg[1][0]) else hips

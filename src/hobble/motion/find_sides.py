@@ -12,9 +12,7 @@ from hobble.motion.names import side_of, side_of_pair
 from hobble.motion.orient import unit
 
 
-def left_leg(
-    rig: MovingRig, pair: LimbPair, leg: list[tuple[int, int, int]], legs: list, arm: list, head: int
-) -> tuple[int, bool]:
+def left_leg(rig: MovingRig, pair: LimbPair, leg: list[tuple[int, int, int]], head: int) -> tuple[int, bool]:
     """Which of the two legs is the left one, and whether names say so."""
     named = _named_sides(rig, pair)
     if named[0] * named[1] < 0:

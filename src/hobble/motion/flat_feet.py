@@ -6,6 +6,7 @@ flat when it is least steep, apart from the first moments. A runner's heel never
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -49,6 +50,8 @@ BRIEF, BRIEF_ERROR = 0.5, np.radians(12.0)  # seconds, and radians
 APART = 10.0  # degrees: a larger difference between the two standing feet is reported
 # A zero pose in which nobody could stand still shows the angle of the ankles, if that agrees with the motion.
 AGREE = np.radians(10.0)
+SAME = np.radians(2.0)  # the feet of a zero pose differ less
+TIPTOE = np.radians(12.0)  # feet of a squatting body that are steeper by more may be on tiptoe
 FORWARD, STRAIGHT = 35.0, 30.0  # degrees
 NOTED = 1.0  # cm: a larger uncertainty (two standard deviations) is reported
 
@@ -89,12 +92,16 @@ def feet_tilt(seen: BodySample) -> Tilt:
     known = [tilt for tilt in sides.values() if tilt is not None]
     if not known:
         return Tilt(sides, sides, 0.0)
+    zero = {side: _zero_tilt(seen, side) for side in SIDES}
+    there = [tilt for tilt in zero.values() if tilt is not None]
+    if _on_tiptoe(seen, known):
+        if len(there) == len(SIDES) and np.ptp(there) < SAME and 0 < np.mean(there) < np.mean(known):
+            return Tilt(sides, zero, CAPTURED_ERROR)
+        return Tilt(sides, _both(sides, seen.target_tilt), BRIEF_ERROR)
     if exact := [tilt for side, tilt in sides.items() if tilt is not None and _exact(seen, side)]:
         return Tilt(sides, _both(sides, float(np.mean(exact))), EXACT_ERROR)
     raised = RAISED if runs(seen) else 0.0
     measured = float(np.mean(known)) - raised
-    zero = {side: _zero_tilt(seen, side) for side in SIDES}
-    there = [tilt for tilt in zero.values() if tilt is not None]
     if len(there) == len(SIDES) and np.ptp(there) < AGREE:
         # A foot that limps or stands on a slope may never come down, so one foot that agrees is enough.
         one = min(abs(a - b + raised) for a, b in zip(there, known, strict=True))
@@ -103,6 +110,12 @@ def feet_tilt(seen: BodySample) -> Tilt:
     error = float(np.hypot(CAPTURED_ERROR, 0.25 * np.ptp(known)))
     angle, error = _likeliest(measured, error, seen.target_tilt)
     return Tilt(sides, _both(sides, angle), error if seen.seconds >= BRIEF else BRIEF_ERROR)
+
+
+def _on_tiptoe(seen: BodySample, known: Sequence[float]) -> bool:
+    """Whether the body squats on feet that are much steeper than the target's flat ones."""
+    low = not any(stands(seen, side) for side in SIDES)
+    return low and bool(np.mean(known) > seen.target_tilt + TIPTOE)
 
 
 def _both(sides: dict[str, float | None], angle: float) -> dict[str, float | None]:
@@ -163,6 +176,8 @@ def doubt(seen: BodySample, zero: bool) -> str | None:
     why = "nobody could stand in its zero pose"
     if seen.seconds < BRIEF:
         why += f" and {seen.seconds:.2f} s are too short for a step of each foot"
+    if _on_tiptoe(seen, [float(np.radians(x)) for x in tilts]):
+        why += " and the figure squats, perhaps on tiptoe"
     if abs(tilts[0] - tilts[1]) > APART:
         why += f" and its feet stand at different angles ({tilts[0]:.0f} and {tilts[1]:.0f} degrees)"
     return (

@@ -19,14 +19,14 @@ UP, AHEAD = np.array([0.0, 1.0, 0.0]), np.array([0.0, 0.0, 1.0])
 AGREE = np.radians(25.0)  # trunk joints that differ by less have the same rest pose
 
 
-def from_motion(seen: BodySample, zero: Array | None) -> dict[int, Array]:
+def from_motion(seen: BodySample, trunk: BodySample, zero: Array | None) -> dict[int, Array]:
     """Frames of all joints from the directions of the bones while the figure moves.
 
-    zero: (4,) frame of the chest in the zero pose, which counts if the rig has no neck. None if nobody could
-    stand in that pose.
+    trunk: the poses that show how the trunk is turned (`trunk_sample`). zero: (4,) frame of the chest in the
+    zero pose, which counts if the rig has no neck. None if nobody could stand in that pose.
     """
     frames: dict[int, Array] = {}
-    _trunk(seen, frames, zero)
+    _trunk(trunk, frames, zero)
     for side, sign in (("left", 1.0), ("right", -1.0)):
         _arm(seen, frames, side, sign)
         _leg(seen, frames, side)
@@ -63,7 +63,10 @@ def _bone(seen: BodySample, joint: int) -> tuple[Array, Array, Array]:
     chain = (*trunk, *body.neck, body.head)
     lengths = np.array([seen.length(a, b) for a, b in pairwise(chain)])
     share = dict(zip(chain, spine_shares(lengths, len(body.trunk)), strict=True))
-    bone, end = seen.first_long(joint, chain[chain.index(joint) + 1 :])
+    following = chain[chain.index(joint) + 1 :]
+    # A rig with many short bones has kinks. One bone of the target follows several of them, up to its end.
+    reach = [j for j in following if share[j] <= seen.spine.end(share[joint]) + 1e-6]
+    bone, end = seen.first_long(joint, [*reach[-1:], *following])
     left = seen.chest_left
     if joint == body.hips:
         left = seen.hips_left

@@ -83,7 +83,7 @@ def foot_down(contacts: Array) -> float:
 
 
 @dataclass(frozen=True)
-class _Line:
+class _ClipLine:
     """A line of the page. figure, down: None if the clip was not read."""
 
     look: ClipSummary
@@ -105,10 +105,10 @@ def look_page(
     one after another.
     """
     some = chosen(reports, labels)
-    lines = [_Line(reported(report), labelled) for report, labelled in zip(reports, labels, strict=True)]
+    lines = [_ClipLine(reported(report), labelled) for report, labelled in zip(reports, labels, strict=True)]
     for n in sorted(some):
         clip, contacts = read(n)
-        lines[n] = _Line(seen(clip, reports[n]), labels[n], figure(clip), foot_down(contacts))
+        lines[n] = _ClipLine(seen(clip, reports[n]), labels[n], figure(clip), foot_down(contacts))
     looks, common = shared_warnings([line.look for line in lines])
     lines = [replace(line, look=look) for line, look in zip(lines, looks, strict=True)]
     whole = len(some) == len(lines)
@@ -148,7 +148,7 @@ def _sample_note(count: int) -> str:
     )
 
 
-def _written(name: str, lines: Sequence[_Line], notes: Sequence[str]) -> str:
+def _written(name: str, lines: Sequence[_ClipLine], notes: Sequence[str]) -> str:
     """The page of lines and notes."""
     seconds = sum(line.look.seconds for line in lines)
     figures = [line.figure for line in lines if line.figure is not None]
@@ -164,7 +164,7 @@ def _written(name: str, lines: Sequence[_Line], notes: Sequence[str]) -> str:
     )
 
 
-def _row(line: _Line) -> str:
+def _row(line: _ClipLine) -> str:
     look, labels = line.look, line.labels
     gaits = ", ".join(f"{gait} {s:.1f}" for gait, s in labels["seconds"].items() if s >= 0.05)
     off = "as it is"

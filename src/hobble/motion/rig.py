@@ -32,7 +32,7 @@ MANDATORY = ("hips", "head", *(f"{side}_{part}" for side in ("left", "right") fo
 
 
 @dataclass(frozen=True)
-class Target:
+class TargetSkeleton:
     """A skeleton as in its file, with its maps to other skeletons."""
 
     skeleton: Skeleton
@@ -55,7 +55,7 @@ class RigMatch:
     alike: bool = True
 
 
-def load_skeleton(path: str | Path, name: str | None = None) -> Target:
+def load_skeleton(path: str | Path, name: str | None = None) -> TargetSkeleton:
     """Read a skeleton file (`config/skeletons/<name>.yaml`). It is validated when the workflow starts."""
     if not Path(path).is_file():
         raise InputError(path, "no such skeleton file")
@@ -64,7 +64,7 @@ def load_skeleton(path: str | Path, name: str | None = None) -> Target:
 
 
 @lru_cache(maxsize=32)
-def _loaded(path: Path, name: str, changed: int, size: int) -> Target:
+def _loaded(path: Path, name: str, changed: int, size: int) -> TargetSkeleton:
     """Read a skeleton file.
 
     The arguments `changed` and `size` make the cache read it again after a change.
@@ -75,12 +75,12 @@ def _loaded(path: Path, name: str, changed: int, size: int) -> Target:
         skeleton = Skeleton.from_dict({**data, "name": name})
         if not (np.abs(skeleton.offsets) <= FARTHEST).all():
             raise ValueError(f"an offset is not three numbers of {FARTHEST:g} cm at most")
-        return Target(skeleton, maps)
+        return TargetSkeleton(skeleton, maps)
     except (AttributeError, KeyError, TypeError, ValueError, OverflowError) as error:
         raise InputError(path, f"not a skeleton file: {printable(error)}") from None
 
 
-def nearest(names: Collection[str], target: Target, folder: str | Path) -> Target:
+def nearest(names: Collection[str], target: TargetSkeleton, folder: str | Path) -> TargetSkeleton:
     """The skeleton file in `folder` that has most of the names, or the target if none has more.
 
     Files whose text cannot contain more of the names are not parsed, because YAML takes longer than most
@@ -103,7 +103,7 @@ def clean_names(names: Sequence[str]) -> tuple[str, ...]:
     return short if len(set(short)) == len(short) and all(short) else tuple(names)
 
 
-def find_hips(names: Sequence[str], target: Target, folder: str | Path) -> int:
+def find_hips(names: Sequence[str], target: TargetSkeleton, folder: str | Path) -> int:
     """Index of a clip's hips, by the known skeleton that has most of its names; else the root.
 
     Some programs export a joint above the hips. folder: the folder of the skeleton files.
@@ -114,7 +114,7 @@ def find_hips(names: Sequence[str], target: Target, folder: str | Path) -> int:
     return names.index(hips) if hips in names else 0
 
 
-def match_rig(rig: Skeleton, target: Target, folder: str | Path) -> RigMatch | None:
+def match_rig(rig: Skeleton, target: TargetSkeleton, folder: str | Path) -> RigMatch | None:
     """Find which known skeleton a clip's rig is, and how it maps to the target.
 
     rig: the clip's joints. folder: the folder of the skeleton files, for their maps. Returns None if no
@@ -214,7 +214,7 @@ def _nearest(skeleton: Skeleton, other: Skeleton) -> dict[str, str | None]:
     return {name: up for name, up in above.items() if name in other.joints}
 
 
-def joint_pairs(source: Target, target: Target) -> dict[str, str]:
+def joint_pairs(source: TargetSkeleton, target: TargetSkeleton) -> dict[str, str]:
     """Target joint -> source joint, by the map of either to the other, or of both to a third skeleton."""
     mine, theirs = source.skeleton.name, target.skeleton.name
     if mine == theirs:

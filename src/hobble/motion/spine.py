@@ -41,11 +41,13 @@ class Spine:
 
         A rig with fewer joints has longer bones. Each of them replaces several bones of this one.
         """
-        chest = int(np.searchsorted(self.shares, 1.0 - 1e-6))
-        first = min(self._below(start), chest - 1 if start < 1 else len(self.shares) - 2)
+        chest, first = int(np.searchsorted(self.shares, 1.0 - 1e-6)), self._bone(start)
         last = min(self._below(end), chest if end <= 1 else len(self.shares) - 1)
-        first = max(first, 0)
         return unit(self.points[max(last, first + 1)] - self.points[first])
+
+    def end(self, start: float) -> float:
+        """Where along the body the bone ends that follows a joint at `start`."""
+        return float(self.shares[self._bone(start) + 1])
 
     @property
     def neck(self) -> Array:
@@ -57,6 +59,11 @@ class Spine:
     def has_neck(self) -> bool:
         """Whether there is a point between chest and head."""
         return bool(((self.shares > 1.0 + 1e-6) & (self.shares < 2.0 - 1e-6)).any())
+
+    def _bone(self, start: float) -> int:
+        """The point at which the bone begins that follows a joint at `start`."""
+        chest = int(np.searchsorted(self.shares, 1.0 - 1e-6))
+        return max(min(self._below(start), chest - 1 if start < 1 else len(self.shares) - 2), 0)
 
     def _below(self, share: float) -> int:
         """The highest point that is at most REACH above a position."""

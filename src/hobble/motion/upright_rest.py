@@ -24,17 +24,18 @@ from hobble.motion.flat_feet import doubt, height_error, rest_tilt
 from hobble.motion.from_motion import bends, from_motion
 from hobble.motion.from_rest import TRUSTED, add_rest, from_rest, zero_doubt
 from hobble.motion.no_neck import lean_doubt
-from hobble.motion.orient import degrees_between_rotations, mean_rotation, pointed_along
+from hobble.motion.orient import degrees_between, mean_rotation, pointed_along
 from hobble.motion.rebase import rebased
 from hobble.motion.spine import SHORT, Spine
 from hobble.motion.standing import stands
 from hobble.motion.tree import above
+from hobble.motion.trunk_sample import stoop_doubt, trunk_sample
 
 SAMPLES = 400
 
 
 @dataclass(frozen=True)
-class Upright:
+class UprightMotion:
     """A clip with a standing rest pose that faces +Z with the arms out. Its joints are those of the body.
 
     rest: where the stance comes from, in words. body: the parts by their new indices. notes: sentences on
@@ -48,7 +49,7 @@ class Upright:
     height_error: float = 0.0
 
 
-def upright(clip: Clip, body: Body, target: Skeleton, others: Collection[int] = ()) -> Upright:
+def upright(clip: Clip, body: Body, target: Skeleton, others: Collection[int] = ()) -> UprightMotion:
     """The motion of a body on a rig that stands in its rest pose.
 
     clip: centimetres, right-handed, Y up. target: the skeleton that it is for. others: further joints to
@@ -77,14 +78,11 @@ def upright(clip: Clip, body: Body, target: Skeleton, others: Collection[int] = 
     )
     problem = stands(body, rest)
     zero = from_rest(seen) if problem is None else None
-    frames = from_motion(seen, zero[body.chest] if zero else None)
-    if (
-        zero
-        and max(degrees_between_rotations(zero[j], frames[j]) for j in (body.hips, *body.trunk)) > TRUSTED
-    ):
+    if zero and _twisted(seen, zero):
         problem, zero = "the trunk is twisted", None
-        frames = from_motion(seen, None)
-    unsure = [lean_doubt(seen, zero is not None)]
+    trunk = trunk_sample(seen, zero is not None)
+    frames = from_motion(seen, trunk, zero[body.chest] if zero else None)
+    unsure = [lean_doubt(seen, zero is not None), stoop_doubt(seen, zero is not None)]
     if zero:
         add_rest(frames, zero, seen)
         unsure.append(zero_doubt(seen, zero))
@@ -93,10 +91,21 @@ def upright(clip: Clip, body: Body, target: Skeleton, others: Collection[int] = 
     kept = _kept(clip, seen, others, frames)
     clip, body = with_balls(clip, body, frames)
     roles = body.roles(clip.skeleton.joints)
-    clip, body = with_bends(clip, body, frames, bends(seen))
+    clip, body = with_bends(clip, body, frames, bends(trunk))
     made = rebased(clip, body, [*body.joints, *kept], frames, roles)
     notes = [note for note in unsure if note]
-    return Upright(*made, source, notes, height_error(seen, problem is None))
+    return UprightMotion(*made, source, notes, height_error(seen, problem is None))
+
+
+def _twisted(seen: BodySample, zero: dict[int, Array]) -> bool:
+    """Whether the trunk's bones are turned about themselves in a zero pose that looks like a stance.
+
+    zero: frames of `from_rest`.
+    """
+    shown = from_motion(seen, trunk_sample(seen, False), zero[seen.body.chest])
+    joints = (seen.body.hips, *seen.body.trunk)
+    lefts = [[quat.rotate(frames[j], LEFT) for frames in (zero, shown)] for j in joints]
+    return max(degrees_between(*pair) for pair in lefts) > TRUSTED
 
 
 def _speeds(clip: Clip) -> Array:

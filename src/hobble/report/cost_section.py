@@ -8,11 +8,11 @@ from typing import Literal
 
 from hobble.report.charts import Chart, axis
 from hobble.report.formats import duration, number, size
-from hobble.report.gather import Material
+from hobble.report.gather import ReportMaterial
 from hobble.report.tables import Column, Table
 
 
-def stage_charts(material: Material) -> list[Chart]:
+def stage_charts(material: ReportMaterial) -> list[Chart]:
     """Seconds and bytes of each stage, side by side."""
     stages = list(material.pipeline.get("stages") or ())[::-1]
     names = [stage["stage"] for stage in stages]
@@ -53,7 +53,7 @@ def log_range(values: Sequence[float]) -> list[float]:
     return [math.floor(min(some)), max(some) + 0.4 * (max(some) - math.floor(min(some)) + 1)]
 
 
-def stage_table(material: Material) -> Table:
+def stage_table(material: ReportMaterial) -> Table:
     """A row per stage, with the published values of this configuration if there are any."""
     rows_of = [row for row in material.published["stages"] if row["configuration"] == material.name]
     theirs = {row["stage"]: row for row in rows_of}

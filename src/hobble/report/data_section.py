@@ -11,7 +11,7 @@ from hobble.channels.shown import speaker
 from hobble.motion.check_retarget import MOST, worst
 from hobble.report.charts import Chart, Trace, axis
 from hobble.report.formats import size
-from hobble.report.gather import Material
+from hobble.report.gather import ReportMaterial
 from hobble.report.tables import Column, Table
 
 GAIT_COLOURS = {"stand": "@g0", "walk": "@g1", "jog": "@g2", "crouch": "@g3", "jump": "@g4", "bump": "@g5"}
@@ -21,7 +21,7 @@ MOST_NAMED = 30  # bars that are few enough for a name under each
 SPLIT_NAMES = {"train": "training", "held_out": "held out"}
 
 
-def gait_chart(material: Material) -> Chart | None:
+def gait_chart(material: ReportMaterial) -> Chart | None:
     """Seconds of each gait, training and held-out."""
     traces: list[Trace] = []
     for split, colour in (("train", "@muted"), ("held_out", "@accent")):
@@ -50,7 +50,7 @@ def gait_chart(material: Material) -> Chart | None:
     return Chart("gaits", "Seconds of each gait", caption, traces, layout, 300)
 
 
-def speed_chart(material: Material) -> Chart | None:
+def speed_chart(material: ReportMaterial) -> Chart | None:
     """Seconds at each speed over the ground, from the speeds in the label reports."""
     edges = np.arange(0, 6.01, 0.2)
     traces: list[Trace] = []
@@ -86,7 +86,7 @@ def speed_chart(material: Material) -> Chart | None:
     return Chart("speeds", "Speed", caption, traces, layout, 300)
 
 
-def retarget_chart(material: Material) -> Chart | None:
+def retarget_chart(material: ReportMaterial) -> Chart | None:
     """A bar for each retargeted clip: the joint or limb that differs most from the file, in degrees."""
     known = {report["clip"] for report in material.motion}
     found = []
@@ -124,7 +124,7 @@ def retarget_chart(material: Material) -> Chart | None:
     )
 
 
-def clip_table(material: Material, clips: frozenset[str]) -> Table:
+def clip_table(material: ReportMaterial, clips: frozenset[str]) -> Table:
     """File, length, split and checksum of these clips."""
     labels = {report["clip"]: report for report in material.labels}
     columns = [
@@ -163,7 +163,7 @@ def clip_table(material: Material, clips: frozenset[str]) -> Table:
     return Table(f"{material.name}-clips", columns, rows, f"{which}, with checksums")
 
 
-def remarks_table(material: Material) -> Table | None:
+def remarks_table(material: ReportMaterial) -> Table | None:
     """Every repair, doubt and warning.
 
     If there are more than MOST_REMARKS, one row for each kind, with the number of its clips and one example.
@@ -201,7 +201,7 @@ def _by_kind(rows: list[list[str]]) -> list[list[Any]]:
     return [[len({row[0] for row in same}), same[0][1], same[0][0], same[0][2]] for same in many]
 
 
-def strips(material: Material, clips: frozenset[str]) -> list[dict[str, Any]]:
+def strips(material: ReportMaterial, clips: frozenset[str]) -> list[dict[str, Any]]:
     """The label strip and channel values of those of `clips` that have them; mirrors are left out."""
     of_clip: dict[str, dict[str, Any]] = {}
     for report in material.channels:

@@ -11,7 +11,7 @@ from hobble.core.quat import Array
 from hobble.report import measure_sections
 from hobble.report.coverage import TURNS
 from hobble.report.formats import duration, number, size
-from hobble.report.gather import Material
+from hobble.report.gather import ReportMaterial
 from hobble.report.summary import Hint, KeyFigure, placed
 
 TURNING = 40.0  # degrees a second; slower turning is the sway of a straight walk
@@ -19,12 +19,12 @@ LITTLE_TURNING = 0.01  # share of the time
 ORDER = ("warn", "note", "good", "fact")
 
 
-def _recipe(material: Material) -> Mapping[str, Any]:
+def _recipe(material: ReportMaterial) -> Mapping[str, Any]:
     """The training section of the configuration; empty if it is not known."""
     return (material.resolved.get("configuration") or {}).get("training") or {}
 
 
-def lead(material: Material) -> str:
+def lead(material: ReportMaterial) -> str:
     """A sentence or two on the network and its training data."""
     clips = [report["clip"] for report in material.motion]
     kept = sum(material.split(clip) == "held_out" for clip in clips)
@@ -42,7 +42,7 @@ def lead(material: Material) -> str:
     return f"{text}. All clips together have {frames:,} frames at 60\u00a0Hz."
 
 
-def key_figures(material: Material) -> list[KeyFigure]:
+def key_figures(material: ReportMaterial) -> list[KeyFigure]:
     """The numbers at the top of the page, most important first."""
     figures = measure_sections.figures(material)
     seconds = sum(report.get("seconds", 0) for report in material.motion)
@@ -63,7 +63,7 @@ def key_figures(material: Material) -> list[KeyFigure]:
     return sorted(figures, key=lambda figure: figure.at)
 
 
-def hints(material: Material, turns: Mapping[str, Array] | None = None) -> list[Hint]:
+def hints(material: ReportMaterial, turns: Mapping[str, Array] | None = None) -> list[Hint]:
     """Advice in the order in which to follow it, then what is good, then plain facts.
 
     turns: split -> seconds at each turn (`coverage.seconds_of_data`), if they were counted.
@@ -79,7 +79,7 @@ def hints(material: Material, turns: Mapping[str, Array] | None = None) -> list[
     return sorted(found, key=lambda hint: (ORDER.index(hint.kind), hint.at))
 
 
-def _curve(material: Material) -> Iterator[Hint]:
+def _curve(material: ReportMaterial) -> Iterator[Hint]:
     history = material.history
     curve = zip(history.get("pass", ()), history.get("held_out_mse", ()), strict=False)
     known = [(p, v) for p, v in curve if p is not None and v is not None]
@@ -111,7 +111,7 @@ def _curve(material: Material) -> Iterator[Hint]:
         yield Hint("good", "The held-out error has stopped falling.", "More passes will change little.")
 
 
-def _coverage(material: Material) -> Iterator[Hint]:
+def _coverage(material: ReportMaterial) -> Iterator[Hint]:
     totals: dict[str, float] = {}
     for report in material.labels:
         for gait, seconds in (report.get("seconds") or {}).items():
@@ -149,7 +149,7 @@ def _turning(turns: Mapping[str, Array]) -> Iterator[Hint]:
         )
 
 
-def _repairs(material: Material) -> Iterator[Hint]:
+def _repairs(material: ReportMaterial) -> Iterator[Hint]:
     repaired = {report["clip"] for report in material.motion if report.get("repairs")}
     warned = {r["clip"] for r in (*material.labels, *material.channels) if r.get("warnings")}
     if repaired or warned:
@@ -160,7 +160,7 @@ def _repairs(material: Material) -> Iterator[Hint]:
         )
 
 
-def _costs(material: Material) -> Iterator[Hint]:
+def _costs(material: ReportMaterial) -> Iterator[Hint]:
     stages = material.pipeline.get("stages") or []
     total = material.pipeline.get("total_seconds") or 0
     if stages and total:

@@ -19,7 +19,7 @@ GENERAL_COLUMNS = ("pass", "section", "samples", "seconds", "train_mse", "held_o
 
 
 @dataclass(frozen=True)
-class Material:
+class ReportMaterial:
     """The results of one configuration.
 
     measured: measurement -> its JSON. history: column -> values, one per section of training, None for an
@@ -78,9 +78,9 @@ def gather(
     channels: Iterable[str],
     terrain: Iterable[str] = (),
     rows: Iterable[str] = (),
-) -> Material:
+) -> ReportMaterial:
     """Read the files of a report. Raises InputError with the name of a file that cannot be read."""
-    return Material(
+    return ReportMaterial(
         name=name,
         dataset=dataset,
         title=title,

@@ -24,7 +24,7 @@ from typing import Any
 
 from hobble.measures.inputs import Json
 from hobble.measures.registry import MEASURES
-from hobble.report.gather import Material
+from hobble.report.gather import ReportMaterial
 from hobble.report.page_parts import PageSection, joined
 from hobble.report.summary import Hint, KeyFigure
 from hobble.report.tables import Column
@@ -43,17 +43,17 @@ class Overview:
     values: Mapping[str, Any] = field(repr=False)
 
 
-def sections(material: Material) -> list[PageSection]:
+def sections(material: ReportMaterial) -> list[PageSection]:
     """The sections of the report that show measurements."""
     return joined(show(material.found(name), material) for name, show in _each("page", "section"))
 
 
-def figures(material: Material) -> list[KeyFigure]:
+def figures(material: ReportMaterial) -> list[KeyFigure]:
     """Figures for the top of the report."""
     return [f for name, show in _each("page", "figures") for f in show(material.found(name), material)]
 
 
-def hints(material: Material) -> list[Hint]:
+def hints(material: ReportMaterial) -> list[Hint]:
     """Advice that follows from the numbers."""
     return [h for name, show in _each("page", "hints") for h in show(material.found(name), material)]
 

@@ -22,7 +22,7 @@ from hobble.report import (
     training_section,
 )
 from hobble.report.formats import embedded, plain
-from hobble.report.gather import Material
+from hobble.report.gather import ReportMaterial
 from hobble.report.ground_pictures import ground_pictures
 from hobble.report.hero import body_channel, first_shown, opening
 from hobble.report.provenance import commit, machine, versions
@@ -30,7 +30,7 @@ from hobble.report.templates import FOLDER, specs, style, template, trusted
 
 
 def render(
-    material: Material,
+    material: ReportMaterial,
     scenes: Mapping[str, Any] | None = None,
     playable: Mapping[str, Any] | None = None,
     compared: Mapping[str, Any] | None = None,
@@ -85,7 +85,7 @@ def render(
     )
 
 
-def _bodies(material: Material) -> dict[str, Any]:
+def _bodies(material: ReportMaterial) -> dict[str, Any]:
     """The body to draw, by the key of its skeleton; {} if the network has no skeleton."""
     if not material.network["skeleton"]:
         return {}
@@ -93,7 +93,7 @@ def _bodies(material: Material) -> dict[str, Any]:
     return {key(figure): packed_body(figure)}
 
 
-def _top(material: Material, playable: Mapping[str, Any]) -> dict[str, Any]:
+def _top(material: ReportMaterial, playable: Mapping[str, Any]) -> dict[str, Any]:
     """Title and text above the first section, and the channel that the figure there shows."""
     return {
         "name": material.name,
@@ -106,7 +106,7 @@ def _top(material: Material, playable: Mapping[str, Any]) -> dict[str, Any]:
     }
 
 
-def _origin(material: Material) -> dict[str, Any]:
+def _origin(material: ReportMaterial) -> dict[str, Any]:
     """The configuration, and the versions and the machine that the page is from."""
     resolved = plain(dict(material.resolved))
     return {
@@ -116,7 +116,7 @@ def _origin(material: Material) -> dict[str, Any]:
 
 
 def _sections(
-    material: Material, found: Mapping[str, Any], clips: frozenset[str], terrain: list[str]
+    material: ReportMaterial, found: Mapping[str, Any], clips: frozenset[str], terrain: list[str]
 ) -> dict[str, dict[str, Any]]:
     """Charts and tables by section, None if there is nothing to show.
 

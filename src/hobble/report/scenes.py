@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from hobble.channels import channel
-from hobble.channels.shown import Shown, shown, words
+from hobble.channels.shown import ChannelDisplay, shown, words
 from hobble.core.files import load_npz
 from hobble.core.quat import Array
 from hobble.core.skeleton import Skeleton
@@ -68,7 +68,7 @@ def _scenario(
     name: str,
     stride: int,
     channels: Mapping[str, Sequence[str]],
-    faces: Mapping[str, Shown],
+    faces: Mapping[str, ChannelDisplay],
     figure: Skeleton,
     keep: list[int],
 ) -> dict[str, Any]:

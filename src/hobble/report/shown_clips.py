@@ -6,13 +6,13 @@ from collections.abc import Iterable, Sequence
 from pathlib import Path
 
 from hobble.measures.stratified_sample import shuffle_key
-from hobble.report.gather import Material
+from hobble.report.gather import ReportMaterial
 
 MOST = 150  # clips with a strip, a row of the table and ground of their own
 MOST_SAMPLED = 600  # clips whose rows are counted, frame by frame
 
 
-def shown(material: Material, most: int = MOST) -> frozenset[str]:
+def shown(material: ReportMaterial, most: int = MOST) -> frozenset[str]:
     """Names of at most `most` clips, or of all clips if there are no more.
 
     The clips are put into kinds by split, main gait, and whether a channel has a value in them. One clip of

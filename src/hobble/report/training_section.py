@@ -7,11 +7,11 @@ from collections.abc import Sequence
 
 from hobble.report.charts import Chart, ChartGroup, axis, line, log_axis
 from hobble.report.formats import number
-from hobble.report.gather import Material
+from hobble.report.gather import ReportMaterial
 from hobble.report.tables import Column, Table
 
 
-def passes_axis(material: Material) -> list[float]:
+def passes_axis(material: ReportMaterial) -> list[float]:
     """The end of each section, in passes: section 10 of 10 in pass 1 ends at 1.0."""
     passes, sections = material.history.get("pass", []), material.history.get("section", [])
     most = max((s for s in sections if s is not None), default=1) or 1
@@ -23,7 +23,7 @@ def passes_axis(material: Material) -> list[float]:
     return [p - start + end for p, end in zip(passes, ends, strict=False) if p is not None]
 
 
-def learning_curve(material: Material) -> Chart:
+def learning_curve(material: ReportMaterial) -> Chart:
     """Training and held-out error, on a logarithmic scale."""
     x, history = passes_axis(material), material.history
     traces = [line("training", x, history.get("train_mse", []), "@muted")]
@@ -44,7 +44,7 @@ def learning_curve(material: Material) -> Chart:
     )
 
 
-def block_curves(material: Material) -> ChartGroup | None:
+def block_curves(material: ReportMaterial) -> ChartGroup | None:
     """The held-out error of each block of Y: small charts with the same scale, largest error first."""
     x, history = passes_axis(material), material.history
     whole = [v for v in history.get("held_out_mse", ()) if v is not None]
@@ -83,7 +83,7 @@ def _log_span(values: Sequence[float | None]) -> list[float]:
     return [min(powers) - room, max(powers) + room]
 
 
-def history_table(material: Material) -> Table:
+def history_table(material: ReportMaterial) -> Table:
     """Every section of training, as in history.csv."""
     names = list(material.history)
     whole = ("pass", "section", "samples")

@@ -40,7 +40,7 @@ class Excerpt(NamedTuple):
 
 
 @dataclass(frozen=True)
-class Kind:
+class ExcerptKind:
     """What is in an excerpt.
 
     gait: the gait with the largest share. speed: mean speed of the root, cm a frame. channels: names of the
@@ -65,14 +65,14 @@ def excerpts(clip: str, rows: int, longest: int = LONGEST) -> list[Excerpt]:
     return [Excerpt(clip, a, b - a, rows) for a, b in pairwise(edges)]
 
 
-def kind(rows: ClipRows, first: int, stop: int) -> Kind:
+def kind(rows: ClipRows, first: int, stop: int) -> ExcerptKind:
     """What is in the rows from `first` up to `stop`, which is not included; at least one row."""
     layout, part = rows.layout, slice(first, stop)
     channels = tuple(name for name, values in rows.channels.items() if np.any(values[part] != 0))
     shares = rows.x[part, body_layout(layout).x_gait].reshape(stop - first, len(GAITS), layout.samples)
     gait = GAITS[int(shares[:, :, layout.samples // 2].mean(axis=0).argmax())]
     speed = np.hypot(*rows.y[part, layout.y_root_velocity].astype(float).T).mean()
-    return Kind(gait, float(speed), channels)
+    return ExcerptKind(gait, float(speed), channels)
 
 
 def load_excerpt(path: str | Path, one: Excerpt, before: int = 0, after: int = 0) -> ClipRows:

@@ -10,7 +10,7 @@ from typing import Any
 from hobble.core.errors import InputError
 from hobble.core.files import read_json, write_json
 from hobble.rows.clip_rows import DELETE_IT, ClipRows
-from hobble.rows.excerpts import Excerpt, Kind, excerpts, kind
+from hobble.rows.excerpts import Excerpt, ExcerptKind, excerpts, kind
 
 
 @dataclass(frozen=True)
@@ -22,10 +22,10 @@ class Facts:
 
     clip: str
     rows: int
-    kinds: tuple[Kind, ...] = field(repr=False)
+    kinds: tuple[ExcerptKind, ...] = field(repr=False)
 
     @property
-    def excerpts(self) -> dict[Excerpt, Kind]:
+    def excerpts(self) -> dict[Excerpt, ExcerptKind]:
         """Excerpt -> what is in it."""
         return dict(zip(excerpts(self.clip, self.rows), self.kinds, strict=True))
 
@@ -45,7 +45,7 @@ def load_facts(path: str | Path) -> Facts:
     """Read a summary. Raises InputError if the file holds something else."""
     values: Mapping[str, Any] = read_json(Path(path))
     try:
-        kinds = tuple(Kind(**{**one, "channels": tuple(one["channels"])}) for one in values["kinds"])
+        kinds = tuple(ExcerptKind(**{**one, "channels": tuple(one["channels"])}) for one in values["kinds"])
         found = Facts(str(values["clip"]), int(values["rows"]), kinds)
         found.excerpts  # noqa: B018 - fails unless each has its entry
     except (KeyError, TypeError, ValueError) as error:

@@ -10,7 +10,7 @@ from hobble.core.compiled import njit
 from hobble.core.skeleton import Skeleton, rest_positions
 from hobble.models.network import Network
 from hobble.runtime.foot_lock import Hold, hold_foot, note_missed, step_rise
-from hobble.runtime.leg_reach import MOST_ADDED, bend, hold_back, turn, turned
+from hobble.runtime.leg_reach import MOST_ADDED, LastFrame, bend, hold_back, turn, turned
 
 HEIGHT_MIX = 0.5  # share of the remaining foot lift that is applied each frame
 # Largest change of the foot lift, cm a frame. It is needed because a network may predict contact while the
@@ -108,12 +108,13 @@ def raise_heel(position: Any, hip: int, knee: int, heel: int, toe: int, shift: A
 
 @njit
 def carry_foot(
-    position: Any, rotation: Any, below: Any, heel: int, toe: int, x: float, y: float, z: float, by: Any
+    position: Any, rotation: Any, below: Any, heel: int, toe: int, was: tuple[float, float, float], by: Any
 ) -> None:
-    """Move a foot along with its heel, which was at x, y, z.
+    """Move a foot along with its heel, which was at `was` (x, y, z).
 
     below: (J,) which joints belong to it, see `carried`. by: (4,) the turn of the foot; its toes do not turn.
     """
+    x, y, z = was
     tx, ty, tz = turned(by, position[toe, 0] - x, position[toe, 1] - y, position[toe, 2] - z)
     tx += position[heel, 0] - position[toe, 0]
     ty += position[heel, 1] - position[toe, 1]
@@ -133,13 +134,14 @@ def carry_foot(
 
 
 @njit
-def hold_toes_back(position: Any, below: Any, toe: int, shown: Any, base: float, fastest: float) -> None:
+def hold_toes_back(position: Any, below: Any, toe: int, last: LastFrame) -> None:
     """`hold_back` for the toe and the joints below it.
 
     A foot that turns may move its toe faster than its heel. below: (J,), see `carried`.
     """
+    shown, base, fastest = last
     x, y, z = position[toe, 0], position[toe, 1], position[toe, 2]
-    if hold_back(position[toe], shown, base, fastest):
+    if hold_back(position[toe], shown[2], base, fastest):
         x, y, z = position[toe, 0] - x, position[toe, 1] - y, position[toe, 2] - z
         for j in range(position.shape[0]):
             if below[j] == TOES and j != toe:
@@ -214,9 +216,9 @@ def place_feet(
         base = root_height[c] + body_lift[c]
         for f in range(2):
             hip, knee, heel, toe = joints[f, 0], joints[f, 1], joints[f, 2], joints[f, 3]
-            x, z = position[c, toe, 0], position[c, toe, 2]
+            at = position[c, toe, 0], position[c, toe, 2]
             shift[0], shift[2] = hold_foot(
-                c, f, x, z, contacts[c, 2 * f + 1], locking, shown[c, f, 2], fastest, held
+                c, f, at, contacts[c, 2 * f + 1], locking, shown[c, f, 2], fastest, held
             )
             # Lift a foot out of the ground; lower a held foot that floats; raise a foot that steps.
             deep = sole_depth(position[c], heel, toe, ground[c, 2 * f], ground[c, 2 * f + 1], sole)
@@ -233,10 +235,11 @@ def place_feet(
                 raise_heel(position[c], hip, knee, heel, toe, shift, by)
             else:
                 by[0], by[1], by[2], by[3] = 1.0, 0.0, 0.0, 0.0
-            x, up, z = position[c, heel, 0], position[c, heel, 1], position[c, heel, 2]
-            bend(position[c], rotation[c], joints[f], shift, ahead, added[c, f], shown[c, f], base, fastest)
-            carry_foot(position[c], rotation[c], below[f], heel, toe, x, up, z, by)
-            hold_toes_back(position[c], below[f], toe, shown[c, f, 2], base, fastest)
+            was = position[c, heel, 0], position[c, heel, 1], position[c, heel, 2]
+            last = shown[c, f], base, fastest
+            bend(position[c], rotation[c], joints[f], shift, ahead, added[c, f], last)
+            carry_foot(position[c], rotation[c], below[f], heel, toe, was, by)
+            hold_toes_back(position[c], below[f], toe, last)
             note_missed(c, f, position[c, toe, 0], position[c, toe, 2], held)
             for i in range(3):
                 j = joints[f, i + 1]

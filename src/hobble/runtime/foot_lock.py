@@ -35,15 +35,23 @@ Hold = tuple[Any, Any, Any, Any]
 
 @njit
 def hold_foot(
-    c: int, f: int, x: float, z: float, contact: float, locking: bool, shown: Any, fastest: float, of: Hold
+    c: int,
+    f: int,
+    toe: tuple[float, float],
+    contact: float,
+    locking: bool,
+    shown: Any,
+    fastest: float,
+    of: Hold,
 ) -> Any:
     """Advance the hold of foot `f` of character `c`. Returns how far (x, z) to move the network's toe, cm.
 
-    x, z: the network's toe. contact: of the toe, predicted. locking: whether feet are held at all. shown:
-    (3,) where the toe was drawn in the last frame. fastest: cm that it may move in this frame. The network's
-    toe never moves faster, so a foot that is behind catches up.
+    toe: x and z of the network's toe. contact: of the toe, predicted. locking: whether feet are held at all.
+    shown: (3,) where the toe was drawn in the last frame. fastest: cm that it may move in this frame. The
+    network's toe never moves faster, so a foot that is behind catches up.
     """
     lock, hold, step, missed = of
+    x, z = toe
     away_x, away_z = hold[c, f, 0] - x, hold[c, f, 1] - z
     if not locking:
         lock[c, f], step[c, f] = 0.0, 0.0

@@ -19,6 +19,10 @@ KNEE_AHEAD = 3.0
 
 # Vectors below are written out by component: array expressions take seconds to compile and allocate memory.
 
+# Where the joints of a leg were drawn in the last frame: shown (2 or more, 3) from the knee on, with heights
+# above `base`; base, cm; fastest, cm that each may move in this frame.
+LastFrame = tuple[Any, float, float]
+
 
 @njit
 def between(ax: float, ay: float, az: float, bx: float, by: float, bz: float) -> Any:
@@ -143,17 +147,16 @@ def bend(
     shift: Any,
     ahead: Any,
     added: Any,
-    shown: Any,
-    base: float,
-    fastest: float,
+    last: LastFrame,
 ) -> None:
     """Move the heel by `shift` (3,), see `reach`, but change the rotations `added` by MOST_ADDED at most.
 
     leg: (4,) hip, knee, heel and toe. ahead: (3,) the direction in which a straight knee bends in the rest
     pose. added: (2, 4) rotations added to the network's thigh and shank in the last frame; updated to this
-    frame's. shown: (2 or more, 3) knee and heel in the last frame, above `base`. Knee and heel move `fastest`
-    cm at most, so the heel may need more than one frame to reach its target.
+    frame's. last: knee and heel in the last frame. They move a limited way in a frame, so the heel may need
+    more than one to reach its target.
     """
+    shown, base, fastest = last
     hip, knee, heel = leg[0], leg[1], leg[2]
     hx, hy, hz = position[hip, 0], position[hip, 1], position[hip, 2]
     kx, ky, kz = position[knee, 0], position[knee, 1], position[knee, 2]

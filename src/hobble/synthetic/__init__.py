@@ -1,1 +1,1 @@
-"""The data set `synthetic`: clips of a procedural walker, written like a user's folder of clips."""
+"""Makes synthetic clips: motion of a procedural walker, written like the files in a user's folder."""

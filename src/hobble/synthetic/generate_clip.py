@@ -1,4 +1,4 @@
-"""Makes one clip of the data set `synthetic`: motion, footsteps and gait labels from a plan."""
+"""Makes one synthetic clip: motion, footsteps and gait labels from a plan."""
 
 from __future__ import annotations
 

@@ -12,7 +12,7 @@ WRITES = ("_footsteps.txt", "_gait.txt")  # endings of the label files that are 
 
 
 class Synthetic(Section):
-    """Size and seed of the data set `synthetic`."""
+    """Synthetic clips: their size and their seed."""
 
     frames: Annotated[int, Field(ge=600, le=1_000_000_000)] = Field(
         20_000, description="frames at 60 Hz of all clips together"

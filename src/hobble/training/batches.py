@@ -11,7 +11,7 @@ from torch import Tensor
 
 from hobble.core.errors import HobbleError
 from hobble.database.reader import Database
-from hobble.database.sharing import SampleRange, Sharing
+from hobble.database.sharing import PassSharing, SampleRange
 from hobble.training.processes import ALONE, Processes
 
 TRAIN = "train"
@@ -54,7 +54,7 @@ class TrainingRows:
         self.database, self.device = database, device
         self.processes, self.stretches = processes, stretches
 
-    def sharing(self, section: int, sections: int, size: int) -> Sharing:
+    def sharing(self, section: int, sections: int, size: int) -> PassSharing:
         """How the processes share a section in batches of `size`."""
         total = self.database.section_pairs(TRAIN, section, sections)
         return self.processes.sharing(total, size, self.stretches)

@@ -12,7 +12,7 @@ from hobble.database import order
 from hobble.database.chunk_window import empty_buffers
 from hobble.database.manifest import Manifest
 from hobble.database.reader import Database
-from hobble.database.sharing import SampleRange, Sharing
+from hobble.database.sharing import PassSharing, SampleRange
 from hobble.rows.compose import compose, fit_columns, x_columns
 from hobble.training.batches import TRAIN, HostRows, SampleBatch, TrainingRows
 from hobble.training.processes import ALONE, Processes
@@ -87,7 +87,7 @@ class DeviceRows(TrainingRows):
         for total, _ in sizes:  # the last batch is too short to have rows for this process
             yield SampleBatch(x[:0], y[:0], p[:0], clip[:0], frame[:0], total)
 
-    def _read(self, sharing: Sharing, place: tuple[int, int, int, int]) -> tuple[np.ndarray, np.ndarray]:
+    def _read(self, sharing: PassSharing, place: tuple[int, int, int, int]) -> tuple[np.ndarray, np.ndarray]:
         """Indices of the rows and of the fits that this process reads in a section, batch by batch."""
         places, batches = [], []
         for stretch in sharing.read():

@@ -46,7 +46,7 @@ class OtherPaces:
             for part in (statistics.x_std, statistics.x_mean, statistics.y_std, statistics.y_mean)
         )
         blocks = [layout.x_channel(name) for name, _ in layout.channels]
-        self.told = [torch.arange(block.start, block.stop, device=device) for block in blocks]
+        self.channel_columns = [torch.arange(block.start, block.stop, device=device) for block in blocks]
         time = np.arange(layout.samples) / (layout.samples // 2) - 1.0
         self.smooth_position, self.smooth_direction = (
             torch.from_numpy(_nearest(np.stack([time**k for k in powers], axis=1))).to(device, torch.float32)
@@ -69,7 +69,7 @@ class OtherPaces:
         self.batches += 1
         pace, rise, part = even.to(x.dtype)[:, :, None]
         pace, rise = torch.exp((2 * pace - 1) * self.most), (2 * rise - 1) * RISE / 2
-        told = [x[:, columns] for columns in self.told]
+        channels = [x[:, columns] for columns in self.channel_columns]
         # Channels are put back below as they were: the deviation of a channel that never varies is so large
         # that multiplying and dividing by it loses the value.
         raw_x, raw_y = x * self.x_std + self.x_mean, y * self.y_std + self.y_mean
@@ -78,7 +78,7 @@ class OtherPaces:
         self._smooth(raw_x, part)
         x.copy_((raw_x - self.x_mean) / self.x_std)
         y.copy_((raw_y - self.y_mean) / self.y_std)
-        for columns, values in zip(self.told, told, strict=True):
+        for columns, values in zip(self.channel_columns, channels, strict=True):
             x[:, columns] = values
 
     def _play_window(self, x: Tensor, y: Tensor, pace: Tensor, rise: Tensor) -> None:

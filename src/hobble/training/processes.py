@@ -20,7 +20,7 @@ import torch.distributed
 from torch import Tensor
 
 from hobble.core.errors import HobbleError
-from hobble.database.sharing import Sharing, own_places
+from hobble.database.sharing import PassSharing, own_places
 
 PATIENCE = timedelta(minutes=30)  # wait for the slowest process; a dead process is noticed at once
 
@@ -47,9 +47,9 @@ class Processes:
         """The places in a batch that this process fills."""
         return own_places(batch, self.rank, self.count)
 
-    def sharing(self, total: int, batch: int, stretches: int | None) -> Sharing:
+    def sharing(self, total: int, batch: int, stretches: int | None) -> PassSharing:
         """What this process reads of a section. stretches: None means one for each process."""
-        return Sharing.of(total, batch, stretches or self.count, self.rank, self.count)
+        return PassSharing.of(total, batch, stretches or self.count, self.rank, self.count)
 
     def sum(self, values: Tensor) -> None:
         """Replace values (n,) by their sum over the processes. All processes get the same bits."""

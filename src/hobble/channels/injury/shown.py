@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Collection, Sequence
 from itertools import pairwise
 
-from hobble.channels.shown import ChannelWords, SampleWalk, Shown
+from hobble.channels.shown import ChannelDisplay, ChannelWords, SampleWalk
 from hobble.core.skeleton import Skeleton
 from hobble.figure.pack import link_ends, regions
 
@@ -77,7 +77,7 @@ HURT = {
 }
 
 
-def shown(skeleton: Skeleton, links: Sequence[str], trained: Collection[str]) -> Shown:
+def shown(skeleton: Skeleton, links: Sequence[str], trained: Collection[str]) -> ChannelDisplay:
     """Sliders and presets of the parts that were hurt in training, and the regions of the body."""
     parts = {label: links[i] for label, i in body_parts(skeleton, links, trained).items()}
     felt = {label: link for label, link in parts.items() if link in trained}
@@ -86,7 +86,7 @@ def shown(skeleton: Skeleton, links: Sequence[str], trained: Collection[str]) ->
         for name, values in PRESETS.items()
         if all(label in felt for label in values)
     }
-    return Shown(tuple(spoken_links(skeleton, links)), felt, presets, regions(skeleton, links))
+    return ChannelDisplay(tuple(spoken_links(skeleton, links)), felt, presets, regions(skeleton, links))
 
 
 def loops(skeleton: Skeleton, links: Sequence[str], trained: Collection[str]) -> list[SampleWalk]:

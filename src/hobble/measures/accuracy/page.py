@@ -11,7 +11,7 @@ from hobble.measures.clip_parts import sampled_words
 from hobble.measures.inputs import Json
 from hobble.report.charts import Chart, axis, mark
 from hobble.report.formats import duration, number
-from hobble.report.gather import Material
+from hobble.report.gather import ReportMaterial
 from hobble.report.page_parts import PageSection, Paragraph, SectionPart, TemplatePart
 from hobble.report.published import cited
 from hobble.report.summary import Hint, KeyFigure, placed
@@ -35,7 +35,7 @@ def _height(count: int) -> int:
     return max(260, 110 + 21 * count)
 
 
-def clip_bars(found: Json, material: Material) -> Chart | None:
+def clip_bars(found: Json, material: ReportMaterial) -> Chart | None:
     """Mean relative error of each clip, with whiskers of one standard deviation and the published mean."""
     rows = _rows(found)[::-1]
     if not rows:
@@ -160,7 +160,7 @@ def accuracy_table(found: Json, name: str) -> Table:
     return Table(f"{name}-accuracy", columns, rows)
 
 
-def published_table(found: Json, material: Material) -> Table:
+def published_table(found: Json, material: ReportMaterial) -> Table:
     """The errors of our two splits, followed by the published means."""
     rows: list[list[Any]] = []
     for split in ("held_out", "train"):
@@ -181,7 +181,7 @@ def published_table(found: Json, material: Material) -> Table:
     return Table(f"{material.name}-published", columns, rows, "Comparison with published results")
 
 
-def section(found: Json, material: Material) -> PageSection:
+def section(found: Json, material: ReportMaterial) -> PageSection:
     """Charts, tables, and the view of captured beside predicted motion. Empty without measured clips."""
     if not found.get("clips"):
         return PageSection("accuracy", [])
@@ -202,7 +202,7 @@ def section(found: Json, material: Material) -> PageSection:
     )
 
 
-def caveat(material: Material) -> str:
+def caveat(material: ReportMaterial) -> str:
     """A paragraph: why these errors must not be compared with the published ones."""
     seconds = sum(clip["seconds"] or 0.0 for clip in material.motion)
     return (
@@ -227,7 +227,7 @@ def sampled(found: Json) -> str:
     )
 
 
-def figures(found: Json, material: Material) -> Iterator[KeyFigure]:
+def figures(found: Json, material: ReportMaterial) -> Iterator[KeyFigure]:
     """The error of each split."""
     for at, split, label in (
         (10, "held_out", "Error on held-out clips"),
@@ -243,7 +243,7 @@ def figures(found: Json, material: Material) -> Iterator[KeyFigure]:
             yield KeyFigure(label, f"{100 * part['mean']:.2f}", "%", note, at)
 
 
-def _centimetres(error: float, split: str, material: Material) -> str:
+def _centimetres(error: float, split: str, material: ReportMaterial) -> str:
     """The position error of the prediction, and of the drawn pose if the roll-outs measured it."""
     lengths = {entry["length"]: entry for entry in material.found("rollouts").get("lengths", ())}
     drawn = (lengths.get(1, {}).get(split) or {}).get("position_error_cm")
@@ -255,7 +255,7 @@ def _centimetres(error: float, split: str, material: Material) -> str:
     )
 
 
-def hints(found: Json, material: Material) -> Iterator[Hint]:
+def hints(found: Json, material: ReportMaterial) -> Iterator[Hint]:
     """How well the network generalises, and which clip has the largest error."""
     held_out = (found.get("held_out") or {}).get("mean")
     yield from placed(10 if held_out is None else 30, _generalisation(found))

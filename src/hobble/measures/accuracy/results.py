@@ -7,7 +7,7 @@ from typing import NotRequired, TypedDict
 from hobble.measures.results import SampleSize
 
 
-class ErrorsOf(TypedDict):
+class ErrorNumbers(TypedDict):
     """Errors over `frames` frames. mean, sd, p05 to p95 (percentiles): of the relative error.
 
     Without a frame, mean, sd and position error are None and the percentiles are missing.
@@ -24,7 +24,7 @@ class ErrorsOf(TypedDict):
     p95: NotRequired[float]
 
 
-class ErrorsOfClip(ErrorsOf):
+class ErrorsOfClip(ErrorNumbers):
     """The errors of one clip. split: "train" or "held_out"."""
 
     clip: str
@@ -38,7 +38,7 @@ class ErrorsOfExcerpt(ErrorsOfClip):
     last_frame: int
 
 
-class ErrorsOfSplit(ErrorsOf):
+class ErrorsOfSplit(ErrorNumbers):
     """The errors of all clips of a split.
 
     clips: their number. mean_of_clips: the mean of their mean relative errors. interval: half widths of the

@@ -11,7 +11,7 @@ from hobble.measures.inputs import Json
 from hobble.measures.manners.results import ChannelResult
 from hobble.measures.manners.windows import EFFECTS, NONE
 from hobble.report.charts import Chart
-from hobble.report.gather import Material
+from hobble.report.gather import ReportMaterial
 from hobble.report.page_parts import PageSection, Paragraph, SectionPart
 
 UNITS = {"speed": "m/s", "stride": "cm", "trunk": "° forward", "arms": "° of swing", "head": "° forward"}
@@ -22,7 +22,7 @@ AMOUNTS: tuple[tuple[Literal["captured", "generated", "generated_at_half"], str,
 )
 
 
-def section(found: Json, material: Material) -> PageSection:
+def section(found: Json, material: ReportMaterial) -> PageSection:
     """For each channel how often its manners are recognised and how much they change the walk.
 
     Empty for a network without such a channel.

@@ -6,7 +6,7 @@ from typing import Any
 
 from hobble.measures.inputs import Json
 from hobble.report.charts import Chart, Trace, axis, line, mark
-from hobble.report.gather import Material
+from hobble.report.gather import ReportMaterial
 
 # The steps of a frame in order, with their colours.
 STEPS = {
@@ -34,7 +34,7 @@ def step_place(step: str) -> int:
     return list(STEPS).index(step) if step in STEPS else len(STEPS)
 
 
-def lap_chart(found: Json, material: Material) -> Chart | None:
+def lap_chart(found: Json, material: ReportMaterial) -> Chart | None:
     """Milliseconds per frame of each step, stacked, lap by lap, for each phase mode."""
     options = {}
     for entry in found.get("modes") or [found]:

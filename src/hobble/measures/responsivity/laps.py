@@ -14,7 +14,7 @@ import numpy as np
 
 from hobble.core.quat import Array
 from hobble.evaluation.motion_measures import foot_slide, turns_between
-from hobble.measures.responsivity.results import LapWalk, Run
+from hobble.measures.responsivity.results import LapPath, LapWalk
 from hobble.models.network import Network
 from hobble.runtime.animation import ProceduralAnimation, world_rotations
 from hobble.runtime.options import Runtime
@@ -59,7 +59,7 @@ def starts_of(track: Sequence[Waypoint], laps: int) -> Starts:
 
 def walk_laps(
     network: Network, runtime: Runtime, laps: int, longest: int, track: Sequence[Waypoint]
-) -> list[tuple[LapWalk, Run]]:
+) -> list[tuple[LapWalk, LapPath]]:
     """Walk `laps` laps, at most `longest` frames each. Returns how each went, and its path.
 
     A figure that does not come to its first waypoint in that time has reached none, and its lap begins where
@@ -170,7 +170,7 @@ def held_back(predicted: Array, taken: Array) -> np.ndarray:
     return np.asarray((~same).any(axis=-1))
 
 
-def _lap(recorded: _Recorded, c: int, first: int, waypoints: int, longest: int) -> tuple[LapWalk, Run]:
+def _lap(recorded: _Recorded, c: int, first: int, waypoints: int, longest: int) -> tuple[LapWalk, LapPath]:
     """Lap c + 1. first: the value of `reached` at which it begins; waypoints: of the track."""
     reached = recorded.reached[:, c]
     begin = int(np.searchsorted(reached, first))
@@ -196,7 +196,7 @@ def _lap(recorded: _Recorded, c: int, first: int, waypoints: int, longest: int) 
     return lap, _run(c + 1, recorded.places[span, c], off)
 
 
-def _run(number: int, places: Array, off: Array) -> Run:
+def _run(number: int, places: Array, off: Array) -> LapPath:
     """The path of a lap, with a place every EVERY frames.
 
     places: (F, 2), cm. off: (F,) distance from the line between waypoints, cm. A stored place has the largest

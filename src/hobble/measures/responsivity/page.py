@@ -16,7 +16,7 @@ from hobble.measures.responsivity.lap_charts import (
     track_chart,
 )
 from hobble.report.formats import number
-from hobble.report.gather import Material
+from hobble.report.gather import ReportMaterial
 from hobble.report.page_parts import KeyFigures, PageSection, Paragraph, SectionPart
 from hobble.report.published import cited
 from hobble.report.summary import Hint, KeyFigure, placed
@@ -43,7 +43,7 @@ LAP_COLUMNS = {
 TRACK = "The character is steered around a track of six waypoints: it walks, side-steps, jogs and crouches."
 
 
-def section(found: Json, material: Material) -> PageSection:
+def section(found: Json, material: ReportMaterial) -> PageSection:
     """The track, the times of the laps, and the published times."""
     followed = track_figures(found)
     return PageSection(
@@ -62,7 +62,7 @@ def section(found: Json, material: Material) -> PageSection:
     )
 
 
-def figures(found: Json, material: Material) -> Iterator[KeyFigure]:
+def figures(found: Json, material: ReportMaterial) -> Iterator[KeyFigure]:
     """The time of a frame."""
     milliseconds = frame_milliseconds(found)
     if milliseconds is not None:
@@ -73,7 +73,7 @@ def figures(found: Json, material: Material) -> Iterator[KeyFigure]:
         yield KeyFigure("Time per frame", number(milliseconds, 2), "ms", note, 20)
 
 
-def hints(found: Json, material: Material) -> Iterator[Hint]:
+def hints(found: Json, material: ReportMaterial) -> Iterator[Hint]:
     """Whether a frame fits into 1/60 s, and whether the character followed the track."""
     yield from placed(60, _speed(found))
     yield from placed(40, _track(found))
@@ -137,7 +137,7 @@ def _turn(found: Json) -> KeyFigure:
     return KeyFigure("Largest predicted turn", predicted, "°", note)
 
 
-def speed_published(found: Json, material: Material) -> Table | None:
+def speed_published(found: Json, material: ReportMaterial) -> Table | None:
     """Our milliseconds, followed by the published means."""
     ours = frame_milliseconds(found)
     if ours is None:

@@ -65,7 +65,7 @@ class Lap(LapWalk):
     milliseconds: Milliseconds
 
 
-class Run(TypedDict):
+class LapPath(TypedDict):
     """The path of a lap, stored every `seconds_between`.
 
     x, z: m. off_cm: largest distance from the line between waypoints since the place before.
@@ -78,7 +78,7 @@ class Run(TypedDict):
     off_cm: list[float]
 
 
-class OfMode(TypedDict):
+class ModeTimes(TypedDict):
     """All laps of one phase mode.
 
     waypoints: how many there are in all laps. foot_slide_cm is the mean over laps; path_overshoot_cm and both
@@ -102,8 +102,8 @@ class OfMode(TypedDict):
 class LapsOfMode(TypedDict):
     """The file of a piece: all laps of a phase mode, and the paths of the first ones."""
 
-    laps: OfMode
-    runs: list[Run]
+    laps: ModeTimes
+    runs: list[LapPath]
 
 
 class Track(TypedDict):
@@ -116,7 +116,7 @@ class Track(TypedDict):
     z: list[float]
 
 
-class Responsivity(OfMode):
+class Responsivity(ModeTimes):
     """responsivity.json. The values of the configured phase mode are at the top, `modes` has those of all.
 
     runs: the paths of the first laps in the configured mode. parameters: see `parameter_counts`; None for a
@@ -126,10 +126,10 @@ class Responsivity(OfMode):
 
     configuration: str
     track: Track
-    runs: list[Run]
+    runs: list[LapPath]
     parameters: dict[str, int] | None
     stored: dict[str, int]
     bytes_each: int
     exact: str
     laps_other_modes: int
-    modes: list[OfMode]
+    modes: list[ModeTimes]

@@ -15,7 +15,7 @@ import numpy as np
 from hobble.measures.inputs import MeasureInputs, Outcome, Row
 from hobble.measures.responsivity import Options
 from hobble.measures.responsivity.laps import FPS, walk_laps
-from hobble.measures.responsivity.results import Lap, LapsOfMode, OfMode, Responsivity, Spread
+from hobble.measures.responsivity.results import Lap, LapsOfMode, ModeTimes, Responsivity, Spread
 from hobble.measures.responsivity.times import milliseconds, timed_frames
 from hobble.models.load import load_network
 from hobble.models.network import Network
@@ -94,7 +94,7 @@ def laps_of_mode(
         {**lap, "milliseconds": milliseconds(seconds)}
         for (lap, _), seconds in zip(walked, times, strict=True)
     ]
-    entry: OfMode = {
+    entry: ModeTimes = {
         "mode": runtime.mode,
         "laps": results,
         "laps_finished": sum(lap["finished"] for lap in results),

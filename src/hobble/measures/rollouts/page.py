@@ -8,11 +8,11 @@ from hobble.measures.accuracy.page import COLOURS, NAMES
 from hobble.measures.clip_parts import sampled_words
 from hobble.measures.inputs import Json
 from hobble.report.charts import Chart, axis, line, log_axis
-from hobble.report.gather import Material
+from hobble.report.gather import ReportMaterial
 from hobble.report.page_parts import PageSection, SectionPart
 
 
-def section(found: Json, material: Material) -> PageSection:
+def section(found: Json, material: ReportMaterial) -> PageSection:
     """The chart, which is added to the section on accuracy."""
     return PageSection("accuracy", [SectionPart(50, rollout_chart(found))])
 

@@ -7,7 +7,7 @@ from typing import NotRequired, TypedDict
 from hobble.measures.results import SampleSize
 
 
-class ErrorsOf(TypedDict):
+class RollOutNumbers(TypedDict):
     """Errors over `frames` frames of roll-outs. They are None if there were no frames.
 
     mean, sd: of the relative error. ended: number of roll-outs that reached their full length. last_cm,
@@ -26,19 +26,19 @@ class ErrorsOf(TypedDict):
     interval: NotRequired[dict[str, float]]
 
 
-class ErrorsOfClip(ErrorsOf):
+class ErrorsOfClip(RollOutNumbers):
     """The errors of one clip. split: "train" or "held_out"."""
 
     clip: str
     split: str
 
 
-class OfLength(TypedDict):
+class LengthErrors(TypedDict):
     """The errors of roll-outs over `length` frames."""
 
     length: int
-    train: ErrorsOf
-    held_out: ErrorsOf
+    train: RollOutNumbers
+    held_out: RollOutNumbers
     clips: list[ErrorsOfClip]
 
 
@@ -48,5 +48,5 @@ class RollOutsFound(TypedDict):
     configuration: str
     joints: int
     mode: str
-    lengths: list[OfLength]
+    lengths: list[LengthErrors]
     sample: NotRequired[SampleSize]

@@ -13,6 +13,8 @@ from hobble.models.stack import Stack, StackPredictor, blend_layers, exp_below_0
 if TYPE_CHECKING:
     from hobble.models.mann.network import Mann
 
+# Of a `Stack`, for compiled functions: weights, numbers, plan.
+Layers = tuple[Any, Any, Any]
 NEGLIGIBLE = 1e-7  # a smaller share changes nothing in single precision beside shares near 1
 
 
@@ -31,25 +33,25 @@ class MannPredictor(StackPredictor):
         """As in `Predictor`; the phase is ignored."""
         gate, experts = self._gate, self._experts
         _evaluate(
-            gate.weights, gate.numbers, gate.plan, self.network.columns,
-            experts.weights, experts.numbers, experts.plan, experts.sets, z, out,
+            (gate.weights, gate.numbers, gate.plan), self.network.columns,
+            (experts.weights, experts.numbers, experts.plan), experts.sets, z, out,
         )  # fmt: skip
 
 
 @njit(error_model="numpy")
-def _evaluate(
-    gate_weights: Any, gate_numbers: Any, gate_plan: Any, columns: Any,
-    weights: Any, numbers: Any, plan: Any, experts: int, z: Any, out: Any,
-) -> None:  # fmt: skip
+def _evaluate(gate: Layers, columns: Any, experts: Layers, count: int, z: Any, out: Any) -> None:
+    """Rows z (C, X) to out (C, Y). columns: those of z that the gate reads. count: of the experts."""
     gate_z = np.empty((z.shape[0], len(columns)), np.float32)
     for c in range(z.shape[0]):
         for i in range(len(columns)):
             gate_z[c, i] = z[c, columns[i]]
-    shares = np.empty((z.shape[0], experts), np.float32)
-    blend_layers(gate_weights, gate_numbers, gate_plan, np.ones((z.shape[0], 1), np.float32), gate_z, shares)
+    shares = np.empty((z.shape[0], count), np.float32)
+    weights, numbers, plan = gate
+    blend_layers(weights, numbers, plan, np.ones((z.shape[0], 1), np.float32), gate_z, shares)
     for c in range(z.shape[0]):
         _softmax(shares[c])
-    blend_layers(weights, numbers, plan, shares, z, out)
+    expert_weights, expert_numbers, expert_plan = experts
+    blend_layers(expert_weights, expert_numbers, expert_plan, shares, z, out)
 
 
 @njit(forceinline=True, cache=False)

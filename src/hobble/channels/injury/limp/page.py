@@ -11,7 +11,7 @@ from hobble.measures.clip_parts import captured_sampled
 from hobble.measures.inputs import Json
 from hobble.report.charts import Chart, Trace, axis, line
 from hobble.report.formats import number
-from hobble.report.gather import Material
+from hobble.report.gather import ReportMaterial
 from hobble.report.page_parts import PageSection, Paragraph, SectionPart
 from hobble.report.tables import Column, Table
 
@@ -40,7 +40,7 @@ IMPAIRMENTS = {
 }
 
 
-def section(found: Json, material: Material) -> PageSection:
+def section(found: Json, material: ReportMaterial) -> PageSection:
     """Where the training data came from, the chart of sizes, the recognition, and all tables."""
     if not found.get("applies"):
         return PageSection("injury", [])

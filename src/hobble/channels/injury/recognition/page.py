@@ -5,11 +5,11 @@ from __future__ import annotations
 from hobble.measures.clip_parts import captured_sampled
 from hobble.measures.inputs import Json
 from hobble.report.charts import Chart, Trace
-from hobble.report.gather import Material
+from hobble.report.gather import ReportMaterial
 from hobble.report.page_parts import PageSection, SectionPart
 
 
-def section(found: Json, material: Material) -> PageSection:
+def section(found: Json, material: ReportMaterial) -> PageSection:
     """The chart, which is added to the section on the response to injury."""
     return PageSection("injury", [SectionPart(30, recognition_chart(found))])
 

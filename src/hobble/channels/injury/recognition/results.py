@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import NotRequired, TypedDict
 
 
-class OfSeverity(TypedDict):
+class SeverityShare(TypedDict):
     """How many windows, or walks, there are of one severity, and the share `right` that is recognised."""
 
     severity: float
@@ -14,7 +14,7 @@ class OfSeverity(TypedDict):
     right: float | None
 
 
-class Judged(TypedDict):
+class RecognisedWindows(TypedDict):
     """How windows, or whole walks, were recognised.
 
     right: share in which the links that hurt are named. right_without_side: share in which the part of the
@@ -25,25 +25,25 @@ class Judged(TypedDict):
     walks: NotRequired[int]
     right: float | None
     right_without_side: float | None
-    by_severity: list[OfSeverity]
+    by_severity: list[SeverityShare]
     confusion: dict[str, dict[str, int]]
 
 
-class OfGenerated(Judged):
+class RecognisedGenerated(RecognisedWindows):
     """How windows of generated walks were recognised. by_walk: with one answer for each whole walk."""
 
-    by_walk: Judged
+    by_walk: RecognisedWindows
 
 
-class OfCaptured(TypedDict):
+class RecognisedCaptured(TypedDict):
     """How captured windows were recognised.
 
     cross_validated: those of training clips, with each quarter of every stretch left out of learning in turn.
     held_out: those of the held-out clips.
     """
 
-    cross_validated: Judged
-    held_out: Judged
+    cross_validated: RecognisedWindows
+    held_out: RecognisedWindows
 
 
 class Recognition(TypedDict):
@@ -60,5 +60,5 @@ class Recognition(TypedDict):
     classes: NotRequired[list[str]]
     features: NotRequired[list[str]]
     chance: NotRequired[float]
-    captured: NotRequired[OfCaptured]
-    generated: NotRequired[OfGenerated]
+    captured: NotRequired[RecognisedCaptured]
+    generated: NotRequired[RecognisedGenerated]

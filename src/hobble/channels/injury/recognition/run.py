@@ -17,7 +17,7 @@ import numpy as np
 from hobble.channels.injury.crowd_severities import links as links_of
 from hobble.channels.injury.crowd_severities import severities
 from hobble.channels.injury.limp.captured_limps import VERSION
-from hobble.channels.injury.recognition.results import Judged, Recognition
+from hobble.channels.injury.recognition.results import RecognisedWindows, Recognition
 from hobble.core.quat import Array
 from hobble.core.skeleton import Skeleton
 from hobble.evaluation.captured import Captured
@@ -182,7 +182,7 @@ def rows(result: Recognition) -> list[Row]:
     if not result["applies"]:
         return []
     captured = result["captured"]
-    tables: dict[str, Judged] = {
+    tables: dict[str, RecognisedWindows] = {
         "cross_validated": captured["cross_validated"],
         "held_out": captured["held_out"],
         "generated": result["generated"],
@@ -217,7 +217,7 @@ def _values(skeleton: Skeleton, local: Array, contacts: Array, root: Array, span
     return features(skeleton, local[span], contacts[span], root[span])
 
 
-def _cross_validated(windows: Sequence[InjuryWindow], sided: Plain) -> Judged:
+def _cross_validated(windows: Sequence[InjuryWindow], sided: Plain) -> RecognisedWindows:
     """How windows are recognised if a classifier judges each quarter and learns from the other three."""
     judged: list[InjuryWindow] = []
     named: list[str] = []
@@ -230,11 +230,11 @@ def _cross_validated(windows: Sequence[InjuryWindow], sided: Plain) -> Judged:
     return _confusion(sorted({w.hurt for w in windows}), judged, named, sided)
 
 
-def _judged(judge: Discriminant, windows: Sequence[InjuryWindow], sided: Plain) -> Judged:
+def _judged(judge: Discriminant, windows: Sequence[InjuryWindow], sided: Plain) -> RecognisedWindows:
     return _confusion(judge.classes, windows, judge.names(table(windows)) if windows else [], sided)
 
 
-def _by_walk(judge: Discriminant, windows: Sequence[InjuryWindow], sided: Plain) -> Judged:
+def _by_walk(judge: Discriminant, windows: Sequence[InjuryWindow], sided: Plain) -> RecognisedWindows:
     """One answer for each walk, from all its windows together."""
     scores = judge.scores(table(windows))
     walks, named = [], []
@@ -251,7 +251,7 @@ def _confusion(
     named: Sequence[str],
     sided: Plain,
     what: str = "windows",
-) -> Judged:
+) -> RecognisedWindows:
     """How windows were recognised. named: the recognised class of each window.
 
     what: "windows", or "walks" if each window stands for a whole walk.
@@ -272,7 +272,7 @@ def _confusion(
         ],
         "confusion": counts,
     }
-    return cast(Judged, found)
+    return cast(RecognisedWindows, found)
 
 
 def _share(right: Sequence[bool]) -> float | None:

@@ -10,7 +10,7 @@ from hobble.channels.injury.response.hints import injury_hints
 from hobble.channels.shown import speaker
 from hobble.measures.inputs import Json
 from hobble.report.charts import Chart, ChartGroup, Trace, axis, line
-from hobble.report.gather import Material
+from hobble.report.gather import ReportMaterial
 from hobble.report.page_parts import ChartPair, PageSection, SectionPart
 from hobble.report.summary import Hint, placed
 from hobble.report.tables import Column, Table
@@ -57,18 +57,18 @@ PANELS: tuple[Panel, ...] = (
 )
 
 
-def section(found: Json, material: Material) -> PageSection:
+def section(found: Json, material: ReportMaterial) -> PageSection:
     """The charts and tables of injury.json. Empty for a network without severities."""
     parts = _parts(in_words(found, material), material.name) if found.get("applies") else []
     return PageSection("injury", parts, title="Injury response", at=20)
 
 
-def hints(found: Json, material: Material) -> Iterator[Hint]:
+def hints(found: Json, material: ReportMaterial) -> Iterator[Hint]:
     """Sentences about the response."""
     return placed(50, injury_hints(in_words(found, material)))
 
 
-def in_words(found: Json, material: Material) -> dict[str, Any]:
+def in_words(found: Json, material: ReportMaterial) -> dict[str, Any]:
     """The results with names for readers in place of the labels of links."""
     say = speaker(material.network["skeleton"])
 

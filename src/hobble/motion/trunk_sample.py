@@ -1,0 +1,60 @@
+"""Chooses the poses that show how the pelvis is turned against the spine.
+
+That is seen in upright poses, where the spine is about straight. In a bow or a squat it bends, and its
+directions would tilt the pelvis.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from hobble.core.quat import Array
+from hobble.motion.body import SIDES
+from hobble.motion.body_sample import BodySample
+from hobble.motion.orient import unit
+
+STRETCHED = 0.8  # one leg of an upright figure is longer than this share of its length
+LEANS = 25.0  # degrees: an upright trunk leans less
+STOOPS = 40.0  # degrees: a sprinter's trunk leans up to 35, but its spine is straight
+SPREAD = 10.0  # degrees: of the upright frames, those count that lean at most this much more than the others
+FEWEST = 0.05  # share of the frames
+OFF = 3.0  # cm: mean distance of hips and head in clips of bows and squats
+
+
+def trunk_sample(seen: BodySample, zero: bool) -> BodySample:
+    """The upright frames. Without them the zero pose, if it stands, else all frames.
+
+    zero: whether a person could stand in the zero pose.
+    """
+    leans = _leans(seen)
+    if np.mean(leans < LEANS) >= FEWEST:
+        return seen.part(leans < np.quantile(leans, FEWEST) + SPREAD)
+    return seen.in_zero_pose() if zero else seen
+
+
+def stoop_doubt(seen: BodySample, zero: bool) -> str | None:
+    """A sentence if the figure always stoops or squats and no zero pose shows its pelvis, else None."""
+    if zero or np.mean(_leans(seen) < STOOPS) >= FEWEST:
+        return None
+    return (
+        "The figure is never upright, and nobody could stand in its zero pose, so how far its pelvis tilts "
+        f"is uncertain: hips, trunk and arms may lie {OFF:g} cm too far forward or back."
+    )
+
+
+def _leans(seen: BodySample) -> Array:
+    """(S,) degrees by which the trunk leans. 180 where no leg is stretched."""
+    body = seen.body
+    shoulders, hips = (
+        seen.at[:, limbs["left"][k]] + seen.at[:, limbs["right"][k]]
+        for limbs, k in ((body.arms, 1), (body.legs, 0))
+    )
+    leans = np.degrees(np.arccos(np.clip(unit(shoulders - hips)[:, 1], -1.0, 1.0)))
+    stretch = np.max([_stretch(seen, *body.legs[side][:3]) for side in SIDES], axis=0)
+    return np.where(stretch > STRETCHED, leans, 180.0)
+
+
+def _stretch(seen: BodySample, hip: int, knee: int, heel: int) -> Array:
+    """(S,) distance from hip to ankle, as a share of the leg's length."""
+    reach = np.linalg.norm(seen.at[:, heel] - seen.at[:, hip], axis=-1)
+    return reach / max(seen.length(hip, knee, heel), 1e-9)

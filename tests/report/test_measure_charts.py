@@ -1,0 +1,126 @@
+"""Charts and tables of the measurements: each number of the JSON is in its place."""
+
+from __future__ import annotations
+
+import pytest
+
+from hobble.channels.injury.recognition.page import recognition_chart
+from hobble.channels.injury.response import page as injury_page
+from hobble.channels.injury.response import page_cases
+from hobble.measures.responsivity import lap_charts
+from hobble.measures.responsivity import page as responsivity_page
+from hobble.report.charts import ChartGroup
+from hobble.report.gather import ReportMaterial
+from hobble.report.page_parts import ChartPair
+from hobble.report.summary import KeyFigure
+
+
+def test_the_steps_of_a_frame_are_in_their_order(material: ReportMaterial) -> None:
+    chart = lap_charts.lap_chart(material.found("responsivity"), material)
+    assert chart is not None
+    traces = next(iter(chart.options.values()))
+    assert [t["name"] for t in traces] == [
+        "prepare",
+        "input",
+        "insert",
+        "predict",
+        "output",
+        "update",
+        "median",
+    ]
+    times = material.measured["responsivity"]["laps"][0]["milliseconds"]
+    assert sum(trace["y"][0] for trace in traces[:-1]) == pytest.approx(times["total"])
+    assert traces[-1]["y"][0] == times["spread"]["median"]
+
+
+def test_a_row_of_the_table_of_laps_reads_as_a_sentence(material: ReportMaterial) -> None:
+    table = responsivity_page.lap_table(material.found("responsivity"), "example")
+    assert table is not None
+    labels = [column.label for column in table.columns]
+    assert labels[:5] == ["lap", "finished", "waypoints reached", "seconds", "frames"]
+    assert not [label for label in labels if "_" in label]
+    assert [shown for *_, shown in table.cells[0][:5]] == ["1", "yes", "6", "113.3", "6,800"]
+    assert [shown for *_, shown in table.cells[3][:3]] == ["4", "no", "5"]
+
+
+def test_feet_with_little_contact_have_no_slide(material: ReportMaterial) -> None:
+    def slide(steps: int) -> KeyFigure:
+        laps = [{**lap, "steps": steps} for lap in material.measured["responsivity"]["laps"][:2]]
+        found = {**material.measured["responsivity"], "laps": laps, "foot_slide_cm": 0.0}
+        figures = responsivity_page.track_figures(found)
+        return next(figure for figure in figures if figure.label == "Foot slide")
+
+    assert (slide(4).value, slide(4).unit) == ("–", "")
+    assert "8 steps" in slide(4).note
+    assert (slide(5).value, slide(5).unit) == ("0", "cm")
+
+
+def test_links_never_hurt_in_training_are_told_from_the_others(material: ReportMaterial) -> None:
+    responses = [
+        {**r, "trained": r["link"].startswith("Left")} for r in material.measured["injury"]["responses"]
+    ]
+    rows = [
+        {"link": link, "severity": v, "jog_from_healthy_cm": 0.1 * v}
+        for link in {r["link"]: None for r in responses}
+        for v in (5.0, 10.0)
+    ]
+    injury = {**material.measured["injury"], "responses": responses, "into_a_jog": rows}
+    parts = [part.content for part in injury_page.section(injury, material).parts]
+    (curves,) = [content for content in parts if isinstance(content, ChartGroup)]
+    overview, (_, into_a_jog) = [content.charts for content in parts if isinstance(content, ChartPair)]
+    never = {"right shank", "lower back"}
+    for chart in overview:
+        hollow = [t for t in chart.traces if t["name"].endswith(", never hurt in training")]
+        assert [set(t["y"]) for t in hollow] == [never, never]
+        assert set(chart.layout["yaxis"]["categoryarray"][: len(never)]) == never
+    marked = [o.endswith("(never hurt in training)") for o in curves.charts[0].options]
+    assert marked == sorted(marked)
+    assert sum(marked) == 2 * len(never)
+    names = [trace["name"] for trace in into_a_jog.traces]
+    assert not never & set(names)
+    assert names[-1] == "never hurt in training"
+
+
+def test_confusions_are_shares_of_each_injury() -> None:
+    confusion = {"knee": {"knee": 3, "back": 1}, "back": {"knee": 0, "back": 2}}
+    part = {"confusion": confusion, "right": 5 / 6}
+    found = {"applies": True, "classes": ["knee", "back"], "chance": 0.5, "people": 0.82}
+    chart = recognition_chart({**found, "generated": part, "captured": {}})
+    assert chart is not None
+    assert list(chart.options) == ["generated walks, by window: 83 % right"]
+    (trace,) = next(iter(chart.options.values()))
+    assert trace["z"] == [[0.75, 0.25], [None, 1.0]]
+    assert "50 %" in chart.caption
+    assert "82 %" in chart.caption
+    assert recognition_chart({"applies": False}) is None
+
+
+def test_every_pair_of_injuries_is_drawn_as_it_is_measured() -> None:
+    rows = [
+        {"first": "a-b", "second": "c-d", "from_first_cm": 2.0, "share": 0.5, "from_second_cm": 1.0},
+        {"first": "c-d", "second": "a-b", "from_first_cm": 0.0, "share": None, "from_second_cm": 0.0},
+    ]
+    chart = page_cases.second_chart(rows)
+    assert chart is not None
+    far, share = (traces[0] for traces in chart.options.values())
+    assert (far["y"], far["x"], far["z"]) == (["a-b", "c-d"], ["c-d", "a-b"], [[2.0, None], [None, 0.0]])
+    assert share["z"] == [[0.5, None], [None, None]]
+    assert page_cases.second_chart([]) is None
+
+
+def test_runs_are_drawn_over_the_track_in_red_where_they_left_it() -> None:
+    track = {"x": [0.0, 10.0, 10.0], "z": [0.0, 0.0, 5.0], "gaits": ["walk", "jog", "crouch"]}
+    near = {"lap": 1, "x": [0.0, 5.0], "z": [0.0, 0.1], "off_cm": [0.0, 10.0]}
+    far = {"lap": 2, "x": [0.0, 5.0, 9.0], "z": [0.0, -2.0, 0.0], "off_cm": [0.0, 200.0, 3.0]}
+    chart = lap_charts.track_chart({"track": track, "runs": [near, far]})
+    assert chart is not None
+    by_name = {trace["name"]: trace for trace in chart.traces}
+    assert by_name["track"]["x"] == [0.0, 10.0, 10.0, 0.0], "it is closed"
+    assert by_name["waypoints"]["text"] == ["0, walk", "1, jog", "2, crouch"]
+    left = by_name["more than 100 cm off"]
+    assert (left["x"], left["y"], left["customdata"]) == ([5.0], [-2.0], [[200.0, 2]])
+    assert "The largest distance from the track was 200 cm" in chart.caption
+    kept = lap_charts.track_chart({"track": track, "runs": [near]})
+    assert kept is not None
+    assert "The largest distance from the track was 10 cm" in kept.caption
+    assert lap_charts.track_chart({"track": {"waypoints": 6}}) is None
