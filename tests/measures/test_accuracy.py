@@ -22,6 +22,7 @@ from hobble.measures.accuracy.run import (
     joint_errors,
     joint_indices,
     measure,
+    prediction,
 )
 from hobble.models.checks import NEEDED_ROLES
 from hobble.models.load import load_network
@@ -157,6 +158,15 @@ def test_the_errors_of_a_clip_cover_all_its_pairs(weights, fits):
     assert got["position_error_cm"] == pytest.approx(np.concatenate(distance).mean())
     for name, share in QUANTILES.items():
         assert got[name] == pytest.approx(np.quantile(np.concatenate(relative), share), rel=0.05)
+
+
+def test_the_errors_of_the_fast_prediction_are_those_of_the_reference(weights):
+    network = load_network(weights)
+    rows = make_rows("a", 70, 10, 5)  # several batches, the last one not full
+    reference = clip_errors(network, rows, [0, 1, 2]).to_dict()
+    fast = clip_errors(network, rows, [0, 1, 2], prediction(network)).to_dict()
+    assert fast == pytest.approx(reference, rel=1e-4)
+    assert fast != reference  # it is another way to compute them
 
 
 def test_errors_do_not_depend_on_the_batch_size(weights, monkeypatch):

@@ -135,19 +135,20 @@ def test_lengths_together_are_as_each_alone_in_fewer_predictions(
         k: found.to_dict() for k, found in alone.items()
     }
     longest = dict.fromkeys(((n, s) for n in (90, 150) for s in range(1, n)), 1)
-    longest |= {(n, s): min(10, n - s) for n in (90, 150) for s in range(1, n, 2)}
-    longest |= {(n, s): min(60, n - s) for n in (90, 150) for s in range(1, n, 15)}
+    longest |= {(n, s): min(10, n - s) for n in (90, 150) for s in range(1, n, 5)}
+    longest |= {(n, s): min(60, n - s) for n in (90, 150) for s in range(1, n, 30)}
     assert sum(predicted) == sum(longest.values()) < apart
 
 
-def test_roll_outs_start_four_times_within_each_length(hurtable: Network) -> None:
+def test_short_roll_outs_start_twice_and_long_ones_four_times_within_their_length(hurtable: Network) -> None:
     rows = clip_rows(hurtable, 240, 1, gap=90)
-    found = clip_roll_outs(PfnnPredictor(hurtable), rows, range(31), (1, 10, 20, 200))
+    found = clip_roll_outs(PfnnPredictor(hurtable), rows, range(31), (1, 10, 20, 100, 200))
     # Of 90 and 150 frames in a row the first of each starts none.
     assert found[1].frames == found[1].starts == 89 + 149
-    assert found[10].frames == sum(min(10, n - s) for n in (90, 150) for s in range(1, n, 2))
-    assert found[20].frames == sum(min(20, n - s) for n in (90, 150) for s in range(1, n, 5))
-    assert found[20].to_dict()["ended"] == sum(s + 20 < n for n in (90, 150) for s in range(1, n, 5))
+    assert found[10].frames == sum(min(10, n - s) for n in (90, 150) for s in range(1, n, 5))
+    assert found[20].frames == sum(min(20, n - s) for n in (90, 150) for s in range(1, n, 10))
+    assert found[20].to_dict()["ended"] == sum(s + 20 < n for n in (90, 150) for s in range(1, n, 10))
+    assert found[100].frames == sum(min(100, n - s) for n in (90, 150) for s in range(1, n, 25))
     assert found[200].to_dict()["ended"] == 0
     assert found[200].to_dict()["last_cm"] is None
     # Each frame weighs as all its joints together.

@@ -33,7 +33,6 @@ def clip_roll_outs(
     """Length -> errors of roll-outs over every frame of the clip.
 
     No roll-out begins at the first frame of a stretch, because the root's movement before it is unknown.
-    Each frame is in `module.OVERLAP` roll-outs of each length, or in one if the roll-outs are one frame long.
     """
     groups = module._groups(LoadedPart(rows, 0, len(rows)), predictor.network.layout, lengths)
     return module._errors(predictor, [groups], joints, lengths)[0]
