@@ -22,7 +22,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from database import cold
+from own_process import cold
 
 from hobble.core.processors import processor
 from hobble.database.chunks import read_chunk, write_chunk

@@ -11,18 +11,16 @@ which limits the page cache too.
 from __future__ import annotations
 
 import argparse
-import contextlib
 import os
 import resource
 import shutil
-import subprocess
-import sys
 import tempfile
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
+from own_process import arguments, child, cold, status
 
 from hobble.core.processors import processor
 from hobble.database.merge import write_database
@@ -66,15 +64,6 @@ def made_up(folder: Path, size: int, joints: int) -> dict[str, Path]:
         save_clip_rows(files[name], rows)
         total += files[name].stat().st_size
     return files
-
-
-def cold(folder: Path) -> None:
-    """Drop a folder's files from the page cache."""
-    for file in folder.rglob("*"):
-        if file.is_file():
-            with open(file, "rb") as opened:
-                os.fsync(opened.fileno())
-                os.posix_fadvise(opened.fileno(), 0, 0, os.POSIX_FADV_DONTNEED)
 
 
 def rate(batches: Iterator[int], seconds: float = SECONDS) -> float:
@@ -141,45 +130,6 @@ def build(args: argparse.Namespace, folder: Path) -> Database:
     return Database.open(folder / "db", args.memory_mb)
 
 
-def child(
-    task: str, folder: Path, argument: str = "", limit_mb: int | None = None, script: str = __file__
-) -> list[float]:
-    """Run a task of a benchmark's script, by default this one, in a new process; the numbers that it prints.
-
-    limit_mb: most memory with the page cache. Above it the kernel reclaims pages or kills the process.
-    """
-    command = [sys.executable, script, "--task", task, "--folder", str(folder), "--argument", argument]
-    one_arena = {**os.environ, "MALLOC_ARENA_MAX": "1"}  # else each thread reserves 64 MB of address space
-    with cgroup(limit_mb) as join:
-        done = subprocess.run(
-            command, check=True, stdout=subprocess.PIPE, text=True, preexec_fn=join, env=one_arena
-        )
-    out = done.stdout
-    return [float(word) for word in out.split()]
-
-
-@contextlib.contextmanager
-def cgroup(limit_mb: int | None) -> Iterator[Callable[[], None] | None]:
-    """Make a memory cgroup, if this user may. Yields a function with which a child joins it."""
-    if limit_mb is None:
-        yield None
-        return
-    v1 = Path("/sys/fs/cgroup/memory")
-    base, file = (v1, "memory.limit_in_bytes") if v1.is_dir() else (Path("/sys/fs/cgroup"), "memory.max")
-    group = base / f"hobble-benchmark-{os.getpid()}"
-    try:
-        group.mkdir()
-        (group / file).write_text(str(limit_mb << 20))
-    except OSError as error:
-        print(f"no memory cgroup ({error}): the page cache is not limited", file=sys.stderr)
-        yield None
-        return
-    try:
-        yield lambda: (group / "cgroup.procs").write_text(str(os.getpid())) and None
-    finally:
-        group.rmdir()
-
-
 def task_build(folder: Path, clips: str) -> None:
     """The merge, as the rule calls it: seconds, peak memory, memory before, MB."""
     files = {file.stem: file for file in sorted(Path(clips).glob("*.npz"))}
@@ -216,14 +166,6 @@ def task_pieces(folder: Path, argument: str) -> None:
     columns, rows = map(int, argument.split())
     table = np.memmap(folder / "expanded.bin", np.float32, "r").reshape(-1, columns)
     print(rate(shuffled_pieces(table, rows)))
-
-
-def status(field: str) -> int:
-    """A line of /proc/self/status, in bytes."""
-    lines = dict(
-        line.split(":") for line in Path("/proc/self/status").read_text().splitlines() if ":" in line
-    )
-    return int(lines[field].split()[0]) << 10
 
 
 def reading(db: Database, folder: Path, args: argparse.Namespace) -> None:
@@ -309,27 +251,15 @@ def training(folder: Path, memory_mb: int, rounds: int) -> None:
         print(f"disk / memory {np.median(ratios):.3f}, {ratios.min():.3f} to {ratios.max():.3f} (goal: 0.95)")
 
 
-def arguments(description: str, rounds: int) -> argparse.ArgumentParser:
-    """The arguments of a benchmark that runs its tasks in processes of their own (`child`)."""
-    parser = argparse.ArgumentParser(description=description)
-    parser.add_argument("--size-mb", type=int, default=1280)
-    parser.add_argument("--memory-mb", type=int, default=128)
-    parser.add_argument("--rounds", type=int, default=rounds, help="rounds in which each way is measured")
-    parser.add_argument("--folder", type=Path)
-    parser.add_argument("--task", help=argparse.SUPPRESS)
-    parser.add_argument("--argument", help=argparse.SUPPRESS)
-    return parser
-
-
 def main() -> None:
     parser = arguments(__doc__.splitlines()[0], rounds=7)
     parser.add_argument("--joints", type=int, default=31)
     parser.add_argument("--only", choices=["reading", "training"], help="leave the other out")
     args = parser.parse_args()
-    print(processor())
     if args.task:
         globals()[f"task_{args.task}"](args.folder, args.argument)
         return
+    print(processor())
     folder = Path(tempfile.mkdtemp(prefix="hobble-database-", dir=args.folder))
     try:
         small = made_up(folder / "one", 1, args.joints)

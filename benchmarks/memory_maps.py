@@ -18,9 +18,10 @@ from collections.abc import Iterator
 from itertools import chain
 from pathlib import Path
 
-import database as of_files
 import numpy as np
-from database import BATCH, PROGRAM_MB, cold, made_up, status
+from database import BATCH, PROGRAM_MB, made_up
+from database import SECONDS as READING_SECONDS
+from own_process import arguments, child, cold, status
 
 from hobble.core.processors import processor
 from hobble.database import chunk_window, chunks, order, reader
@@ -144,7 +145,7 @@ def task_maps(folder: Path, argument: str) -> None:
                 file.read_bytes()
     next(batches)
     start, used, rows, own = time.perf_counter(), time.process_time(), 0, 0
-    while time.perf_counter() - start < of_files.SECONDS:
+    while time.perf_counter() - start < READING_SECONDS:
         rows += next(batches)
         own = max(own, status("RssAnon"))
     clock, processor = time.perf_counter() - start, time.process_time() - used
@@ -164,7 +165,7 @@ def measure(folder: Path, memory_mb: int, rounds: int) -> None:
             for kind in list(found)[:: 1 - 2 * (number % 2)]:
                 cold(folder)
                 limit = None if warm else memory_mb + PROGRAM_MB
-                found[kind].append(of_files.child("maps", folder, f"{kind} {memory} {warm}", limit, __file__))
+                found[kind].append(child("maps", folder, f"{kind} {memory} {warm}", limit))
         base = np.median(found["reader"], axis=0)
         for kind, runs in found.items():
             clock, processor, own, peak = np.median(runs, axis=0)
@@ -176,7 +177,7 @@ def measure(folder: Path, memory_mb: int, rounds: int) -> None:
 
 
 def main() -> None:
-    args = of_files.arguments(__doc__.splitlines()[0], rounds=5).parse_args()
+    args = arguments(__doc__.splitlines()[0], rounds=5).parse_args()
     print(processor())
     if args.task:
         globals()[f"task_{args.task}"](args.folder, args.argument)
@@ -190,7 +191,7 @@ def main() -> None:
         shutil.rmtree(folder / "clips")
         db = Database.open(folder / "db", args.memory_mb)
         write_tables(db, folder / "tables")
-        of_files.child("same", folder, str(args.memory_mb), script=__file__)
+        child("same", folder, str(args.memory_mb))
         print(f"both give the same blocks; {db.manifest.bytes >> 20} MB of rows")
         ours = lines(reader, chunk_window, chunks)
         without = lines(

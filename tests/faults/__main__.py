@@ -15,8 +15,8 @@ from random import Random
 
 from . import attacks, runs, texts, throws
 from .grammar import Case
+from .judging import FAULT, REFUSED, REMADE, SKIPPED, UNHARMED, Throw
 from .lab import ROOT, Lab
-from .throws import FAULT, REFUSED, REMADE, SKIPPED, UNHARMED, Throw
 
 TARGET = "results/test/report.html"
 KINDS: dict[Callable[[Lab, Random], Throw], int] = {

@@ -8,8 +8,8 @@ from collections.abc import Iterator
 from pathlib import Path
 from xml.etree import ElementTree
 
+from .judging import FAULT, REFUSED, SKIPPED, UNHARMED, Throw
 from .lab import ROOT
-from .throws import FAULT, REFUSED, SKIPPED, UNHARMED, Throw
 
 # What is thrown -> where it hits, what should happen, and the tests that throw it.
 ATTACKS: dict[str, tuple[str, str, tuple[str, ...]]] = {

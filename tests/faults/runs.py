@@ -15,9 +15,9 @@ from contextlib import contextmanager, suppress
 from pathlib import Path
 from random import Random
 
+from .judging import FAULT, REFUSED, REMADE, SKIPPED, TRACEBACK, UNHARMED, Throw
 from .lab import End, Job, Lab, tracked
 from .same import same
-from .throws import FAULT, REFUSED, REMADE, SKIPPED, TRACEBACK, UNHARMED, Throw
 
 FAILED = re.compile(r"^\d+ of \d+ jobs done in .*, \d+ failed:$", re.M)
 LOCKED = "cannot be locked"  # Snakemake's own words

@@ -13,9 +13,10 @@ from hobble.core.errors import HobbleError
 from hobble.workflow.project import Project
 from hobble.workflow.targets import check
 
+from .judging import TRACEBACK
 from .lab import Lab
 from .texts import SKELETON
-from .throws import TRACEBACK, become_nobody
+from .throws import become_nobody
 
 pytestmark = pytest.mark.workflow
 DATASET = "skeleton: holden31\nfolder: mine\n"

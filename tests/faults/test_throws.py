@@ -12,9 +12,9 @@ import pytest
 from . import attacks, bvh_grammar, runs, status_grammar, texts, throws
 from .damage import DAMAGES
 from .grammar import Case, mutated
+from .judging import FAULT, REFUSED, REMADE, UNHARMED
 from .lab import ROOT, Lab
 from .same import same
-from .throws import FAULT, REFUSED, REMADE, UNHARMED
 
 pytestmark = pytest.mark.workflow
 SEED = 20

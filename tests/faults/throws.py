@@ -1,4 +1,4 @@
-"""Faults in single jobs, and whether what happened is what should happen."""
+"""Faults in single jobs: each function throws one kind at a job, and returns what happened."""
 
 from __future__ import annotations
 
@@ -10,49 +10,29 @@ import subprocess
 import sys
 import time
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
 from pathlib import Path
 from random import Random
 from typing import Any
 
 from .damage import DAMAGES, damaged, group_of
-from .lab import NOBODY, Bench, End, Job, Lab
+from .judging import (
+    ANY,
+    FAULT,
+    REFUSED,
+    REMADE,
+    SKIPPED,
+    UNHARMED,
+    Throw,
+    half_a_database,
+    judged,
+    kind,
+    refusal,
+    run_again,
+    some_input_file,
+)
+from .lab import NOBODY, Bench, Job, Lab
 
 OLD = b"what an earlier run made"
-TRACEBACK = "Traceback (most recent call last)"
-BUG = "This is a bug in Hobble"
-ANY = "any job"
-REFUSED, UNHARMED, REMADE, SKIPPED, FAULT = "refused", "unharmed", "made again", "skipped", "FAULT"
-
-
-@dataclass(frozen=True)
-class Throw:
-    """A fault and what happened. detail: more about it if Hobble failed."""
-
-    what: str
-    at: str
-    happened: str
-    detail: str = ""
-
-
-def kind(path: str) -> str:
-    """The kind of an artefact, as the table names it."""
-    name = Path(path).name
-    for special in ("checkpoint", "manifest", "statistics"):
-        if name.startswith(special):
-            return f"{special}{Path(name).suffix}"
-    return Path(name).suffix or "folder"
-
-
-def refusal(end: End, job: Job, *pieces: str) -> str:
-    """What is wrong with a refusal, or "" if it is one message with the expected pieces and no traceback."""
-    if end.status != 1:
-        return f"status {end.status}"
-    messages = [line for line in end.said.splitlines() if line.startswith(f"{job.rule}: ")]
-    if TRACEBACK in end.said or BUG in end.said or not messages:
-        return f"no message but: {end.said[-1500:]}"
-    missing = [piece for piece in pieces if piece not in messages[-1]]
-    return f"{missing} not in {messages[-1]!r}" if missing else ""
 
 
 def kill(lab: Lab, rng: Random) -> Throw:
@@ -76,9 +56,9 @@ def kill(lab: Lab, rng: Random) -> Throw:
         torn = [path for path in files if not _old_or_new(bench, path, older)]
         moment = "as it writes" if writing else "at a random moment"
         what = f"a job killed {moment}, {'older' if older else 'no'} artefacts there"
-        if torn or _half_a_database(bench):
+        if torn or half_a_database(bench):
             return Throw(what, ANY, FAULT, f"{job.name} after {after:.3f} s left half of {torn}")
-        return _again(bench, what, ANY, UNHARMED if end.status == 0 else REMADE)
+        return run_again(bench, what, ANY, UNHARMED if end.status == 0 else REMADE)
 
 
 def _die_writing(n: int, seconds: float) -> Callable[[], None]:
@@ -107,26 +87,6 @@ def _old_or_new(bench: Bench, path: str, older: bool) -> bool:
     return (older and here.read_bytes() == OLD) or path not in bench.unlike()
 
 
-def _half_a_database(bench: Bench) -> bool:
-    folders = [path for path in bench.job.outputs if (bench.lab.run / path / "manifest.json").exists()]
-    return any((bench.folder / f / "manifest.json").exists() and f in bench.unlike() for f in folders)
-
-
-def _again(bench: Bench, what: str, at: str, happened: str) -> Throw:
-    """Run the job again with undamaged inputs. It must give the artefacts of the undisturbed run."""
-    for path in bench.job.outputs:  # as Snakemake does before a job
-        if (bench.folder / path).is_dir():
-            shutil.rmtree(bench.folder / path)
-    end = bench.run()
-    if end.status != 0:
-        return Throw(what, at, FAULT, f"{bench.job.name}: the run after it ended in {end.said[-1500:]}")
-    if unlike := bench.unlike():
-        return Throw(what, at, FAULT, f"{bench.job.name}: the run after it made another {unlike}")
-    if left := [str(p) for p in (bench.folder / "results").rglob("*.part")]:
-        return Throw(what, at, FAULT, f"{bench.job.name}: left {left}")
-    return Throw(what, at, happened)
-
-
 def harm(lab: Lab, rng: Random, only: str | None = None) -> Throw:
     """Cut, flip or zero bytes of one input that another job made. The file's time stays the same."""
     there = [(job, path) for job in lab.jobs for path in _files_read(lab, job) if only in (None, job.rule)]
@@ -140,7 +100,7 @@ def harm(lab: Lab, rng: Random, only: str | None = None) -> Throw:
             return Throw("bytes " + group_of(name), kind(str(target)), SKIPPED, "an empty file")
         target.write_bytes(damaged(rng, name, whole))
         os.utime(target, ns=(times.st_atime_ns, times.st_mtime_ns))
-        return _judged(bench, name, target, rng)
+        return judged(bench, name, target, rng)
 
 
 def _files_read(lab: Lab, job: Job) -> list[str]:
@@ -154,39 +114,12 @@ def gone(lab: Lab, rng: Random) -> Throw:
     """Remove an input, or put a folder in its place."""
     job = rng.choice([job for job in lab.jobs if any(p.startswith("results/") for p in job.inputs)])
     with lab.bench(job) as bench:
-        target = _some_file(bench, rng)
+        target = some_input_file(bench, rng)
         target.unlink()
         folder = rng.random() < 0.3
         if folder:
             target.mkdir()
-        return _judged(bench, "a folder where a file was" if folder else "a file that is gone", target, rng)
-
-
-def _some_file(bench: Bench, rng: Random) -> Path:
-    """A random input file. Small and large files are equally likely; of a folder, any file in it."""
-    path = bench.folder / rng.choice(bench.artefacts)
-    if path.is_dir():
-        return rng.choice(sorted(p for p in path.rglob("*") if p.is_file() and not p.name.startswith(".")))
-    return path
-
-
-def _judged(bench: Bench, what: str, target: Path, rng: Random) -> Throw:
-    """A damaged input is refused with its name, or the result is the same as with the undamaged one."""
-    at = kind(str(target)) if target.is_file() else "any file"
-    what = f"bytes {group_of(what)}" if what in DAMAGES else what
-    end = bench.run()
-    if end.status == 0:
-        if unlike := bench.unlike():
-            return Throw(what, at, FAULT, f"{bench.job.name} took {target.name} and made another {unlike}")
-        return Throw(what, at, UNHARMED)
-    named = target.name if "database" not in target.parts or target.name != "manifest.json" else "database"
-    if wrong := refusal(end, bench.job, named):
-        return Throw(what, at, FAULT, f"{bench.job.name}, {target.name}: {wrong}")
-    if rng.random() < 0.2:  # with the whole input back, all is well
-        shutil.rmtree(bench.folder / "results")
-        bench.fill()
-        return _again(bench, what, at, REFUSED)
-    return Throw(what, at, REFUSED)
+        return judged(bench, "a folder where a file was" if folder else "a file that is gone", target, rng)
 
 
 def full_disk(lab: Lab, rng: Random) -> Throw:
@@ -200,13 +133,13 @@ def full_disk(lab: Lab, rng: Random) -> Throw:
         end = bench.run()
         subprocess.run(["mount", "-o", "remount,size=2g", str(disk)], check=True)
         if end.status == 0:
-            return _again(bench, "a full disk", ANY, UNHARMED)
+            return run_again(bench, "a full disk", ANY, UNHARMED)
         if wrong := refusal(end, job, "the disk is full"):
             return Throw("a full disk", ANY, FAULT, f"{job.name}: {wrong}")
         torn = [p for p in job.outputs if (bench.folder / p).is_file() and p in bench.unlike()]
-        if torn or _half_a_database(bench) or list(disk.rglob("*.part")):
+        if torn or half_a_database(bench) or list(disk.rglob("*.part")):
             return Throw("a full disk", ANY, FAULT, f"{job.name} left half of {torn}")
-        return _again(bench, "a full disk", ANY, REFUSED)
+        return run_again(bench, "a full disk", ANY, REFUSED)
 
 
 @contextlib.contextmanager
@@ -248,7 +181,7 @@ def no_permission(lab: Lab, rng: Random) -> Throw:
     job = rng.choice(jobs)
     with lab.bench(job) as bench:
         if what.startswith("an"):
-            target = _some_file(bench, rng)
+            target = some_input_file(bench, rng)
         else:
             target = (bench.folder / job.outputs[0]).parent
             target.mkdir(parents=True, exist_ok=True)
@@ -265,7 +198,7 @@ def no_permission(lab: Lab, rng: Random) -> Throw:
         named = target.name if target.is_file() else Path(job.outputs[0]).parent.name
         if wrong := refusal(end, job, named, "ermission"):
             return Throw(what, ANY, FAULT, f"{job.name}: {wrong}")
-        return _again(bench, what, ANY, REFUSED)
+        return run_again(bench, what, ANY, REFUSED)
 
 
 def become_nobody() -> None:
@@ -346,4 +279,4 @@ def spoilt_checkpoint(lab: Lab, rng: Random) -> Throw:
         target = bench.folder / there[-1].relative_to(lab.run)
         target.parent.mkdir(parents=True)
         target.write_bytes(damaged(rng, name, there[-1].read_bytes()))
-        return _judged(bench, name, target, rng)
+        return judged(bench, name, target, rng)
