@@ -16,7 +16,7 @@ from hobble.motion.orient import unit
 STRETCHED = 0.8  # one leg of an upright figure is longer than this share of its length
 LEANS = 25.0  # degrees: an upright trunk leans less
 STOOPS = 40.0  # degrees: a sprinter's trunk leans up to 35, but its spine is straight
-SPREAD = 10.0  # degrees: of the upright frames, those count that lean at most this much more than the others
+SPREAD = 15.0  # degrees: of the upright frames, those count that lean at most this much more than the others
 FEWEST = 0.05  # share of the frames
 OFF = 3.0  # cm: mean distance of hips and head in clips of bows and squats
 
