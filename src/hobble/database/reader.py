@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from itertools import chain, cycle
 from pathlib import Path
 from typing import Any, NamedTuple, TypeVar
@@ -48,7 +48,7 @@ class RawRows(NamedTuple):
     """n rows before composing, standardised float32: x (n, X without terrain), y (n, Y), p (n,) phase.
 
     fits: (m, columns) of all terrain fits of these rows: heights, then the lift in cm (see
-    `hobble.database.split`). first: (n,) index of each row's first fit.
+    `hobble.database.standardise`). first: (n,) index of each row's first fit.
     """
 
     x: Array
@@ -60,7 +60,7 @@ class RawRows(NamedTuple):
 
 @dataclass(frozen=True)
 class Database:
-    """A database opened for reading; see `open`."""
+    """A database opened for reading; see `open`. phase_weight: see `with_phase_weight`."""
 
     path: Path
     manifest: Manifest
@@ -69,6 +69,7 @@ class Database:
     _shards: Shards = field(repr=False)
     _loaded: dict[str, ChunkWindow] = field(default_factory=dict, repr=False)
     _verified: set[str] = field(default_factory=set, repr=False)
+    phase_weight: float = 1.0
 
     @classmethod
     def open(cls, path: str | Path, memory_mb: int = 512) -> Database:
@@ -81,6 +82,26 @@ class Database:
         manifest = Manifest.load(path)
         statistics = Statistics(**load_npz(path / manifest.folder / STATISTICS))
         return cls(path, manifest, statistics, memory_mb, Shards(path, manifest, statistics))
+
+    def with_phase_weight(self, weight: float) -> Database:
+        """The same rows, with the change of phase divided by 1/`weight` of its standard deviation.
+
+        Its error then counts `weight`^2 times in a mean over the standardised columns.
+        """
+        if weight == 1.0:
+            return self
+        y_std = self.statistics.y_std.copy()
+        y_std[self.layout.y_phase_change] /= weight
+        statistics = replace(self.statistics, y_std=y_std)
+        shards = Shards(self.path, self.manifest, statistics)
+        return Database(
+            self.path,
+            self.manifest,
+            statistics,
+            self.memory_mb,
+            shards,
+            phase_weight=self.phase_weight * weight,
+        )
 
     @property
     def layout(self) -> RowLayout:

@@ -16,13 +16,15 @@ from hobble.core.clip import Clip
 from hobble.core.quat import Array
 from hobble.motion.body import SIDES, Body
 
-BALL = np.array([0.0, -0.045, 0.14])  # from the ankle, in leg lengths, for feet without toes
+# Offset from an ankle to the ball that is added below it, as a share of the length of thigh and shank, along
+# the axes of a body that stands upright and faces +Z.
+BALL = np.array([0.0, -0.045, 0.14])
 
 
 def with_balls(clip: Clip, body: Body, frames: dict[int, Array]) -> tuple[Clip, Body]:
-    """The clip with a ball on every foot, and frames with the balls.
+    """The clip and the body with a ball on every foot. Missing balls are put where people have them.
 
-    Missing balls are put where people have them.
+    frames: joint -> (4,) frame, as `BodySample` defines it. Those of the new joints are added to it.
     """
     without = [side for side in SIDES if body.legs[side][3] is None]
     legs, offsets = dict(body.legs), []
@@ -44,9 +46,10 @@ def with_balls(clip: Clip, body: Body, frames: dict[int, Array]) -> tuple[Clip, 
 def with_bends(
     clip: Clip, body: Body, frames: dict[int, Array], bends: Mapping[int, Array]
 ) -> tuple[Clip, Body]:
-    """The clip with further joints at hips and chest, and frames with them.
+    """The clip and the body with further joints at the places of hips and chest.
 
-    bends: hips or chest -> (4,) frame of the bone above it.
+    frames: joint -> (4,) frame, as `BodySample` defines it. Those of the new joints are added to it. bends:
+    hips or chest, or both -> (4,) frame of the bone above that joint, which the new joint gets.
     """
     trunk, neck = body.trunk, body.neck
     for new, (joint, turn) in enumerate(bends.items(), len(clip.skeleton.joints)):
@@ -61,7 +64,9 @@ def with_bends(
 
 
 def _with_joints(clip: Clip, word: str, parents: Sequence[int], offsets: Sequence[Array]) -> Clip:
-    """The clip with more joints (at offsets (3,) from their parents) that do not move in their parents."""
+    """The clip with a new joint below each of `parents`, at an offset (3,) from it. The new joints never move
+    relative to their parents. word: end of their names.
+    """
     if not parents:
         return clip
     skeleton = clip.skeleton

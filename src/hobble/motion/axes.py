@@ -14,18 +14,23 @@ from hobble.core.clip import Clip
 from hobble.core.quat import Array
 from hobble.core.skeleton import Skeleton, rest_positions
 
+# Factors of a position (3,) and of a quaternion (4,) that negate the x axis.
 FLIP = np.array([-1.0, 1.0, 1.0])
 MIRROR = np.array([1.0, 1.0, -1.0, -1.0])
-CLIMB = 20.0  # cm: a clip climbs if its lowest points rise by more than this
-UPRIGHT = np.cos(np.radians(20.0))
-DIRECTIONS = {
+CLIMB = 20.0  # cm: a body climbs if its lowest joint rises by more than this during the clip
+UPRIGHT = np.cos(np.radians(20.0))  # a rest pose that is off its nearest axes by less counts as along them
+DIRECTIONS = {  # name of an axis, such as "-X" -> (3,) unit vector
     sign + axis: np.eye(3)["XYZ".index(axis)] * (1 if sign == "+" else -1) for sign in "+-" for axis in "XYZ"
 }
 
 
 @dataclass(frozen=True)
 class RigAxes:
-    """Axes that were found or given. facing: of the rest pose ("+Z", "oblique")."""
+    """The axes of a file, found or given.
+
+    up: the axis that points up, such as "+Y". handedness: "right" or "left". facing: the axis along which the
+    rest pose faces, or "oblique" if it faces along none.
+    """
 
     up: str
     handedness: str
@@ -40,9 +45,10 @@ def nearest_axis(direction: Array) -> tuple[str, float]:
 
 
 def body_axes(skeleton: Skeleton, positions: Array) -> tuple[Array, Array, Array]:
-    """Unit vectors (..., 3) to the left, up the trunk, and forward by feet or knees.
+    """Unit vectors (..., 3): from right to left, from hips to head, and forward as the feet point, or as the
+    knees do on a rig without toes.
 
-    positions: (..., J, 3).
+    positions: (..., J, 3) of the joints.
     """
     at = {role: positions[..., skeleton.role(role), :] for role in skeleton.roles}
     left = at["left_hip"] - at["right_hip"] + at["left_shoulder"] - at["right_shoulder"]
@@ -52,7 +58,10 @@ def body_axes(skeleton: Skeleton, positions: Array) -> tuple[Array, Array, Array
 
 
 def _foot(at: dict[str, Array], side: str) -> Array:
-    """Where a foot points. On a rig without toes, where the knee points."""
+    """(..., 3) direction in which a foot points or, on a rig without toes, the knee of that leg.
+
+    at: role -> (..., 3) positions.
+    """
     if f"{side}_toe" in at:
         return at[f"{side}_toe"] - at[f"{side}_heel"]
     hip, knee, heel = (at[f"{side}_{part}"] for part in ("hip", "knee", "heel"))
@@ -67,7 +76,7 @@ def _unit(v: Array) -> Array:
 def rest_frame(skeleton: Skeleton) -> Array:
     """(4,) rotation from left = X, up = Y, forward = Z to the body's own axes in the rest pose.
 
-    A rest pose within 20 degrees of the axes counts as exactly along them.
+    A rest pose whose axes are all within 20 degrees of coordinate axes counts as exactly along those.
     """
     left, up, _ = body_axes(skeleton, rest_positions(skeleton))
     up = _unit(up - left * (up @ left))
@@ -80,9 +89,10 @@ def rest_frame(skeleton: Skeleton) -> Array:
 
 @dataclass(frozen=True)
 class UprightClip:
-    """A clip with right-handed coordinates and Y up, and its axes before.
+    """A clip with right-handed coordinates and Y up.
 
-    notes: a sentence if motion and rest pose disagree on what is up. unsure: the same if it is in doubt.
+    axes: those of the file. If motion and rest pose disagree on what is up, a sentence says so: in `notes` if
+    the motion decides it, and in `unsure` if it stays in doubt. The other list is then empty.
     """
 
     clip: Clip
@@ -92,14 +102,15 @@ class UprightClip:
 
 
 def straighten(clip: Clip, up: str, handedness: str, standing: bool = True) -> UprightClip:
-    """The clip with right-handed coordinates, Y up, and a rest pose that faces +Z if whole axes allow it.
+    """The clip with right-handed coordinates and Y up.
 
-    up: "auto", "Y" or "Z". handedness: "auto", "right" or "left". standing: whether a person can stand in the
+    A rest pose that faces along an axis is turned to +Z. One that faces obliquely is left as it is. up:
+    "auto", "Y" or "Z". handedness: "auto", "right" or "left". standing: whether a person can stand in the
     rest pose; if not, it does not show what is up.
 
-    With `auto` the axes come from the motion. Up goes from hips to head and from feet to hips, unless the
-    figure crawls. The feet point forward. Raises ValueError if neither the motion nor a rest pose shows what
-    is up.
+    With "auto" the axes come from the motion. Up is from the feet over the hips to the head, unless the
+    figure crawls: then the rest pose decides. Raises ValueError if the figure crawls and nobody can stand in
+    the rest pose.
     """
     name, notes, unsure = _up_of(clip, standing) if up == "auto" else (f"+{up}", [], [])
     if handedness == "auto":
@@ -116,7 +127,7 @@ def straighten(clip: Clip, up: str, handedness: str, standing: bool = True) -> U
 
 
 def _up_of(clip: Clip, standing: bool) -> tuple[str, list[str], list[str]]:
-    """The axis that is up, and a sentence if motion and rest pose disagree: a note, or a doubt."""
+    """The axis that is up, and the lists `notes` and `unsure` of `UprightClip`."""
     body, rest = (
         nearest_axis(_along_body(clip.skeleton, positions).mean(axis=0))[0]
         for positions in (clip.positions, rest_positions(clip.skeleton)[None])
@@ -135,7 +146,7 @@ def _up_of(clip: Clip, standing: bool) -> tuple[str, list[str], list[str]]:
 
 
 def _along_body(skeleton: Skeleton, positions: Array) -> Array:
-    """(F, 3) directions from the feet over the hips to the head, both parts of equal weight.
+    """(F, 3) sum of the unit vectors from the feet to the hips and from the hips to the head.
 
     positions: (F, J, 3).
     """
@@ -146,9 +157,10 @@ def _along_body(skeleton: Skeleton, positions: Array) -> Array:
 
 
 def _crawls(clip: Clip, axis: str) -> bool:
-    """Whether the body moves along its own axis. A standing figure never climbs further than it goes.
+    """Whether the body moves along `axis`, the one from its feet to its head, more than sideways to it.
 
-    A jump comes down to where it began, so its lowest point does not rise.
+    For an upright figure that would mean climbing, and an upright figure climbs less far than it moves over
+    the ground. A jump does not count, since the lowest joint comes down again.
     """
     along = clip.positions @ DIRECTIONS[axis]
     early, late = np.percentile(along.min(axis=1), [25, 75])
@@ -157,7 +169,7 @@ def _crawls(clip: Clip, axis: str) -> bool:
 
 
 def _travels(clip: Clip, axis: str) -> bool:
-    """Whether the figure goes further over the ground than it is tall, if an axis is up."""
+    """Whether the figure moves further over the ground than it is tall, if `axis` is the one that is up."""
     along, level = DIRECTIONS[axis], 1 - np.abs(DIRECTIONS[axis])
     tall = float(np.median(np.ptp(clip.positions @ along, axis=1)))
     return bool(np.linalg.norm(np.ptp(clip.root * level, axis=0)) > tall)
@@ -169,7 +181,7 @@ def _hand_of(clip: Clip) -> str:
 
 
 def _other_hand(clip: Clip) -> Clip:
-    """Change from left- to right-handed coordinates: negate x."""
+    """The clip with x negated, which changes left-handed to right-handed coordinates."""
     ends = {name: (-x, y, z) for name, (x, y, z) in clip.skeleton.end_sites.items()}
     return replace(
         clip,
@@ -181,7 +193,10 @@ def _other_hand(clip: Clip) -> Clip:
 
 
 def _turned(clip: Clip, world: Array, rest: Array) -> Clip:
-    """Turn the world by `world`, and the rest pose by `rest` without moving any joint."""
+    """The clip with its world turned by `world` (4,), and its rest pose turned by `rest` (4,).
+
+    Turning the rest pose moves no joint of the motion.
+    """
     if np.allclose(world, quat.IDENTITY) and np.allclose(rest, quat.IDENTITY):
         return clip
     rotations = quat.mul(quat.mul(rest, clip.rotations), quat.inv(rest))
@@ -204,7 +219,7 @@ def _turned(clip: Clip, world: Array, rest: Array) -> Clip:
 def turned(clip: Clip, angle: float) -> Clip:
     """The clip turned about the vertical through its first root position.
 
-    angle: radians from +Z towards +X.
+    angle: radians, positive from +Z towards +X.
     """
     turn = quat.yaw(angle)
     rotations = clip.rotations.copy()

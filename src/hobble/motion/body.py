@@ -13,17 +13,19 @@ from hobble.motion.fingers import pointing_fingers
 from hobble.motion.tree import common, path
 
 SIDES = ("left", "right")
-REACH = 0.2  # share of the trunk by which a source joint may lie above its target joint
+# A joint may follow a source joint that lies higher in the trunk (or neck) than itself by up to this share of
+# its length.
+REACH = 0.2
 
 
 @dataclass(frozen=True)
 class Body:
     """Joints of a rig, by index, parents first.
 
-    hips: carries both thighs. trunk: from the first joint above the hips to the chest, which carries both
-    arms; empty if the hips carry the arms. neck: between chest and head. arms: side -> clavicle or None,
-    shoulder, elbow, wrist. legs: side -> hip, knee, heel (the ankle), toe (the ball of the foot) or None.
-    fingers: side -> base of a finger.
+    hips: the joint that carries both thighs. trunk: from the first joint above the hips to the chest, which
+    carries both arms; empty if the hips carry the arms. neck: the joints between chest and head. arms: side
+    -> clavicle (or None), shoulder, elbow and wrist. legs: side -> hip, knee, heel (the ankle) and toe (the
+    ball of the foot, or None). fingers: side -> joint at the base of a finger, if a hand has one.
     """
 
     hips: int
@@ -41,14 +43,17 @@ class Body:
 
     @property
     def joints(self) -> list[int]:
-        """All joints."""
+        """All joints of the body but the fingers."""
         out = [self.hips, *self.trunk, *self.neck, self.head]
         for side in SIDES:
             out += [j for j in (*self.arms[side], *self.legs[side]) if j is not None]
         return out
 
     def renumbered(self, new: Mapping[int, int]) -> Body:
-        """The same body with other joint indices. Fingers without a new index are left out."""
+        """The same body with other joint indices. new: index -> new index.
+
+        Every joint but the fingers must have a new index; fingers that have none are left out.
+        """
 
         def one(joint: int | None) -> int | None:
             return None if joint is None else new[joint]
@@ -60,7 +65,7 @@ class Body:
         return Body(new[self.hips], trunk, neck, new[self.head], arms, legs, fingers)
 
     def roles(self, names: Sequence[str]) -> dict[str, str]:
-        """Role -> joint, as in a skeleton file."""
+        """Role -> name of its joint, as in a skeleton file. names: of all joints, by index."""
         out = {"hips": names[self.hips]}
         if self.trunk:
             out |= {"spine": names[self.trunk[max(0, len(self.trunk) - 2)]], "chest": names[self.chest]}
@@ -75,10 +80,10 @@ class Body:
 
 
 def body_of(parents: Sequence[int], roles: Mapping[str, int]) -> Body:
-    """The body with the given roles. The joints between them follow from the hierarchy.
+    """The body whose joints have the given roles. The hierarchy shows which joints lie between them.
 
-    roles: role -> joint. Needed are hips and head, and on both sides shoulder, elbow, wrist, hip, knee and
-    heel.
+    parents: the parent of each joint, -1 for the root. roles: role -> joint. Hips, head, and on both sides
+    shoulder, elbow, wrist, hip, knee and heel must be among them.
     """
     hips = roles["hips"]
     shoulders = [roles[f"{side}_shoulder"] for side in SIDES]
@@ -97,7 +102,7 @@ def body_of(parents: Sequence[int], roles: Mapping[str, int]) -> Body:
 
 
 def with_fingers(body: Body, skeleton: Skeleton) -> Body:
-    """The body with a finger of each hand (`hobble.motion.fingers`)."""
+    """The body with the finger of each hand that `hobble.motion.fingers` chooses."""
     return replace(body, fingers=pointing_fingers(skeleton, {s: arm[3] for s, arm in body.arms.items()}))
 
 
@@ -108,10 +113,12 @@ def body_by_roles(skeleton: Skeleton) -> Body:
 
 
 def pairs(source: Skeleton, own: Body, target: Skeleton, theirs: Body) -> dict[str, str]:
-    """Target joint -> source joint that it follows, part by part.
+    """For each joint of the target, the name of the source joint that it follows.
 
-    The joints of a trunk are paired by height. Each follows the highest source joint that is not above it by
-    more than a fifth of the trunk. The chest follows the chest.
+    own: the body on `source`. theirs: the body on `target`. Limbs, hips and head follow the same parts.
+    Inside the trunk each joint follows the highest source joint that is not above it by more than a fifth of
+    the trunk (so it is in the neck), and the chest follows the chest. Joints without a counterpart are left
+    out.
     """
     out: dict[int, int] = {theirs.hips: own.hips, theirs.head: own.head}
     out |= _joints_along(target, (theirs.hips, *theirs.trunk), source, (own.hips, *own.trunk))
@@ -141,6 +148,6 @@ def _joints_along(
 
 
 def _shares(skeleton: Skeleton, joints: Sequence[int]) -> Array:
-    """Position of each joint between the first (0) and the last (1), by length."""
+    """How far along a chain of joints each one is, by lengths of bones: 0 at the first, 1 at the last."""
     lengths = np.concatenate([[0.0], np.linalg.norm(skeleton.offsets[list(joints[1:])], axis=-1)])
     return np.cumsum(lengths) / max(float(lengths.sum()), 1e-9)

@@ -16,20 +16,20 @@ from hobble.motion.orient import pointed_along, robust_mean, unit
 from hobble.motion.spine import SHORT, Spine
 
 LEFT = np.array([1.0, 0.0, 0.0])
-FLEXED = 0.05  # a knee or elbow with a larger mean sine of its bend shows where the limb's front is
+FLEXED = 0.05  # a knee or elbow whose bend has a larger mean sine shows about which axis it bends
 
 
 class BodySample:
-    """A sample of frames of a body: bones, facing directions, and how joints are turned.
+    """S moments of a clip, chosen to show how a rig's joints are turned on its body.
 
-    A joint's frame is the rotation (4,) from the axes of a figure that stands facing +Z with its arms out to
-    the joint's own axes. The joint's world rotation times its frame is the turn of the body part from that
-    stance.
+    The frame of a joint (not a moment of the clip) is a rotation (4,), the same at all times: from the axes
+    of a figure that stands facing +Z with its arms out sideways to the joint's own axes. The joint's rotation
+    in the world times its frame is how far the body part has turned from that stance.
 
-    positions: (S, J, 3) cm. rotations: (S, J, 4) in the world. speeds: (S, J) cm a second. rest: (J, 3)
-    positions in the zero pose. ends: position of an ankle's end site, if it has one. spine: the shape of the
-    target's trunk in that stance. target_tilt: radians by which the bones from ankle to ball point down on
-    the target. seconds: length of the clip.
+    positions: (S, J, 3) cm, kept as `at`. rotations: (S, J, 4) in the world, kept as `turned`. speeds: (S, J)
+    cm a second. rest: (J, 3) positions in the zero pose. ends: side -> (3,) position of the end site below
+    the ankle, or None. spine: the shape of the target's trunk in that stance. target_tilt: radians by which
+    the bones from ankle to ball point down on the target. seconds: length of the clip.
     """
 
     def __init__(
@@ -67,30 +67,36 @@ class BodySample:
         return out
 
     def line(self, start: int, end: int) -> Array:
-        """(S, 3) unit vectors from joint to joint."""
+        """(S, 3) unit vectors from the joint `start` to the joint `end`."""
         return unit(self.at[:, end] - self.at[:, start])
 
     def local(self, joint: int, vectors: Array) -> Array:
-        """(3,) mean of world vectors (S, 3) in the joint's coordinates."""
+        """(3,) robust mean of vectors (S, 3) in the world, after a change to the joint's own axes."""
         own = quat.rotate(quat.inv(self.turned[:, joint]), vectors)
         return robust_mean(own)
 
     def bone(self, start: int, end: int) -> Array:
-        """(3,) the bone from `start` to `end`, in the coordinates of `start`."""
+        """(3,) mean vector from `start` to `end`, along the own axes of `start`."""
         return self.local(start, self.at[:, end] - self.at[:, start])
 
     def length(self, *joints: int) -> float:
-        """Distance between two joints."""
+        """Sum of the distances from each of the joints to the next, cm (medians over the sample)."""
         ways = (self.at[:, b] - self.at[:, a] for a, b in pairwise(joints))
         return sum(float(np.median(np.linalg.norm(way, axis=-1))) for way in ways)
 
     def first_long(self, joint: int, following: Sequence[int]) -> tuple[Array, int]:
-        """(3,) the bone to the first of the following joints that is at another place, and that joint."""
+        """(3,) `bone` from a joint to the first of `following` that is not at the same place, and that joint.
+
+        If all are at the same place, the last of them.
+        """
         bones = [(self.bone(joint, end), end) for end in following]
         return next((found for found in bones if np.linalg.norm(found[0]) > SHORT), bones[-1])
 
     def hinge(self, start: int, middle: int, end: int, otherwise: Array) -> Array:
-        """(S, 3) axis of a limb's bend, for a knee to the body's left. `otherwise` if it hardly bends."""
+        """(S, 3) axis about which a limb of three joints bends, or `otherwise` (S, 3) if it hardly bends.
+
+        The axis is fixed to the joint `start`. For a leg it points to the body's left.
+        """
         axis = np.cross(self.line(start, middle), self.line(middle, end))
         own = self.local(start, axis)
         if np.linalg.norm(own) < FLEXED:
@@ -98,7 +104,11 @@ class BodySample:
         return quat.rotate(self.turned[:, start], np.broadcast_to(unit(own), axis.shape))
 
     def hand(self, side: str, straight: Array, sign: float) -> Array:
-        """The frame of a hand: its forearm's, but pointing where its fingers are."""
+        """(4,) the frame of a hand: `straight`, but pointing where its finger is.
+
+        straight: (4,) the frame of the hand if it is in line with its forearm, returned for a hand without a
+        finger. sign: 1 for the left hand, whose arm points to +X in the stance, -1 for the right.
+        """
         if side not in self.body.fingers:
             return straight
         return pointed_along(

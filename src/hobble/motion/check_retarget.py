@@ -13,36 +13,41 @@ from hobble.core.quat import Array
 
 MOST = 15.0  # degrees: a result with a larger mean difference is refused
 SIDES = ("left", "right")
-# At each joint the angle between the bones from it and to it is measured.
+# Joint -> three roles. The angle is the one between the bone from the first to the second and the bone from
+# the second to the third: 0 if they are in line.
 ANGLES = {
     "knee": ("hip", "knee", "heel"),
     "elbow": ("shoulder", "elbow", "wrist"),
     "hip": ("head", "hip", "knee"),
     "ankle": ("knee", "heel", "toe"),
 }
-BONES = {
+BONES = {  # limb -> roles of its two ends
     "thigh": ("hip", "knee"),
     "shank": ("knee", "heel"),
     "upper arm": ("shoulder", "elbow"),
     "forearm": ("elbow", "wrist"),
 }
-# Bodies of other shapes have other angles there in the same pose. A nearly straight leg bends by 15 degrees
-# for 1.5 cm. So the constant part of the difference is subtracted first.
+# In the same pose, bodies of other shapes have other angles at these joints: at a knee that is nearly
+# straight, 1.5 cm make 15 degrees. So the median of the difference is subtracted first.
 SHAPED = ("hip", "ankle", "knee")
-OFFSET = 25.0  # degrees: largest constant difference of a knee
+OFFSET = 25.0  # degrees: a larger constant difference of a knee is an error and is not subtracted
 STANDS = 0.6  # cm a frame at 60 Hz: the ball of a standing foot is slower
 # Least mean cosine between the directions of a bent knee and of the front of the trunk. In 172 clips of CMU,
 # styles, patients, Ferre et al. and the original release it is .7 or more.
 KNEE_AHEAD = 0.25
-BENT = 20.0  # degrees: a knee that bends more shows where it points
+BENT = 20.0  # degrees: only where a knee bends more does it show where it points
 
 
 def compare(source: Clip, made: Clip, scale: float) -> dict[str, Any]:
     """How different a result is from its source at the same times, in degrees and centimetres.
 
-    scale: leg length of the result / leg length of the source. Returns for both sides: `angles`, for each
-    joint the median and range in source and result, and the difference. `directions`, the mean difference of
-    each limb. `feet`, how much higher the balls are, and how far they slide in a second while they stand.
+    scale: leg length of the result / leg length of the source.
+
+    angles: "left knee" -> 5th, 50th and 95th percentile of the angle in `source` and in `result`; `constant`,
+    the median difference; and `apart`, the mean difference without it (at joints where that is allowed).
+    directions: "left thigh" -> mean angle between its directions. feet: side -> how much `higher` the ball is
+    in the result, and how fast it slides while it stands, in cm a second. knees: side -> mean cosine between
+    the directions of the bent knee and of the body, or None if the knee hardly bends.
     """
     frames = min(len(source), len(made))
     before, after = (_places(clip, frames) for clip in (source, made))
@@ -55,7 +60,10 @@ def compare(source: Clip, made: Clip, scale: float) -> dict[str, Any]:
 
 
 def check(path: Path, figures: dict[str, Any], rig: str) -> None:
-    """Raise InputError with the joint if a result does not move like its source."""
+    """Raise InputError if a result does not move like its source. It names the joint or limb most apart.
+
+    path: of the source. figures: from `compare`. rig: its name.
+    """
     apart = {name: each["apart"] for name, each in figures["angles"].items()} | figures["directions"]
     name = max(apart, key=lambda part: apart[part])
     look = (
@@ -86,7 +94,7 @@ def check_knees(path: Path, clip: Clip, leave: bool) -> None:
 
 
 def worst(figures: dict[str, Any]) -> tuple[str, float]:
-    """The joint or limb with the largest difference, and the difference in degrees."""
+    """The joint or limb that differs most in the figures of `compare`, and by how many degrees on average."""
     apart = {name: each["apart"] for name, each in figures["angles"].items()} | figures["directions"]
     name = max(apart, key=lambda part: apart[part])
     return name, apart[name]
@@ -110,7 +118,7 @@ def _angle(before: dict[str, Array], after: dict[str, Array], side: str, name: s
 
 
 def _bend(at: dict[str, Array], side: str, parts: tuple[str, ...]) -> Array:
-    """(F,) degrees between the bone to the middle joint and the bone from it."""
+    """(F,) degrees between the bones to and from the second of three joints: 0 if they are in line."""
     a, b, c = (at[part] if part == "head" else at[f"{side}_{part}"] for part in parts)
     return np.degrees(np.arccos(np.clip(np.sum(_unit(b - a) * _unit(c - b), axis=-1), -1.0, 1.0)))
 
@@ -138,7 +146,9 @@ def _foot(
 def _forward(
     at: dict[str, Array], side: str, up: Array | tuple[float, ...] = (0.0, 1.0, 0.0)
 ) -> float | None:
-    """Mean cosine between the directions of a bent knee and of the body. None if the knee hardly bends.
+    """Mean cosine between where a knee and where the body points, in the frames in which the knee is bent.
+
+    None if it is bent in less than a tenth of the frames.
 
     up: (3,) or (F, 3), the direction in which the body is upright.
     """

@@ -11,9 +11,12 @@ from hobble.core.errors import InputError
 from hobble.core.quat import Array
 from hobble.motion.read import Bvh
 
+# Frames a second. Where two fit a file equally well, the first is taken.
 STANDARD_RATES = (120, 60, 30, 24, 25, 50, 100, 90, 48, 72, 144, 180, 200, 240, 250, 300, 15, 20, 12, 10)
 
-RADIANS = 0.5  # an angle that changes by more is a movement, if it is in radians
+# A file whose angles are all below 2 pi is in radians if one of them changes by more than this. In degrees
+# that would be too little for a movement.
+RADIANS = 0.5
 BLOCK = 4096  # frames at a time, to keep intermediate arrays small
 
 
@@ -21,8 +24,9 @@ BLOCK = 4096  # frames at a time, to keep intermediate arrays small
 class Decoded:
     """F frames of J joints, in the file's unit.
 
-    rotations: (F, J, 4) local. root: (F, 3). offsets: (J, 3). translations: (F, J, 3) local positions if any
-    joint but the root moves in its parent, else None. repairs: sentences on dropped or kept channels. notes:
+    rotations: (F, J, 4) local. root: (F, 3) positions of the root. offsets: (J, 3) from the parents.
+    translations: (F, J, 3) positions relative to the parents if any joint but the root moves there, else
+    None. repairs: sentences on how the position channels of other joints than the root were read. notes:
     sentences on what needs no repair.
     """
 
@@ -35,7 +39,10 @@ class Decoded:
 
 
 def frame_rate(frame_time: float, text: str) -> float:
-    """Frames a second of a Frame Time. It is a standard rate if the digits fit one, rounded as written.
+    """Frames a second of a frame time: the standard rate that it can be a rounded value of, if there is one.
+
+    frame_time: seconds. text: the same number as the file writes it, which shows to how many digits it was
+    rounded.
 
     >>> frame_rate(0.008333, "0.008333"), frame_rate(0.0333, "0.0333"), frame_rate(0.016, "0.016")
     (120.0, 30.0, 60.0)
@@ -73,9 +80,10 @@ def check_angles(bvh: Bvh) -> None:
 def decode(bvh: Bvh, still: float) -> Decoded:
     """Rotations and positions of a BVH file.
 
-    A position channel replaces that component of the joint's OFFSET, as all current programs write it. If the
-    channels of a joint below the root are about zero and the OFFSET is not, they are added to it. still: a
-    joint whose position stays this close to its offset (file units) does not move in its parent.
+    A position channel replaces that component of the joint's OFFSET, as all current programs write it. Only
+    if the position channels of a joint below the root are about zero although its OFFSET is not, their values
+    are added to the OFFSET. still: a joint whose position stays this close to its offset (in the file's unit)
+    does not move relative to its parent.
     """
     frames, joints = len(bvh), len(bvh.names)
     rotations = np.broadcast_to(quat.IDENTITY, (frames, joints, 4)).copy()
@@ -112,7 +120,10 @@ def _wraps(bvh: Bvh, starts: Array) -> list[str]:
 
 
 def _positions(bvh: Bvh, starts: Array, still: float) -> tuple[Array, Array, Array | None, list[str]]:
-    """Root positions, offsets, local positions (if any joint moves in its parent), and repairs."""
+    """The fields `root`, `offsets`, `translations` and `repairs` of `Decoded`.
+
+    starts: the first column of each joint's channels.
+    """
     root = np.broadcast_to(bvh.offsets[0], (len(bvh), 3)).copy()
     below = []
     for j, channels in enumerate(bvh.channels):
@@ -136,9 +147,11 @@ def _positions(bvh: Bvh, starts: Array, still: float) -> tuple[Array, Array, Arr
 def _judge_channels(
     bvh: Bvh, local: Array, given: Array, still: float
 ) -> tuple[Array, Array | None, list[str]]:
-    """Which position channels carry motion, which only repeat an offset, and which contradict it.
+    """Judges which position channels carry motion, which only repeat an offset, and which contradict it.
 
-    local: (F, J, 3) the positions. Increments become sums here. given: (J, 3) bool, which come from channels.
+    Returns the fields `offsets`, `translations` and `repairs` of `Decoded`. local: (F, J, 3) positions
+    relative to the parents; where channels must be added to the OFFSETs, that is done in it. given: (J, 3)
+    bool, which of its components come from channels.
     """
     joints = np.flatnonzero(given.any(axis=1)).tolist()
     middle = np.median(local, axis=0)
@@ -180,8 +193,9 @@ def _increments(offsets: Array, middle: Array, given: Array, still: float) -> li
     """Joints whose channels are about zero although their offsets are not, so they must be added to the
     offsets.
 
-    middle: (J, 3) the median position. given: as in `_judge_channels`. A bone cannot be as short as a tenth
-    of its offset.
+    middle: (J, 3) the median over the frames of the positions relative to the parents. given: (J, 3) bool,
+    which of its components come from channels. About zero is at most a tenth of the offset: no bone is that
+    much shorter than its OFFSET.
     """
     apart = np.linalg.norm(middle * given, axis=1)
     length = np.linalg.norm(offsets * given, axis=1)

@@ -2,7 +2,7 @@
 
 A joint of a living body changes its velocity little between frames. A larger jump is an error of the file: a
 rest pose or zeros as first or last frame, a teleport, a jump at the seam of a loop, a single wrong frame.
-Sentences count frames from 1, the code from 0.
+In sentences for users the first frame is frame 1, but in the code it is frame 0.
 """
 
 from __future__ import annotations
@@ -20,20 +20,25 @@ from hobble.core.quat import Array
 # where velocities change more between frames. At f Hz it is JUMP + JUMP_AT_30 * (30 / f)^2.
 JUMP = 12.0
 JUMP_AT_30 = 30.0
-GLITCH = 6.5  # cm: distance of a wrong frame from the mean of its neighbours
-GLITCH_AT_30 = 8.0  # added at 30 Hz, as above
-TELEPORT = 30.0  # cm: a larger jump of the root is not the seam of a loop
+# A single frame is wrong if a joint is further than GLITCH cm from the mean of the frames before and after,
+# plus GLITCH_AT_30 at 30 Hz. At f Hz it is GLITCH + GLITCH_AT_30 * (30 / f)^2.
+GLITCH = 6.5
+GLITCH_AT_30 = 8.0
+TELEPORT = 30.0  # cm: where the root jumps further, the clip is cut instead of smoothed
 HEAD, TAIL = 0.5, 1.0  # seconds: shorter pieces before the first and after the last jump are cut off
 BRIDGE = 0.25  # seconds: shorter pieces between two jumps are bridged
 BLEND = 0.1  # seconds on each side over which a jump of the pose is smoothed
-FLIP = np.radians(60.0)  # a joint that turns more between two frames has flipped
+FLIP = np.radians(60.0)  # a joint that turns by more from one frame to the next has flipped
 BLOCK = 4096  # frames at a time
 NO_POSE = 0.75  # in a frame without a pose, at least this share of the joints has no rotation
 
 
 @dataclass(frozen=True)
 class Repaired:
-    """A clip without its broken frames, its first frame in the source (from 0), and the repairs."""
+    """A clip without its broken frames.
+
+    first: the source's frame (from 0) at which it begins. sentences: one on each repair.
+    """
 
     clip: Clip
     first: int
@@ -42,7 +47,11 @@ class Repaired:
 
 @dataclass(frozen=True)
 class Jump:
-    """A jump between frame `after` and the next: its size in cm, its worst joint, and the root's share."""
+    """A jump between frame `after` and the next.
+
+    size: by how many cm the step of the worst joint differs from the usual one. joint: its name. root: the
+    same difference for the root, cm.
+    """
 
     after: int
     size: float
@@ -88,7 +97,9 @@ def repair(clip: Clip) -> Repaired:
 
 
 def find_jumps(clip: Clip) -> list[Jump]:
-    """Transitions in which some joint moves much further than in the three before and the three after."""
+    """The jumps of a clip: steps from a frame to the next in which a joint moves quite unlike in the three
+    steps before and the three after.
+    """
     if len(clip) < 3:
         return []
     limit = JUMP + JUMP_AT_30 * (30.0 / clip.fps) ** 2
@@ -106,7 +117,10 @@ def find_jumps(clip: Clip) -> list[Jump]:
 
 
 def _running_median(values: Array, reach: int) -> Array:
-    """Median over `reach` frames to either side of (F, ...) values, mirrored at the ends."""
+    """For each frame of (F, ...) values, the median from `reach` frames before it to `reach` frames after it.
+
+    Beyond the ends the values are mirrored.
+    """
     index = np.abs(np.arange(-reach, len(values) + reach))
     index = np.where(index >= len(values), 2 * (len(values) - 1) - index, index)
     padded = values[np.clip(index, 0, len(values) - 1)]
@@ -115,7 +129,7 @@ def _running_median(values: Array, reach: int) -> Array:
 
 
 def _find_glitches(clip: Clip) -> list[tuple[int, float, str]]:
-    """Single frames far from the mean of their neighbours: frame, cm, and the joint furthest off."""
+    """Single wrong frames: frame, distance in cm from the mean of its neighbours, and the joint most off."""
     if len(clip) < 5:
         return []
     limit = GLITCH + GLITCH_AT_30 * (30.0 / clip.fps) ** 2
@@ -154,7 +168,10 @@ def flips(clip: Clip, first: int) -> list[str]:
 
 
 def _without_edges(frames: int, fps: float, jumps: list[Jump]) -> tuple[int, int]:
-    """First and last frame without the short pieces before the first and after the last jump."""
+    """First and last frame that are left without the short pieces at both ends that a jump separates.
+
+    frames: how many the clip has.
+    """
     first, last = 0, frames - 1
     head = [j.after for j in jumps if j.after + 1 <= HEAD * fps and 2 * (j.after + 1) <= frames]
     if head:
@@ -175,9 +192,10 @@ def _cut_sentence(clip: Clip, start: int, end: int, jumps: list[Jump], after: in
 
 
 def _short_pieces(clip: Clip, jumps: list[Jump]) -> tuple[list[Jump], list[tuple[int, int, Jump]]]:
-    """Split jumps into single ones and pairs around a few broken frames: (first, last, jump).
+    """Find pairs of jumps with a few broken frames between them.
 
-    Two jumps are a pair if the motion after the second continues the motion before the first.
+    Two jumps are a pair if the motion after the second continues the motion before the first. Returns the
+    jumps that are in no pair, and for each pair the first and the last broken frame and its first jump.
     """
     left: list[Jump] = []
     bridges = []
@@ -198,7 +216,7 @@ def _short_pieces(clip: Clip, jumps: list[Jump]) -> tuple[list[Jump], list[tuple
 
 
 def _copy(clip: Clip) -> Clip:
-    """A copy whose arrays may be changed, as long as its positions have not been computed."""
+    """A copy whose arrays may be changed until its `positions` are asked for: those are computed once."""
     moved = clip.translations
     return replace(
         clip,
@@ -209,7 +227,7 @@ def _copy(clip: Clip) -> Clip:
 
 
 def _interpolate(draft: Clip, start: int, end: int) -> None:
-    """Replace the frames start..end by interpolation between the frames before and after."""
+    """Replace the frames `start` to `end` by interpolation between the frame before and the frame after."""
     a, b, here = start - 1, end + 1, slice(start, end + 1)
     share = (np.arange(start, end + 1) - a) / (b - a)
     draft.rotations[here] = quat.slerp(draft.rotations[a][None], draft.rotations[b][None], share[:, None])
@@ -220,9 +238,11 @@ def _interpolate(draft: Clip, start: int, end: int) -> None:
 
 
 def _smooth(draft: Clip, after: int) -> None:
-    """Smooth a jump of the pose. Half of it is added before and subtracted after, fading out.
+    """Smooth the jump between frame `after` and the next.
 
-    A sideways jump of the root is subtracted from all later frames, so that the path has no gap.
+    Half of the difference is added to the frames before and half is subtracted from the frames after, less
+    and less over BLEND seconds. What the root jumps over the ground is subtracted from all later frames, so
+    that its path has no gap.
     """
     a, b = after, after + 1
     reach = max(2, round(BLEND * draft.fps))

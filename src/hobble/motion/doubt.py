@@ -1,4 +1,4 @@
-"""What makes a rig's parts uncertain."""
+"""The error for a rig whose parts are uncertain, and a check that a figure's height is certain enough."""
 
 from __future__ import annotations
 
@@ -7,11 +7,13 @@ from pathlib import Path
 
 from hobble.core.errors import InputError
 
-MOST = 3.0  # cm: a clip whose height is more uncertain is refused
+MOST = 3.0  # cm (two standard deviations): a clip whose height is more uncertain is refused
 
 
 class Doubt(Exception):
-    """What is uncertain about a rig. why: in words. roles: those that are certain, role -> joint."""
+    """The parts of a rig are uncertain. why: what is uncertain, in words. roles: role -> joint, for the roles
+    that are certain.
+    """
 
     def __init__(self, why: str, roles: dict[str, int] | None = None) -> None:
         super().__init__(why)

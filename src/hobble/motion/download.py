@@ -1,4 +1,4 @@
-"""Downloads a clip. A download resumes after an interruption, retries if a server fails, and is checked."""
+"""Downloads a clip and checks it. If the server fails, it tries again and resumes where it stopped."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ log = logging.getLogger("hobble.download")
 ATTEMPTS = 5
 PAUSE = 1.0  # seconds before the second attempt; doubled before each further one
 TIMEOUT = 30.0  # seconds without data
-DEADLINE = 600.0  # seconds for all attempts; the rule asks a cluster for as much
+DEADLINE = 600.0  # seconds for all attempts; the workflow's rule asks a cluster for as much time
 BLOCK = 1 << 16
 LENGTH = re.compile(r"\d{1,18}")
 RETRY_STATUS = {408, 425, 429, *range(500, 600)}  # HTTP statuses after which a retry may work
@@ -62,12 +62,16 @@ def download_clip(
     most: int = MOST_BYTES,
     sleep: Callable[[float], object] = time.sleep,
 ) -> int:
-    """Download `url` to `path`. Returns its number of bytes. `path` exists only if the checksum is right.
+    """Download `url` to `path`. Returns its number of bytes. `path` is written only if the checksum is right.
 
-    sha256: of the file, or of the file with newlines as line ends, since version control may change those.
-    folder: where users can put the file themselves, for the message. Data are kept in a hidden file beside
-    `path`, from which this or a later call resumes. pause, timeout: seconds. deadline: seconds in all. most:
-    bytes; a larger file is not kept.
+    sha256: checksum of the file. A file also passes if it does so after \\r\\n at the ends of lines is
+    changed to \\n, since version control may add the \\r. folder: where users can put the file themselves,
+    for the message. Until they are complete, the data are in a hidden file beside `path`, from which this or
+    a later call resumes.
+
+    attempts: how many are made. pause: seconds before the second attempt. timeout: seconds without data after
+    which an attempt fails. deadline: seconds for all attempts. most: bytes; a larger file is not kept. sleep:
+    waits for so many seconds.
 
     Raises InputError with advice if no attempt succeeds.
     """
@@ -136,7 +140,7 @@ def _refusal(url: str, path: Path, folder: str, reason: str, attempts: int) -> H
 
 
 def _fetch(url: str, part: Path, timeout: float, most: int) -> None:
-    """Complete `part`. If the server allows it, resume from the data that are there."""
+    """Download the rest of the file `part`, or all of it if the server cannot send a part."""
     have = part.stat().st_size if part.is_file() else 0
     headers = {"User-Agent": "hobble", "Accept-Encoding": "identity"}
     if have:
@@ -204,7 +208,7 @@ def _block(answer: http.client.HTTPResponse, timeout: float) -> bytes:
 
 
 def _check(part: Path, sha256: str) -> None:
-    """Delete the file and raise _OtherFile if its checksum is not the manifest's."""
+    """Delete the file and raise _OtherFile if its checksum is not the one that the manifest gives."""
     data = part.read_bytes()
     found = hashlib.sha256(data).hexdigest()
     if sha256.lower() in (found, hashlib.sha256(data.replace(b"\r\n", b"\n")).hexdigest()):

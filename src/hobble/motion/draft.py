@@ -1,4 +1,4 @@
-"""Writes a draft of a rig file with what was found, for the user to correct."""
+"""Writes a draft of a rig file, with roles of joints as far as they are known, for users to correct."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ def refusal(file: Bvh, rig: Skeleton, doubt: Doubt) -> InputError:
 
 
 def draft(rig: Skeleton, roles: Mapping[str, str]) -> str:
-    """A rig file in YAML: the file's joints and their roles, `?` if unknown."""
+    """A rig file in YAML: the rig's joints and their roles. roles: role -> joint; others get `?` as joint."""
     lines = ["# Role: joint. Fill in each ?. Leave out roles that the rig does not have.", "roles:"]
     for role in ROLES:
         if role in roles:
@@ -54,7 +54,7 @@ def draft(rig: Skeleton, roles: Mapping[str, str]) -> str:
 
 
 def guessed(rig: Skeleton) -> dict[str, str]:
-    """Roles by names alone."""
+    """Role -> joint, as far as the names of the joints suggest it."""
     out: dict[str, str] = {}
     for name in rig.joints:
         part = part_of(name)

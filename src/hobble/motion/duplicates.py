@@ -1,4 +1,4 @@
-"""Finds duplicate clips: the same file, the same motion under another name or heading, or a mirror."""
+"""Finds duplicate clips: the same file, or the same motion by another name or heading or mirrored."""
 
 from __future__ import annotations
 
@@ -14,9 +14,9 @@ from hobble.core.files import load_npz, save_npz
 from hobble.core.quat import Array
 from hobble.motion.root import facing
 
-NEAR = 1.0  # cm: clips with a smaller mean difference are the same motion
-LONGER = 0.02  # relative difference of length that the same motion may have
-POSES = 12
+NEAR = 1.0  # cm: clips whose joints are nearer to each other on average are the same motion
+LONGER = 0.02  # the same motion may be longer in one clip than in another by this share
+POSES = 12  # number of poses of each clip that are compared
 FLIP = np.array([-1.0, 1.0, 1.0])
 
 
@@ -24,8 +24,9 @@ FLIP = np.array([-1.0, 1.0, 1.0])
 class ClipDigest:
     """The data by which clips are compared.
 
-    sha256: of the file. poses: (12, J, 3) cm, frames evenly over the clip, relative to the ground below the
-    hips and to the first facing direction. mirrored: the same, mirrored, or None if the rig cannot be
+    sha256: checksum of the file. seconds: length of the clip. poses: (12, J, 3) cm, the positions of the
+    joints at times spread evenly over the clip, relative to the ground below the hips in that pose and to
+    where the first pose faces. mirrored: `poses` with left and right exchanged, or None if the rig cannot be
     mirrored.
     """
 
@@ -53,7 +54,7 @@ def likeness(clip: Clip, sha256: str) -> ClipDigest:
 
 
 def save_likenesses(path: Path, clips: Sequence[ClipDigest]) -> None:
-    """Write them to one file."""
+    """Write the data of all clips to one file."""
     arrays = {
         f"{number}.{name}": np.array(value)
         for number, clip in enumerate(clips)
@@ -79,7 +80,7 @@ def load_likenesses(path: Path) -> list[ClipDigest]:
 
 
 def same_pairs(clips: Sequence[ClipDigest]) -> list[tuple[str, str, str]]:
-    """Pairs of duplicates: name, name, and "the same file", "the same motion" or "mirrors"."""
+    """Pairs of duplicates: two names, and "the same file", "the same motion" or "mirrors of each other"."""
     out = []
     order = sorted(clips, key=lambda clip: clip.seconds)
     for i, a in enumerate(order):

@@ -38,17 +38,21 @@ from hobble.motion.rig import (
 from hobble.motion.standing import stands
 from hobble.motion.upright_rest import upright
 
-STILL = 0.1  # cm: a position channel that stays nearer to its offset only repeats it
+STILL = 0.1  # cm: a joint whose position stays nearer to its offset than this does not move in its parent
 Limb = TypeVar("Limb")
 FOUND = "found"  # name in reports of a rig without a skeleton file
 
 
 @dataclass(frozen=True)
 class FileMotion:
-    """A file's motion at its own frame rate, on its own rig, or on the parts of its body.
+    """A file's motion at its own frame rate, on its own rig or on the joints of its body.
 
-    stance: where its rest pose comes from, in words. moving: whether joints below the hips move in their
-    parents. unsure: sentences on what is uncertain about the rest pose.
+    match: what the rig is known as, and which of its joints the target's joints follow. unit, unit_name: cm
+    per unit of the file, and the unit in words. axes: those of the file. first_frame: the file's frame (from
+    0) at which the clip begins. repairs, notes: sentences on what was repaired, and on what else users should
+    know. stance: where the rest pose comes from, in words. moving: whether joints of the body below the hips
+    move relative to their parents. straightened: whether the rig is not the file's own, but one made of the
+    joints of its body with a standing rest pose. unsure: sentences on what is uncertain about the rest pose.
     """
 
     clip: Clip
@@ -68,9 +72,11 @@ class FileMotion:
 def load_source(file: Bvh, target: TargetSkeleton, maps: str | Path, options: ClipMotion) -> FileMotion:
     """A file's motion, checked and, if allowed, repaired.
 
-    maps: the folder of the skeleton files. A rig with a skeleton file and an equal rest pose is taken as that
-    skeleton. On other rigs the parts of the body and a standing rest pose are found. Raises InputError if the
-    parts cannot be found, or for defects that cannot be repaired.
+    target: the rig to which the motion will go. maps: the folder of the skeleton files.
+
+    A rig with a skeleton file and the rest pose given there counts as that skeleton. On other rigs the parts
+    of the body and a standing rest pose are found. Raises InputError if the parts cannot be found, or for
+    defects that cannot be repaired.
     """
     check_angles(file)
     repairs = _frame_count(file, options.defects)
@@ -84,7 +90,7 @@ def load_source(file: Bvh, target: TargetSkeleton, maps: str | Path, options: Cl
 def _on_known_rig(
     file: Bvh, hips: int, match: RigMatch, repairs: list[str], options: ClipMotion
 ) -> FileMotion:
-    """The source of a file whose rig has a skeleton file."""
+    """The motion of a file whose rig has a skeleton file."""
     rig = replace(rig_of(below_hips(file, hips)), roles=match.roles)
     unit, unit_name = _unit(file.path, leg_length(rig), options.unit)
     decoded = decode_below(file, hips, STILL / unit)
@@ -113,7 +119,7 @@ def _on_known_rig(
 def _on_unknown_rig(
     file: Bvh, target: TargetSkeleton, known: RigMatch | None, repairs: list[str], options: ClipMotion
 ) -> FileMotion:
-    """The source of a file on any other rig. Its parts and a standing rest pose are found."""
+    """The motion of a file on any other rig. Its parts and a standing rest pose are found."""
     rig = rig_of(file)
     decoded = _decoded(file)
     raw = Clip(file.path.stem, rig, 1.0, decoded.rotations, decoded.root, decoded.translations)
@@ -194,7 +200,7 @@ def _swapped(limbs: Mapping[str, Limb]) -> dict[str, Limb]:
 
 
 def _notes_on_names(found: FoundBody, handedness: str) -> list[str]:
-    """Sentences on what was found, and on what names did not say."""
+    """Sentences on how the parts of the rig and its left side were found."""
     out = ["No skeleton file describes this rig: its parts were found from structure, motion and names."]
     if not found.sided:
         out.append(f"Its joint names do not say left and right, so motion.handedness: {handedness} was used.")
@@ -231,7 +237,7 @@ def _decoded(file: Bvh) -> Decoded:
 
 
 def rig_of(file: Bvh) -> Skeleton:
-    """The joints of a file as a skeleton, in its own unit. Names have no prefixes."""
+    """The joints of a file as a skeleton, in the file's unit. Prefixes of the names are left out."""
     names = clean_names(file.names)
     short = dict(zip(file.names, names, strict=True))
     ends = {short[name]: sites[0] for name, sites in file.end_sites.items()}

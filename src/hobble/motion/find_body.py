@@ -1,8 +1,9 @@
 """Finds the legs, arms, trunk and head of an unknown rig, from structure, motion and names.
 
 A limb is one of two chains with bones of equal lengths that start at one joint and bend in the middle. The
-legs point away from the joint that carries the arms, and they are the longer pair. Names say which side is
-left. If they do not, up and forward do, in right-handed coordinates.
+legs point away from the joint that carries the arms, and they are the longer pair. Names show which side is
+left. Where they do not, it follows from where the body's head is and where its feet and knees point, if
+coordinates are right-handed.
 """
 
 from __future__ import annotations
@@ -23,7 +24,7 @@ from hobble.motion.tree import above, common, path
 
 @dataclass(frozen=True)
 class FoundBody:
-    """The body of a rig. sided: whether names distinguish left and right."""
+    """The body of a rig. sided: whether the names of its joints distinguish left and right."""
 
     body: Body
     sided: bool
@@ -32,8 +33,9 @@ class FoundBody:
 def find_body(names: Sequence[str], parents: Sequence[int], positions: Array) -> FoundBody:
     """Find the parts of a body.
 
-    positions: (F, J, 3) in the world, any unit, any axes. Raises Doubt if the rig and the motion do not
-    determine the parts.
+    names, parents: of the J joints; the root's parent is -1. positions: (F, J, 3) of the joints in the world,
+    in any unit and along any axes. Raises TwoFigures if there is a second body, and Doubt if the rig and the
+    motion do not determine the parts.
     """
     rig = MovingRig(tuple(names), tuple(parents), positions)
     pairs = rig.pairs()
@@ -49,7 +51,7 @@ def find_body(names: Sequence[str], parents: Sequence[int], positions: Array) ->
     hips = parents[hips] if hips in (leg[0][0], leg[1][0]) else hips
     trunk = [j for j in path(parents, hips, arms.hub) if j != hips and (j not in above(parents, hips))]
     if len(trunk) > 1 and part_of(names[trunk[-1]]) == "neck" and head != trunk[-1]:
-        neck = (trunk.pop(), *neck)  # 3ds Max hangs the arms from the neck
+        neck = (trunk.pop(), *neck)  # in rigs of 3ds Max the neck carries the arms
     ordered = {SIDES[0]: first, SIDES[1]: 1 - first}
     across = {SIDES[0]: across_first, SIDES[1]: 1 - across_first}
     body = Body(
@@ -66,7 +68,7 @@ def find_body(names: Sequence[str], parents: Sequence[int], positions: Array) ->
 
 
 def _second(names: Sequence[str], parents: Sequence[int], positions: Array, hips: int) -> int | None:
-    """The top joint of another figure beside the one with these hips, or None."""
+    """The top joint of another figure beside the one with the given hips, or None."""
     chain = above(parents, hips)
     for top in range(len(parents)):
         if parents[top] not in chain[1:] or top in chain:

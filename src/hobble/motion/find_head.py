@@ -12,7 +12,7 @@ from hobble.motion.tree import above, path
 
 
 def find_head(rig: MovingRig, legs: LimbPair, arms: LimbPair) -> tuple[int, tuple[int, ...]]:
-    """The head, and the joints between it and the chest."""
+    """The head, and the joints of the neck: those between the joint that carries the arms and the head."""
     limbs = set(sum(legs.chains, ())) | set(sum(arms.chains, ()))
     named = [
         j for j, n in enumerate(rig.names) if part_of(n) == "head" and not is_end(n) and side_of(n) is None
@@ -26,19 +26,20 @@ def find_head(rig: MovingRig, legs: LimbPair, arms: LimbPair) -> tuple[int, tupl
 
 
 def _highest(rig: MovingRig, legs: LimbPair, arms: LimbPair, limbs: set[int]) -> int:
-    """The end of the chain that goes furthest from the trunk.
+    """The head by its place: the end of the chain that goes furthest beyond the shoulders.
 
-    Joints that only mark the head's end do not count.
+    Joints that only mark the end of the head do not count. limbs: all joints of arms and legs.
     """
     trunk = unit(rig.at[:, arms.hub] - rig.at[:, legs.hub])
     base = sum(rig.at[:, chain[0]] for chain in arms.chains) / 2
 
     def height(j: int) -> float:
+        # How far a joint lies beyond the shoulders, along the trunk.
         return float(np.mean(np.sum((rig.at[:, j] - base) * trunk, axis=-1)))
 
     below = [j for j in range(len(rig.names)) if arms.hub in above(rig.parents, j)[1:]]
     below = [j for j in below if not limbs & set(above(rig.parents, j))]
-    # Hair, ears and wings have a left and a right, and a head has not.
+    # Hair, ears and wings come in pairs, a left and a right one. There is only one head.
     pairs = [set(sum(pair.chains, ())) for pair in rig.pairs()]
     twins = set().union(*(pair for pair in pairs if not pair & limbs))
     single = [j for j in below if not twins & set(above(rig.parents, j)) and not side_of(rig.names[j])]

@@ -11,20 +11,22 @@ from hobble.motion.moving_rig import LimbPair, MovingRig
 from hobble.motion.names import is_control, limb_parts, part_of
 from hobble.motion.orient import unit
 
-RIGID = 0.03  # relative change of the length between two joints that count as one bone
-RATIOS = {"leg": (0.6, 1.6), "arm": (0.48, 1.6)}  # shank to thigh, forearm to upper arm
-APART = {"leg": 0.2, "arm": 0.4}  # of hips to knees, of shoulders to elbows, which may be spread for balance
-SWING = 10.0  # degrees: limbs that bend and stretch by more are surely limbs
-AWAY = -0.2  # legs and trunk point apart if the cosine between them is below this
-WORDS = {
+RIGID = 0.03  # two joints are the ends of one bone if their distance varies by no more than this share
+RATIOS = {"leg": (0.6, 1.6), "arm": (0.48, 1.6)}  # range of shank / thigh, and of forearm / upper arm
+# Least distance between the two hips as a share of that between the knees, and between the two shoulders as a
+# share of that between the elbows. Knees and elbows may be spread for balance.
+APART = {"leg": 0.2, "arm": 0.4}
+SWING = 10.0  # degrees: a pair of chains whose bend varies by this much or more gets the full score for it
+AWAY = -0.2  # largest mean cosine between the directions of legs and trunk, which point apart
+WORDS = {  # words in the names of joints (`names.part_of`) that suggest a kind of limb
     "leg": {"thigh", "shank", "foot", "ankle", "toe", "leg", "hip"},
     "arm": {"clavicle", "upperarm", "forearm", "hand", "wrist", "finger", "arm", "shoulder"},
 }
-LIMBS = {"leg": ("thigh", "shank", "foot"), "arm": ("upperarm", "forearm", "hand")}
+LIMBS = {"leg": ("thigh", "shank", "foot"), "arm": ("upperarm", "forearm", "hand")}  # from the trunk outward
 
 
 def find_limbs(rig: MovingRig, pairs: list[LimbPair]) -> tuple[LimbPair, LimbPair]:
-    """The pair of legs and the pair of arms of the likeliest body."""
+    """The pair of legs and the pair of arms of the likeliest body. pairs: all that can be limbs."""
     known = {}
     for i, pair in enumerate(pairs):
         for kind in ("leg", "arm"):
@@ -52,7 +54,10 @@ def find_limbs(rig: MovingRig, pairs: list[LimbPair]) -> tuple[LimbPair, LimbPai
 
 
 def _away(rig: MovingRig, legs: LimbPair, middle: tuple[int, int, int], arms: LimbPair) -> float:
-    """Mean cosine between the directions to the feet and to the arms' root; -1 for a standing body."""
+    """Mean cosine of the angle between legs and trunk, both seen from the hips: -1 for a standing body.
+
+    middle: as `segments` returns it for the legs.
+    """
     trunk = rig.at[:, arms.hub] - rig.at[:, legs.hub]
     feet = sum(rig.at[:, chain[middle[2]]] for chain in legs.chains) / 2 - rig.at[:, legs.hub]
     return float(np.mean(np.sum(unit(trunk) * unit(feet), axis=-1)))
@@ -67,13 +72,19 @@ def _length_between(rig: MovingRig, pair: LimbPair, middle: tuple[int, int, int]
 
 
 def _swing(rig: MovingRig, pair: LimbPair, middle: tuple[int, int, int]) -> float:
-    """How much the limbs bend and stretch, 0 to 1. Hair, skirts and wings often keep one angle."""
+    """Score from 0 to 1 for how much the limbs bend and stretch. Hair, skirts and wings often keep one angle.
+
+    middle: as `segments` returns it.
+    """
     turns = [np.ptp(np.percentile(rig.bend(chain, *middle), [3, 97])) for chain in pair.chains]
     return float(np.minimum(np.mean(turns) / SWING, 1.0))
 
 
 def _named(rig: MovingRig, pair: LimbPair, kind: str) -> float:
-    """How strongly names suggest a kind of limb, -1 to 1. Joints that control others count against it."""
+    """Score from -1 to 1 for how strongly the names of a pair's joints suggest a kind of limb.
+
+    Names of the other kind count against it, and so do those of joints that only control others.
+    """
     names = [rig.names[j] for chain in pair.chains for j in chain]
     parts = [part_of(name) for name in names]
     other = "arm" if kind == "leg" else "leg"
@@ -82,11 +93,12 @@ def _named(rig: MovingRig, pair: LimbPair, kind: str) -> float:
 
 
 def segments(rig: MovingRig, pair: LimbPair, kind: str) -> tuple[int, int, int] | None:
-    """Indices in the chains of hip, knee and ankle, or of shoulder, elbow and wrist.
+    """Indices in both chains of hip, knee and ankle, or of shoulder, elbow and wrist.
 
-    Names count if they give all three and the bones have the proportions of a body. Otherwise the two
-    bones are the longest consecutive ones that keep their length and bend between. A chain of twist
-    joints along a bone keeps its length from end to end.
+    kind: "leg" or "arm". None if the pair cannot be of this kind. Names decide if they give all three joints
+    and the bones between those have the proportions of a body. Otherwise the two bones are the longest
+    consecutive ones that keep their lengths and have a bend between them. A bone may consist of several
+    joints in line (twist joints): its length is the distance of the outer two.
     """
     chain = pair.chains[0]
     named = [limb_parts([rig.names[j] for j in c]) for c in pair.chains]
@@ -119,12 +131,18 @@ def _fits(rig: MovingRig, chain: Sequence[int], places: Sequence[int], kind: str
 
 
 def _moves(rig: MovingRig, pair: LimbPair, i: int, j: int) -> bool:
-    """Whether the distance between two joints of a chain changes, so that they are not one bone."""
+    """Whether the distance between two joints of a chain changes, so that no one bone connects them.
+
+    i, j: their indices in both chains.
+    """
     return any(rig.chord(chain[i], chain[j])[1] > RIGID for chain in pair.chains)
 
 
 def _apart(rig: MovingRig, pair: LimbPair, i: int, j: int, kind: str) -> bool:
-    """Whether the limbs begin apart, like shoulders and hips and unlike collarbones."""
+    """Whether the two limbs begin apart from each other, as at the shoulders or hips, not at the collarbones.
+
+    i, j: indices in both chains of the joints that may be shoulder and elbow, or hip and knee.
+    """
     at = [
         np.median(np.linalg.norm(rig.at[:, a] - rig.at[:, b], axis=-1))
         for a, b in ((pair.chains[0][i], pair.chains[1][i]), (pair.chains[0][j], pair.chains[1][j]))
@@ -133,7 +151,10 @@ def _apart(rig: MovingRig, pair: LimbPair, i: int, j: int, kind: str) -> bool:
 
 
 def _bends(rig: MovingRig, pair: LimbPair, i: int, j: int, k: int) -> bool:
-    """Whether the limb bends there, by at least six degrees on either side."""
+    """Whether the limb bends at joint `j` between `i` and `k`, by more than six degrees on either side.
+
+    i, j, k: indices in both chains.
+    """
     for chain in pair.chains:
         angle = rig.bend(chain, i, j, k)
         if np.percentile(angle, 97) > 6:
@@ -142,7 +163,7 @@ def _bends(rig: MovingRig, pair: LimbPair, i: int, j: int, k: int) -> bool:
 
 
 def joints_of(rig: MovingRig, pair: LimbPair, kind: str, k: int) -> tuple[int, int, int]:
-    """Hip, knee and ankle, or shoulder, elbow and wrist, of the chain k of a pair. It must have them."""
+    """Hip, knee and ankle, or shoulder, elbow and wrist, of chain `k` (0 or 1) of a pair that has them."""
     places = segments(rig, pair, kind)
     assert places is not None
     a, b, c = places
@@ -150,7 +171,11 @@ def joints_of(rig: MovingRig, pair: LimbPair, kind: str, k: int) -> tuple[int, i
 
 
 def toe(rig: MovingRig, pair: LimbPair, k: int, heel: int) -> int | None:
-    """The ball of the foot: the first joint a foot's length away from the ankle, or None."""
+    """The ball of a foot, or None if the rig has none.
+
+    It is the joint that is named as toe, or the first one that is clearly away from the ankle. k: the chain
+    of the pair, 0 or 1. heel: the ankle.
+    """
     chain = pair.chains[k]
     leg = pair.length
     after = chain[chain.index(heel) + 1 :]
@@ -160,13 +185,13 @@ def toe(rig: MovingRig, pair: LimbPair, k: int, heel: int) -> int | None:
     found = next((j for j in after if rig.chord(heel, j)[0] > 0.06 * leg), None)
     if found is None or part_of(rig.names[found]) != "ankle":
         return found
-    # The chain goes to the back of the heel.
+    # A second joint named ankle: this chain goes to the back of the heel, and the toe is on another one.
     toes = (j for j in rig.children[heel] if part_of(rig.names[j]) == "toe")
     return next((j for j in toes if rig.chord(heel, j)[0] > 0.03 * leg), None)
 
 
 def clavicle(rig: MovingRig, pair: LimbPair, k: int, shoulder: int) -> int | None:
-    """The joint between chest and shoulder that moves the shoulder, or None."""
+    """The joint between chest and shoulder that moves the shoulder, or None. k: chain of the pair, 0 or 1."""
     chain = pair.chains[k]
     before = chain[: chain.index(shoulder)]
     moving = [j for j in before if rig.chord(j, shoulder)[0] > 0.01 * rig.size]

@@ -13,7 +13,11 @@ from hobble.motion.orient import unit
 
 
 def left_leg(rig: MovingRig, pair: LimbPair, leg: list[tuple[int, int, int]], head: int) -> tuple[int, bool]:
-    """Which of the two legs is the left one, and whether names say so."""
+    """Which of the two legs (0 or 1) is the left one, and whether names say so.
+
+    leg: hip, knee and ankle of both chains of `pair`. head: the joint of the head. If names do not tell, up
+    (to the head) and forward (by feet and knees) do.
+    """
     named = _named_sides(rig, pair)
     if named[0] * named[1] < 0:
         return (0 if named[0] > 0 else 1), True
@@ -27,7 +31,7 @@ def left_leg(rig: MovingRig, pair: LimbPair, leg: list[tuple[int, int, int]], he
 
 
 def _named_sides(rig: MovingRig, pair: LimbPair) -> tuple[int, int]:
-    """For both chains how many more joints have left than right names."""
+    """For each of the two chains, how many more of its joints are named left than right."""
     votes = []
     for chain, across in (pair.chains, pair.chains[::-1]):
         sides = [side_of(rig.names[j]) for j in chain]
@@ -38,7 +42,7 @@ def _named_sides(rig: MovingRig, pair: LimbPair) -> tuple[int, int]:
 
 
 def _ahead(rig: MovingRig, pair: LimbPair, leg: list[tuple[int, int, int]]) -> Array:
-    """(S, 3) direction of the feet and, with less weight, of the knees."""
+    """(S, 3) unit vectors in which the feet point and, with less weight, the knees."""
     out = np.zeros((len(rig.at), 3))
     for k, (hip, knee, heel) in enumerate(leg):
         ball = toe(rig, pair, k, heel)
@@ -58,7 +62,11 @@ def left_arm(
     arm: list[tuple[int, int, int]],
     pair: LimbPair,
 ) -> int:
-    """Which of the two arms is the left one, on the side of the left leg."""
+    """Which of the two arms (0 or 1) is the left one: that on the side of the left leg.
+
+    leg, arm: three joints of both legs and both arms, from the trunk outward. left: which leg is the left
+    one. pair: the arms.
+    """
     across = rig.at[:, leg[left][0]] - rig.at[:, leg[1 - left][0]]
     arms = rig.at[:, arm[0][0]] - rig.at[:, arm[1][0]]
     side = float(np.mean(np.sum(unit(across) * unit(arms), axis=-1)))

@@ -1,7 +1,10 @@
 """Finds how feet are turned when they stand flat, from the motion alone, and how certain that is.
 
-The ball of a standing foot is low and slow. Meanwhile the heel comes down and goes up again, so the foot is
-flat when it is least steep, apart from the first moments. A runner's heel never comes all the way down.
+The ball of a standing foot is low and slow. While it stands, the heel comes down and goes up again, so the
+foot is flat when it is least steep, except for the moments in which it lands on the heel. A runner's heel
+never comes all the way down. The tilt of a foot is the angle by which the bone from the ankle to the
+ball points down. What is measured here of the motion is compared with the zero pose and with the target's
+feet.
 """
 
 from __future__ import annotations
@@ -22,46 +25,53 @@ from hobble.motion.orient import degrees_between, mean_rotation, unit
 from hobble.motion.spine import SHORT
 
 UP, AHEAD, LEFT = np.array([0.0, 1.0, 0.0]), np.array([0.0, 0.0, 1.0]), np.array([1.0, 0.0, 0.0])
-STANCE = 0.2  # the foot stands in this share of the frames, those with the lowest and slowest ball
-LEAST_STEEP = (10.0, 30.0)  # percentiles: a standing foot is flat if its steepness is between them
-FEWEST = 3  # frames
-SLOW = 0.5  # leg lengths a second: a slower ball stands
-RUNS = 0.3  # it is a run if the ball stands in a smaller share of frames; CMU's walks have at least .41
+STANCE = 0.2  # a foot counts as standing in this share of the frames: those with the lowest and slowest ball
+LEAST_STEEP = (10.0, 30.0)  # percentiles: of a standing foot's frames, those between them are flat
+FEWEST = 3  # least number of frames in which a foot is flat
+SLOW = 0.5  # leg lengths a second: a slower ball may stand
+RUNS = 0.3  # a figure runs if its balls are slow in a smaller share of frames; CMU's walks have at least .41
 # How much steeper than flat a runner's standing foot is. On 19 runs of CMU, relative to their zero poses, the
 # mean is 6.8 degrees and the range 4.0 to 9.2. On 50 walks the mean is .7.
 RAISED = np.radians(6.8)
-UNLIKE = np.radians(2.5)
+UNLIKE = np.radians(2.5)  # the tilt of each foot may differ from the mean of both by at most this
 UPRIGHT = 0.6  # least height of the hips above a standing foot, in leg lengths
-# Feet that were animated or cleaned stand at exactly one angle: their 10th and 50th percentile differ by less
-# (.00 degrees in most clips of `styles`). Those of captured feet differ by at least .1 degrees.
+# Feet that were animated or cleaned stand at exactly one angle: the 10th and 50th percentile of their angles
+# differ by less than EXACT (in most clips of `styles` by .00 degrees), while the feet also turn by more than
+# TILTS during the clip. For captured feet the percentiles differ by at least .1 degrees.
 EXACT = np.radians(0.02)
 TILTS = np.radians(10.0)
+# Standard deviation of the tilt of feet that stand at one angle, or whose tilt the zero pose shows.
 EXACT_ERROR = np.radians(0.5)
-# Standard deviation of the difference between a captured foot that stands and the same foot in the rig's zero
-# pose: 3 degrees over seven subjects of CMU, and one for the clip.
+# Standard deviation of the difference between the tilt of a captured foot that stands and of the same foot in
+# the rig's zero pose: 3 degrees over seven subjects of CMU, and a little more for differences between clips.
 CAPTURED_ERROR = np.radians(3.5)
-# The seven subjects' feet differ from those of `holden31` by 4.5 degrees, root mean square. Feet of other
-# rigs have any angle in the range.
+# A captured rig's feet are built either about like the target's or in any way. In the first case their tilt
+# differs from the target's by LIKE_TARGET, root mean square (of the seven subjects' feet from those of
+# `holden31`). In the second case, all tilts in a range of ANY_FOOT are equally likely.
 LIKE_TARGET = np.radians(4.5)
 ANY_FOOT = np.radians(42.0)
-# A foot that is not seen to stand may have any angle. Clips of a third of a second or less were 10 to 15
-# degrees off.
-BRIEF, BRIEF_ERROR = 0.5, np.radians(12.0)  # seconds, and radians
+# In a clip shorter than BRIEF seconds, the feet may never stand. The standard deviation of their tilt is then
+# BRIEF_ERROR radians: clips of a third of a second or less were 10 to 15 degrees off.
+BRIEF, BRIEF_ERROR = 0.5, np.radians(12.0)
 APART = 10.0  # degrees: a larger difference between the two standing feet is reported
-# A zero pose in which nobody could stand still shows the angle of the ankles, if that agrees with the motion.
+# Even if nobody could stand in the zero pose, it shows the tilt of the feet, if both feet agree with each
+# other and with the motion to this angle.
 AGREE = np.radians(10.0)
-SAME = np.radians(2.0)  # the feet of a zero pose differ less
-TIPTOE = np.radians(12.0)  # feet of a squatting body that are steeper by more may be on tiptoe
-FORWARD, STRAIGHT = 35.0, 30.0  # degrees
+SAME = np.radians(2.0)  # the tilts of the two feet of such a zero pose differ by less
+TIPTOE = np.radians(12.0)  # feet of a squatting body that are steeper than the target's by more are on tiptoe
+# Degrees. A foot of the zero pose that points further than FORWARD from where its knee points shows no tilt,
+# unless the knee bends by less than STRAIGHT and so does not show where it points.
+FORWARD, STRAIGHT = 35.0, 30.0
 NOTED = 1.0  # cm: a larger uncertainty (two standard deviations) is reported
 
 
 @dataclass(frozen=True)
 class Tilt:
-    """How far the bone from ankle to ball points down when the feet stand flat.
+    """The tilt of each foot when it stands flat: how far the bone from ankle to ball points down.
 
-    Side -> radians, None without a ball. measured: of standing feet. flat: the angle that is used. error:
-    standard deviation of the mean of both, radians.
+    measured: side -> radians in the frames in which the foot is flat, or None if it has no ball. flat: side
+    -> radians that are taken for right, or None. error: standard deviation of the mean of both feet's `flat`,
+    radians.
     """
 
     measured: dict[str, float | None]
@@ -70,7 +80,9 @@ class Tilt:
 
 
 def flat_feet(seen: BodySample) -> dict[int, Array]:
-    """Frames (4,) of ankles and balls that show how they are turned while the feet are flat."""
+    """Ankles and balls -> their frames (4,), as `BodySample` defines them, from how they are turned while the
+    feet are flat.
+    """
     tilt = feet_tilt(seen)
     frames: dict[int, Array] = {}
     for side in SIDES:
@@ -87,7 +99,7 @@ def flat_feet(seen: BodySample) -> dict[int, Array]:
 
 
 def feet_tilt(seen: BodySample) -> Tilt:
-    """The angles of flat feet, from standing feet or from the zero pose where it shows them."""
+    """The tilt of flat feet: from the zero pose if it shows it, else from frames in which they stand."""
     sides = {side: _steepness(seen, side) for side in SIDES}
     known = [tilt for tilt in sides.values() if tilt is not None]
     if not known:
@@ -119,7 +131,7 @@ def _on_tiptoe(seen: BodySample, known: Sequence[float]) -> bool:
 
 
 def _both(sides: dict[str, float | None], angle: float) -> dict[str, float | None]:
-    """Angles of the two feet with a given mean.
+    """Side -> tilt in radians, with the mean `angle`; None for a foot without a ball. sides: measured tilt.
 
     Both feet of a rig have about the same build, so a limping foot is corrected by the other. Half of the
     measured difference is kept, but no more than UNLIKE from the mean.
@@ -132,11 +144,11 @@ def _both(sides: dict[str, float | None], angle: float) -> dict[str, float | Non
 
 
 def _likeliest(measured: float, error: float, target: float) -> tuple[float, float]:
-    """The expected angle and its standard deviation, radians.
+    """The expected tilt of a captured rig's feet and its standard deviation, radians.
 
-    error: standard deviation of the measured angle. A captured rig's feet are either built about like the
-    target's or in any other way. Both cases are weighted by how well they explain the measured angle (a
-    mixture of a normal and an even distribution).
+    measured: the measured tilt. error: its standard deviation. target: the tilt of the target's feet. The
+    feet are built either about like the target's or in any way. Both cases are weighted by how well they
+    explain the measured tilt: a mixture of a normal and an even distribution.
     """
     apart, both = target - measured, float(np.hypot(error, LIKE_TARGET))
     alike = np.exp(-0.5 * (apart / both) ** 2) / (np.sqrt(2 * np.pi) * both)
@@ -149,8 +161,8 @@ def _likeliest(measured: float, error: float, target: float) -> tuple[float, flo
 def height_error(seen: BodySample, zero: bool) -> float:
     """Centimetres (two standard deviations) by which the figure may stand too high or low.
 
-    0 if the zero pose shows how the feet are turned, or without joints for the balls. zero: whether a person
-    could stand in it.
+    0 if a person could stand in the zero pose (`zero`), which then shows how the feet are turned, and 0 if
+    the rig has no joints for the balls of the feet.
     """
     feet = [(heel, toe) for *_, heel, toe in seen.body.legs.values() if toe is not None]
     if zero or len(feet) < len(SIDES):
@@ -187,7 +199,7 @@ def doubt(seen: BodySample, zero: bool) -> str | None:
 
 
 def rest_tilt(skeleton: Skeleton, body: Body) -> float:
-    """Radians by which the bones from ankle to ball point down in a skeleton's standing rest pose."""
+    """The tilt of the feet in a skeleton's standing rest pose, in radians: the mean of both."""
     rest = quat.rotate(quat.inv(rest_frame(skeleton)), rest_positions(skeleton))
     bones = [rest[toe] - rest[heel] for *_, heel, toe in body.legs.values() if toe is not None]
     return float(np.mean(_steep(np.array(bones))))
@@ -202,7 +214,7 @@ def runs(seen: BodySample) -> bool:
 
 
 def flat_frames(seen: BodySample, side: str) -> NDArray[np.integer]:
-    """The frames in which a foot is flat on the ground, as far as there are any."""
+    """The frames in which a foot is most likely flat on the ground: at least FEWEST."""
     stance = _stance(seen, side)
     steep = _steep(_ahead(seen, side)[stance])
     low, high = np.percentile(steep, LEAST_STEEP)
@@ -211,7 +223,7 @@ def flat_frames(seen: BodySample, side: str) -> NDArray[np.integer]:
 
 
 def stands(seen: BodySample, side: str) -> bool:
-    """Whether the body is upright while that foot is flat."""
+    """Whether the body is upright while the foot on this side is flat."""
     hip, knee, heel, _ = seen.body.legs[side]
     flat = flat_frames(seen, side)
     height = np.median(seen.at[flat, hip, 1] - seen.at[flat, heel, 1])
@@ -219,7 +231,7 @@ def stands(seen: BodySample, side: str) -> bool:
 
 
 def _steepness(seen: BodySample, side: str) -> float | None:
-    """Radians by which the foot's bone points down when it is flat, or None without a bone."""
+    """The tilt in radians of a foot in the frames in which it is flat, or None if it has no ball."""
     heel, toe = seen.body.legs[side][2:]
     if toe is None:
         return None
@@ -228,24 +240,24 @@ def _steepness(seen: BodySample, side: str) -> float | None:
 
 
 def _exact(seen: BodySample, side: str) -> bool:
-    """Whether the foot stands at exactly one angle, and tilts at other times."""
+    """Whether a foot has exactly one tilt whenever it stands, and other ones at other times."""
     steep = _steep(_ahead(seen, side))
     low, middle = np.percentile(steep[_stance(seen, side)], [10, 50])
     return bool(middle - low < EXACT and np.ptp(steep) > TILTS)
 
 
 def _stance(seen: BodySample, side: str) -> NDArray[np.integer]:
-    """The frames with the lowest and slowest ball."""
+    """The frames in which the ball of a foot is lowest and slowest, so that it stands, the surest first."""
     ball = _ball(seen, side)
     order = _rank(seen.speeds[:, ball]) + _rank(seen.at[:, ball, 1])
     return np.argsort(order)[: max(FEWEST + 2, round(STANCE * len(order)))]
 
 
 def _zero_tilt(seen: BodySample, side: str) -> float | None:
-    """Radians by which the foot's bone points down in the zero pose when the shank is upright.
+    """The tilt in radians of a foot in the zero pose, turned so that its shank is upright.
 
-    None if the foot does not point forward there: in a heap of bones any angle is possible. If the leg is
-    straight, bones may be twisted, so the foot may point sideways.
+    None if the foot does not point where its knee points, since it can have any tilt then. If the leg is
+    nearly straight, its bones may be twisted, so the foot may point sideways.
     """
     hip, knee, heel, toe = seen.body.legs[side]
     if toe is None:
@@ -267,7 +279,9 @@ def _ball(seen: BodySample, side: str) -> int:
 
 
 def _ahead(seen: BodySample, side: str) -> Array:
-    """(S, 3) direction of a foot: along its bone, to its end site, or where the hips face."""
+    """(S, 3) vectors in which a foot points: from ankle to ball; without a ball, to the ankle's end site;
+    without that, where the hips face on average.
+    """
     heel, toe = seen.body.legs[side][2:]
     if toe is not None:
         return seen.at[:, toe] - seen.at[:, heel]

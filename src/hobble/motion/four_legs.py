@@ -1,4 +1,4 @@
-"""Recognises figures that go on four legs, which cannot be put on a person's skeleton."""
+"""Recognises figures that walk on four legs, whose motion cannot be put on a person's skeleton."""
 
 from __future__ import annotations
 
@@ -8,10 +8,10 @@ from hobble.core.quat import Array
 from hobble.motion.body import SIDES, Body
 from hobble.motion.orient import unit
 
-STRETCHED = 0.7  # least distance of hips and feet, in leg lengths; a crawling person kneels
-REACH = 0.6  # least depth of the hands below the hips, relative to that of the feet
-LEVEL = -0.5  # cosine between trunk and legs; -1 in a standing person
-MOST = 0.9  # of all frames
+STRETCHED = 0.7  # least distance of hips and feet, in leg lengths; a crawling person kneels and has less
+REACH = 0.6  # least depth of the hands below the hips, as a share of the depth of the feet
+LEVEL = -0.5  # least cosine between trunk and legs; it is -1 in a standing person
+MOST = 0.9  # share of the frames in which all this has to be true
 
 
 def on_four_legs(body: Body, positions: Array) -> bool:

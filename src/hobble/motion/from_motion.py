@@ -20,10 +20,10 @@ AGREE = np.radians(25.0)  # trunk joints that differ by less have the same rest 
 
 
 def from_motion(seen: BodySample, trunk: BodySample, zero: Array | None) -> dict[int, Array]:
-    """Frames of all joints from the directions of the bones while the figure moves.
+    """Joint -> (4,) frame, as `BodySample` defines it, from the directions of the bones in motion.
 
     trunk: the poses that show how the trunk is turned (`trunk_sample`). zero: (4,) frame of the chest in the
-    zero pose, which counts if the rig has no neck. None if nobody could stand in that pose.
+    zero pose, which is used if the rig has no neck. None if nobody could stand in that pose.
     """
     frames: dict[int, Array] = {}
     _trunk(trunk, frames, zero)
@@ -34,7 +34,7 @@ def from_motion(seen: BodySample, trunk: BodySample, zero: Array | None) -> dict
 
 
 def bends(seen: BodySample) -> dict[int, Array]:
-    """Hips and chest -> how the bone above each is turned. Without those that have a joint for it."""
+    """Hips and chest -> (4,) rotation of the bone above each; left out where that bone has no length."""
     body, out = seen.body, {}
     for joint, following in ((body.hips, body.trunk), (body.chest, (*body.neck, body.head))):
         if following and seen.length(joint, following[0]) > SHORT:
@@ -50,14 +50,18 @@ def _trunk(seen: BodySample, frames: dict[int, Array], zero: Array | None) -> No
         bone, axis, left = _bone(seen, joint)
         if body.trunk and joint == body.chest and not has_neck(seen):
             bone, axis = neck_bone(seen, left, zero), seen.spine.neck
-        # Hips and chest are level where limbs begin. Spines of captured rigs bend sideways by some degrees.
+        # For hips and chest, left is more reliable than the bone: limbs begin level there, but spines of
+        # captured rigs bend sideways by some degrees.
         carries = joint in (body.hips, body.chest)
         frames[joint] = frame(left, LEFT, bone, axis) if carries else frame(bone, axis, left, LEFT)
     frames[body.head] = _head(seen, frames, chain)
 
 
 def _bone(seen: BodySample, joint: int) -> tuple[Array, Array, Array]:
-    """(3,) the bone above a joint of trunk or neck, its direction in a standing rest pose, and left."""
+    """The bone above a joint of trunk or neck, its direction in a standing rest pose, and left: (3,) each.
+
+    Bone and left are in the joint's coordinates.
+    """
     body = seen.body
     trunk = (body.hips, *body.trunk)
     chain = (*trunk, *body.neck, body.head)
@@ -76,9 +80,9 @@ def _bone(seen: BodySample, joint: int) -> tuple[Array, Array, Array]:
 
 
 def _head(seen: BodySample, frames: dict[int, Array], chain: Sequence[int]) -> Array:
-    """The chest's frame if the whole trunk agrees on what is up.
+    """(4,) the rotation of the head: that of the chest if all joints of the trunk have nearly the same one.
 
-    Otherwise the head looks ahead on average.
+    If not, the head is assumed to look ahead on average.
     """
     chest = frames[seen.body.chest]
     if len(chain) > 2 and max(float(quat.angle(frames[j], chest)) for j in chain) < AGREE:

@@ -1,5 +1,6 @@
-"""Derives how the joints of a body are turned in a standing zero pose, which knows some joints better than
-motion.
+"""Derives how the joints of a body are turned from a standing zero pose.
+
+For some joints it is more reliable than motion.
 """
 
 from __future__ import annotations
@@ -21,22 +22,23 @@ from hobble.motion.orient import (
 )
 
 UP = np.array([0.0, 1.0, 0.0])
-# Degrees: if zero pose and motion differ by more for a joint, the motion counts.
+# Degrees. If zero pose and motion differ by more for a joint, the motion is used.
 TRUSTED = 30.0
-# A larger difference between standing feet and those of the zero pose is reported. In `patients` it is at
-# most 9 degrees.
+# A larger difference between the angle of standing feet and that in the zero pose is reported. In the data
+# set `patients` it is at most 9 degrees.
 UNLIKE_ZERO = np.radians(12.0)
-# cm between the heights of feet that stand flat, 5th to 95th percentile. With more, the ground is uneven and
-# their angle shows nothing of the rig. On flat ground it is up to 3, in CMU's walks on uneven ground 9 to 18.
+# cm between the 5th and 95th percentile of the heights of feet that stand flat. With more, the ground is
+# uneven and the angle of the feet shows nothing of the rig. On flat ground it is up to 3, in CMU's walks on
+# uneven ground 9 to 18.
 UNEVEN = 6.0
-SHRUG = 12.0  # degrees: mean angle to the chest up to which the zero pose counts for clavicles
-LIMP = 60.0  # degrees: the same for hands and their forearms
+SHRUG = 12.0  # degrees; a clavicle whose mean angle to the chest is smaller is turned like the chest
+LIMP = 60.0  # degrees; if zero pose and motion differ by less for a hand, the zero pose is used
 
 
 def from_rest(seen: BodySample) -> dict[int, Array]:
-    """Frames of all joints from the zero pose, if a person could stand so.
+    """Joint -> (4,) rotation of its axes, from a zero pose in which a person could stand.
 
-    Limbs are turned by the direction that they have in it.
+    Limbs are turned by the directions of their bones in the zero pose.
     """
     body, rest = seen.body, seen.rest
     across = [rest[side["left"][k]] - rest[side["right"][k]] for side, k in ((body.legs, 0), (body.arms, 1))]
@@ -66,7 +68,7 @@ def from_rest(seen: BodySample) -> dict[int, Array]:
 
 
 def add_rest(frames: dict[int, Array], zero: dict[int, Array], seen: BodySample) -> None:
-    """Replace in `frames` the joints that the zero pose knows better."""
+    """Replace in `frames` the joints for which the zero pose is more reliable."""
     body = seen.body
     if degrees_between_rotations(zero[body.head], frames[body.head]) < TRUSTED:
         frames[body.head] = zero[body.head]
@@ -83,10 +85,10 @@ def add_rest(frames: dict[int, Array], zero: dict[int, Array], seen: BodySample)
 
 
 def zero_doubt(seen: BodySample, zero: dict[int, Array]) -> str | None:
-    """A sentence if the feet stand at another angle than in the zero pose. None if they agree.
+    """A sentence if the feet stand at another angle than in the zero pose; None if they agree.
 
-    zero: frames of `from_rest`. A person's zero pose may stand on its toes or lean. On uneven ground feet
-    stand at any angle.
+    zero: from `from_rest`. In the zero pose a person may stand on the toes or lean. On uneven ground, where
+    feet stand at any angle, nothing is said.
     """
     measured = feet_tilt(seen).measured
     difference, lengths, heights = [], [], []
@@ -113,10 +115,10 @@ def zero_doubt(seen: BodySample, zero: dict[int, Array]) -> str | None:
 
 
 def _foot(standing: Array, zero: Array, seen: BodySample, side: str) -> Array:
-    """How a foot is turned: as it stands, but as steep as in the zero pose, if the two roughly agree.
+    """(4,) the rotation of a foot: as it stands, but as steep as in the zero pose if both roughly agree.
 
-    If the legs are splayed in the zero pose, the feet are rolled and point outward there. A patient's foot
-    may never be flat.
+    It is not taken from the zero pose alone: if the legs are splayed there, the feet are rolled and point
+    outward. It is taken from the zero pose if the foot never stands flat, as some patients' feet.
     """
     if not stands(seen, side):
         return zero

@@ -1,4 +1,4 @@
-"""Keeps the heels of standing feet from sliding: tilts feet of another shape about their balls."""
+"""Keeps the heels of standing feet from sliding, by tilting the feet about their balls."""
 
 from __future__ import annotations
 
@@ -8,18 +8,18 @@ from hobble.core import quat
 from hobble.core.quat import Array
 
 STANDING = 0.8  # cm a frame at 60 Hz: a slower heel counts as standing
-SHORTEST = 1 / 20  # seconds
+SHORTEST = 1 / 20  # seconds; a heel that is slow for a shorter time does not stand
 RAMP = 1 / 15  # seconds before and after standing over which the tilt is blended
 MOST_TILT = np.radians(10.5)  # half of all frames need 0.3 degrees, nine of ten less than 3.5
-LOW = 1.5  # cm: tilting helps if the ankle is at least this far above the ball
+LOW = 1.5  # cm; if the ankle is lower above the ball, tilting has little effect and is reduced
 
 
 def level_heels(foot: Array, heel: Array, toe: Array, fps: float) -> Array:
     """Rotations (F, 4) about the ball of the foot that keep a standing heel as still as in the source.
 
-    In a foot of another shape the ankle has another height above the ball. The same rotation then moves it
-    further over the ground. foot: (F, 3) from heel to ball in the world, of the result. heel, toe: (F, 3)
-    positions in the source, scaled.
+    They are needed because the target's ankle may be higher above the ball than the source's, so that the
+    same rotation moves it farther over the ground. foot: (F, 3) from heel to ball in the world, of the
+    target. heel, toe: (F, 3) scaled positions of the source.
     """
     apart = toe - foot - heel
     missing = np.zeros_like(foot)
@@ -45,8 +45,9 @@ def _limited(angle: Array) -> Array:
 
 
 def standing_runs(point: Array, slow: float, shortest: int) -> list[tuple[int, int]]:
-    """Runs [first, last) of at least `shortest` frames in which a point (F, 3) moves less than `slow` a
-    frame.
+    """(first, stop) of each run of `shortest` frames or more in which a point (F, 3) is slower than `slow`.
+
+    slow: cm a frame.
     """
     speed = np.linalg.norm(np.diff(point, axis=0), axis=1)
     still = np.concatenate([[False], speed < slow, [False]])
@@ -56,10 +57,10 @@ def standing_runs(point: Array, slow: float, shortest: int) -> list[tuple[int, i
 
 
 def _bridged(values: Array, runs: list[tuple[int, int]], ramp: int) -> Array:
-    """Values (F, 3) that equal `values` within the runs and are smooth between them.
+    """(F, 3) numbers that equal `values` within the runs and are smooth between them.
 
-    They fade out over `ramp` frames after a run and fade in over as many before the next. If two runs are
-    nearer than that, they go straight from one to the other.
+    They fade out over `ramp` frames after a run and fade in over `ramp` frames before the next. Between runs
+    that are nearer to each other, they change smoothly from one to the other.
     """
     at: list[int] = [-ramp - 1]
     known: list[Array] = [np.zeros((1, 3))]

@@ -23,9 +23,9 @@ def below_hips(file: Bvh, hips: int) -> Bvh:
 
 
 def decode_below(file: Bvh, hips: int, still: float) -> Decoded:
-    """Rotations and positions of `below_hips`. The joints above, which may move, move the hips.
+    """Rotations and positions of `below_hips`. The motion of the joints above is added to that of the hips.
 
-    still: as for `decode`.
+    still: see `decode`.
     """
     decoded = decode(below_hips(file, hips), still)
     if not hips:

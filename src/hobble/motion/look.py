@@ -1,8 +1,8 @@
 """Summarises a folder of clips before training: one line for each clip, and notes on all of them.
 
-Cadence is how often the ankles pass each other in a minute, speed how fast the hips go. Steps of a given
-length have nearly the same rate for all people. If a file's frame rate contradicts this, the note names a
-rate that would not.
+The cadence is how often the ankles pass each other in a minute. The speed is that of the hips. For steps of a
+given length, the cadence is nearly the same for all people. If a clip contradicts this, a note names a frame
+rate of the file that would explain it.
 """
 
 from __future__ import annotations
@@ -27,10 +27,11 @@ from hobble.motion.rig import leg_length
 
 SLOWEST, FASTEST = 40.0, 260.0  # steps a minute of people who walk or run
 RATES = (24, 25, 30, 60, 120, 240)  # usual frame rates of files
-STILL = 3.0  # cm a second: slower hips stand
-STANDING = 0.5  # seconds: a shorter rest does not count as standing
-STRIDE = 0.25  # leg lengths: least distance of the ankles in a step
-MANY = 5  # clips with the same warning, from which on it is printed once for all
+STILL = 3.0  # cm a second; slower hips count as standing
+STANDING = 0.5  # seconds; a shorter rest does not count as standing
+STRIDE = 0.25  # least distance of the ankles in a step, in leg lengths
+MANY = 5  # a warning of so many clips or more is printed once for all of them
+# Kind of duplicates -> advice. For other kinds, one of them is enough.
 ENOUGH = {"mirrors of each other": "hold both out or neither"}
 
 
@@ -38,8 +39,10 @@ ENOUGH = {"mirrors of each other": "hold both out or neither"}
 class ClipSummary:
     """The summary of one clip.
 
-    stands: seconds in which nobody moves. steps: how often the ankles pass each other. like: for finding
-    duplicates.
+    refused: why it cannot be used; empty if it can. fps: of the file. hips: median height of the hips, cm.
+    speed: of the hips, cm a second. steps: how often the ankles pass each other. cadence: steps a minute.
+    stands: seconds in which the figure stands. off: the joint or limb that differs most from the file after
+    retargeting, and by how many degrees; None if the clip was not retargeted. like: for finding duplicates.
     """
 
     name: str
@@ -66,7 +69,7 @@ class FolderSummary:
 
 
 def look(folder: Path, skeleton: Path, maps: Path, options: ClipMotion | None = None) -> FolderSummary:
-    """Summarise each clip of a folder, or one file. Raises HobbleError if there are none.
+    """Summarise each clip of a folder, or one file. Raises InputError if there are none.
 
     options: how the files are read, as in a data set.
     """
@@ -80,7 +83,7 @@ def look(folder: Path, skeleton: Path, maps: Path, options: ClipMotion | None = 
 
 
 def shared_warnings(clips: Sequence[ClipSummary]) -> tuple[list[ClipSummary], list[str]]:
-    """Moves a sentence that at least MANY clips have from their lines to the notes on the folder."""
+    """The clips without the warnings that at least MANY of them share, and these warnings as notes."""
     count = Counter(warning for clip in clips for warning in clip.warnings if warning.endswith("."))
     common = {warning: times for warning, times in count.items() if times >= MANY}
     short = [replace(clip, warnings=tuple(w for w in clip.warnings if w not in common)) for clip in clips]
@@ -96,7 +99,7 @@ def _summary_of_file(file: Path, skeleton: Path, maps: Path, options: ClipMotion
 
 
 def reported(report: Mapping[str, Any]) -> ClipSummary:
-    """What the report of a clip says (`motion/<clip>.json`), without reading the clip."""
+    """The summary as far as the clip's report (`motion/<clip>.json`) tells it. The clip is not read."""
     return ClipSummary(
         report["clip"],
         rig=report["rig"],
@@ -137,7 +140,8 @@ def _first(report: Mapping[str, Any]) -> list[str]:
 
 
 def step_count(clip: Clip) -> int:
-    """How often the ankles pass each other in the facing direction, with enough distance between."""
+    """How often the ankles pass each other in the facing direction, if they are far enough apart before and
+    after."""
     p, role = clip.positions, clip.skeleton.role
     left = p[:, role("left_hip")] - p[:, role("right_hip")]
     ahead = np.cross(left, [0.0, 1.0, 0.0])
@@ -157,16 +161,16 @@ def stand_seconds(speed: Array, fps: float) -> float:
 
 
 def rate_warnings(steps: int, moving: float, way: float, clip: Clip, report: Mapping[str, Any]) -> list[str]:
-    """A sentence if no person has this cadence, with the frame rate that would explain it.
+    """A sentence if no person has this cadence, with a frame rate that would explain it; else no sentence.
 
-    moving: seconds in which the figure moves. way: its distance, cm.
+    moving: seconds in which the figure moves. way: length of its path, cm.
     """
     if steps < 2:
         return []
     cadence = 60.0 * steps / moving
     stride = way / steps
     leg = leg_length(clip.skeleton)
-    # Grieve and Gear 1966: cadence grows with step length. Steps of .8 leg lengths come 110 times a minute.
+    # Cadence grows with step length (Grieve and Gear 1966). With steps of .8 leg lengths it is 110 a minute.
     usual = 110.0 * np.clip(stride / (0.8 * leg), 0.5, 2.2) ** 0.6
     if SLOWEST <= cadence <= FASTEST and 0.45 < cadence / usual < 2.2:
         return []

@@ -1,6 +1,6 @@
 """Makes the page of a data set before training: a line for each clip, with a small walking figure.
 
-With very many clips, only a sample is read. The lines of the others show their reports alone.
+If there are very many clips, only a sample of them is read. The lines of the others show only their reports.
 """
 
 from __future__ import annotations
@@ -18,9 +18,9 @@ from hobble.core.quat import Array
 from hobble.motion.look import ClipSummary, reported, same_notes, seen, shared_warnings, standing_notes
 from hobble.motion.root import facing
 
-FRAMES, SECONDS = 40, 4.0  # of the picture, from the middle of the clip
-MOST_READ, MOST_SECONDS = 600, 5 * 3600.0  # clips that are read, and their length: 10 MB, about half a minute
-MOST_NOTES = 40  # on clips together, such as duplicates
+FRAMES, SECONDS = 40, 4.0  # frames of the small figure, and their duration, from the middle of the clip
+MOST_READ, MOST_SECONDS = 600, 5 * 3600.0  # most clips that are read, and their length: 10 MB, half a minute
+MOST_NOTES = 40  # most notes on several clips, such as duplicates
 LABELS = ("cycles", "seconds", "warnings")  # what the page shows of the labels
 GOLDEN = 0.6180339887498949
 HEAD = (
@@ -54,10 +54,10 @@ if(calm)addEventListener('scroll',()=>draw(0));requestAnimationFrame(draw);"""
 
 
 def figure(clip: Clip) -> dict[str, Any]:
-    """A walk in place seen from the side, in pixels of an 80 x 80 picture.
+    """A clip as a walk in place, seen from the side, in pixels of a picture of 80 x 80.
 
-    p: for each frame x and y of every joint. b: bones (joint, joint, 0 middle, 1 left or 2 right). f: frames
-    a second.
+    p: for each frame, x and y of every joint. b: bones as (joint, joint, side), where side is 0 in the
+    middle, 1 left and 2 right. f: frames a second.
     """
     long = min(len(clip), round(SECONDS * clip.fps))
     first = (len(clip) - long) // 2
@@ -84,7 +84,7 @@ def foot_down(contacts: Array) -> float:
 
 @dataclass(frozen=True)
 class _ClipLine:
-    """A line of the page. figure, down: None if the clip was not read."""
+    """A line of the page. down: from `foot_down`. figure, down: None if the clip was not read."""
 
     look: ClipSummary
     labels: Mapping[str, Any]
@@ -100,9 +100,9 @@ def look_page(
 ) -> str:
     """The page of data set `name` as one file.
 
-    reports, labels: of each clip `motion/<clip>.json`, and the keys LABELS of `labels/<clip>.json`. read:
-    returns a clip, by its place among them, and its contacts (F, 4). It is called for the clips of `chosen`,
-    one after another.
+    reports: `motion/<clip>.json` of each clip. labels: the keys LABELS of `labels/<clip>.json` of each clip.
+    read: index of a clip -> the clip and its contacts (F, 4). It is called for the clips of `chosen`, one
+    after another.
     """
     some = chosen(reports, labels)
     lines = [_ClipLine(reported(report), labelled) for report, labelled in zip(reports, labels, strict=True)]
@@ -120,9 +120,10 @@ def look_page(
 
 
 def chosen(reports: Sequence[Mapping[str, Any]], labels: Sequence[Mapping[str, Any]]) -> list[int]:
-    """The clips that are read for the page: all, or a sample of many, those with warnings first.
+    """Indices of the clips that are read for the page: all of them, or a sample if there are very many.
 
-    The others are spread evenly over the names. At least one clip is chosen, if there are any.
+    Clips with warnings come first. The others are spread evenly over the names. At least one clip is chosen,
+    if there are any.
     """
     warned = [
         bool(reported(report).warnings or labelled["warnings"])

@@ -13,9 +13,9 @@ from hobble.core.quat import Array
 from hobble.motion.axes import turned
 from hobble.motion.root import facing
 
-BLEND = 0.2  # seconds on each side of a seam; doubled until the seam is smooth
-FASTEST = 1.3  # highest joint speed at a smooth seam, relative to the highest in the clip
-TURNING = np.radians(20.0)  # a cycle that turns less counts as straight
+BLEND = 0.2  # seconds on each side of a seam that are blended; doubled until the seam is smooth
+FASTEST = 1.3  # highest joint speed at a smooth seam, as a multiple of the highest in the clip
+TURNING = np.radians(20.0)  # a cycle that turns by less counts as straight
 UP = np.array([0.0, 1.0, 0.0])
 
 
@@ -23,7 +23,7 @@ def loop_clip(clip: Clip, times: int, heading: float | None = None) -> Clip:
     """The clip repeated `times` times. Each repetition adds the displacement and the turn of one cycle.
 
     heading: direction of the first cycle, degrees from +Z towards +X; by default as in the clip. The last
-    frame may repeat the first or come just before it. Raises HobbleError for less than four frames.
+    frame may repeat the first or be the one before it. Raises HobbleError for less than four frames.
     """
     if len(clip) < 4:
         raise HobbleError(f"{clip.name}: {len(clip)} frames are too few for a cycle that could be repeated")
@@ -65,7 +65,7 @@ def _yaw(clip: Clip, frame: int) -> float:
 
 
 def _step_between_cycles(cycle: Clip) -> tuple[float, Array]:
-    """From one cycle to the next: a turn about Y, then a shift over the ground."""
+    """The movement from one cycle to the next: a turn about Y in radians, then a shift (3,) in cm."""
     turn = (_yaw(cycle, -1) - _yaw(cycle, 0) + np.pi) % (2 * np.pi) - np.pi
     turn = float(turn) if abs(turn) > TURNING else 0.0
     pace = np.median(np.diff(cycle.root[-4:], axis=0), axis=0)
@@ -75,8 +75,9 @@ def _step_between_cycles(cycle: Clip) -> tuple[float, Array]:
 
 
 def _blended(cycle: Clip, step: tuple[float, Array], reach: int) -> Clip:
-    """The cycle with smooth ends: half of their difference is subtracted from each, fading over `reach`
-    frames.
+    """The cycle with ends that fit together: half of their difference is removed at each end.
+
+    The change fades over `reach` frames.
     """
     turn, frames = step[0], len(cycle)
     first = cycle.rotations[0].copy()

@@ -27,7 +27,7 @@ from hobble.motion.root import facing
 from hobble.motion.tilt import check_tilt
 from hobble.motion.upright_rest import upright
 
-SAME = 1e-3  # cm: offsets that differ less from the skeleton's are equal
+SAME = 1e-3  # cm; offsets that differ less from those of the skeleton count as equal
 
 KEPT = "Movements of joints in their parents were kept."
 DROPPED = "Movements of joints in their parents were dropped, because the bone lengths changed."
@@ -46,9 +46,9 @@ def make_clip(
     skeleton: the target's file. maps: the folder of the skeleton files. clip: name of the new clip. options:
     the `motion` section of the data set, with the values of the clip's entry.
 
-    Returns the clip and its report: `motion/<clip>.json` of docs/artefacts.md. Raises InputError for a file
-    that cannot be read, for an unsuitable skeleton, for defects that cannot be repaired and, with defects:
-    refuse, for all defects.
+    Returns the clip and its report (`motion/<clip>.json` in docs/artefacts.md). Raises InputError for a file
+    that cannot be read, for an unsuitable skeleton, and for defects that cannot be repaired; with
+    `defects: refuse`, for all defects.
     """
     target = load_skeleton(skeleton, skeleton_name)
     file = read_bvh(bvh)
@@ -82,7 +82,7 @@ def make_clip(
 
 
 def _check_length(file: Bvh, clip: Clip, target: Skeleton, options: ClipMotion) -> None:
-    """Refuse a clip that would take more memory at the new frame rate than any real one."""
+    """Raise InputError for a clip that would take more memory at the new frame rate than any real clip."""
     frames = len(clip) / clip.fps * options.fps * options.loops
     if frames * max(len(clip.skeleton.joints), len(target.joints)) > MOST_POSES:
         raise InputError(
@@ -94,7 +94,7 @@ def _check_length(file: Bvh, clip: Clip, target: Skeleton, options: ClipMotion) 
 
 
 def _check_finite(file: Bvh, clip: Clip) -> None:
-    """Refuse values that are not finite, and rigs whose bones have no length."""
+    """Raise InputError for values that are not finite, which come from joints without length."""
     lengths = np.linalg.norm(file.offsets, axis=1)
     for values in (clip.rotations, clip.root, clip.positions):
         bad = ~np.isfinite(values).reshape(len(clip), -1).all(axis=1)
@@ -133,11 +133,11 @@ def resample(clip: Clip, fps: float) -> Clip:
 
 @dataclass(frozen=True)
 class Fitted:
-    """A clip on the joints of the target, the scale of its path, and notes.
+    """A clip on the joints of the target.
 
-    figures: difference from its source (`hobble.motion.check_retarget.compare`), or None if it was not
-    retargeted.
-    unsure: sentences on what is uncertain.
+    scale: of its path. repairs: sentences on what was changed. figures: its difference from the source
+    (`hobble.motion.check_retarget.compare`), or None if it was not retargeted. unsure: sentences on what is
+    uncertain.
     """
 
     clip: Clip
@@ -150,7 +150,7 @@ class Fitted:
 def fit_skeleton(clip: Clip, source: FileMotion, target: Skeleton, proportions: str) -> Fitted:
     """The clip's motion on the target skeleton, or on its joints with the clip's own bone lengths.
 
-    clip: the source's, at another frame rate.
+    clip: that of `source` at the new frame rate. proportions: see `MotionOptions`.
     """
     match = source.match
     if match.same:

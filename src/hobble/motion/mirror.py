@@ -1,4 +1,4 @@
-"""Mirrors a motion: x negated, left and right swapped."""
+"""Mirrors a motion: negates x and swaps left and right."""
 
 from __future__ import annotations
 
@@ -47,5 +47,5 @@ def mirror_clip(clip: Clip, name: str) -> Clip:
 
 
 def mirror_report(report: Mapping[str, Any], name: str) -> dict[str, Any]:
-    """The report of the mirrored clip: its original's, with the facing direction mirrored."""
+    """The report of the mirrored clip: that of the original with the facing direction mirrored."""
     return {**report, "clip": name, "mirror_of": report["clip"], "facing": 0.0 - report["facing"]}

@@ -1,4 +1,4 @@
-"""Measures an unknown rig in motion: bones, bends, and pairs of equal chains of bones."""
+"""Measures an unknown rig in motion: lengths of bones, bends, and pairs of equal chains of bones."""
 
 from __future__ import annotations
 
@@ -13,15 +13,15 @@ from hobble.motion.body import SIDES
 from hobble.motion.names import are_twins, side_of
 from hobble.motion.orient import unit
 
-SAMPLES = 150
-ALIKE = 0.15  # relative difference of length that a bone and its counterpart may have
-FEWEST = 3  # joints of a limb
-LEAST = 0.1  # least length of a limb, relative to the size of the body, which wings and swords make larger
+SAMPLES = 150  # frames of the clip that are looked at
+ALIKE = 0.15  # largest relative difference of length between a bone and its counterpart
+FEWEST = 3  # fewest joints of a limb
+LEAST = 0.1  # least length of a limb, as a share of the size of the body, which includes wings and swords
 
 
 @dataclass(frozen=True)
 class LimbPair:
-    """Two equal chains of joints below one joint, from the trunk outward, `sides` (a, b)."""
+    """Two equal chains of joints below joint `hub`, from the trunk outward. length: that of each chain."""
 
     hub: int
     chains: tuple[tuple[int, ...], tuple[int, ...]]
@@ -30,7 +30,7 @@ class LimbPair:
 
 @dataclass(frozen=True)
 class MovingRig:
-    """Joints and where they are: positions (F, J, 3) in the world, any unit, any axes."""
+    """The joints of a rig in motion. positions: (F, J, 3) in the world, in any unit and axes."""
 
     names: tuple[str, ...]
     parents: tuple[int, ...]
@@ -38,13 +38,13 @@ class MovingRig:
 
     @cached_property
     def at(self) -> Array:
-        """(S, J, 3): a sample of frames that is large enough to see what moves."""
+        """(S, J, 3) positions in a sample of frames."""
         every = np.unique(np.linspace(0, len(self.positions) - 1, SAMPLES).round().astype(int))
         return self.positions[every]
 
     @cached_property
     def lengths(self) -> Array:
-        """(J,) length from each joint to its parent."""
+        """(J,) distance of each joint from its parent."""
         up = [max(p, 0) for p in self.parents]
         return np.median(np.linalg.norm(self.at - self.at[:, up], axis=-1), axis=0)
 
@@ -63,7 +63,7 @@ class MovingRig:
         return out
 
     def alike(self, a: int, b: int) -> bool:
-        """Whether two bones can be each other's counterparts."""
+        """Whether two bones, by their names and lengths, can be each other's counterparts."""
         sides = {side_of(self.names[a]), side_of(self.names[b])}
         if None not in sides and len(sides) == 1:
             return False
@@ -72,7 +72,7 @@ class MovingRig:
         return bool(abs(self.lengths[a] - self.lengths[b]) <= share * longer + 0.01 * self.size)
 
     def match(self, a: int, b: int) -> tuple[float, tuple[int, ...], tuple[int, ...]]:
-        """The longest equal chains of bones from a and b on: their length and joints."""
+        """The longest equal chains of bones that begin with a and b: their length, and the joints of each."""
         best: tuple[float, tuple[int, ...], tuple[int, ...]] = (0.0, (), ())
         for c in self.children[a]:
             for d in self.children[b]:
@@ -107,14 +107,14 @@ class MovingRig:
         return out
 
     def chord(self, a: int, b: int) -> tuple[float, float]:
-        """Median distance of two joints, and its relative change."""
+        """Median distance of two joints, and by how much it varies, as a share of the median."""
         apart = np.linalg.norm(self.at[:, b] - self.at[:, a], axis=-1)
         middle = float(np.median(apart))
         low, high = np.percentile(apart, [3, 97])
         return middle, float(high - low) / max(middle, 1e-9)
 
     def bend(self, chain: Sequence[int], i: int, j: int, k: int) -> Array:
-        """(S,) degrees between the bones before and after the middle one of three joints of a chain."""
+        """(S,) degrees between the lines i to j and j to k. i, j, k: indices in `chain`."""
         upper = unit(self.at[:, chain[j]] - self.at[:, chain[i]])
         lower = unit(self.at[:, chain[k]] - self.at[:, chain[j]])
         return np.degrees(np.arccos(np.clip(np.sum(upper * lower, axis=-1), -1, 1)))

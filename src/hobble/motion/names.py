@@ -1,4 +1,4 @@
-"""What the name of a joint says about its side and its part of the body."""
+"""Reads the side and the part of the body from the name of a joint."""
 
 from __future__ import annotations
 
@@ -102,9 +102,9 @@ def side_of(name: str) -> str | None:
 
 
 def side_of_pair(name: str, other: str) -> str | None:
-    """The side of a joint, by its own name and its counterpart's. None if the names do not say.
+    """The side of a joint, by its own name and that of its counterpart. None if the names do not say.
 
-    Two names that differ only in one letter say more than each alone.
+    Two names that differ only in one letter say more together than each alone.
 
     >>> side_of_pair("lfemur", "rfemur"), side_of_pair("toe_r2", "toe_l2"), side_of_pair("armA", "armB")
     ('left', 'right', None)
@@ -119,7 +119,7 @@ def side_of_pair(name: str, other: str) -> str | None:
 
 
 def are_twins(name: str, other: str) -> bool:
-    """Whether two names are those of one joint on the left and on the right.
+    """Whether two names mean the same joint on the left and on the right.
 
     >>> are_twins("LeftToe2", "RightToe2"), are_twins("toe2.L", "toe1.R"), are_twins("lfemur", "rfemur")
     (True, False, True)
@@ -139,7 +139,7 @@ def _without_side(name: str) -> list[str]:
 
 
 def part_of(name: str) -> str | None:
-    """The part of the body that a name means: one of the words of WORDS, or None.
+    """The part of the body that a name means: the first of a pair in WORDS, or None.
 
     >>> part_of("LeftForeArm"), part_of("RightShoulder"), part_of("Bip01 R Calf"), part_of("qwertz")
     ('forearm', 'shoulder', 'shank', None)
@@ -152,7 +152,7 @@ def part_of(name: str) -> str | None:
 
 
 def is_end(name: str) -> bool:
-    """Whether a name says that the joint only ends a bone, like HeadTop_End."""
+    """Whether a name says that the joint only marks the end of a bone, like HeadTop_End."""
     return any(w in ENDS for w in words(name))
 
 
@@ -162,10 +162,10 @@ def is_control(name: str) -> bool:
 
 
 def limb_parts(names: Sequence[str]) -> dict[str, int]:
-    """Which of the joints along a limb, from the trunk outward, is which part, by names alone.
+    """The parts of a limb, by names alone. names: of the joints along the limb, from the trunk outward.
 
-    Returns thigh, shank, foot and toe, or clavicle, upperarm, forearm and hand, as far as the names say, each
-    with its index in `names`.
+    Returns part -> index in `names`, as far as the names say. The parts are thigh, shank, foot and toe, or
+    clavicle, upperarm, forearm and hand.
     """
     parts = [part_of(name) for name in names]
     out: dict[str, int] = {}

@@ -1,6 +1,6 @@
 """Finds how far the chest leans on a rig without a joint between chest and head.
 
-On other rigs the neck shows it. On these rigs a neck is assumed with the lean of people's necks.
+On other rigs the neck shows it. On these rigs a neck is assumed that leans as far as people's necks do.
 """
 
 from __future__ import annotations
@@ -13,14 +13,15 @@ from hobble.motion.body_sample import BodySample
 from hobble.motion.orient import unit
 from hobble.motion.spine import SHORT
 
-# Radians by which the first bone of a person's neck leans forward: against the vertical in a standing zero
-# pose, and against the line from chest to head. Means and standard deviations over seven subjects of CMU.
+# Radians by which the first bone of a person's neck leans forward: from the vertical in a standing zero pose
+# (AHEAD), and from the line between chest and head (AHEAD_OF_HEAD). Means, and standard deviations (ERROR),
+# over seven subjects of CMU.
 AHEAD, AHEAD_ERROR = np.radians(5.4), np.radians(2.6)
 AHEAD_OF_HEAD, AHEAD_OF_HEAD_ERROR = np.radians(5.6), np.radians(3.9)
 
 
 def has_neck(seen: BodySample) -> bool:
-    """Whether the rig has a neck, or the target has none either, so that both can be compared as they are.
+    """Whether the rig has a neck, or neither the rig nor the target has one. Then nothing need be assumed.
 
     A joint at the same place as the chest is no neck.
     """
@@ -29,9 +30,10 @@ def has_neck(seen: BodySample) -> bool:
 
 
 def neck_bone(seen: BodySample, left: Array, zero: Array | None) -> Array:
-    """(3,) direction of the neck that a rig without one would have, in the chest's coordinates.
+    """(3,) direction of the assumed neck, in the chest's coordinates.
 
-    left: (3,) the body's left there. zero: (4,) the chest's frame in a standing zero pose, or None.
+    left: (3,) the body's left in the chest's coordinates. zero: (4,) the rotation of the chest's axes in a
+    standing zero pose, or None.
     """
     if zero is not None:
         return quat.rotate(zero, np.array([0.0, np.cos(AHEAD), np.sin(AHEAD)]))
@@ -40,7 +42,7 @@ def neck_bone(seen: BodySample, left: Array, zero: Array | None) -> Array:
 
 
 def lean_doubt(seen: BodySample, zero: bool) -> str | None:
-    """A sentence on how far the chest leans, on a rig without a neck. None if that is known.
+    """A sentence that the lean of the chest is uncertain, on a rig without a neck; None if it is known.
 
     zero: whether a person could stand in the zero pose.
     """

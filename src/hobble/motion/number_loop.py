@@ -1,4 +1,4 @@
-"""The compiled loop of `read_numbers`."""
+"""The compiled loop of `hobble.motion.read_numbers`."""
 
 from __future__ import annotations
 
@@ -8,10 +8,10 @@ import numpy as np
 
 from hobble.core.compiled import njit
 
-EXACT = np.uint64(1 << 53)  # a double holds every integer up to here
-MOST_POWER = 22  # and every power of ten up to this one
+EXACT = np.uint64(1 << 53)  # a double holds every integer up to this one exactly
+MOST_POWER = 22  # a double holds every power of ten up to this one exactly
 POWERS = np.array([float(f"1e{power}") for power in range(MOST_POWER + 1)])
-MOST_DIGITS = 18  # that fit an integer of 64 bits
+MOST_DIGITS = 18  # so many digits fit into an integer of 64 bits
 FARTHEST = 400  # larger exponents are left to Python; no double has them
 NONE, END_OF_LINE, END, OTHER = range(4)
 ZERO, TEN = np.uint8(48), np.uint64(10)
@@ -24,8 +24,8 @@ def read_lines(data: Any, at: int, table: Any, long: Any) -> tuple[int, int]:
     """Read lines of data (n,) from `at` on into table (F, width).
 
     Returns the number of lines, or -1 if something is unusual (see `read_numbers`), and how many numbers are
-    too long to be read here. long: (m, 3) gets their places in the flat table, and where they begin and end
-    in data.
+    too long to be read here. For each of these, its index in the flat table and its begin and end in data are
+    written to long (m, 3).
     """
     rows, width = table.shape
     row, column, found = 0, 0, 0
@@ -57,9 +57,9 @@ def read_lines(data: Any, at: int, table: Any, long: Any) -> tuple[int, int]:
 
 @njit(inline="always")
 def _to_next(data: Any, at: int) -> tuple[int, int]:
-    """Skip blanks. Returns where the next number is and NONE, or what is there in place of one.
+    """Skip blanks. Returns the next place, and what is there: NONE for a number, END_OF_LINE, END or OTHER.
 
-    A line end is skipped too.
+    The place after an END_OF_LINE is the start of the next line.
     """
     size = len(data)
     while at < size and (data[at] == SPACE or data[at] == TAB):
@@ -114,7 +114,7 @@ def _number(data: Any, at: int) -> tuple[float, int, bool]:
 
 @njit(inline="always")
 def _exponent(data: Any, at: int) -> tuple[int, int]:
-    """The exponent at `at`, and where it ends; -1 if there is no digit. Not exact from FARTHEST on."""
+    """The exponent at `at`, and where it ends (-1 if there is no digit). Above FARTHEST it is not exact."""
     size = len(data)
     negative = at < size and data[at] == MINUS
     if at < size and (negative or data[at] == PLUS):

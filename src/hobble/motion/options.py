@@ -12,7 +12,7 @@ from hobble.core.section import Finite, Ground, Inside, Positive, PositiveFloat,
 
 
 def _sixty(fps: float) -> float:
-    """Refuse other rates than 60 Hz, which windows, speeds, thresholds and the character are based on."""
+    """Refuse other rates than 60 Hz: windows, speeds, thresholds and the character are based on it."""
     if fps != 60.0:
         raise ValueError("clips must have 60 frames a second, whatever the rate of their files")
     return fps
@@ -31,7 +31,7 @@ class Download(Section):
         description="address of a clip; {clip} is its name, {subject} the part before the first _"
     )
     checksums: Inside = Field(
-        description="file of SHA-256 sums, as sha256sum writes them; beside the data set's own file"
+        description="file of SHA-256 sums, as sha256sum writes them, in the folder of the data set's file"
     )
 
     @model_validator(mode="after")
@@ -54,7 +54,7 @@ class Download(Section):
 class MotionOptions(Section):
     """How BVH files are read and checked.
 
-    With `auto` a value is found from the rig; other values override it.
+    With `auto` a value is derived from the rig (the file's skeleton); another value overrides it.
     """
 
     fps: SixtyHz = Field(60.0, description="frames a second of the clips; must be 60")
@@ -63,8 +63,8 @@ class MotionOptions(Section):
     up: Literal["auto", "Y", "Z"] = "auto"
     handedness: Literal["auto", "right", "left"] = Field(
         "auto",
-        description="of the file's coordinates; x is negated in left-handed files. `auto` needs joint names "
-        "that say left and right",
+        description="handedness of the file's coordinates; x is negated in left-handed files. `auto` needs "
+        "joint names that say left and right",
     )
     facing: Finite | None = Field(
         None,

@@ -1,4 +1,4 @@
-"""Derives how a part of a body is turned from the directions of its bones."""
+"""Rotations of parts of a body from the directions of their bones."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ def degrees_between(a: Array, b: Array) -> float:
 
 
 def frame(first: Array, axis: Array, second: Array, other: Array) -> Array:
-    """(4,) the rotation that takes `axis` to `first`, and `other` as near as possible to `second`."""
+    """(4,) the rotation that turns `axis` to `first`, and `other` as near as possible to `second`."""
     return quat.from_matrix(_axes(first, second) @ _axes(axis, other).T)
 
 
@@ -32,7 +32,7 @@ def _axes(first: Array, second: Array) -> Array:
 
 
 def snapped_to_axes(frame: Array) -> Array:
-    """The frame, or the nearest whole axes if they are within 20 degrees."""
+    """The rotation `frame` (4,), or the nearest one that permutes the axes if it is within 20 degrees."""
     axes = quat.to_matrix(frame)
     whole = np.round(axes)
     if np.all(np.abs(whole).sum(axis=0) == 1) and np.sum(axes * whole, axis=0).min() > np.cos(np.radians(20)):
@@ -41,18 +41,18 @@ def snapped_to_axes(frame: Array) -> Array:
 
 
 def pointed_along(whole: Array, axis: Array, bone: Array) -> Array:
-    """A frame turned as little as possible so that its `axis` lies along the bone."""
+    """The rotation `whole` (4,), changed as little as possible so that it turns `axis` to the bone."""
     return quat.mul(quat.between(quat.rotate(whole, axis), bone), whole)
 
 
 def robust_mean(vectors: Array) -> Array:
-    """Mean (3,) of vectors (S, 3), without those far from their median."""
+    """Mean (3,) of vectors (S, 3), without outliers."""
     apart = np.linalg.norm(vectors - np.median(vectors, axis=0), axis=-1)
     return vectors[apart <= 3 * np.median(apart) + 1e-9].mean(axis=0)
 
 
 def mean_rotation(turns: Array) -> Array:
-    """Mean rotation (4,) of (S, 4), without those far from it."""
+    """Mean (4,) of rotations (S, 4), without outliers."""
     for _ in range(2):
         _, vectors = np.linalg.eigh(turns.T @ turns)
         mean = vectors[:, -1]

@@ -1,7 +1,7 @@
-"""Compares how fast the hips go with how fast the feet step.
+"""Compares the speed of the hips with that of the feet.
 
-A foot that stands moves backward, seen from the hips, as fast as they go forward. If the root's positions are
-in another unit than the bones, the two speeds differ.
+Relative to the hips, a standing foot moves backward as fast as the hips move forward. If the root's positions
+are in another unit than the bones, the two speeds differ.
 """
 
 from __future__ import annotations
@@ -14,34 +14,33 @@ from hobble.core.clip import Clip
 from hobble.core.errors import InputError
 from hobble.motion.rig import leg_length
 
-# Speed of the hips / speed of the lower foot seen from the hips. In 172 clips of CMU, styles, patients,
-# Ferre et al. and the original release it is .88 to 1.17.
+# Allowed quotients: speed of the hips / speed of the lower foot relative to the hips. In 172 clips of CMU,
+# styles, patients, Ferre et al. and the original release it is .88 to 1.17.
 LEAST, MOST = 0.5, 1.7
-# Percentiles of the foot's speed seen from the hips. In the air it is lower than on the ground.
+# Percentiles of the foot's speed relative to the hips. The higher ones are of the standing foot.
 STEPS = (50.0, 75.0)
-IN_PLACE = 0.15  # with a smaller quotient the hips stay in place
+IN_PLACE = 0.15  # with a smaller quotient the figure walks in place
 SLOW = 0.5  # leg lengths a second: slower movements are not compared
 # A foot stands if it is slower than this share of the speed of the hips, both over this many seconds.
 STANDS, SPAN = 0.12, 2 / 15
-# The share of frames in which some foot stands while the hips go. It is .29 or more in those clips, and .2
-# with 1 cm of noise. With rotation channels declared in a wrong order it is .12 or less in 40 of 42 tries.
-# In a walk straight along an axis it is .25.
+# The share of frames in which some foot stands while the hips move. Below SELDOM the clip gets a warning,
+# below NEVER it is refused. The share is .29 or more in those 172 clips, and .2 with 1 cm of noise. With
+# rotation channels declared in a wrong order it is .12 or less in 40 of 42 tries, but .25 in a walk straight
+# along an axis.
 SELDOM, NEVER = 0.27, 0.12
-# The factor by which to scale the path of the hips so that feet stand most often. In those clips it is .85 to
-# 1, as feet roll.
+# Allowed factors by which to scale the path of the hips so that feet stand most often. In those clips the
+# factor is .85 to 1, because feet roll.
 SHORTEST, LONGEST = 0.79, 1.12
 FACTORS = np.exp(np.linspace(np.log(0.4), np.log(2.5), 47))
-FEWEST = 40  # frames in which the hips go
+FEWEST = 40  # fewest frames in which the hips move
 UPRIGHT = 0.6  # least height of the hips above the lower foot, in leg lengths
 
 
 def pace(clip: Clip) -> float | None:
-    """Speed of the hips divided by that of the lower foot seen from the hips.
+    """Speed of the hips divided by the speed of the lower foot relative to the hips.
 
-    The foot's speed may be any between its percentiles STEPS. The one that brings the quotient nearest to 1
-    is taken.
-
-    None if both are slow, or if the figure is not upright.
+    Any speed of the foot between its percentiles STEPS is allowed. The one that brings the quotient nearest
+    to 1 is taken. None if both are slow, or if the figure is not upright.
     """
     role, p = clip.skeleton.role, clip.positions
     if len(p) < 3:
@@ -63,7 +62,7 @@ def pace(clip: Clip) -> float | None:
 def standing_share(clip: Clip) -> tuple[float, float] | None:
     """Share of the frames in which some foot stands, and the factor of the hips' path that makes it largest.
 
-    None if the hips hardly go.
+    None if the hips hardly move.
     """
     role, p = clip.skeleton.role, clip.positions[..., [0, 2]]
     n = max(1, round(SPAN * clip.fps))
@@ -86,9 +85,9 @@ def standing_share(clip: Clip) -> tuple[float, float] | None:
 
 
 def check_pace(path: Path, clip: Clip, leave: bool) -> str | None:
-    """A sentence if the clip walks in place or its feet hardly ever stand, else None.
+    """A warning if the figure walks in place or its feet seldom stand; else None.
 
-    leave: accept any pace. Raises InputError if the feet do not step as fast as the hips go, or never stand.
+    leave: accept any pace. Raises InputError if the speeds of feet and hips do not fit, or if no foot stands.
     """
     if leave:
         return None

@@ -1,4 +1,4 @@
-"""Reads BVH files of all kinds, fast, with errors that name the line.
+"""Reads BVH files of all kinds. Errors name the line.
 
 It accepts any order of rotations, any channels on any joint, tabs, CRLF, scientific notation, several end
 sites, joint names with spaces or prefixes, and braces anywhere. Other modules interpret the numbers.
@@ -24,9 +24,9 @@ from hobble.motion.read_numbers import read_numbers
 # Limits. An hour of a rig of 191 joints at 60 Hz is 41 million joint poses, whose rotations take 1.3 GB.
 MOST_BYTES = 1 << 30
 MOST_HEADER = 1 << 24  # bytes before MOTION
-MOST_LINES = 50_000_000  # of frames after MOTION
-LONGEST_LINE = 1 << 22  # bytes; a frame of 4096 joints, six channels and 25 letters has 614,400
-MOST_POSES = 50_000_000
+MOST_LINES = 50_000_000  # after MOTION
+LONGEST_LINE = 1 << 22  # bytes; a frame of 4096 joints with six channels of 25 letters has 614,400
+MOST_POSES = 50_000_000  # frames times joints
 
 
 @dataclass(frozen=True)
@@ -36,8 +36,8 @@ class Bvh:
     names, parents: J joints in the file's order, -1 for the root.
     offsets: (J, 3) in the file's unit.
     channels: the channels of each joint in the file's order, such as ("Xposition", ..., "Zrotation", ...).
-    values: (F, C), degrees and file units.
-    frame_time: seconds, with its digits as written in frame_time_text.
+    values: (F, C) of F frames and C channels, in degrees and file units.
+    frame_time: seconds. frame_time_text: the same, as it is written in the file.
     end_sites: joint -> offsets of its end sites.
     declared: the number of frames that the file declares. F may differ by one (see `read_bvh`).
     sha256, bytes: of the file as it was read.
@@ -96,7 +96,7 @@ _MOTION = re.compile(rb"^[ \t\r}]*MOTION(?![^\s])", re.MULTILINE | re.IGNORECASE
 
 
 def _motion_at(path: Path, data: bytes) -> int:
-    """Where the MOTION section begins: the first line with only that word."""
+    """The index where the MOTION section begins: the first line with only that word."""
     found = _MOTION.search(data)
     if not found:
         lines = data.count(b"\n") + 1
@@ -159,7 +159,10 @@ def _motion(path: Path, data: bytes, at: int, header: Header) -> Bvh:
 
 
 def _declaration(path: Path, head: list[bytes], key: bytes, line: int) -> tuple[str, int, int]:
-    """The text after the first `key` from `head` on, its line, and where the line ends."""
+    """The text after `key` in the lines `head`, the number of its line, and the bytes up to the line's end.
+
+    line: number of the first line of `head`.
+    """
     end = 0
     for i, raw in enumerate(head[:8]):
         end += len(raw) + 1
@@ -171,8 +174,9 @@ def _declaration(path: Path, head: list[bytes], key: bytes, line: int) -> tuple[
 
 
 def _values(path: Path, data: bytes, at: int, width: int, declared: int, first_line: int) -> Array:
-    """The table (F, width): one line for each frame from `at` on. If that fails, a slower reader finds the
-    error.
+    """The table (F, width) of the text from `at` on, with one line for each frame.
+
+    If the lines are not like this, a slower reader reads them or finds the error.
     """
     text = io.BytesIO(data)  # shares the bytes; a slice would copy them
     text.seek(at)
@@ -209,7 +213,7 @@ def _check_lines(path: Path, data: bytes, at: int, first_line: int) -> None:
 
 
 def _explained(path: Path, body: bytes, width: int, first_line: int) -> Array:
-    """Reads frames that run over several lines. Anything else is refused with its line."""
+    """Reads frames that run over several lines. Raises InputError with the line of anything else."""
     counts = np.fromiter((len(raw.split()) for raw in io.BytesIO(body)), np.int32)
     used, total = np.flatnonzero(counts), int(counts.sum(dtype=np.int64))
     if total % width or not total or not (counts[used] < width).all():

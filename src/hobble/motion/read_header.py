@@ -19,7 +19,7 @@ EXPORT = "Export the clip again."
 
 @dataclass
 class Header:
-    """The joints before MOTION, as for `hobble.motion.read.Bvh`."""
+    """The joints of a file. For the fields see `hobble.motion.read.Bvh`."""
 
     names: list[str] = field(default_factory=list)
     parents: list[int] = field(default_factory=list)
@@ -29,7 +29,7 @@ class Header:
 
 
 class _Hierarchy:
-    """Reads the header's lines in one pass. Open joints are on a stack, so deep hierarchies cost nothing."""
+    """Reads the header's lines in one pass. Open joints are kept on a stack, so a hierarchy may be deep."""
 
     def __init__(self, path: Path) -> None:
         self.path = path
@@ -139,7 +139,7 @@ class _Hierarchy:
 
 
 def read_header(path: Path, data: bytes) -> Header:
-    """The joints of a file. data: all before MOTION. Raises InputError with the line of what is wrong."""
+    """The joints of a file. data: the text before MOTION. Raises InputError with the line of an error."""
     try:
         text = data.decode("utf-8")
     except UnicodeDecodeError:

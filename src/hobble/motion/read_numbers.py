@@ -1,8 +1,8 @@
-"""Reads the table of numbers of a large BVH file by compiled code, with the same bits as Python's `float`.
+"""Reads the table of numbers of a large BVH file with compiled code, with the results of Python's `float`.
 
-A double holds the digits of most numbers, as an integer, and the power of ten exactly. Then one
-multiplication or division rounds as `float` does (Clinger, How to read floating point numbers accurately,
-1990). Python reads the longer numbers. Whatever else is unusual is left to the general reader.
+For most numbers, a double can hold the digits as an integer exactly, and the power of ten, too. Then one
+multiplication or division rounds like `float` (Clinger, How to read floating point numbers accurately, 1990).
+Python reads longer numbers. A file with anything else that is unusual is left to the general reader.
 """
 
 from __future__ import annotations
@@ -14,16 +14,17 @@ import numpy as np
 
 from hobble.core.quat import Array
 
-LARGE = 1 << 25  # bytes: below, loading the compiler takes longer than it saves
-# At most this share of the numbers is read by Python; with more, the general reader is as fast.
+LARGE = 1 << 25  # bytes; for a smaller file, loading the compiler takes longer than it saves
+# Largest share of the numbers that Python may read; with more, the general reader is as fast.
 MOST_LONG = 0.25
 
 
 def read_numbers(data: bytes, at: int, width: int, declared: int) -> Array | None:
     """The table (F, width) of the lines from `at` on, or None if the general reader has to read it.
 
-    It has to if the text is shorter than LARGE, if a line does not have `width` values, if there are over
-    `declared` + 1 lines, and if there is anything but decimal numbers, blanks and line ends.
+    That is the case if the text is shorter than LARGE and the compiler is not loaded yet, if a line does not
+    have `width` values, if there are more than `declared` + 1 lines, and if there is anything but decimal
+    numbers, blanks and line ends.
     """
     if len(data) - at < LARGE and "numba" not in sys.modules:
         return None

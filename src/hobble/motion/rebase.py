@@ -14,15 +14,16 @@ from hobble.motion.body import SIDES, Body
 from hobble.motion.body_sample import LEFT
 from hobble.motion.tree import above
 
-MOVES = 0.1  # cm
+MOVES = 0.1  # cm; a joint whose offset changes by more moves in its parent
 
 
 def rebased(
     clip: Clip, body: Body, joints: list[int], frames: dict[int, Array], roles: Mapping[str, str]
 ) -> tuple[Clip, Body]:
-    """The clip on these joints alone, relative to its new rest pose, and the body with new indices.
+    """The clip with only these joints and a new rest pose, and the body with new indices.
 
-    frames: joint -> (4,) how it is turned in that pose. roles: role -> joint, of the new skeleton.
+    frames: joint -> (4,) the rotation of its axes in the new rest pose. roles: role -> joint, of the new
+    skeleton.
     """
     skeleton = clip.skeleton
     joints = [
@@ -60,7 +61,7 @@ def _depth(skeleton: Skeleton, body: Body, joint: int) -> int:
 
 
 def _carrier(parents: Sequence[int], body: Body, joint: int, among: Collection[int]) -> int:
-    """The joint that carries a part of the body. For other joints, the nearest of `among` above it."""
+    """The joint that `joint` hangs from: the body part before it, or the nearest of `among` above it."""
     chain = (body.hips, *body.trunk, *body.neck, body.head)
     if joint in chain:
         return chain[chain.index(joint) - 1]

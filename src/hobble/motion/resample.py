@@ -1,4 +1,4 @@
-"""Changes the frame rate: positions linearly, rotations by spherical interpolation."""
+"""Changes the frame rate: positions by linear interpolation, rotations by spherical interpolation."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from hobble.core.quat import Array
 
 
 def sample_times(frames: int, source_fps: float, fps: float) -> Array:
-    """(N,) times of the new frames, in source frames, from 0 to the last within the clip.
+    """(N,) times of the new frames, in source frames, from 0 to the last one within the clip.
 
     >>> sample_times(5, 120, 60)
     array([0., 2., 4.])

@@ -1,11 +1,11 @@
 """Transfers one figure's motion to another, by joint maps, rest poses and leg lengths.
 
-World rotations are transferred relative to the rest poses. Limbs point where the source's limbs point. Trunk,
-head and feet turn as far from their rest pose as in the source, so that a flat foot stays flat whatever the
-height of its ankle. The path is scaled by the leg length. Two-bone inverse kinematics puts the balls of the
-feet where the source's are, scaled, so that feet that do not slide in the source do not slide in the result.
-Joints that follow no joint of the source (fingers, face, roll joints) keep their rest pose relative to the
-joint above.
+World rotations are transferred relative to the rest poses. Limbs get the directions of the source's limbs.
+Trunk, head and feet turn as far from their rest pose as in the source, so that a flat foot stays flat
+whatever the height of its ankle. The path is scaled by the leg length. Two-bone inverse kinematics puts the
+balls of the feet at the scaled positions of the source's, so that feet that do not slide in the source do not
+slide in the result. Joints that follow no joint of the source (fingers, face, roll joints) keep their rest
+pose relative to the joint above.
 """
 
 from __future__ import annotations
@@ -28,13 +28,13 @@ from hobble.motion.rig import leg_length, missing_bone
 # Bones of limbs: role of the joint -> role of the bone's other end.
 LIMB_BONES = {"shoulder": "elbow", "elbow": "wrist", "hip": "knee", "knee": "heel"}
 SIDES = ("left", "right")
-# How far a leg is stretched, as a share of its length. While the source's leg is bent more than BENT, the
-# target's may be straighter than it. From NEARLY_STRAIGHT on it may not; in between the rule sets in
-# gradually.
+# Distance from hip to ankle, as a share of the leg's length. If that of the source is NEARLY_STRAIGHT or
+# more, the hips come down so that the target's leg is no straighter. If it is BENT or less, they do not.
+# Between the two, the rule sets in gradually.
 BENT, NEARLY_STRAIGHT = 0.88, 0.95
 SMOOTH = 0.08  # seconds on each side over which the hips come down
-MOST_DROP = 6.0  # cm
-STRAIGHT = 0.5  # cm: a knee nearer to the line from hip to ankle counts as pointing forward
+MOST_DROP = 6.0  # cm; the hips come down by at most this
+STRAIGHT = 0.5  # cm; for a knee nearer to the line from hip to ankle, the direction is partly assumed forward
 
 
 @dataclass(frozen=True)
@@ -42,13 +42,13 @@ class Retarget:
     """How `target` follows `source`. Made once by `plan` and applied to any pose.
 
     joints: (M,) target joints that follow a joint of the source, parents first. follows: (M,) the joints that
-    they follow. turns: (M, 4) world rotation of the target = world rotation of the source times this.
+    they follow. turns: (M, 4); the world rotation of a target joint is that of the source joint times this.
     drivers: (J,) for each target joint the nearest of `joints` above it, or itself if it is one of them.
-    driver_offsets: (J, 3) position of a joint in its driver's frame; for one of `joints`, in the frame of its
-    parent's driver. levels: the `joints` below the hips, in groups in the order in which they are placed.
-    forward: (3,) where the target's rest pose faces. pelvis: (3,) from the target's hips to the middle
-    between its legs. scale: leg length of the target / leg length of the source. lift: cm that the target's
-    ankles are higher above the ground than the source's, scaled.
+    driver_offsets: (J, 3) cm, position of a joint in its driver's coordinates; for one of `joints`, in those
+    of its parent's driver. levels: the `joints` below the hips, in groups in the order in which they are
+    placed. forward: (3,) the direction that the target's rest pose faces. pelvis: (3,) cm, from the target's
+    hips to the middle between its legs. scale: leg length of the target / leg length of the source. lift: cm
+    by which the target's ankles are higher above the balls of the feet than the source's ankles, scaled.
     """
 
     source: Skeleton = field(repr=False)
@@ -66,7 +66,7 @@ class Retarget:
 
 
 def plan(source: Skeleton, target: Skeleton, sources: Mapping[str, str]) -> Retarget:
-    """Work out how `target` follows `source`. sources: the target's joint -> the joint that it follows.
+    """Plan how `target` follows `source`. sources: joint of the target -> joint of the source.
 
     Both need the roles hips and head, and on both sides shoulder, hip, knee, heel and toe. Raises HobbleError
     if the target's hips or legs follow nothing, or if a bone of a leg has no length.
@@ -109,7 +109,7 @@ def plan(source: Skeleton, target: Skeleton, sources: Mapping[str, str]) -> Reta
 def _limb_bones(
     source: Skeleton, target: Skeleton, from_source: Array, to_target: Array
 ) -> dict[tuple[int, int], Array]:
-    """(target joint, source joint) of each limb bone -> the turn that makes it parallel to the source's."""
+    """(target joint, source joint) of each limb bone -> its entry of `turns`, which makes bones parallel."""
     a, b = rest_positions(target), rest_positions(source)
     out = {}
     for side in SIDES:
@@ -151,7 +151,7 @@ def _levels(target: Skeleton, joints: Array, drivers: Array) -> tuple[Array, ...
 
 
 def retarget_clip(clip: Clip, how: Retarget) -> Clip:
-    """The clip's motion on the target."""
+    """The clip's motion on the target skeleton."""
     rotations = _carried(how, clip.global_rotations)
     for side in SIDES:
         heel, toe = (clip.positions[:, how.source.role(f"{side}_{part}")] for part in ("heel", "toe"))
@@ -165,24 +165,24 @@ def retarget_clip(clip: Clip, how: Retarget) -> Clip:
 
 
 def retarget_pose(how: Retarget, positions: Array, rotations: Array) -> tuple[Array, Array]:
-    """Any number of poses on the target, such as the pose of a network in each frame of a game.
+    """Poses on the target, such as the pose of a network in each frame of a game.
 
-    positions (..., J, 3) and rotations (..., J, 4) in the world. Returns the same of the target's joints.
+    positions (..., J, 3) and rotations (..., J, 4) in the world. Returns those of the target's joints.
     """
     return _posed(how, positions, _carried(how, rotations))
 
 
 def _carried(how: Retarget, rotations: Array) -> Array:
-    """World rotations (..., J, 4) of the target's joints that follow a joint. The others are not set yet."""
+    """World rotations (..., J, 4) of the target. Only those of `how.joints` are set."""
     out = np.empty((*rotations.shape[:-2], len(how.target.joints), 4))
     out[..., how.joints, :] = quat.mul(rotations[..., how.follows, :], how.turns)
     return out
 
 
 def _posed(how: Retarget, source: Array, rotations: Array, fps: float | None = None) -> tuple[Array, Array]:
-    """World positions and rotations of the target's joints, with the feet where the source's are, scaled.
+    """World positions and rotations of the target's joints, with the feet at the source's scaled positions.
 
-    fps: frame rate of successive frames, over which the hips come down smoothly. None for single poses.
+    fps: frame rate of successive frames, in which the hips come down smoothly. None for single poses.
     """
     hips = _hips(how, source, rotations)
     legs = [_Leg(how, source, rotations, hips, side) for side in SIDES]
@@ -207,9 +207,9 @@ def _posed(how: Retarget, source: Array, rotations: Array, fps: float | None = N
 
 
 def _hips(how: Retarget, source: Array, rotations: Array) -> Array:
-    """Position of the hips that puts the middle between the legs where the source's is, scaled.
+    """Position of the hips that puts the middle between the legs at the source's scaled position.
 
-    Rigs place their first joint differently in the pelvis, but legs and feet must fit anyway.
+    The place of the hips joint in the pelvis differs between skeletons, but legs and feet must fit.
     """
     middle = 0.5 * sum(source[..., how.source.role(f"{side}_hip"), :] for side in SIDES)
     arm = quat.rotate(rotations[..., how.target.role("hips"), :], how.pelvis)
@@ -267,7 +267,7 @@ class _Leg:
 
 
 def _knee_direction(hip: Array, knee: Array, thigh: Array, shank: Array, ahead: Array) -> Array:
-    """Where the knee points: away from the line hip-ankle. The straighter the leg, the more it is forward."""
+    """The direction of the knee from the line between hip and ankle; forward if the leg is straight."""
     along = quat.rotate(hip, thigh)
     line = along + quat.rotate(knee, shank)
     line = line / np.linalg.norm(line, axis=-1, keepdims=True)

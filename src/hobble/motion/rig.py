@@ -1,4 +1,4 @@
-"""Finds a rig's unit, its axes, its facing direction, and which known skeleton it is."""
+"""Finds which known skeleton the rig (the skeleton of a file) is, how it maps to the target, and its unit."""
 
 from __future__ import annotations
 
@@ -19,13 +19,13 @@ from hobble.core.untrusted import printable, read_text, read_yaml
 
 # Centimetres per unit of the file. The unit of CMU files is an inch / 0.45.
 UNITS = {"cm": 1.0, "inch": 2.54, "m": 100.0, "mm": 0.1, "CMU": 5.6444, "foot": 30.48}
-LEG = 80.0  # cm: thigh and shank of an average adult
+LEG = 80.0  # cm: length of thigh and shank of an average adult
 KNOWN = 0.75  # a skeleton is a clip's rig if it has at least this share of the joint names
 # A joint's name in a skeleton file.
 NAME = re.compile(r"^ +['\"]?([^\s'\":{}][^'\":{}]*)['\"]?\s*:", re.MULTILINE)
-# Degrees that bones may differ in two rest poses that count as equal, by the role at the bone's end.
+# Two rest poses count as equal if bones differ by at most this many degrees, by the role at the bone's end.
 LIKE = {"elbow": 20.0, "wrist": 25.0, "knee": 35.0, "heel": 35.0, "toe": 35.0}
-LEG_RANGE = (35.0, 125.0)  # cm: children's and giants'
+LEG_RANGE = (35.0, 125.0)  # cm: from small children to giants
 FARTHEST = 1e5  # cm from a joint to its parent
 LIMBS = ("shoulder", "hip", "knee", "heel", "toe")
 MANDATORY = ("hips", "head", *(f"{side}_{part}" for side in ("left", "right") for part in LIMBS))
@@ -43,9 +43,9 @@ class TargetSkeleton:
 class RigMatch:
     """Which known skeleton a clip's rig is, and how it maps to the target.
 
-    rig: name of the skeleton file. roles: role -> the clip's joint. same: the clip is on the target itself.
-    sources: the target's joint -> the clip's joint that it follows. alike: whether the clip's rest pose is
-    that of the file.
+    rig: name of the skeleton file. roles: role -> the clip's joint. same: whether the clip's rig is the
+    target itself. sources: the target's joint -> the clip's joint that it follows. alike: whether the rest
+    pose of the clip equals that of the skeleton file.
     """
 
     rig: str
@@ -81,10 +81,10 @@ def _loaded(path: Path, name: str, changed: int, size: int) -> TargetSkeleton:
 
 
 def nearest(names: Collection[str], target: TargetSkeleton, folder: str | Path) -> TargetSkeleton:
-    """The skeleton file in `folder` that has most of the names, or the target if none has more.
+    """The skeleton file in `folder` that has most of the names; the target if no file has more than it.
 
-    Files whose text cannot contain more of the names are not parsed, because YAML takes longer than most
-    clips.
+    A file whose text cannot contain more of the names is not parsed, because parsing YAML takes longer than
+    reading most clips.
     """
     best, found = len(set(names) & set(target.skeleton.joints)), target
     for file in sorted(Path(folder).glob("*.yaml")):
@@ -98,15 +98,15 @@ def nearest(names: Collection[str], target: TargetSkeleton, folder: str | Path) 
 
 
 def clean_names(names: Sequence[str]) -> tuple[str, ...]:
-    """Joint names without a prefix up to a colon ("mixamorig:Hips"), unless they become ambiguous."""
+    """Joint names without a prefix like "mixamorig:", unless they become ambiguous without it."""
     short = tuple(name.rpartition(":")[2].strip() for name in names)
     return short if len(set(short)) == len(short) and all(short) else tuple(names)
 
 
 def find_hips(names: Sequence[str], target: TargetSkeleton, folder: str | Path) -> int:
-    """Index of a clip's hips, by the known skeleton that has most of its names; else the root.
+    """Index of a clip's hips, by the known skeleton that has most of its names; else that of the root.
 
-    Some programs export a joint above the hips. folder: the folder of the skeleton files.
+    It is needed because some programs export a joint above the hips. folder: that of the skeleton files.
     """
     if names[0] == target.skeleton.roles["hips"]:
         return 0
@@ -171,7 +171,7 @@ def _share(rig: Skeleton, known: Skeleton) -> float:
 
 
 def _differences(rig: Skeleton, target: Skeleton) -> list[str]:
-    """Why the rig is not the target, in words. Empty if names and hierarchy agree."""
+    """How the rig differs from the target, in words. Empty if names and hierarchy agree."""
     mine, wanted = _parent_names(rig), _parent_names(target)
     found = [f"joint {name} is missing" for name in wanted if name not in mine]
     found += [f"joint {name} is not in the skeleton" for name in mine if name not in wanted]
@@ -193,7 +193,7 @@ def _roles(rig: Skeleton, known: Skeleton) -> dict[str, str]:
 
 
 def _unfit(rig: Skeleton, known: Skeleton) -> list[str]:
-    """Why a rig cannot be used as a known one, in words.
+    """Why a rig cannot be treated as a known one, in words; empty if it can.
 
     It may lack fingers or eyes, but no mandatory role. It may have unknown joints.
     """
@@ -256,9 +256,9 @@ def missing_bone(skeleton: Skeleton) -> str | None:
 
 
 def unit_of(leg: float) -> tuple[float, str] | None:
-    """Centimetres per unit, and the unit's name, that make a leg of length `leg` an adult's.
+    """(centimetres per unit, name of the unit) in which a leg of length `leg` is nearest to an adult's.
 
-    None if no unit does.
+    None if no unit gives a length within LEG_RANGE.
     """
     if leg <= 0:
         return None

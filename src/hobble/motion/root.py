@@ -24,11 +24,10 @@ STEADY = 10  # frames at 60 Hz whose median velocity continues the root past the
 class RootFrames:
     """The root of each of F frames.
 
-    position: (F, 2) x and z of the hips, cm, not smoothed.
-    direction: (F, 3) unit facing direction, horizontal, smoothed.
-    rotation: (F, 4) world to root: the turn about Y that takes `direction` to +Z.
-    turn: (F - 1,) yaw velocity from each frame to the next, radians, in the sense of column 2 of Y
-        (the runtime applies its negative).
+    position: (F, 2) x and z of the hips, cm, not smoothed. direction: (F, 3) unit facing direction,
+    horizontal, smoothed. rotation: (F, 4) world to root: the turn about Y that takes `direction` to +Z. turn:
+    (F - 1,) radians from each frame to the next, with the sign of the network's output: it is the turn of
+    the world seen from the root, so the runtime applies its negative.
     """
 
     position: Array = field(repr=False)
@@ -53,7 +52,8 @@ def across_body(skeleton: Skeleton, positions: Array) -> Array:
 def facing(skeleton: Skeleton, positions: Array, sigma: float) -> Array:
     """Facing direction (F, 3), unit and horizontal, of joint positions (F, J, 3).
 
-    across x up, smoothed over time by a Gaussian of `sigma` frames (edges: nearest), normalised again.
+    It is the cross product of `across_body` and up, smoothed over time by a Gaussian of `sigma` frames and
+    normalised again. Past its ends, the clip counts as standing still.
     """
     forward = np.cross(across_body(skeleton, positions), [0.0, 1.0, 0.0])
     if sigma > 0:
@@ -74,9 +74,9 @@ def root_frames(clip: Clip, sigma: float) -> RootFrames:
 def continued(root: RootFrames, frames: int) -> RootFrames:
     """The root, continued for `frames` frames before the first frame and after the last.
 
-    It goes straight, with the smoothed facing direction of that end and the median velocity of the nearest
-    STEADY frames. Frame i of the clip is frame i + `frames` of the result. Half a second ahead this is 11 cm
-    off on the walks of the CMU database.
+    It continues straight, with the smoothed facing direction at that end of the clip and the median velocity
+    of the nearest STEADY frames. Frame i of the clip is frame i + `frames` of the result. On walks of the CMU
+    database, the position half a second ahead is off by 11 cm.
     """
     steps = np.diff(root.position, axis=0) if len(root) > 1 else np.zeros((1, 2))
     n = np.arange(1, frames + 1)[:, None]
@@ -95,7 +95,7 @@ def continued(root: RootFrames, frames: int) -> RootFrames:
 
 
 def points_to_root(root: RootFrames, points: Array, frames: Array | slice | None = None) -> Array:
-    """World points (N, ..., 3), cm, relative to the roots of `frames` (N of them; by default all).
+    """World points (N, ..., 3), cm, in the root coordinates of N `frames` (by default all frames).
 
     Heights stay relative to the world's zero.
     """
@@ -107,7 +107,7 @@ def points_to_root(root: RootFrames, points: Array, frames: Array | slice | None
 
 
 def vectors_to_root(root: RootFrames, vectors: Array, frames: Array | slice | None = None) -> Array:
-    """World vectors (N, ..., 3), such as velocities and directions, in the root frames of `frames`."""
+    """World vectors (N, ..., 3), such as velocities and directions, in the root coordinates of `frames`."""
     _, rotation = _for_broadcast(root, slice(None) if frames is None else frames, vectors)
     return quat.rotate(rotation, vectors)
 
@@ -121,8 +121,8 @@ def rotations_to_root(root: RootFrames, rotations: Array, frames: Array | slice 
 def local_pose(clip: Clip, root: RootFrames) -> tuple[Array, Array, Array]:
     """The pose as the network sees it, for the frames 0 .. F-2.
 
-    Returns positions (F-1, J, 3) in cm, velocities (F-1, J, 3) in cm a frame, both in the frame's root, and
-    rotations (F-1, J, 3): axis times half the angle.
+    Returns positions (F-1, J, 3) in cm, velocities (F-1, J, 3) in cm a frame, and rotations (F-1, J, 3) as
+    axis times half the angle. All are in the root coordinates of their frame.
     """
     n = slice(0, len(clip) - 1)
     positions = points_to_root(root, clip.positions[n], n)

@@ -20,7 +20,8 @@ SHORT = 2.0  # cm: a bone shorter than this has no direction
 class Spine:
     """The points where trunk and neck may bend, in a rest pose that stands facing +Z.
 
-    shares: (N,) position of each point along the body: hips 0, chest 1, head 2. points: (N, 3) cm.
+    shares: (N,) position of each point along the body, where hips are at 0, chest at 1 and head at 2. points:
+    (N, 3) cm.
     """
 
     shares: Array
@@ -37,9 +38,9 @@ class Spine:
         return cls(spine_shares(lengths, len(body.trunk))[long], places[long])
 
     def direction(self, start: float, end: float) -> Array:
-        """(3,) direction of a bone between two positions along the body.
+        """(3,) direction of a bone between two positions along the body, `start` and `end` (see `shares`).
 
-        A rig with fewer joints has longer bones. Each of them replaces several bones of this one.
+        A rig with fewer joints has longer bones. Each of them replaces several bones of this spine.
         """
         chest, first = int(np.searchsorted(self.shares, 1.0 - 1e-6)), self._bone(start)
         last = min(self._below(end), chest if end <= 1 else len(self.shares) - 1)
@@ -51,7 +52,7 @@ class Spine:
 
     @property
     def neck(self) -> Array:
-        """(3,) direction of the first bone above the chest: of the neck, or of the head without one."""
+        """(3,) direction from the chest to the next joint above: the neck, or the head if it has none."""
         chest = min(int(np.searchsorted(self.shares, 1.0 - 1e-6)), len(self.shares) - 2)
         return unit(self.points[chest + 1] - self.points[chest])
 
@@ -66,15 +67,15 @@ class Spine:
         return max(min(self._below(start), chest - 1 if start < 1 else len(self.shares) - 2), 0)
 
     def _below(self, share: float) -> int:
-        """The highest point that is at most REACH above a position."""
+        """Index of the highest point that is at most REACH above a position along the body."""
         return int(np.searchsorted(self.shares, share + REACH, side="right")) - 1
 
 
 def spine_shares(lengths: Array, trunk: int) -> Array:
-    """(N,) position of each joint along the body: hips 0, chest 1, head 2.
+    """(N,) position of each joint along the body, where hips are at 0, chest at 1 and head at 2.
 
-    lengths: (N-1,) of the bones from the hips over `trunk` joints, the last of which is the chest, and the
-    neck to the head.
+    lengths: (N-1,) of the bones from the hips through trunk and neck to the head. trunk: number of trunk
+    joints above the hips; the last one is the chest.
     """
     way = np.concatenate([[0.0], np.cumsum(lengths)])
     below, above = way[: trunk + 1], way[trunk:] - way[trunk]

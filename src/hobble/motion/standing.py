@@ -1,4 +1,4 @@
-"""Whether a person could stand in a rest pose."""
+"""Checks whether a person could stand in a rest pose."""
 
 from __future__ import annotations
 
@@ -11,11 +11,13 @@ from hobble.motion.body import SIDES, Body
 from hobble.motion.orient import degrees_between, unit
 from hobble.motion.spine import SHORT
 
-LEG, TRUNK, HEAD, FOOT = 40.0, 40.0, 50.0, 50.0  # degrees: largest angles of a standing person
+# Largest angles of a standing person, degrees: legs from straight down, trunk and head from straight up, feet
+# from straight ahead.
+LEG, TRUNK, HEAD, FOOT = 40.0, 40.0, 50.0, 50.0
 
 
 def stands(body: Body, rest: Array) -> str | None:
-    """Why a person could not stand in a rest pose (J, 3), in words. None if they could."""
+    """Why a person could not stand in the rest pose `rest` (J, 3), in words; None if a person could."""
     hips = 0.5 * (rest[body.legs["left"][0]] + rest[body.legs["right"][0]])
     shoulders = 0.5 * (rest[body.arms["left"][1]] + rest[body.arms["right"][1]])
     up = unit(shoulders - hips)

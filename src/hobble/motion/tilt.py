@@ -17,24 +17,28 @@ from hobble.motion.balance import Balance, balance
 from hobble.motion.orient import unit
 from hobble.motion.rig import leg_length
 
-# Degrees. Flat ground is at most 1.2 degrees off in 172 clips of CMU, styles, patients, Ferre et al. and the
-# original release, along axes where the feet spread widely. Else the fit of the ground is worse.
+# Degrees: least tilt that is found. Flat ground is at most 1.2 degrees off in 172 clips of CMU, styles,
+# patients, Ferre et al. and the original release, along axes where the feet spread widely. Along others the
+# fit of the ground is worse, and LEAST_NARROW takes the place of LEAST.
 LEAST, LEAST_NARROW = 4.0, 6.0
 AGREE = 0.6  # body and ground agree if they differ by less than this share of the tilt
-EVEN = 2.5  # cm, median: if standing feet are further than this from the fitted plane, they show no plane
-UNEVEN = 4.0  # cm, 90th percentile: the same for tilts below LEAST_NARROW
+EVEN = 2.5  # cm; if the median distance of standing feet from the fitted plane is larger, they show no plane
+UNEVEN = 4.0  # cm; for tilts below LEAST_NARROW, the same for the 90th percentile of these distances
 # Degrees to the side by which a body balances off Y. In the 172 clips it is 3.9 at most if each foot stands
 # alone for LONG seconds, and 6 in shorter clips.
 BALANCED, BALANCED_SHORT, LONG = 5.0, 9.0, 0.2
-# Degrees by which trunk, legs and the line across the body all lean to the same side, if balance does not
-# show the tilt. In the 172 clips it is 7.5 at most, with a hurt leg.
+# If balance does not show the tilt, the world is tilted if trunk, legs and the line across the body all lean
+# to the same side by more degrees than this. In the 172 clips it is 7.5 at most, with a hurt leg.
 ASIDE = 8.0
 LEAN = 4.0  # degrees: how far a walking body leans forward
-WIDE = 0.4  # leg lengths, standard deviation: axes along which feet spread further are tried without others
-NARROW = 0.05  # leg lengths: with less spread than this, there is no slope to see
-SLOW = 0.3  # leg lengths a second: the ball of a standing foot is slower
-FEWEST = 10  # positions of standing feet
-FITS = 12  # rounds of the fit of the ground, which minimises the sum of distances
+# The spread of feet along an axis of the ground is their standard deviation in leg lengths. The slope along
+# axes with a spread above WIDE is tried first, then along those above NARROW. With less spread no slope
+# shows.
+WIDE = 0.4
+NARROW = 0.05
+SLOW = 0.3  # leg lengths a second; the ball of a standing foot is slower
+FEWEST = 10  # fewest positions of standing feet
+FITS = 12  # rounds of fitting the ground, which minimise the sum of distances
 
 
 def tilt(clip: Clip) -> float | None:
@@ -94,8 +98,9 @@ def standing_balls(clip: Clip) -> Array:
 
 
 def _plane(level: Array, height: Array) -> tuple[Array, Array]:
-    """Slope (2,) of the ground through points at `level` (N, 2) and `height` (N,), and the median and the
-    90th percentile (2,) of their distance from it.
+    """Slope (2,) of the plane through points; median and 90th percentile (2,) of their distances from it, cm.
+
+    level: (N, 2) positions on the ground, cm. height: (N,) cm.
     """
     points = np.column_stack([level, np.ones(len(level))])
     weight = np.ones(len(level))
@@ -115,7 +120,7 @@ def _parts(skeleton: Skeleton, p: Array) -> tuple[Array, Array, Array]:
 
 
 def _leaning(skeleton: Skeleton, p: Array) -> Array:
-    """(2,) x and z of the body's mean direction upward, without the lean of a walk."""
+    """(2,) x and z of the mean unit vector up the body, without the forward lean of a walk."""
     trunk, legs, across = _parts(skeleton, p)
     ahead = unit(np.cross(across, [0.0, 1.0, 0.0]))
     return np.asarray((unit(trunk + legs) - np.sin(np.radians(LEAN)) * ahead)[:, [0, 2]].mean(axis=0))

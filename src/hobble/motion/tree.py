@@ -1,4 +1,4 @@
-"""Paths between joints in the tree of a rig. parents: the parent of each joint, -1 for the root."""
+"""Paths between joints in the tree of a rig. Argument `parents`: each joint's parent, -1 for the root."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ def above(parents: Sequence[int], joint: int) -> list[int]:
 
 
 def common(parents: Sequence[int], joints: Iterable[int]) -> int:
-    """The nearest joint that is above each of `joints`, or is one of them."""
+    """The nearest joint that is above all `joints`; it may be one of them."""
     first, *others = (above(parents, j) for j in joints)
     return next(j for j in first if all(j in other for other in others))
 

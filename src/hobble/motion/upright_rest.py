@@ -1,9 +1,9 @@
-"""Puts a rig's motion on an upright rest pose: the same joints in the same places.
+"""Gives a rig's motion an upright rest pose. Joints stay in the same places.
 
-The meaning of a joint's rotations depends on the pose in which all of them are zero. If a person could stand
-in that pose, it is the rest pose. If not (all bones along one axis, a heap of twisted bones), the directions
-of the bones in motion show how each joint is turned when its bone points down a leg, out along an arm or up
-the trunk. Knees and elbows show a limb's front, and standing feet show what is level.
+The meaning of a joint's rotations depends on the zero pose, in which all of them are zero. If a person could
+stand in the zero pose, it is the rest pose. If not (all bones along one axis, or a heap of twisted bones),
+the directions of the bones in motion show how each joint is turned when its bone points down a leg, out along
+an arm or up the trunk. Knees and elbows show the front of a limb, and standing feet show what is level.
 """
 
 from __future__ import annotations
@@ -31,15 +31,15 @@ from hobble.motion.standing import stands
 from hobble.motion.tree import above
 from hobble.motion.trunk_sample import stoop_doubt, trunk_sample
 
-SAMPLES = 400
+SAMPLES = 400  # frames of the clip that are looked at
 
 
 @dataclass(frozen=True)
 class UprightMotion:
     """A clip with a standing rest pose that faces +Z with the arms out. Its joints are those of the body.
 
-    rest: where the stance comes from, in words. body: the parts by their new indices. notes: sentences on
-    what is uncertain. height_error: cm that the figure may stand too high or low.
+    body: the parts by their new indices. rest: where the rest pose comes from, in words. notes: sentences on
+    what is uncertain. height_error: by how many cm the figure may stand too high or low.
     """
 
     clip: Clip = field(repr=False)
@@ -52,10 +52,10 @@ class UprightMotion:
 def upright(clip: Clip, body: Body, target: Skeleton, others: Collection[int] = ()) -> UprightMotion:
     """The motion of a body on a rig that stands in its rest pose.
 
-    clip: centimetres, right-handed, Y up. target: the skeleton that it is for. others: further joints to
-    keep, turned like the body part that they are on.
+    clip: centimetres, right-handed, Y up. target: the skeleton to which it will be retargeted. others:
+    further joints to keep, turned like the body part that they are on.
 
-    The directions of the bones alone decide how trunk, limbs and feet are turned, so that the same motion
+    Only the directions of the bones decide how trunk, limbs and feet are turned, so that the same motion
     gives the same result on any rig. A standing zero pose adds what no bone shows: how head, clavicles and
     hands are turned.
     """
@@ -109,16 +109,17 @@ def _twisted(seen: BodySample, zero: dict[int, Array]) -> bool:
 
 
 def _speeds(clip: Clip) -> Array:
-    """(F, J) cm a second."""
+    """(F, J) speeds of the joints, cm a second."""
     if len(clip) < 2:
         return np.zeros(clip.positions.shape[:2])
     return np.linalg.norm(np.gradient(clip.positions, axis=0), axis=-1) * clip.fps
 
 
 def _kept(clip: Clip, seen: BodySample, others: Collection[int], frames: dict[int, Array]) -> list[int]:
-    """The other joints that can be kept. Their frames are added to `frames`.
+    """Those of `others` that can be kept. Their rotations in the rest pose are added to `frames`.
 
-    Each gets the mean rotation of the body part that it is on. The base of a finger points along the finger.
+    Each joint gets the mean rotation of the body part that it is on. The base of a finger points along the
+    finger.
     """
     body, parents = seen.body, clip.skeleton.parents
     out = []

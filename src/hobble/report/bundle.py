@@ -22,9 +22,9 @@ PACKAGES = ("package.json", "package-lock.json")
 
 
 def install(folder: str | Path) -> None:
-    """Install the packages of the lock file into folder/node_modules and check their hashes.
+    """Install the npm packages of the lock file into folder/node_modules and check their hashes.
 
-    Uses Node and npm of the Python environment. npm has a cache, so a machine needs the internet only once.
+    Node and npm come from the Python environment. npm has a cache, so a machine needs the internet only once.
     Raises HobbleError if the registry cannot be reached.
     """
     folder = Path(folder)
@@ -54,7 +54,7 @@ def bundle(modules: str | Path, target: str | Path, sources: str | Path = WEB) -
 
 
 def bundle_module(modules: str | Path, target: str | Path) -> None:
-    """Bundle only the character, as an ES module without imports; otherwise like `bundle`."""
+    """Bundle only the code of the character, as an ES module without imports; else see `bundle`."""
     with tempfile.TemporaryDirectory() as folder:
         networks = Path(folder, "networks.js")
         networks.write_text(networks_module(), encoding="utf-8")

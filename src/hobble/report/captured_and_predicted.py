@@ -17,17 +17,17 @@ from hobble.models.network import Network
 from hobble.report.scenes import FPS, UNIT, packed_motion
 from hobble.rows.clip_rows import ClipRows, load_clip_rows, pairs
 
-CLIPS = 6  # shown at least, if there are that many; up to MOST held-out clips are shown
-MOST = 16  # clips shown at most; one takes up to 230 kB
-LONGEST = 12 * 60  # frames shown of a clip
+CLIPS = 6  # fewest clips to show, if there are as many; training clips are added up to this number
+MOST = 16  # most held-out clips to show; one takes up to 230 kB
+LONGEST = 12 * 60  # most frames to show of a clip
 
 
 def comparisons(network: Network, paths: Iterable[str | Path], splits: Mapping[str, str]) -> dict[str, Any]:
-    """The longest unbroken stretch of each held-out clip, and of training clips up to CLIPS; {} without
-    clips.
+    """The longest unbroken stretch of each shown clip, captured and predicted; {} without clips.
 
-    paths: `database/clips/<clip>.npz`. Each prediction is one frame ahead from the captured input, on the
-    first terrain fit of the row. Both motions are drawn at the captured root.
+    paths: `database/clips/<clip>.npz`. Shown are up to MOST held-out clips, and training clips if there are
+    fewer than CLIPS. Each pose is predicted from the captured input of the frame before, on the first terrain
+    fit of the row. Both motions are drawn at the captured root.
     """
     if network.skeleton is None:
         return {}
@@ -35,7 +35,7 @@ def comparisons(network: Network, paths: Iterable[str | Path], splits: Mapping[s
     order = sorted(paths, key=lambda path: (splits.get(Path(path).stem) != "held_out", Path(path).stem))
     clips = []
     held_out = sum(splits.get(Path(path).stem) == "held_out" for path in order)
-    # Spread over the names: neighbours are often takes of the same motion.
+    # Take clips from all over the list: neighbours in it are often takes of the same motion.
     for path in order[: max(CLIPS, held_out)][:: max(1, -(-held_out // MOST))]:
         rows = load_clip_rows(path, longest_stretch(path))
         if rows.layout.joints == network.layout.joints and len(rows):
@@ -45,7 +45,7 @@ def comparisons(network: Network, paths: Iterable[str | Path], splits: Mapping[s
 
 
 def longest_stretch(path: str | Path) -> tuple[int, int]:
-    """First row of a clip's longest unbroken stretch, and the one after its last; at most LONGEST frames."""
+    """(first, stop): the rows of a clip's longest unbroken stretch, or of its first LONGEST frames."""
     stretches = unbroken(ArrayParts(path).whole("frame"))
     if not stretches:
         return 0, 0
@@ -87,9 +87,9 @@ def _compared(network: Network, rows: ClipRows, split: str, keep: list[int]) -> 
 
 
 def in_world(points: Array, place: Array, yaw: Array, lift: Array) -> Array:
-    """World positions (F, J, 3) of points in the root frame of place (F, 3) and yaw (F,).
+    """World positions (F, J, 3), cm, of points (F, J, 3) relative to a root at place (F, 3) with yaw (F,).
 
-    lift: (F, 1), cm that were subtracted from heights.
+    lift: (F, 1) cm that were subtracted from the heights.
     """
     out = points.copy()
     out[..., ::2] = rotate_by_yaw(points[..., ::2], yaw[:, None])

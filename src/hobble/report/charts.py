@@ -14,8 +14,8 @@ Trace = dict[str, Any]
 class Chart:
     """A chart, with a caption that says how to read it.
 
-    traces: plotly traces. options: instead of `traces`, name -> traces; a menu with the label `choose`
-    selects one. option_layouts: name -> changes of the layout for that option.
+    traces: plotly traces. options: option -> its traces, instead of `traces`; a menu with the label `choose`
+    selects an option. option_layouts: option -> changes of the layout. height: pixels.
     """
 
     name: str
@@ -88,7 +88,7 @@ def line(name: str, x: Sequence, y: Sequence, colour: str, **more: Any) -> Trace
 
 
 def mark(value: float, text: str, vertical: bool = True, colour: str = "@soft") -> tuple[dict, dict]:
-    """A dotted line across the plot at `value` with a text at its end, as (shape, annotation)."""
+    """A dotted line across the plot at `value`, and a text at its end, as plotly's (shape, annotation)."""
     across = {"type": "line", "line": {"color": colour, "width": 1, "dash": "dot"}}
     note = {"text": text, "showarrow": False, "font": {"size": 11, "color": colour}}
     if vertical:

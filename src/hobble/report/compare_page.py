@@ -29,9 +29,9 @@ def render_compared(
 ) -> str:
     """The comparison as one HTML document.
 
-    compared: compare.json. playables: configuration -> data from `playable.playable`; as many as fit into the
-    page are kept, in order. If not all fit, their weights get 8 bits. bundle: the scripts, from
-    `bundle.bundle`. errors: configuration -> centimetres from `rounded_weights.rounding_error`.
+    compared: compare.json. playables: configuration -> data from `playable.playable`. If they do not all fit
+    into the page, their weights get 8 bits, and those that still do not fit are left out. bundle: the
+    scripts, from `bundle.bundle`. errors: configuration -> centimetres from `rounded_weights.rounding_error`.
     """
     sections: dict[str, dict[str, Any]] = {
         "overview": {

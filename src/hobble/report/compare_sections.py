@@ -1,4 +1,4 @@
-"""Comparison of configurations: training, and time and size of the stages."""
+"""Charts that compare configurations: training, and time and size of the stages."""
 
 from __future__ import annotations
 
@@ -71,7 +71,7 @@ def stage_dots(compared: Compared) -> list[Chart]:
 
 
 def _passes(entry: Mapping[str, Any]) -> list[float]:
-    """The end of each section, in passes."""
+    """For each section of training, the number of passes at its end."""
     sections = [s for s in entry.get("section", ()) if s is not None]
     most = max(sections, default=1)
     return [p - 1 + s / most for p, s in zip(entry.get("pass", ()), entry.get("section", ()), strict=True)]

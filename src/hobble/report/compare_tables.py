@@ -18,7 +18,8 @@ MEASURES = {
 }
 
 
-# Columns of the table of pairs. "sd of means": over the clips of a split, or the laps of a phase mode.
+# Columns of the table of pairs. "sd of means" is the standard deviation of the means of a split's clips, or
+# of a phase mode's laps.
 PAIR = (
     ("mean_a", "mean, one"),
     ("sd_a", "sd of frames, one"),
@@ -54,7 +55,10 @@ def configuration_table(compared: Compared) -> Table:
 
 
 def difference_table(compared: Compared) -> Table | None:
-    """Errors and frame times of every pair, with Segerstedt's eq. 3.2 for two standard deviations."""
+    """Errors and frame times of every pair, and their difference by eq. 3.2 of Segerstedt.
+
+    The difference is divided by the deviation of frames in one column, and by that of means in another.
+    """
     found = [("error", r) for r in compared["difference"]]
     found += [("mean ms a frame", r) for r in compared["milliseconds"].get("difference", ())]
     rows = [

@@ -1,4 +1,4 @@
-"""Shared by the charts of the comparison page: names, colours, dots."""
+"""What the charts of the comparison page share: names, colours, dots."""
 
 from __future__ import annotations
 

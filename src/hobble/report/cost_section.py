@@ -54,7 +54,7 @@ def log_range(values: Sequence[float]) -> list[float]:
 
 
 def stage_table(material: ReportMaterial) -> Table:
-    """A row per stage, with the published values of this configuration if there are any."""
+    """A row for each stage, with the published values of this configuration if there are any."""
     rows_of = [row for row in material.published["stages"] if row["configuration"] == material.name]
     theirs = {row["stage"]: row for row in rows_of}
     columns = [

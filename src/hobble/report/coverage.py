@@ -1,6 +1,4 @@
-"""How much data there is at each speed, turn and channel value: seconds, counted over the rows of the
-database.
-"""
+"""How many seconds of data there are at each speed, turn and channel value, counted over rows of clips."""
 
 from __future__ import annotations
 
@@ -29,12 +27,12 @@ SPLITS = (("train", "training", "@muted"), ("held_out", "held out", "@accent"))
 def seconds_of_data(
     paths: Sequence[str | Path], splits: Mapping[str, str], of: int | None = None
 ) -> dict[str, Any]:
-    """Seconds over the rows in `database/clips/<clip>.npz`, each frame counted once.
+    """Seconds of data in the files `database/clips/<clip>.npz`. Each frame counts once.
 
-    of: the number of all clips, if `paths` are a random choice of them; seconds are then an estimate for all.
-    `turns`: split -> seconds at each turn. `both`: (turns, speeds), seconds at each turn and speed.
-    `channels`: channel -> column -> seconds at each tenth of the highest value. `estimate`: a sentence about
-    the choice.
+    of: the number of all clips, if `paths` are a random choice of them; the seconds are then an estimate for
+    all clips. The result has `turns`: split -> seconds in each bin of TURNS; `both`: (turns, speeds), seconds
+    in each bin of turn and speed; `channels`: channel -> column -> seconds at each tenth of the highest
+    value; `estimate`: a sentence which says what was read, empty if everything was.
     """
     chosen, share = _chosen(paths)
     each = max(of or 0, len(paths)) / max(len(paths), 1) / share / FPS
@@ -66,7 +64,7 @@ def seconds_of_data(
 
 
 def _chosen(paths: Sequence[str | Path]) -> tuple[list[tuple[str | Path, Excerpt]], float]:
-    """What to read of the files: all, or at most MOST excerpts drawn at random. And its share of all rows."""
+    """The excerpts to read: all, or MOST drawn at random. Also returns their share of all rows."""
     every = [(path, one) for path in paths for one in excerpts(Path(path).stem, row_count(path))]
     some = sorted(every, key=lambda pair: shuffle_key(f"{pair[1].clip} {pair[1].first}"))[:MOST]
     rows = sum(one.rows for _, one in every)
@@ -124,7 +122,7 @@ def both_chart(found: Mapping[str, Any]) -> Chart | None:
 
 
 def channel_charts(found: Mapping[str, Any], say: Callable[[str], str] = str) -> list[Chart]:
-    """Seconds at each value of each column: a chart for each channel that has a value above 0 in any clip.
+    """A chart for each channel that has a value above 0 in any clip: seconds at each value of each column.
 
     say: column -> its name on the page.
     """

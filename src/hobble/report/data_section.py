@@ -15,9 +15,9 @@ from hobble.report.gather import ReportMaterial
 from hobble.report.tables import Column, Table
 
 GAIT_COLOURS = {"stand": "@g0", "walk": "@g1", "jog": "@g2", "crouch": "@g3", "jump": "@g4", "bump": "@g5"}
-MOST_BARS = 200  # clips with a bar of their own
-MOST_REMARKS = 500  # rows of the table of repairs and warnings
-MOST_NAMED = 30  # bars that are few enough for a name under each
+MOST_BARS = 200  # most clips with a bar of their own
+MOST_REMARKS = 500  # most rows of the table of repairs and warnings
+MOST_NAMED = 30  # most bars that have a name under each
 SPLIT_NAMES = {"train": "training", "held_out": "held out"}
 
 
@@ -118,7 +118,7 @@ def retarget_chart(material: ReportMaterial) -> Chart | None:
         "more are refused."
     )
     if every > len(found):
-        caption += f" The {len(found)} clips of {every:,} that differ most."
+        caption += f" Shown are the {len(found)} of {every:,} clips that differ most."
     return Chart(
         "retarget", "Difference between retargeted clips and their files", caption, [trace], layout, 220
     )
@@ -190,9 +190,9 @@ def remarks_table(material: ReportMaterial) -> Table | None:
 
 
 def _by_kind(rows: list[list[str]]) -> list[list[Any]]:
-    """Remarks whose sentences differ in numbers only, as one row: most frequent first.
+    """One row for all remarks whose sentences differ only in numbers, most frequent first.
 
-    The example is the first clip, whose sentence is shown.
+    A row has the number of clips, the stage, the first clip, and the first clip's sentence.
     """
     kinds: dict[tuple[str, str], list[list[str]]] = {}
     for row in rows:
@@ -202,7 +202,7 @@ def _by_kind(rows: list[list[str]]) -> list[list[Any]]:
 
 
 def strips(material: ReportMaterial, clips: frozenset[str]) -> list[dict[str, Any]]:
-    """The label strip and channel values of those of `clips` that have them; mirrors are left out."""
+    """The label curves and channel values of each of `clips` that has any; mirror clips are left out."""
     of_clip: dict[str, dict[str, Any]] = {}
     for report in material.channels:
         highest = {"highest": report.get("highest", 10.0)}

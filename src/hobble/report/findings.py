@@ -15,7 +15,7 @@ from hobble.report.gather import ReportMaterial
 from hobble.report.summary import Hint, KeyFigure, placed
 
 TURNING = 40.0  # degrees a second; slower turning is the sway of a straight walk
-LITTLE_TURNING = 0.01  # share of the time
+LITTLE_TURNING = 0.01  # share of the time with turns; with less the page warns
 ORDER = ("warn", "note", "good", "fact")
 
 
@@ -66,7 +66,7 @@ def key_figures(material: ReportMaterial) -> list[KeyFigure]:
 def hints(material: ReportMaterial, turns: Mapping[str, Array] | None = None) -> list[Hint]:
     """Advice in the order in which to follow it, then what is good, then plain facts.
 
-    turns: split -> seconds at each turn (`coverage.seconds_of_data`), if they were counted.
+    turns: split -> seconds in each bin of `coverage.TURNS`, if they were counted.
     """
     found = [
         *measure_sections.hints(material),

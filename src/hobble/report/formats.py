@@ -43,8 +43,7 @@ def size(count: float | None) -> str:
 
 
 def number(value: float | None, digits: int = 3) -> str:
-    """A number to `digits` significant digits, with thousands separators; an en dash for None, NaN and
-    infinity.
+    """A number with `digits` significant digits and thousands separators; a dash for None, NaN and infinity.
 
     >>> number(0.04391), number(20000, 5), number(1234.5), number(None), number(float("nan")), number(0)
     ('0.0439', '20,000', '1,234', '–', '–', '0')

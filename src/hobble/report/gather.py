@@ -22,9 +22,11 @@ GENERAL_COLUMNS = ("pass", "section", "samples", "seconds", "train_mse", "held_o
 class ReportMaterial:
     """The results of one configuration.
 
-    measured: measurement -> its JSON. history: column -> values, one per section of training, None for an
-    empty cell. motion, labels: reports of the clips, in the same order; channels: reports of their channels.
-    terrain, rows: paths of the clips' terrain fits and rows. splits: clip -> "train" or "held_out".
+    splits: clip -> "train" or "held_out". resolved: the configuration with all defaults. measured:
+    measurement -> its JSON. pipeline: pipeline.json. history: column -> values, one for each section of
+    training, None for an empty cell. network: see `describe_network`. motion, labels: reports of the clips,
+    in the same order. channels: reports of their channels. terrain, rows: paths of the clips' terrain fits
+    and rows. published: published.yaml.
     """
 
     name: str

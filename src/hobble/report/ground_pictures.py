@@ -1,4 +1,4 @@
-"""Small 3D views of terrain fits: the ground of a cycle, the soles on it, the figure at three moments."""
+"""Small 3D views of terrain fits: the ground of a cycle, the soles on it, and the figure at three moments."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from hobble.figure.pack import packed_turns
 from hobble.models.packing import packed
 
 STEPS_PER_CM = 10  # lengths are stored as 16-bit integers, in millimetres
-MOST = 24
+MOST = 24  # most views in the page
 PARTS = ("cycle", "x", "z", "ground", "soles", "contacts", "pose")
 
 
@@ -47,7 +47,7 @@ def ground_pictures(paths: Iterable[str | Path], skeleton: Mapping[str, Any]) ->
 
 
 def _packed(part: Mapping[str, Array]) -> dict[str, Any]:
-    """Places relative to the middle figure, so that 16 bits are enough wherever the clip is."""
+    """Packs a view. Positions become relative to the middle figure, so that 16 bits are enough."""
     middle = part["pose"][1, 0] * np.array([1.0, 0.0, 1.0])  # any bone will do
     return {
         "n": len(part["x"]),

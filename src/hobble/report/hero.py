@@ -1,4 +1,4 @@
-"""The state in which the page opens: which value of which channel the figure has, and how much."""
+"""The state in which the page opens: which column of which channel has a value, and what value."""
 
 from __future__ import annotations
 
@@ -11,10 +11,10 @@ OPENING = 7  # tenths of the highest value: easy to see, but not the maximum
 def opening(playable: Mapping[str, Any], measured: Iterable[Mapping[str, Any]]) -> dict[str, Any]:
     """The slider that is set when the page opens, and its value.
 
-    `part`: the label of the slider whose column makes the walk limp most according to `measured`, the JSON of
-    the measurements. If they measured no limps, the one that changes the pose most; the first slider if they
-    do not say either; None if no channel has sliders. `value`: what the dial is set to, in tenths of the
-    highest value.
+    measured: the JSON of the measurements. In the result, `part` is the label of a slider: the one that makes
+    the walk limp most according to `measured`; if no limps were measured, the one that changes the pose most;
+    if that was not measured either, the first one. It is None if no channel has sliders. `value`: what the
+    dial is set to, in tenths of the highest value.
     """
     one = first_shown(playable)
     if one is None:
@@ -31,14 +31,15 @@ def opening(playable: Mapping[str, Any], measured: Iterable[Mapping[str, Any]]) 
 
 
 def _pose_change(row: Mapping[str, Any]) -> tuple[float, float]:
-    """How far severity 10 moves the joints, cm, below every limp: a bent back changes the pose most, but a
-    visitor looks for a limp.
+    """A rank by how far severity 10 moves the joints, cm. It is below every rank by limp (`_limp`).
+
+    A bent back changes the pose most, but a visitor looks for a limp.
     """
     return 0.0, row.get("from_healthy_cm") or 0.0
 
 
 def _limp(row: Mapping[str, Any]) -> tuple[float, float]:
-    """How uneven the walk is: what it changes of the stance, the step and the knee of the hurt leg."""
+    """A rank by how uneven the walk is: the changes of stance, step and knee of the hurt leg, added up."""
     shares = [row.get(name) for name in ("step_hurt", "knee_hurt")]
     return abs(row.get("stance") or 0.0) + sum(abs(1 - share) for share in shares if share is not None), 0.0
 

@@ -6,12 +6,12 @@ A measurement's `page.py` may have
 - `figures(found, material) -> Iterable[KeyFigure]`: key figures for the top of the report,
 - `hints(found, material) -> Iterable[Hint]`: advice that follows from its numbers,
 
-where `found` is its own JSON ({} if it was not run) and `material` everything else that is known about
-the configuration. Its `comparison_page.py` may have
+where `found` is the measurement's JSON ({} if it was not run) and `material` is everything else that is known
+about the configuration. Its `comparison_page.py` may have
 
 - `section(compared) -> PageSection`: its part of the comparison page,
-- `columns(compared) -> Iterable[Overview]`: for the table of configurations at the top of that page,
-- `verdicts(compared) -> Iterable[Verdict]`: which configuration is best at something, for the first screen,
+- `columns(compared) -> Iterable[Overview]`: columns of the table of configurations at the top of that page,
+- `verdicts(compared) -> Iterable[Verdict]`: sentences on which configuration is best, for the summary,
 
 where `compared` is compare.json.
 """
@@ -35,7 +35,7 @@ from hobble.report.verdicts import Verdict
 class Overview:
     """A column of the table of configurations.
 
-    values: configuration -> value. at: columns are sorted by it.
+    values: configuration -> value. at: its place; columns are sorted by it.
     """
 
     at: int
@@ -64,7 +64,7 @@ def compared_sections(compared: Json) -> list[PageSection]:
 
 
 def compared_verdicts(compared: Json) -> list[Verdict]:
-    """Which configuration is best at what, in the order of the page."""
+    """Sentences on which configuration is best at something, in the order of the page."""
     found = [verdict for _, show in _each("comparison_page", "verdicts") for verdict in show(compared)]
     return sorted(found, key=lambda verdict: verdict.at)
 

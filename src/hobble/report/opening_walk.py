@@ -1,4 +1,4 @@
-"""The figures with which the page opens: they already walk, so that the page has nothing to compute first."""
+"""The figures at the top of the page. They already walk when it opens, so it has nothing to compute first."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from hobble.runtime.options import Runtime
 
 FRAMES = 120  # of walking before the page opens: two seconds, enough to reach the speed and to begin to limp
 
-# Fields of the state, which are flat lists in the page. Its names are those of Python in camel case.
+# Fields of `hobble.runtime.character.Character` that are flat lists in the page, with names in camel case.
 FLAT = (
     "gait",
     "ground",
@@ -27,7 +27,7 @@ FLAT = (
     "channel_targets",
     "memory",
 )
-# Fields that are nested lists or numbers there.
+# Fields that are nested lists or numbers in the page.
 NESTED = (
     *("root_height", "phase", "smoothed_velocity", "smoothed_direction", "strafe", "correction", "placed"),
     *("foot_lock", "foot_hold", "foot_step", "foot_missed", "foot_lift", "foot_added"),
@@ -38,10 +38,11 @@ NESTED = (
 def opening_walk(
     network: Network, runtime: Runtime, playable: Mapping[str, Any], measured: Iterable[Mapping[str, Any]]
 ) -> dict[str, Any]:
-    """The result of `hero.opening`, with the states of its one or two figures under `walked`.
+    """The result of `hero.opening`, with the states of one or two figures under `walked`.
 
-    They have walked straight on for `FRAMES` frames on flat ground. The first has the value of the slider.
-    The second is there if there is a slider, and has no value. Names and units are those of state.js.
+    The figures have walked straight on for FRAMES frames on flat ground. The first one has the value of the
+    slider. The second one has no value; it is there only if there is a slider. Names and units are those of
+    state.js.
     """
     found, one = opening(playable, measured), first_shown(playable)
     if one is None:

@@ -1,6 +1,6 @@
-"""The recogniser of limps, packed for the page.
+"""Packs the recogniser of limps for the page.
 
-It has the statistics of people's limps, and the healthy walk of the character, with which its limps are
+It consists of the statistics of people's limps, and of the character's healthy walk, with which its limps are
 compared.
 """
 
@@ -32,8 +32,8 @@ ROLES = ("hip", "knee", "heel", "toe", "shoulder")  # roles that both sides must
 def playable_with_recogniser(network: Network, runtime: Runtime) -> dict[str, Any]:
     """The data of `playable`, and under `recogniser` what the page needs to recognise a limp.
 
-    There is no `recogniser` if the network has no channel with parts of the body, if its rig lacks a role, or
-    if the healthy character makes no gait cycle.
+    There is no `recogniser` if the network has no channel for parts of the body, if its skeleton lacks one of
+    ROLES, or if the healthy character walks no complete gait cycle.
     """
     spec = playable(network, runtime)
     if any(channel["regions"] for channel in spec.get("channels", ())):
@@ -45,7 +45,10 @@ def playable_with_recogniser(network: Network, runtime: Runtime) -> dict[str, An
 
 
 def healthy_walk(network: Network, skeleton: Skeleton, runtime: Runtime) -> Profile | None:
-    """The profile of the character walking straight on, healthy, with joints placed as in the page."""
+    """The profile of the healthy character walking straight on, with joints placed as in the page.
+
+    None if its skeleton lacks one of ROLES, or if it walks no complete gait cycle.
+    """
     if not all(f"{side}_{part}" in skeleton.roles for side in SIDES for part in ROLES):
         return None
     poses = [pose for _, pose in walk_straight(network, runtime, WARM_UP + MEASURED, {})][WARM_UP:]
@@ -55,11 +58,11 @@ def healthy_walk(network: Network, skeleton: Skeleton, runtime: Runtime) -> Prof
 
 
 def learnt(known: Grader | None = None) -> dict[str, Any]:
-    """The statistics that `hobble.gait.limp_grade` learnt, with D features per walk.
+    """The statistics that `hobble.gait.limp_grade` learnt from walks with D features each.
 
-    `features`: their names. `strengths`. `healthySpread`: (D, D) covariance of healthy walks. `kinds`: for
-    each label and side its `words` for the page, `mean` (D,) at strength 1 and covariance `spread` (D, D).
-    Arrays are float64 in base64.
+    `features`: their names. `strengths`: the strengths of limps that are tried. `healthySpread`: (D, D)
+    covariance of healthy walks. `kinds`: for each label and side its `words` for the page, the `mean` (D,) at
+    strength 1, and the covariance `spread` (D, D). Arrays are float64 in base64.
     """
     known = known or grader()
     normal = people().normal()
@@ -81,7 +84,7 @@ def learnt(known: Grader | None = None) -> dict[str, Any]:
 
 
 def words(label: str, side: str) -> str:
-    """The words for the page: "left thigh, shank or foot", "back, leaning forward"."""
+    """The words for the page, such as "left thigh, shank or foot" or "back, leaning forward"."""
     parts = PARTS[label]
     named = parts[0] if len(parts) == 1 else f"{', '.join(parts[:-1])} or {parts[-1]}"
     return f"{named}, leaning {side}" if label == LEANING else f"{side} {named}"

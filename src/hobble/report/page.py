@@ -42,7 +42,7 @@ def render(
     scenes: from `scenes.scenes`; playable: from `playable.playable`; compared: from
     `captured_and_predicted.comparisons`. A part without data is left out. bundle: the page's scripts, from
     `bundle.bundle`. hero: from `opening_walk.opening_walk`; without it the figures at the top start from a
-    stand.
+    standing pose.
 
     The template escapes every value. Data for the scripts is JSON without any "<".
     """
@@ -118,10 +118,10 @@ def _origin(material: ReportMaterial) -> dict[str, Any]:
 def _sections(
     material: ReportMaterial, found: Mapping[str, Any], clips: frozenset[str], terrain: list[str]
 ) -> dict[str, dict[str, Any]]:
-    """Charts and tables by section, None if there is nothing to show.
+    """Section -> name -> chart or table, None if there is nothing to show.
 
     found: from `coverage.seconds_of_data`. clips: names of the clips that are shown one by one. terrain:
-    their fits.
+    files of their terrain fits.
     """
     costs, data, training = cost_section, data_section, training_section
     return {

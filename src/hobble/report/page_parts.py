@@ -21,7 +21,7 @@ class Paragraph:
 
 @dataclass(frozen=True)
 class KeyFigures:
-    """A row of figures."""
+    """A row of key figures."""
 
     figures: Sequence[KeyFigure]
 
@@ -56,8 +56,8 @@ KINDS: dict[type, str] = {
 class SectionPart:
     """One part of a section. at: its place, from 0 (top) to 100 (end).
 
-    content: None if there is nothing to show. tall: a chart with a row for each clip. open: a table that is
-    shown unfolded. short: a table that needs no scroll bar.
+    content: None if there is nothing to show. tall: whether it is a chart with a row for each clip. open:
+    whether a table is shown unfolded. short: whether a table needs no scroll bar.
     """
 
     at: int
@@ -76,8 +76,8 @@ class SectionPart:
 class PageSection:
     """A section of a page. Sections with the same `name` are joined into one (`joined`).
 
-    title: its heading; one of the joined sections gives it. at: sections are sorted by it. nav: a shorter
-    title for the list of contents. long: whether printing may break the section between pages.
+    title: the heading; only one of the joined sections needs it. at: the place; sections are sorted by it.
+    nav: a shorter title for the list of contents. long: whether printing may break the section between pages.
     """
 
     name: str

@@ -21,14 +21,17 @@ def summarise(configuration: str, stages: Mapping[str, Mapping[str, Iterable[str
     """The content of `pipeline.json`.
 
     stages: in the order of the pipeline, stage -> {"benchmarks": tsv files or folders of them, "files":
-    artefacts or folders of them}. For the stages of a data set also "made": folders, each called as a rule,
-    with the records of its finished clips; and "batches": of these rules only the benchmarks with these names
-    count. A missing file is listed under `missing` and is no error: a stage may have been copied from another
-    machine without its benchmarks. The time of training comes from its history, and that of clips from their
-    records if these say more, because Snakemake measures only the last of several calls. Returns `stages`
-    (one entry each: jobs, seconds and longest in seconds, max_rss_mb, cpu_seconds, files, bytes, and the same
-    for each rule), `total_seconds`, `total_bytes`, `database` (see `hobble.database.sizes`; None without a
-    database), `missing`, `machine`, `versions`. Raises InputError for a malformed benchmark or history.
+    artefacts or folders of them}. Stages of a data set also have "made": folders with the records of finished
+    clips, each named after its rule; and "batches": names of benchmarks, and only these count for such rules.
+
+    A missing file is listed under `missing` and is no error: a stage may have been copied from another
+    machine without its benchmarks. The time of training comes from its history. The time of clips comes from
+    their records if it is longer there, because Snakemake measures only the last of several calls.
+
+    The result has `stages` (for each stage: jobs, seconds, `longest` job in seconds, max_rss_mb, cpu_seconds,
+    files, bytes, and the same for each rule), `total_seconds`, `total_bytes`, `database` (see
+    `hobble.database.sizes`; None without a database), `missing`, `machine`, `versions`. Raises InputError for
+    a malformed benchmark or history.
     """
     missing: list[str] = []
     entries: list[StageTotal] = []
@@ -91,7 +94,8 @@ def _jobs(
 ) -> list[tuple[str, dict[str, float]]]:
     """(rule, row) of every benchmark in `paths`: <rule>.tsv or <rule>/<name>.tsv.
 
-    Of the rules in `made` only those whose name is in `batches`.
+    For rules in `made`, only benchmarks whose name is in `batches` are read. Missing paths are added to
+    `missing`.
     """
     found = []
     for root in map(Path, paths):
@@ -110,9 +114,9 @@ def _jobs(
 
 
 def _add_earlier_calls(rows: list[dict[str, float]], seconds: float) -> None:
-    """Scale the times of a rule's jobs to the seconds that all its clips took.
+    """Scale the times of a rule's jobs so that they add up to the seconds that all its clips took.
 
-    The jobs took less time if earlier calls of them had made some of the clips.
+    The measured time of the jobs is shorter if earlier calls had already made some of the clips.
     """
     last = sum(row.get("s", 0.0) for row in rows)
     if seconds > last > 0:
@@ -121,7 +125,7 @@ def _add_earlier_calls(rows: list[dict[str, float]], seconds: float) -> None:
 
 
 def _sizes(paths: Iterable[str], missing: list[str]) -> list[int]:
-    """Bytes of every file in `paths`, without hidden files, which are half-written."""
+    """Bytes of every file in `paths`. Hidden files do not count, because they are half-written."""
     sizes = []
     for root in map(Path, paths):
         if root.is_dir():

@@ -36,7 +36,7 @@ def playable(network: Network, runtime: Runtime) -> dict[str, Any]:
     """The data of the page's JavaScript runtime; {} if the network has no skeleton.
 
     It leaves out inputs without effect (hidden joints) and the rotations of joints that move no part of the
-    drawn body, such as fingers. Those joints keep their rest pose relative to their parent.
+    drawn body, such as fingers. In the page these joints keep their rest pose relative to their parent.
     """
     skeleton = network.skeleton
     if skeleton is None:
@@ -83,10 +83,10 @@ def playable(network: Network, runtime: Runtime) -> dict[str, Any]:
 
 
 def shown_channels(network: Network, runtime: Runtime) -> list[dict[str, Any]]:
-    """The data of each channel, with columns as indices. `first`: index of its first column among all
-    channels.
+    """The data of each channel for the page. Columns are given as indices.
 
-    `rate`: largest change of a value in one frame. `scale`: the divisor of values.
+    `first`: index of the channel's first column among the columns of all channels. `rate`: largest change of
+    a value in one frame. `scale`: the divisor of values.
     """
     skeleton, out, first = network.skeleton, [], 0
     assert skeleton is not None
@@ -137,7 +137,7 @@ def turning_joints(skeleton: Skeleton) -> list[int]:
 
 
 def _rows(layout: RowLayout, turning: Sequence[int]) -> NDArray[np.int64]:
-    """Indices of the outputs that the page uses: all before the rotations, and those of `turning` joints."""
+    """Indices of the outputs that the page uses: all but rotations, and the rotations of `turning` joints."""
     start = layout.y_joint_rotation.start
     turns = start + 3 * np.asarray(turning)[:, None] + np.arange(3)
     return np.concatenate([np.arange(start), turns.ravel()])
@@ -169,7 +169,7 @@ def _start(network: Network) -> dict[str, Any]:
 
 
 def _constants() -> dict[str, float]:
-    """The constants of the Python runtime, so that they are defined in one place only."""
+    """The constants of the Python runtime for the page, so that they are defined in one place only."""
     return {
         "targetMix": trajectory.TARGET_MIX,
         "gaitMix": trajectory.GAIT_MIX,

@@ -7,7 +7,7 @@ from typing import Any
 
 
 def cited(row: Mapping[str, Any], sources: Mapping[str, str]) -> str:
-    """Source and table of a figure, with a different value in the same publication if there is one.
+    """Source and table of a published figure, and another value that the same publication gives, if any.
 
     >>> cited({"source": "a", "table": "5.2", "other_figure": "3 in Appendix A"}, {"a": "Author (2021)"})
     'Author (2021), Table 5.2 (but 3 in Appendix A)'

@@ -1,4 +1,4 @@
-"""Renders the page's body without a browser, with light, ground and shadow."""
+"""Renders the body that the page draws, without a browser, with light, ground and shadow."""
 
 from __future__ import annotations
 
@@ -60,7 +60,7 @@ class Camera:
 
 
 class BodyRenderer:
-    """Draws one body in any pose. regions: for each bone, the indices of the columns that colour it."""
+    """Draws a body in any pose. regions: for each bone, the indices of the channel columns that colour it."""
 
     def __init__(self, body: Mesh, regions: Sequence[Sequence[int]] = ()) -> None:
         self._body, self._faces = body, body.faces
@@ -107,8 +107,11 @@ class BodyRenderer:
 
 @functools.lru_cache(maxsize=4)
 def _sheet(yaw: float, pitch: float, distance: float, size: int, height: float) -> tuple[Array, Array, Array]:
-    """For each pixel: the point of the ground that it shows, relative to the point under the target (cm); the
-    share of ground colour over background; half the width of a grid line (cm)."""
+    """What each pixel (size, size) shows of the ground.
+
+    Returns the point of the ground, (size, size, 2), relative to the point under the target, cm; the share of
+    ground colour over background; and half the width of a grid line, cm. height: of the target, cm.
+    """
     camera = Camera(np.array([0.0, height, 0.0]), yaw, pitch, distance, size)
     pixel = np.arange(size) + 0.5 - size / 2
     x, y = np.meshgrid(pixel, -pixel)

@@ -1,4 +1,4 @@
-"""Characters with weights of 8 bits, for a page that has to hold several of them."""
+"""Rounds the weights of a character to 8 bits, for a page that has to hold several characters."""
 
 from __future__ import annotations
 
@@ -16,8 +16,8 @@ from hobble.report.straight_walk import walk_straight
 from hobble.runtime.options import Runtime
 
 GROUP = 64  # columns that share a factor; with one factor for the whole row the error is twice as large
-MOST = 127
-WARM_UP, MEASURED = 60, 180  # frames of walking: to get up to speed, and measured
+MOST = 127  # largest rounded weight
+WARM_UP, MEASURED = 60, 180  # frames of walking to get up to speed, and frames that are measured
 
 
 def rounded(spec: Mapping[str, Any]) -> dict[str, Any]:
@@ -38,9 +38,9 @@ def has_weights(spec: Mapping[str, Any]) -> bool:
 
 
 def rounding_error(network: Network, runtime: Runtime) -> float:
-    """By how many centimetres a predicted joint is off on average with weights of 8 bits, over 3 s of a walk.
+    """The mean error of a predicted joint with weights of 8 bits, cm, over 3 s of a walk.
 
-    The network must have `weights`, see `has_weights`.
+    The network must have `weights`, as those have for which `has_weights` is true.
     """
     weights: Any = network.weights  # type: ignore[attr-defined]
     there = type(weights)(_of_groups(*_in_groups(w), w.shape) for w in weights)
@@ -76,7 +76,7 @@ def _layer(one: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def _in_groups(weights: Array) -> tuple[Array, Array]:
-    """Weights (..., columns) as integers (..., groups, GROUP) with 0 at the end; factors (..., groups)."""
+    """Weights (..., columns) as integers (..., groups, GROUP), padded with 0, and factors (..., groups)."""
     groups = -(-weights.shape[-1] // GROUP)
     whole = np.zeros((*weights.shape[:-1], groups * GROUP))
     whole[..., : weights.shape[-1]] = weights
@@ -86,6 +86,6 @@ def _in_groups(weights: Array) -> tuple[Array, Array]:
 
 
 def _of_groups(integers: Array, factors: Array, shape: tuple[int, ...]) -> Array:
-    """The weights back from `_in_groups`."""
+    """The weights from the result of `_in_groups`. shape: theirs before they were grouped."""
     whole = (integers * factors[..., None]).reshape(*shape[:-1], -1)
     return np.ascontiguousarray(whole[..., : shape[-1]], np.float32)

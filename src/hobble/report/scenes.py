@@ -40,8 +40,8 @@ def scenes(
 ) -> dict[str, Any]:
     """The scripted walks of the page, from `runtime/scenarios.npz`.
 
-    skeleton: as in the network's file. channels: channel -> its columns. Positions of bones are kept at 30
-    Hz, relative to the root joint, as 16-bit integers in steps of 0.1 mm. Rotations have 16 bits too.
+    skeleton: as in the network's file. channels: channel -> its columns. Positions of bones are stored at 30
+    Hz, relative to the root joint, as 16-bit integers in steps of 0.1 mm. Rotations have 16 bits, too.
     """
     data = load_npz(path)
     if not skeleton:
@@ -107,18 +107,18 @@ def _scenario(
 def packed_motion(
     figure: Skeleton, positions: Array, rotations: Array, keep: Sequence[int]
 ) -> dict[str, str]:
-    """Packs positions (F, J, 3) and rotations (F, J, 4). Bones keep their lengths and follow the rotations.
+    """Packs positions (F, J, 3) and rotations (F, J, 4) as a motion with constant bone lengths (`jointed`).
 
-    `root`, `pose`: from `pack_positions`. `turn`: rotations of the joints in `keep`, from `packed_turns`.
+    In the result, `root` and `pose` are from `pack_positions`. `turn`: rotations of the joints in `keep`,
+    from `packed_turns`.
     """
     world, places = jointed(figure, positions, rotations)
     return {**pack_positions(places, keep), "turn": packed_turns(world[:, keep])}
 
 
 def pack_positions(positions: Array, keep: Sequence[int] | slice = slice(None)) -> dict[str, str]:
-    """Packs positions (F, J, 3): `root` as float32 cm, `pose` of the joints in `keep` as int16, relative to
-    it.
-    """
+    """Packs positions (F, J, 3), cm. `root`: of joint 0, float32, cm. `pose`: of the joints in `keep`, int16,
+    relative to joint 0, in steps of UNIT."""
     root = positions[:, 0].astype(np.float32)
     steps = np.round((positions[:, keep] - root[:, None].astype(float)) / UNIT)
     return {"root": packed(root), "pose": packed(np.clip(steps, -32767, 32767).astype(np.int16))}

@@ -1,4 +1,4 @@
-"""Which clips of a large data set the page shows one by one, so that its size does not grow with the data."""
+"""Chooses the clips that the page shows one by one, so that its size does not grow with the data set."""
 
 from __future__ import annotations
 
@@ -8,15 +8,15 @@ from pathlib import Path
 from hobble.measures.stratified_sample import shuffle_key
 from hobble.report.gather import ReportMaterial
 
-MOST = 150  # clips with a strip, a row of the table and ground of their own
-MOST_SAMPLED = 600  # clips whose rows are counted, frame by frame
+MOST = 150  # most clips with curves of their labels, a row of the table, and views of their ground
+MOST_SAMPLED = 600  # most clips whose rows are counted frame by frame
 
 
 def shown(material: ReportMaterial, most: int = MOST) -> frozenset[str]:
     """Names of at most `most` clips, or of all clips if there are no more.
 
-    The clips are put into kinds by split, main gait, and whether a channel has a value in them. One clip of
-    each kind is taken in turn, in a random order that depends on the names only.
+    The clips are put into kinds by split, by main gait, and by whether a channel has a value in them. The
+    kinds take turns to give one clip each, in a random order that depends only on the names.
     """
     changed = {report["clip"] for report in material.channels if report.get("values")}
     kinds: dict[tuple[str, str, bool], list[str]] = {}
@@ -33,7 +33,7 @@ def shown(material: ReportMaterial, most: int = MOST) -> frozenset[str]:
 
 
 def sampled(paths: Sequence[str], most: int = MOST_SAMPLED) -> list[str]:
-    """At most `most` of the clips' files: each clip is as likely as any other."""
+    """At most `most` of the clips' files, drawn at random with the same probability for each clip."""
     if len(paths) <= most:
         return list(paths)
     chosen = set(sorted((Path(path).stem for path in paths), key=shuffle_key)[:most])

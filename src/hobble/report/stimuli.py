@@ -28,17 +28,17 @@ from hobble.runtime.options import Runtime
 SETTLED = 6 * 60  # frames until the gait has settled
 SHORTEST, LONGEST = 150, 300  # frames of a loop
 BLEND = 12  # frames over which the end of a loop is blended into its start
-STRIDE = 2  # motion frames per image
-QUALITY = 80
-VISIBLE = 0.1  # cm; a loop that is nearer to the neutral one looks the same
+STRIDE = 2  # frames of motion for each image
+QUALITY = 80  # of the WebP images, 0 to 100
+VISIBLE = 0.1  # cm; a loop that is nearer to the neutral loop looks the same
 
 
 @dataclass(frozen=True)
 class RepeatedWalk:
     """A walk that can be repeated.
 
-    positions (F, J, 3), cm; rotations (F, J, 4); travel (3,): translation of one round, cm; gap: mean
-    distance of joints between end and start before blending, cm.
+    positions: (F, J, 3), cm. rotations: (F, J, 4). travel: (3,) cm from the start of one repetition to that
+    of the next. gap: mean distance between the joints of the last and the first pose before blending, cm.
     """
 
     positions: Array
@@ -53,8 +53,8 @@ def write_stimuli(
     """Write <name>.webp and <name>.bvh of each walk of each channel into a folder, and stimuli.json.
 
     The files of the second channel and later ones are called <channel>-<name>. stimuli.json also lists
-    columns without training data and the distance of each walk from the neutral one (see `doubts`). Raises
-    HobbleError for a network without channels.
+    columns without training data, and how far each walk is from the neutral walk (see `doubts`). Returns its
+    entries. Raises HobbleError for a network without channels.
     """
     if network.skeleton is None or not network.channels:
         raise HobbleError(
@@ -117,14 +117,18 @@ def trained_columns(network: Network, name: str) -> set[str]:
 def apart(loop: RepeatedWalk, other: RepeatedWalk) -> float:
     """Mean distance (cm, over joints and poses) from each pose of `loop` to the nearest pose of `other`.
 
-    Both are moved to the origin and turned the same way. 0 for the same walk, even if it starts elsewhere.
+    Both are moved to the origin and turned to the same direction. The distance of a walk from itself is 0,
+    even if it starts at another moment.
     """
     ours, theirs = _ahead(loop), _ahead(other)
     return float(np.mean([np.linalg.norm(theirs - pose, axis=-1).mean(axis=1).min() for pose in ours]))
 
 
 def doubts(rows: Sequence[Mapping[str, Any]]) -> list[str]:
-    """Warnings about loops that look like the neutral walk. rows: from `write_stimuli`."""
+    """Warnings about loops that look like the neutral walk or have values without effect.
+
+    rows: from `write_stimuli`.
+    """
     same = [row for row in rows if row["values"] and row["from_plain_cm"] < VISIBLE]
     part = [row for row in rows if row["untrained"] and row not in same]
     out = []
@@ -161,7 +165,8 @@ def walk(network: Network, values: Mapping[str, Mapping[str, float]], runtime: R
 def cut(positions: Array) -> tuple[int, int, float]:
     """First frame of a loop, the frame after its last, and the mean distance (cm) of joints between the two.
 
-    Searches first frames within a second after SETTLED and all allowed lengths. Velocities count too.
+    It tries first frames within a second after SETTLED, and all allowed lengths. Similar velocities count,
+    too.
     """
     local = positions - positions[:, :1] * np.array([1.0, 0.0, 1.0])
     speed = np.gradient(local, axis=0)
@@ -181,7 +186,8 @@ def frames(
 ) -> list[NDArray[np.uint8]]:
     """The pictures of a loop.
 
-    The camera moves at constant speed, by whole cells of the grid in each round.
+    values: (columns,) from 0 to 1, drawn as colours. The camera moves at constant speed, by whole cells of
+    the grid in each repetition, so that the ground repeats, too.
     """
     count, keep = len(loop.positions), body(skeleton).bones
     world, places = jointed(skeleton, loop.positions, loop.rotations)

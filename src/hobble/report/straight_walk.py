@@ -1,4 +1,4 @@
-"""The character walks straight on, on flat ground: the same walk for every picture and measure of a page."""
+"""Generates a walk straight on over flat ground, the same one for all pictures and measures of the page."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from hobble.models.network import Network
 from hobble.runtime.animation import Pose, ProceduralAnimation
 from hobble.runtime.options import Runtime
 
-AHEAD = (0.0, 2.5)  # cm a frame, the target velocity; the same as that of "walk" in Play
+AHEAD = (0.0, 2.5)  # target velocity, cm a frame; the same as for walking in the page's section Play
 
 
 def walk_straight(

@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 
 @dataclass(frozen=True)
 class KeyFigure:
-    """A key figure. note: the smaller text under it. at: figures are sorted by it."""
+    """A key figure. note: the smaller text under it. at: its place; figures are sorted by it."""
 
     label: str
     value: str
@@ -19,11 +19,12 @@ class KeyFigure:
 
 @dataclass(frozen=True)
 class Hint:
-    """A sentence of advice that follows from the numbers.
+    """Advice that follows from the numbers.
 
-    kind: "warn", a problem; "note", something to improve; "good", something fine; "fact", information.
-    at: hints of a kind are sorted by it, in the order of the pipeline, because earlier problems cause later
-    ones: data below 20, training 20, network 30, motion of the character 40, channels 50, speed 60.
+    kind: "warn", a problem; "note", something to improve; "good", something fine; "fact", information. head:
+    the first words, in bold. text: the rest. at: its place; hints of a kind are sorted by it in the order of
+    the pipeline, because earlier problems cause later ones: data below 20, training 20, network 30, motion of
+    the character 40, channels 50, speed 60.
     """
 
     kind: str

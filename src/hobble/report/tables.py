@@ -11,7 +11,7 @@ from hobble.report.formats import number
 
 @dataclass(frozen=True)
 class Column:
-    """A column. label: its heading. show: formats a value. kind "n": right-aligned and sorted as numbers."""
+    """A column. label: its heading. show: value -> text. kind: its CSS class; "n" is sorted as numbers."""
 
     label: str
     show: Callable[[Any], str] = str

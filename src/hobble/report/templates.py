@@ -1,4 +1,4 @@
-"""Shared by all pages: templates that escape, style, scripts, specifications of charts."""
+"""What all pages share: templates that escape, style, scripts, specifications of charts."""
 
 from __future__ import annotations
 

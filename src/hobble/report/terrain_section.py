@@ -22,11 +22,11 @@ STRIDE = 3  # frames between two points of a profile
 
 @dataclass(frozen=True)
 class ShownFits:
-    """The fits of one clip.
+    """The terrain fits of one clip with C gait cycles and 10 fits of each cycle.
 
     foot_error: (C, 10, 2) mean and largest distance of a standing foot from its ground, cm. error: (C, 10)
-    energy. frame: (S,) frames of the profile. profile: (S, K) height of the ground under the root for each
-    fit, cm.
+    fitting error, cm². frame: (S,) frames of the profile. profile: (S, K) height of the ground under the
+    root, for K fits, cm.
     """
 
     clip: str

@@ -12,7 +12,7 @@ from hobble.report.tables import Column, Table
 
 
 def passes_axis(material: ReportMaterial) -> list[float]:
-    """The end of each section, in passes: section 10 of 10 in pass 1 ends at 1.0."""
+    """For each section of training, the passes done at its end: section 10 of 10 in pass 1 ends at 1.0."""
     passes, sections = material.history.get("pass", []), material.history.get("section", [])
     most = max((s for s in sections if s is not None), default=1) or 1
     first = min((p for p in passes if p is not None), default=1)

@@ -1,4 +1,4 @@
-"""Compiled parts of `raster`: triangles into pixels, the grid of the ground, and the finished picture.
+"""Compiled functions for `raster`: they draw triangles and the grid of the ground, and finish the picture.
 
 They release Python's lock, so that several films can be drawn at once.
 """
@@ -15,7 +15,7 @@ from hobble.core.quat import Array
 
 @njit(nogil=True)
 def normals(corners: Array, faces: Any) -> Array:  # pragma: no cover
-    """Unit normals (V, 3) of corners (V, 3), from their triangles (T, 3), each weighted by its area."""
+    """Unit normals (V, 3) of corners (V, 3): means over their triangles (T, 3), weighted by area."""
     out = np.zeros_like(corners)
     for f in range(len(faces)):
         i, j, k = faces[f]
@@ -56,7 +56,7 @@ def grid(
 
 @njit(nogil=True, cache=False, inline="always")
 def _range(a: float, b: float, c: float, size: int) -> tuple[int, int]:  # pragma: no cover
-    """First and last whole number between the least and the greatest of three, both within 0 and size - 1."""
+    """First and last whole number between the least and the greatest of a, b and c, within 0 and size - 1."""
     return max(0, int(np.ceil(min(a, b, c)))), min(size - 1, int(np.floor(max(a, b, c))))
 
 
@@ -64,7 +64,7 @@ def _range(a: float, b: float, c: float, size: int) -> tuple[int, int]:  # pragm
 def _weights(
     a: Array, b: Array, c: Array, x: int, y: int, area: float
 ) -> tuple[float, float]:  # pragma: no cover
-    """Weights of corners a and b at pixel (x, y); c has the rest to 1. area: twice that of the triangle."""
+    """Barycentric weights of corners a and b at pixel (x, y). area: twice that of the triangle, with sign."""
     u = ((b[0] - x) * (c[1] - y) - (b[1] - y) * (c[0] - x)) / area
     v = ((c[0] - x) * (a[1] - y) - (c[1] - y) * (a[0] - x)) / area
     return u, v
@@ -74,7 +74,10 @@ def _weights(
 def shade(
     points: Array, colours: Array, faces: Any, picture: Array, depth: Array
 ) -> None:  # pragma: no cover
-    """Draw triangles with corners (V, 3) in pixels and colours (V, 3), with a depth buffer."""
+    """Draw triangles `faces` (T, 3) into `picture` (H, W, 3), with a buffer `depth` (H, W).
+
+    points: (V, 3) corners, x and y in pixels, and depth. colours: (V, 3) of the corners.
+    """
     height, width = depth.shape
     for f in range(len(faces)):
         i, j, k = faces[f]
@@ -99,7 +102,7 @@ def shade(
 
 @njit(nogil=True)
 def fill(points: Array, faces: Any, cover: Array) -> None:  # pragma: no cover
-    """Set pixels under triangles to 1, seen from either side. points: (V, 3) corners, in pixels."""
+    """Set the pixels of `cover` (H, W) under triangles to 1. points: (V, 3) corners, in pixels."""
     height, width = cover.shape
     for f in range(len(faces)):
         a, b, c = points[faces[f, 0]], points[faces[f, 1]], points[faces[f, 2]]

@@ -5,14 +5,15 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 
-EQUAL = 0.03  # share of the lower value; two configurations with a smaller difference are equally good
+EQUAL = 0.03  # two values that differ by a smaller share of the lower one are called almost equal
 
 
 @dataclass(frozen=True)
 class Verdict:
     """A sentence about the best configuration.
 
-    title: what is compared. name: the best configuration. text: the sentence. at: verdicts are sorted by it.
+    at: its place; verdicts are sorted by it. title: what is compared. name: the best configuration. text: the
+    sentence.
     """
 
     at: int

@@ -66,6 +66,11 @@ class Recipe(Section):
         False,
         description="keep the network the same for left and right; for data sets with `mirror: true`",
     )
+    phase_weight: PositiveFloat = Field(
+        1.0,
+        description="weight of the error of the phase's change, relative to the other outputs. It is one of "
+        "311 numbers, but decides when each foot lands",
+    )
     keep: Literal["last", "best"] = Field(
         "last",
         description="weights to write: those at the end, as in the original, or those with the lowest "

@@ -48,7 +48,7 @@ def run(
     cm from the path to the points at its sides where the rows have ground heights. clips: name -> file of its
     rows in order, needed only for a network that is built, not trained.
     """
-    data = Database.open(database, training.memory_mb)
+    data = Database.open(database, training.memory_mb).with_phase_weight(training.phase_weight)
     if isinstance(model(network.kind), Built):
         run_built(
             data,

@@ -1,8 +1,8 @@
 """Laps of the waypoint track, walked by a crowd with one figure for each lap.
 
-The laps begin at one waypoint after another and end there. There are more laps than waypoints, so in each
-further round the figures start further ahead of their waypoint. They come to it at another moment of their
-gait and by a slightly different path, so no two laps are the same.
+Lap 1 begins and ends at one waypoint, lap 2 at the next, and so on around the track. There are more laps than
+waypoints, so in each further round the figures start farther before the waypoint where their lap begins. They
+come to it at another moment of their gait and by a slightly different path, so no two laps are the same.
 """
 
 from __future__ import annotations
@@ -23,12 +23,12 @@ from hobble.runtime.waypoints import Waypoint
 FPS = 60
 EVERY = 15  # frames between two stored places of a path
 AT_ONCE = 60  # frames whose rotations are in memory together
-RUN_UP = 1000.0  # cm; figures start nearer than this to the waypoint where their laps begin
+RUN_UP = 1000.0  # cm; figures start at most this far before the waypoint where their laps begin
 
 
 @dataclass(frozen=True)
 class Starts:
-    """Where the figures of C laps start: places (C, 2) in cm, facing (C, 2) and the waypoints (C,) ahead."""
+    """Where the figures of C laps start. places: (C, 2) cm. facing: (C, 2). waypoints: (C,) the next one."""
 
     places: Array
     facing: Array
@@ -132,7 +132,7 @@ class _Turns:
         self._found: list[tuple[Array, Array, np.ndarray]] = []
 
     def add(self, animation: ProceduralAnimation, drawn: Array) -> None:
-        """The last frame of C characters; drawn: (C, J, 4) as the caller sees them."""
+        """Add the last frame of C characters. drawn: (C, J, 4) rotations that the caller got."""
         self._drawn.append(drawn)
         self._taken.append(animation.state.joint_rotation.copy())
         self._predicted.append(animation.predicted_turns)
@@ -162,7 +162,7 @@ class _Turns:
 
 
 def held_back(predicted: Array, taken: Array) -> np.ndarray:
-    """(...) whether the runtime limited the turn of a joint.
+    """(...) whether the runtime limited the turn of any joint.
 
     predicted, taken: (..., J, 4) quaternions before and after the limit.
     """

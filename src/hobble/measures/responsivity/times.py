@@ -16,7 +16,7 @@ from hobble.runtime.controller import STEPS
 from hobble.runtime.options import Runtime
 from hobble.runtime.waypoints import Waypoint
 
-# Frames that are timed, of each lap and of all laps together, at most.
+# Most frames that are timed: of each lap, and of all laps together.
 OF_LAP, OF_ALL = 10 * FPS, 100 * FPS
 WARM_UP = 60  # frames that are not measured, because compiled code is loaded in them
 
@@ -24,7 +24,7 @@ WARM_UP = 60  # frames that are not measured, because compiled code is loaded in
 def timed_frames(
     network: Network, runtime: Runtime, laps: int, longest: int, track: Sequence[Waypoint]
 ) -> list[Array]:
-    """For each lap the times (F, steps + 1) in seconds of its first frames, the whole call last.
+    """For each lap, the times (F, steps + 1) of its first F frames, in seconds, the last of the whole call.
 
     The figures of `laps.walk_laps` walk one after another, each alone and from its own start, for OF_LAP
     frames or an equal part of OF_ALL, and at most `longest`. A character alone does the same as in the crowd,
@@ -49,7 +49,7 @@ def timed_frames(
 
 
 def milliseconds(seconds: Array) -> Milliseconds:
-    """Means and deviations of times (F, steps + 1) in seconds, the whole call last."""
+    """Means and deviations of times (F, steps + 1) in seconds, the last of the whole call."""
     ms = 1000 * seconds
     total = ms[:, : len(STEPS)].sum(axis=1)
     return {

@@ -1,4 +1,4 @@
-// One character in Play: its controller, its body, its footprints, and the motion of its last seconds.
+// One character in Play: its controller, its body, its footprints, and its motion in the last seconds.
 import { createCharacter } from "./character.js";
 import { createFigure } from "./figure.js";
 import { drawInputs } from "./inputs.js";
@@ -54,7 +54,7 @@ export const createActor = (view, spec, { place = [0, 0], tint = null, ghost = f
       marks.strip(a, b, 2.2, tint ? paint[tint] : paint.accent, i > c.px.length / 2 ? .85 : .35);
     }
   };
-  // withPath: whether the past and predicted path is drawn on the ground. With null, footprints are not drawn either.
+  // withPath: whether the past and the predicted path are drawn on the ground. If it is null, footprints are not drawn either.
   actor.draw = (withPath = true) => {
     const c = actor.character, { paint } = view, plain = tint ? paint[tint] : paint.body, one = placed(spec);
     drawGround(withPath);
@@ -65,8 +65,8 @@ export const createActor = (view, spec, { place = [0, 0], tint = null, ghost = f
       return channelColour(paint, most, plain);
     });
   };
-  // The part of the body at a point of the screen, or null. columns: its columns of the channel that has parts of the body.
-  // deep: its distance from the camera.
+  // The part of the body at a point of the screen, or null. columns: the columns of this part in the channel that has parts of the
+  // body. deep: distance from the camera.
   actor.under = (x, y) => {
     const found = figure.under(x, y);
     return found && { deep: found.deep, columns: found.links.map((l) => placed(spec).columns[l]) };

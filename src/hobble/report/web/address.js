@@ -1,6 +1,6 @@
 // The state in a link. Anybody can write a link, so every part is checked.
 
-// {text: what follows "#play?", or null}
+// The values after "#play?" in an address, or null without them.
 export const read = (hash) => {
   const [, text = null] = hash.match(/^#play\?(.*)$/s) || [];
   return text === null ? null : new URLSearchParams(text);

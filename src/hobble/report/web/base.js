@@ -1,6 +1,6 @@
-// Shared by every part of the page: its data and its colours.
+// What all parts of the page share: its data and its colours.
 
-// The data of the page, one element for each part. A part is parsed when it is used first, so that nobody waits for it.
+// The data of the page, one element for each part. A part is parsed when it is first used, so that the page opens fast.
 const PARTS = ["name", "hero", "bodies", "playable", "charts", "scenes", "strips", "grounds", "compare"];
 export const material = Object.defineProperties({}, Object.fromEntries(PARTS.map((part) => {
   let known;
@@ -30,7 +30,7 @@ export const colour = (() => {
   };
 })();
 
-// The numbers [r, g, b] of a token, 0 to 255, for blending.
+// The colour [r, g, b], 0 to 255, of a token, for blending.
 export const rgb = (token) => (colour(token).match(/[\d.]+/g) || [0, 0, 0]).slice(0, 3).map(Number);
 
 // Saves a blob under a name.

@@ -1,4 +1,4 @@
-// The bodies that lie in the page, each unpacked once.
+// The bodies that are stored in the page. Each is unpacked once.
 import { BufferAttribute, BufferGeometry, Matrix4, Quaternion, Sphere, Vector3 } from "three";
 import { material } from "./base.js";
 import { unpackBody } from "./skinned.js";

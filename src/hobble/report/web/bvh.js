@@ -12,7 +12,7 @@ const angles = ([w, x, y, z]) => {
   ].map((a) => a * degrees);
 };
 
-// spec: `names`, `parents` and `offsets` of its joints; frames: place of the root and world rotations of all joints.
+// spec: `names`, `parents` and `offsets` of the joints. frames: place of the root, then world rotations of all joints.
 export const bvh = ({ names, parents, offsets }, frames) => {
   const children = names.map((_, j) => parents.flatMap((p, k) => (p === j ? [k] : []))), header = [], order = [];
   const joint = (j, indent) => {

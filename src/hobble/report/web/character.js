@@ -1,6 +1,6 @@
 // The controller of `hobble.runtime` in JavaScript, for one character. It has the same steps in the same order, so the
 // same test data check both. Centimetres, 60 Hz; yaw 0 faces +Z and grows toward +X.
-import { networks } from "networks"; // by kind; the bundle gathers them from the folders of hobble.models
+import { networks } from "networks"; // kind -> createNetwork; made by `bundle.networks_module` from the folders of hobble.models
 import { createFeet } from "./feet.js";
 import { bytes } from "./numbers.js";
 import { createRows } from "./rows.js";
@@ -8,7 +8,7 @@ import { createState } from "./state.js";
 import { createTargets } from "./targets.js";
 import { createTrajectory } from "./trajectory.js";
 
-// Characters of one network share it. It remembers nothing between two predictions.
+// Characters of one network share its predictor, which remembers nothing between two predictions.
 const predictors = new WeakMap();
 const predictor = (spec) => {
   if (!predictors.has(spec)) predictors.set(spec, networks[spec.network.kind](spec));
@@ -22,7 +22,7 @@ export const createCharacter = (spec, place = [0, 0], heading = 0) => {
   // Inputs and outputs are clipped to the range seen in training.
   const [xLow, xHigh, yLow, yHigh] = ["xLow", "xHigh", "yLow", "yHigh"].map((name) => new Float32Array(bytes(spec.bounds[name])));
   const within = (row, low, high) => { for (let i = 0; i < row.length; i++) row[i] = min(max(row[i], low[i]), high[i]); };
-  // How far the value of each column of the channels may change in a frame.
+  // The largest change of each channel column in a frame.
   const rates = spec.channels.flatMap((one) => one.columns.map(() => one.rate));
   const changeChannels = () => rates.forEach((rate, l) => {
     c.channelValues[l] += min(max(c.channelTargets[l] - c.channelValues[l], -rate), rate);

@@ -1,9 +1,9 @@
-// Charts: drawn when they scroll into view, in the page's colours, and again when the theme changes.
+// Draws charts in the page's colours when they scroll into view, and again when the theme changes.
 import library from "plotly.js-cartesian-dist-min"; // as text, see bundle.py
 import { colour, material, onTheme } from "./base.js";
 import { openClip } from "./captured.js";
 
-// To read and run plotly.js takes long, so it happens at the first chart.
+// Parsing and running plotly.js takes long, so it is done only when the first chart is drawn.
 const plotly = () => {
   if (!globalThis.Plotly) {
     const script = document.createElement("script");

@@ -1,7 +1,7 @@
-// A camera that follows the character and turns behind it, smoothed by time, so that it does not depend on the frame rate.
+// A camera that follows the character and turns behind it. Its movement is smoothed in seconds, not in frames.
 import { wrap } from "./numbers.js";
 
-const FOLLOW = 8, COME_ROUND = .9; // rates per second: in a second the camera goes 1 - exp(-rate) of the remaining way
+const FOLLOW = 8, COME_ROUND = .9; // rates: in a second the camera moves by 1 - exp(-rate) of the remaining distance or angle
 const PATIENCE = 2500; // ms after the user turned the camera until it turns behind the character again
 
 export const createChase = (orbit, canvas) => {
@@ -22,7 +22,7 @@ export const createChase = (orbit, canvas) => {
       eye = eye.map((v, i) => v + (1 - Math.exp(-passed * (i === 1 ? .5 * FOLLOW : FOLLOW))) * (middle[i] - v));
       if (going && now - touched > PATIENCE) {
         const off = wrap(Math.atan2(going[0], going[1]) + Math.PI - orbit.yaw);
-        // Somebody who walks toward the camera wants to be seen from the front.
+        // If the character walks toward the camera, the user wants to see it from the front.
         if (Math.abs(off) < 2.4) orbit.yaw += (1 - Math.exp(-passed * COME_ROUND)) * off;
       }
       return eye;

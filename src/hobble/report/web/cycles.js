@@ -1,17 +1,17 @@
 // The gait cycles of a walk and their measures, as in `hobble.gait.cycles` and `hobble.gait.profile`. A foot lands when
 // its ankle is furthest ahead of the hips.
-import { LIMBS, MIDDLE, SIDES, SIGNED, median, mirroredSignals, signals } from "./signals.js";
+import { LIMBS, MIDDLE, SIDES, SIGN_CHANGES, median, mirroredSignals, signals } from "./signals.js";
 
 const SAMPLES = 50;
 const SCALARS = ["stride_seconds", "speed_per_leg", "left_strike_phase", "stance_share_R", "stance_share_L", "step_R", "step_L", "step_width"];
 const CURVES = [...SIDES.flatMap((side) => LIMBS.map((limb) => `${limb}_${side}`)), ...MIDDLE];
 const STANDING_SPEED = .35; // share of the walking speed; a slower ankle counts as standing
 const [SHORTEST, LONGEST] = [.4, 3.5]; // s, a cycle
-const LEAST_TRAVEL = .2; // leg lengths in a cycle; less is standing
+const LEAST_TRAVEL = .2; // leg lengths in a cycle; with less the figure stands
 const LEAST_SWING = .12; // leg lengths; an ankle that swings less makes no step
-const LEAST_SWING_SHARE = .4; // share of the ankle's range within the longest cycle; smaller swings are no steps
-const STRAIGHT = 25; // degrees that the path turns in a cycle at most
-const AHEAD = .7; // mean cosine between facing and travel; less is a walk backward or sideways
+const LEAST_SWING_SHARE = .4; // share of the ankle's range within LONGEST seconds; smaller swings are no steps
+const STRAIGHT = 25; // degrees; if the path turns more in a cycle, the walk is not straight
+const AHEAD = .7; // least mean cosine between facing and travel; with less the figure walks backward or sideways
 
 const mean = (values) => values.reduce((a, b) => a + b, 0) / values.length;
 const range = (values) => Math.max(...values) - Math.min(...values);
@@ -26,7 +26,7 @@ const rangeAround = (values, i, reach) => {
   return high - low;
 };
 
-// Frames where an ankle, leg lengths ahead of the hips, is furthest ahead.
+// The frames in which an ankle is furthest ahead. forward: its distance ahead of the hips in each frame, in leg lengths.
 export const landings = (forward, fps) => {
   const reach = Math.floor(LONGEST * fps / 2), found = [];
   let high = 0, low = 0, rising = true;
@@ -70,7 +70,7 @@ const cycles = (walk) => {
   return out;
 };
 
-// The cycles in which a figure walks straight ahead: of the right leg, and of the left as seen in a mirror.
+// The cycles in which a figure walks straight ahead: those of the right leg, and those of the left leg, mirrored.
 export const measureWalk = (spec, frames, fps = 60) => {
   if (frames.length < SHORTEST * fps) return { right: [], left: [] };
   const walk = signals(spec, frames, fps);
@@ -90,7 +90,7 @@ const ofCycles = (some) => {
 
 const mirroredProfile = (values) => Object.fromEntries(Object.keys(values).map((name) => {
   if (name === "left_strike_phase") return [name, 1 - values[name]];
-  if (SIGNED.some((curve) => name === `mean ${curve}`)) return [name, -values[name]];
+  if (SIGN_CHANGES.some((curve) => name === `mean ${curve}`)) return [name, -values[name]];
   const across = name.endsWith("_R") ? `${name.slice(0, -1)}L` : name.endsWith("_L") ? `${name.slice(0, -1)}R` : name;
   return [name, values[across]];
 }));

@@ -11,7 +11,7 @@ const arc = (from, to) => {
   return `M${a[0].toFixed(2)} ${a[1].toFixed(2)}A${R} ${R} 0 ${SWEEP * (to - from) > 180 ? 1 : 0} 1 ${b[0].toFixed(2)} ${b[1].toFixed(2)}`;
 };
 
-// host: an element with role "slider"; changed(value): called when a person turned it.
+// host: an element with role "slider". changed(value): called when a person has turned the dial.
 export const createDial = (host, { most = 10, value = 0, changed }) => {
   const svg = document.createElementNS(NS, "svg"), parts = {};
   svg.setAttribute("viewBox", "0 0 120 108");

@@ -1,5 +1,5 @@
-// Foot placement, as `feet`, `foot_lock` and `leg_reach` of `hobble.runtime`: hold feet in contact where they landed, keep
-// feet out of the ground, and bend the leg to reach. Changes the drawn pose of the character `c`, see character.js.
+// Foot placement, as in `feet`, `foot_lock` and `leg_reach` of `hobble.runtime`: it holds feet in contact where they landed, keeps
+// feet out of the ground, and bends the legs accordingly. It changes the drawn pose of the character `c`, see character.js.
 import { dot, minus } from "./numbers.js";
 import { at4, between, multiply, rotate } from "./turns.js";
 
@@ -44,13 +44,13 @@ export const createFeet = (spec, c) => {
     bend(joint(hip), joint(knee), joint(heel), shift, hip, knee, c.footAdded[f], c.legShown[f]);
     carryFoot(f, before, by);
     holdToesBack(f);
-    c.legShown[f] = [knee, heel, toe].map((j) => { // above the body's own height, because the whole body may rise in a frame
+    c.legShown[f] = [knee, heel, toe].map((j) => { // heights relative to the body, because the whole body may rise in a frame
       const [x, y, z] = joint(j);
       return [x, y - c.rootHeight - c.bodyLift, z];
     });
     c.footMissed[f] = c.footLock[f] === 1 ? hypot(c.footHold[f][0] - point[0], c.footHold[f][1] - point[2]) : 0;
   };
-  // Hold a foot from its landing until the network lifts it, or until it has to step. Returns how far [x, z] to move it.
+  // Hold a foot from its landing until the network lifts it, or until it has to step. Returns the shift [x, z] of the network's foot.
   const holdFoot = (f, point) => {
     let away = [c.footHold[f][0] - point[0], c.footHold[f][1] - point[2]];
     if (!spec.footLocking) {
@@ -58,7 +58,7 @@ export const createFeet = (spec, c) => {
       return [0, 0];
     }
     const far = hypot(...away);
-    if (c.footLock[f] < 1 && far > k.tooFarAlone) { // a foot in the air goes along with the network's
+    if (c.footLock[f] < 1 && far > k.tooFarAlone) { // a foot in the air follows the network's foot
       away = away.map((v) => v * k.tooFarAlone / far);
       c.footHold[f] = [point[0] + away[0], point[2] + away[1]];
     }
@@ -75,12 +75,12 @@ export const createFeet = (spec, c) => {
     if (c.footStep[f] > 0) c.footLock[f] = 1 - c.footStep[f] * c.footStep[f] * (3 - 2 * c.footStep[f]);
     return within(away.map((v) => c.footLock[f] * v), point, c.legShown[f][2]);
   };
-  // The movement [x, z] of a toe, changed so that it gets no further than spec.bounds.fastest from where it was shown.
+  // The movement [x, z] of a toe, limited so that the toe is at most spec.bounds.fastest from where it was shown.
   const within = (by, point, shown) => {
     const to = [point[0] + by[0] - shown[0], point[2] + by[1] - shown[2]], share = spec.bounds.fastest / hypot(...to);
     return share >= 1 ? by : [shown[0] + share * to[0] - point[0], shown[2] + share * to[1] - point[2]];
   };
-  // Moves a point to where it is spec.bounds.fastest from where it was shown, if it is further. Returns whether it did.
+  // Moves a point back until it is at most spec.bounds.fastest from where it was shown. Returns whether it had to move.
   const holdBack = (point, shown) => {
     const to = [point[0] - shown[0], point[1] - shown[1] - c.rootHeight - c.bodyLift, point[2] - shown[2]];
     const share = 1 - spec.bounds.fastest / hypot(...to);
@@ -114,7 +114,7 @@ export const createFeet = (spec, c) => {
     shift[2] += forward * fz;
     return [cos(angle / 2), sin(angle / 2) * fz, 0, -sin(angle / 2) * fx];
   };
-  // The joints below a heel that was at `before`: the foot turns `by`, its toes do not.
+  // Moves the joints below a heel that was at `before`. The foot is turned by the rotation `by`; its toes are not.
   const carryFoot = (f, before, by) => {
     const [, , heel, toe] = spec.legs[f], now = joint(heel);
     const place = (point) => rotate(by, minus(point, before)).map((v, i) => v + now[i]);
@@ -128,7 +128,7 @@ export const createFeet = (spec, c) => {
       }
     }
   };
-  // Turns `held` toward `aim` by at most mostAdded. Returns whether it did not reach it.
+  // Turns `held` toward `aim` by at most mostAdded. Returns true if it does not reach `aim`.
   const approach = (held, aim) => {
     const near = held[0] * aim[0] + held[1] * aim[1] + held[2] * aim[2] + held[3] * aim[3], to = near < 0 ? aim.map((v) => -v) : aim;
     const whole = Math.acos(min(abs(near), 1)), most = .5 * k.mostAdded, late = whole > most;
@@ -136,7 +136,7 @@ export const createFeet = (spec, c) => {
     for (let i = 0; i < 4; i++) held[i] = keep * held[i] + take * to[i];
     return late;
   };
-  // Like `reach`, but adds at most mostAdded to the network's own turn of thigh and shank. `shown`: knee and heel in the last frame.
+  // Like `reach`, but the rotations `added` to thigh and shank change by at most mostAdded. `shown`: knee and heel in the last frame.
   const bend = (hip, knee, heel, shift, h, n, added, shown) => {
     const thigh = minus(knee, hip), shank = minus(heel, knee);
     reach(hip, knee, heel, shift, rotate(at4(c.poseRotation, h), spec.ahead));
@@ -166,7 +166,7 @@ export const createFeet = (spec, c) => {
     const was = leg.map((v) => v / before), way = aim.map((v) => v / distance);
     const length = min(max(distance, abs(upper - lower) * 1.001 + 1e-6), (upper + lower) * .999);
     const cosine = min(max((upper * upper + length * length - lower * lower) / (2 * upper * length), -1), 1);
-    // The knee points forward by kneeAhead at least. Its direction turns with the leg.
+    // The knee is at least kneeAhead in front of the line from hip to heel. Its direction turns with the leg.
     const along = dot(thigh, was), front = dot(ahead, was), forward = ahead.map((v, i) => v - front * was[i]), long = max(hypot(...forward), 1e-6);
     let side = thigh.map((v, i) => v - along * was[i]);
     const more = max(k.kneeAhead - dot(side, forward) / long, 0);

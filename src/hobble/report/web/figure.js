@@ -31,7 +31,7 @@ ${shader.fragmentShader}`
   return material;
 };
 
-// body: its name in the page; regions: for each bone the links that colour it.
+// body: name of a body in the page. regions: for each bone the channel columns that colour it.
 export const createFigure = (view, body, regions = [], { ghost = false } = {}) => {
   const { geometry, inverses, keep, balls } = bodyOf(body), B = keep.length, one = new Vector3(1, 1, 1);
   const bones = keep.map(() => new Bone()), skeleton = new Skeleton(bones, inverses);
@@ -41,7 +41,7 @@ export const createFigure = (view, body, regions = [], { ghost = false } = {}) =
     mesh.bindMode = DetachedBindMode;
     mesh.bind(skeleton, new Matrix4());
     mesh.frustumCulled = false;
-    mesh.boundingSphere = new Sphere(); // else three.js poses every corner to find one, which nothing needs
+    mesh.boundingSphere = new Sphere(); // not used, but without it three.js computes one from all corners
     view.scene.add(mesh);
     meshes.push(mesh);
     return mesh;
@@ -57,7 +57,7 @@ export const createFigure = (view, body, regions = [], { ghost = false } = {}) =
 
   const figure = { mesh, keep, places: new Float64Array(3 * B), turns: new Float64Array(4 * B) };
   const spot = new Vector3(), turn = new Quaternion();
-  // Moves the bones to `figure.places` and `figure.turns`. colour(links): returns [r, g, b], 0 to 255, of a part.
+  // Moves the bones to `figure.places` and `figure.turns`. colour(columns): returns [r, g, b], 0 to 255, of a bone.
   figure.pose = (colour) => {
     const { places: p, turns: q } = figure;
     for (let b = 0; b < B; b++) {
@@ -67,7 +67,7 @@ export const createFigure = (view, body, regions = [], { ghost = false } = {}) =
       linear(colour(regions[b] || []), tints.value[b]);
     }
   };
-  // Copies the bones from arrays of all joints.
+  // Takes places and rotations of the bones from arrays of all joints.
   figure.take = ({ places, turns }) => {
     keep.forEach((j, b) => {
       for (let i = 0; i < 3; i++) figure.places[3 * b + i] = places[3 * j + i];
@@ -103,7 +103,7 @@ export const createFigure = (view, body, regions = [], { ghost = false } = {}) =
     }
     return out;
   };
-  // The links of the part at a point of the screen, and its distance; null if there is none.
+  // The channel columns of the bone at a point of the screen (`links`), and its distance; null if there is none.
   figure.under = (x, y) => {
     const corners = figure.corners(), n = corners.length / 3, index = geometry.index.array, seen = new Float64Array(3 * n);
     for (let v = 0; v < n; v++) seen.set(view.project([corners[3 * v], corners[3 * v + 1], corners[3 * v + 2]]), 3 * v);

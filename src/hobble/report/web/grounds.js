@@ -1,6 +1,6 @@
-// The grounds in Play: height in cm at x, z. Those with `tile` consist of level tiles of this size in cm along x and z (0:
-// unlimited), and are drawn with vertical edges.
-const scattered = (i, k) => { // the same number for the same tile, 0 to 1
+// The grounds in Play. height(x, z): cm. Grounds with `tile` consist of level tiles of this size in cm along x and z (0: unlimited)
+// and are drawn with vertical edges.
+const scattered = (i, k) => { // a random number from 0 to 1, always the same for a tile
   const n = Math.sin(12.9898 * i + 78.233 * k) * 43758.5453;
   return n - Math.floor(n);
 };

@@ -1,12 +1,12 @@
-// The top of the page: the walking character with a value of a channel, and next to it a
-// transparent one without, with the same controls.
+// The top of the page: the walking character with a value of a channel. Next to it walks a transparent one without this value, with the
+// same controls.
 import { createActor } from "./actor.js";
 import { find, material } from "./base.js";
 import { createDial } from "./dial.js";
 import { firstShown, keyed } from "./sliders.js";
 import { createView } from "./view.js";
 
-const GHOST_OFFSET = -84; // cm from the figure to the transparent one, negative: to its left
+const GHOST_OFFSET = -84; // cm from the figure to the transparent one; negative: to the right of the figure
 const MOST_AHEAD = 120; // cm that the transparent one may get ahead before it is moved back
 const FADE = 24; // frames in which it fades out, and in
 const SPEED = 2.5; // target speed, cm per frame
@@ -16,7 +16,7 @@ const createHero = (spec, opening) => {
   const one = firstShown(spec), labels = one ? Object.keys(one.sliders) : [];
   const values = new Map(), neutralValues = new Map(), flat = () => 0, hero = { frames: 0 };
   let drawn;
-  hero.shown = new Promise((done) => { drawn = done; }); // when it has moved, or has its first picture if it rests
+  hero.shown = new Promise((done) => { drawn = done; }); // resolved when the figure has moved, or, if it rests, has been drawn
   let part = labels.includes(opening.part) ? opening.part : labels[0];
   let last = null, due = 0, shown = 0, fade = 1, leaving = false, camera = null, walks = !matchMedia("(prefers-reduced-motion: reduce)").matches;
 
@@ -56,7 +56,7 @@ const createHero = (spec, opening) => {
     for (; due >= 1; due--) step();
     glide(1 - Math.exp(-passed / 350));
   };
-  // The camera follows the path and not the hips, because they move up and down.
+  // The camera follows the path, not the hips, because the hips move up and down.
   const glide = (share) => {
     const { root } = main.character, [x, z] = ghost ? aside().map((v) => v / 2) : [0, 0], goal = [root[0] + x, root[2] + z, heading()];
     camera = camera ? camera.map((v, i) => v + share * (goal[i] - v)) : goal;
@@ -124,7 +124,7 @@ const createHero = (spec, opening) => {
   still.addEventListener("click", () => { walks = !walks; last = null; rest(); view.ask(); });
   rest();
 
-  // The page has the states of figures that walk already, because to predict their first steps would take long here.
+  // The page contains the states of figures that already walk, because predicting their first steps here would take long.
   const [walking, healthy] = opening.walked ?? [];
   view.compile();
   main.start(flat);

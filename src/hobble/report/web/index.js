@@ -33,7 +33,7 @@ const next = () => {
   if (start) { setTimeout(next); start(); } else Hobble.ready = true;
 };
 const rest = async () => {
-  // Who follows a link to Play does not wait for the figures at the top.
+  // If the address is a link to Play, do not wait for the figures at the top.
   if (hero && !location.hash.startsWith("#play")) await Promise.race([hero.shown, new Promise((done) => { setTimeout(done, 1000); })]);
   setTimeout(next);
   atOnce.forEach((start) => start());

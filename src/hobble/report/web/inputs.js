@@ -1,5 +1,5 @@
 // Draws inputs of the network in Play: ground heights and joint velocities.
-const AHEAD = 8; // frames that a joint would go on for at its velocity
+const AHEAD = 8; // frames of movement that a line shows
 const LEAST = .15; // cm a frame; slower joints have no line
 
 // The ground samples of the network's input: along the past and future path and to both sides of it. above: cm above the

@@ -11,7 +11,7 @@ export const bend = (hip, knee, heel) => {
   return size ? Math.acos(Math.min(1, Math.max(-1, dot(a, b) / size))) * 180 / Math.PI : 0;
 };
 
-// legs: [hip, knee, heel, toe] of the left and of the right.
+// legs: the joints [hip, knee, heel, toe] of the left leg and of the right leg.
 export const createLab = (legs) => {
   const lab = { stance: [[], []], knees: [[], []], steps: [null, null], stood: [false, false] };
   let landed = [null, null];
@@ -34,7 +34,7 @@ export const createLab = (legs) => {
   return lab;
 };
 
-// Draws onto a canvas: a bar while a foot is on the ground, and the angle of its knee above.
+// Draws onto a canvas, for each leg: a bar while the foot is on the ground, and above it the angle of the knee.
 export const drawLab = (canvas, lab, { ink, line, accent, second }) => {
   const scale = Math.min(2, devicePixelRatio || 1), [w, h] = [canvas.clientWidth, canvas.clientHeight];
   if (!w) return;

@@ -5,7 +5,7 @@ import { linear } from "./paint.js";
 
 const REACH = 1100; // cm from the middle to the edge
 const STEP = 12.5;
-const BALLS = 24; // round parts of bodies that the ground is shaded by
+const BALLS = 24; // most round parts of bodies that darken the ground
 
 const geometryOf = (place, index) => {
   const geometry = new BufferGeometry();
@@ -133,7 +133,7 @@ export const createLand = (scene) => {
       const n = name === "flat" ? 2 : 2 * Math.round(far / STEP) + 1;
       fill(n, [cx - far, cx + far], [cz - far, cz + far], (i, k, u, w) => height(u, w));
     },
-    // Draws one piece of ground, whole: n by n heights in rows of x.
+    // Draws a piece of ground as a whole. heights: n by n, in rows of x, over the ranges x and z.
     piece(n, x, z, heights) {
       focus.value = [(x[0] + x[1]) / 2, (z[0] + z[1]) / 2];
       reach.value = 4 * Math.max(x[1] - x[0], z[1] - z[0]);

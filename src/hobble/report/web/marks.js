@@ -1,4 +1,4 @@
-// Strips, dots and needles on the ground or in the air. They are set anew for every picture.
+// Strips, dots and needles on the ground or in the air. They are cleared and added again for every picture.
 import { BufferAttribute, BufferGeometry, Color, DoubleSide, DynamicDrawUsage, Mesh, MeshBasicMaterial } from "three";
 import { cross, minus, unit } from "./numbers.js";
 import { linear } from "./paint.js";

@@ -1,10 +1,10 @@
-// Motion that lies in the page: where the bones of a figure are, frame by frame, and their rotations.
+// Motion that is stored in the page: the places and rotations of a figure's bones, frame by frame.
 import { bytes } from "./numbers.js";
 import { mixTurn } from "./turns.js";
 
 const TURN = 32767; // steps of a component of a rotation
 
-// root, pose, turn: as `hobble.report.scenes.packed_motion` packs them; B: bones; unit: cm of a step.
+// root, pose, turn: from `hobble.report.scenes.packed_motion`. B: number of bones. unit: cm of a step of `pose`.
 export const createMotion = ({ root, pose, turn }, B, unit) => {
   const roots = new Float32Array(bytes(root)), steps = new Int16Array(bytes(pose));
   const turns = Float32Array.from(new Int16Array(bytes(turn)), (v) => v / TURN), frames = roots.length / 3;
@@ -12,7 +12,7 @@ export const createMotion = ({ root, pose, turn }, B, unit) => {
   return {
     frames, roots,
     at: (frame, b) => [0, 1, 2].map((i) => place(frame, b, i)),
-    // Puts a figure where it is at a time in frames, `by` [x, z] cm aside.
+    // Puts a figure into its pose at a time in frames, shifted by [x, z] cm.
     show(figure, time, by = [0, 0]) {
       const f = Math.min(frames - 1, Math.floor(time)), g = Math.min(frames - 1, f + 1), t = time - f, aside = [by[0], 0, by[1]];
       for (let b = 0; b < B; b++) {

@@ -1,4 +1,4 @@
-// Numbers that lie in the page as base64, and vectors of three.
+// Numbers that are stored in the page as base64, and vectors of three numbers.
 
 export const bytes = (text) => {
   if (Uint8Array.fromBase64) return Uint8Array.fromBase64(text).buffer;

@@ -1,4 +1,4 @@
-// A camera that goes around what it looks at: by dragging, pinching, keys and the wheel.
+// A camera that moves around its target: by dragging, pinching, keys and the wheel.
 
 export const createOrbit = (canvas, home, changed) => {
   const orbit = { ...home };

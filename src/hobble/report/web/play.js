@@ -1,4 +1,4 @@
-// Play: the networks run here. A report has one character; a comparison has two on the same ground.
+// Play, the section in which the networks run. A report has one character; a comparison has two on the same ground.
 import { createActor } from "./actor.js";
 import { camera, pairs, read } from "./address.js";
 import { bvh } from "./bvh.js";

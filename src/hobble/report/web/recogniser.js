@@ -1,10 +1,10 @@
 // Recognises a limp by comparing a walk with the healthy walk of the same figure: what hurts, on which side, how likely.
-// The same as `hobble.gait.features` and `hobble.gait.limp_grade` in Python. The page has the statistics of people's limps.
+// It computes the same as `hobble.gait.features` and `hobble.gait.limp_grade` in Python. The page contains the statistics of people's limps.
 import { measureWalk, profile } from "./cycles.js";
 import { bytes } from "./numbers.js";
 
-const LEAST_RANGE = 3; // degrees; smaller ranges count as this, so that a ratio of two of them stays meaningful
-const MOST = 5; // larger ratios count as this
+const LEAST_RANGE = 3; // degrees; smaller ranges are set to this, so that a ratio of two ranges stays meaningful
+const MOST_RATIO = 5; // larger ratios are set to this
 export const SECONDS = 3; // of motion that are used; within two seconds, half of all limps have no whole cycle of both legs
 
 const clip = (v, low, high) => Math.min(Math.max(v, low), high);
@@ -12,7 +12,7 @@ const clip = (v, low, high) => Math.min(Math.max(v, low), high);
 // About twenty features that distinguish limps, by name, in the same order as in Python.
 export const features = (walk, healthy) => {
   const change = (name) => walk[name] - healthy[name], sides = (name) => change(`${name}_R`) - change(`${name}_L`);
-  const share = (name) => Math.min(Math.max(walk[`range ${name}`], LEAST_RANGE) / Math.max(healthy[`range ${name}`], LEAST_RANGE), MOST);
+  const share = (name) => Math.min(Math.max(walk[`range ${name}`], LEAST_RANGE) / Math.max(healthy[`range ${name}`], LEAST_RANGE), MOST_RATIO);
   const out = {
     "stance L - R": -sides("stance_share"),
     "left landing": change("left_strike_phase"),
@@ -22,7 +22,7 @@ export const features = (walk, healthy) => {
     "range ankle_height R - L": sides("range ankle_height"),
   };
   for (const part of ["knee_flexion", "hip_flexion"]) out[`range ${part} R - L`] = share(`${part}_R`) - share(`${part}_L`);
-  out["range arm_forward R - L"] = clip(Math.log(share("arm_forward_R") / share("arm_forward_L")), -Math.log(MOST), Math.log(MOST));
+  out["range arm_forward R - L"] = clip(Math.log(share("arm_forward_R") / share("arm_forward_L")), -Math.log(MOST_RATIO), Math.log(MOST_RATIO));
   for (const part of ["knee_flexion", "hip_flexion", "hip_abduction"]) for (const side of "RL") out[`mean ${part} ${side}`] = change(`mean ${part}_${side}`);
   for (const part of ["trunk_forward", "trunk_left", "pelvis_left_up"]) for (const kind of ["range", "mean"]) out[`${kind} ${part}`] = change(`${kind} ${part}`);
   return out;
@@ -41,7 +41,8 @@ const cholesky = (matrix, D) => {
   return low;
 };
 
-// learnt: from `hobble.report.pack_recogniser`. Returns a function (walk, healthy) => {label, side, strength, distance, probabilities, sides}.
+// learnt: from `hobble.report.pack_recogniser`. Returns a function (walk, healthy) => {label, kind, strength, distance, probabilities, sides}.
+// kind: the most likely kind of limp, an entry of learnt.kinds, or null. probabilities: by label. sides: probability of each kind.
 export const createGrader = (learnt) => {
   const D = learnt.features.length, healthy = new Float64Array(bytes(learnt.healthySpread)), densities = [];
   const numbers = (text) => new Float64Array(bytes(text));

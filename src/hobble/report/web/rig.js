@@ -1,9 +1,9 @@
-// Joints on bones of fixed length, from predicted rotations. Legs bend so that toes are where they were predicted. The same
-// as `hobble.runtime.export.jointed` in Python.
+// Places joints on bones of constant length, from predicted rotations. Legs bend so that toes are where they were predicted. It computes
+// the same as `hobble.runtime.export.jointed` in Python.
 import { dot, minus } from "./numbers.js";
 import { at3, at4, between, multiply } from "./turns.js";
 
-// spec: `parents`, `offsets`, `legs`. take(places, turns): of all joints, in the world, as predicted.
+// take(places, turns): sets the rig from predicted world places and rotations of all joints.
 export const createRig = ({ parents, offsets, legs }) => {
   const J = parents.length, rig = { places: new Float64Array(3 * J), turns: new Float64Array(4 * J) };
   const root = parents.findIndex((p) => p < 0);

@@ -4,7 +4,7 @@ import { createDrawnTurns } from "./state.js";
 export const createRows = (spec, c) => {
   const { joints: J, step, x: X, y: Y, gaits, constants: k } = spec, M = spec.window, S = 2 * M / step, G = gaits.length;
   const { atan2, sin, cos, acos, hypot, min, max, abs } = Math, setDrawnTurns = createDrawnTurns(spec);
-  // The place in X of each column of the channels.
+  // The index in X of each channel column.
   const columns = spec.channels.flatMap((one) => one.columns.map((_, l) => X[one.name] + l));
 
   const writeInputs = (x) => {
@@ -31,7 +31,7 @@ export const createRows = (spec, c) => {
     columns.forEach((at, l) => { x[at] = c.channelValues[l]; });
   };
 
-  // A joint's next place is the mean of two: its old place plus its predicted velocity, and its predicted place.
+  // A joint's new place is the mean of its predicted place and of its old place plus its predicted velocity.
   const moveJoints = (y) => {
     const si = c.dx[M], co = c.dz[M];
     const climbed = c.rootHeight - c.root[1];
@@ -58,7 +58,7 @@ export const createRows = (spec, c) => {
     [q[0], q[1], q[2], q[3]] = [co * w - si * b, co * a + si * d, co * b + si * w, co * d - si * a];
   };
 
-  // Limit the turn of a joint to fastestTurn a frame, along the shorter way.
+  // Turn the joints along the shorter way, by at most fastestTurn in a frame.
   const turnJoints = (y) => {
     const yaw = atan2(c.dx[M], c.dz[M]), halfCos = cos(yaw / 2), halfSin = sin(yaw / 2), slowest = cos(k.fastestTurn / 2);
     for (let n = 0; n < spec.turning.length; n++) {

@@ -1,13 +1,13 @@
-// Curves of a walking body over time, for the recogniser, as in `hobble.gait.signals`. In degrees and leg lengths; angles are
-// relative to the vertical and the direction of travel.
+// Curves of a walking body over time, for the recogniser, as in `hobble.gait.signals`. Units are degrees and leg lengths. Angles are
+// relative to the vertical and to the direction of travel.
 import { cross, dot, minus } from "./numbers.js";
 
 export const SIDES = ["L", "R"];
 const NAMES = { L: "left", R: "right" };
 export const LIMBS = ["hip_flexion", "hip_abduction", "knee_flexion", "ankle_height", "ankle_forward", "arm_forward"];
 export const MIDDLE = ["trunk_forward", "trunk_left", "pelvis_left_up"];
-export const SIGNED = ["trunk_left", "pelvis_left_up"]; // negated in a mirror
-const TRAVEL = .5; // s, sigma of the smoothing after which the hips' velocity is the direction of travel
+export const SIGN_CHANGES = ["trunk_left", "pelvis_left_up"]; // they change their sign in a mirror
+const TRAVEL = .5; // s, sigma of the smoothing; the smoothed velocity of the hips is the direction of travel
 
 const degrees = (a, b) => Math.atan2(a, b) * 180 / Math.PI;
 const scaled = (v, least = 1e-9) => { const n = Math.max(Math.hypot(...v), least); return v.map((x) => x / n); };
@@ -101,11 +101,11 @@ const unwrapped = (angles) => {
   });
 };
 
-// The same walk, as in a mirror: left and right swapped.
+// The signals of the mirrored walk: left and right are swapped.
 export const mirroredSignals = (walk) => {
   const curves = {}, other = { L: "R", R: "L" };
   for (const limb of LIMBS) for (const side of SIDES) curves[`${limb}_${side}`] = walk.curves[`${limb}_${other[side]}`];
-  for (const name of MIDDLE) curves[name] = SIGNED.includes(name) ? walk.curves[name].map((v) => -v) : walk.curves[name];
+  for (const name of MIDDLE) curves[name] = SIGN_CHANGES.includes(name) ? walk.curves[name].map((v) => -v) : walk.curves[name];
   return {
     ...walk, curves,
     heading: walk.heading.map((v) => -v),

@@ -2,7 +2,7 @@
 import { bytes } from "./numbers.js";
 
 // Returns {geometry, inverses, keep, balls}. keep: the joints that are bones. inverses: inverse matrix of each bone in the
-// rest pose. balls: [x, y, z, radius] of the part of each bone, in its own frame.
+// rest pose. balls: for each bone, a sphere [x, y, z, radius] around its part of the body, in the bone's coordinates.
 export const unpackBody = ({ BufferAttribute, BufferGeometry, Matrix4, Quaternion, Sphere, Vector3 }, b) => {
   const geometry = new BufferGeometry(), steps = new Int16Array(bytes(b.corners));
   geometry.setAttribute("position", new BufferAttribute(Float32Array.from(steps, (v) => v * b.unit), 3));

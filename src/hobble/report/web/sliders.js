@@ -10,10 +10,10 @@ export const firstShown = (spec) => {
   return some.find((one) => one.regions.length) || some[0];
 };
 
-// specs: of the played characters, which may have different channels. changed(): called after every change.
+// specs: those of the played characters, which may have different channels. changed(): called after every change.
 export const createSliders = (specs, changed) => {
   const channels = [];
-  for (const one of specs.flatMap((spec) => spec.channels)) { // of channels with the same name, the one with most trained columns
+  for (const one of specs.flatMap((spec) => spec.channels)) { // if channels have the same name, take the one with most trained columns
     const at = channels.findIndex(({ name }) => name === one.name);
     if (at < 0) channels.push(one);
     else if (one.trained.length > channels[at].trained.length) channels[at] = one;
@@ -56,7 +56,7 @@ export const createSliders = (specs, changed) => {
     });
     changed();
   };
-  // Sets triples of a channel, a column and its value, and all others to 0; with `only`, all others of that channel.
+  // Sets columns to values and all other columns to 0. triples: [channel, column, value]. only: a channel; other channels stay as they are.
   panel.set = (triples, only = null) => {
     channels.filter((one) => !only || one === only).forEach((one) => columns(one).forEach((column) => values.set(keyed(one, column), 0)));
     triples.forEach(([one, column, value]) => { if (values.has(keyed(one, column)) && value) put(one, column, value); });
@@ -68,7 +68,7 @@ export const createSliders = (specs, changed) => {
     put(one, column, Math.round(1e6 * (values.get(keyed(one, column)) + by * one.highest / 5)) / 1e6);
     show();
   };
-  // The keys 1 to 9. Returns true if the key has a slider.
+  // Handles the keys 1 to 9. Returns true if the key has a slider.
   panel.key = (event) => {
     const digit = event.code.match(/^Digit([1-9])$/), slider = digit && rows[digit[1] - 1];
     if (slider) panel.more(slider.one, slider.column, event.shiftKey ? -1 : 1);

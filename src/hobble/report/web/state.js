@@ -1,5 +1,5 @@
-// The state of one character, at first in a frame of the clips. Fields and units as in `hobble.runtime.character` and
-// `hobble.runtime.controller`, in camel case; the path is px, pz (position) and dx, dz (direction).
+// The state of one character, which starts in a frame of the clips. Fields and units are those of `hobble.runtime.character` and
+// `hobble.runtime.controller`, with names in camel case. The path is px, pz (position) and dx, dz (direction).
 import { bytes } from "./numbers.js";
 import { at3, at4, multiply } from "./turns.js";
 

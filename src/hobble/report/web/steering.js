@@ -1,7 +1,7 @@
-// Where the character has to go: keys, a gamepad, or a thumb on the disc.
+// The target of the character from keys, a gamepad, or a thumb on the disc.
 import { find } from "./base.js";
 
-// Keys by their place on the keyboard, not by letter, so that WASD is in the same place on every layout.
+// Keys are named by their place on the keyboard, not by letter, so that WASD is in the same place on every layout.
 const CODES = {
   KeyW: [0, 1], KeyS: [0, -1], KeyA: [-1, 0], KeyD: [1, 0],
   ArrowUp: [0, 1], ArrowDown: [0, -1], ArrowLeft: [-1, 0], ArrowRight: [1, 0],

@@ -1,4 +1,4 @@
-// Tables: a click on a heading sorts, a button saves the table as CSV with all digits.
+// Tables: a click on a heading sorts by it, and a button saves the table as CSV with all digits.
 import { save } from "./base.js";
 
 const raw = (cell) => cell.dataset.v ?? cell.textContent;

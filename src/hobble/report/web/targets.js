@@ -1,4 +1,4 @@
-// Targets as `ProceduralAnimation.next_pose` takes them: velocity [x, z], facing [x, z] or null, gait or null. And the limits
+// Converts targets like those of `ProceduralAnimation.next_pose`: velocity [x, z], facing [x, z] or null, gait or null. Applies the limits
 // of a hurt body, as in `hobble.runtime.limits`: a highest speed, and a walk instead of a jog if the body cannot jog.
 import { wrap } from "./numbers.js";
 

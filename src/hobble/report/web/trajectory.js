@@ -1,4 +1,4 @@
-// The path of the root: two seconds, half of them ahead, as in `hobble.runtime.trajectory`.
+// The path of the root over two seconds, half of them ahead, as in `hobble.runtime.trajectory`.
 import { wrap } from "./numbers.js";
 
 export const createTrajectory = (spec, c) => {
@@ -75,8 +75,8 @@ export const createTrajectory = (spec, c) => {
     }
   };
 
-  // The movement [a, b] of the root without half of what goes against the target, or without half of it while the character
-  // turns on the spot.
+  // The movement [a, b] of the root without half of its part against the target, or, while the target is to stand, without half of
+  // all movement.
   const limited = (a, b, target) => {
     const loss = spec.steering > 0 && !spec.rooted ? k.backwardLoss : 0, squared = target[0] ** 2 + target[1] ** 2;
     if (squared < k.still ** 2) return [(1 - loss) * a, (1 - loss) * b];
@@ -93,7 +93,7 @@ export const createTrajectory = (spec, c) => {
     return [a + more * ahead[0] + share * across[0], b + more * ahead[1] + share * across[1]];
   };
 
-  // Go on by a frame: the root moves as the outputs say, and so does the path ahead.
+  // Advance by a frame: the root and the path ahead move as the outputs say.
   const advance = (y, target) => {
     for (let i = 0; i < M; i++) {
       c.px[i] = c.px[i + 1];

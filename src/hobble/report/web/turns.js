@@ -9,7 +9,7 @@ export const rotate = (q, v) => {
   const axis = [q[1], q[2], q[3]], t = cross(axis, v).map((x) => 2 * x), more = cross(axis, t);
   return v.map((x, i) => x + q[0] * t[i] + more[i]);
 };
-// The least rotation that takes direction a to b; none where they are opposite.
+// The smallest rotation from direction a to b; the identity if they are opposite.
 export const between = (a, b) => {
   const w = Math.hypot(...a) * Math.hypot(...b) + dot(a, b), v = cross(a, b), n = Math.hypot(w, ...v);
   return n < 1e-9 ? [1, 0, 0, 0] : [w / n, v[0] / n, v[1] / n, v[2] / n];
@@ -17,7 +17,7 @@ export const between = (a, b) => {
 export const at4 = (array, j) => [array[4 * j], array[4 * j + 1], array[4 * j + 2], array[4 * j + 3]];
 export const at3 = (array, j) => [array[3 * j], array[3 * j + 1], array[3 * j + 2]];
 
-// Rotations on the way from those of `a` (at `i`) to those of `b` (at `k`), the shorter way, normalised.
+// Writes into `out` (at `o`) the rotation between that of `a` (at `i`, t = 0) and that of `b` (at `k`, t = 1), along the shorter way.
 export const mixTurn = (a, i, b, k, t, out, o) => {
   const near = a[i] * b[k] + a[i + 1] * b[k + 1] + a[i + 2] * b[k + 2] + a[i + 3] * b[k + 3] < 0 ? -t : t;
   let n = 0;

@@ -1,5 +1,5 @@
-// A lit scene on a canvas. All views of the page share one WebGL context. Each copies its picture to its own canvas, for
-// printing and saving. Centimetres, Y up.
+// A lit scene on a canvas. All views of the page share one WebGL context. Each view copies its picture to its own canvas, where it can be
+// printed and saved. Centimetres, Y up.
 import {
   DirectionalLight, HemisphereLight, PerspectiveCamera, Scene, VSMShadowMap, WebGLRenderer,
 } from "three";
@@ -16,7 +16,7 @@ export const views = [];
 // Levels of quality, best first. scale: pixels drawn for each CSS pixel. shadow: size of the shadow map. balls: round parts
 // of bodies that darken the ground under them.
 const LEVELS = [{ scale: 2, shadow: 768, balls: 24 }, { scale: 1, shadow: 512, balls: 16 }, { scale: .8, shadow: 0, balls: 12 }];
-const SLOW = 50, PATIENCE = 24; // ms; after this many pictures that took longer, the quality goes down a level
+const SLOW = 50, PATIENCE = 24; // if more than PATIENCE pictures take longer than SLOW ms, the quality goes down a level
 const requested = new URLSearchParams(location.search).get("quality");
 let level = 0, slow = 0;
 
@@ -82,7 +82,7 @@ export const createView = (canvas, home, draw) => {
   const context = canvas.getContext("2d"), scene = new Scene(), camera = new PerspectiveCamera(30, 1, 10, 6000);
   const lights = lit(scene);
   let scale = 1, eye = [0, 0, 1], right, up, ahead, seen = false, waiting = false, drawnAt = 0, drawnFor = -1;
-  // framing: size of the body in the picture, and its shift as a share of the width (aside) and of the height (up).
+  // framing: size of the body in the picture, and its shift as a share of the picture's width (aside) and height (up).
   const view = { scene, W: 0, H: 0, zoom: 1, paint: {}, milliseconds: 0, framing: { size: 1.75, aside: 0, up: 0 }, balls: 12, inputs: false, onHidden: () => {} };
   view.land = createLand(scene);
   view.marks = createMarks(scene);
@@ -143,7 +143,7 @@ export const createView = (canvas, home, draw) => {
     camera.updateProjectionMatrix();
     lights.aim(target, yaw);
   };
-  // The x and y on the screen, and the distance from the camera along its view.
+  // The x and y of a point on the screen, and its distance from the camera along the view.
   view.project = (p) => {
     const d = minus(p, eye), z = Math.max(1, dot(d, ahead));
     const { aside, up: raised } = view.framing;
@@ -167,7 +167,7 @@ export const createView = (canvas, home, draw) => {
     lights.fine(LEVELS[level].shadow);
     view.balls = LEVELS[level].balls;
   };
-  // Begins to compile the shaders of what is in the scene. The graphics card does it while scripts go on.
+  // Begins to compile the shaders of the scene. The graphics card does this while the scripts continue.
   view.compile = () => {
     const gl = shared(canvas);
     if (!gl) return;

@@ -1,4 +1,4 @@
-// Scripted walks: plays the motion in the page, with footprints, readings and a time slider.
+// Plays the scripted walks, with footprints, readings and a time slider.
 import { find, material } from "./base.js";
 import { createFigure } from "./figure.js";
 import { createMotion } from "./motion.js";
@@ -26,8 +26,8 @@ export const startWalks = () => {
     return unpacked.get(index);
   };
   const joint = (s, frame, b) => s.motion.at(frame, b);
-  // Where the camera looks: the mean position of the root over a second around the frame. So the camera moves smoothly, and
-  // a frame always looks the same.
+  // The target of the camera: the mean position of the root over a second around the frame. So the camera moves smoothly, and a frame
+  // always looks the same.
   const followed = (s) => {
     const half = Math.round(fps / 2), { roots } = s.motion, out = new Float32Array(roots.length);
     for (let f = 0; f < s.frames; f++) {

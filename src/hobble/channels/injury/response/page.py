@@ -127,12 +127,13 @@ def curves(
         healing.setdefault(label_of(row), []).append(row)
     charts = [_panel(panel, rows, sweeps, healing) for panel in PANELS]
     caption = (
-        "The character walks on while the severity of one link rises from 0 to 10 and falls again, step by "
-        "step. Each point is measured at the end of a step, over whole gait cycles. Dotted lines: falling "
-        "severity. A smooth curve means that the walk changes gradually. A gap between left and right is a "
-        "limp. A jump between neighbours means that the network switches between two gaits. Pose distances "
-        "are means over joints at the same phase."
+        "The character moves on while the severity of one link rises from 0 to 10 and falls again. Each "
+        "point is measured over whole gait cycles at one severity. A smooth curve means that the walk "
+        "changes gradually. A gap between left and right is a limp. A jump between neighbours means that "
+        "the network switches between two gaits. Pose distances are means over joints at the same phase."
     )
+    if back:
+        caption += " Dotted lines: falling severity."
     if untrained:
         caption += " Links that were never hurt in training show how much a healthy walk varies."
     return ChartGroup("sweeps", "One link at rising severity", caption, charts, "Link and gait")

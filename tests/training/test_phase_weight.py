@@ -1,0 +1,75 @@
+"""The weight of the phase in the loss."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+import torch
+
+from hobble.database.reader import Database
+from hobble.models.pfnn.forward import forward
+from hobble.models.pfnn.options import PfnnOptions
+from hobble.training import run as stage
+from hobble.training.held_out import HeldOut
+from training.conftest import Recipe
+
+CPU = torch.device("cpu")
+
+
+def block(data: Database) -> tuple[np.ndarray, np.ndarray]:
+    made = next(data.blocks("train", 0, 0, 1, 1, block_rows=10_000))
+    return made.x, made.y
+
+
+def test_only_the_error_of_the_phase_gets_the_weight(data: Database) -> None:
+    (x, y), (weighted_x, weighted_y) = block(data), block(data.with_phase_weight(8.0))
+    at = data.layout.y_phase_change.start
+    assert np.array_equal(weighted_x, x)
+    np.testing.assert_allclose(weighted_y[:, at], 8 * y[:, at], rtol=1e-4, atol=1e-5)
+    assert np.array_equal(np.delete(weighted_y, at, axis=1), np.delete(y, at, axis=1))
+
+
+class Means:
+    """Predicts the mean of every output."""
+
+    def __init__(self, data: Database) -> None:
+        self.outputs = data.layout.y_size
+
+    def __call__(self, x: torch.Tensor, p: torch.Tensor) -> torch.Tensor:
+        return torch.zeros(len(x), self.outputs)
+
+
+def test_held_out_errors_do_not_depend_on_the_weight(data: Database) -> None:
+    errors = HeldOut(data, CPU, 0).every_row(Means(data))
+    assert HeldOut(data.with_phase_weight(8.0), CPU, 0).every_row(Means(data)) == pytest.approx(
+        errors, rel=1e-4
+    )
+
+
+def test_the_file_has_the_phase_in_its_own_unit(
+    small_database: Path, network: PfnnOptions, training: Recipe, tmp_path: Path
+) -> None:
+    weights = tmp_path / "weights.npz"
+    stage.run(
+        small_database,
+        configuration="test",
+        network=network,
+        training=training | {"passes": 3, "dropout": 0.0, "phase_weight": 8.0},
+        checkpoints=tmp_path,
+        threads=1,
+        start=None,
+        code=None,
+        weights=weights,
+        history=tmp_path / "history.csv",
+        checkpoint=tmp_path / "checkpoint.npz",
+    )
+    data = Database.open(small_database)
+    s, at = data.statistics, data.layout.y_phase_change.start
+    rows = next(data.blocks("train", 0, 0, 1, 1, block_rows=10_000))
+    with np.load(weights) as made:
+        found = forward([made[f"W{i}"] for i in range(3)], [made[f"b{i}"] for i in range(3)], rows.x, rows.p)
+        change = (found * made["Ystd"] + made["Ymean"])[:, at]
+    wanted = rows.y[:, at] * s.y_std[at] + s.y_mean[at]
+    assert np.mean((change - wanted) ** 2) < 0.2 * wanted.var()
