@@ -47,9 +47,9 @@ def period(phase: Array) -> int:
 def settling(distance: Array, normal: float, window: int) -> float | None:
     """Seconds until a motion has settled after a change: until `distance` stays close to its last value.
 
-    distance: (F,) from a reference motion, cm, from the change on. window: frames to average over, usually a
-    cycle. normal: the distance before the change. Close means within SETTLED_SHARE of the whole change. None
-    if the change is below SMALLEST_CHANGE_CM.
+    distance: (F,) cm to a reference motion, in each frame after the change. window: frames to average over,
+    usually a cycle. normal: the distance before the change. Close means within SETTLED_SHARE of the whole
+    change. None if the change is below SMALLEST_CHANGE_CM.
     """
     window = min(window, len(distance))
     smooth = np.convolve(distance, np.ones(window) / window, mode="valid")

@@ -1,4 +1,4 @@
-"""The body of a skeleton as a mesh: corners, triangles, skin weights, and posing."""
+"""The body of a skeleton as a mesh: corners (vertices), triangles, skin weights, and posing."""
 
 from __future__ import annotations
 
@@ -40,9 +40,10 @@ class Mesh:
     """A body in its bind pose, centimetres.
 
     corners, normals: (V, 3). faces: (T, 3) indices of corners, counter-clockwise seen from outside. shade:
-    (V,) how little of a corner's surroundings is covered by the body, 0 to 1. bones: (B,) joints of the
-    skeleton that move the body. bone: (V, 4) the bones that move each corner, as indices into `bones`. share:
-    (V, 4) their weights, which sum to 1. positions (B, 3), rotations (B, 4): the bones in the bind pose.
+    (V,) the share of a corner's surroundings that is open: 0 (dark) if the body covers all, 1 (light) if it
+    covers nothing. bones: (B,) joints of the skeleton that move the body. bone: (V, 4) the bones that move
+    each corner, as indices into `bones`. share: (V, 4) their weights, which sum to 1. positions (B, 3),
+    rotations (B, 4): the bones in the bind pose.
     """
 
     corners: Array = field(repr=False)
@@ -80,7 +81,8 @@ def _skinned(corners: Array, bone: Any, share: Array, turn: Array, move: Array) 
 def body(skeleton: Skeleton) -> Mesh:
     """The body of a skeleton: a person if the skeleton has the roles NEEDED, else a rod for every bone.
 
-    It depends only on joints, offsets and roles. Skeletons that agree in these share one mesh.
+    It depends only on the joints (with their offsets) and the roles. Skeletons that agree in these share one
+    mesh.
     """
     return _mesh_of(_text(skeleton))
 

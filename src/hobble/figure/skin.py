@@ -1,4 +1,4 @@
-"""Skin weights: which bones move each corner of a body, and how much."""
+"""Skin weights: which bones move each corner (vertex) of a body's mesh, and how much."""
 
 from __future__ import annotations
 
@@ -64,5 +64,6 @@ def spread(
     if kept.shape[1] < MOST:
         pad = MOST - kept.shape[1]
         kept, order = np.pad(kept, ((0, 0), (0, pad))), np.pad(order, ((0, 0), (0, pad)))
-    kept = np.maximum(kept - 0.01, 0)  # a weight fades to 0 before a fifth bone replaces it
+    # Along the surface, a weight then falls to 0 smoothly where another bone takes its place among the four.
+    kept = np.maximum(kept - 0.01, 0)
     return joints[order], kept / kept.sum(axis=1, keepdims=True)

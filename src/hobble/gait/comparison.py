@@ -57,7 +57,7 @@ def measure_clip(clip: Clip) -> WalkCycles:
 
 
 def healthy_profile(clips: Sequence[Clip]) -> Profile:
-    """The profile of all cycles of a figure's healthy clips. Without clips, the mean of people.
+    """The profile of all cycles of a figure's healthy clips. Without clips, the mean of normal people.
 
     Raises HobbleError if no clip has a cycle.
     """

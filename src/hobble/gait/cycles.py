@@ -1,7 +1,7 @@
 """The cycles of a walk, from one landing of a foot to its next, and the numbers of each cycle.
 
-A foot lands where its ankle is furthest ahead of the hips. This also works for feet that drag and for feet
-that are set down next to the other, where contacts and zero crossings fail.
+A foot lands where its ankle is furthest ahead of the hips. This also works for a foot that drags or is set
+down beside the other, where contacts, or zero crossings of the distance between the ankles, fail.
 """
 
 from __future__ import annotations

@@ -101,9 +101,9 @@ def hips_height(
 ) -> Array:
     """(N,) heights of the root.
 
-    root: (N, 3) before the change. For each leg: hips: (N, 3) position of the hip joint relative to the root.
-    ankles: (N, 3). reaches: (N,) desired distance from hip to ankle while the leg stands, cm. stands: (N,) 0
-    to 1. longest: `Leg.longest`.
+    root: (N, 3) positions before the change. For each leg: hips: (N, 3) position of the hip joint relative to
+    the root. ankles: (N, 3). reaches: (N,) desired distance from hip to ankle while the leg stands, cm.
+    stands: (N,) from 0 (swings) to 1 (stands). longest: `Leg.longest`.
     """
     needed = np.zeros(len(root))
     weight = np.full(len(root), 1e-9)

@@ -88,7 +88,7 @@ class Trainable(ABC):
     @property
     @abstractmethod
     def about(self) -> dict[str, Any]:
-        """Its entries in the file's meta, as JSON. `network` is its formula in one line."""
+        """Its entries in the file's meta, as JSON. The entry `network` is its formula in one line."""
 
     @property
     @abstractmethod
@@ -98,7 +98,7 @@ class Trainable(ABC):
     def mirrors(self, inputs: ColumnMirror, outputs: ColumnMirror) -> list[LayerMirror]:
         """How each layer changes with the mirrors of standardised X and Y.
 
-        Only for kinds whose `Options.asymmetric` can be empty.
+        Raises TypeError for kinds that cannot be trained with `training.symmetric`.
         """
         raise TypeError(f"{type(self).__name__} has no mirror")
 

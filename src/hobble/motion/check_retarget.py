@@ -27,8 +27,9 @@ BONES = {  # limb -> roles of its two ends
     "upper arm": ("shoulder", "elbow"),
     "forearm": ("elbow", "wrist"),
 }
-# In the same pose, bodies of other shapes have other angles at these joints: at a knee that is nearly
-# straight, 1.5 cm make 15 degrees. So the median of the difference is subtracted first.
+# In the same pose, bodies of other shapes have other angles at these joints: a nearly straight knee bends 15
+# degrees more if the leg is 1.5 cm longer and hip and ankle stay where they are. So the median of the
+# difference is subtracted first.
 SHAPED = ("hip", "ankle", "knee")
 OFFSET = 25.0  # degrees: a larger constant difference of a knee is an error and is not subtracted
 STANDS = 0.6  # cm a frame at 60 Hz: the ball of a standing foot is slower
@@ -44,10 +45,11 @@ def compare(source: Clip, made: Clip, scale: float) -> dict[str, Any]:
     scale: leg length of the result / leg length of the source.
 
     angles: "left knee" -> 5th, 50th and 95th percentile of the angle in `source` and in `result`; `constant`,
-    the median difference; and `apart`, the mean difference without it (at joints where that is allowed).
-    directions: "left thigh" -> mean angle between its directions. feet: side -> how much `higher` the ball is
-    in the result, and how fast it slides while it stands, in cm a second. knees: side -> mean cosine between
-    the directions of the bent knee and of the body, or None if the knee hardly bends.
+    the median difference (0 for joints not in SHAPED); and `apart`, the mean difference after `constant` is
+    subtracted (at a knee only if it is below OFFSET). directions: "left thigh" -> mean angle between its
+    directions in source and result. feet: side -> how much `higher` the ball is in the result, and how fast
+    it slides while it stands, in cm a second. knees: side -> mean cosine between the directions of the bent
+    knee and of the body, or None if the knee hardly bends.
     """
     frames = min(len(source), len(made))
     before, after = (_places(clip, frames) for clip in (source, made))
@@ -60,9 +62,10 @@ def compare(source: Clip, made: Clip, scale: float) -> dict[str, Any]:
 
 
 def check(path: Path, figures: dict[str, Any], rig: str) -> None:
-    """Raise InputError if a result does not move like its source. It names the joint or limb most apart.
+    """Raise InputError if a result does not move like its source.
 
-    path: of the source. figures: from `compare`. rig: its name.
+    The error names the joint or limb that differs most. path: of the source. figures: from `compare`. rig:
+    its name.
     """
     apart = {name: each["apart"] for name, each in figures["angles"].items()} | figures["directions"]
     name = max(apart, key=lambda part: apart[part])

@@ -45,22 +45,22 @@ def find_body(names: Sequence[str], parents: Sequence[int], positions: Array) ->
     leg = [joints_of(rig, legs, "leg", k) for k in (0, 1)]
     arm = [joints_of(rig, arms, "arm", k) for k in (0, 1)]
     head, neck = find_head(rig, legs, arms)
-    first, sided = left_leg(rig, legs, leg, head)
-    across_first = left_arm(rig, leg, first, arm, arms)
+    left_leg_index, sided = left_leg(rig, legs, leg, head)
+    left_arm_index = left_arm(rig, leg, left_leg_index, arm, arms)
     hips = common(parents, [leg[0][0], leg[1][0]])
     hips = parents[hips] if hips in (leg[0][0], leg[1][0]) else hips
     trunk = [j for j in path(parents, hips, arms.hub) if j != hips and (j not in above(parents, hips))]
     if len(trunk) > 1 and part_of(names[trunk[-1]]) == "neck" and head != trunk[-1]:
         neck = (trunk.pop(), *neck)  # in rigs of 3ds Max the neck carries the arms
-    ordered = {SIDES[0]: first, SIDES[1]: 1 - first}
-    across = {SIDES[0]: across_first, SIDES[1]: 1 - across_first}
+    leg_of_side = {SIDES[0]: left_leg_index, SIDES[1]: 1 - left_leg_index}
+    arm_of_side = {SIDES[0]: left_arm_index, SIDES[1]: 1 - left_arm_index}
     body = Body(
         hips,
         tuple(trunk),
         neck,
         head,
-        {s: (clavicle(rig, arms, k, arm[k][0]), *arm[k]) for s, k in across.items()},
-        {s: (*leg[k], toe(rig, legs, k, leg[k][2])) for s, k in ordered.items()},
+        {s: (clavicle(rig, arms, k, arm[k][0]), *arm[k]) for s, k in arm_of_side.items()},
+        {s: (*leg[k], toe(rig, legs, k, leg[k][2])) for s, k in leg_of_side.items()},
     )
     if other := _second(names, parents, positions, hips):
         raise TwoFigures(f"it holds two figures, {names[hips]} and {names[other]}")

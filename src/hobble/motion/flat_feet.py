@@ -26,7 +26,7 @@ from hobble.motion.spine import SHORT
 
 UP, AHEAD, LEFT = np.array([0.0, 1.0, 0.0]), np.array([0.0, 0.0, 1.0]), np.array([1.0, 0.0, 0.0])
 STANCE = 0.2  # a foot counts as standing in this share of the frames: those with the lowest and slowest ball
-LEAST_STEEP = (10.0, 30.0)  # percentiles: of a standing foot's frames, those between them are flat
+LEAST_STEEP = (10.0, 30.0)  # percentiles of a standing foot's steepness; between them it counts as flat
 FEWEST = 3  # least number of frames in which a foot is flat
 SLOW = 0.5  # leg lengths a second: a slower ball may stand
 RUNS = 0.3  # a figure runs if its balls are slow in a smaller share of frames; CMU's walks have at least .41
@@ -54,11 +54,10 @@ ANY_FOOT = np.radians(42.0)
 # BRIEF_ERROR radians: clips of a third of a second or less were 10 to 15 degrees off.
 BRIEF, BRIEF_ERROR = 0.5, np.radians(12.0)
 APART = 10.0  # degrees: a larger difference between the two standing feet is reported
-# Even if nobody could stand in the zero pose, it shows the tilt of the feet, if both feet agree with each
-# other and with the motion to this angle.
-AGREE = np.radians(10.0)
-SAME = np.radians(2.0)  # the tilts of the two feet of such a zero pose differ by less
-TIPTOE = np.radians(12.0)  # feet of a squatting body that are steeper than the target's by more are on tiptoe
+# Even a zero pose in which nobody could stand shows the tilt of the feet, if they differ from each other and
+# from the motion by less than AGREE. For a body on tiptoe, they must differ from each other by less than SAME.
+AGREE, SAME = np.radians(10.0), np.radians(2.0)
+TIPTOE = np.radians(12.0)  # a squatting body is on tiptoe if its feet are steeper than the target's by more
 # Degrees. A foot of the zero pose that points further than FORWARD from where its knee points shows no tilt,
 # unless the knee bends by less than STRAIGHT and so does not show where it points.
 FORWARD, STRAIGHT = 35.0, 30.0
@@ -70,8 +69,8 @@ class Tilt:
     """The tilt of each foot when it stands flat: how far the bone from ankle to ball points down.
 
     measured: side -> radians in the frames in which the foot is flat, or None if it has no ball. flat: side
-    -> radians that are taken for right, or None. error: standard deviation of the mean of both feet's `flat`,
-    radians.
+    -> radians that are taken as correct, or None. error: standard deviation in radians of the mean of both
+    feet's `flat`.
     """
 
     measured: dict[str, float | None]
@@ -80,8 +79,9 @@ class Tilt:
 
 
 def flat_feet(seen: BodySample) -> dict[int, Array]:
-    """Ankles and balls -> their frames (4,), as `BodySample` defines them, from how they are turned while the
-    feet are flat.
+    """Joint (ankle or ball) -> (4,) rotation from the axes of a figure that faces +Z to the joint's own axes.
+
+    `BodySample` calls it the joint's frame. It follows from how the joint is turned while the foot is flat.
     """
     tilt = feet_tilt(seen)
     frames: dict[int, Array] = {}
@@ -193,8 +193,8 @@ def doubt(seen: BodySample, zero: bool) -> str | None:
     if abs(tilts[0] - tilts[1]) > APART:
         why += f" and its feet stand at different angles ({tilts[0]:.0f} and {tilts[1]:.0f} degrees)"
     return (
-        f"The height of its ankles is uncertain, because {why}: told from standing feet, the figure may "
-        f"stand {most:.1f} cm too high or low."
+        f"The height of its ankles is uncertain, because {why}. It was estimated from standing feet: "
+        f"the figure may stand {most:.1f} cm too high or low."
     )
 
 
@@ -256,8 +256,8 @@ def _stance(seen: BodySample, side: str) -> NDArray[np.integer]:
 def _zero_tilt(seen: BodySample, side: str) -> float | None:
     """The tilt in radians of a foot in the zero pose, turned so that its shank is upright.
 
-    None if the foot does not point where its knee points, since it can have any tilt then. If the leg is
-    nearly straight, its bones may be twisted, so the foot may point sideways.
+    None if the foot does not point where its knee points, since it can have any tilt then. The bones of a
+    nearly straight leg may be twisted, so there the foot may point anywhere.
     """
     hip, knee, heel, toe = seen.body.legs[side]
     if toe is None:

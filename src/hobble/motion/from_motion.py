@@ -11,7 +11,7 @@ from hobble.core import quat
 from hobble.core.quat import Array
 from hobble.motion.body_sample import LEFT, BodySample
 from hobble.motion.flat_feet import flat_feet
-from hobble.motion.no_neck import has_neck, neck_bone
+from hobble.motion.no_neck import lacks_neck, neck_bone
 from hobble.motion.orient import frame, mean_rotation, unit
 from hobble.motion.spine import SHORT, spine_shares
 
@@ -48,7 +48,7 @@ def _trunk(seen: BodySample, frames: dict[int, Array], zero: Array | None) -> No
     chain = (body.hips, *body.trunk, *body.neck)
     for joint in chain:
         bone, axis, left = _bone(seen, joint)
-        if body.trunk and joint == body.chest and not has_neck(seen):
+        if body.trunk and joint == body.chest and lacks_neck(seen):
             bone, axis = neck_bone(seen, left, zero), seen.spine.neck
         # For hips and chest, left is more reliable than the bone: limbs begin level there, but spines of
         # captured rigs bend sideways by some degrees.

@@ -20,13 +20,13 @@ AHEAD, AHEAD_ERROR = np.radians(5.4), np.radians(2.6)
 AHEAD_OF_HEAD, AHEAD_OF_HEAD_ERROR = np.radians(5.6), np.radians(3.9)
 
 
-def has_neck(seen: BodySample) -> bool:
-    """Whether the rig has a neck, or neither the rig nor the target has one. Then nothing need be assumed.
+def lacks_neck(seen: BodySample) -> bool:
+    """Whether the rig has no neck although the target has one, so that a neck must be assumed.
 
     A joint at the same place as the chest is no neck.
     """
-    body = seen.body
-    return not seen.spine.has_neck or any(seen.length(body.chest, joint) > SHORT for joint in body.neck)
+    body, target = seen.body, seen.spine
+    return target.has_neck and all(seen.length(body.chest, joint) <= SHORT for joint in body.neck)
 
 
 def neck_bone(seen: BodySample, left: Array, zero: Array | None) -> Array:
@@ -46,7 +46,7 @@ def lean_doubt(seen: BodySample, zero: bool) -> str | None:
 
     zero: whether a person could stand in the zero pose.
     """
-    if has_neck(seen):
+    if not lacks_neck(seen):
         return None
     body, error = seen.body, AHEAD_ERROR if zero else AHEAD_OF_HEAD_ERROR
     arm = float(np.mean([seen.length(body.chest, arm[1]) for arm in body.arms.values()]))

@@ -202,7 +202,7 @@ def _values(path: Path, data: bytes, at: int, width: int, declared: int, first_l
 
 
 def _check_lines(path: Path, data: bytes, at: int, first_line: int) -> None:
-    """Raise InputError for lines that are too long or too many, before each becomes an object."""
+    """Raise InputError if a line is too long or there are too many, before splitting them takes memory."""
     for start in range(at, len(data) - LONGEST_LINE, LONGEST_LINE):
         if data.find(b"\n", start, start + LONGEST_LINE) < 0:
             line = first_line + data.count(b"\n", at, start)
@@ -213,7 +213,7 @@ def _check_lines(path: Path, data: bytes, at: int, first_line: int) -> None:
 
 
 def _explained(path: Path, body: bytes, width: int, first_line: int) -> Array:
-    """Reads frames that run over several lines. Raises InputError with the line of anything else."""
+    """Reads frames that run over several lines. Anything else raises InputError, which names the line."""
     counts = np.fromiter((len(raw.split()) for raw in io.BytesIO(body)), np.int32)
     used, total = np.flatnonzero(counts), int(counts.sum(dtype=np.int64))
     if total % width or not total or not (counts[used] < width).all():

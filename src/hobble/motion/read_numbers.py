@@ -22,9 +22,9 @@ MOST_LONG = 0.25
 def read_numbers(data: bytes, at: int, width: int, declared: int) -> Array | None:
     """The table (F, width) of the lines from `at` on, or None if the general reader has to read it.
 
-    That is the case if the text is shorter than LARGE and the compiler is not loaded yet, if a line does not
-    have `width` values, if there are more than `declared` + 1 lines, and if there is anything but decimal
-    numbers, blanks and line ends.
+    It has to if any of these is true: the text is shorter than LARGE and the compiler is not loaded yet; a
+    line does not have `width` values; there are more than `declared` + 1 lines; there is anything but decimal
+    numbers, blanks and line ends; more than MOST_LONG of the numbers are too long to be read here.
     """
     if len(data) - at < LARGE and "numba" not in sys.modules:
         return None

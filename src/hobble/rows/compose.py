@@ -23,7 +23,7 @@ def body_columns(layout: RowLayout) -> int:
 
 
 def body_layout(layout: RowLayout) -> RowLayout:
-    """The same layout without channels, with the blocks of X in the order of BODY."""
+    """The same layout without channels, with the blocks of X in the order of `hobble.rows.layout.BODY`."""
     return replace(layout, channels=(), order=())
 
 
@@ -45,8 +45,8 @@ def joint_heights(joints: slice) -> slice:
 def frame_inputs(layout: RowLayout, body: Array, channels: Mapping[str, Array]) -> Array:
     """The columns of X without terrain (n, x_columns), in the order of the layout.
 
-    body: (n, body_columns) the columns without terrain and channels, in the order of BODY. channels: name ->
-    (n, columns of the channel).
+    body: (n, body_columns) the columns without terrain and channels, in the order of `body_layout`. channels:
+    name -> (n, columns of the channel).
     """
     if not layout.order:  # the channels come last
         return np.concatenate([body, *(channels[name] for name, _ in layout.channels)], axis=1)

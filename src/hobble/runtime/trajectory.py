@@ -30,8 +30,8 @@ STILL = 0.1  # cm a frame: a slower target means standing
 # Groups of arrays for compiled functions, which unpack them into names. They are plain tuples, because
 # passing a named tuple costs a microsecond.
 #
-# position, direction (C, T, 2): world x and z. gait (C, T, 6): shares. T is twice the window (120); entry T/2
-# is the present frame.
+# position, direction (C, T, 2): world x and z. gait (C, T, 6): shares. T is 120: 60 frames of the
+# past and 60 from the present on (entry T/2 is the present), unless the rows were made with another window.
 Trajectory = tuple[Any, Any, Any]
 # What the caller wants: velocity, direction (C, 2); strafe (C,) share; gait (C, 6) shares.
 Target = tuple[Any, Any, Any, Any]

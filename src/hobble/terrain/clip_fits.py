@@ -22,6 +22,7 @@ from hobble.terrain.patches import Patches
 from hobble.terrain.soles import Feet, Mask, find_soles, held_above_other
 
 log = logging.getLogger("hobble.terrain")
+REMAKE = "Delete the motion and the labels of this clip; the next run makes both again from the same file."
 
 
 @dataclass(frozen=True)
@@ -102,7 +103,10 @@ def clip_fits(
 
 
 def _warn_if_off_ground(name: str, fits: ClipFits, deepest: float | None) -> None:
-    """Log a warning if feet are further than `deepest` from the ground (on average) or below it."""
+    """Log a warning if feet are more than `deepest` cm from the ground.
+
+    These are feet in contact (on average), or any foot that is below the ground.
+    """
     if deepest is None or not len(fits.patch):
         return
     mean, below = float(fits.foot_error[..., 0].mean()), float(fits.foot_below.max())
@@ -224,7 +228,7 @@ def _check(clip: Clip, cycles: np.ndarray, contacts: Mask) -> None:
         raise InputError(
             clip.name,
             f"the contacts have shape {contacts.shape}, but the clip has {len(clip)} frames",
-            fix="Make both again from the same clip.",
+            fix=REMAKE,
         )
     for start, end in cycles:
         if not 0 <= start < end < len(clip):
@@ -232,7 +236,7 @@ def _check(clip: Clip, cycles: np.ndarray, contacts: Mask) -> None:
                 clip.name,
                 f"a cycle has frames {start} to {end}, but the clip has {len(clip)} frames",
                 frame=int(start),
-                fix="Make both again from the same clip.",
+                fix=REMAKE,
             )
 
 

@@ -25,8 +25,8 @@ class State:
 
     adam: the optimiser. recipe: hash of everything that determines the result
     (`hobble.training.start.run_name`). samples, seconds: used so far. best, best_mse: the flat weights with
-    the lowest held-out error so far, and this error. history: one row of numbers per section, in the order of
-    `hobble.training.history.columns`. There is no state of random generators: the order of the rows and
+    the lowest held-out error so far, and this error. history: one row of numbers per section: COLUMNS, then
+    the held-out error of each block of Y. There is no state of random generators: the order of the rows and
     dropout are seeded by pass and section.
     """
 

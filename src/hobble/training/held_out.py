@@ -61,12 +61,13 @@ class HeldOut:
             total += squares.sum(0, dtype=torch.float64).cpu().numpy()
             rows += len(x)
         mean = total / rows if rows else np.full(len(total), np.nan)
-        # As if all columns had the same weight, so that recipes can be compared.
+        # The database multiplies the change of phase by phase_weight. Undo this, so that networks that were
+        # trained with different weights can be compared.
         mean[self.blocks["phase_change"]] /= self.database.phase_weight**2
         return [float(mean.mean()), *(float(mean[columns].mean()) for columns in self.blocks.values())]
 
     def _stream(self) -> Iterator[tuple[Tensor, ...]]:
-        """Yield every row once, in random order: the first of the visits to each row in a pass."""
+        """Yield every row once, in random order. A pass uses each row several times; this takes the first."""
         visits = self.database.manifest.visits
         for block in self.database.blocks(SPLIT, 0, 0, visits, 0, ROWS_AT_ONCE):
             yield tuple(torch.from_numpy(array).to(self.device) for array in block[:3])

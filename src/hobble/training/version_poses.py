@@ -25,17 +25,18 @@ class VersionPoses:
     """Moves the pose in rows of X towards that of another version of the same clip. Y is unchanged.
 
     Each link is hurt in few clips. A network that continues the walk that it sees takes the posture of these
-    clips for a part of the injury, and a character that walks as if at severity 10 does not change at 5. With
-    these rows the network sees each clip's poses with and without the injury, and only the channels tell
-    whether Y is hurt.
+    clips for a part of the injury, and a character that limps as at severity 10 goes on like that when the
+    severity falls to 5. With these rows the network sees each clip's poses with and without the injury, and
+    only the channels tell whether Y is hurt.
 
     The pose of a hurt row moves along the line to a pose of the healthy clip, and that of a healthy row along
     the line to a pose of a hurt version. Among the rows with nearly the same phase, the one whose path turns
-    most alike is taken. The pose moves by a part of the way between -1 and 1. The parts are spread evenly. A
-    part depends only on the row's place in the batch and on the number of the batch, so several processes get
-    the same rows as one. Rows of clips without hurt versions are not changed.
+    most alike is taken. The pose moves by -1 to 1 times the way to the other pose; a negative factor moves it
+    away. The factors are spread evenly. They depend only on the row's place in the batch and on the number of
+    the batch, so several processes get the same rows as one. Rows of clips without hurt versions are not
+    changed.
 
-    The parts have the mean 0. If all poses moved towards the other version, the network would learn that Y
+    The factors have the mean 0. If all poses moved towards the other version, the network would learn that Y
     is always further from the other version than X is. Then the character exaggerates at run time.
 
     share: share of the rows that are moved; 0 changes nothing. batch: largest number of this process's rows

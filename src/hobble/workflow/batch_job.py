@@ -81,6 +81,7 @@ def make_each(snakemake: Any, make: Callable[[JobPiece, logging.Logger], None]) 
     """
     with reporting(snakemake) as report:
         checksums.forget(snakemake.output)
+        # Rules of other data sets and batches that make the same kind of file have the same family.
         kept, digests = KeptFiles(family_of(snakemake.rule)), _Digests()
         all_pieces = pieces(snakemake)
         taken = failed = 0
@@ -107,7 +108,7 @@ def _make_piece(
     digests: _Digests,
     report: JobLog,
 ) -> bool:
-    """Make a piece, or take its kept files. Returns whether they were kept."""
+    """Make a piece, or take its kept files. Returns whether kept files were taken."""
     outputs, began = list(piece.output.values()), time.monotonic()
     with checked(piece.files, outputs):
         mark = fingerprint(piece.params, digests.of(piece.files), outputs)
@@ -148,12 +149,12 @@ def _as_list(files: Any) -> list[str]:
 def _distributed(files: list[str], pieces: int, counts: list[int] | None = None) -> list[Any]:
     """For each piece its file or, with `counts`, its list of files; [] if there are no files at all."""
     if counts is not None:
-        assert sum(counts) == len(files), f"{files} are not {counts}"
+        assert sum(counts) == len(files), f"{len(files)} files, but files_per_clip adds up to {sum(counts)}"
         starts = [sum(counts[:n]) for n in range(pieces)]
         return [files[start : start + count] for start, count in zip(starts, counts, strict=True)]
     if len(files) == 1:
         return files * pieces
-    assert len(files) in (0, pieces), f"{files} are not for {pieces}"
+    assert len(files) in (0, pieces), f"{len(files)} files for {pieces} pieces: {files}"
     return files
 
 

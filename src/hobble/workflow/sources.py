@@ -1,4 +1,7 @@
-"""Reads the joints of BVH files and download lists while Snakemake plans, before any job runs."""
+"""Reads what Snakemake needs to plan, before any job runs: joint names of BVH files, and download lists.
+
+A download list holds the checksum of each clip that can be downloaded.
+"""
 
 from __future__ import annotations
 

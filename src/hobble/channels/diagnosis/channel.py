@@ -39,7 +39,7 @@ class Diagnosis(Channel):
 
     name = "diagnosis"
     title = "Diagnosis"
-    value = "amount"
+    value = "amount"  # the word on the page for a value: how strong the diagnosis is, 0 to 1
     highest = 1.0
     rate = 1.0
     slows = True
@@ -59,7 +59,7 @@ class Diagnosis(Channel):
         return _of(source) in (HEALTHY, None)
 
     def check(self, source: ClipSource, rig: HasLinks) -> None:
-        """Raise InputError if the clip's entry is not a known diagnosis."""
+        """Raise InputError if the data set's entry for the clip names a diagnosis that is not known."""
         if source.value is not None and source.value not in (*DIAGNOSES, HEALTHY):
             where = f"{source.clip}.channels.{self.name}"
             raise InputError(where, f"cannot be {source.value!r:.80}", fix=f"Write one of {_known_names()}.")
@@ -75,7 +75,10 @@ class Diagnosis(Channel):
 
 
 def _of(source: ClipSource) -> str | None:
-    """The diagnosis of a clip's person, or HEALTHY. None if neither the entry nor the table has it."""
+    """The diagnosis of a clip's person, or HEALTHY. None if neither the clip's entry nor the table has it.
+
+    The entry is in the configuration of the data set and comes first.
+    """
     if source.value is not None:
         return str(source.value)
     found: str | None = None

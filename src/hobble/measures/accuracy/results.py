@@ -10,7 +10,7 @@ from hobble.measures.results import SampleSize
 class ErrorNumbers(TypedDict):
     """Errors over `frames` frames. mean, sd, p05 to p95 (percentiles): of the relative error.
 
-    Without a frame, mean, sd and position error are None and the percentiles are missing.
+    If `frames` is 0, then mean, sd and position error are None and the percentiles are missing.
     """
 
     frames: int

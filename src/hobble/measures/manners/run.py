@@ -74,7 +74,7 @@ def of_channel(
     people: Mapping[str, str],
     runtime: Runtime,
 ) -> ChannelResult | None:
-    """The result for one channel; None with walks of fewer than two manners.
+    """The result for one channel; None if there are walks of fewer than two manners.
 
     captured: recognition of captured people, see `left_out`. generated: for each manner and value, the share
     of windows that a recogniser trained on the training clips names right. For two manners at once, either

@@ -24,10 +24,10 @@ WARM_UP = 60  # frames that are not measured, because compiled code is loaded in
 def timed_frames(
     network: Network, runtime: Runtime, laps: int, longest: int, track: Sequence[Waypoint]
 ) -> list[Array]:
-    """For each lap, the times (F, steps + 1) of its first F frames, in seconds, the last of the whole call.
+    """For each lap, (F, steps + 1) seconds of its first F frames: of each step, and last of the whole call.
 
-    The figures of `laps.walk_laps` walk one after another, each alone and from its own start, for OF_LAP
-    frames or an equal part of OF_ALL, and at most `longest`. A character alone does the same as in the crowd,
+    The figures of `laps.walk_laps` walk one after another, each alone and from its own start. F is OF_LAP, an
+    equal share of OF_ALL, or `longest`, whichever is least. A character alone does the same as in the crowd,
     to the last bit.
     """
     starts = starts_of(track, laps)
@@ -49,7 +49,7 @@ def timed_frames(
 
 
 def milliseconds(seconds: Array) -> Milliseconds:
-    """Means and deviations of times (F, steps + 1) in seconds, the last of the whole call."""
+    """Means and standard deviations of the times (F, steps + 1) that `timed_frames` returns for one lap."""
     ms = 1000 * seconds
     total = ms[:, : len(STEPS)].sum(axis=1)
     return {

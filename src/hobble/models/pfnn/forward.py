@@ -5,8 +5,8 @@ phase lie on a cyclic cubic spline through the control points:
 
     h1 = elu(W0(p) x + b0(p))    h2 = elu(W1(p) h1 + b1(p))    y = W2(p) h2 + b2(p)
 
-The rest of this folder computes the same: `step` and `fused` with its gradient, `predictor` fast for one
-character or a crowd, `onnx_export` and `network.js` for other programs.
+The other modules of this folder compute the same. `step` and `fused` also compute the gradient, for training.
+`predictor` is fast for one character or a crowd. `onnx_export` and `network.js` are for other programs.
 """
 
 from __future__ import annotations

@@ -24,8 +24,8 @@ def limps_together(
     """A row for each trained column of another channel and each of the links `legs` at severity 10.
 
     The column, such as "sad", has its highest value. The effects are relative to the walk with that value and
-    no injury. If the character does not walk a whole cycle then, the column is left out. speed: target speed,
-    cm a frame. row_of: makes a row.
+    no injury. A column is left out if the character walks no whole cycle with that value and no injury.
+    speed: target speed, cm a frame. row_of: makes a row.
     """
     names = [name for name in network.channels if name != INJURY]
     found = [(name, column) for name in names for column in network.trained(name)]
