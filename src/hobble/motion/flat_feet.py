@@ -55,7 +55,7 @@ ANY_FOOT = np.radians(42.0)
 BRIEF, BRIEF_ERROR = 0.5, np.radians(12.0)
 APART = 10.0  # degrees: a larger difference between the two standing feet is reported
 # Even a zero pose in which nobody could stand shows the tilt of the feet, if they differ from each other and
-# from the motion by less than AGREE. For a body on tiptoe, they must differ from each other by less than SAME.
+# from the motion by less than AGREE. On tiptoe, they must differ from each other by less than SAME.
 AGREE, SAME = np.radians(10.0), np.radians(2.0)
 TIPTOE = np.radians(12.0)  # a squatting body is on tiptoe if its feet are steeper than the target's by more
 # Degrees. A foot of the zero pose that points further than FORWARD from where its knee points shows no tilt,
