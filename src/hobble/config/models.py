@@ -8,7 +8,7 @@ from typing import Annotated, Any
 from pydantic import AfterValidator, Field, create_model, field_validator, model_validator
 
 from hobble.channels import NAMES as NAMES_OF_CHANNELS
-from hobble.channels import channel, every
+from hobble.channels import all_channels, channel
 from hobble.config import sections as s
 from hobble.core.clip_files import CLIP_NAME_RULE, is_valid_clip_name
 from hobble.models import DEFAULT, model
@@ -38,7 +38,7 @@ def _channel(name: str) -> str:
 Name = Annotated[str, Field(pattern=r"^[A-Za-z0-9][A-Za-z0-9_.-]{0,99}$")]
 ClipName = Annotated[str, AfterValidator(_clip_name)]
 ChannelName = Annotated[str, AfterValidator(_channel)]
-OLD_KEYS = {key: one.name for one in every() for key in one.old_keys}
+OLD_KEYS = {key: one.name for one in all_channels() for key in one.old_keys}
 WALKER_KEYS = ("recipe", "share")  # keys of a clip that only the generator of synthetic clips reads
 
 

@@ -163,7 +163,7 @@ def test_windows_hold_straight_walking_with_one_injury(hurtable) -> None:
 
 
 def test_without_sides_both_legs_are_one_class(holden31: Skeleton) -> None:
-    parts = module.sides_of(holden31)
+    parts = module.parts_of_classes(holden31)
     assert parts("LeftUpLeg-LeftLeg") == parts("RightUpLeg-RightLeg") == ("thigh",)
     assert parts("RightLeg-RightFoot and LeftForeArm-LeftHand") == ("forearm", "shank")
     assert parts(HEALTHY) == () != parts("LowerBack-Spine")
