@@ -74,7 +74,7 @@ class Dataset(s.Section):
     extends: Name | None = None
     skeleton: Name
     source: Name | None = Field(None, description="the data set whose generated source files are read")
-    folder: s.Inside | None = Field(None, description="folder of the BVH files, inside the mocap folder")
+    folder: s.MocapPath | None = Field(None, description="folder of the BVH files, inside the mocap folder")
     download: s.Download | None = Field(None, description="address of clips that are not in the folder")
     clips: dict[ClipName, ClipEntry | None] = Field(
         default_factory=dict, description="clips by name; empty: every .bvh in the folder and its subfolders"

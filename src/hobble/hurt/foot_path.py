@@ -9,12 +9,11 @@ import itertools
 from dataclasses import dataclass, field
 
 import numpy as np
-from scipy.ndimage import maximum_filter1d
 
 from hobble.core import quat
 from hobble.core.curve_value import value_at
 from hobble.core.quat import Array
-from hobble.core.smooth import gaussian
+from hobble.core.smooth import gaussian, smooth_above
 from hobble.hurt.body_parts import SIDES
 from hobble.hurt.effects import Effects
 from hobble.hurt.healthy_clip import UP, HealthyClip, SourceStance
@@ -177,10 +176,3 @@ def _moved(
     width = value_at(effects.sided["width"][near].max(axis=1), when - near.start) * source.leg / 2
     outward = quat.rotate(source.heading[at], np.array([SIGN[side] * width, 0.0, 0.0]))
     return path.moved(place, when) + np.array([ahead[0], 0.0, ahead[1]]) + outward
-
-
-def smooth_above(values: Array, frames: int) -> Array:
-    """(F,) a smooth curve that is nowhere below `values` (F,): their running maximum, smoothed."""
-    wide = maximum_filter1d(values, 4 * frames + 1, mode="nearest")
-    kernel = np.convolve(np.ones(2 * frames + 1), np.ones(2 * frames + 1))
-    return np.convolve(np.pad(wide, 2 * frames, mode="edge"), kernel / kernel.sum(), mode="valid")

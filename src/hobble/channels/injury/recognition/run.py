@@ -205,8 +205,8 @@ def run(inputs: MeasureInputs, options: SampleOptions) -> Outcome:
     """recognition.json, and all its confusion tables as one table."""
     # Generated hurt versions are left out: the classifier would learn the generator's table of injuries.
     clips = {clip: file for clip, file in inputs.clips.items() if not VERSION.search(clip)}
-    facts = [file for file in inputs.facts if file.stem in clips]
-    sample = sample_of(replace(inputs, facts=facts), options)
+    summaries = [file for file in inputs.summaries if file.stem in clips]
+    sample = sample_of(replace(inputs, summaries=summaries), options)
     result = recognition(
         load_network(inputs.weights),
         captured_motion(clips, sample),
