@@ -104,9 +104,9 @@ def amounts(part: str) -> dict[str, float | Array]:
     """Name -> change, for a part that is hurt on the right at severity 10.
 
     Names are those of ADDED_CHANGES, where a ratio is given as what is added to 1, and these. `arm`,
-    `arm_sound`: ratios of the arms' swing. `off`, `off_sound`, `land_sound`: cycles by which a foot leaves and lands
-    later. `step`: ratio of the step onto the hurt foot, minus that of a body that is only slower. `width`:
-    leg lengths by which steps are wider. `curves`: (5, 5) factors of the CURVES (see `Profile`).
+    `arm_sound`: ratios of the arms' swing. `off`, `off_sound`, `land_sound`: cycles by which a foot leaves
+    and lands later. `step`: ratio of the step onto the hurt foot, minus that of a body that is only slower.
+    `width`: leg lengths by which steps are wider. `curves`: (5, 5) factors of the CURVES (see `Profile`).
     """
     own = dict(ADDED_CHANGES[part])
     out: dict[str, float | Array] = {"curves": np.zeros((len(CURVES), 1 + 2 * HARMONICS))}

@@ -43,10 +43,10 @@ class HealthyClip:
     """A healthy clip of F frames and its measurements. Pairs are left and right.
 
     stances: those of each foot in order, at least one. swinging: (F, 2) whether a foot swings. swing: (F, 2)
-    rises from 0 to 1 and falls back to 0 over a swing. phase: (F,) cycles, unwrapped; whole numbers as the right
-    foot lands. walking: (F,) from 0 to 1, where 1 means that the phase is known. jog: (F,) share. cycle: (F,)
-    length in frames of the cycle around each frame. path: (F, 2) horizontal path of the hips, x and z, cm.
-    heading: (F, 4) rotation about Y of the pelvis. leg: cm from hip to ankle of a straight leg.
+    rises from 0 to 1 and falls back to 0 over a swing. phase: (F,) cycles, unwrapped; whole numbers as the
+    right foot lands. walking: (F,) from 0 to 1, where 1 means that the phase is known. jog: (F,) share.
+    cycle: (F,) length in frames of the cycle around each frame. path: (F, 2) horizontal path of the hips, x
+    and z, cm. heading: (F, 4) rotation about Y of the pelvis. leg: cm from hip to ankle of a straight leg.
     """
 
     clip: Clip
