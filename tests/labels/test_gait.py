@@ -93,7 +93,7 @@ def test_a_short_walk_before_a_jog_counts_as_jog():
     gait = np.array([g.STAND] * 20 + [g.WALK] * 40 + [g.JOG] * 20 + [g.WALK] * 30 + [g.CROUCH] * 5)
     out = g._without_passages(gait, clearly(gait))
     assert out.tolist() == [g.STAND] * 40 + [g.JOG] * 40 + [g.WALK] * 30 + [g.CROUCH] * 5
-    longer = np.array([g.STAND] * 5 + [g.WALK] * (g.LONGEST_PASSAGE + 1) + [g.JOG] * 5)
+    longer = np.array([g.STAND] * 5 + [g.WALK] * (g.LONGEST_SHORT_WALK + 1) + [g.JOG] * 5)
     assert (g._without_passages(longer, clearly(longer)) == longer).all()
 
 
