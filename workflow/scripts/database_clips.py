@@ -6,7 +6,7 @@ from hobble.core.files import load_npz
 from hobble.database.options import RowOptions
 from hobble.rows.build_rows import clip_rows
 from hobble.rows.clip_rows import save_clip_rows
-from hobble.rows.clip_summary import save_summary, summary_of_rows
+from hobble.rows.summary import save_summary, summary_of_rows
 from hobble.workflow.batch_job import make_each
 
 

@@ -12,7 +12,7 @@ from hobble.measures.inputs import Json, MeasureInputs
 from hobble.measures.sample_options import SampleOptions
 from hobble.measures.stratified_sample import Sample, draw_sample
 from hobble.rows.clip_rows import ClipRows, load_clip_rows
-from hobble.rows.clip_summary import load_summary
+from hobble.rows.summary import load_summary
 from hobble.rows.excerpts import LONGEST, Excerpt, load_excerpt
 
 

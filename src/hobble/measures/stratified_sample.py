@@ -22,7 +22,7 @@ from typing import Any
 import numpy as np
 
 from hobble.measures.results import SampleSize
-from hobble.rows.clip_summary import ClipSummary
+from hobble.rows.summary import RowsSummary
 from hobble.rows.excerpts import Excerpt, ExcerptKind
 
 LEAST = 2  # fewest excerpts drawn from a stratum, because the variance needs two
@@ -99,7 +99,7 @@ def _variance(stratum: Stratum, values: Mapping[Excerpt, float]) -> float:
     return float((1 - n / stratum.count) * (off**2).sum() / (n - 1) / n)
 
 
-def draw_sample(summaries: Iterable[ClipSummary], splits: Mapping[str, str], frames: int) -> Sample | None:
+def draw_sample(summaries: Iterable[RowsSummary], splits: Mapping[str, str], frames: int) -> Sample | None:
     """A sample of about `frames` rows; None if all clips together have no more.
 
     The same clips give the same sample, and one more clip changes it only a little.
