@@ -178,10 +178,10 @@ def measure(folder: Path, memory_mb: int, rounds: int) -> None:
 
 def main() -> None:
     args = arguments(__doc__.splitlines()[0], rounds=5).parse_args()
-    print(processor())
     if args.task:
         globals()[f"task_{args.task}"](args.folder, args.argument)
         return
+    print(processor())
     folder = Path(tempfile.mkdtemp(prefix="hobble-maps-", dir=args.folder))
     try:
         files = made_up(folder / "clips", args.size_mb << 20, 31)

@@ -228,9 +228,9 @@ def test_all_excerpts_of_a_clip_together_measure_what_the_clip_does(tmp_path):
     rolled = measure_roll_outs(*given, lengths=(1, 20), sample=sample)
     every = measure_roll_outs(*given, lengths=(1, 20))
     assert rolled["lengths"][0]["clips"] == [pytest.approx(every["lengths"][0]["clips"][0])]
-    # Starts in steps of 5: at 1, 6, ... in the clip, at 1, 40, 80, ... in the excerpts.
-    assert every["lengths"][1]["train"]["ended"] == 20
-    assert rolled["lengths"][1]["train"]["ended"] == 8 + 8 + 4
+    # Starts in steps of 10: at 1, 11, ... in the clip, at 1, 11, ..., 40, 50, ..., 80, ... in the excerpts.
+    assert every["lengths"][1]["train"]["ended"] == 10
+    assert rolled["lengths"][1]["train"]["ended"] == 4 + 4 + 2
 
 
 def test_facts_of_a_clip_survive_their_file(tmp_path):

@@ -48,7 +48,7 @@ class RawRows(NamedTuple):
     """n rows before composing, standardised float32: x (n, X without terrain), y (n, Y), p (n,) phase.
 
     fits: (m, columns) of all terrain fits of these rows: heights, then the lift in cm (see
-    `hobble.database.split`). first: (n,) index of each row's first fit.
+    `hobble.database.standardise`). first: (n,) index of each row's first fit.
     """
 
     x: Array

@@ -27,11 +27,11 @@ SCALARS = (
     "step_L",
     "step_width",
 )
-SLOW = 0.35  # share of the walking speed; an ankle that is slower stands
+STANDING_SPEED = 0.35  # share of the walking speed; an ankle that is slower stands
 SHORTEST, LONGEST = 0.4, 3.5  # s, a cycle
 LEAST_TRAVEL = 0.2  # leg lengths that the hips travel in a cycle; less is standing
 LEAST_SWING = 0.12  # leg lengths that an ankle moves at least in a step, forward and then back
-LEAST_TURN = 0.4  # the same as a share of the ankle's range; smaller movements are no step
+LEAST_SWING_SHARE = 0.4  # the same as a share of the ankle's range; smaller movements are no step
 STRAIGHT = 25.0  # degrees that the path turns at most in a cycle; people were measured on straight paths
 AHEAD = 0.7  # least mean cosine between facing and travel; below it the walk is backward or sideways
 
@@ -100,10 +100,11 @@ def joined(walks: Iterable[WalkCycles]) -> WalkCycles:
 def landings(forward: Array, fps: float) -> list[int]:
     """Frames in which an ankle is furthest ahead of the hips. forward: (F,) how far, in leg lengths.
 
-    The ankle must then go back by LEAST_SWING, and by LEAST_TURN of its range in the LONGEST seconds around.
+    The ankle must then go back by LEAST_SWING, and by LEAST_SWING_SHARE of its range in the LONGEST seconds
+    around.
     """
     reach = int(LONGEST * fps / 2)
-    least = np.maximum(LEAST_SWING, LEAST_TURN * _ranges(forward, reach))
+    least = np.maximum(LEAST_SWING, LEAST_SWING_SHARE * _ranges(forward, reach))
     found: list[int] = []
     high = low = 0
     rising = True
@@ -141,7 +142,7 @@ def _cycle(walk: Signals, a: int, other: int, b: int) -> Cycle:
     seconds = (b - a) / walk.fps
     speed = float(np.linalg.norm(walk.hips[b] - walk.hips[a])) / seconds
     apart = walk.curves["ankle_forward_R"] - walk.curves["ankle_forward_L"]
-    standing = {side: float(np.mean(walk.ankle_speed[side][a:b] < SLOW * speed)) for side in "LR"}
+    standing = {side: float(np.mean(walk.ankle_speed[side][a:b] < STANDING_SPEED * speed)) for side in "LR"}
     width = [walk.across["L"][i] - walk.across["R"][i] for i in (a, other)]
     values = (
         seconds,

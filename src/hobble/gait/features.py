@@ -12,7 +12,7 @@ import numpy as np
 from hobble.gait.profile import Profile
 
 LEAST_RANGE = 3.0  # degrees: smaller ranges are raised to this, because ratios of tiny ranges are arbitrary
-MOST = 5.0  # larger ratios are limited to this
+MOST_RATIO = 5.0  # larger ratios are limited to this
 TRUNK_FORWARD, TRUNK_LEFT = "mean trunk_forward", "mean trunk_left"
 TRUNK = (TRUNK_FORWARD, TRUNK_LEFT, "range trunk_forward", "range trunk_left")
 ARMS = "range arm_forward R - L"
@@ -30,7 +30,7 @@ def features(walk: Profile, healthy: Profile) -> dict[str, float]:
 
     def share(name: str) -> float:
         own, other = walk[f"range {name}"], healthy[f"range {name}"]
-        return min(max(own, LEAST_RANGE) / max(other, LEAST_RANGE), MOST)
+        return min(max(own, LEAST_RANGE) / max(other, LEAST_RANGE), MOST_RATIO)
 
     def sides(name: str) -> float:
         return change(f"{name}_R") - change(f"{name}_L")
@@ -46,7 +46,7 @@ def features(walk: Profile, healthy: Profile) -> dict[str, float]:
     for part in ("knee_flexion", "hip_flexion"):
         out[f"range {part} R - L"] = share(f"{part}_R") - share(f"{part}_L")
     arms = np.log(share("arm_forward_R") / share("arm_forward_L"))
-    out[ARMS] = float(np.clip(arms, -np.log(MOST), np.log(MOST)))
+    out[ARMS] = float(np.clip(arms, -np.log(MOST_RATIO), np.log(MOST_RATIO)))
     for part in ("knee_flexion", "hip_flexion", "hip_abduction"):
         out |= {f"mean {part} {side}": change(f"mean {part}_{side}") for side in "RL"}
     for part in ("trunk_forward", "trunk_left", "pelvis_left_up"):

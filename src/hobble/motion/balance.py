@@ -19,9 +19,11 @@ from hobble.motion.rig import leg_length
 from hobble.motion.root import facing
 
 GRAVITY = 981.0  # cm / s2
-# Share of the body's mass, ends of the segment, and where between them its centre is (de Leva 1996).
+# Shares of the body's mass, and where the centres of mass of the body's segments are (de Leva 1996): that of
+# the trunk between the hips (0) and the shoulders (1), that of the head at its joint.
 TRUNK, TRUNK_CENTRE = 0.4346, 0.55
 HEAD = 0.0694
+# Segments on each side: share of the mass, the joints at both ends, and where between them the centre is.
 SEGMENTS = (
     (0.0271, "shoulder", "elbow", 0.577),
     (0.0162, "elbow", "wrist", 0.457),
@@ -30,25 +32,27 @@ SEGMENTS = (
     (0.0433, "knee", "heel", 0.446),
     (0.0137, "heel", "toe", 0.5),
 )
-SMOOTH = 0.04  # seconds, standard deviation, before accelerations are taken
-SLOW = 0.4  # leg lengths a second: ball of a standing foot; ball and heel of a swinging one are faster
-UPRIGHT = 0.6  # leg lengths: hips of a figure that does not sit or kneel are higher above the foot
-SHORTEST = 0.06  # seconds on each foot
+SMOOTH = 0.04  # seconds: positions are smoothed by a Gaussian of this width before accelerations are taken
+# Leg lengths a second. The ball of a standing foot is slower. Ball and heel of a swinging foot are faster.
+SLOW = 0.4
+UPRIGHT = 0.6  # leg lengths: the hips of a figure that does not sit or kneel are further above the ankle
+SHORTEST = 0.06  # least number of seconds that the figure stands on each foot alone
 SIDES = ("left", "right")
-# Where the force acts between ankle (0) and ball (1), by the speed forward (over the root of gravity times
-# leg length). Means over 172 clips of CMU, styles, patients, Ferre et al. and the original release.
+# The point between ankle (0) and ball (1) at which the ground's force acts, at three speeds forward (divided
+# by the square root of gravity times leg length). Means over 172 clips of CMU, styles, patients, Ferre et al.
+# and the original release.
 SPEEDS, PRESSED = (-0.1, 0.0, 0.1), (0.45, 0.25, 1.0)
-# Degrees that runners seem to lean further forward than they do, by the same speed, in those clips.
+# In those clips, runners seem to balance further forward than they do: by LEAN degrees at the speeds RUNS.
 RUNS, LEAN = (0.5, 0.9), (0.0, 3.5)
 
 
 @dataclass(frozen=True)
 class Balance:
-    """Which way the body balances. up: (2,) x and z of a unit vector against gravity. In 172 clips its error
-    is 1 degree to the side and 1.9 forward (standard deviations), and twice that in short clips.
+    """The direction against gravity, by how the body balances.
 
-    left: (2,) mean direction to the body's left. seconds: how long the figure stood on the foot that stood
-    less.
+    up: (2,) its x and z for y = 1. In 172 clips the error is 1 degree to the side and 1.9 forward (standard
+    deviations), and twice that in short clips. left: (2,) x and z of the mean direction to the body's left.
+    seconds: how long the figure stood on one foot alone, for the foot with less of that.
     """
 
     up: Array
@@ -57,12 +61,17 @@ class Balance:
 
     @property
     def aside(self) -> float:
-        """Degrees by which it differs from Y to the left."""
+        """Degrees by which the direction against gravity differs from Y to the body's left."""
         return float(np.degrees(np.arcsin(np.clip(self.up @ self.left, -1.0, 1.0))))
 
 
 class _Moving(NamedTuple):
-    """at: role -> (F, 3). ahead: (F, 3). speed: (F,) forward. centre, push: (F, 3)."""
+    """What the balance of a body depends on, in F frames.
+
+    at: role -> (F, 3) positions, cm. ahead: (F, 3) unit vectors in which the body faces. speed: (F,) forward,
+    divided by the square root of gravity times leg length. centre: (F, 3) centre of mass, cm. push: (F, 3)
+    its acceleration, divided by gravity plus the vertical acceleration.
+    """
 
     at: dict[str, Array]
     ahead: Array
@@ -72,7 +81,7 @@ class _Moving(NamedTuple):
 
 
 def balance(clip: Clip) -> Balance | None:
-    """Which way the body balances, or None if it does not step with both feet."""
+    """The direction against gravity, or None if the body does not stand long enough on each foot alone."""
     fps, leg = clip.fps, leg_length(clip.skeleton)
     reach = max(1, round(fps / 20))
     if len(clip) < 4 * reach + 3:
@@ -116,11 +125,12 @@ def centre_of_mass(at: dict[str, Array]) -> Array:
 
 
 def _up(moving: _Moving, side: str) -> Array:
-    """(F, 2) x and z of the direction against gravity, while that foot stands alone."""
+    """(F, 2) x and z of the direction against gravity for y = 1, right while this foot stands alone."""
     heel, bone = moving.at[f"{side}_heel"], moving.at[f"{side}_toe"] - moving.at[f"{side}_heel"]
     pressed = np.interp(moving.speed, SPEEDS, PRESSED)[:, None]
     level = np.linalg.norm(bone * [1, 0, 1], axis=-1, keepdims=True)
-    # Across the foot, the force acts beside the middle of its bone.
+    # Along where the body faces, the force acts at the share `pressed` of the way from ankle to ball.
+    # Sideways it acts at the share `middle`.
     middle = 0.6
     foot = heel + middle * bone + (pressed - middle) * level * moving.ahead
     arm = moving.centre - foot
@@ -129,13 +139,13 @@ def _up(moving: _Moving, side: str) -> Array:
 
 
 def _mean(values: Array) -> Array:
-    """(2,) mean of (N, 2) without the highest and the lowest tenth."""
+    """(2,) mean of values (N, 2), in each column without the highest and the lowest tenth."""
     low, high = np.quantile(values, [0.1, 0.9], axis=0)
     inside = (values >= low) & (values <= high)
     return np.asarray((values * inside).sum(axis=0) / inside.sum(axis=0))
 
 
 def _speed(place: Array, reach: int) -> Array:
-    """(F,) cm a frame of a point (F, 3), over `reach` frames on each side."""
+    """(F,) speed of a point (F, 3) in cm a frame, from `reach` frames before to `reach` frames after."""
     steps = np.linalg.norm(place[2 * reach :] - place[: -2 * reach], axis=-1) / (2 * reach)
     return np.pad(steps, reach, mode="edge")

@@ -27,7 +27,7 @@ class RootFrames:
     position: (F, 2) x and z of the hips, cm, not smoothed. direction: (F, 3) unit facing direction,
     horizontal, smoothed. rotation: (F, 4) world to root: the turn about Y that takes `direction` to +Z. turn:
     (F - 1,) radians from each frame to the next, with the sign of the network's output: it is the turn of
-        the world seen from the root, so the runtime applies its negative.
+    the world seen from the root, so the runtime applies its negative.
     """
 
     position: Array = field(repr=False)

@@ -1,7 +1,7 @@
 """Chooses the poses that show how the pelvis is turned against the spine.
 
-That is seen in upright poses, where the spine is about straight. In a bow or a squat it bends, and its
-directions would tilt the pelvis.
+Upright poses show it, because the spine is about straight in them. In a bow or a squat the spine bends, and
+if it were taken for straight, the pelvis would come out tilted.
 """
 
 from __future__ import annotations
@@ -13,16 +13,18 @@ from hobble.motion.body import SIDES
 from hobble.motion.body_sample import BodySample
 from hobble.motion.orient import unit
 
-STRETCHED = 0.8  # one leg of an upright figure is longer than this share of its length
-LEANS = 25.0  # degrees: an upright trunk leans less
-STOOPS = 40.0  # degrees: a sprinter's trunk leans up to 35, but its spine is straight
-SPREAD = 10.0  # degrees: of the upright frames, those count that lean at most this much more than the others
-FEWEST = 0.05  # share of the frames
-OFF = 3.0  # cm: mean distance of hips and head in clips of bows and squats
+STRETCHED = 0.8  # in one leg of an upright figure, hip and ankle are this share of its length apart, or more
+LEANS = 25.0  # degrees: the trunk of an upright figure leans less
+STOOPS = 40.0  # degrees: a figure whose trunk leans more stoops; a sprinter's straight trunk leans up to 35
+# Share of the frames that must be upright. The most upright frames of this share set a limit: the frames that
+# lean at most SPREAD degrees more are the sample.
+FEWEST = 0.05
+SPREAD = 10.0
+OFF = 3.0  # cm: mean error of where hips and head are, in clips of bows and squats
 
 
 def trunk_sample(seen: BodySample, zero: bool) -> BodySample:
-    """The upright frames. Without them the zero pose, if it stands, else all frames.
+    """The upright frames of a sample. If there are too few: the zero pose if it stands, else all.
 
     zero: whether a person could stand in the zero pose.
     """
@@ -33,7 +35,10 @@ def trunk_sample(seen: BodySample, zero: bool) -> BodySample:
 
 
 def stoop_doubt(seen: BodySample, zero: bool) -> str | None:
-    """A sentence if the figure always stoops or squats and no zero pose shows its pelvis, else None."""
+    """A sentence if the figure always stoops or squats and nobody could stand in its zero pose, else None.
+
+    zero: whether a person could stand in the zero pose.
+    """
     if zero or np.mean(_leans(seen) < STOOPS) >= FEWEST:
         return None
     return (
@@ -43,7 +48,7 @@ def stoop_doubt(seen: BodySample, zero: bool) -> str | None:
 
 
 def _leans(seen: BodySample) -> Array:
-    """(S,) degrees by which the trunk leans. 180 where no leg is stretched."""
+    """(S,) degrees between the trunk and the vertical; 180 in frames in which no leg is stretched."""
     body = seen.body
     shoulders, hips = (
         seen.at[:, limbs["left"][k]] + seen.at[:, limbs["right"][k]]

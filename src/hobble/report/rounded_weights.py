@@ -16,7 +16,7 @@ from hobble.report.straight_walk import walk_straight
 from hobble.runtime.options import Runtime
 
 GROUP = 64  # columns that share a factor; with one factor for the whole row the error is twice as large
-MOST = 127
+MOST = 127  # largest rounded weight
 WARM_UP, MEASURED = 60, 180  # frames of walking to get up to speed, and frames that are measured
 
 
@@ -40,7 +40,7 @@ def has_weights(spec: Mapping[str, Any]) -> bool:
 def rounding_error(network: Network, runtime: Runtime) -> float:
     """The mean error of a predicted joint with weights of 8 bits, cm, over 3 s of a walk.
 
-    The network must have `weights`, see `has_weights`.
+    The network must have `weights`, as those have for which `has_weights` is true.
     """
     weights: Any = network.weights  # type: ignore[attr-defined]
     there = type(weights)(_of_groups(*_in_groups(w), w.shape) for w in weights)
@@ -86,6 +86,6 @@ def _in_groups(weights: Array) -> tuple[Array, Array]:
 
 
 def _of_groups(integers: Array, factors: Array, shape: tuple[int, ...]) -> Array:
-    """The weights, with this shape, from the result of `_in_groups`."""
+    """The weights from the result of `_in_groups`. shape: theirs before they were grouped."""
     whole = (integers * factors[..., None]).reshape(*shape[:-1], -1)
     return np.ascontiguousarray(whole[..., : shape[-1]], np.float32)

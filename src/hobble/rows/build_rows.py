@@ -47,24 +47,7 @@ def clip_rows(
     _check(name, clip, labels, channels, terrain, frame)
     root = root_frames(clip, facing_sigma)
     path, here = continued(root, window), frame + window
-    position, velocity, rotation = local_pose(clip, root)
-    x = [
-        *trajectory(path, here, here, layout.offsets),
-        gait_columns(labels["gait"], frame, layout.offsets),
-        position[frame - 1],
-        velocity[frame - 1],
-    ]
-    hips = skeleton.role("hips")
-    y = [
-        velocity[frame, hips][:, [0, 2]],
-        root.turn[frame],
-        phase_change(labels["phase"])[frame],
-        labels["contacts"][frame],
-        *trajectory(path, here + 1, here + 1, layout.offsets[layout.future :]),
-        position[frame],
-        velocity[frame],
-        rotation[frame],
-    ]
+    x, y = _columns(labels, layout, frame, (path, here), root, local_pose(clip, root), skeleton.role("hips"))
     centre = terrain["heights"][:, layout.samples : 2 * layout.samples]
     mean = centre.mean(axis=1, dtype=np.float64)
     return ClipRows(
@@ -82,6 +65,41 @@ def clip_rows(
         mean=mean,
         visits=terrain["patch"].shape[1],
     )
+
+
+def _columns(
+    labels: Arrays,
+    layout: RowLayout,
+    frame: np.ndarray,
+    path: tuple[RootFrames, np.ndarray],
+    root: RootFrames,
+    pose: tuple[Array, Array, Array],
+    hips: int,
+) -> tuple[list[Array], list[Array]]:
+    """The parts of X (without the ground) and of Y in the rows of the frames `frame` (R,), in their order.
+
+    path: the root that moves on past the ends of the clip, and the places (R,) of the frames on it. pose: of
+    all frames, in the root frame, see `local_pose`.
+    """
+    going, here = path
+    position, velocity, rotation = pose
+    x = [
+        *trajectory(going, here, here, layout.offsets),
+        gait_columns(labels["gait"], frame, layout.offsets),
+        position[frame - 1],
+        velocity[frame - 1],
+    ]
+    y = [
+        velocity[frame, hips][:, [0, 2]],
+        root.turn[frame],
+        phase_change(labels["phase"])[frame],
+        labels["contacts"][frame],
+        *trajectory(going, here + 1, here + 1, layout.offsets[layout.future :]),
+        position[frame],
+        velocity[frame],
+        rotation[frame],
+    ]
+    return x, y
 
 
 def cycle_frames(cycles: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

@@ -146,21 +146,23 @@ def blend_future(smoothed: Smoothed, path: Trajectory) -> None:
     position, direction, gait = path
     length = position.shape[1]
     middle = length // 2
+    shares = np.empty((2, length))  # of the target, for the position and for the direction
     for c in range(position.shape[0]):
-        bias_position = 0.5 + 0.5 * strafe[c]
-        bias_direction = 2.0 - 1.5 * strafe[c]
+        # Powers take half of the time of this function, and most characters of a crowd strafe equally (by 0).
+        if c == 0 or strafe[c] != strafe[c - 1]:
+            for i in range(middle + 1, length):
+                left = 1.0 - (i - middle) / middle
+                shares[0, i] = 1.0 - left ** (0.5 + 0.5 * strafe[c])
+                shares[1, i] = 1.0 - left ** (2.0 - 1.5 * strafe[c])
         goal = np.arctan2(facing[c, 0], facing[c, 1])
         old_x, old_z = position[c, middle]
         for i in range(middle + 1, length):
-            left = 1.0 - (i - middle) / middle
-            share = 1.0 - left**bias_position
             step_x, step_z = position[c, i, 0] - old_x, position[c, i, 1] - old_z
             old_x, old_z = position[c, i]
-            position[c, i, 0] = position[c, i - 1, 0] + step_x + share * (velocity[c, 0] - step_x)
-            position[c, i, 1] = position[c, i - 1, 1] + step_z + share * (velocity[c, 1] - step_z)
-            share = 1.0 - left**bias_direction
+            position[c, i, 0] = position[c, i - 1, 0] + step_x + shares[0, i] * (velocity[c, 0] - step_x)
+            position[c, i, 1] = position[c, i - 1, 1] + step_z + shares[0, i] * (velocity[c, 1] - step_z)
             yaw = np.arctan2(direction[c, i, 0], direction[c, i, 1])
-            yaw += share * wrap(goal - yaw)
+            yaw += shares[1, i] * wrap(goal - yaw)
             direction[c, i, 0], direction[c, i, 1] = np.sin(yaw), np.cos(yaw)
             for k in range(gait.shape[2]):
                 gait[c, i, k] = gait[c, middle, k]

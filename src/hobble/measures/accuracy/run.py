@@ -237,10 +237,10 @@ def joint_indices(network: Network, names: Sequence[str] | None = None) -> list[
         return list(range(network.layout.joints))
     if network.skeleton is None:
         raise HobbleError("The network's file names no joints, so none can be chosen.")
-    clip_parts = [i for i, name in enumerate(network.skeleton.joints) if name in names]
-    if not clip_parts:
+    indices = [i for i, name in enumerate(network.skeleton.joints) if name in names]
+    if not indices:
         raise HobbleError(f"None of {', '.join(names)} is a joint of {network.skeleton.name}.")
-    return clip_parts
+    return indices
 
 
 def check_layout(where: str | Path, rows: ClipRows, network: Network) -> None:

@@ -1,6 +1,6 @@
 // The gait cycles of a walk and their measures, as in `hobble.gait.cycles` and `hobble.gait.profile`. A foot lands when
 // its ankle is furthest ahead of the hips.
-import { LIMBS, MIDDLE, SIDES, SIGNED, median, mirroredSignals, signals } from "./signals.js";
+import { LIMBS, MIDDLE, SIDES, SIGN_CHANGES, median, mirroredSignals, signals } from "./signals.js";
 
 const SAMPLES = 50;
 const SCALARS = ["stride_seconds", "speed_per_leg", "left_strike_phase", "stance_share_R", "stance_share_L", "step_R", "step_L", "step_width"];
@@ -90,7 +90,7 @@ const ofCycles = (some) => {
 
 const mirroredProfile = (values) => Object.fromEntries(Object.keys(values).map((name) => {
   if (name === "left_strike_phase") return [name, 1 - values[name]];
-  if (SIGNED.some((curve) => name === `mean ${curve}`)) return [name, -values[name]];
+  if (SIGN_CHANGES.some((curve) => name === `mean ${curve}`)) return [name, -values[name]];
   const across = name.endsWith("_R") ? `${name.slice(0, -1)}L` : name.endsWith("_L") ? `${name.slice(0, -1)}R` : name;
   return [name, values[across]];
 }));

@@ -1,4 +1,5 @@
-// A button that records a canvas as a film until it is pressed again.
+// A button that records a canvas as a film until it is pressed again. name(): the name of the film's file,
+// without its ending.
 import { save } from "./base.js";
 
 export const film = (button, canvas, name) => {

@@ -4,7 +4,7 @@ import { measureWalk, profile } from "./cycles.js";
 import { bytes } from "./numbers.js";
 
 const LEAST_RANGE = 3; // degrees; smaller ranges are set to this, so that a ratio of two ranges stays meaningful
-const MOST = 5; // larger ratios are set to this
+const MOST_RATIO = 5; // larger ratios are set to this
 export const SECONDS = 3; // of motion that are used; within two seconds, half of all limps have no whole cycle of both legs
 
 const clip = (v, low, high) => Math.min(Math.max(v, low), high);
@@ -12,7 +12,7 @@ const clip = (v, low, high) => Math.min(Math.max(v, low), high);
 // About twenty features that distinguish limps, by name, in the same order as in Python.
 export const features = (walk, healthy) => {
   const change = (name) => walk[name] - healthy[name], sides = (name) => change(`${name}_R`) - change(`${name}_L`);
-  const share = (name) => Math.min(Math.max(walk[`range ${name}`], LEAST_RANGE) / Math.max(healthy[`range ${name}`], LEAST_RANGE), MOST);
+  const share = (name) => Math.min(Math.max(walk[`range ${name}`], LEAST_RANGE) / Math.max(healthy[`range ${name}`], LEAST_RANGE), MOST_RATIO);
   const out = {
     "stance L - R": -sides("stance_share"),
     "left landing": change("left_strike_phase"),
@@ -22,7 +22,7 @@ export const features = (walk, healthy) => {
     "range ankle_height R - L": sides("range ankle_height"),
   };
   for (const part of ["knee_flexion", "hip_flexion"]) out[`range ${part} R - L`] = share(`${part}_R`) - share(`${part}_L`);
-  out["range arm_forward R - L"] = clip(Math.log(share("arm_forward_R") / share("arm_forward_L")), -Math.log(MOST), Math.log(MOST));
+  out["range arm_forward R - L"] = clip(Math.log(share("arm_forward_R") / share("arm_forward_L")), -Math.log(MOST_RATIO), Math.log(MOST_RATIO));
   for (const part of ["knee_flexion", "hip_flexion", "hip_abduction"]) for (const side of "RL") out[`mean ${part} ${side}`] = change(`mean ${part}_${side}`);
   for (const part of ["trunk_forward", "trunk_left", "pelvis_left_up"]) for (const kind of ["range", "mean"]) out[`${kind} ${part}`] = change(`${kind} ${part}`);
   return out;

@@ -6,7 +6,7 @@ export const SIDES = ["L", "R"];
 const NAMES = { L: "left", R: "right" };
 export const LIMBS = ["hip_flexion", "hip_abduction", "knee_flexion", "ankle_height", "ankle_forward", "arm_forward"];
 export const MIDDLE = ["trunk_forward", "trunk_left", "pelvis_left_up"];
-export const SIGNED = ["trunk_left", "pelvis_left_up"]; // they change their sign in a mirror
+export const SIGN_CHANGES = ["trunk_left", "pelvis_left_up"]; // they change their sign in a mirror
 const TRAVEL = .5; // s, sigma of the smoothing; the smoothed velocity of the hips is the direction of travel
 
 const degrees = (a, b) => Math.atan2(a, b) * 180 / Math.PI;
@@ -105,7 +105,7 @@ const unwrapped = (angles) => {
 export const mirroredSignals = (walk) => {
   const curves = {}, other = { L: "R", R: "L" };
   for (const limb of LIMBS) for (const side of SIDES) curves[`${limb}_${side}`] = walk.curves[`${limb}_${other[side]}`];
-  for (const name of MIDDLE) curves[name] = SIGNED.includes(name) ? walk.curves[name].map((v) => -v) : walk.curves[name];
+  for (const name of MIDDLE) curves[name] = SIGN_CHANGES.includes(name) ? walk.curves[name].map((v) => -v) : walk.curves[name];
   return {
     ...walk, curves,
     heading: walk.heading.map((v) => -v),
