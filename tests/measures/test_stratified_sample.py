@@ -16,9 +16,9 @@ from hobble.measures.rollouts.page import rollout_chart
 from hobble.measures.rollouts.run import measure_roll_outs
 from hobble.measures.stratified_sample import LEAST, Sample, Stratum, draw_sample
 from hobble.rows.clip_rows import save_clip_rows
-from hobble.rows.summary import RowsSummary, load_summary, save_summary, summary_of_rows
 from hobble.rows.excerpts import LONGEST, Excerpt, ExcerptKind, excerpts, load_excerpt
 from hobble.rows.layout import GAITS
+from hobble.rows.summary import RowsSummary, load_summary, save_summary, summary_of_rows
 
 _spec = importlib.util.spec_from_file_location("of_accuracy", Path(__file__).with_name("test_accuracy.py"))
 assert _spec is not None

@@ -12,8 +12,8 @@ from hobble.measures.inputs import Json, MeasureInputs
 from hobble.measures.sample_options import SampleOptions
 from hobble.measures.stratified_sample import Sample, draw_sample
 from hobble.rows.clip_rows import ClipRows, load_clip_rows
-from hobble.rows.summary import load_summary
 from hobble.rows.excerpts import LONGEST, Excerpt, load_excerpt
+from hobble.rows.summary import load_summary
 
 
 @dataclass(frozen=True)

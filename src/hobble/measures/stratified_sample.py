@@ -22,8 +22,8 @@ from typing import Any
 import numpy as np
 
 from hobble.measures.results import SampleSize
-from hobble.rows.summary import RowsSummary
 from hobble.rows.excerpts import Excerpt, ExcerptKind
+from hobble.rows.summary import RowsSummary
 
 LEAST = 2  # fewest excerpts drawn from a stratum, because the variance needs two
 SPEEDS = 3  # ranges of speed into which each gait is divided
