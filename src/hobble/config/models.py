@@ -105,7 +105,7 @@ class Dataset(s.Section):
     @model_validator(mode="after")
     def _one_source(self) -> Dataset:
         if self.synthetic is None and self.folder is None:
-            raise ValueError("a data set needs `folder` (BVH files) or `synthetic` (the embedded walker)")
+            raise ValueError("a data set needs `folder` (BVH files) or `synthetic` (generated clips)")
         if self.synthetic is not None and not self.clips:
             raise ValueError("a synthetic data set lists its clips")
         if self.download is not None and not (self.folder and self.clips):
