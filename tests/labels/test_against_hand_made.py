@@ -97,7 +97,10 @@ def test_gaits_agree_with_hand_made_ones_on_95_of_100_frames(shared: Path, read,
 @pytest.mark.shared
 @pytest.mark.parametrize(
     "name",
-    ["07_01", "07_12", "08_05", "08_08", "09_12", "16_25", "105_10", "105_16", "105_25", "105_26", "03_02"],
+    [
+        *("07_01", "07_05", "07_12", "08_05", "08_08", "09_12", "16_25", "03_02"),
+        *("105_10", "105_15", "105_16", "105_22", "105_25", "105_26", "105_31"),
+    ],
 )
 def test_a_walk_always_has_a_foot_on_the_ground(shared: Path, read, name):
     """Without a given gait: walks, brisk walks, limps, and a walk on rough ground."""
@@ -107,7 +110,7 @@ def test_a_walk_always_has_a_foot_on_the_ground(shared: Path, read, name):
     assert walking.mean() > 0.6
     assert not (labels.gait.argmax(axis=1) == JOG).any()
     left, right = labels.contacts[walking, :2].any(axis=1), labels.contacts[walking, 2:].any(axis=1)
-    assert (left | right).mean() > 0.955  # over all walks of `cmu` it is .987
+    assert (left | right).mean() > 0.975  # over all walks of `cmu` it is .99
     assert 0.35 < left.mean() < 0.85
     assert 0.35 < right.mean() < 0.85
 

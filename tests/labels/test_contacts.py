@@ -78,3 +78,15 @@ def test_contacts_of_very_short_clips_have_the_right_shape(walker, frames):
         translations=clip.translations[:frames],
     )
     assert contacts(short, LabelOptions()).shape == (frames, 4)
+
+
+def test_a_dip_does_not_end_the_rest_of_a_stance(walker):
+    """A captured foot that pushes off may dip some centimetres below the floor."""
+    clip = walker()
+    standing = np.flatnonzero(stance(clip, LabelOptions())[:, 2])
+    middle = standing[len(standing) // 2]
+    away = np.abs(np.arange(len(clip)) - middle)
+    moved = clip.translations.copy()
+    moved[:, clip.skeleton.role("right_heel"), 1] -= 3.0 * np.exp(-0.5 * (away / 4.0) ** 2)
+    found = stance(replace(clip, translations=moved), LabelOptions())
+    assert found[(away > 8) & (away < 18), 2].all()

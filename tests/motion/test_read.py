@@ -82,6 +82,7 @@ VARIANTS = {
     "no newline at the end": lambda s: s.rstrip("\n"),
     "braces on the line": lambda s: s.replace("ROOT Hips\n{", "ROOT Hips {").replace("Leg\n\t{", "Leg {"),
     "lower case": lambda s: s.replace("Xposition", "xposition").replace("Frames:", "FRAMES:"),
+    "lower case section": lambda s: s.replace("MOTION", "motion"),
     "frames over several lines": lambda s: s.replace(" 5 6", "\n5 6"),
     "blank lines between": lambda s: s.replace("7 8 9\n", "7 8 9\n\n"),
 }

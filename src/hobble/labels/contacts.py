@@ -23,6 +23,9 @@ HEEL_HEIGHTS, TOE_HEIGHTS = (0.015, 0.02), (0.02, 0.035)
 SPEEDS, SHARES = (0.010, 0.020), (0.18, 0.30)
 # Leg lengths: a heel is in the air if it is this much higher above its toe than in the clip's flattest
 # stances.
+# A captured toe that pushes off may dip some centimetres below its stance. A stance is at most this share of
+# the height for landing below the median of its slow frames.
+DIPS = 0.8
 ON_TIPTOE = 0.03
 # Heights of a hip above its heel, leg lengths. A foot is held up if its leg is below the first and the other
 # leg is above the second.
@@ -96,7 +99,8 @@ def _find_stances(
         swing = min((speed[p] for p in (a, b) if 0 < p < len(speed)), default=0.0)
         slow, leaves = (max(limit, share * swing) for limit, share in zip(SPEEDS, SHARES, strict=True))
         h, v = height[a:b], speed[a:b]
-        levels.append(h[v <= max(slow, 1.2 * v.min())].min())
+        still = h[v <= max(slow, 1.2 * v.min())]
+        levels.append(max(still.min(), np.median(still) - DIPS * heights[0]))
         lands[a:b] = (h < levels[-1] + heights[0]) & (v < slow)
         stays[a:b] = (h < levels[-1] + heights[1]) & (v < leaves)
     down[:] = _stretches_with(stays | lands, lands)

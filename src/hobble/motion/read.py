@@ -92,7 +92,7 @@ def _text(path: Path, data: bytes) -> bytes:
     return data
 
 
-_MOTION = re.compile(rb"^[ \t\r}]*MOTION(?![^\s])", re.MULTILINE)
+_MOTION = re.compile(rb"^[ \t\r}]*MOTION(?![^\s])", re.MULTILINE | re.IGNORECASE)
 
 
 def _motion_at(path: Path, data: bytes) -> int:

@@ -19,7 +19,7 @@ STOOPS = 40.0  # degrees: a figure whose trunk leans more stoops; a sprinter's s
 # Share of the frames that must be upright. The most upright frames of this share set a limit: the frames that
 # lean at most SPREAD degrees more are the sample.
 FEWEST = 0.05
-SPREAD = 10.0
+SPREAD = 15.0
 OFF = 3.0  # cm: mean error of where hips and head are, in clips of bows and squats
 
 
