@@ -15,6 +15,7 @@ from hobble.motion.find_body import find_body
 from hobble.motion.look import look, table
 from hobble.motion.options import ClipMotion
 from hobble.motion.read import read_bvh
+from hobble.motion.retarget_picture import picture_of_file
 
 SKELETONS = Path("config/skeletons")
 
@@ -52,6 +53,12 @@ def main() -> int:
         default="auto",
         help="handedness of the files' coordinates, as motion.handedness of a data set",
     )
+    many.add_argument(
+        "--picture",
+        type=Path,
+        metavar="SVG",
+        help="for one file: draw it beside what is made of it, with the joint that differs most in red",
+    )
     given = parser.parse_args()
     try:
         if given.command == "rig":
@@ -59,7 +66,10 @@ def main() -> int:
             write_text(given.to, text) if given.to else print(text, end="")
             return 0
         options = ClipMotion(handedness=given.handedness)
-        seen = look(given.folder, given.maps / f"{given.skeleton}.yaml", given.maps, options)
+        target = given.maps / f"{given.skeleton}.yaml"
+        if given.picture:
+            write_text(given.picture, picture_of_file(given.folder, target, given.maps, options))
+        seen = look(given.folder, target, given.maps, options)
         print(table(seen))
         return int(any(one.refused for one in seen.clips))
     except HobbleError as error:

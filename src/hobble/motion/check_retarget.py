@@ -67,9 +67,10 @@ def check(path: Path, figures: dict[str, Any], rig: str) -> None:
     apart = {name: each["apart"] for name, each in figures["angles"].items()} | figures["directions"]
     name = max(apart, key=lambda part: apart[part])
     look = (
-        f"Look at it (`python -m hobble.motion look {path}`), and correct the roles of its rig. `python -m "
+        f"Look at it (`python -m hobble.motion look {path} --picture apart.svg` draws it beside its source), "
+        f"and correct the roles of its rig. `python -m hobble.motion rig {path}` writes a draft for "
+        "config/skeletons/."
     )
-    look += f"hobble.motion rig {path}` writes a draft for config/skeletons/."
     if apart[name] > MOST:
         raise InputError(
             path, f"the {name} is {apart[name]:.0f} degrees off its source on average (rig: {rig})", fix=look

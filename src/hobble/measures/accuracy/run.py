@@ -120,6 +120,7 @@ def prediction(network: Network) -> Predict:
     predictor = network.predictor(storage="float32")
 
     def predict(x: Array, phase: Array) -> Array:
+        phase = phase.astype(float)  # as at run time; compiled code is made once for each type
         starts = range(0, len(x), BATCH)
         return np.concatenate([predictor.predict(x[n : n + BATCH], phase[n : n + BATCH]) for n in starts])
 
