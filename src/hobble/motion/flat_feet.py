@@ -11,6 +11,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -98,6 +99,7 @@ def flat_feet(seen: BodySample) -> dict[int, Array]:
     return frames
 
 
+@lru_cache(maxsize=1)
 def feet_tilt(seen: BodySample) -> Tilt:
     """The tilt of flat feet: from the zero pose if it shows it, else from frames in which they stand."""
     sides = {side: _steepness(seen, side) for side in SIDES}

@@ -25,8 +25,7 @@ def from_motion(seen: BodySample, trunk: BodySample, zero: Array | None) -> dict
     trunk: the poses that show how the trunk is turned (`trunk_sample`). zero: (4,) frame of the chest in the
     zero pose, which is used if the rig has no neck. None if nobody could stand in that pose.
     """
-    frames: dict[int, Array] = {}
-    _trunk(trunk, frames, zero)
+    frames = trunk_frames(trunk, zero)
     for side, sign in (("left", 1.0), ("right", -1.0)):
         _arm(seen, frames, side, sign)
         _leg(seen, frames, side)
@@ -43,8 +42,9 @@ def bends(seen: BodySample) -> dict[int, Array]:
     return out
 
 
-def _trunk(seen: BodySample, frames: dict[int, Array], zero: Array | None) -> None:
-    body = seen.body
+def trunk_frames(seen: BodySample, zero: Array | None) -> dict[int, Array]:
+    """`from_motion` for hips, trunk, neck and head alone. seen: the poses that show how they are turned."""
+    body, frames = seen.body, dict[int, Array]()
     chain = (body.hips, *body.trunk, *body.neck)
     for joint in chain:
         bone, axis, left = _bone(seen, joint)
@@ -55,6 +55,7 @@ def _trunk(seen: BodySample, frames: dict[int, Array], zero: Array | None) -> No
         carries = joint in (body.hips, body.chest)
         frames[joint] = frame(left, LEFT, bone, axis) if carries else frame(bone, axis, left, LEFT)
     frames[body.head] = _head(seen, frames, chain)
+    return frames
 
 
 def _bone(seen: BodySample, joint: int) -> tuple[Array, Array, Array]:

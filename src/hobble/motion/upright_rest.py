@@ -21,7 +21,7 @@ from hobble.motion.added_joints import with_balls, with_bends
 from hobble.motion.body import Body, body_by_roles
 from hobble.motion.body_sample import LEFT, BodySample
 from hobble.motion.flat_feet import doubt, height_error, rest_tilt
-from hobble.motion.from_motion import bends, from_motion
+from hobble.motion.from_motion import bends, from_motion, trunk_frames
 from hobble.motion.from_rest import TRUSTED, add_rest, from_rest, zero_doubt
 from hobble.motion.no_neck import lean_doubt
 from hobble.motion.orient import degrees_between, mean_rotation, pointed_along
@@ -102,7 +102,7 @@ def _twisted(seen: BodySample, zero: dict[int, Array]) -> bool:
 
     zero: frames of `from_rest`.
     """
-    shown = from_motion(seen, trunk_sample(seen, False), zero[seen.body.chest])
+    shown = trunk_frames(trunk_sample(seen, False), zero[seen.body.chest])
     joints = (seen.body.hips, *seen.body.trunk)
     lefts = [[quat.rotate(frames[j], LEFT) for frames in (zero, shown)] for j in joints]
     return max(degrees_between(*pair) for pair in lefts) > TRUSTED
