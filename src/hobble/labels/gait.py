@@ -49,7 +49,7 @@ LONGEST_START = 180  # frames: a doubtful walk from standing to a jog counts as 
 CLEARLY_WALKING = -4.0  # log odds: with a lower median in its second half such a walk is not doubtful
 # Frames. Any other walk between standing and jogging that is shorter is split: half counts as standing, half
 # as jogging.
-LONGEST_PASSAGE = 75
+LONGEST_SHORT_WALK = 75
 
 
 def overwrite_crouch(gait: Array, clip: Clip) -> Array:
@@ -72,7 +72,7 @@ def automatic_gait(clip: Clip, down: np.ndarray, dominant: str | None) -> Array:
     """
     odds = jog_odds(clip, down) + {"jog": DATA_SET_ODDS, "walk": -DATA_SET_ODDS}.get(dominant or "", 0.0)
     gait = _likeliest_path(_evidence(clip, odds), SWITCH_COST)
-    shares = _fade(_without_passages(gait, odds), len(GAITS))
+    shares = _fade(_without_short_walks(gait, odds), len(GAITS))
     if dominant in ("jump", "bump"):
         shares[:, GAITS.index(dominant)] = 1 - shares[:, STAND]
         shares[:, [WALK, JOG, CROUCH]] = 0.0
@@ -96,8 +96,8 @@ def jog_odds(clip: Clip, down: np.ndarray) -> Array:
         + JOG_CONSTANT
     )
     walks = (double_support >= LEAST_DOUBLE_SUPPORT) & (flight <= NO_FLIGHT) & (spring < CLEAR_SPRING)
-    skips = (froude < SLOW) & (flight <= SOME_FLIGHT) & (spring < SOME_SPRING)
-    return np.where(walks | skips, np.minimum(odds, MOST_ODDS_OF_A_WALK), odds)
+    slow_walk = (froude < SLOW) & (flight <= SOME_FLIGHT) & (spring < SOME_SPRING)
+    return np.where(walks | slow_walk, np.minimum(odds, MOST_ODDS_OF_A_WALK), odds)
 
 
 def _evidence(clip: Clip, odds: Array) -> Array:
@@ -180,8 +180,8 @@ def _likeliest_path(evidence: Array, switch: float) -> Array:
     return path
 
 
-def _without_passages(gait: Array, odds: Array) -> Array:
-    """Gaits (F,) without short walks between standing and jogging (LONGEST_START, LONGEST_PASSAGE).
+def _without_short_walks(gait: Array, odds: Array) -> Array:
+    """Gaits (F,) without short walks between standing and jogging (LONGEST_START, LONGEST_SHORT_WALK).
 
     odds: (F,) of `jog_odds`.
     """
@@ -193,7 +193,7 @@ def _without_passages(gait: Array, odds: Array) -> Array:
             continue
         if after == JOG and b - a <= LONGEST_START and np.median(odds[(a + b) // 2 : b]) > CLEARLY_WALKING:
             out[a:b] = JOG
-        elif b - a <= LONGEST_PASSAGE:
+        elif b - a <= LONGEST_SHORT_WALK:
             middle = (a + b) // 2
             out[a:middle], out[middle:b] = before, after
     return out

@@ -40,5 +40,5 @@ MEASURE = Measure(
     options=Options,
     runtime=tuple(Runtime.model_fields),
     pieces=pieces,
-    cost=Cost(memory_mb=134, minutes=60),
+    cost=Cost(memory_mb=200, minutes=60),
 )
