@@ -12,7 +12,7 @@ import argparse
 from pathlib import Path
 
 from hobble.channels.injury.crowd_severities import links
-from hobble.channels.injury.limp.captured_limps import Limp
+from hobble.channels.injury.limp.captured_limps import CapturedWalk
 from hobble.channels.injury.limp.run import compare_held_out
 from hobble.channels.injury.status import read_status
 from hobble.core.errors import InputError
@@ -24,7 +24,7 @@ from hobble.models.network import Network
 from hobble.runtime.options import Runtime
 
 
-def captured_limp(path: Path, network: Network) -> Limp:
+def captured_limp(path: Path, network: Network) -> CapturedWalk:
     clip = read_clip(path)
     spells = read_status(path.with_name(f"{path.stem}_injuries.txt"), links(network)).spells
     if len({spell.links for spell in spells}) != 1:
@@ -32,7 +32,7 @@ def captured_limp(path: Path, network: Network) -> Limp:
     walk = measure(clip.skeleton, clip.positions, clip.fps)
     if not len(walk):
         raise InputError(path, NO_CYCLE)
-    return Limp(path.stem, dict(spells[0].links), walk, 0.0)
+    return CapturedWalk(path.stem, dict(spells[0].links), walk, 0.0)
 
 
 def main() -> None:

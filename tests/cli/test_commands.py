@@ -16,7 +16,7 @@ from hobble.synthetic.options import Synthetic
 
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory, root: Path) -> Path:
-    """Two clips of the embedded walker, and a file that is not BVH."""
+    """Two clips of the procedural walker, and a file that is not BVH."""
     out = tmp_path_factory.mktemp("clips")
     skeleton = {"name": "holden31", **yaml.safe_load((root / "config/skeletons/holden31.yaml").read_text())}
     for name in ("one", "two"):

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from hypothesis import HealthCheck, Phase, given, seed, settings
 
-from hobble.channels.injury.severity import odd_ranges, severity_matrix
+from hobble.channels.injury.severity import range_warnings, severity_matrix
 from hobble.channels.injury.status import read_status
 from hobble.core.errors import InputError
 from hobble.motion.make import make_clip
@@ -46,7 +46,7 @@ def read_severity(path: Path) -> Arrays:
     matrix = severity_matrix(status, links)
     assert matrix.min() >= 0, "a severity below 0"
     assert matrix.max() <= 10, "a severity above 10"
-    odd_ranges(status, path)
+    range_warnings(status, path)
     return {"severity": matrix}
 
 

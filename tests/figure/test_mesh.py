@@ -16,7 +16,7 @@ from hobble.core import quat
 from hobble.core.skeleton import Skeleton, forward_kinematics
 from hobble.figure.fit_rotations import fitted_rotations
 from hobble.figure.mesh import Mesh, body, key
-from hobble.figure.pack import balls, regions, whole_weights
+from hobble.figure.pack import part_spheres, regions, whole_weights
 
 
 def rig(root: Path, name: str) -> Skeleton:
@@ -69,7 +69,7 @@ def test_the_surface_is_smooth(mesh: Mesh, holden31: Skeleton) -> None:
     fine = [
         holden31.role(f"{side}_{role}") for side in ("left", "right") for role in ("wrist", "heel", "toe")
     ]
-    trunk = ~np.isin(mesh.bones[mesh.bone[a, 0]], [*fine, holden31.role("head")])
+    trunk = ~np.isin(mesh.bones[mesh.bones_of_corner[a, 0]], [*fine, holden31.role("head")])
     assert np.median(turn) < 8
     assert np.quantile(turn[trunk], 0.99) < 25
 
@@ -82,12 +82,12 @@ def test_left_and_right_of_the_body_are_mirror_images(mesh: Mesh) -> None:
 
 
 def test_a_corner_has_at_most_four_bones_and_their_shares_sum_to_one(mesh: Mesh) -> None:
-    assert mesh.bone.shape == mesh.share.shape == (len(mesh.corners), 4)
-    assert mesh.share.sum(axis=1) == pytest.approx(1)
-    assert mesh.share.min() >= 0
-    steps = whole_weights(mesh.share)
+    assert mesh.bones_of_corner.shape == mesh.weights.shape == (len(mesh.corners), 4)
+    assert mesh.weights.sum(axis=1) == pytest.approx(1)
+    assert mesh.weights.min() >= 0
+    steps = whole_weights(mesh.weights)
     assert steps.sum(axis=1).tolist() == [255] * len(steps)
-    assert np.abs(steps / 255 - mesh.share).max() < 0.02
+    assert np.abs(steps / 255 - mesh.weights).max() < 0.02
 
 
 def test_in_the_rest_pose_the_corners_are_where_they_were_modelled(mesh: Mesh) -> None:
@@ -112,7 +112,7 @@ def test_no_corner_moves_further_than_its_bones_move_it(mesh: Mesh, holden31: Sk
         local = quat.rotate(quat.inv(mesh.rotations[b]), mesh.corners - mesh.positions[b])
         carried = [quat.rotate(world[i, mesh.bones[b]], local) + places[i, mesh.bones[b]] for i in (0, 1)]
         step = np.linalg.norm(carried[1] - carried[0], axis=1)
-        mine = ((mesh.bone == b) & (mesh.share > 0)).any(axis=1)
+        mine = ((mesh.bones_of_corner == b) & (mesh.weights > 0)).any(axis=1)
         most[mine] = np.maximum(most[mine], step[mine])
     assert (np.linalg.norm(after - before, axis=1) <= most + 1e-6).all()
 
@@ -162,7 +162,7 @@ def test_a_skeleton_without_roles_gets_a_rod_for_every_bone() -> None:
 
 
 def test_every_bone_has_a_ball_that_stands_for_its_part(mesh: Mesh) -> None:
-    found = balls(mesh)
+    found = part_spheres(mesh)
     assert found.shape == (len(mesh.bones), 4)
     assert (found[:, 3] > 1).all()
     assert found[:, 3].max() < 25

@@ -1,4 +1,4 @@
-"""The commands of hobble.gait, and the walker of the embedded data set."""
+"""The commands of hobble.gait, and the walker of the data set `synthetic`."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ from hobble.synthetic.recipes import WALK, Segment
 
 @pytest.fixture(scope="module")
 def walker(holden31) -> Callable[[float], Clip]:
-    """The embedded walker, straight ahead for ten seconds at a speed in cm/s."""
+    """The procedural walker, straight ahead for ten seconds at a speed in cm/s."""
 
     def make(speed: float) -> Clip:
         segments = [Segment(WALK, speed, seconds=12.0)]
@@ -46,7 +46,7 @@ def at_the_checkout(monkeypatch, root):
 
 
 @pytest.mark.parametrize("speed", [65, 80, 100, 150])
-def test_the_embedded_walker_is_healthy_at_any_speed(walker, speed):
+def test_the_procedural_walker_is_healthy_at_any_speed(walker, speed):
     seen = compare(walker(speed), healthy_profile([walker(125)]))
     assert seen.windows
     assert seen.named() == {"normal": 1.0}

@@ -126,5 +126,5 @@ def test_severities_out_of_range_are_refused(made, hurting, bad) -> None:
     clip, labels, _ = made("turning")
     with pytest.raises(HobbleError, match=r"turning: a severity is not in 0\.\.10"):
         hurt_clip(clip, labels, hurting(len(clip), {"RightUpLeg-RightLeg": bad}))
-    with pytest.raises(HobbleError, match="turning: severities"):
+    with pytest.raises(HobbleError, match="turning: the severities"):
         hurt_clip(clip, labels, np.zeros((3, 30)))

@@ -12,7 +12,7 @@ from hobble.core.errors import HobbleError
 from hobble.hurt.body_parts import part_of_link
 from hobble.hurt.options import Hurt
 from hobble.hurt.schedule import severities
-from hobble.hurt.version import WHOLE
+from hobble.hurt.version import UNCUT_SECONDS
 from hobble.workflow.project import Project
 
 
@@ -22,7 +22,7 @@ def seconds_hurt(skeleton, versions, frames, options):
     for name, turn in versions.items():
         clip = name.rpartition("_hurt")[0]
         severity = severities(skeleton, frames[clip], 60.0, options(clip), name, turn)
-        if len(severity) >= WHOLE * 60:
+        if len(severity) >= UNCUT_SECONDS * 60:
             severity = severity[: round(options(clip).longest * len(severity))]
         out += (severity > 0).sum(axis=0) / 60
     return out

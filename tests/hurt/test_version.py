@@ -11,7 +11,7 @@ from hurt_gait import measures
 from hobble.hurt.effects import POWER
 from hobble.hurt.hurt_clip import hurt_clip
 from hobble.hurt.options import Hurt
-from hobble.hurt.version import NEAR, hurt_version
+from hobble.hurt.version import SEVERITY_TOLERANCE, hurt_version
 from hobble.labels.clip_labels import LabelReport
 from hobble.labels.label import mirror_labels
 from hobble.motion.mirror import mirror_clip
@@ -74,7 +74,7 @@ def test_without_in_between_no_cycle_has_a_severity_in_between(made, mirrored) -
     inside = np.concatenate([np.arange(a, b + 1) for a, b in own.cycles])
     assert len(inside) > 200
     shown = severity[inside]
-    assert (np.minimum(shown, np.abs(shown - 10)) <= NEAR).all()
+    assert (np.minimum(shown, np.abs(shown - 10)) <= SEVERITY_TOLERANCE).all()
     assert (shown > 9).any(axis=1).mean() > 0.9
     kept, _ = hurt_version(
         clip, labels, REPORT, options.model_copy(update={"in_between": True}), name="a_hurt1", turn=0,

@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from hobble.labels.footfall import SETTLING, find_swings, foot_speeds, landings
+from hobble.labels.footfall import SETTLING_CM, find_swings, foot_speeds, landings
 from hobble.labels.options import LabelOptions
 from hobble.labels.phase import find_cycles, phase_of_footsteps, rows_of_landings
 
@@ -28,7 +28,7 @@ def test_every_landing_is_found_once(walker, limp, half, swing, stride):
     assert [foot for _, foot in events] == [foot for _, foot in truth]
     late = np.array([when - true for (when, _), (true, _) in zip(events, truth, strict=True)])
     assert np.abs(late - late.mean()).max() <= 1.0
-    assert -0.15 * swing < late.mean() < SETTLING / 1.5
+    assert -0.15 * swing < late.mean() < SETTLING_CM / 1.5
 
 
 def test_phase_of_a_made_limp_is_within_three_hundredths(walker):

@@ -91,20 +91,21 @@ def test_the_likeliest_path_changes_gait_only_if_that_is_worth_the_cost():
 
 def test_a_short_walk_before_a_jog_counts_as_jog():
     gait = np.array([g.STAND] * 20 + [g.WALK] * 40 + [g.JOG] * 20 + [g.WALK] * 30 + [g.CROUCH] * 5)
-    out = g._without_passages(gait, clearly(gait))
+    out = g._without_short_walks(gait, clearly(gait))
     assert out.tolist() == [g.STAND] * 40 + [g.JOG] * 40 + [g.WALK] * 30 + [g.CROUCH] * 5
-    longer = np.array([g.STAND] * 5 + [g.WALK] * (g.LONGEST_PASSAGE + 1) + [g.JOG] * 5)
-    assert (g._without_passages(longer, clearly(longer)) == longer).all()
+    longer = np.array([g.STAND] * 5 + [g.WALK] * (g.LONGEST_SHORT_WALK + 1) + [g.JOG] * 5)
+    assert (g._without_short_walks(longer, clearly(longer)) == longer).all()
 
 
 def test_a_doubtful_start_belongs_to_the_jog():
     gait = np.array([g.STAND] * 20 + [g.WALK] * 100 + [g.JOG] * 20 + [g.WALK] * 100 + [g.STAND] * 5)
     doubtful = np.full(len(gait), -1.0)
     assert (
-        g._without_passages(gait, doubtful).tolist() == [g.STAND] * 20 + [g.JOG] * 120 + gait[140:].tolist()
+        g._without_short_walks(gait, doubtful).tolist()
+        == [g.STAND] * 20 + [g.JOG] * 120 + gait[140:].tolist()
     )
     much_longer = np.array([g.STAND] * 5 + [g.WALK] * (g.LONGEST_START + 1) + [g.JOG] * 5)
-    assert (g._without_passages(much_longer, np.full(len(much_longer), -1.0)) == much_longer).all()
+    assert (g._without_short_walks(much_longer, np.full(len(much_longer), -1.0)) == much_longer).all()
 
 
 @pytest.mark.parametrize(

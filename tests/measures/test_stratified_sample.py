@@ -17,8 +17,8 @@ from hobble.measures.rollouts.run import measure_roll_outs
 from hobble.measures.stratified_sample import LEAST, Sample, Stratum, draw_sample
 from hobble.rows.clip_rows import save_clip_rows
 from hobble.rows.excerpts import LONGEST, Excerpt, ExcerptKind, excerpts, load_excerpt
-from hobble.rows.facts import Facts, facts, load_facts, save_facts
 from hobble.rows.layout import GAITS
+from hobble.rows.summary import RowsSummary, load_summary, save_summary, summary_of_rows
 
 _spec = importlib.util.spec_from_file_location("of_accuracy", Path(__file__).with_name("test_accuracy.py"))
 assert _spec is not None
@@ -30,7 +30,7 @@ make_rows, make_network = _of_accuracy.make_rows, _of_accuracy.make_network
 
 def population(
     seed: int, count: int = 600, rows: tuple[int, int] = (500, 5000)
-) -> tuple[list[Facts], dict[str, str], dict[Excerpt, float]]:
+) -> tuple[list[RowsSummary], dict[str, str], dict[Excerpt, float]]:
     """Clips of four kinds and of any length, one in twelve held out, and the mean error of each excerpt.
 
     Half of the spread within a kind is that of clips, so excerpts of one clip resemble each other.
@@ -45,7 +45,7 @@ def population(
         for one in excerpts(name, length):
             kinds.append(ExcerptKind(gait, float(speed * rng.uniform(0.9, 1.1)), ("injury",) if hurt else ()))
             values[one] = (2 if gait == "jog" else 1) + hurt + 0.1 * speed + own + rng.normal(0, 0.2)
-        clips.append(Facts(name, length, tuple(kinds)))
+        clips.append(RowsSummary(name, length, tuple(kinds)))
     return clips, {one.clip: "held_out" if i % 12 == 0 else "train" for i, one in enumerate(clips)}, values
 
 
@@ -95,7 +95,7 @@ def test_of_two_long_clips_only_excerpts_are_drawn():
 
 def test_an_additional_clip_hardly_changes_the_sample():
     clips, splits, _ = population(2)
-    more = [*clips, Facts("another", 900, (ExcerptKind("walk", 3.0, ()),))]
+    more = [*clips, RowsSummary("another", 900, (ExcerptKind("walk", 3.0, ()),))]
     before = draw_sample(clips, splits, 300_000)
     after = draw_sample(more, {**splits, "another": "train"}, 300_000)
     assert before is not None
@@ -239,15 +239,15 @@ def test_facts_of_a_clip_survive_their_file(tmp_path):
     gait[:] = 0
     gait[:, GAITS.index("jog")] = 1
     rows.y[:, rows.layout.y_root_velocity] = [3, 4]
-    found = facts(rows)
+    found = summary_of_rows(rows)
     assert (found.clip, found.rows) == ("a", 30)
     assert [(kind.gait, kind.channels) for kind in found.kinds] == [("jog", ("injury",))]
     assert found.kinds[0].speed == pytest.approx(5)
-    save_facts(tmp_path / "a.json", found)
-    assert load_facts(tmp_path / "a.json") == found
+    save_summary(tmp_path / "a.json", found)
+    assert load_summary(tmp_path / "a.json") == found
     (tmp_path / "a.json").write_text('{"clip": "a"}')
-    with pytest.raises(InputError, match="not the facts of a clip"):
-        load_facts(tmp_path / "a.json")
-    save_facts(tmp_path / "a.json", Facts("a", 30, ()))
-    with pytest.raises(InputError, match="not the facts of a clip"):
-        load_facts(tmp_path / "a.json")
+    with pytest.raises(InputError, match="not the summary of a clip"):
+        load_summary(tmp_path / "a.json")
+    save_summary(tmp_path / "a.json", RowsSummary("a", 30, ()))
+    with pytest.raises(InputError, match="not the summary of a clip"):
+        load_summary(tmp_path / "a.json")

@@ -10,7 +10,7 @@ import pytest
 from hobble.core.errors import HobbleError
 from hobble.database.split_check import refuse_both_sides
 from hobble.motion.axes import turned
-from hobble.motion.duplicates import likeness, load_likenesses, same_pairs, save_likenesses
+from hobble.motion.duplicates import digest, load_digests, same_pairs, save_digests
 from hobble.motion.mirror import mirror_clip
 
 
@@ -28,7 +28,7 @@ def test_turned_shortened_and_mirrored_copies_are_found(walker, holden31):
         "longer": other,
         "lower": bent,
     }
-    pairs = same_pairs([likeness(replace(one, name=name), name) for name, one in named.items()])
+    pairs = same_pairs([digest(replace(one, name=name), name) for name, one in named.items()])
     assert {pair[:2] for pair in pairs if pair[2] == "the same motion"} == {
         ("a", "b"),
         ("a", "c"),
@@ -43,10 +43,10 @@ def test_turned_shortened_and_mirrored_copies_are_found(walker, holden31):
 
 def test_the_data_for_comparing_clips_survives_its_file(walker, holden31, tmp_path):
     clip = walker(holden31, 120, 60.0)
-    found = [likeness(replace(clip, name=name), name) for name in "ab"]
+    found = [digest(replace(clip, name=name), name) for name in "ab"]
     found.append(replace(found[0], name="c", mirrored=None))
-    save_likenesses(tmp_path / "some.npz", found)
-    back = load_likenesses(tmp_path / "some.npz")
+    save_digests(tmp_path / "some.npz", found)
+    back = load_digests(tmp_path / "some.npz")
     assert [(one.name, one.sha256, one.seconds) for one in back] == [
         (one.name, one.sha256, one.seconds) for one in found
     ]
@@ -59,7 +59,7 @@ def test_the_data_for_comparing_clips_survives_its_file(walker, holden31, tmp_pa
 
 def test_files_with_one_digest_are_the_same_file(walker, holden31):
     clip = walker(holden31, 120, 60.0)
-    same = [likeness(replace(clip, name=name), "aa") for name in "yx"]
+    same = [digest(replace(clip, name=name), "aa") for name in "yx"]
     assert same_pairs(same) == [("x", "y", "the same file")]
 
 
@@ -87,6 +87,6 @@ def test_no_two_patients_walks_are_equal_except_for_known_copies(root, shared):
             made = make_clip(
                 file, skeletons / "holden31.yaml", skeletons, file.stem, "holden31", ClipMotion()
             )
-            found.append(likeness(made[0], made[1]["sha256"]))
+            found.append(digest(made[0], made[1]["sha256"]))
     assert np.isfinite([one.poses for one in found]).all()
     assert [pair for pair in same_pairs(found) if pair[2] != "the same file"] == []

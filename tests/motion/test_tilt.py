@@ -11,7 +11,7 @@ from hobble.core import quat
 from hobble.core.clip import Clip
 from hobble.core.errors import InputError
 from hobble.motion.balance import balance
-from hobble.motion.tilt import tilt
+from hobble.motion.tilt import world_tilt
 
 X, Z = np.eye(3)[0], np.eye(3)[2]
 
@@ -32,8 +32,8 @@ def test_a_tilted_world_is_refused(bvh, walk, make, axis, degrees):
 
 
 def test_the_size_of_the_tilt_is_found(walk):
-    assert tilt(turned(walk, X, 12.0)) == pytest.approx(12.0, abs=1.5)
-    assert tilt(turned(walk, Z, 20.0)) == pytest.approx(20.0, abs=3.0)
+    assert world_tilt(turned(walk, X, 12.0)) == pytest.approx(12.0, abs=1.5)
+    assert world_tilt(turned(walk, Z, 20.0)) == pytest.approx(20.0, abs=3.0)
 
 
 def sloped(clip: Clip, degrees: float) -> Clip:
@@ -47,7 +47,7 @@ def sloped(clip: Clip, degrees: float) -> Clip:
 # The made-up walk balances 5 degrees forward of its feet, so on 8 degrees down it would look tilted.
 @pytest.mark.parametrize("degrees", [-14.0, 8.0])
 def test_a_real_slope_is_no_tilt(walk, degrees):
-    assert tilt(sloped(walk, degrees)) is None
+    assert world_tilt(sloped(walk, degrees)) is None
 
 
 @pytest.mark.parametrize("degrees", [-6.0, 6.0, 10.0])
@@ -57,8 +57,8 @@ def test_a_tilt_to_the_side_shows_in_the_balance_alone(walk, degrees):
     line = walk.skeleton.offsets.copy()
     line[legs, 0] = 0.0
     narrow = replace(walk, skeleton=replace(walk.skeleton, offsets=line))
-    assert tilt(narrow) is None
-    assert tilt(turned(narrow, Z, degrees)) == pytest.approx(abs(degrees), abs=1.0)
+    assert world_tilt(narrow) is None
+    assert world_tilt(turned(narrow, Z, degrees)) == pytest.approx(abs(degrees), abs=1.0)
 
 
 def test_balance_turns_with_the_world_and_stays_on_a_slope(walk):
@@ -79,16 +79,16 @@ def test_a_figure_that_does_not_step_shows_no_balance(walk):
 def test_a_captured_walk_tilted_to_the_side_is_refused(shared, make, name, degrees):
     clip, _ = make(shared / f"mocap/cmu/{name}.bvh")
     ahead = clip.root[-1] - clip.root[0]
-    assert tilt(clip) is None
-    assert tilt(turned(clip, ahead / np.linalg.norm(ahead), degrees)) == pytest.approx(8.0, abs=2.5)
+    assert world_tilt(clip) is None
+    assert world_tilt(turned(clip, ahead / np.linalg.norm(ahead), degrees)) == pytest.approx(8.0, abs=2.5)
 
 
 def test_a_trunk_that_leans_aside_is_no_tilt(walk):
     rotations = walk.rotations.copy()
     spine = walk.skeleton.role("spine")
     rotations[:, spine] = quat.mul(quat.from_axis_angle(Z, 0.35), rotations[:, spine])
-    assert tilt(replace(walk, rotations=rotations)) is None
+    assert world_tilt(replace(walk, rotations=rotations)) is None
 
 
 def test_the_walk_itself_is_not_tilted(walk):
-    assert tilt(walk) is None
+    assert world_tilt(walk) is None

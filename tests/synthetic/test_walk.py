@@ -132,7 +132,7 @@ def test_no_leg_is_fully_stretched_and_no_joint_jerks(written, recipe):
 
 
 def test_no_joint_turns_fast(holden31, dataset):
-    """No more than 15 degrees a frame from its parent, in any clip of the embedded data set."""
+    """No more than 15 degrees a frame from its parent, in any clip of the data set `synthetic`."""
     total = sum(entry.get("share", 1) for entry in dataset["clips"].values())
     for name, entry in dataset["clips"].items():
         frames = round(dataset["synthetic"]["frames"] * entry.get("share", 1) / total)

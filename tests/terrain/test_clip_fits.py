@@ -41,7 +41,7 @@ def test_patch_and_feet_have_the_same_mean_height(made: SimpleNamespace, patches
     contacts, path = walk.labels["contacts"][60:200], walk.clip.root[60:200, [0, 2]]
     sides = np.tile([1.0, 0.0], (len(path), 1))
     ground = fit_cycle(patches, soles, contacts, path, sides, "rocky", fits=5, smoothing=0.1, deepest=1.0)
-    patch = replace(ground, surfaces=(), dug=())
+    patch = replace(ground, surfaces=(), pits=())
     assert np.allclose(patch.above(soles)[:, contacts].mean(axis=1), 0, atol=1e-3)
     assert np.allclose(ground.centre, soles[contacts][:, [0, 2]].mean(axis=0))
 

@@ -15,8 +15,8 @@ from hobble.core.errors import InputError
 from hobble.core.files import write_text
 from hobble.workflow.batch_job import make_each, pieces
 from hobble.workflow.clip_batches import (
-    LARGEST,
-    SMALLEST,
+    LEAST_BATCHES,
+    MOST_CLIPS_OF_A_BATCH,
     ClipBatch,
     batch_count,
     batch_of,
@@ -103,9 +103,11 @@ def whole(job: Job, clips: str = "abc") -> None:
 
 
 def test_few_clips_have_one_batch_each_and_thousands_share_about_thirty() -> None:
-    assert [batch_count(n) for n in (1, SMALLEST, SMALLEST + 1, SMALLEST * LARGEST)] == [1, 12, 12, 12]
-    for clips in range(SMALLEST * LARGEST + 1, 20_000, 97):
-        assert LARGEST / 2 <= clips / batch_count(clips) <= LARGEST
+    assert [
+        batch_count(n) for n in (1, LEAST_BATCHES, LEAST_BATCHES + 1, LEAST_BATCHES * MOST_CLIPS_OF_A_BATCH)
+    ] == [1, 12, 12, 12]
+    for clips in range(LEAST_BATCHES * MOST_CLIPS_OF_A_BATCH + 1, 20_000, 97):
+        assert MOST_CLIPS_OF_A_BATCH / 2 <= clips / batch_count(clips) <= MOST_CLIPS_OF_A_BATCH
 
 
 def test_the_batch_of_a_clip_depends_on_its_name_and_batches_split_in_two() -> None:

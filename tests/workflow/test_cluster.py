@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 import yaml
 
-from hobble.workflow.clip_batches import SMALLEST, ClipBatch, batch_of
+from hobble.workflow.clip_batches import LEAST_BATCHES, ClipBatch, batch_of
 from hobble.workflow.project import Project
 from hobble.workflow.resource_demands import ENGINE_MB, WEEK_MINUTES, Demands, bvh_seconds
 from hobble.workflow.resource_use import planned_jobs, with_use
@@ -44,7 +44,7 @@ def test_a_stage_has_a_job_for_each_batch_of_clips(workflow, tmp_path) -> None:
     request = ("--config", f"mocap={tmp_path}", "--", "results/many/report.html")
     planned = workflow.planned(*request)
     stages = ("motion_clips", "labels_clips", "channel_clips", "terrain_fits", "database_clips")
-    used = len({batch_of(f"clip-{number:02}", SMALLEST) for number in range(CLIPS)})
+    used = len({batch_of(f"clip-{number:02}", LEAST_BATCHES) for number in range(CLIPS)})
     assert {rule: planned.pop(rule) for rule in stages} == dict.fromkeys(stages, used)
     # Whatever is not in a batch is there once for the data set, the configuration or a measurement or its
     # piece, not once for each clip.

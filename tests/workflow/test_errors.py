@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from hobble.workflow.clip_batches import SMALLEST, batch_of
+from hobble.workflow.clip_batches import LEAST_BATCHES, batch_of
 
 pytestmark = pytest.mark.workflow
 
@@ -164,8 +164,8 @@ def test_a_full_disk_gives_a_message_and_the_next_run_completes(workflow, small_
 def test_one_bad_clip_of_a_batch_does_not_stop_the_others(clips: list[Path], workflow) -> None:
     """There are enough clips for shared batches. Only one batch, of three clips, is requested."""
     names = [f"clip-{number}" for number in range(200)]
-    together = [name for name in names if batch_of(name, SMALLEST) == 5][:3]
-    others = [name for name in names if name not in together][: SMALLEST - 2]
+    together = [name for name in names if batch_of(name, LEAST_BATCHES) == 5][:3]
+    others = [name for name in names if name not in together][: LEAST_BATCHES - 2]
     folder = workflow.folder / "mocap" / "mine"
     folder.mkdir(parents=True)
     for number, name in enumerate([*together, *others]):

@@ -18,7 +18,7 @@ for batch in [*batches_of_clips, *batches_of_versions]:
             terrain=batch.of_names("terrain/clips/{clip}.npz"),
         output:
             rows=batch.of_names("database/clips/{clip}.npz"),
-            facts=batch.of_names("database/clips/{clip}.json"),
+            summaries=batch.of_names("database/clips/{clip}.json"),
         log:
             batch.log("database", "database_clips"),
         benchmark:

@@ -6,7 +6,7 @@ from hobble.core.files import load_npz
 from hobble.database.options import RowOptions
 from hobble.rows.build_rows import clip_rows
 from hobble.rows.clip_rows import save_clip_rows
-from hobble.rows.facts import facts, save_facts
+from hobble.rows.summary import save_summary, summary_of_rows
 from hobble.workflow.batch_job import make_each
 
 
@@ -25,7 +25,7 @@ def make(piece, log):
         facing_sigma=options.facing_sigma,
     )
     save_clip_rows(piece.output["rows"], rows)
-    save_facts(piece.output["facts"], facts(rows))
+    save_summary(piece.output["summaries"], summary_of_rows(rows))
     log.info("%d rows, %d fits", len(rows), rows.fits.sum())
 
 

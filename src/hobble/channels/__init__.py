@@ -13,9 +13,9 @@ __all__ = [
     "NAMES",
     "Channel",
     "ClipSource",
+    "all_channels",
     "channel",
     "channel_of_old_key",
-    "every",
     "modules_of",
     "shown_modules",
 ]
@@ -39,7 +39,7 @@ def channel(name: str) -> Channel:
     return found
 
 
-def every() -> tuple[Channel, ...]:
+def all_channels() -> tuple[Channel, ...]:
     """All channels, in the order of NAMES."""
     return tuple(channel(name) for name in NAMES)
 
@@ -60,7 +60,7 @@ def channel_of_old_key(key: str) -> str:
 
     Raises ValueError for an unknown key.
     """
-    for one in every():
+    for one in all_channels():
         if key in one.old_keys:
             return one.name
     raise ValueError(f"there is no such key: {key}")

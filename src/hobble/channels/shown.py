@@ -15,7 +15,7 @@ from dataclasses import dataclass, field
 from types import ModuleType
 from typing import Any
 
-from hobble.channels import channel, every
+from hobble.channels import all_channels, channel
 from hobble.core.skeleton import Skeleton
 
 
@@ -114,7 +114,7 @@ def speaker(skeleton: Mapping[str, Any]) -> Callable[[str], str]:
         return str
     figure = Skeleton.from_dict({"name": "", **skeleton})
     names: dict[str, str] = {}
-    for one in every():
+    for one in all_channels():
         columns = one.columns(figure)
         names |= dict(zip(columns, shown(one.name, figure, columns, columns).spoken, strict=True))
     return lambda column: names.get(column, column)

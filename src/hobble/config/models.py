@@ -8,7 +8,7 @@ from typing import Annotated, Any
 from pydantic import AfterValidator, Field, create_model, field_validator, model_validator
 
 from hobble.channels import NAMES as NAMES_OF_CHANNELS
-from hobble.channels import channel, every
+from hobble.channels import all_channels, channel
 from hobble.config import sections as s
 from hobble.core.clip_files import CLIP_NAME_RULE, is_valid_clip_name
 from hobble.models import DEFAULT, model
@@ -38,7 +38,7 @@ def _channel(name: str) -> str:
 Name = Annotated[str, Field(pattern=r"^[A-Za-z0-9][A-Za-z0-9_.-]{0,99}$")]
 ClipName = Annotated[str, AfterValidator(_clip_name)]
 ChannelName = Annotated[str, AfterValidator(_channel)]
-OLD_KEYS = {key: one.name for one in every() for key in one.old_keys}
+OLD_KEYS = {key: one.name for one in all_channels() for key in one.old_keys}
 WALKER_KEYS = ("recipe", "share")  # keys of a clip that only the generator of synthetic clips reads
 
 
@@ -74,7 +74,7 @@ class Dataset(s.Section):
     extends: Name | None = None
     skeleton: Name
     source: Name | None = Field(None, description="the data set whose generated source files are read")
-    folder: s.Inside | None = Field(None, description="folder of the BVH files, inside the mocap folder")
+    folder: s.MocapPath | None = Field(None, description="folder of the BVH files, inside the mocap folder")
     download: s.Download | None = Field(None, description="address of clips that are not in the folder")
     clips: dict[ClipName, ClipEntry | None] = Field(
         default_factory=dict, description="clips by name; empty: every .bvh in the folder and its subfolders"
@@ -105,7 +105,7 @@ class Dataset(s.Section):
     @model_validator(mode="after")
     def _one_source(self) -> Dataset:
         if self.synthetic is None and self.folder is None:
-            raise ValueError("a data set needs `folder` (BVH files) or `synthetic` (the embedded walker)")
+            raise ValueError("a data set needs `folder` (BVH files) or `synthetic` (generated clips)")
         if self.synthetic is not None and not self.clips:
             raise ValueError("a synthetic data set lists its clips")
         if self.download is not None and not (self.folder and self.clips):

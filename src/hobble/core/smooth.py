@@ -32,6 +32,16 @@ def median_of_three(values: Array) -> Array:
     return np.median(_windows(values, 3), axis=-1)
 
 
+def smooth_above(values: Array, frames: int) -> Array:
+    """(F,) a smooth curve that is nowhere below `values` (F,): their running maximum, smoothed.
+
+    The maximum is taken over 2 `frames` before and after each frame, and so reaches as far as the smoothing.
+    """
+    highest = _windows(values, 4 * frames + 1).max(axis=-1)
+    kernel = np.convolve(np.ones(2 * frames + 1), np.ones(2 * frames + 1))
+    return _weighted(highest, kernel / kernel.sum())
+
+
 def _weighted(values: Array, weights: Array) -> Array:
     columns = np.reshape(values, (len(values), -1)).T
     reach = len(weights) // 2

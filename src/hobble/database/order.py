@@ -16,9 +16,9 @@ import numpy as np
 CHUNKS, ROWS, FITS = 1, 2, 3  # purpose of a generator, so that no two draw the same numbers
 
 
-def generator(seed: int, *of: int) -> np.random.Generator:
+def generator(seed: int, *purpose: int) -> np.random.Generator:
     """A generator seeded by the configuration's seed and by its purpose, independent of earlier draws."""
-    return np.random.default_rng([seed, *of])
+    return np.random.default_rng([seed, *purpose])
 
 
 def spans(
@@ -87,9 +87,9 @@ def picks(count: np.ndarray, visits: int, seed: int, pass_index: int, layer: int
     place = layer % np.maximum(count, 1)
     out = np.zeros(len(count), np.int64)
     for fits in np.unique(count[count > 1]):
-        of = np.flatnonzero(count == fits)
-        ranked = np.argsort(draws[of, :fits], axis=1)
-        out[of] = ranked[np.arange(len(of)), place[of]]
+        of_rows = np.flatnonzero(count == fits)
+        ranked = np.argsort(draws[of_rows, :fits], axis=1)
+        out[of_rows] = ranked[np.arange(len(of_rows)), place[of_rows]]
     return out
 
 

@@ -26,7 +26,7 @@ def compare(all_measured: Sequence[ConfigurationResults], published: Json) -> Js
     2021). `against_published`: published figures next to ours. `published`: all published figures.
     `milliseconds`: what was measured with a clock, with its own `difference` and `against_published`.
     """
-    found = {name: say(all_measured, published) for name, say in each("compared")}
+    found = {name: put_together(all_measured, published) for name, put_together in each("compared")}
     times = SideBySide(milliseconds={"against_published": stage_times(all_measured, published)})
     everything = [*found.values(), times]
     clocked = dict.fromkeys(kind for one in everything for kind in one.milliseconds)

@@ -10,7 +10,7 @@ from hobble.measures.inputs import Json, Row
 
 def tables(compared: Json) -> dict[str, Sequence[Row]]:
     """Table name -> rows with equal keys, from the result of `compare`."""
-    of_measures = {name: rows for _, say in each("tables") for name, rows in say(compared).items()}
+    of_measures = {name: rows for _, make in each("tables") for name, rows in make(compared).items()}
     return {
         "configurations": [flat(row) for row in compared["configurations"]],
         **of_measures,

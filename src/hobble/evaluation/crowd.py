@@ -82,34 +82,35 @@ def run(network: Network, script: Sequence[CrowdTarget], runtime: Runtime) -> Wa
     assert network.skeleton is not None
     count, frames = len(script[0].gait), sum(s.frames for s in script)
     animation = ProceduralAnimation(network, **dict(runtime))
-    of = np.zeros(count, int)  # the character that walks for each figure
+    walker = np.zeros(count, int)  # the character that walks for each figure
     local = np.zeros((frames, count, len(network.skeleton.joints), 3), np.float32)
     contacts, root = np.zeros((frames, count, 4)), np.zeros((frames, count, 3))
-    phase, rough = np.zeros((frames, count)), np.zeros((frames, count))
+    phase, acceleration = np.zeros((frames, count)), np.zeros((frames, count))
     before: list[Array] = []
     f = 0
     for stretch in script:
         target = _targets(network, stretch)
-        first, now = _unlike(of, *target.values())
+        first, new_walker = _grouped_by_target(walker, *target.values())
         if len(first) > animation.characters:
-            came_from = of[first]
-            animation, before, of = animation.copies(came_from), [p[came_from] for p in before], now
-        asked = {name: values[_first_of(of)] for name, values in target.items()}
-        velocity, shares = asked.pop(VELOCITY), asked.pop(GAIT)
+            came_from = walker[first]
+            animation, before = animation.copies(came_from), [p[came_from] for p in before]
+            walker = new_walker
+        target_now = {name: values[_first_of(walker)] for name, values in target.items()}
+        velocity, shares = target_now.pop(VELOCITY), target_now.pop(GAIT)
         for _ in range(stretch.frames):
-            pose = animation.next_pose(velocity, gait=shares, **asked)
+            pose = animation.next_pose(velocity, gait=shares, **target_now)
             # A single character has no leading axis.
             positions, place = pose.positions.reshape(len(shares), -1, 3), np.atleast_2d(pose.root)
-            root[f], phase[f] = place[of], np.atleast_1d(pose.phase)[of]
-            contacts[f] = np.atleast_2d(pose.contacts)[of]
-            local[f] = in_root_frame(positions, place, np.atleast_1d(pose.yaw))[of]
+            root[f], phase[f] = place[walker], np.atleast_1d(pose.phase)[walker]
+            contacts[f] = np.atleast_2d(pose.contacts)[walker]
+            local[f] = in_root_frame(positions, place, np.atleast_1d(pose.yaw))[walker]
             before = [*before[-2:], positions]
             if len(before) == 3:
                 bend = before[2] - 2 * before[1] + before[0]
-                rough[f - 1] = np.sqrt(np.max(np.einsum("cjk,cjk->cj", bend, bend), axis=1))[of]
+                acceleration[f - 1] = np.sqrt(np.max(np.einsum("cjk,cjk->cj", bend, bend), axis=1))[walker]
             f += 1
     starts = np.cumsum([0, *(s.frames for s in script)])
-    return Walks(local, contacts, phase, root, rough, starts)
+    return Walks(local, contacts, phase, root, acceleration, starts)
 
 
 def _targets(network: Network, stretch: CrowdTarget) -> dict[str, Array]:
@@ -120,19 +121,20 @@ def _targets(network: Network, stretch: CrowdTarget) -> dict[str, Array]:
     return {VELOCITY: velocity, GAIT: shares, **stretch.channels}
 
 
-def _unlike(of: np.ndarray, *targets: Array) -> tuple[np.ndarray, np.ndarray]:
+def _grouped_by_target(walker: np.ndarray, *targets: Array) -> tuple[np.ndarray, np.ndarray]:
     """Groups figures that one character can walk for: those with the same character and the same targets.
 
-    of: (C,) the character that has walked for each figure. targets: (C, n) arrays. Returns the first figure
-    of each group (groups,), and the group of each figure (C,).
+    walker: (C,) the character that has walked for each figure. targets: (C, n) arrays. Returns the first
+    figure of each group (groups,), and the group of each figure (C,).
     """
-    _, first, now = np.unique(np.column_stack([of, *targets]), axis=0, return_index=True, return_inverse=True)
-    return first, now.reshape(-1)
+    alike = np.column_stack([walker, *targets])
+    _, first, group = np.unique(alike, axis=0, return_index=True, return_inverse=True)
+    return first, group.reshape(-1)
 
 
-def _first_of(of: np.ndarray) -> np.ndarray:
-    """The first figure of each character. of: (C,) the character that walks for each figure."""
-    return np.unique(of, return_index=True)[1]
+def _first_of(walker: np.ndarray) -> np.ndarray:
+    """The first figure of each character. walker: (C,) the character that walks for each figure."""
+    return np.unique(walker, return_index=True)[1]
 
 
 def channel_values(network: Network, name: str, figures: Sequence[Mapping[str, float]]) -> dict[str, Array]:

@@ -27,14 +27,14 @@ class Targets:
     """The targets of C characters in a frame. Each character gets new ones every 1 to 8 seconds.
 
     velocity: (C, 2) cm a frame. facing: (C, 2) direction; (0, 0) for none. gait: C names. channels: name ->
-    (C, columns). left: (C,) frames until the next targets.
+    (C, columns). frames_left: (C,) frames until the next targets.
     """
 
     velocity: Array
     facing: Array
     gait: list[str]
     channels: dict[str, Array]
-    left: np.ndarray
+    frames_left: np.ndarray
 
     @classmethod
     def none(cls, characters: int, channels: Mapping[str, int]) -> Targets:
@@ -52,8 +52,8 @@ class Targets:
 
         On average a third stand, and half face a random direction.
         """
-        self.left -= 1
-        for c in np.flatnonzero(self.left <= 0):
+        self.frames_left -= 1
+        for c in np.flatnonzero(self.frames_left <= 0):
             going, looking = rng.uniform(-np.pi, np.pi, 2)
             speed = 0.0 if rng.random() < 1 / 3 else rng.uniform(0.2, FASTEST_TARGET)
             self.velocity[c] = speed * np.array([np.sin(going), np.cos(going)])
@@ -62,7 +62,7 @@ class Targets:
             for name, values in self.channels.items():
                 some = rng.random(values.shape[1]) < 2 / values.shape[1]
                 values[c] = some * rng.uniform(0, channel(name).highest, values.shape[1])
-            self.left[c] = rng.integers(FPS, 8 * FPS)
+            self.frames_left[c] = rng.integers(FPS, 8 * FPS)
 
 
 def grounds(characters: int, rng: np.random.Generator) -> Callable[[Array, Array], Array]:
@@ -141,7 +141,7 @@ class WorstPoses:
         self.frames_beyond += int((added.max(axis=1) > LIMITS["added_turn_degrees"]).sum())
 
     @property
-    def hold(self) -> bool:
+    def within_limits(self) -> bool:
         """Whether all values are finite and within LIMITS."""
         return (
             self.finite
@@ -220,5 +220,5 @@ def soak(
         "fastest_joint_cm": round(worst.fastest_joint, 1),
         "slide_cm": round(float(slide.mean()), 3) if len(slide) else None,
         "stances": len(slide),
-        "holds": worst.hold,
+        "holds": worst.within_limits,
     }

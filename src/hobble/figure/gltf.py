@@ -21,7 +21,7 @@ from hobble.figure.mesh import NEEDED, Mesh, body
 from hobble.figure.pack import whole_weights
 
 METRES = 0.01  # metres per centimetre
-MOVES = 1e-5  # a joint does not move if the components of its rotation vary by less than this
+LEAST_MOVEMENT = 1e-5  # a joint does not move if the components of its rotation vary by less than this
 COLOUR = (0.72, 0.72, 0.69, 1.0)
 # Component types (FLOAT to INT) and buffer targets (ARRAY, ELEMENTS) of the format.
 FLOAT, BYTE, SHORT, INT = 5126, 5121, 5123, 5125
@@ -105,7 +105,7 @@ def write_glb(path: str | Path, skeleton: Skeleton, motions: Iterable[BodyMotion
                 "name": "body",
                 "skeleton": 0,
                 "joints": mesh.bones.tolist(),
-                "inverseBindMatrices": buffer.add(_undoing(mesh), "MAT4", FLOAT),
+                "inverseBindMatrices": buffer.add(_inverse_bind_matrices(mesh), "MAT4", FLOAT),
             }
         ],
     }
@@ -140,8 +140,8 @@ def _nodes(skeleton: Skeleton, mesh: Mesh) -> list[dict[str, object]]:
 
 
 def _primitive(mesh: Mesh, buffer: _Buffer) -> dict[str, object]:
-    share = whole_weights(mesh.share)
-    bone = np.where(share > 0, mesh.bone, 0).astype(np.uint8)
+    weights = whole_weights(mesh.weights)
+    bone = np.where(weights > 0, mesh.bones_of_corner, 0).astype(np.uint8)
     normals = mesh.normals.astype(np.float32)
     normals /= np.linalg.norm(normals, axis=1, keepdims=True)
     wide = len(mesh.corners) > 65535
@@ -152,14 +152,14 @@ def _primitive(mesh: Mesh, buffer: _Buffer) -> dict[str, object]:
             "POSITION": buffer.add(corners, "VEC3", FLOAT, target=ARRAY, bounds=True),
             "NORMAL": buffer.add(normals, "VEC3", FLOAT, target=ARRAY),
             "JOINTS_0": buffer.add(bone, "VEC4", BYTE, target=ARRAY),
-            "WEIGHTS_0": buffer.add(share, "VEC4", BYTE, target=ARRAY, normalized=True),
+            "WEIGHTS_0": buffer.add(weights, "VEC4", BYTE, target=ARRAY, normalized=True),
         },
         "indices": buffer.add(faces, "SCALAR", INT if wide else SHORT, target=ELEMENTS),
         "material": 0,
     }
 
 
-def _undoing(mesh: Mesh) -> NDArray[np.float32]:
+def _inverse_bind_matrices(mesh: Mesh) -> NDArray[np.float32]:
     """Inverse bind matrices (B, 16), column by column."""
     turn = quat.to_matrix(quat.inv(mesh.rotations))
     out = np.tile(np.eye(4), (len(mesh.bones), 1, 1))
@@ -175,17 +175,17 @@ def _animation(motion: BodyMotion, buffer: _Buffer) -> dict[str, object]:
     samplers: list[dict[str, object]] = []
     channels: list[dict[str, object]] = []
 
-    def follow(node: int, path: str, times: int, values: Array, kind: str) -> None:
+    def add_channel(node: int, path: str, times: int, values: Array, kind: str) -> None:
         output = buffer.add(values.astype(np.float32), kind, FLOAT)
         samplers.append({"input": times, "output": output, "interpolation": "LINEAR"})
         channels.append({"sampler": len(samplers) - 1, "target": {"node": node, "path": path}})
 
-    follow(0, "translation", at, METRES * motion.root, "VEC3")
+    add_channel(0, "translation", at, METRES * motion.root, "VEC3")
     for j, turns in enumerate(np.moveaxis(_xyzw(quat.normalize(quat.continuous(motion.local))), 1, 0)):
-        if len(times) > 2 and np.ptp(turns, axis=0).max() < MOVES:
-            follow(j, "rotation", ends, turns[[0, -1]], "VEC4")
+        if len(times) > 2 and np.ptp(turns, axis=0).max() < LEAST_MOVEMENT:
+            add_channel(j, "rotation", ends, turns[[0, -1]], "VEC4")
         else:
-            follow(j, "rotation", at, turns, "VEC4")
+            add_channel(j, "rotation", at, turns, "VEC4")
     return {"name": motion.name, "samplers": samplers, "channels": channels}
 
 

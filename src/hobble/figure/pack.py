@@ -22,35 +22,36 @@ def packed_body(skeleton: Skeleton) -> dict[str, Any]:
     """The mesh of `mesh.body` with the data that moves it.
 
     `unit`: UNIT. `wide`: whether `faces` are 32-bit. `keep`: the joints that are bones of the mesh. `places`,
-    `turns`: their positions and rotations in the bind pose. `balls`: see `balls`. Other keys: as in `Mesh`.
+    `turns`: their positions and rotations in the bind pose. `balls`: see `part_spheres`. `bone`, `share`: the
+    `bones_of_corner` and `weights` of `Mesh`. Other keys: as in `Mesh`.
     """
     mesh = body(skeleton)
-    wide = np.uint16 if len(mesh.corners) < 1 << 16 else np.uint32
+    index_type = np.uint16 if len(mesh.corners) < 1 << 16 else np.uint32
     return {
         "unit": UNIT,
         "corners": packed(np.round(mesh.corners / UNIT).astype(np.int16)),
         "normals": packed(np.round(mesh.normals * 127).astype(np.int8)),
         "shade": packed(np.round(mesh.shade * 255).astype(np.uint8)),
-        "faces": packed(mesh.faces.astype(wide)),
-        "wide": wide is np.uint32,
-        "bone": packed(mesh.bone.astype(np.uint8)),
-        "share": packed(whole_weights(mesh.share)),
+        "faces": packed(mesh.faces.astype(index_type)),
+        "wide": index_type is np.uint32,
+        "bone": packed(mesh.bones_of_corner.astype(np.uint8)),
+        "share": packed(whole_weights(mesh.weights)),
         "keep": mesh.bones.tolist(),
         "places": np.round(mesh.positions, 4).tolist(),
         "turns": np.round(mesh.rotations, 6).tolist(),
-        "balls": np.round(balls(mesh), 2).tolist(),
+        "balls": np.round(part_spheres(mesh), 2).tolist(),
     }
 
 
-def balls(mesh: Mesh) -> Array:
-    """(B, 4) a ball for the part that each bone moves: centre in the bone's coordinates, and radius, cm.
+def part_spheres(mesh: Mesh) -> Array:
+    """(B, 4) a sphere for the part that each bone moves: centre in the bone's coordinates, and radius, cm.
 
-    The balls replace the body where a rough shape is enough, as for its shadow on the ground.
+    The spheres replace the body where a rough shape is enough, as for its shadow on the ground.
     """
     out = np.zeros((len(mesh.bones), 4))
-    main = np.take_along_axis(mesh.bone, mesh.share.argmax(axis=1)[:, None], axis=1)[:, 0]
+    main_bone = np.take_along_axis(mesh.bones_of_corner, mesh.weights.argmax(axis=1)[:, None], axis=1)[:, 0]
     for b in range(len(mesh.bones)):
-        if not (own := main == b).any():
+        if not (own := main_bone == b).any():
             continue
         local = quat.rotate(quat.inv(mesh.rotations[b]), mesh.corners[own] - mesh.positions[b])
         low, high = local.min(axis=0), local.max(axis=0)
@@ -58,10 +59,10 @@ def balls(mesh: Mesh) -> Array:
     return out
 
 
-def whole_weights(share: Array) -> NDArray[np.uint8]:
+def whole_weights(weights: Array) -> NDArray[np.uint8]:
     """Weights (V, 4) as integers (V, 4) that sum to 255. The rounding error is added to the largest."""
-    steps = np.floor(share * 255).astype(np.int64)
-    steps[np.arange(len(steps)), share.argmax(axis=1)] += 255 - steps.sum(axis=1)
+    steps = np.floor(weights * 255).astype(np.int64)
+    steps[np.arange(len(steps)), weights.argmax(axis=1)] += 255 - steps.sum(axis=1)
     return steps.astype(np.uint8)
 
 

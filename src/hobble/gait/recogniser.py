@@ -68,14 +68,14 @@ def classifier() -> Discriminant:
     return learn(*examples(people(), range(people().count)), shrinkage=SHRINKAGE)
 
 
-def recognise(walk: Profile, healthy: Profile, judge: Discriminant | None = None) -> Impairment:
+def recognise(walk: Profile, healthy: Profile, discriminant: Discriminant | None = None) -> Impairment:
     """The impairment of a walk, relative to the figure's healthy walk."""
-    judge = judge or classifier()
-    scores = judge.scores(np.array([list(features(walk, healthy).values())]))[0]
+    discriminant = discriminant or classifier()
+    scores = discriminant.scores(np.array([list(features(walk, healthy).values())]))[0]
     likely = np.exp(scores - scores.max())
     likely /= likely.sum()
     sides, labels = {}, dict.fromkeys(GAITS, 0.0)
-    for name, p in zip(judge.classes, map(float, likely), strict=True):
+    for name, p in zip(discriminant.classes, map(float, likely), strict=True):
         gait, _, which = name.partition(" ")
         labels[gait] += p
         if which:

@@ -1,9 +1,9 @@
 """How much a hurt part of the body changes the motion at severity 10.
 
-Two tables decide this: MIXES, the impairment profiles of people that a part mixes, and OWN, values for what
-the recordings do not show. In the recordings, feet and toes are inaccurate, and arms, shoulders, neck and
-back were not hurt. The lean of a hurt back and its bent knees (`forward`, `crouch`) are about those of CMU
-105_26, which has severity 7. Values of one side are for a hurt right side; `_sound` is the other side.
+Two tables decide this: MIXES, the impairment profiles of people that a part mixes, and ADDED_CHANGES, for
+what the recordings do not show. In the recordings, feet and toes are inaccurate, and arms, shoulders, neck
+and back were not hurt. The lean of a hurt back and its bent knees (`forward`, `crouch`) are about those of
+CMU 105_26, which has severity 7. Values of one side are for a hurt right side; `_sound` is the other side.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ import numpy as np
 from hobble.core.quat import Array
 from hobble.hurt.impairment_profiles import CURVES, HARMONICS, profiles
 
-# part -> impairment profiles and their weights. Parts that are not here have only the values of OWN.
+# part -> impairment profiles and their weights. Parts that are not here have only ADDED_CHANGES.
 MIXES: dict[str, dict[str, float]] = {
     "pelvis": {"trendelenburg": 0.55, "lurch": 0.25, "antalgic": 0.2},
     "hip": {"trendelenburg": 0.75, "antalgic": 0.25},
@@ -24,9 +24,9 @@ MIXES: dict[str, dict[str, float]] = {
     "foot": {"antalgic": 0.65, "steppage": 0.35},
     "back": {"lurch": 1.0},
 }
-BOTH_SIDES = ("back",)  # parts whose profile is applied to both sides
+UNSIDED = ("back",)  # parts without a side: their profile is applied to both sides alike
 # Factors on the mixed curves of trunk, pelvis and shoulders.
-GAIN: dict[str, float] = {"pelvis": 1.6, "hip": 2.1, "thigh": 1.25, "shank": 1.0, "foot": 0.9}
+CURVE_FACTOR: dict[str, float] = {"pelvis": 1.6, "hip": 2.1, "thigh": 1.25, "shank": 1.0, "foot": 0.9}
 # Part -> changes that the recordings do not show.
 # - Ratios to the healthy clip: speed; stride (time); lift (height of the swinging foot); push and strike
 #   (pitch of the foot while the heel is up and while the toe is up); arms (swing of both arms); back and head
@@ -35,7 +35,7 @@ GAIN: dict[str, float] = {"pelvis": 1.6, "hip": 2.1, "thigh": 1.25, "shank": 1.0
 # - Leg lengths: out (how far the foot swings outward).
 # - Degrees: toe_out; crouch (knee flexion added in stance); forward and side (lean of the trunk forward and
 #   to the hurt side); list (pelvis up on the hurt side while that leg swings); nod (head forward).
-OWN: dict[str, dict[str, float]] = {
+ADDED_CHANGES: dict[str, dict[str, float]] = {
     "pelvis": {"speed": 0.74, "stride": 1.15, "push": 0.65, "back": 0.6, "lift": 0.8, "list": 2.0},
     "hip": {"speed": 0.66, "stride": 1.2, "push": 0.6, "lift": 0.75, "forward": 2.0, "out": 0.02},
     "thigh": {
@@ -94,21 +94,21 @@ RATIOS = (
 )
 # Factor on the changes of timing in the recordings. They count a slow ankle as stance, so they show only half
 # of an early landing. Besides, a network smooths the effect.
-TIMING = 1.85
+TIMING_FACTOR = 1.85
 # Ratio of the length of the step onto the hurt foot, instead of the mixed one.
-STEP = {"thigh": 0.44, "shank": 0.38, "foot": 0.44}
+STEP_RATIO = {"thigh": 0.44, "shank": 0.38, "foot": 0.44}
 
 
 @functools.cache
 def amounts(part: str) -> dict[str, float | Array]:
     """Name -> change, for a part that is hurt on the right at severity 10.
 
-    Names are those of OWN, where a ratio is given as what is added to 1, and these. `arm`, `arm_sound`:
-    ratios of the arms' swing. `off`, `off_sound`, `land_sound`: cycles by which a foot leaves and lands
-    later. `step`: ratio of the step onto the hurt foot, minus that of a body that is only slower. `width`:
-    leg lengths by which steps are wider. `curves`: (5, 5) factors of the CURVES (see `Profile`).
+    Names are those of ADDED_CHANGES, where a ratio is given as what is added to 1, and these. `arm`,
+    `arm_sound`: ratios of the arms' swing. `off`, `off_sound`, `land_sound`: cycles by which a foot leaves
+    and lands later. `step`: ratio of the step onto the hurt foot, minus that of a body that is only slower.
+    `width`: leg lengths by which steps are wider. `curves`: (5, 5) factors of the CURVES (see `Profile`).
     """
-    own = dict(OWN[part])
+    own = dict(ADDED_CHANGES[part])
     out: dict[str, float | Array] = {"curves": np.zeros((len(CURVES), 1 + 2 * HARMONICS))}
     if mix := MIXES.get(part):
         own, out = _of_people(part, mix, own)
@@ -125,19 +125,19 @@ def _of_people(
     def mean(name: str) -> float:
         return float(sum(share * getattr(known[p], name) for p, share in mix.items()))
 
-    curves = sum(share * known[p].harmonics() for p, share in mix.items()) * GAIN.get(part, 1.0)
+    curves = sum(share * known[p].harmonics() for p, share in mix.items()) * CURVE_FACTOR.get(part, 1.0)
     ratios = {"stride": mean("stride"), "arm": mean("arm_hurt"), "arm_sound": min(mean("arm_sound"), 1.0)}
-    if part in BOTH_SIDES:
+    if part in UNSIDED:
         # A hurt back has no side, so it takes neither curves nor shifts of landings from the profile.
         return {"stride": mean("stride") ** 0.5, **own}, {"curves": np.zeros_like(curves)}
     speed = own["speed"]
     slower = speed * own.get("stride", mean("stride"))  # ratio of the stride length
-    step = STEP.get(part, mean("step_hurt"))
+    step = STEP_RATIO.get(part, mean("step_hurt"))
     return {**ratios, **own}, {
         "curves": curves,
-        "land_sound": TIMING * mean("strike"),
-        "off": TIMING * mean("stance_hurt"),
-        "off_sound": TIMING * (mean("strike") + mean("stance_sound")),
+        "land_sound": TIMING_FACTOR * mean("strike"),
+        "off": TIMING_FACTOR * mean("stance_hurt"),
+        "off_sound": TIMING_FACTOR * (mean("strike") + mean("stance_sound")),
         "step": min(step - slower, 0.25),
         "width": mean("width"),
     }

@@ -18,7 +18,7 @@ LEAST_RATIO = 0.02  # smaller ratios are raised to this
 SETTLING = 0.3  # seconds: sigma of the Gaussian that smooths changes of severity
 LEAST_SEVERITY = 0.05  # smaller severities count as 0
 TOGETHER = 3.0  # how the effects of several injuries add: p of a p-norm (1: sum, infinity: maximum)
-WHOLE = ("speed", "stride", "back", "head", "forward", "nod")  # changes of the whole body
+WHOLE_BODY = ("speed", "stride", "back", "head", "forward", "nod")  # changes of the whole body
 SIDED = (
     *(
         "land",
@@ -38,13 +38,13 @@ SIDED = (
     ),
     *("upper", "fore", "carry"),
 )
-OTHER = "_sound"  # names of changes of the side that is not hurt end with this
+SOUND_SUFFIX = "_sound"  # names of changes of the side that is not hurt end with this
 FLIPPED = np.array([1.0, -1.0, -1.0, -1.0, -1.0])  # signs of CURVES in a mirror
 # Signs of a curve's factors (mean, then cosine and sine of both harmonics) when it is shifted by half a
 # cycle.
-LATER = np.array([1.0, -1.0, -1.0, 1.0, 1.0])
-# How a hurt part of an arm makes a person hold this arm; see GUARDS of `hobble.hurt.upper_body`.
-GUARD = {"shoulder": "upper", "upper arm": "upper", "forearm": "fore", "hand": "carry"}
+HALF_CYCLE_SIGNS = np.array([1.0, -1.0, -1.0, 1.0, 1.0])
+# How a hurt part of an arm makes a person hold this arm; see HELD_ARMS of `hobble.hurt.upper_body`.
+HELD_ARM_OF_PART = {"shoulder": "upper", "upper arm": "upper", "forearm": "fore", "hand": "carry"}
 
 
 @dataclass(frozen=True)
@@ -52,15 +52,15 @@ class Effects:
     """The changes of each of F frames of a clip, named as in `hobble.hurt.amounts`.
 
     body: name -> (F,). sided: name -> (F, 2), left and right. curves: (F, 5, 5) factors of the CURVES.
-    strength: (F,) of the worst link, 0 to 1. shown: (F, L) severities of the L links that the frames show.
-    They follow the requested severities over about a second.
+    strength: (F,) of the worst link, 0 to 1. shown_severity: (F, L) severities of the L links that the
+    frames show. They follow the requested severities over about a second.
     """
 
     body: dict[str, Array] = field(repr=False)
     sided: dict[str, Array] = field(repr=False)
     curves: Array = field(repr=False)
     strength: Array = field(repr=False)
-    shown: Array = field(repr=False)
+    shown_severity: Array = field(repr=False)
 
     def ratio(self, name: str) -> Array:
         """(F,), or (F, 2) left and right: the factor that a change of RATIOS stands for."""
@@ -74,7 +74,7 @@ def effects(skeleton: Skeleton, severity: Array, fps: float) -> Effects:
     """
     frames = len(severity)
     strength = gaussian((np.clip(severity, 0, HIGHEST) / HIGHEST) ** POWER, SETTLING * fps)
-    body = {name: _Sum(np.zeros(frames)) for name in WHOLE}
+    body = {name: _Sum(np.zeros(frames)) for name in WHOLE_BODY}
     sided = {name: _Sum(np.zeros((frames, 2))) for name in SIDED}
     curves = _Sum(np.zeros((frames, 5, 5)))
     parts: dict[tuple[str, int | None], Array] = {}
@@ -89,22 +89,22 @@ def effects(skeleton: Skeleton, severity: Array, fps: float) -> Effects:
         for name, amount in amounts(part).items():
             if name == "curves":
                 curves.add(own[:, None, None] * _of_side(np.asarray(amount), side))
-            elif name in WHOLE:
+            elif name in WHOLE_BODY:
                 body[name].add(own * amount)
             else:
                 _add_sided(sided, name, own * amount, side)
-        if part in GUARD and side is not None:
-            _add_sided(sided, GUARD[part], own, side)
+        if part in HELD_ARM_OF_PART and side is not None:
+            _add_sided(sided, HELD_ARM_OF_PART[part], own, side)
     return Effects(
         {name: total.value() for name, total in body.items()},
         {name: total.value() for name, total in sided.items()},
         curves.value(),
         strength.max(axis=1, initial=0.0),
-        _shown(strength),
+        _shown_severity(strength),
     )
 
 
-def _shown(strength: Array) -> Array:
+def _shown_severity(strength: Array) -> Array:
     """The severities (F, L) of strengths. Very small ones are 0."""
     severity = np.round(HIGHEST * np.clip(strength, 0.0, 1.0) ** (1 / POWER), 3)
     return np.where(severity < LEAST_SEVERITY, 0.0, severity)
@@ -115,14 +115,14 @@ def _add_sided(sided: dict[str, _Sum], name: str, values: Array, side: int | Non
         sided["arm"].add(np.stack([values, values], axis=1))
         return
     hurt = RIGHT if side is None else side
-    at = 1 - hurt if name.endswith(OTHER) else hurt
+    at = 1 - hurt if name.endswith(SOUND_SUFFIX) else hurt
     both = np.zeros((len(values), 2))
     both[:, at] = values
-    sided[name.removesuffix(OTHER)].add(both)
+    sided[name.removesuffix(SOUND_SUFFIX)].add(both)
 
 
 def _of_side(curves: Array, side: int | None) -> Array:
-    return curves * FLIPPED[:, None] * LATER if side == LEFT else curves
+    return curves * FLIPPED[:, None] * HALF_CYCLE_SIGNS if side == LEFT else curves
 
 
 class _Sum:

@@ -9,12 +9,11 @@ import itertools
 from dataclasses import dataclass, field
 
 import numpy as np
-from scipy.ndimage import maximum_filter1d
 
 from hobble.core import quat
 from hobble.core.curve_value import value_at
 from hobble.core.quat import Array
-from hobble.core.smooth import gaussian
+from hobble.core.smooth import gaussian, smooth_above
 from hobble.hurt.body_parts import SIDES
 from hobble.hurt.effects import Effects
 from hobble.hurt.healthy_clip import UP, HealthyClip, SourceStance
@@ -24,11 +23,11 @@ from hobble.hurt.shortened_path import ShortenedPath
 SIGN = (1.0, -1.0)  # +X is the figure's left
 # Radians of pitch over which the ratio changes from `strike` to `push`.
 LEVEL = np.radians(8.0)
-SHORT = 12.0  # cm: in swings shorter than this, progress is measured mainly by time, else by distance
-CLEARANCE = 1.3  # cm: least height of a swinging toe joint above its stance, unless the source's is lower
-EVEN = 4.0  # cm: the swing is lowered less, the more two stances differ in height; at this, by a factor of e
+SHORT_SWING_CM = 12.0  # in swings shorter than this, progress is measured mainly by time, else by distance
+CLEARANCE_CM = 1.3  # least height of a swinging toe joint above its stance, unless the source's is lower
+UNEVEN_CM = 4.0  # the swing is lowered less, the more two stances differ in height; at this, by a factor of e
 JOGGING = 0.65  # in a jog, the change of a step's length is smaller by this share
-ENDS = 0.22  # share of the swing, at both ends, over which its lower height is blended in and out
+BLEND_SHARE = 0.22  # share of the swing, at both ends, over which its lower height is blended in and out
 
 
 @dataclass(frozen=True)
@@ -51,7 +50,7 @@ def rolled_foot(source: HealthyClip, effects: Effects, side: int) -> HurtFoot:
     heel, toe = (skeleton.role(f"{SIDES[side]}_{role}") for role in ("heel", "toe"))
     ankle, ball, turn = clip.positions[:, heel], clip.positions[:, toe], clip.global_rotations[:, heel]
     along = ball - ankle
-    axis = _hinge(turn, along, ~source.up[:, side])
+    axis = _hinge(turn, along, ~source.swinging[:, side])
     ahead = np.cross(UP, axis)
     pitch = np.arctan2(np.sum(along * np.cross(axis, ahead), axis=1), np.sum(along * ahead, axis=1))
     middles = np.array([s.middle for s in source.stances[side]])
@@ -64,13 +63,13 @@ def rolled_foot(source: HealthyClip, effects: Effects, side: int) -> HurtFoot:
     tilt = quat.from_axis_angle(axis, raised * (share - 1))
     new_along = quat.rotate(tilt, along)
     ankle = ankle + np.where(raised < 0, 1.0, 0.0)[:, None] * (along - new_along)
-    ankle = ankle - UP * _not_risen(source, ball[:, 1], push, side)[:, None]
+    ankle = ankle - UP * _lowered_push_off(source, ball[:, 1], push, side)[:, None]
     rest = quat.normalize(gaussian(quat.continuous(clip.rotations[:, toe]), 0.5 * clip.fps))
     toes = quat.slerp(rest, clip.rotations[:, toe], share)
     return HurtFoot(ankle, ankle + new_along, quat.mul(tilt, turn), toes)
 
 
-def _not_risen(source: HealthyClip, ball: Array, push: Array, side: int) -> Array:
+def _lowered_push_off(source: HealthyClip, ball: Array, push: Array, side: int) -> Array:
     """(F,) cm by which a foot with less push-off is lower.
 
     A healthy foot rolls over its toes, so its ball rises before the foot leaves the ground. ball: (F,) height
@@ -103,7 +102,7 @@ def _middle(values: Array, stance: SourceStance) -> Array:
     return np.median(values[int(a) : int(np.ceil(b)) + 1], axis=0)
 
 
-def places(foot: HurtFoot, stances: list[SourceStance]) -> list[Array]:
+def ankle_places(foot: HurtFoot, stances: list[SourceStance]) -> list[Array]:
     """(3,) for each stance: where the ankle is."""
     return [_middle(foot.ankle, stance) for stance in stances]
 
@@ -113,7 +112,7 @@ def move_foot(
 ) -> HurtFoot:
     """The path of a foot (`foot`, from `rolled_foot`) that follows the body's new path."""
     stances = source.stances[side]
-    old = places(foot, stances)
+    old = ankle_places(foot, stances)
     new = [
         _moved(place, s.middle, source, effects, path, side) for place, s in zip(old, stances, strict=True)
     ]
@@ -139,14 +138,14 @@ def move_foot(
         line = foot.ankle[off] + (foot.ankle[land] - foot.ankle[off]) * way
         moved = ankle[off] + (ankle[land] - ankle[off]) * way + foot.ankle[part] - line
         u = np.linspace(0.0, 1.0, land - off + 1)
-        edge = smoothstep(u / ENDS) * smoothstep((1 - u) / ENDS)
-        even = np.exp(-abs(foot.ankle[land, 1] - foot.ankle[off, 1]) / EVEN)
+        edge = smoothstep(u / BLEND_SHARE) * smoothstep((1 - u) / BLEND_SHARE)
+        even = np.exp(-abs(foot.ankle[land, 1] - foot.ankle[off, 1]) / UNEVEN_CM)
         moved[:, 1] -= (1 - lift[part]) * even * edge * (foot.ankle[part, 1] - line[:, 1])
         moved += outward[part] * (np.sin(np.pi * u) ** 2)[:, None]
         under = soles[i] + (soles[i + 1] - soles[i]) * way[:, 0]
         up = rises[i] + (rises[i + 1] - rises[i]) * way[:, 0]
         own = ball[part] - under
-        least[part] = under + up + np.minimum(own, CLEARANCE * np.sin(np.pi * u))
+        least[part] = under + up + np.minimum(own, CLEARANCE_CM * np.sin(np.pi * u))
         ankle[part] = moved
     ankle[:, 1] += smooth_above(np.maximum(least - ankle[:, 1] - along[:, 1], 0.0), 1)
     return HurtFoot(ankle, ankle + along, quat.mul(yaw, foot.turn), foot.toes)
@@ -157,7 +156,8 @@ def _way(ankle: Array) -> Array:
     level = ankle * [1, 0, 1]
     way = level[-1] - level[0]
     time = smoothstep(np.linspace(0.0, 1.0, len(ankle)))
-    return ((((level - level[0]) @ way) + SHORT**2 * time) / (way @ way + SHORT**2))[:, None]
+    by_time = SHORT_SWING_CM**2
+    return ((((level - level[0]) @ way) + by_time * time) / (way @ way + by_time))[:, None]
 
 
 def _moved(
@@ -177,10 +177,3 @@ def _moved(
     width = value_at(effects.sided["width"][near].max(axis=1), when - near.start) * source.leg / 2
     outward = quat.rotate(source.heading[at], np.array([SIGN[side] * width, 0.0, 0.0]))
     return path.moved(place, when) + np.array([ahead[0], 0.0, ahead[1]]) + outward
-
-
-def smooth_above(values: Array, frames: int) -> Array:
-    """(F,) a smooth curve that is nowhere below `values` (F,): their running maximum, smoothed."""
-    wide = maximum_filter1d(values, 4 * frames + 1, mode="nearest")
-    kernel = np.convolve(np.ones(2 * frames + 1), np.ones(2 * frames + 1))
-    return np.convolve(np.pad(wide, 2 * frames, mode="edge"), kernel / kernel.sum(), mode="valid")

@@ -18,11 +18,11 @@ from hobble.labels.options import LabelOptions
 from hobble.labels.phase import phase_of_footsteps
 
 UP = np.array([0.0, 1.0, 0.0])
-CYCLE = 1.1  # seconds: assumed length of a cycle in clips without one
-LONGEST_CYCLE = 2.5  # seconds
+CYCLE_SECONDS = 1.1  # assumed length of a cycle in clips without one
+LONGEST_CYCLE_SECONDS = 2.5
 LEAST_SWING = 6  # frames
-PATH = 0.25  # seconds: sigma of the Gaussian that smooths the hips' positions to a path
-FACING = 0.2  # seconds: sigma of the Gaussian that smooths the heading
+PATH_SECONDS = 0.25  # sigma of the Gaussian that smooths the hips' positions to a path
+FACING_SECONDS = 0.2  # sigma of the Gaussian that smooths the heading
 
 
 @dataclass(frozen=True)
@@ -42,17 +42,17 @@ class SourceStance:
 class HealthyClip:
     """A healthy clip of F frames and its measurements. Pairs are left and right.
 
-    stances: those of each foot in order, at least one. up: (F, 2) whether a foot swings. swing: (F, 2) rises
-    from 0 to 1 and falls back to 0 over a swing. phase: (F,) cycles, unwrapped; whole numbers as the right
-    foot lands. walking: (F,) from 0 to 1, where 1 means that the phase is known. jog: (F,) share. cycle: (F,)
-    length in frames of the cycle around each frame. path: (F, 2) horizontal path of the hips, x and z, cm.
-    heading: (F, 4) rotation about Y of the pelvis. leg: cm from hip to ankle of a straight leg.
+    stances: those of each foot in order, at least one. swinging: (F, 2) whether a foot swings. swing: (F, 2)
+    rises from 0 to 1 and falls back to 0 over a swing. phase: (F,) cycles, unwrapped; whole numbers as the
+    right foot lands. walking: (F,) from 0 to 1, where 1 means that the phase is known. jog: (F,) share.
+    cycle: (F,) length in frames of the cycle around each frame. path: (F, 2) horizontal path of the hips, x
+    and z, cm. heading: (F, 4) rotation about Y of the pelvis. leg: cm from hip to ankle of a straight leg.
     """
 
     clip: Clip
     labels: Labels
     stances: tuple[list[SourceStance], list[SourceStance]] = field(repr=False)
-    up: np.ndarray = field(repr=False)
+    swinging: np.ndarray = field(repr=False)
     swing: Array = field(repr=False)
     phase: Array = field(repr=False)
     walking: Array = field(repr=False)
@@ -66,12 +66,12 @@ class HealthyClip:
         return len(self.clip)
 
 
-def read_source(clip: Clip, labels: Labels) -> HealthyClip:
+def measure_healthy_clip(clip: Clip, labels: Labels) -> HealthyClip:
     """Measure a healthy clip with its labels."""
     frames, skeleton = len(clip), clip.skeleton
     options = LabelOptions()
     found = find_swings(clip, options)
-    stances, up, swing = [], np.zeros((frames, 2), bool), np.zeros((frames, 2))
+    stances, swinging, swing = [], np.zeros((frames, 2), bool), np.zeros((frames, 2))
     for side in (LEFT, RIGHT):
         own = [
             (s.start, min(s.end, frames - 1)) for s in found if s.foot == 1 - side
@@ -79,7 +79,7 @@ def read_source(clip: Clip, labels: Labels) -> HealthyClip:
         touches = np.asarray(labels.contacts[:, 2 * side : 2 * side + 2].any(axis=1))
         own = [_in_the_air(start, end, touches) for start, end in own]
         for start, end in own:
-            up[start:end, side] = True
+            swinging[start:end, side] = True
             u = (np.arange(start, end) - start + 0.5) / max(end - start, 1)
             swing[start:end, side] = np.sin(np.pi * u) ** 2
         ends = [0, *(x for pair in own for x in pair), frames - 1]
@@ -94,13 +94,13 @@ def read_source(clip: Clip, labels: Labels) -> HealthyClip:
         clip,
         labels,
         (stances[LEFT], stances[RIGHT]),
-        up,
+        swinging,
         swing,
         phase,
         gaussian(known.astype(float), 0.2 * clip.fps),
         gaussian(labels.gait[:, GAITS.index("jog")], 0.1 * clip.fps),
         _cycles((stances[LEFT], stances[RIGHT]), frames, clip.fps),
-        gaussian(clip.positions[:, skeleton.role("hips")][:, [0, 2]], PATH * clip.fps),
+        gaussian(clip.positions[:, skeleton.role("hips")][:, [0, 2]], PATH_SECONDS * clip.fps),
         _heading(clip),
         float(np.mean(legs)),
     )
@@ -128,16 +128,16 @@ def _cycles(stances: tuple[list[SourceStance], list[SourceStance]], frames: int,
     middles, lengths = [], []
     for own in stances:
         for a, b in itertools.pairwise(own[1:]):
-            if b.land - a.land <= LONGEST_CYCLE * fps:
+            if b.land - a.land <= LONGEST_CYCLE_SECONDS * fps:
                 middles.append((a.land + b.land) / 2)
                 lengths.append(b.land - a.land)
     if not middles:
-        return np.full(frames, CYCLE * fps)
+        return np.full(frames, CYCLE_SECONDS * fps)
     order = np.argsort(middles)
     return np.interp(np.arange(frames), np.array(middles)[order], np.array(lengths)[order])
 
 
 def _heading(clip: Clip) -> Array:
     left, right = (clip.positions[:, clip.skeleton.role(f"{side}_hip")] for side in SIDES)
-    forward = gaussian(np.cross(left - right, UP), FACING * clip.fps)
+    forward = gaussian(np.cross(left - right, UP), FACING_SECONDS * clip.fps)
     return quat.yaw(np.arctan2(forward[:, 0], forward[:, 2]))

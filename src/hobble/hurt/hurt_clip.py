@@ -14,8 +14,8 @@ from hobble.core.skeleton import local_rotations
 from hobble.core.smooth import gaussian
 from hobble.hurt.body_parts import LEFT, RIGHT, SIDES
 from hobble.hurt.effects import HIGHEST, Effects, effects
-from hobble.hurt.foot_path import HurtFoot, move_foot, places, rolled_foot
-from hobble.hurt.healthy_clip import HealthyClip, read_source
+from hobble.hurt.foot_path import HurtFoot, ankle_places, move_foot, rolled_foot
+from hobble.hurt.healthy_clip import HealthyClip, measure_healthy_clip
 from hobble.hurt.interpolate import at_frames, turns_at
 from hobble.hurt.legs import Leg, hips_height, knee_flexion, place_leg, reach_of, read_leg
 from hobble.hurt.relabel import relabel
@@ -76,7 +76,7 @@ def hurt_clip(
         return HurtClip(same, severity, labels, np.arange(len(clip), dtype=float))
     if clip.translations is not None:
         raise HobbleError(f"clip {clip.name} has bones that change their length, so it cannot be hurt")
-    source = read_source(clip, labels)
+    source = measure_healthy_clip(clip, labels)
     changes = effects(clip.skeleton, severity, clip.fps)
     timing = retime(source, changes)
     feet = [rolled_foot(source, changes, side) for side in (LEFT, RIGHT)]
@@ -84,7 +84,7 @@ def hurt_clip(
     feet = [move_foot(source, changes, path, feet[side], side) for side in (LEFT, RIGHT)]
     out = _assembled(source, changes, timing, path, feet, name)
     which = np.clip(np.floor(timing.body + 1e-6).astype(int), 0, len(clip) - 1)
-    return HurtClip(out, changes.shown[which], relabel(labels, timing, zero, margins), timing.body)
+    return HurtClip(out, changes.shown_severity[which], relabel(labels, timing, zero, margins), timing.body)
 
 
 def _ground(source: HealthyClip, feet: list[HurtFoot]) -> Array:
@@ -92,7 +92,7 @@ def _ground(source: HealthyClip, feet: list[HurtFoot]) -> Array:
     for side in (LEFT, RIGHT):
         stances = source.stances[side]
         heights.append(
-            [(s.middle, float(p[1])) for s, p in zip(stances, places(feet[side], stances), strict=True)]
+            [(s.middle, float(p[1])) for s, p in zip(stances, ankle_places(feet[side], stances), strict=True)]
         )
     return ground_below(source, heights)
 
@@ -118,7 +118,8 @@ def _assembled(
     hips = [_from_root(source, world, side) for side in (LEFT, RIGHT)]
     ankles = [at_frames(feet[side].ankle, timing.legs[:, side]) for side in (LEFT, RIGHT)]
     stands = [
-        at_frames(gaussian(1.0 - source.up[:, side], 2.0), timing.legs[:, side]) for side in (LEFT, RIGHT)
+        at_frames(gaussian(1.0 - source.swinging[:, side], 2.0), timing.legs[:, side])
+        for side in (LEFT, RIGHT)
     ]
     reaches = [_reach(legs[side], changes, source, timing, side) for side in (LEFT, RIGHT)]
     root[:, 1] = hips_height(root, hips, ankles, reaches, stands, [leg.longest for leg in legs])

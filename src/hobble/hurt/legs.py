@@ -11,9 +11,8 @@ from hobble.core.clip import Clip
 from hobble.core.ik import two_bone_knee
 from hobble.core.quat import Array
 from hobble.core.skeleton import Skeleton
-from hobble.core.smooth import gaussian
+from hobble.core.smooth import gaussian, smooth_above
 from hobble.hurt.body_parts import SIDES
-from hobble.hurt.foot_path import smooth_above
 from hobble.hurt.interpolate import at_frames, turns_at
 
 # Radians of knee flexion. Below the first the bend is too small to tell where the knee points, above the

@@ -19,12 +19,12 @@ PELVIS = 0.35  # the pelvis tilts by this share of the trunk's lean
 PELVIS_CALM = 0.7  # the pelvis loses this share of the movement that a stiff back loses
 MEAN = 0.5  # seconds: sigma of the Gaussian that gives a joint's mean posture
 LOOK = {"neck": 0.5, "head": 0.85}  # share of the trunk's lean that neck and head undo, to look ahead
-MOST_GUARD = 0.93  # a held arm loses up to this share of its movement
+STILL = 0.93  # a held arm loses up to this share of its movement
 # How a hurt left arm is held: directions of upper arm and forearm (forward, left, up), relative to the
 # heading. `fore`, for a hurt forearm, lies across the belly: the mean of the jog with a hurt forearm by Ferre
 # et al. (Injured_Jog_LLA). `upper`, for a hurt upper arm, is closer to the body, with the forearm ahead.
 # `carry`, for a hurt hand, only carries the forearm in front of the body.
-GUARDS = {
+HELD_ARMS = {
     "upper": ((0.10, 0.16, -0.98), (0.80, -0.58, 0.10)),
     "fore": ((0.28, 0.17, -0.85), (0.26, -0.86, -0.41)),
     "carry": ((0.10, 0.14, -0.98), (0.92, -0.25, 0.30)),
@@ -38,16 +38,16 @@ def change_body(source: HealthyClip, effects: Effects) -> Array:
     local = _stiffened(source, effects)
     world = _world(skeleton, local)
     pelvis, chest, head = _turns(source, effects)
-    given = _shares(skeleton)
+    position_in_trunk = _shares(skeleton)
     for j in range(len(skeleton.joints)):
-        where, share = given[j]
+        where, share = position_in_trunk[j]
         if where == "pelvis":
             turn = quat.slerp(pelvis, chest, np.full(len(source), share))
         else:
             turn = quat.slerp(chest, head, np.full(len(source), share))
         world[:, j] = quat.mul(turn, world[:, j])
     for side in (LEFT, RIGHT):
-        _guard(source, effects, world, side)
+        _hold_arm(source, effects, world, side)
     return world
 
 
@@ -130,12 +130,12 @@ def _lean(source: HealthyClip, turn: Array, roll: Array, forward: Array) -> Arra
     return quat.mul(source.heading, quat.mul(own, quat.inv(source.heading)))
 
 
-def _guard(source: HealthyClip, effects: Effects, world: Array, side: int) -> None:
+def _hold_arm(source: HealthyClip, effects: Effects, world: Array, side: int) -> None:
     """Hold a hurt arm with a bent elbow, against the body or in front of the chest. Changes `world`."""
     skeleton = source.clip.skeleton
-    weights = {name: np.clip(effects.sided[name][:, side], 0.0, 1.0) for name in GUARDS}
+    weights = {name: np.clip(effects.sided[name][:, side], 0.0, 1.0) for name in HELD_ARMS}
     weights["carry"] = HAND * weights["carry"]
-    held = MOST_GUARD * np.max(list(weights.values()), axis=0)
+    held = STILL * np.max(list(weights.values()), axis=0)
     if not held.any():
         return
     total = np.sum(list(weights.values()), axis=0)
@@ -147,7 +147,7 @@ def _guard(source: HealthyClip, effects: Effects, world: Array, side: int) -> No
     shoulder, elbow, wrist = (skeleton.role(f"{SIDES[side]}_{r}") for r in ("shoulder", "elbow", "wrist"))
     for bone, (joint, end) in enumerate(((shoulder, elbow), (elbow, wrist))):
         goal = np.zeros((len(source), 3))
-        for name, dirs in GUARDS.items():
+        for name, dirs in HELD_ARMS.items():
             ahead, out, up = dirs[bone]
             goal += (weights[name] / total)[:, None] * np.array([out, up, ahead]) * sign
         toward = quat.rotate(source.heading, goal)

@@ -16,8 +16,8 @@ from hobble.labels.clip_labels import LabelReport, Labels
 from hobble.labels.phase import find_cycles
 from hobble.labels.read_files import whole_frame
 
-NEAR = 0.5  # a severity that differs by at most this from a requested one counts as that one
-WHOLE = 6.0  # seconds: versions of shorter clips are not cut, because they might lose all cycles
+SEVERITY_TOLERANCE = 0.5  # a severity that differs by at most this from a requested one counts as that one
+UNCUT_SECONDS = 6.0  # versions of shorter clips are not cut, because they might lose all cycles
 
 
 def hurt_version(
@@ -32,7 +32,7 @@ def hurt_version(
     hurt = hurt_clip(clip, labels, severity, name, flat=flat, zero=report.phase_zero, margins=report.margins)
     if not options.in_between:
         hurt = settled(hurt, options.severities, report)
-    if len(clip) >= WHOLE * clip.fps:
+    if len(clip) >= UNCUT_SECONDS * clip.fps:
         hurt = cut(hurt, round(options.longest * len(clip)), report)
     _, dropped = find_cycles(hurt.labels.footsteps, len(hurt.clip), report.phase_zero, report.margins)
     return hurt, replace(report, clip=name, cycles_dropped=dropped)
@@ -44,7 +44,7 @@ def settled(hurt: HurtClip, severities: Sequence[float], report: LabelReport) ->
     Their footsteps are marked as unused, so that the mirrored clip lacks them, too.
     """
     known = np.array([0.0, *severities])
-    odd = (np.abs(hurt.severity[..., None] - known).min(axis=-1) > NEAR).any(axis=1)
+    odd = (np.abs(hurt.severity[..., None] - known).min(axis=-1) > SEVERITY_TOLERANCE).any(axis=1)
     footsteps = hurt.labels.footsteps.copy()
     for line, following in itertools.pairwise(footsteps):
         if np.isfinite(line[0]) and np.isfinite(following[0]):

@@ -29,7 +29,7 @@ LEAST_PATH = 6.0  # cm: if the toe moves less than this, it is no swing
 SAME_SWING = 12  # frames: two swings with a rest of at most this between them are one
 LESSER_SWING = 0.4  # share of the longer of two successive swings of a foot: a shorter one is no step
 LONGEST_REST = 60  # frames: a longer rest of both feet ends a bout of walking
-SETTLING = 8.0  # cm, see `landings`
+SETTLING_CM = 8.0  # see `landings`
 LAST_FRAMES = 2  # a swing that ends in the last frames may not have landed
 
 
@@ -70,7 +70,7 @@ def find_swings(clip: Clip, options: LabelOptions) -> list[Swing]:
     speed, relative = foot_speeds(clip), relative_speeds(clip, options)
     swings = []
     for foot, side, toe in ((RIGHT, 1, 3), (LEFT, 0, 1)):
-        for start, end in _times_up(relative[:, side], options.valley_factor):
+        for start, end in _swing_frames(relative[:, side], options.valley_factor):
             path, peak = speed[start:end, toe].sum(), speed[start:end, toe].max()
             swings.append(Swing(foot, start, end, float(path), float(peak)))
     real = sorted((s for s in swings if s.path >= LEAST_PATH), key=lambda s: (s.end, s.foot))
@@ -89,7 +89,7 @@ def landings(swings: list[Swing], frames: int, shortest_step: float) -> list[tup
     """Alternating landings (frame, foot). END_OF_BOUT separates bouts of walking.
 
     shortest_step: a landing at most so many frames (at 120 Hz) after one of the other foot is left out. A
-    landing is the frame of first contact, plus the time that the toe needs for SETTLING cm at its top speed.
+    landing is the frame of first contact, plus the time that the toe needs for SETTLING_CM at its top speed.
     So it is later after a slow swing, as in hand-made labels: people mark when the weight comes down.
     """
     out: list[tuple[float, int]] = []
@@ -99,7 +99,7 @@ def landings(swings: list[Swing], frames: int, shortest_step: float) -> list[tup
             continue
         if out and swing.start - resting_since > LONGEST_REST:
             out.append(END_OF_BOUT)
-        when = swing.end + SETTLING / max(swing.peak, 1.5)
+        when = swing.end + SETTLING_CM / max(swing.peak, 1.5)
         resting_since = max(resting_since, swing.end)
         if out and out[-1][1] == 1 - swing.foot and when - out[-1][0] <= shortest_step / 2:
             continue
@@ -107,7 +107,7 @@ def landings(swings: list[Swing], frames: int, shortest_step: float) -> list[tup
     return out
 
 
-def _times_up(relative: Array, valley_factor: float) -> np.ndarray:
+def _swing_frames(relative: Array, valley_factor: float) -> np.ndarray:
     """(n, 2) first frame up, and first frame down again, of each swing of a foot.
 
     relative: (F,) a column of `relative_speeds`.

@@ -49,7 +49,7 @@ LONGEST_START = 180  # frames: a doubtful walk from standing to a jog counts as 
 CLEARLY_WALKING = -4.0  # a walk is not doubtful if the median of its log odds in its second half is lower
 # Frames. Any other walk between standing and jogging that is shorter is split: half counts as standing, half
 # as jogging.
-LONGEST_PASSAGE = 75
+LONGEST_SHORT_WALK = 75
 
 
 def overwrite_crouch(gait: Array, clip: Clip) -> Array:
@@ -72,7 +72,7 @@ def automatic_gait(clip: Clip, down: np.ndarray, dominant: str | None) -> Array:
     """
     odds = jog_odds(clip, down) + {"jog": DATA_SET_ODDS, "walk": -DATA_SET_ODDS}.get(dominant or "", 0.0)
     gait = _likeliest_path(_evidence(clip, odds), SWITCH_COST)
-    shares = _fade(_without_passages(gait, odds), len(GAITS))
+    shares = _fade(_without_short_walks(gait, odds), len(GAITS))
     if dominant in ("jump", "bump"):
         shares[:, GAITS.index(dominant)] = 1 - shares[:, STAND]
         shares[:, [WALK, JOG, CROUCH]] = 0.0
@@ -180,8 +180,8 @@ def _likeliest_path(evidence: Array, switch: float) -> Array:
     return path
 
 
-def _without_passages(gait: Array, odds: Array) -> Array:
-    """Gaits (F,) without short walks between standing and jogging (LONGEST_START, LONGEST_PASSAGE).
+def _without_short_walks(gait: Array, odds: Array) -> Array:
+    """Gaits (F,) without short walks between standing and jogging (LONGEST_START, LONGEST_SHORT_WALK).
 
     odds: (F,) of `jog_odds`.
     """
@@ -193,7 +193,7 @@ def _without_passages(gait: Array, odds: Array) -> Array:
             continue
         if after == JOG and b - a <= LONGEST_START and np.median(odds[(a + b) // 2 : b]) > CLEARLY_WALKING:
             out[a:b] = JOG
-        elif b - a <= LONGEST_PASSAGE:
+        elif b - a <= LONGEST_SHORT_WALK:
             middle = (a + b) // 2
             out[a:middle], out[middle:b] = before, after
     return out

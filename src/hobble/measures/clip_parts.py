@@ -13,7 +13,7 @@ from hobble.measures.sample_options import SampleOptions
 from hobble.measures.stratified_sample import Sample, draw_sample
 from hobble.rows.clip_rows import ClipRows, load_clip_rows
 from hobble.rows.excerpts import LONGEST, Excerpt, load_excerpt
-from hobble.rows.facts import load_facts
+from hobble.rows.summary import load_summary
 
 
 @dataclass(frozen=True)
@@ -67,7 +67,7 @@ def captured_motion(clips: Mapping[str, str | Path], sample: Sample | None) -> I
 
 def sample_of(inputs: MeasureInputs, options: SampleOptions) -> Sample | None:
     """The excerpts to measure; None for all clips."""
-    return draw_sample(map(load_facts, inputs.facts), inputs.splits, options.sample_frames)
+    return draw_sample(map(load_summary, inputs.summaries), inputs.splits, options.sample_frames)
 
 
 def with_sample(result: Json, sample: Sample | None) -> Json:

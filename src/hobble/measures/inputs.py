@@ -22,7 +22,7 @@ Row = Mapping[str, object]  # of a CSV table: column -> number, text or None
 class MeasureInputs:
     """The inputs of a measurement of one configuration: only those listed in its `Measure.inputs`.
 
-    clips: clip -> its file of rows. facts: files of `hobble.rows.facts` of the same clips. splits: clip ->
+    clips: clip -> its file of rows. summaries: their `hobble.rows.summary` files. splits: clip ->
     "train" or "held_out". people: clip -> the person who walks in it; each clip without a known person counts
     as a person of its own. runtime: the values of the keys in `Measure.runtime`; the other keys have
     defaults. pieces: name of a piece -> its JSON file, if the pieces ran as separate jobs. files: name ->
@@ -34,7 +34,7 @@ class MeasureInputs:
     clips: Mapping[str, Path] = field(default_factory=dict, repr=False)
     splits: Mapping[str, str] = field(default_factory=dict, repr=False)
     people: Mapping[str, str] = field(default_factory=dict, repr=False)
-    facts: Sequence[Path] = field(default=(), repr=False)
+    summaries: Sequence[Path] = field(default=(), repr=False)
     runtime: Runtime = field(default_factory=Runtime)
     pieces: Mapping[str, Path] = field(default_factory=dict, repr=False)
 

@@ -25,7 +25,7 @@ from hobble.core.section import Section
 from hobble.runtime.options import Runtime
 
 # Inputs of a measurement. Any other name is that of another measurement, whose JSON is the input.
-INPUTS = ("weights", "clips", "facts", "skeleton", "published")
+INPUTS = ("weights", "clips", "summaries", "skeleton", "published")
 
 
 @dataclass(frozen=True)

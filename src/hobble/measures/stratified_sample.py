@@ -23,11 +23,11 @@ import numpy as np
 
 from hobble.measures.results import SampleSize
 from hobble.rows.excerpts import Excerpt, ExcerptKind
-from hobble.rows.facts import Facts
+from hobble.rows.summary import RowsSummary
 
 LEAST = 2  # fewest excerpts drawn from a stratum, because the variance needs two
 SPEEDS = 3  # ranges of speed into which each gait is divided
-SURE = 1.96  # half the width of a 95 % confidence interval, in standard errors
+STANDARD_ERRORS = 1.96  # half the width of a 95 % confidence interval, in standard errors
 
 
 @dataclass(frozen=True)
@@ -61,7 +61,7 @@ class Sample:
     def clip_weights(self) -> dict[Excerpt, float]:
         """Excerpt in the sample -> number of clips that it represents."""
         return {
-            one: one.rows / one.of * stratum.count / len(stratum.drawn)
+            one: one.rows / one.clip_rows * stratum.count / len(stratum.drawn)
             for stratum in self.strata
             for one in stratum.drawn
         }
@@ -74,7 +74,7 @@ class Sample:
         strata = [stratum for stratum in self.strata if stratum.split == split and stratum.rows]
         total = sum(stratum.rows for stratum in strata)
         variance = sum((stratum.rows / total) ** 2 * _variance(stratum, values) for stratum in strata)
-        return SURE * math.sqrt(variance)
+        return STANDARD_ERRORS * math.sqrt(variance)
 
     def to_dict(self) -> SampleSize:
         """Plain data for a measurement's JSON."""
@@ -99,12 +99,12 @@ def _variance(stratum: Stratum, values: Mapping[Excerpt, float]) -> float:
     return float((1 - n / stratum.count) * (off**2).sum() / (n - 1) / n)
 
 
-def draw_sample(facts: Iterable[Facts], splits: Mapping[str, str], frames: int) -> Sample | None:
+def draw_sample(summaries: Iterable[RowsSummary], splits: Mapping[str, str], frames: int) -> Sample | None:
     """A sample of about `frames` rows; None if all clips together have no more.
 
     The same clips give the same sample, and one more clip changes it only a little.
     """
-    clips = [one for one in facts if one.rows]
+    clips = [one for one in summaries if one.rows]
     if sum(one.rows for one in clips) <= frames:
         return None
     every = {excerpt: kind for one in clips for excerpt, kind in one.excerpts.items()}

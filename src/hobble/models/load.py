@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from hobble.channels import NAMES, channel, every
+from hobble.channels import NAMES, all_channels, channel
 from hobble.channels.speed_limits import Limits
 from hobble.core.errors import InputError
 from hobble.core.files import load_npz
@@ -144,7 +144,9 @@ def _guess_layout(x_size: int, y_size: int, skeleton: Skeleton | None) -> RowLay
     left = x_size - RowLayout(joints).x_size
     if left <= 0:
         return RowLayout(joints)
-    fitting = (one.name for one in every() if skeleton is not None and len(one.columns(skeleton)) == left)
+    fitting = (
+        one.name for one in all_channels() if skeleton is not None and len(one.columns(skeleton)) == left
+    )
     return RowLayout(joints, channels=((next(fitting, NAMES[0]), left),))
 
 

@@ -29,9 +29,9 @@ from hobble.core.processors import processor
 # Environment variables that limit which instructions the libraries use, and so change speed and rounding.
 SETTINGS = ("ATEN_CPU_CAPABILITY", "ONEDNN_MAX_CPU_ISA", "MKL_ENABLE_INSTRUCTIONS", "MKL_CBWR")
 SECONDS = 0.1  # length of a trial of one product
-TURNS = 5, 50  # fewest and most calls of each way in a trial
-HOPELESS = 1.5  # a way this many times slower than another after two turns gets no more turns
-GAIN = 0.97  # a way replaces one listed before it only if it takes less than this share of its time
+CALLS_OF_A_WAY = 5, 50  # fewest and most calls of each way in a trial
+GIVE_UP_ABOVE = 1.5  # a way this many times slower than another after two turns gets no more turns
+REPLACES_BELOW = 0.97  # a way replaces one listed before it only if it takes less than this share of its time
 
 log = logging.getLogger("hobble")
 
@@ -66,18 +66,18 @@ def fastest(ways: Mapping[str, Callable[[], object]], clock: Callable[[], float]
     """
     best = dict.fromkeys(ways, float("inf"))
     begun = perf_counter()
-    for turn in range(TURNS[1]):
-        if turn >= TURNS[0] and perf_counter() - begun > SECONDS:
+    for turn in range(CALLS_OF_A_WAY[1]):
+        if turn >= CALLS_OF_A_WAY[0] and perf_counter() - begun > SECONDS:
             break
         least = min(best.values())
         for name, call in ways.items():
-            if turn < 2 or best[name] < HOPELESS * least:
+            if turn < 2 or best[name] < GIVE_UP_ABOVE * least:
                 before = clock()
                 call()
                 best[name] = min(best[name], clock() - before)
     chosen, *others = ways
     for name in others:
-        if best[name] < GAIN * best[chosen]:
+        if best[name] < REPLACES_BELOW * best[chosen]:
             chosen = name
     return chosen
 

@@ -13,11 +13,11 @@ from time import perf_counter, process_time
 
 import torch
 
-from hobble.models.product_trial import GAIN, kept_choice
+from hobble.models.product_trial import REPLACES_BELOW, kept_choice
 
 INPUTS, OUTPUTS = 512, 2048  # size of the product in the trial: a layer of 512 units, four sets of weights
 SECONDS = 0.01  # length of the calls that are timed together; single calls are too short to be timed
-TURNS = 8  # how often each number of threads is timed
+CALLS = 8  # how often each number of threads is timed
 # Least processor time of each thread, in seconds per second. With less, other programs used the processors
 # during the trial, and the trial says nothing.
 UNDISTURBED = 0.9
@@ -61,7 +61,7 @@ def compare(
     """
     best = {threads: (float("inf"), 0.0) for threads in (1, most)}
     calls = 1
-    for turn in range(TURNS + 1):
+    for turn in range(CALLS + 1):
         for threads in best:
             use(threads)
             call()  # wakes the threads
@@ -74,4 +74,4 @@ def compare(
             elif threads == 1:
                 calls = max(1, round(SECONDS / max(seconds, 1e-6)))
     undisturbed = all(share >= UNDISTURBED * threads for threads, (_, share) in best.items())
-    return "1" if undisturbed and best[1][0] < GAIN * best[most][0] else str(most)
+    return "1" if undisturbed and best[1][0] < REPLACES_BELOW * best[most][0] else str(most)

@@ -43,7 +43,7 @@ def with_balls(clip: Clip, body: Body, frames: dict[int, Array]) -> tuple[Clip, 
     return _with_joints(clip, "ball", heels, offsets), replace(body, legs=legs)
 
 
-def with_bends(
+def with_split_joints(
     clip: Clip, body: Body, frames: dict[int, Array], bends: Mapping[int, Array]
 ) -> tuple[Clip, Body]:
     """The clip and the body with further joints at the places of hips and chest.

@@ -112,37 +112,38 @@ def body_by_roles(skeleton: Skeleton) -> Body:
     return with_fingers(body, skeleton)
 
 
-def pairs(source: Skeleton, own: Body, target: Skeleton, theirs: Body) -> dict[str, str]:
+def pairs(source: Skeleton, source_body: Body, target: Skeleton, target_body: Body) -> dict[str, str]:
     """For each joint of the target, the name of the source joint that it follows.
 
-    own: the body on `source`. theirs: the body on `target`. Limbs, hips and head follow the same parts.
-    Inside the trunk each joint follows the highest source joint that is not above it by more than a fifth of
-    the trunk (so it is in the neck), and the chest follows the chest. Joints without a counterpart are left
-    out.
+    source_body: the body on `source`. target_body: the body on `target`. Limbs, hips and head follow the same
+    parts. Inside the trunk each joint follows the highest source joint that is not above it by more than a
+    fifth of the trunk (so it is in the neck), and the chest follows the chest. Joints without a counterpart
+    are left out.
     """
-    out: dict[int, int] = {theirs.hips: own.hips, theirs.head: own.head}
-    out |= _joints_along(target, (theirs.hips, *theirs.trunk), source, (own.hips, *own.trunk))
-    if own.neck:
-        out |= _joints_along(
-            target, (theirs.chest, *theirs.neck, theirs.head), source, (own.chest, *own.neck, own.head)
-        )
+    out: dict[int, int] = {target_body.hips: source_body.hips, target_body.head: source_body.head}
+    target_trunk = (target_body.hips, *target_body.trunk)
+    out |= _joints_along(target, target_trunk, source, (source_body.hips, *source_body.trunk))
+    if source_body.neck:
+        target_neck = (target_body.chest, *target_body.neck, target_body.head)
+        source_neck = (source_body.chest, *source_body.neck, source_body.head)
+        out |= _joints_along(target, target_neck, source, source_neck)
     for side in SIDES:
-        for mine, other in zip(theirs.arms[side], own.arms[side], strict=True):
-            if mine is not None and other is not None:
-                out[mine] = other
-        for mine, other in zip(theirs.legs[side], own.legs[side], strict=True):
-            if mine is not None and other is not None:
-                out[mine] = other
+        for target_joint, source_joint in zip(target_body.arms[side], source_body.arms[side], strict=True):
+            if target_joint is not None and source_joint is not None:
+                out[target_joint] = source_joint
+        for target_joint, source_joint in zip(target_body.legs[side], source_body.legs[side], strict=True):
+            if target_joint is not None and source_joint is not None:
+                out[target_joint] = source_joint
     return {target.joints[a]: source.joints[b] for a, b in sorted(out.items())}
 
 
 def _joints_along(
-    target: Skeleton, mine: Sequence[int], source: Skeleton, theirs: Sequence[int]
+    target: Skeleton, target_chain: Sequence[int], source: Skeleton, source_chain: Sequence[int]
 ) -> dict[int, int]:
-    here, there = _shares(target, mine), _shares(source, theirs)
-    out = {mine[-1]: theirs[-1]}
-    for joint, share in zip(mine[1:-1], here[1:-1], strict=True):
-        below = [j for j, s in zip(theirs[:-1], there[:-1], strict=True) if s <= share + REACH]
+    target_shares, source_shares = _shares(target, target_chain), _shares(source, source_chain)
+    out = {target_chain[-1]: source_chain[-1]}
+    for joint, share in zip(target_chain[1:-1], target_shares[1:-1], strict=True):
+        below = [j for j, s in zip(source_chain[:-1], source_shares[:-1], strict=True) if s <= share + REACH]
         out[joint] = below[-1]
     return out
 

@@ -49,14 +49,14 @@ class Repaired:
 class Jump:
     """A jump between frame `after` and the next.
 
-    size: by how many cm the step of the worst joint differs from the usual one. joint: its name. root: the
-    same difference for the root, cm.
+    size: by how many cm the step of the worst joint differs from the usual one. joint: its name. root_size:
+    the same difference for the root, cm.
     """
 
     after: int
     size: float
     joint: str
-    root: float = field(default=0.0)
+    root_size: float = field(default=0.0)
 
     def __str__(self) -> str:
         between = f"between frames {self.after + 1} and {self.after + 2}"
@@ -77,7 +77,7 @@ def repair(clip: Clip) -> Repaired:
     if not left and not bridges:
         return Repaired(draft, 0, sentences)
     first, last = _without_edges(len(clip), clip.fps, left)
-    teleports = [jump.after for jump in left if jump.root > TELEPORT and first <= jump.after < last]
+    teleports = [jump.after for jump in left if jump.root_size > TELEPORT and first <= jump.after < last]
     edges = [first - 1, *teleports, last]
     first, last = max(((a + 1, b) for a, b in pairwise(edges)), key=lambda part: part[1] - part[0])
     mended = _copy(draft)

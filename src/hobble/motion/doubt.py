@@ -11,13 +11,14 @@ MOST = 3.0  # cm (two standard deviations): a clip whose height is more uncertai
 
 
 class Doubt(Exception):
-    """The parts of a rig are uncertain. why: what is uncertain, in words. roles: role -> joint, for the roles
-    that are certain.
+    """The parts of a rig are uncertain.
+
+    why: what is uncertain, in words. certain_roles: role -> joint, for the roles that are certain.
     """
 
-    def __init__(self, why: str, roles: dict[str, int] | None = None) -> None:
+    def __init__(self, why: str, certain_roles: dict[str, int] | None = None) -> None:
         super().__init__(why)
-        self.roles = roles or {}
+        self.certain_roles = certain_roles or {}
 
 
 class TwoFigures(Doubt):

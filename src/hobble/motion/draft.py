@@ -19,7 +19,7 @@ MOST_SHOWN = 80  # joints in a message; enough for usual rigs with all fingers
 
 def refusal(file: Bvh, rig: Skeleton, doubt: Doubt) -> InputError:
     """The error for a rig in doubt. It contains a draft to correct, or the start of a long one."""
-    roles = guessed(rig) | {role: rig.joints[j] for role, j in doubt.roles.items()}
+    roles = guessed(rig) | {role: rig.joints[j] for role, j in doubt.certain_roles.items()}
     text, name, more = draft(rig, roles), file.path.name, len(rig.joints) - MOST_SHOWN
     if more > 0:
         shown = "\n".join(text.rstrip("\n").split("\n")[:-more])

@@ -37,7 +37,7 @@ class ClipDigest:
     mirrored: Array | None = field(default=None, repr=False)
 
 
-def likeness(clip: Clip, sha256: str) -> ClipDigest:
+def digest(clip: Clip, sha256: str) -> ClipDigest:
     """The data by which a clip is compared with others."""
     at = np.linspace(0, len(clip) - 1, POSES).round().astype(int)
     moved = None if clip.translations is None else clip.translations[at]
@@ -53,7 +53,7 @@ def likeness(clip: Clip, sha256: str) -> ClipDigest:
     return ClipDigest(clip.name, sha256, len(clip) / clip.fps, poses, mirrored)
 
 
-def save_likenesses(path: Path, clips: Sequence[ClipDigest]) -> None:
+def save_digests(path: Path, clips: Sequence[ClipDigest]) -> None:
     """Write the data of all clips to one file."""
     arrays = {
         f"{number}.{name}": np.array(value)
@@ -64,8 +64,8 @@ def save_likenesses(path: Path, clips: Sequence[ClipDigest]) -> None:
     save_npz(path, count=np.array(len(clips)), **arrays)
 
 
-def load_likenesses(path: Path) -> list[ClipDigest]:
-    """The inverse of `save_likenesses`."""
+def load_digests(path: Path) -> list[ClipDigest]:
+    """The inverse of `save_digests`."""
     data = load_npz(path)
     return [
         ClipDigest(

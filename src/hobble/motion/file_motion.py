@@ -35,7 +35,7 @@ from hobble.motion.rig import (
     missing_bone,
     unit_of,
 )
-from hobble.motion.standing import stands
+from hobble.motion.standing import why_not_standing
 from hobble.motion.upright_rest import upright
 
 STILL = 0.1  # cm: a joint whose position stays nearer to its offset than this does not move in its parent
@@ -131,7 +131,7 @@ def _on_unknown_rig(
     unit, unit_name = _unit(file.path, _leg(raw, body), options.unit)
     rig = replace(rig, roles=body.roles(rig.joints))
     clip = _scaled(file, rig, decoded, unit, options)
-    standing = stands(body, rest_positions(rig)) is None
+    standing = why_not_standing(body, rest_positions(rig)) is None
     if not standing and on_four_legs(body, raw.positions):
         raise InputError(
             file.path, "the figure goes on four legs", fix="Only clips of figures with two legs can be used."

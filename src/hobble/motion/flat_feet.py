@@ -80,56 +80,57 @@ class Tilt:
     error: float
 
 
-def flat_feet(seen: BodySample) -> dict[int, Array]:
+def flat_feet(sample: BodySample) -> dict[int, Array]:
     """Ankles and balls -> their frames (4,), as `BodySample` defines them, from how they are turned while the
     feet are flat.
     """
-    tilt = feet_tilt(seen)
+    tilt = feet_tilt(sample)
     frames: dict[int, Array] = {}
     for side in SIDES:
         measured, wanted = tilt.measured[side], tilt.flat[side]
         turn = 0.0 if measured is None or wanted is None else wanted - measured
         more = quat.from_axis_angle(LEFT, np.array(turn))
-        flat = flat_frames(seen, side)
-        level = quat.between(AHEAD, unit(_ahead(seen, side)[flat] * [1, 0, 1]))
-        for joint in seen.body.legs[side][2:]:
+        flat = flat_frames(sample, side)
+        level = quat.between(AHEAD, unit(_ahead(sample, side)[flat] * [1, 0, 1]))
+        for joint in sample.body.legs[side][2:]:
             if joint is not None:
-                found = mean_rotation(quat.mul(quat.inv(seen.turned[flat, joint]), level))
+                found = mean_rotation(quat.mul(quat.inv(sample.turned[flat, joint]), level))
                 frames[joint] = quat.mul(found, quat.inv(more))
     return frames
 
 
 @lru_cache(maxsize=1)
-def feet_tilt(seen: BodySample) -> Tilt:
+def feet_tilt(sample: BodySample) -> Tilt:
     """The tilt of flat feet: from the zero pose if it shows it, else from frames in which they stand."""
-    sides = {side: _steepness(seen, side) for side in SIDES}
-    known = [tilt for tilt in sides.values() if tilt is not None]
-    if not known:
+    sides = {side: _steepness(sample, side) for side in SIDES}
+    measured_tilts = [tilt for tilt in sides.values() if tilt is not None]
+    if not measured_tilts:
         return Tilt(sides, sides, 0.0)
-    zero = {side: _zero_tilt(seen, side) for side in SIDES}
-    there = [tilt for tilt in zero.values() if tilt is not None]
-    if _on_tiptoe(seen, known):
-        if len(there) == len(SIDES) and np.ptp(there) < SAME and 0 < np.mean(there) < np.mean(known):
+    zero = {side: _zero_tilt(sample, side) for side in SIDES}
+    zero_tilts = [tilt for tilt in zero.values() if tilt is not None]
+    if _on_tiptoe(sample, measured_tilts):
+        alike = len(zero_tilts) == len(SIDES) and np.ptp(zero_tilts) < SAME
+        if alike and 0 < np.mean(zero_tilts) < np.mean(measured_tilts):
             return Tilt(sides, zero, CAPTURED_ERROR)
-        return Tilt(sides, _both(sides, seen.target_tilt), BRIEF_ERROR)
-    if exact := [tilt for side, tilt in sides.items() if tilt is not None and _exact(seen, side)]:
+        return Tilt(sides, _both(sides, sample.target_tilt), BRIEF_ERROR)
+    if exact := [tilt for side, tilt in sides.items() if tilt is not None and _exact(sample, side)]:
         return Tilt(sides, _both(sides, float(np.mean(exact))), EXACT_ERROR)
-    raised = RAISED if runs(seen) else 0.0
-    measured = float(np.mean(known)) - raised
-    if len(there) == len(SIDES) and np.ptp(there) < AGREE:
+    raised = RAISED if runs(sample) else 0.0
+    measured = float(np.mean(measured_tilts)) - raised
+    if len(zero_tilts) == len(SIDES) and np.ptp(zero_tilts) < AGREE:
         # A foot that limps or stands on a slope may never come down, so one foot that agrees is enough.
-        one = min(abs(a - b + raised) for a, b in zip(there, known, strict=True))
-        if min(abs(np.mean(there) - measured), 2 * one) < AGREE:
+        best_foot = min(abs(a - b + raised) for a, b in zip(zero_tilts, measured_tilts, strict=True))
+        if min(abs(np.mean(zero_tilts) - measured), 2 * best_foot) < AGREE:
             return Tilt(sides, zero, EXACT_ERROR)
-    error = float(np.hypot(CAPTURED_ERROR, 0.25 * np.ptp(known)))
-    angle, error = _likeliest(measured, error, seen.target_tilt)
-    return Tilt(sides, _both(sides, angle), error if seen.seconds >= BRIEF else BRIEF_ERROR)
+    error = float(np.hypot(CAPTURED_ERROR, 0.25 * np.ptp(measured_tilts)))
+    angle, error = _likeliest(measured, error, sample.target_tilt)
+    return Tilt(sides, _both(sides, angle), error if sample.seconds >= BRIEF else BRIEF_ERROR)
 
 
-def _on_tiptoe(seen: BodySample, known: Sequence[float]) -> bool:
+def _on_tiptoe(sample: BodySample, measured_tilts: Sequence[float]) -> bool:
     """Whether the body squats on feet that are much steeper than the target's flat ones."""
-    low = not any(stands(seen, side) for side in SIDES)
-    return low and bool(np.mean(known) > seen.target_tilt + TIPTOE)
+    low = not any(upright_while_flat(sample, side) for side in SIDES)
+    return low and bool(np.mean(measured_tilts) > sample.target_tilt + TIPTOE)
 
 
 def _both(sides: dict[str, float | None], angle: float) -> dict[str, float | None]:
@@ -160,37 +161,37 @@ def _likeliest(measured: float, error: float, target: float) -> tuple[float, flo
     return measured + alike * pull * apart, float(np.sqrt(variance))
 
 
-def height_error(seen: BodySample, zero: bool) -> float:
+def height_error(sample: BodySample, zero: bool) -> float:
     """Centimetres (two standard deviations) by which the figure may stand too high or low.
 
     0 if a person could stand in the zero pose (`zero`), which then shows how the feet are turned, and 0 if
     the rig has no joints for the balls of the feet.
     """
-    feet = [(heel, toe) for *_, heel, toe in seen.body.legs.values() if toe is not None]
+    feet = [(heel, toe) for *_, heel, toe in sample.body.legs.values() if toe is not None]
     if zero or len(feet) < len(SIDES):
         return 0.0
-    return float(2 * np.mean([seen.length(*bone) for bone in feet]) * feet_tilt(seen).error)
+    return float(2 * np.mean([sample.length(*bone) for bone in feet]) * feet_tilt(sample).error)
 
 
-def doubt(seen: BodySample, zero: bool) -> str | None:
+def doubt(sample: BodySample, zero: bool) -> str | None:
     """A sentence on what is uncertain about how the feet stand, or None.
 
     zero: whether a person could stand in the zero pose, which then shows how the feet are turned.
     """
-    tilt = feet_tilt(seen)
+    tilt = feet_tilt(sample)
     tilts = [np.degrees(measured) for measured in tilt.measured.values() if measured is not None]
     if len(tilts) < len(SIDES):
         guessed = "the figure may stand 3 cm too high or low"
         if not zero:
             guessed += ", and toes and ankles may lie some centimetres off"
         return f"It has no joints for the balls of the feet. They were put where people have them: {guessed}."
-    most = height_error(seen, zero)
+    most = height_error(sample, zero)
     if most < NOTED:
         return None
     why = "nobody could stand in its zero pose"
-    if seen.seconds < BRIEF:
-        why += f" and {seen.seconds:.2f} s are too short for a step of each foot"
-    if _on_tiptoe(seen, [float(np.radians(x)) for x in tilts]):
+    if sample.seconds < BRIEF:
+        why += f" and {sample.seconds:.2f} s are too short for a step of each foot"
+    if _on_tiptoe(sample, [float(np.radians(x)) for x in tilts]):
         why += " and the figure squats, perhaps on tiptoe"
     if abs(tilts[0] - tilts[1]) > APART:
         why += f" and its feet stand at different angles ({tilts[0]:.0f} and {tilts[1]:.0f} degrees)"
@@ -207,67 +208,68 @@ def rest_tilt(skeleton: Skeleton, body: Body) -> float:
     return float(np.mean(_steep(np.array(bones))))
 
 
-def runs(seen: BodySample) -> bool:
+def runs(sample: BodySample) -> bool:
     """Whether the figure runs, so that its feet hardly stand."""
     slow = [
-        seen.speeds[:, _ball(seen, side)] < SLOW * seen.length(*seen.body.legs[side][:3]) for side in SIDES
+        sample.speeds[:, _ball(sample, side)] < SLOW * sample.length(*sample.body.legs[side][:3])
+        for side in SIDES
     ]
     return bool(np.mean(slow) < RUNS)
 
 
-def flat_frames(seen: BodySample, side: str) -> NDArray[np.integer]:
+def flat_frames(sample: BodySample, side: str) -> NDArray[np.integer]:
     """The frames in which a foot is most likely flat on the ground: at least FEWEST."""
-    stance = _stance(seen, side)
-    steep = _steep(_ahead(seen, side)[stance])
+    stance = _stance(sample, side)
+    steep = _steep(_ahead(sample, side)[stance])
     low, high = np.percentile(steep, LEAST_STEEP)
     flat = stance[(steep >= low) & (steep <= high)]
     return flat if len(flat) >= FEWEST else stance[np.argsort(steep)[:FEWEST]]
 
 
-def stands(seen: BodySample, side: str) -> bool:
+def upright_while_flat(sample: BodySample, side: str) -> bool:
     """Whether the body is upright while the foot on this side is flat."""
-    hip, knee, heel, _ = seen.body.legs[side]
-    flat = flat_frames(seen, side)
-    height = np.median(seen.at[flat, hip, 1] - seen.at[flat, heel, 1])
-    return bool(height > UPRIGHT * seen.length(hip, knee, heel))
+    hip, knee, heel, _ = sample.body.legs[side]
+    flat = flat_frames(sample, side)
+    height = np.median(sample.at[flat, hip, 1] - sample.at[flat, heel, 1])
+    return bool(height > UPRIGHT * sample.length(hip, knee, heel))
 
 
-def _steepness(seen: BodySample, side: str) -> float | None:
+def _steepness(sample: BodySample, side: str) -> float | None:
     """The tilt in radians of a foot in the frames in which it is flat, or None if it has no ball."""
-    heel, toe = seen.body.legs[side][2:]
+    heel, toe = sample.body.legs[side][2:]
     if toe is None:
         return None
-    flat = flat_frames(seen, side)
-    return float(np.median(_steep(seen.at[flat, toe] - seen.at[flat, heel])))
+    flat = flat_frames(sample, side)
+    return float(np.median(_steep(sample.at[flat, toe] - sample.at[flat, heel])))
 
 
-def _exact(seen: BodySample, side: str) -> bool:
+def _exact(sample: BodySample, side: str) -> bool:
     """Whether a foot has exactly one tilt whenever it stands, and other ones at other times."""
-    steep = _steep(_ahead(seen, side))
-    low, middle = np.percentile(steep[_stance(seen, side)], [10, 50])
+    steep = _steep(_ahead(sample, side))
+    low, middle = np.percentile(steep[_stance(sample, side)], [10, 50])
     return bool(middle - low < EXACT and np.ptp(steep) > TILTS)
 
 
-def _stance(seen: BodySample, side: str) -> NDArray[np.integer]:
+def _stance(sample: BodySample, side: str) -> NDArray[np.integer]:
     """The frames in which the ball of a foot is lowest and slowest, so that it stands, the surest first."""
-    ball = _ball(seen, side)
-    order = _rank(seen.speeds[:, ball]) + _rank(seen.at[:, ball, 1])
+    ball = _ball(sample, side)
+    order = _rank(sample.speeds[:, ball]) + _rank(sample.at[:, ball, 1])
     return np.argsort(order)[: max(FEWEST + 2, round(STANCE * len(order)))]
 
 
-def _zero_tilt(seen: BodySample, side: str) -> float | None:
+def _zero_tilt(sample: BodySample, side: str) -> float | None:
     """The tilt in radians of a foot in the zero pose, turned so that its shank is upright.
 
     None if the foot does not point where its knee points, since it can have any tilt then. If the leg is
     nearly straight, its bones may be twisted, so the foot may point sideways.
     """
-    hip, knee, heel, toe = seen.body.legs[side]
+    hip, knee, heel, toe = sample.body.legs[side]
     if toe is None:
         return None
     thigh, shank, foot = (
-        unit(seen.rest[b] - seen.rest[a]) for a, b in ((hip, knee), (knee, heel), (heel, toe))
+        unit(sample.rest[b] - sample.rest[a]) for a, b in ((hip, knee), (knee, heel), (heel, toe))
     )
-    left = seen.local(knee, seen.hinge(hip, knee, heel, seen.hips_left))
+    left = sample.local(knee, sample.hinge(hip, knee, heel, sample.hips_left))
     forward = unit(np.cross(shank, unit(left)))
     level = unit(foot - shank * (shank @ foot))
     if degrees_between(level, forward) > FORWARD and degrees_between(thigh, shank) > STRAIGHT:
@@ -275,22 +277,22 @@ def _zero_tilt(seen: BodySample, side: str) -> float | None:
     return float(np.arcsin(np.clip(foot @ shank, -1.0, 1.0)))
 
 
-def _ball(seen: BodySample, side: str) -> int:
-    heel, toe = seen.body.legs[side][2:]
+def _ball(sample: BodySample, side: str) -> int:
+    heel, toe = sample.body.legs[side][2:]
     return heel if toe is None else toe
 
 
-def _ahead(seen: BodySample, side: str) -> Array:
+def _ahead(sample: BodySample, side: str) -> Array:
     """(S, 3) vectors in which a foot points: from ankle to ball; without a ball, to the ankle's end site;
     without that, where the hips face on average.
     """
-    heel, toe = seen.body.legs[side][2:]
+    heel, toe = sample.body.legs[side][2:]
     if toe is not None:
-        return seen.at[:, toe] - seen.at[:, heel]
-    if (site := seen.ends[side]) is not None and np.linalg.norm(site) > SHORT:
-        return quat.rotate(seen.turned[:, heel], np.array(site))
-    ahead = np.cross(seen.hips_left, UP)
-    return quat.rotate(seen.turned[:, heel], seen.local(heel, ahead))
+        return sample.at[:, toe] - sample.at[:, heel]
+    if (site := sample.ends[side]) is not None and np.linalg.norm(site) > SHORT:
+        return quat.rotate(sample.turned[:, heel], np.array(site))
+    ahead = np.cross(sample.hips_left, UP)
+    return quat.rotate(sample.turned[:, heel], sample.local(heel, ahead))
 
 
 def _steep(ahead: Array) -> Array:

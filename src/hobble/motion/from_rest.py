@@ -11,7 +11,7 @@ from hobble.core import quat
 from hobble.core.quat import Array
 from hobble.motion.body import SIDES
 from hobble.motion.body_sample import LEFT, BodySample
-from hobble.motion.flat_feet import RAISED, feet_tilt, flat_frames, runs, stands
+from hobble.motion.flat_feet import RAISED, feet_tilt, flat_frames, runs, upright_while_flat
 from hobble.motion.orient import (
     degrees_between,
     degrees_between_rotations,
@@ -35,12 +35,12 @@ SHRUG = 12.0  # degrees; a clavicle whose mean angle to the chest is smaller is 
 LIMP = 60.0  # degrees; if zero pose and motion differ by less for a hand, the zero pose is used
 
 
-def from_rest(seen: BodySample) -> dict[int, Array]:
+def from_rest(sample: BodySample) -> dict[int, Array]:
     """Joint -> (4,) rotation of its axes, from a zero pose in which a person could stand.
 
     Limbs are turned by the directions of their bones in the zero pose.
     """
-    body, rest = seen.body, seen.rest
+    body, rest = sample.body, sample.rest
     across = [rest[side["left"][k]] - rest[side["right"][k]] for side, k in ((body.legs, 0), (body.arms, 1))]
     left = unit(unit(across[0]) + unit(across[1]))
     middle = [
@@ -56,20 +56,20 @@ def from_rest(seen: BodySample) -> dict[int, Array]:
         if clavicle is not None:
             frames[clavicle] = whole
         for start, end in ((shoulder, elbow), (elbow, wrist)):
-            frames[start] = pointed_along(whole, sign * LEFT, seen.bone(start, end))
-        frames[wrist] = seen.hand(side, frames[elbow], sign)
+            frames[start] = pointed_along(whole, sign * LEFT, sample.bone(start, end))
+        frames[wrist] = sample.hand(side, frames[elbow], sign)
         hip, knee, heel, toe = body.legs[side]
         for start, end in ((hip, knee), (knee, heel)):
-            frames[start] = pointed_along(whole, -UP, seen.bone(start, end))
+            frames[start] = pointed_along(whole, -UP, sample.bone(start, end))
         frames[heel] = whole
         if toe is not None:
             frames[toe] = whole
     return frames
 
 
-def add_rest(frames: dict[int, Array], zero: dict[int, Array], seen: BodySample) -> None:
+def add_rest(frames: dict[int, Array], zero: dict[int, Array], sample: BodySample) -> None:
     """Replace in `frames` the joints for which the zero pose is more reliable."""
-    body = seen.body
+    body = sample.body
     if degrees_between_rotations(zero[body.head], frames[body.head]) < TRUSTED:
         frames[body.head] = zero[body.head]
     for side in SIDES:
@@ -79,26 +79,26 @@ def add_rest(frames: dict[int, Array], zero: dict[int, Array], seen: BodySample)
         if degrees_between_rotations(zero[wrist], frames[wrist]) < LIMP:
             frames[wrist] = zero[wrist]
         heel, toe = body.legs[side][2:]
-        frames[heel] = _foot(frames[heel], zero[heel], seen, side)
+        frames[heel] = _foot(frames[heel], zero[heel], sample, side)
         if toe is not None:
-            frames[toe] = _foot(frames[toe], zero[toe], seen, side)
+            frames[toe] = _foot(frames[toe], zero[toe], sample, side)
 
 
-def zero_doubt(seen: BodySample, zero: dict[int, Array]) -> str | None:
+def zero_doubt(sample: BodySample, zero: dict[int, Array]) -> str | None:
     """A sentence if the feet stand at another angle than in the zero pose; None if they agree.
 
     zero: from `from_rest`. In the zero pose a person may stand on the toes or lean. On uneven ground, where
     feet stand at any angle, nothing is said.
     """
-    measured = feet_tilt(seen).measured
+    measured = feet_tilt(sample).measured
     difference, lengths, heights = [], [], []
     for side in SIDES:
-        heel, toe = seen.body.legs[side][2:]
-        if toe is not None and (tilt := measured[side]) is not None and stands(seen, side):
-            x, y, z = quat.rotate(quat.inv(zero[heel]), seen.bone(heel, toe))
-            difference.append(tilt - (RAISED if runs(seen) else 0.0) - np.arctan2(-y, np.hypot(x, z)))
-            lengths.append(seen.length(heel, toe))
-            heights.append(seen.at[flat_frames(seen, side), toe, 1])
+        heel, toe = sample.body.legs[side][2:]
+        if toe is not None and (tilt := measured[side]) is not None and upright_while_flat(sample, side):
+            x, y, z = quat.rotate(quat.inv(zero[heel]), sample.bone(heel, toe))
+            difference.append(tilt - (RAISED if runs(sample) else 0.0) - np.arctan2(-y, np.hypot(x, z)))
+            lengths.append(sample.length(heel, toe))
+            heights.append(sample.at[flat_frames(sample, side), toe, 1])
     if not difference or np.ptp(np.percentile(np.concatenate(heights), [5, 95])) > UNEVEN:
         return None
     if abs(np.mean(difference)) < UNLIKE_ZERO:
@@ -114,18 +114,18 @@ def zero_doubt(seen: BodySample, zero: dict[int, Array]) -> str | None:
     return f"{sentence}: if that pose is no stance, the figure stands {high:.1f} cm too high or low."
 
 
-def _foot(standing: Array, zero: Array, seen: BodySample, side: str) -> Array:
+def _foot(standing: Array, zero: Array, sample: BodySample, side: str) -> Array:
     """(4,) the rotation of a foot: as it stands, but as steep as in the zero pose if both roughly agree.
 
     It is not taken from the zero pose alone: if the legs are splayed there, the feet are rolled and point
     outward. It is taken from the zero pose if the foot never stands flat, as some patients' feet.
     """
-    if not stands(seen, side):
+    if not upright_while_flat(sample, side):
         return zero
-    heel, toe = seen.body.legs[side][2:]
+    heel, toe = sample.body.legs[side][2:]
     if toe is None:
         return zero if degrees_between_rotations(standing, zero) < TRUSTED else standing
-    bone = seen.bone(heel, toe)
+    bone = sample.bone(heel, toe)
     if degrees_between_rotations(standing, zero) > TRUSTED + 60:
         return standing
     wanted, found = (quat.rotate(quat.inv(frame), bone) for frame in (zero, standing))

@@ -20,7 +20,7 @@ from hobble.core.clip_files import find_clips, only_file, unused_file_notes
 from hobble.core.errors import HobbleError, InputError
 from hobble.core.quat import Array
 from hobble.motion.check_retarget import worst
-from hobble.motion.duplicates import ClipDigest, likeness, same_pairs
+from hobble.motion.duplicates import ClipDigest, digest, same_pairs
 from hobble.motion.make import make_clip
 from hobble.motion.options import ClipMotion
 from hobble.motion.rig import leg_length
@@ -57,7 +57,7 @@ class ClipSummary:
     stands: float = 0.0
     off: tuple[str, float] | None = None
     warnings: tuple[str, ...] = ()
-    like: ClipDigest | None = field(default=None, repr=False)
+    digest: ClipDigest | None = field(default=None, repr=False)
 
 
 @dataclass(frozen=True)
@@ -130,7 +130,7 @@ def seen(clip: Clip, report: Mapping[str, Any]) -> ClipSummary:
         cadence=cadence,
         stands=stands,
         warnings=(*rate_warnings(steps, moving, float(path.sum()), clip, report), *known.warnings),
-        like=likeness(clip, report["sha256"]),
+        digest=digest(clip, report["sha256"]),
     )
 
 
@@ -186,7 +186,7 @@ def rate_warnings(steps: int, moving: float, way: float, clip: Clip, report: Map
 
 def same_notes(clips: Sequence[ClipSummary]) -> list[str]:
     """Sentences on duplicates."""
-    pairs = same_pairs([clip.like for clip in clips if clip.like is not None])
+    pairs = same_pairs([clip.digest for clip in clips if clip.digest is not None])
     return [f"{a} and {b} are {what}: {ENOUGH.get(what, 'one of them is enough')}." for a, b, what in pairs]
 
 

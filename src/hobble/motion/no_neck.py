@@ -20,16 +20,16 @@ AHEAD, AHEAD_ERROR = np.radians(5.4), np.radians(2.6)
 AHEAD_OF_HEAD, AHEAD_OF_HEAD_ERROR = np.radians(5.6), np.radians(3.9)
 
 
-def has_neck(seen: BodySample) -> bool:
+def has_neck(sample: BodySample) -> bool:
     """Whether the rig has a neck, or neither the rig nor the target has one. Then nothing need be assumed.
 
     A joint at the same place as the chest is no neck.
     """
-    body = seen.body
-    return not seen.spine.has_neck or any(seen.length(body.chest, joint) > SHORT for joint in body.neck)
+    body = sample.body
+    return not sample.spine.has_neck or any(sample.length(body.chest, joint) > SHORT for joint in body.neck)
 
 
-def neck_bone(seen: BodySample, left: Array, zero: Array | None) -> Array:
+def neck_bone(sample: BodySample, left: Array, zero: Array | None) -> Array:
     """(3,) direction of the assumed neck, in the chest's coordinates.
 
     left: (3,) the body's left in the chest's coordinates. zero: (4,) the rotation of the chest's axes in a
@@ -37,19 +37,19 @@ def neck_bone(seen: BodySample, left: Array, zero: Array | None) -> Array:
     """
     if zero is not None:
         return quat.rotate(zero, np.array([0.0, np.cos(AHEAD), np.sin(AHEAD)]))
-    head = seen.bone(seen.body.chest, seen.body.head)
+    head = sample.bone(sample.body.chest, sample.body.head)
     return quat.rotate(quat.from_axis_angle(unit(left), np.array(AHEAD_OF_HEAD)), unit(head))
 
 
-def lean_doubt(seen: BodySample, zero: bool) -> str | None:
+def lean_doubt(sample: BodySample, zero: bool) -> str | None:
     """A sentence that the lean of the chest is uncertain, on a rig without a neck; None if it is known.
 
     zero: whether a person could stand in the zero pose.
     """
-    if has_neck(seen):
+    if has_neck(sample):
         return None
-    body, error = seen.body, AHEAD_ERROR if zero else AHEAD_OF_HEAD_ERROR
-    arm = float(np.mean([seen.length(body.chest, arm[1]) for arm in body.arms.values()]))
+    body, error = sample.body, AHEAD_ERROR if zero else AHEAD_OF_HEAD_ERROR
+    arm = float(np.mean([sample.length(body.chest, arm[1]) for arm in body.arms.values()]))
     return (
         "It has no joint for the neck, so how far the chest leans is uncertain: arms may lie "
         f"{2 * error * arm:.0f} cm too far forward or back."

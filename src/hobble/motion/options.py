@@ -8,7 +8,7 @@ from typing import Annotated, Literal
 
 from pydantic import AfterValidator, Field, model_validator
 
-from hobble.core.section import Finite, Ground, Inside, Positive, PositiveFloat, Section
+from hobble.core.section import Finite, Ground, MocapPath, Positive, PositiveFloat, Section
 
 
 def _sixty(fps: float) -> float:
@@ -30,7 +30,7 @@ class Download(Section):
     url: str = Field(
         description="address of a clip; {clip} is its name, {subject} the part before the first _"
     )
-    checksums: Inside = Field(
+    checksums: MocapPath = Field(
         description="file of SHA-256 sums, as sha256sum writes them, in the folder of the data set's file"
     )
 

@@ -18,7 +18,7 @@ from hobble.motion.rig import leg_length
 # styles, patients, Ferre et al. and the original release it is .88 to 1.17.
 LEAST, MOST = 0.5, 1.7
 # Percentiles of the foot's speed relative to the hips. The higher ones are of the standing foot.
-STEPS = (50.0, 75.0)
+PERCENTILES = (50.0, 75.0)
 IN_PLACE = 0.15  # with a smaller quotient the figure walks in place
 SLOW = 0.5  # leg lengths a second: slower movements are not compared
 # A foot stands if it is slower than this share of the speed of the hips, both over this many seconds.
@@ -39,7 +39,7 @@ UPRIGHT = 0.6  # least height of the hips above the lower foot, in leg lengths
 def pace(clip: Clip) -> float | None:
     """Speed of the hips divided by the speed of the lower foot relative to the hips.
 
-    Any speed of the foot between its percentiles STEPS is allowed. The one that brings the quotient nearest
+    Any speed of the foot between its PERCENTILES is allowed. The one that brings the quotient nearest
     to 1 is taken. None if both are slow, or if the figure is not upright.
     """
     role, p = clip.skeleton.role, clip.positions
@@ -47,11 +47,11 @@ def pace(clip: Clip) -> float | None:
         return None
     hips = p[:, role("hips")]
     balls = np.stack([p[:, role(f"{side}_toe")] for side in ("left", "right")], axis=1)
-    seen = np.diff(balls - hips[:, None], axis=0)[..., [0, 2]]
+    from_hips = np.diff(balls - hips[:, None], axis=0)[..., [0, 2]]
     lower = balls[:-1, :, 1].argmin(axis=1)
-    foot = seen[np.arange(len(seen)), lower]
+    foot = from_hips[np.arange(len(from_hips)), lower]
     speed = float(np.median(np.linalg.norm(np.diff(hips, axis=0)[:, [0, 2]], axis=-1)))
-    slow, fast = np.percentile(np.linalg.norm(foot, axis=-1), STEPS)
+    slow, fast = np.percentile(np.linalg.norm(foot, axis=-1), PERCENTILES)
     leg = leg_length(clip.skeleton)
     height = float(np.median(hips[:, 1] - balls[..., 1].min(axis=1)))
     if max(speed, slow) * clip.fps < SLOW * leg or height < UPRIGHT * leg:

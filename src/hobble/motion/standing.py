@@ -16,7 +16,7 @@ from hobble.motion.spine import SHORT
 LEG, TRUNK, HEAD, FOOT = 40.0, 40.0, 50.0, 50.0
 
 
-def stands(body: Body, rest: Array) -> str | None:
+def why_not_standing(body: Body, rest: Array) -> str | None:
     """Why a person could not stand in the rest pose `rest` (J, 3), in words; None if a person could."""
     hips = 0.5 * (rest[body.legs["left"][0]] + rest[body.legs["right"][0]])
     shoulders = 0.5 * (rest[body.arms["left"][1]] + rest[body.arms["right"][1]])

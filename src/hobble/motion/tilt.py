@@ -41,7 +41,7 @@ FEWEST = 10  # fewest positions of standing feet
 FITS = 12  # rounds of fitting the ground, which minimise the sum of distances
 
 
-def tilt(clip: Clip) -> float | None:
+def world_tilt(clip: Clip) -> float | None:
     """Degrees by which the world is tilted, or None if nothing shows a tilt."""
     p, leg = clip.positions, leg_length(clip.skeleton)
     body, level = balance(clip), False
@@ -78,7 +78,7 @@ def _sideways(clip: Clip, body: Balance | None) -> float | None:
 
 def check_tilt(path: Path, clip: Clip, leave: bool) -> None:
     """Raise InputError if the world is tilted. leave: accept any tilt."""
-    found = None if leave else tilt(clip)
+    found = None if leave else world_tilt(clip)
     if found is not None:
         raise InputError(
             path,

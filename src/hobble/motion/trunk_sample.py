@@ -23,23 +23,23 @@ SPREAD = 15.0
 OFF = 3.0  # cm: mean error of where hips and head are, in clips of bows and squats
 
 
-def trunk_sample(seen: BodySample, zero: bool) -> BodySample:
+def trunk_sample(sample: BodySample, zero: bool) -> BodySample:
     """The upright frames of a sample. If there are too few: the zero pose if it stands, else all.
 
     zero: whether a person could stand in the zero pose.
     """
-    leans = _leans(seen)
+    leans = _leans(sample)
     if np.mean(leans < LEANS) >= FEWEST:
-        return seen.part(leans < np.quantile(leans, FEWEST) + SPREAD)
-    return seen.in_zero_pose() if zero else seen
+        return sample.part(leans < np.quantile(leans, FEWEST) + SPREAD)
+    return sample.in_zero_pose() if zero else sample
 
 
-def stoop_doubt(seen: BodySample, zero: bool) -> str | None:
+def stoop_doubt(sample: BodySample, zero: bool) -> str | None:
     """A sentence if the figure always stoops or squats and nobody could stand in its zero pose, else None.
 
     zero: whether a person could stand in the zero pose.
     """
-    if zero or np.mean(_leans(seen) < STOOPS) >= FEWEST:
+    if zero or np.mean(_leans(sample) < STOOPS) >= FEWEST:
         return None
     return (
         "The figure is never upright, and nobody could stand in its zero pose, so how far its pelvis tilts "
@@ -47,19 +47,19 @@ def stoop_doubt(seen: BodySample, zero: bool) -> str | None:
     )
 
 
-def _leans(seen: BodySample) -> Array:
+def _leans(sample: BodySample) -> Array:
     """(S,) degrees between the trunk and the vertical; 180 in frames in which no leg is stretched."""
-    body = seen.body
+    body = sample.body
     shoulders, hips = (
-        seen.at[:, limbs["left"][k]] + seen.at[:, limbs["right"][k]]
+        sample.at[:, limbs["left"][k]] + sample.at[:, limbs["right"][k]]
         for limbs, k in ((body.arms, 1), (body.legs, 0))
     )
     leans = np.degrees(np.arccos(np.clip(unit(shoulders - hips)[:, 1], -1.0, 1.0)))
-    stretch = np.max([_stretch(seen, *body.legs[side][:3]) for side in SIDES], axis=0)
+    stretch = np.max([_stretch(sample, *body.legs[side][:3]) for side in SIDES], axis=0)
     return np.where(stretch > STRETCHED, leans, 180.0)
 
 
-def _stretch(seen: BodySample, hip: int, knee: int, heel: int) -> Array:
+def _stretch(sample: BodySample, hip: int, knee: int, heel: int) -> Array:
     """(S,) distance from hip to ankle, as a share of the leg's length."""
-    reach = np.linalg.norm(seen.at[:, heel] - seen.at[:, hip], axis=-1)
-    return reach / max(seen.length(hip, knee, heel), 1e-9)
+    reach = np.linalg.norm(sample.at[:, heel] - sample.at[:, hip], axis=-1)
+    return reach / max(sample.length(hip, knee, heel), 1e-9)

@@ -17,7 +17,7 @@ from hobble.core import quat
 from hobble.core.clip import Clip
 from hobble.core.quat import Array
 from hobble.core.skeleton import Skeleton, rest_positions
-from hobble.motion.added_joints import with_balls, with_bends
+from hobble.motion.added_joints import with_balls, with_split_joints
 from hobble.motion.body import Body, body_by_roles
 from hobble.motion.body_sample import LEFT, BodySample
 from hobble.motion.flat_feet import doubt, height_error, rest_tilt
@@ -27,7 +27,7 @@ from hobble.motion.no_neck import lean_doubt
 from hobble.motion.orient import degrees_between, mean_rotation, pointed_along
 from hobble.motion.rebase import rebased
 from hobble.motion.spine import SHORT, Spine
-from hobble.motion.standing import stands
+from hobble.motion.standing import why_not_standing
 from hobble.motion.tree import above
 from hobble.motion.trunk_sample import stoop_doubt, trunk_sample
 
@@ -65,7 +65,7 @@ def upright(clip: Clip, body: Body, target: Skeleton, others: Collection[int] = 
     }
     speeds = _speeds(clip)[every]
     rest, theirs = rest_positions(clip.skeleton), body_by_roles(target)
-    seen = BodySample(
+    sample = BodySample(
         body,
         clip.positions[every],
         clip.global_rotations[every],
@@ -76,34 +76,34 @@ def upright(clip: Clip, body: Body, target: Skeleton, others: Collection[int] = 
         rest_tilt(target, theirs),
         len(clip) / clip.fps,
     )
-    problem = stands(body, rest)
-    zero = from_rest(seen) if problem is None else None
-    if zero and _twisted(seen, zero):
+    problem = why_not_standing(body, rest)
+    zero = from_rest(sample) if problem is None else None
+    if zero and _twisted(sample, zero):
         problem, zero = "the trunk is twisted", None
-    trunk = trunk_sample(seen, zero is not None)
-    frames = from_motion(seen, trunk, zero[body.chest] if zero else None)
-    unsure = [lean_doubt(seen, zero is not None), stoop_doubt(seen, zero is not None)]
+    trunk = trunk_sample(sample, zero is not None)
+    frames = from_motion(sample, trunk, zero[body.chest] if zero else None)
+    unsure = [lean_doubt(sample, zero is not None), stoop_doubt(sample, zero is not None)]
     if zero:
-        add_rest(frames, zero, seen)
-        unsure.append(zero_doubt(seen, zero))
+        add_rest(frames, zero, sample)
+        unsure.append(zero_doubt(sample, zero))
     source = "its zero pose" if problem is None else f"its motion, because in its zero pose {problem}"
-    unsure.append(doubt(seen, problem is None))
-    kept = _kept(clip, seen, others, frames)
+    unsure.append(doubt(sample, problem is None))
+    kept = _kept(clip, sample, others, frames)
     clip, body = with_balls(clip, body, frames)
     roles = body.roles(clip.skeleton.joints)
-    clip, body = with_bends(clip, body, frames, bends(trunk))
+    clip, body = with_split_joints(clip, body, frames, bends(trunk))
     made = rebased(clip, body, [*body.joints, *kept], frames, roles)
     notes = [note for note in unsure if note]
-    return UprightMotion(*made, source, notes, height_error(seen, problem is None))
+    return UprightMotion(*made, source, notes, height_error(sample, problem is None))
 
 
-def _twisted(seen: BodySample, zero: dict[int, Array]) -> bool:
+def _twisted(sample: BodySample, zero: dict[int, Array]) -> bool:
     """Whether the trunk's bones are turned about themselves in a zero pose that looks like a stance.
 
     zero: frames of `from_rest`.
     """
-    shown = trunk_frames(trunk_sample(seen, False), zero[seen.body.chest])
-    joints = (seen.body.hips, *seen.body.trunk)
+    shown = trunk_frames(trunk_sample(sample, False), zero[sample.body.chest])
+    joints = (sample.body.hips, *sample.body.trunk)
     lefts = [[quat.rotate(frames[j], LEFT) for frames in (zero, shown)] for j in joints]
     return max(degrees_between(*pair) for pair in lefts) > TRUSTED
 
@@ -115,23 +115,23 @@ def _speeds(clip: Clip) -> Array:
     return np.linalg.norm(np.gradient(clip.positions, axis=0), axis=-1) * clip.fps
 
 
-def _kept(clip: Clip, seen: BodySample, others: Collection[int], frames: dict[int, Array]) -> list[int]:
+def _kept(clip: Clip, sample: BodySample, others: Collection[int], frames: dict[int, Array]) -> list[int]:
     """Those of `others` that can be kept. Their rotations in the rest pose are added to `frames`.
 
     Each joint gets the mean rotation of the body part that it is on. The base of a finger points along the
     finger.
     """
-    body, parents = seen.body, clip.skeleton.parents
+    body, parents = sample.body, clip.skeleton.parents
     out = []
     for joint in sorted(set(others) - set(body.joints)):
         carrier = next((j for j in above(parents, joint)[1:] if j in body.joints), None)
         if carrier is None:
             continue
-        part = quat.mul(seen.turned[:, carrier], frames[carrier])
-        frames[joint] = mean_rotation(quat.mul(quat.inv(seen.turned[:, joint]), part))
+        part = quat.mul(sample.turned[:, carrier], frames[carrier])
+        frames[joint] = mean_rotation(quat.mul(quat.inv(sample.turned[:, joint]), part))
         for side, sign in (("left", 1.0), ("right", -1.0)):
             tips = [j for j in others if joint in above(parents, j)[1:]]
-            bones = [bone for j in tips if np.linalg.norm(bone := seen.bone(joint, j)) > SHORT]
+            bones = [bone for j in tips if np.linalg.norm(bone := sample.bone(joint, j)) > SHORT]
             if carrier == body.arms[side][3] and bones:
                 frames[joint] = pointed_along(frames[joint], sign * LEFT, bones[0])
         out.append(joint)

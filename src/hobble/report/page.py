@@ -33,13 +33,13 @@ def render(
     material: ReportMaterial,
     scenes: Mapping[str, Any] | None = None,
     playable: Mapping[str, Any] | None = None,
-    compared: Mapping[str, Any] | None = None,
+    captured_and_predicted: Mapping[str, Any] | None = None,
     bundle: str = "",
     hero: Mapping[str, Any] | None = None,
 ) -> str:
     """The report as one HTML document.
 
-    scenes: from `scenes.scenes`; playable: from `playable.playable`; compared: from
+    scenes: from `scenes.scenes`; playable: from `playable.playable`; captured_and_predicted: from
     `captured_and_predicted.comparisons`. A part without data is left out. bundle: the page's scripts, from
     `bundle.bundle`. hero: from `opening_walk.opening_walk`; without it the figures at the top start from a
     standing pose.
@@ -51,7 +51,8 @@ def render(
     some = shown_clips.sampled(material.rows)
     found = coverage.seconds_of_data(some, material.splits, of=len(material.rows))
     sections, measured = _sections(material, found, clips, terrain), measure_sections.sections(material)
-    scenes, compared, playable = dict(scenes or {}), compared or {}, playable or {}
+    scenes, playable = dict(scenes or {}), playable or {}
+    captured_and_predicted = captured_and_predicted or {}
     strips = data_section.strips(material, clips)
     grounds = ground_pictures(terrain, material.network["skeleton"])
     playables = {material.name: playable} if playable else {}
@@ -64,7 +65,7 @@ def render(
         "grounds": grounds,
         "name": material.name,
         "playable": playables,
-        "compare": compared,
+        "compare": captured_and_predicted,
     }
     return template("page.html.j2").render(
         material=material,
@@ -74,7 +75,7 @@ def render(
         embedded={name: embedded(part) for name, part in data.items()},
         scene_names=[scene["name"] for scene in scenes.get("scenarios", ())],
         playable=playables,
-        compared=[clip["name"] for clip in compared.get("clips", ())],
+        captured_and_predicted=[clip["name"] for clip in captured_and_predicted.get("clips", ())],
         grounds=[picture["name"] for picture in grounds["pictures"]],
         strips=[strip["clip"] for strip in strips],
         style=style(),

@@ -102,7 +102,7 @@ class BodyRenderer:
             if t:
                 low = BODY + (HURT_LOW - BODY) * min(1.0, 0.35 + 1.3 * t)
                 bones[i] = low if t < 0.5 else HURT_LOW + (HURT_HIGH - HURT_LOW) * (2 * t - 1)
-        return np.einsum("vk,vkc->vc", self._body.share, bones[self._body.bone])
+        return np.einsum("vk,vkc->vc", self._body.weights, bones[self._body.bones_of_corner])
 
 
 @functools.lru_cache(maxsize=4)

@@ -21,17 +21,17 @@ LONGEST = 1200  # rows, 20 seconds: an excerpt has several steps, and an hour ha
 
 
 class Excerpt(NamedTuple):
-    """Rows of a clip. first: index of the first. rows: how many. of: how many rows the whole clip has."""
+    """Rows of a clip. first: index of the first. rows: how many. clip_rows: how many the whole clip has."""
 
     clip: str
     first: int
     rows: int
-    of: int
+    clip_rows: int
 
     @property
     def whole(self) -> bool:
         """Whether it is the whole clip."""
-        return self.rows == self.of
+        return self.rows == self.clip_rows
 
     @property
     def stop(self) -> int:
@@ -65,7 +65,7 @@ def excerpts(clip: str, rows: int, longest: int = LONGEST) -> list[Excerpt]:
     return [Excerpt(clip, a, b - a, rows) for a, b in pairwise(edges)]
 
 
-def kind(rows: ClipRows, first: int, stop: int) -> ExcerptKind:
+def excerpt_kind(rows: ClipRows, first: int, stop: int) -> ExcerptKind:
     """What is in the rows from `first` up to `stop`, which is not included; at least one row."""
     layout, part = rows.layout, slice(first, stop)
     channels = tuple(name for name, values in rows.channels.items() if np.any(values[part] != 0))
@@ -79,10 +79,12 @@ def load_excerpt(path: str | Path, one: Excerpt, before: int = 0, after: int = 0
     """The rows of an excerpt, and up to `before` and `after` rows of the same clip around it.
 
     Only these rows are read from the file. Raises InputError if the file is damaged, or if the clip does not
-    have `one.of` rows.
+    have `one.clip_rows` rows.
     """
-    first, stop = max(0, one.first - before), min(one.of, one.stop + after)
-    rows = load_clip_rows(path, None if stop - first == one.of else (first, stop))
+    first, stop = max(0, one.first - before), min(one.clip_rows, one.stop + after)
+    rows = load_clip_rows(path, None if stop - first == one.clip_rows else (first, stop))
     if len(rows) != stop - first:
-        raise InputError(path, f"does not have as many rows as its summary says ({one.of})", fix=DELETE_IT)
+        raise InputError(
+            path, f"does not have as many rows as its summary says ({one.clip_rows})", fix=DELETE_IT
+        )
     return rows

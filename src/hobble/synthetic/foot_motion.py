@@ -6,11 +6,11 @@ from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
-from scipy.ndimage import maximum_filter1d
 
 from hobble.core import quat
 from hobble.core.curve_value import value_at
 from hobble.core.quat import Array
+from hobble.core.smooth import smooth_above
 from hobble.synthetic.footsteps import FOOT, PlannedStance
 from hobble.synthetic.planned_ground import Ground
 from hobble.synthetic.style import Style
@@ -163,13 +163,6 @@ def _lack(toe: Array, rotation: Array, toes: Array, clearance: Array, ground: Gr
     for point in (toe, tip, heel):
         lack = np.maximum(lack, ground(point[:, 0], point[:, 2]) + SOLE_HEIGHT + clearance - point[:, 1])
     return smooth_above(lack, max(1, len(toe) // 14))
-
-
-def smooth_above(values: Array, frames: int) -> Array:
-    """(F,) a smooth curve that is nowhere below `values` (F,): their running maximum, smoothed."""
-    wide = maximum_filter1d(values, 4 * frames + 1, mode="nearest")
-    kernel = np.convolve(np.ones(2 * frames + 1), np.ones(2 * frames + 1))
-    return np.convolve(np.pad(wide, 2 * frames, mode="edge"), kernel / kernel.sum(), mode="valid")
 
 
 def _ease(u: Array) -> Array:

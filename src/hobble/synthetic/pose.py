@@ -9,7 +9,8 @@ from hobble.core import quat
 from hobble.core.ik import two_bone_knee
 from hobble.core.quat import Array
 from hobble.core.skeleton import Skeleton, local_rotations
-from hobble.synthetic.foot_motion import FootPoses, smooth_above
+from hobble.core.smooth import smooth_above
+from hobble.synthetic.foot_motion import FootPoses
 from hobble.synthetic.planned_ground import Ground, flat
 from hobble.synthetic.planned_path import PlannedPath
 from hobble.synthetic.style import LEFT, RIGHT, SIGN, Style

@@ -159,7 +159,12 @@ def _fit_ground(
     smoothing, deepest = options.smoothing, options.deepest
     if kind == "flat":
         return flat_ground(
-            soles, contacts, options.flat_level, smoothing=smoothing, deepest=deepest, bent=options.bend_flat
+            soles,
+            contacts,
+            options.flat_level,
+            smoothing=smoothing,
+            deepest=deepest,
+            correct=options.bend_flat,
         )
     path = samples[1, around]
     sides = samples[0, around] - path

@@ -21,8 +21,8 @@ from hobble.terrain.correction import (
 from hobble.terrain.patches import Patches
 from hobble.terrain.soles import Mask
 
-STANCE_PIECE = 8  # most frames of a stance that are averaged to one point
-COVERED_PIECE = 4  # most frames of a foot below the ground that are averaged to one point
+STANCE_FRAMES = 8  # most frames of a stance that are averaged to one point
+COVERED_FRAMES = 4  # most frames of a foot below the ground that are averaged to one point
 BEAM_SIDE_CM = (35.0, 50.0)  # distances from the path at which there must be no ground next to a beam
 PATH_CLEARANCE_CM = 25.0  # points next to the path that are closer than this to any part of it are left out
 
@@ -33,8 +33,8 @@ class Ground:
 
     patches: all patches; None for flat ground. chosen, error: (K,) indices of the fitted patches and their
     errors, best first. centre: (2,) x and z of the middle of the patches, cm. level: (K,) height that is
-    added to each patch, cm. surfaces: for each fit, the surface that is added to meet the feet. dug: for each
-    fit, the pits in it.
+    added to each patch, cm. surfaces: for each fit, the surface that is added to meet the feet. pits: for
+    each fit, the pits in it.
     """
 
     patches: Patches | None = field(repr=False)
@@ -43,7 +43,7 @@ class Ground:
     centre: Array = field(repr=False)
     level: Array = field(repr=False)
     surfaces: Sequence[Surface] = field(default=(), repr=False)
-    dug: Sequence[Pits] = field(default=(), repr=False)
+    pits: Sequence[Pits] = field(default=(), repr=False)
 
     def at(self, points: Array) -> Array:
         """Heights (K, M), cm, at world points (M, 2), x and z."""
@@ -52,8 +52,8 @@ class Ground:
             heights += self.patches.at(self.chosen, self.patches.cells(points, self.centre))
         for k, surface in enumerate(self.surfaces):
             heights[k] += surface.at(points)
-        for k, out in enumerate(self.dug):
-            heights[k] = out.of(heights[k], points)
+        for k, pit in enumerate(self.pits):
+            heights[k] = pit.of(heights[k], points)
         return heights
 
     def above(self, soles: Array) -> Array:
@@ -99,26 +99,26 @@ def fit_cycle(
 
 
 def flat_ground(
-    soles: Array, contacts: Mask, level: str, *, smoothing: float, deepest: float | None, bent: bool
+    soles: Array, contacts: Mask, level: str, *, smoothing: float, deepest: float | None, correct: bool
 ) -> Ground:
     """Flat ground, with one fit.
 
     level: "zero", or "feet" for the mean height of the soles in contact, as in the original. The original
     has no velocity in the last frame, so the contacts of the frame before it are used there.
 
-    bent: whether to correct the ground. If the feet in contact are more than `deepest` cm from it on average
-    (an uneven floor or capture), a surface is added. Otherwise pits are dug under feet more than `deepest`
-    below it.
+    correct: whether to correct the ground. If the feet in contact are more than `deepest` cm from it on
+    average (an uneven floor or capture), a surface is added. Otherwise pits are dug under feet more than
+    `deepest` below it.
     """
     heights = soles[..., 1]
     original = np.concatenate([contacts[:-1], contacts[-2:-1]])
     zero = heights[original if original.any() else contacts].mean() if level == "feet" else 0.0
     plain = Ground(None, np.array([-1]), np.zeros(1), np.zeros(2), np.array([zero]))
-    if deepest is None or not bent:
+    if deepest is None or not correct:
         return plain
     if np.abs(heights[contacts] - zero).mean() > deepest:
         return meet_feet(plain, soles, contacts, smoothing, deepest)
-    return replace(plain, dug=_dug(plain, soles, gather_stances(soles, contacts, STANCE_PIECE), deepest))
+    return replace(plain, pits=_pits(plain, soles, gather_stances(soles, contacts, STANCE_FRAMES), deepest))
 
 
 def meet_feet(plain: Ground, soles: Array, contacts: Mask, smoothing: float, deepest: float | None) -> Ground:
@@ -128,23 +128,23 @@ def meet_feet(plain: Ground, soles: Array, contacts: Mask, smoothing: float, dee
     feet are then more than deepest / 2 below the ground, they are added to the points and the surface is
     fitted again. Feet that are still more than `deepest` below the ground get pits.
     """
-    standing = gather_stances(soles, contacts, STANCE_PIECE)
+    standing = gather_stances(soles, contacts, STANCE_FRAMES)
     residual = standing.height - plain.at(standing.place)
     most = None if deepest is None else deepest / 2
     ground = replace(plain, surfaces=fit_surfaces(standing, residual, smoothing, most))
     if deepest is None:
         return ground
     surfaces = [
-        _refitted(plain, k, standing, gather_stances(soles, c & ~contacts, COVERED_PIECE), smoothing, most)
+        _refitted(plain, k, standing, gather_stances(soles, c & ~contacts, COVERED_FRAMES), smoothing, most)
         if c.any()
         else same
         for k, (c, same) in enumerate(zip(ground.above(soles) > deepest / 2, ground.surfaces, strict=True))
     ]
     ground = replace(plain, surfaces=surfaces)
-    return replace(ground, dug=_dug(ground, soles, standing, deepest))
+    return replace(ground, pits=_pits(ground, soles, standing, deepest))
 
 
-def _dug(ground: Ground, soles: Array, standing: Stances, deepest: float) -> list[Pits]:
+def _pits(ground: Ground, soles: Array, standing: Stances, deepest: float) -> list[Pits]:
     """For each fit, pits for feet that are more than `deepest` below it; then they are deepest / 2 below."""
     return [dig_pits(soles[covered], standing, deepest / 2) for covered in ground.above(soles) > deepest]
 

@@ -6,14 +6,14 @@ from typing import Annotated, Literal
 
 from pydantic import Field, model_validator
 
-from hobble.core.section import Finite, Inside, Positive, PositiveFloat, Section
+from hobble.core.section import Finite, MocapPath, Positive, PositiveFloat, Section
 
 
 class HeightmapOptions(Section):
     """One source of ground: generated, matplotlib's elevation model of a real landscape, or a file."""
 
     kind: Literal["fractal", "hills", "stairs", "slope", "boxes", "beams", "elevation", "file"]
-    path: Inside | None = Field(None, description="for kind: file; relative to the mocap folder")
+    path: MocapPath | None = Field(None, description="for kind: file; relative to the mocap folder")
     seed: int = 0
     cell: PositiveFloat | None = Field(None, description="width of a cell, cm, instead of terrain.cell")
     height_scale: PositiveFloat | None = Field(

@@ -110,12 +110,12 @@ def _make_piece(
     """Make a piece, or take its kept files. Returns whether they were kept."""
     outputs, began = list(piece.output.values()), time.monotonic()
     with checked(piece.files, outputs):
-        mark = fingerprint(piece.params, digests.of(piece.files), outputs)
-        if kept.take(mark, outputs):
+        key = fingerprint(piece.params, digests.of(piece.files), outputs)
+        if kept.take(key, outputs):
             return True
         report.logger.info("%s:", piece.name)
         make(piece, report.logger)
-    kept.keep(mark, outputs, time.monotonic() - began)
+    kept.keep(key, outputs, time.monotonic() - began)
     return False
 
 

@@ -1,7 +1,8 @@
 """Batches of a data set's clips: each stage has one job for each batch, because a job takes time to start.
 
-Up to SMALLEST clips have a batch each. More are put into SMALLEST batches by a hash of their names, and the
-number of batches doubles until they hold at most LARGEST clips on average. So a new clip changes one batch.
+Up to LEAST_BATCHES clips have a batch each. More are put into LEAST_BATCHES batches by a hash of their names,
+and the number of batches doubles until they hold at most MOST_CLIPS_OF_A_BATCH clips on average. So a new
+clip changes one batch.
 """
 
 from __future__ import annotations
@@ -15,8 +16,8 @@ from dataclasses import dataclass
 
 from hobble.workflow.clips import DATASETS, MIRROR_SUFFIX, Clips, original
 
-SMALLEST = 12  # least number of batches of a data set that has more clips than this
-LARGEST = 32  # most clips in a batch, on average
+LEAST_BATCHES = 12  # least number of batches of a data set that has more clips than this
+MOST_CLIPS_OF_A_BATCH = 32  # most clips in a batch, on average
 JOB_OPTION = "--target-jobs"  # in the command of a job that Snakemake starts; <rule>:<wildcards> follow
 MARK = "__"  # separates the parts of the name of a batch's rule
 
@@ -155,9 +156,9 @@ def rules_of_job(arguments: Sequence[str]) -> list[str]:
 
 
 def batch_count(clips: int) -> int:
-    """The number of batches of a data set with so many clips. Up to SMALLEST clips have a batch each."""
-    count = min(clips, SMALLEST)
-    while clips > count * LARGEST:
+    """The number of batches of a data set with so many clips. Up to LEAST_BATCHES clips have a batch each."""
+    count = min(clips, LEAST_BATCHES)
+    while clips > count * MOST_CLIPS_OF_A_BATCH:
         count *= 2
     return count
 

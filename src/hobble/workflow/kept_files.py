@@ -29,7 +29,7 @@ def fingerprint(params: Mapping[str, Any], inputs: Iterable[tuple[str, str]], ou
     params: plain values, with the fingerprint of the code. inputs: (file name, SHA-256) of each input, in
     order. outputs: the paths of the files.
     """
-    dependencies = [params, list(inputs), [str(_place(Path(path), "")[1]) for path in outputs]]
+    dependencies = [params, list(inputs), [str(_kept_folder(Path(path), "")[1]) for path in outputs]]
     return hashlib.sha256(json.dumps(dependencies, sort_keys=True).encode()).hexdigest()
 
 
@@ -39,14 +39,14 @@ class KeptFiles:
     def __init__(self, rule: str) -> None:
         self.rule = rule
 
-    def take(self, mark: str, outputs: Iterable[str]) -> bool:
+    def take(self, key: str, outputs: Iterable[str]) -> bool:
         """Put the outputs in their places if they were kept with this fingerprint and are undamaged.
 
         Returns whether they were. Raises HobbleError if they cannot be put there.
         """
         pairs = [(self._kept(path), Path(path)) for path in outputs]
-        record = _read(_record(pairs[0][0]))
-        if record.get("fingerprint") != mark:
+        record = _read_record(_record_file(pairs[0][0]))
+        if record.get("fingerprint") != key:
             return False
         with contextlib.suppress(OSError):
             if record["files"] == [file_crc32(kept) for kept, _ in pairs]:
@@ -58,41 +58,41 @@ class KeptFiles:
                 return True
         return False
 
-    def keep(self, mark: str, outputs: Iterable[str], seconds: float) -> None:
+    def keep(self, key: str, outputs: Iterable[str], seconds: float) -> None:
         """Keep finished outputs. On a full disk nothing is kept, and no error is raised."""
         pairs = [(self._kept(path), Path(path)) for path in outputs]
-        place = _record(pairs[0][0])
+        place = _record_file(pairs[0][0])
         with contextlib.suppress(OSError):
             place.unlink(missing_ok=True)
             for kept, path in pairs:
                 _link(path, kept)
             files = [file_crc32(path) for _, path in pairs]
-            record = {"fingerprint": mark, "files": files, "seconds": round(seconds, 3)}
+            record = {"fingerprint": key, "files": files, "seconds": round(seconds, 3)}
             with _replaced(place) as temporary:
                 temporary.write_text(json.dumps(record), encoding="utf-8")
 
     def _kept(self, path: str) -> Path:
-        root, below = _place(Path(path), self.rule)
+        root, below = _kept_folder(Path(path), self.rule)
         return root / below
 
 
 def recorded_seconds(folder: Path) -> float:
     """Seconds that the kept files of a rule took to make. folder: results/.../.made/<rule>."""
-    return sum(float(_read(path).get("seconds", 0.0)) for path in folder.rglob(".*.kept"))
+    return sum(float(_read_record(path).get("seconds", 0.0)) for path in folder.rglob(".*.kept"))
 
 
-def _place(path: Path, rule: str) -> tuple[Path, Path]:
+def _kept_folder(path: Path, rule: str) -> tuple[Path, Path]:
     """The folder in which files of a path's data set are kept, and the path below the data set."""
     parts = path.parts
     root = max(n for n in range(1, len(parts)) if parts[n - 1 : n + 1] == ("results", "datasets")) + 2
     return Path(*parts[:root], FOLDER, rule), Path(*parts[root:])
 
 
-def _record(kept: Path) -> Path:
+def _record_file(kept: Path) -> Path:
     return kept.with_name(f".{kept.stem}.kept")
 
 
-def _read(path: Path) -> dict[str, Any]:
+def _read_record(path: Path) -> dict[str, Any]:
     try:
         found = json.loads(path.read_text(encoding="utf-8"))
     except (OSError, ValueError):

@@ -10,7 +10,7 @@ from hobble.measures.inputs import MeasureInputs
 from hobble.measures.measure import Measure
 from hobble.runtime.options import Runtime
 
-LISTS = ("clips", "facts", "pieces")  # inputs of several files
+LISTS = ("clips", "summaries", "pieces")  # inputs of several files
 
 
 def measure_of(job: Any) -> Measure:
@@ -27,7 +27,7 @@ def inputs_of_job(job: Any) -> MeasureInputs:
         {path.stem: path for path in many["clips"]},
         job.params.splits,
         job.params.people,
-        many["facts"],
+        many["summaries"],
         Runtime.model_validate(job.params.runtime),
         {path.stem: path for path in many["pieces"]},
     )

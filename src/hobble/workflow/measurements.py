@@ -49,7 +49,7 @@ class Measurements:
             return configurations.network(configuration, "weights.npz")
         if need == "clips":
             return configurations.of_dataset(configuration, "database/clips/{clip}.npz")
-        if need == "facts":
+        if need == "summaries":
             return configurations.of_dataset(configuration, "database/clips/{clip}.json")
         if need == "skeleton":
             return self.clips.skeleton_file(configurations.dataset(configuration))

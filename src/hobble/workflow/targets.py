@@ -6,7 +6,7 @@ from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, get_args
 
-from hobble.channels import every
+from hobble.channels import all_channels
 from hobble.config.sections import PhaseMode
 from hobble.core.errors import HobbleError, InputError
 from hobble.workflow.clip_batches import dataset_of, rules_of_job
@@ -191,7 +191,7 @@ def _check_possible(project: Project, name: str, folder: str, file: str) -> None
             f"results/{name}/stimuli: configuration {owner} has no `channels`, so it has only one walk to "
             "show. Use a configuration with channels."
         )
-    for channel in every():
+    for channel in all_channels():
         if folder in channel.targets and channel.name not in project.catalogue.configuration(owner).channels:
             raise HobbleError(
                 f"results/{name}/{folder}: the network of configuration {owner} has no channel "

@@ -13,7 +13,7 @@ import pytest
 from hobble.channels import channel
 from hobble.channels.injury.limp import page, with_other_channel
 from hobble.channels.injury.limp import run as module
-from hobble.channels.injury.limp.captured_limps import VERSION, HurtSeconds, Limp, healthy_of
+from hobble.channels.injury.limp.captured_limps import VERSION, CapturedWalk, HurtSeconds, healthy_of
 from hobble.channels.injury.limp.crowd_walks import FigureWalk
 from hobble.channels.injury.limp.run import SEVERITIES, distance, hurt_side, limp
 from hobble.gait.cycles import SCALARS, Cycle, WalkCycles
@@ -63,7 +63,9 @@ def measured(hurtable, holden31, monkeypatch):
     limp.
     """
 
-    def run(effect, other_side: bool = False, every: tuple[Limp, ...] = (), splits=None) -> dict[str, Any]:
+    def run(
+        effect, other_side: bool = False, every: tuple[CapturedWalk, ...] = (), splits=None
+    ) -> dict[str, Any]:
         def walk_figures(network, each, speeds, gait, seconds, runtime):
             out = []
             for hurt in each:
@@ -167,8 +169,8 @@ def test_a_limp_is_compared_with_the_healthy_walk_of_the_same_mood(
     assert with_other_channel.limps_together(hurtable, [LEFT_KNEE], 2.0, 8.0, Runtime(), row) == []
 
 
-def clip(name: str, hurt: dict[str, float], limp: dict[str, float]) -> Limp:
-    return Limp(name, hurt, walking(limp, 2.0).walk, 2.0)
+def clip(name: str, hurt: dict[str, float], limp: dict[str, float]) -> CapturedWalk:
+    return CapturedWalk(name, hurt, walking(limp, 2.0).walk, 2.0)
 
 
 def test_a_held_out_limp_is_nearer_only_if_the_same_leg_is_hurt(measured) -> None:

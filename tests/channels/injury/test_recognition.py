@@ -145,7 +145,7 @@ def test_windows_hold_straight_walking_with_one_injury(hurtable) -> None:
     good = clip(hurtable, "a", KNEE, 5.0, 1, frames=400)
     windows = walking_windows(good, hurtable)
     # Four parts of 100 frames; windows of 60 begin every 15 frames and stay in their part.
-    assert [w.part for w in windows] == [part for part in range(4) for _ in range(3)]
+    assert [w.quarter for w in windows] == [quarter for quarter in range(4) for _ in range(3)]
     assert {(w.hurt, w.severity) for w in windows} == {(KNEE, 5.0)}
     aside = replace(good, velocity=good.velocity[:, ::-1])
     assert walking_windows(aside, hurtable) == []
@@ -163,7 +163,7 @@ def test_windows_hold_straight_walking_with_one_injury(hurtable) -> None:
 
 
 def test_without_sides_both_legs_are_one_class(holden31: Skeleton) -> None:
-    parts = module.sides_of(holden31)
+    parts = module.parts_of_classes(holden31)
     assert parts("LeftUpLeg-LeftLeg") == parts("RightUpLeg-RightLeg") == ("thigh",)
     assert parts("RightLeg-RightFoot and LeftForeArm-LeftHand") == ("forearm", "shank")
     assert parts(HEALTHY) == () != parts("LowerBack-Spine")

@@ -17,7 +17,7 @@ from hobble.channels.injury.channel import CHANNEL
 from hobble.channels.injury.severity import (
     clip_severity,
     mirror_severity,
-    odd_ranges,
+    range_warnings,
     severity_matrix,
     source_rows,
 )
@@ -66,7 +66,7 @@ def test_odd_frame_ranges_are_reported_with_their_lines():
         InjurySpell(11, 14, ((ARM, 4.0),), 4),
         InjurySpell(1, 10, ((ARM, 1.0),), 5),
     )
-    said = odd_ranges(Status(10, spells), "walk_injuries.txt")
+    said = range_warnings(Status(10, spells), "walk_injuries.txt")
     assert [s.split(": ")[0] for s in said] == [
         "walk_injuries.txt, line 2",
         "walk_injuries.txt, line 2",
@@ -205,7 +205,7 @@ def test_severities_equal_the_published_matrices_of_ferre(shared: Path, holden31
     stem = shared / "mocap/ferre" / f"Injured_{name}_extended_converted_injuries"
     status = read_status(stem.with_suffix(".txt"), holden31.link_names)
     assert (severity_matrix(status, holden31.link_names) == np.loadtxt(stem)).all()
-    assert len(odd_ranges(status, stem)) == 1
+    assert len(range_warnings(status, stem)) == 1
 
 
 def test_source_rows_of_a_looped_clip_start_over_with_each_cycle():

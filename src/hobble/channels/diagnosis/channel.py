@@ -13,7 +13,7 @@ from pydantic import Field
 
 from hobble.channels.channel import Channel, ClipSource, HasLinks
 from hobble.core.errors import InputError
-from hobble.core.section import Inside, Section
+from hobble.core.section import MocapPath, Section
 from hobble.core.untrusted import MAX_TEXT_BYTES, printable, read_bytes
 
 if TYPE_CHECKING:
@@ -29,7 +29,7 @@ COLUMNS = ("file", "diagnosis")  # columns that the table needs; others are igno
 class DiagnosisTable(Section):
     """The section `channels.diagnosis` of a data set."""
 
-    table: Inside = Field(
+    table: MocapPath = Field(
         description="CSV in the mocap folder with the columns `file` (a BVH file) and `diagnosis`"
     )
 

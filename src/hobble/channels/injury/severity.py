@@ -29,7 +29,7 @@ def severity_matrix(status: Status, links: Sequence[str]) -> Array:
     return out
 
 
-def odd_ranges(status: Status, path: str | Path) -> list[str]:
+def range_warnings(status: Status, path: str | Path) -> list[str]:
     """A warning for each range that starts at 0, goes past the clip's end or contradicts an earlier line."""
     notes = []
     overlaps = _overlaps(status.spells)
@@ -95,7 +95,7 @@ def clip_severity(
             line=1,
             fix="Count the frames of the BVH file, at its own rate, and check the ranges.",
         )
-    warnings = odd_ranges(read, status_file)
+    warnings = range_warnings(read, status_file)
     if read.frames != motion["source_frames"]:
         warnings.insert(
             0,

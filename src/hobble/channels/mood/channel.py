@@ -16,13 +16,13 @@ if TYPE_CHECKING:
     from hobble.core.quat import Array
 
 Name = Literal["tired", "old", "happy", "sad", "angry"]
-Much = Annotated[float, Field(ge=0, le=1)]
+Amount = Annotated[float, Field(ge=0, le=1)]
 
 
 class Patterns(Section):
     """Which clips have which mood."""
 
-    patterns: dict[str, dict[Name, Much]] = Field(
+    patterns: dict[str, dict[Name, Amount]] = Field(
         description="pattern of clip names -> mood; * stands for any text; the first that fits counts"
     )
 

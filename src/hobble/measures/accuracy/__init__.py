@@ -12,7 +12,7 @@ class Options(Joints, SampleOptions):
 MEASURE = Measure(
     name="accuracy",
     package=__name__,
-    inputs=("weights", "clips", "facts", "skeleton"),
+    inputs=("weights", "clips", "summaries", "skeleton"),
     options=Options,
     cost=Cost(memory_each=12, seconds_each=0.2, minutes=10),
 )

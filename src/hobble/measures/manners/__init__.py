@@ -11,7 +11,7 @@ from hobble.runtime.options import Runtime
 MEASURE = Measure(
     name="manners",
     package=__name__,
-    inputs=("weights", "clips", "facts"),
+    inputs=("weights", "clips", "summaries"),
     options=SampleOptions,
     runtime=tuple(Runtime.model_fields),
     people=True,

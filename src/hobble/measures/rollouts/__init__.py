@@ -30,7 +30,7 @@ class Options(Joints, SampleOptions):
 MEASURE = Measure(
     name="rollouts",
     package=__name__,
-    inputs=("weights", "clips", "facts", "skeleton"),
+    inputs=("weights", "clips", "summaries", "skeleton"),
     options=Options,
     runtime=("mode",),
     cost=Cost(memory_mb=120, memory_each=27, seconds_each=0.6, minutes=30),

@@ -19,7 +19,7 @@ class Options(SampleOptions):
 MEASURE = Measure(
     name="limp",
     package=__name__,
-    inputs=("weights", "clips", "facts"),
+    inputs=("weights", "clips", "summaries"),
     options=Options,
     runtime=tuple(Runtime.model_fields),
     cost=Cost(memory_mb=600, memory_each=14, seconds_each=0.1, minutes=20),

@@ -26,7 +26,7 @@ PERFORMER = re.compile(r"^([^_]+)_")  # "105" in "105_25"
 
 
 @dataclass(frozen=True)
-class Limp:
+class CapturedWalk:
     """The walking of one captured clip whose severities do not change.
 
     hurt: link -> severity, of links that hurt. walk: its cycles. speed: mean, cm a frame.
@@ -52,61 +52,65 @@ class Limp:
 class HurtSeconds:
     """Link -> seconds in which it hurts in the training clips.
 
-    captured: in captured motion. made: in hurt versions that were generated from healthy clips.
+    captured: in captured motion. generated: in hurt versions that were generated from healthy clips.
     """
 
     captured: dict[str, float] = field(default_factory=dict)
-    made: dict[str, float] = field(default_factory=dict)
+    generated: dict[str, float] = field(default_factory=dict)
 
 
-def limps(
-    read: Iterable[ClipPart], splits: Mapping[str, str], links: Sequence[str], skeleton: Skeleton
-) -> tuple[list[Limp], HurtSeconds]:
+def captured_walks(
+    parts: Iterable[ClipPart], splits: Mapping[str, str], links: Sequence[str], skeleton: Skeleton
+) -> tuple[list[CapturedWalk], HurtSeconds]:
     """The walks of all captured clips, and the seconds for which each link hurts in the training clips.
 
-    read: the parts of the clips to read, sorted by clip. If they are only a sample, the seconds are
+    parts: the parts of the clips to read, sorted by clip. If they are only a sample, the seconds are
     estimates. splits: clip -> "train" or "held_out".
     """
     found, hurt_seconds = [], HurtSeconds()
-    for clip, some in groupby(read, key=lambda one: one.clip):
-        is_made = VERSION.search(clip) is not None
+    for clip, some in groupby(parts, key=lambda one: one.clip):
+        is_generated = VERSION.search(clip) is not None
         seen: list[ClipRows] = []
         for one in some:
             rows = one.load().rows
             if splits.get(clip) == "train":
-                kept = hurt_seconds.made if is_made else hurt_seconds.captured
-                _add_seconds(kept, links, rows.channels.get(INJURY), one.weight)
-            if not is_made:
+                of_links = hurt_seconds.generated if is_generated else hurt_seconds.captured
+                _add_seconds(of_links, links, rows.channels.get(INJURY), one.weight)
+            if not is_generated:
                 seen.append(rows)
         found += _walked(clip, seen, links, skeleton)
     return found, hurt_seconds
 
 
-def _add_seconds(kept: dict[str, float], links: Sequence[str], severity: Array | None, weight: float) -> None:
-    """Add the seconds for which each link hurts to `kept`.
+def _add_seconds(
+    of_links: dict[str, float], links: Sequence[str], severity: Array | None, weight: float
+) -> None:
+    """Add the seconds for which each link hurts to `of_links`.
 
     severity: (R, links). weight: how many rows of the clip each row stands for.
     """
     for link, column in zip(links, () if severity is None else severity.T, strict=False):
         if column.any():
-            kept[link] = round(kept.get(link, 0.0) + float(np.sum(column > 0)) * weight / FPS, 2)
+            of_links[link] = round(of_links.get(link, 0.0) + float(np.sum(column > 0)) * weight / FPS, 2)
 
 
-def healthy_of(limp: Limp, every: Sequence[Limp]) -> tuple[Profile, str]:
+def healthy_of(walk: CapturedWalk, walks: Sequence[CapturedWalk]) -> tuple[Profile, str]:
     """The healthy walk to compare a clip with, and whose it is.
 
     It is the performer's ("performer"). If the data set has none, it is that of all its healthy clips ("data
     set"), and if there are none, the mean walk of the people in `hobble.gait.people` ("people").
     """
-    well = [one for one in every if not one.hurt and len(one.walk)]
-    own = [one for one in well if one.performer == limp.performer]
-    for some, whose in ((own, "performer"), (well, "data set")):
+    healthy = [one for one in walks if not one.hurt and len(one.walk)]
+    own = [one for one in healthy if one.performer == walk.performer]
+    for some, whose in ((own, "performer"), (healthy, "data set")):
         if some:
             return profile(joined(one.walk for one in some)), whose
     return people().normal(), "people"
 
 
-def _walked(clip: str, seen: Sequence[ClipRows], links: Sequence[str], skeleton: Skeleton) -> list[Limp]:
+def _walked(
+    clip: str, seen: Sequence[ClipRows], links: Sequence[str], skeleton: Skeleton
+) -> list[CapturedWalk]:
     """The walking of a clip, in a list. It is empty if severities change or no whole cycle is walked.
 
     seen: the clip's rows, or excerpts of them.
@@ -130,7 +134,7 @@ def _walked(clip: str, seen: Sequence[ClipRows], links: Sequence[str], skeleton:
     if not len(walk):
         return []
     hurt = {link: float(value) for link, value in zip(links, severity[0], strict=True) if value > 0}
-    return [Limp(clip, hurt, walk, float(np.mean(speeds)))]
+    return [CapturedWalk(clip, hurt, walk, float(np.mean(speeds)))]
 
 
 def _placed(local: Array, root: Array, yaw: Array) -> Array:

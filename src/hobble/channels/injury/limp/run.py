@@ -15,7 +15,7 @@ import numpy as np
 from hobble.channels.injury.crowd_severities import hurt_links
 from hobble.channels.injury.crowd_severities import links as links_of
 from hobble.channels.injury.limp import Options
-from hobble.channels.injury.limp.captured_limps import HurtSeconds, Limp, healthy_of, limps
+from hobble.channels.injury.limp.captured_limps import CapturedWalk, HurtSeconds, captured_walks, healthy_of
 from hobble.channels.injury.limp.crowd_walks import FigureWalk, walk_figures
 from hobble.channels.injury.limp.with_other_channel import limps_together, named_together
 from hobble.core.errors import HobbleError
@@ -46,7 +46,7 @@ WINDOW = 4.0  # seconds of a walk that a recogniser judges at once
 
 def limp(
     network: Network,
-    every: Sequence[Limp],
+    captured: Sequence[CapturedWalk],
     hurt_seconds: HurtSeconds,
     splits: Mapping[str, str],
     *,
@@ -57,7 +57,7 @@ def limp(
 ) -> dict[str, Any]:
     """The content of limp.json. If nothing can be measured, `applies` is false and `reason` says why.
 
-    every: the walks of the data set's captured clips. hurt_seconds: seconds for which each link hurts in
+    captured: the walks of the data set's captured clips. hurt_seconds: seconds for which each link hurts in
     training. splits: clip -> "train" or "held_out". seconds: length of each walk. links: links to hurt, by
     default all.
 
@@ -82,7 +82,7 @@ def limp(
         "seconds": seconds,
         "effects": EFFECTS,
         "trained": [link for link in links if link in hurt_links(network)],
-        "hurt_seconds": {"captured": hurt_seconds.captured, "made": hurt_seconds.made},
+        "hurt_seconds": {"captured": hurt_seconds.captured, "made": hurt_seconds.generated},
         "sizes": rows,
         "trends": _trends(rows),
         "named": _named(rows),
@@ -90,8 +90,8 @@ def limp(
             gait: {name: [round(v, 5) for v in pair] for name, pair in found.items()}
             for gait, found in effects_of_people(people()).items()
         },
-        "captured": [_of_clip(network.skeleton, one, every) for one in every if one.hurt],
-        "held_out_limps": compare_held_out(network, every, splits, seconds, runtime),
+        "captured": [_of_clip(network.skeleton, one, captured) for one in captured if one.hurt],
+        "held_out_limps": compare_held_out(network, captured, splits, seconds, runtime),
         "second": second_injuries(network, links, seconds, runtime),
         **_together(network, links, seconds, runtime),
     }
@@ -212,9 +212,9 @@ def _named(rows: Sequence[Mapping[str, Any]]) -> list[dict[str, Any]]:
     return out
 
 
-def _of_clip(skeleton: Skeleton, one: Limp, every: Sequence[Limp]) -> dict[str, Any]:
+def _of_clip(skeleton: Skeleton, one: CapturedWalk, captured: Sequence[CapturedWalk]) -> dict[str, Any]:
     """The effects of a captured clip relative to a healthy walk (`healthy_of`)."""
-    healthy, whose = healthy_of(one, every)
+    healthy, whose = healthy_of(one, captured)
     side = hurt_side(skeleton, max(one.hurt, key=lambda link: one.hurt[link]))
     sizes = _rounded_values(effects(profile(one.walk), healthy, side))
     return {"clip": one.clip, "hurt": dict(one.hurt), "side": side, "healthy": whose, **sizes}
@@ -233,7 +233,11 @@ def distance(walk: Profile, healthy: Profile, other: Profile, other_healthy: Pro
 
 
 def compare_held_out(
-    network: Network, every: Sequence[Limp], splits: Mapping[str, str], seconds: float, runtime: Runtime
+    network: Network,
+    captured: Sequence[CapturedWalk],
+    splits: Mapping[str, str],
+    seconds: float,
+    runtime: Runtime,
 ) -> list[dict[str, Any]]:
     """Whether the hurt character comes nearer to captured limps that were held out of training.
 
@@ -241,7 +245,7 @@ def compare_held_out(
     have a target speed of 1.2 m/s, which is likely for the performer's healthy walk. `hurt` and `healthy`:
     the `distance` of the clip from each. `nearer`: whether the hurt one is nearer, as it should be.
     """
-    limps = [one for one in every if one.hurt and splits.get(one.clip) == "held_out"]
+    limps = [one for one in captured if one.hurt and splits.get(one.clip) == "held_out"]
     if not limps:
         return []
     figures = walk_figures(
@@ -250,14 +254,21 @@ def compare_held_out(
     own = figures[0].profile
     out = []
     for one, figure in zip(limps, figures[1:], strict=True):
-        healthy, whose = healthy_of(one, every)
+        healthy, whose = healthy_of(one, captured)
         row: dict[str, Any] = {"clip": one.clip, "hurt_links": dict(one.hurt), "compared_with": whose}
         if own is None or figure.profile is None:
             out.append({**row, "healthy": None, "hurt": None, "nearer": False})
             continue
-        limps_so = profile(one.walk)
-        well, ill = (distance(limps_so, healthy, p, own) for p in (own, figure.profile))
-        out.append({**row, "healthy": round(well, 5), "hurt": round(ill, 5), "nearer": ill < well})
+        walk_of_clip = profile(one.walk)
+        from_healthy, from_hurt = (distance(walk_of_clip, healthy, p, own) for p in (own, figure.profile))
+        out.append(
+            {
+                **row,
+                "healthy": round(from_healthy, 5),
+                "hurt": round(from_hurt, 5),
+                "nearer": from_hurt < from_healthy,
+            }
+        )
     return out
 
 
@@ -303,11 +314,11 @@ def run(inputs: MeasureInputs, options: Options) -> Outcome:
         raise HobbleError(f"{inputs.weights} has no skeleton")
     # Without severities there is nothing to measure.
     sample = sample_of(inputs, options)
-    read = clip_parts(inputs.clips, sample) if links_of(network) else ()
-    every, hurt_seconds = limps(read, inputs.splits, links_of(network), network.skeleton)
+    parts = clip_parts(inputs.clips, sample) if links_of(network) else ()
+    captured, hurt_seconds = captured_walks(parts, inputs.splits, links_of(network), network.skeleton)
     result = limp(
         network,
-        every,
+        captured,
         hurt_seconds,
         inputs.splits,
         configuration=inputs.configuration,

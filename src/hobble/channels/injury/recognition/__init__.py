@@ -7,7 +7,7 @@ from hobble.runtime.options import Runtime
 MEASURE = Measure(
     name="recognition",
     package=__name__,
-    inputs=("weights", "clips", "facts", "published"),
+    inputs=("weights", "clips", "summaries", "published"),
     options=SampleOptions,
     runtime=tuple(Runtime.model_fields),
     cost=Cost(memory_each=18, seconds_each=0.2, minutes=30),

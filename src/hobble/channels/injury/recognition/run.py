@@ -43,7 +43,8 @@ SPEEDS = (1.8, 2.2, 2.6)  # their target speeds, cm a frame
 WARM_UP, USED = 4 * FPS, 6 * FPS  # frames of a generated walk that are skipped, and that are used
 AHEAD = 0.9  # a window counts as walking if at least this share of the root's speed is forward
 LEAST_SPEED = 0.5  # cm a frame; a slower window does not count as walking
-Plain = Callable[[str], tuple[str, ...]]  # class -> parts of the body without their side; see `sides_of`
+# Class -> parts of the body without their side; see `parts_of_classes`.
+PartsOfClass = Callable[[str], tuple[str, ...]]
 REASON = "this network has no severity inputs"
 TOO_FEW = "fewer than two parts hurt in the captured clips, or no clip walks"
 
@@ -54,14 +55,14 @@ class InjuryWindow:
 
     clip: its clip, or the name of a generated walk. hurt: its class, that is the links that hurt, joined by
     " and ", or HEALTHY. severity: the highest. values: the features of `hobble.evaluation.gait_features`.
-    part: which quarter of a captured stretch it is in, for the cross-validation.
+    quarter: which quarter of a captured stretch it is in, for the cross-validation.
     """
 
     clip: str
     hurt: str
     severity: float
     values: Mapping[str, float]
-    part: int
+    quarter: int
 
 
 def recognition(
@@ -91,8 +92,8 @@ def recognition(
     classes = sorted({w.hurt for w in known})
     if len(classes) < 2:
         return {**refused, "reason": TOO_FEW}
-    judge = learn(table(known), [w.hurt for w in known])
-    sided = sides_of(network.skeleton)
+    classifier = learn(table(known), [w.hurt for w in known])
+    parts_of_class = parts_of_classes(network.skeleton)
     walks = generated(network, [c for c in classes if c != HEALTHY], HEALTHY in classes, runtime)
     return {
         "configuration": configuration,
@@ -102,10 +103,15 @@ def recognition(
         "features": list(known[0].values),
         "chance": round(1 / len(classes), 5),
         "captured": {
-            "cross_validated": _cross_validated(known, sided),
-            "held_out": _judged(judge, [w for w in windows if splits[w.clip] == "held_out"], sided),
+            "cross_validated": _cross_validated(known, parts_of_class),
+            "held_out": _judged(
+                classifier, [w for w in windows if splits[w.clip] == "held_out"], parts_of_class
+            ),
         },
-        "generated": {**_judged(judge, walks, sided), "by_walk": _by_walk(judge, walks, sided)},
+        "generated": {
+            **_judged(classifier, walks, parts_of_class),
+            "by_walk": _by_walk(classifier, walks, parts_of_class),
+        },
     }
 
 
@@ -115,10 +121,10 @@ def walking_windows(clip: Captured, network: Network) -> list[InjuryWindow]:
     walk = clip.gait[:, network.gaits.index("walk")]
     hurts = clip.channels[INJURY] > 0
     out = []
-    for part, start in product(range(FOLDS), range(0, len(clip), STEP)):
-        first = part * len(clip) // FOLDS + start
+    for quarter, start in product(range(FOLDS), range(0, len(clip), STEP)):
+        first = quarter * len(clip) // FOLDS + start
         span = slice(first, first + WINDOW)
-        if span.stop > (part + 1) * len(clip) // FOLDS:
+        if span.stop > (quarter + 1) * len(clip) // FOLDS:
             continue
         speed = np.hypot(*clip.velocity[span].mean(axis=0))
         ahead = clip.velocity[span, 1].mean() >= AHEAD * speed and speed >= LEAST_SPEED
@@ -127,7 +133,7 @@ def walking_windows(clip: Captured, network: Network) -> list[InjuryWindow]:
             names = [links_of(network)[i] for i in np.flatnonzero(hurts[first])]
             values = _values(network.skeleton, clip.local, clip.contacts, clip.root, span)
             severity = float(clip.channels[INJURY][span].max())
-            out.append(InjuryWindow(clip.clip, " and ".join(names) or HEALTHY, severity, values, part))
+            out.append(InjuryWindow(clip.clip, " and ".join(names) or HEALTHY, severity, values, quarter))
     return out
 
 
@@ -157,7 +163,7 @@ def generated(
     return out
 
 
-def sides_of(skeleton: Skeleton) -> Plain:
+def parts_of_classes(skeleton: Skeleton) -> PartsOfClass:
     """A function that returns the parts of the body of a class, without left and right.
 
     For the class "LeftLeg-LeftFoot" it returns ("shank",), for HEALTHY ().
@@ -199,8 +205,8 @@ def run(inputs: MeasureInputs, options: SampleOptions) -> Outcome:
     """recognition.json, and all its confusion tables as one table."""
     # Generated hurt versions are left out: the classifier would learn the generator's table of injuries.
     clips = {clip: file for clip, file in inputs.clips.items() if not VERSION.search(clip)}
-    facts = [file for file in inputs.facts if file.stem in clips]
-    sample = sample_of(replace(inputs, facts=facts), options)
+    summaries = [file for file in inputs.summaries if file.stem in clips]
+    sample = sample_of(replace(inputs, summaries=summaries), options)
     result = recognition(
         load_network(inputs.weights),
         captured_motion(clips, sample),
@@ -217,39 +223,45 @@ def _values(skeleton: Skeleton, local: Array, contacts: Array, root: Array, span
     return features(skeleton, local[span], contacts[span], root[span])
 
 
-def _cross_validated(windows: Sequence[InjuryWindow], sided: Plain) -> RecognisedWindows:
+def _cross_validated(windows: Sequence[InjuryWindow], parts_of_class: PartsOfClass) -> RecognisedWindows:
     """How windows are recognised if a classifier judges each quarter and learns from the other three."""
     judged: list[InjuryWindow] = []
     named: list[str] = []
-    for part in range(FOLDS):
-        rest = [w for w in windows if w.part != part]
-        of_part = [w for w in windows if w.part == part]
-        if of_part and len({w.hurt for w in rest}) > 1:
-            named += learn(table(rest), [w.hurt for w in rest]).names(table(of_part))
-            judged += of_part
-    return _confusion(sorted({w.hurt for w in windows}), judged, named, sided)
+    for quarter in range(FOLDS):
+        rest = [w for w in windows if w.quarter != quarter]
+        of_quarter = [w for w in windows if w.quarter == quarter]
+        if of_quarter and len({w.hurt for w in rest}) > 1:
+            named += learn(table(rest), [w.hurt for w in rest]).names(table(of_quarter))
+            judged += of_quarter
+    return _confusion(sorted({w.hurt for w in windows}), judged, named, parts_of_class)
 
 
-def _judged(judge: Discriminant, windows: Sequence[InjuryWindow], sided: Plain) -> RecognisedWindows:
-    return _confusion(judge.classes, windows, judge.names(table(windows)) if windows else [], sided)
+def _judged(
+    classifier: Discriminant, windows: Sequence[InjuryWindow], parts_of_class: PartsOfClass
+) -> RecognisedWindows:
+    return _confusion(
+        classifier.classes, windows, classifier.names(table(windows)) if windows else [], parts_of_class
+    )
 
 
-def _by_walk(judge: Discriminant, windows: Sequence[InjuryWindow], sided: Plain) -> RecognisedWindows:
+def _by_walk(
+    classifier: Discriminant, windows: Sequence[InjuryWindow], parts_of_class: PartsOfClass
+) -> RecognisedWindows:
     """One answer for each walk, from all its windows together."""
-    scores = judge.scores(table(windows))
+    scores = classifier.scores(table(windows))
     walks, named = [], []
     for walk in dict.fromkeys(w.clip for w in windows):
         mine = [i for i, w in enumerate(windows) if w.clip == walk]
         walks.append(windows[mine[0]])
-        named.append(judge.classes[int(np.argmax(scores[mine].sum(axis=0)))])
-    return _confusion(judge.classes, walks, named, sided, "walks")
+        named.append(classifier.classes[int(np.argmax(scores[mine].sum(axis=0)))])
+    return _confusion(classifier.classes, walks, named, parts_of_class, "walks")
 
 
 def _confusion(
     classes: Sequence[str],
     windows: Sequence[InjuryWindow],
     named: Sequence[str],
-    sided: Plain,
+    parts_of_class: PartsOfClass,
     what: str = "windows",
 ) -> RecognisedWindows:
     """How windows were recognised. named: the recognised class of each window.
@@ -265,7 +277,7 @@ def _confusion(
         what: len(windows),
         "right": _share([r for some in right.values() for r in some]),
         "right_without_side": _share(
-            [sided(w.hurt) == sided(name) for w, name in zip(windows, named, strict=True)]
+            [parts_of_class(w.hurt) == parts_of_class(name) for w, name in zip(windows, named, strict=True)]
         ),
         "by_severity": [
             {"severity": s, what: len(some), "right": _share(some)} for s, some in sorted(right.items())

@@ -20,7 +20,7 @@ class Options(SampleOptions):
 MEASURE = Measure(
     name="injury",
     package=__name__,
-    inputs=("weights", "clips", "facts"),
+    inputs=("weights", "clips", "summaries"),
     options=Options,
     runtime=tuple(Runtime.model_fields),
     cost=Cost(memory_each=14, seconds_each=0.2, minutes=60),

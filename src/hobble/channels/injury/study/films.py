@@ -112,12 +112,12 @@ def part_links(network: Network, parts: Sequence[str]) -> list[str]:
     return out
 
 
-def act(network: Network, film: Film, runtime: Runtime) -> FilmMotion:
+def film_motion(network: Network, film: Film, runtime: Runtime) -> FilmMotion:
     """The motion of a film. The character goes straight ahead. The injury begins after HEALTHY seconds."""
     severities = dict.fromkeys(part_links(network, film.parts), SEVERITY)
-    hurt, well = _walked(network, film, severities, runtime), _walked(network, film, {}, runtime)
+    hurt, healthy = _walked(network, film, severities, runtime), _walked(network, film, {}, runtime)
     begun = round(HEALTHY * FPS)
-    apart = np.linalg.norm(_local(hurt[0]) - _local(well[0]), axis=-1)[begun:].mean()
+    apart = np.linalg.norm(_local(hurt[0]) - _local(healthy[0]), axis=-1)[begun:].mean()
     return FilmMotion(*hurt, float(apart))
 
 

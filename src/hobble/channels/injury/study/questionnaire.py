@@ -16,7 +16,16 @@ from numpy.typing import NDArray
 from PIL import Image
 
 from hobble.channels.injury.crowd_severities import hurt_links
-from hobble.channels.injury.study.films import FILMS, FPS, PARTS, SEVERITY, Film, FilmMotion, act, part_links
+from hobble.channels.injury.study.films import (
+    FILMS,
+    FPS,
+    PARTS,
+    SEVERITY,
+    Film,
+    FilmMotion,
+    film_motion,
+    part_links,
+)
 from hobble.core.files import write_json, write_text
 from hobble.core.skeleton import Skeleton
 from hobble.core.smooth import gaussian
@@ -60,7 +69,7 @@ def write_questionnaire(
     studio, skeleton = BodyRenderer(body(network.skeleton)), network.skeleton
 
     def made(film: Film) -> tuple[dict[str, Any], dict[str, Any]]:
-        motion = act(network, film, runtime)
+        motion = film_motion(network, film, runtime)
         data = encoded(pictures(studio, skeleton, motion, size))
         return _row(network, film, motion), {
             "film": film.number,

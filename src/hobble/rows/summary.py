@@ -10,11 +10,11 @@ from typing import Any
 from hobble.core.errors import InputError
 from hobble.core.files import read_json, write_json
 from hobble.rows.clip_rows import DELETE_IT, ClipRows
-from hobble.rows.excerpts import Excerpt, ExcerptKind, excerpts, kind
+from hobble.rows.excerpts import Excerpt, ExcerptKind, excerpt_kind, excerpts
 
 
 @dataclass(frozen=True)
-class Facts:
+class RowsSummary:
     """A summary of a clip's rows.
 
     rows: number of rows. kinds: what is in each excerpt, in the order of `hobble.rows.excerpts.excerpts`.
@@ -30,24 +30,26 @@ class Facts:
         return dict(zip(excerpts(self.clip, self.rows), self.kinds, strict=True))
 
 
-def facts(rows: ClipRows) -> Facts:
+def summary_of_rows(rows: ClipRows) -> RowsSummary:
     """The summary of the rows of one clip."""
     parts = excerpts(rows.clip, len(rows))
-    return Facts(rows.clip, len(rows), tuple(kind(rows, part.first, part.stop) for part in parts))
+    return RowsSummary(
+        rows.clip, len(rows), tuple(excerpt_kind(rows, part.first, part.stop) for part in parts)
+    )
 
 
-def save_facts(path: str | Path, found: Facts) -> None:
+def save_summary(path: str | Path, found: RowsSummary) -> None:
     """Write a summary as JSON."""
     write_json(Path(path), asdict(found))
 
 
-def load_facts(path: str | Path) -> Facts:
+def load_summary(path: str | Path) -> RowsSummary:
     """Read a summary. Raises InputError if the file holds something else."""
     values: Mapping[str, Any] = read_json(Path(path))
     try:
         kinds = tuple(ExcerptKind(**{**one, "channels": tuple(one["channels"])}) for one in values["kinds"])
-        found = Facts(str(values["clip"]), int(values["rows"]), kinds)
+        found = RowsSummary(str(values["clip"]), int(values["rows"]), kinds)
         found.excerpts  # noqa: B018 - fails unless each has its entry
     except (KeyError, TypeError, ValueError) as error:
-        raise InputError(path, f"not the facts of a clip ({error})", fix=DELETE_IT) from error
+        raise InputError(path, f"not the summary of a clip ({error})", fix=DELETE_IT) from error
     return found
