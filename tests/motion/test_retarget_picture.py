@@ -49,7 +49,7 @@ def test_a_wrong_map_is_refused_with_the_joint_and_a_picture(
     file.write_text(text.replace("    RightArm: RightArm\n", "    RightArm: LeftArm\n"))
     clip = tmp_path / "clip.bvh"
     write_bvh(clip, walker(load_skeleton(file).skeleton, 120, 60.0), decimals=6)
-    given = ["look", str(clip), "--maps", str(maps), "--picture", str(tmp_path / "apart.svg")]
+    given = ["look", str(clip), "--skeletons", str(maps), "--picture", str(tmp_path / "apart.svg")]
     monkeypatch.setattr(sys, "argv", ["motion", *given])
     assert main() == 1
     said = capsys.readouterr().out

@@ -20,8 +20,8 @@ LEVELS = 5  # number of values, from 0 to the channel's highest, for which a spe
 TOP = 95  # percentile of the speeds of healthy cycles in a gait: the limit of a healthy body
 # Percentile of these speeds that counts as the usual speed. The median is too low: clips start and stop.
 USUAL = 65
-# A body that keeps at most this share of the usual speed cannot go faster than that. A body that keeps all of
-# it can go as fast as a healthy one.
+# If an injury leaves at most this share of the usual speed, what it leaves is the limit. If it leaves all,
+# the limit is that of a healthy body. In between, the limit is interpolated.
 CANNOT_HURRY = 0.85
 AHEAD = 0.9  # a cycle counts if at least this share of its speed is forward
 STEADY = 0.35  # a cycle is left out if a value changes in it by more than this share of the highest value
@@ -205,13 +205,13 @@ class LimitLearner:
         speeds = np.repeat(top[:, None, None], labels, axis=1).repeat(LEVELS, axis=2)
         for label in range(labels):
             of = _of_label(label, values, self.across)
-            s, r, gaits = (
+            value, left, gaits = (
                 np.concatenate(part) for part in zip(*((v, share[i], gait[i]) for i, v in of), strict=True)
             )
-            fall = float(s @ (1 - r) / (s @ s)) if len(s) else 0.0
-            expected = _fitted(levels, s, r, np.maximum(1 - fall * levels, SLOWEST))
+            fall = float(value @ (1 - left) / (value @ value)) if len(value) else 0.0
+            expected = _fitted(levels, value, left, np.maximum(1 - fall * levels, SLOWEST))
             for k in np.flatnonzero(top < UNLIMITED):
-                own = _fitted(levels, s[gaits == k], r[gaits == k], expected)
+                own = _fitted(levels, value[gaits == k], left[gaits == k], expected)
                 hurries = np.maximum(own - CANNOT_HURRY, 0.0) / (1 - CANNOT_HURRY)
                 speeds[k, label] = usual[k] * own + (top[k] - usual[k]) * hurries
         return Limits(levels, speeds, usual)

@@ -72,6 +72,7 @@ def write_labels(
         skeleton_name=SKELETON,
         options=ClipMotion(source_fps=source_fps),
     )
+    # The ground is unknown: on "flat" ground, the height of the head would decide about crouching.
     labels, checked = label_clip(clip, [], report, gait, "rocky", LabelOptions())
     time = SourceTime(report["source_frames"], report["source_fps"], report["source_start"])
     write_label_files(paths[0], paths[1], paths[2], labels, time)

@@ -24,7 +24,7 @@ from hobble.motion.mirror import mirror_clip
 from hobble.motion.options import ClipMotion
 from hobble.motion.read import read_bvh
 
-ROLES_FROM = "holden31"  # without --skeleton, joints get the roles that they have on this skeleton
+ROLES_FROM = "holden31"  # without --skeleton, the roles that this skeleton has are looked for in the file
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:

@@ -40,13 +40,13 @@ CLEAR_SPRING = 0.5
 # `styles` flight is at most .06, in its slowest run .16. With a limit of .25 for the spring, slow jogs of the
 # original release would count as walks.
 SLOW, SOME_FLIGHT, SOME_SPRING = 0.35, 0.1, 0.2
-MOST_ODDS_OF_A_WALK = -1.0
+MOST_ODDS_OF_A_WALK = -1.0  # the highest log odds of jogging for a figure that walks by either rule
 CERTAIN_ODDS = 2.0  # log odds that count as full evidence
 DATA_SET_ODDS = 1.0  # log odds that are added for the clip's main gait, which the data set tells
 SWITCH_COST = 18.0  # frames of full evidence that a change of gait costs
 FADE_FRAMES = 31
 LONGEST_START = 180  # frames: a doubtful walk from standing to a jog counts as jog if it is at most this long
-CLEARLY_WALKING = -4.0  # log odds: with a lower median in its second half such a walk is not doubtful
+CLEARLY_WALKING = -4.0  # a walk is not doubtful if the median of its log odds in its second half is lower
 # Frames. Any other walk between standing and jogging that is shorter is split: half counts as standing, half
 # as jogging.
 LONGEST_SHORT_WALK = 75

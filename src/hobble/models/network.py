@@ -27,9 +27,10 @@ Export = Callable[[Path, str], str]
 class Predictor(Protocol):
     """A network prepared for fast evaluation, called in every frame.
 
-    Use one predictor for one crowd: it may keep buffers between calls. State of each character is kept in the
-    character: if `Network.memory` is above 0, `evaluate` and `predict` take a last argument `memory`,
-    (C, Network.memory) float64. They change it in place; it is zero before a character's first frame.
+    Use one predictor for one crowd: it may keep buffers between calls. It keeps nothing of a
+    character. If `Network.memory` is above 0, the caller keeps an array of that many numbers for each
+    character, zero before its first frame, and passes them to `evaluate` and `predict` as a last argument
+    `memory`, (C, Network.memory) float64. They change it in place.
     """
 
     @property
@@ -59,8 +60,8 @@ class Network(ABC):
 
     kind: ClassVar[str] = ""  # its folder in hobble.models
     phase: ClassVar[bool] = True  # whether a prediction depends on the phase
-    # Whether the root's movement is part of the predicted pose. Then the runtime does not reduce it while the
-    # character stands or moves away from the target.
+    # Whether poses are recorded frames: feet slide unless the root moves exactly as predicted. Then the
+    # runtime does not reduce this movement while the character stands or moves away from the target.
     rooted: ClassVar[bool] = False
     modes: ClassVar[tuple[str, ...]] = ("exact",)  # of the predictor; the last one is exact
     storage: ClassVar[str] = "float32"  # of the predictor's weights by default, one of STORAGES

@@ -46,7 +46,7 @@ def main() -> int:
     many.add_argument(
         "--skeleton", default="holden31", help="skeleton to put the clips on, by name (default holden31)"
     )
-    many.add_argument("--maps", type=Path, default=SKELETONS, help="the folder of the skeleton files")
+    many.add_argument("--skeletons", type=Path, default=SKELETONS, help="the folder of the skeleton files")
     many.add_argument(
         "--handedness",
         choices=["auto", "right", "left"],
@@ -66,10 +66,10 @@ def main() -> int:
             write_text(given.to, text) if given.to else print(text, end="")
             return 0
         options = ClipMotion(handedness=given.handedness)
-        target = given.maps / f"{given.skeleton}.yaml"
+        target = given.skeletons / f"{given.skeleton}.yaml"
         if given.picture:
-            write_text(given.picture, picture_of_file(given.folder, target, given.maps, options))
-        seen = look(given.folder, target, given.maps, options)
+            write_text(given.picture, picture_of_file(given.folder, target, given.skeletons, options))
+        seen = look(given.folder, target, given.skeletons, options)
         print(table(seen))
         return int(any(one.refused for one in seen.clips))
     except HobbleError as error:

@@ -15,9 +15,9 @@ from hobble.report.gather import ReportMaterial
 from hobble.report.tables import Column, Table
 
 GAIT_COLOURS = {"stand": "@g0", "walk": "@g1", "jog": "@g2", "crouch": "@g3", "jump": "@g4", "bump": "@g5"}
-MOST_BARS = 200  # most clips with a bar of their own
-MOST_REMARKS = 500  # most rows of the table of repairs and warnings
-MOST_NAMED = 30  # most bars that have a name under each
+MOST_BARS = 200  # clips with a bar of their own, at most
+MOST_REMARKS = 500  # rows of the table of repairs and warnings, at most
+MOST_NAMED = 30  # bars, at most, with a name under each
 SPLIT_NAMES = {"train": "training", "held_out": "held out"}
 
 

@@ -20,7 +20,7 @@ HEEL = np.array([0.0, -4.2, -3.0])  # approximate back of the sole, from the ank
 READY = 0.95  # share of the swing after which the foot is pitched for its landing
 KICK = 0.68  # at less than 1 the foot is highest in the first half of the swing
 FOLLOW = 0.45  # share of its pitch rate that the foot keeps as it leaves
-SPEED_LEFT = 0.36  # speed of the foot as it lands, as a share of its mean speed
+LANDING_SPEED = 0.36  # speed of the foot as it lands, as a share of its mean speed
 EARLY = 0.81  # at less than 1 the foot covers more than half of its distance in the first half of the swing
 RISE, SETTLE = 0.36, 0.3  # shares of the swing in which the foot rises to its clearance and comes down again
 SOLE_HEIGHT = 2.0  # cm: a joint of the swinging foot stays at least this plus the clearance above the ground
@@ -39,19 +39,22 @@ class FootPoses:
 
 
 def move_foot(steps: list[PlannedStance], style: Style, side: int, ground: Ground) -> FootPoses:
-    """The path of one foot through its stances. Frames before the first and after the last stance stay 0."""
+    """The path of one foot through its stances.
+
+    Frames before the first stance, and from the last one on, stay 0.
+    """
     frames = len(style.duty)
     turns = np.tile(quat.IDENTITY, (frames, 1))
     foot = FootPoses(np.zeros((frames, 3)), turns, turns.copy())
     rest = np.radians(style.rest_pitch)
     rolls = [_Roll.of(step, style, side, rest) for step in steps]
     for i, (here, there) in enumerate(pairwise(rolls)):
-        rests = not there.step.swings
-        leave = there.step.land if rests else here.step.leave
+        stays = not there.step.swings
+        leave = there.step.land if stays else here.step.leave
         t = _frames(here.step.land, leave)
-        pitch = here.pitch(t, lands=here.step.swings or i == 0, leaves=not rests)
+        pitch = here.pitch(t, lands=here.step.swings or i == 0, leaves=not stays)
         _stand(foot, t, here, pitch)
-        if not rests:
+        if not stays:
             _swing(foot, here, there, style, side, ground)
     return foot
 
@@ -140,7 +143,7 @@ def _swing(foot: FootPoses, here: _Roll, there: _Roll, style: Style, side: int, 
     bend = np.minimum(pitch, 0) * (1 - 0.4 * bump)
     toes = quat.mul(rotation, quat.from_axis_angle(X_AXIS, bend))
     # The toe joint starts at rest, and still moves as it lands. Its position and the pitch give the ankle.
-    going = _hermite(0.0, 0.0, 1.0, SPEED_LEFT / EARLY, u**EARLY)
+    going = _hermite(0.0, 0.0, 1.0, LANDING_SPEED / EARLY, u**EARLY)
     share = np.stack([going, _ease(u), going], axis=1)
     toe = here.toe(p0) + (there.toe(p1) - here.toe(p0)) * share
     toe[:, 1] += style.lift[t, side] * bump

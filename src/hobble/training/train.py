@@ -50,8 +50,9 @@ def train(
 
     network, training: these sections of a configuration. checkpoints: a folder with one subfolder for each
     run, named by the hash of everything that determines it; a run resumes from its own checkpoint there.
-    start: a checkpoint to start from if the run has none of its own; it is part of the hash. processes: those
-    that train together, each of which calls this; the first reads and writes checkpoints and the history.
+    start: a checkpoint to start from if the run has none of its own; it is part of the hash, as is `code`,
+    the hash of the code. processes: those that train together, each of which calls this; the first reads and
+    writes checkpoints and the history.
 
     The result depends on the arguments and the number of threads, never on interruptions. Raises HobbleError
     if an error is not finite (the message names the batch, and the last checkpoint stays), if there are fewer

@@ -22,7 +22,10 @@ def compared(all_measured: Sequence[ConfigurationResults], published: Json) -> S
         entries=[{"dataset": m.dataset, **m.found(NAME), "configuration": m.name} for m in all_measured],
         about={m.name: {"joints": m.found(NAME)["joints"]} for m in all_measured},
         differences=accuracy_differences(all_measured),
-        against_published=[*_splits(all_measured, published), *_published_clips(all_measured, published)],
+        against_published=[
+            *_published_splits(all_measured, published),
+            *_published_clips(all_measured, published),
+        ],
     )
 
 
@@ -43,10 +46,10 @@ def accuracy_differences(all_measured: Sequence[ConfigurationResults]) -> list[D
     """
     out: list[DifferenceOf] = []
     for a, b in combinations(all_measured, 2):
-        ours, theirs = ({**_of_splits(m), **_clips(m)} for m in (a, b))
-        for over in ours:
-            if over in theirs and ours[over]["frames"] and theirs[over]["frames"]:
-                out.append({"a": a.name, "b": b.name, "over": over, **pair(ours[over], theirs[over])})
+        of_a, of_b = ({**_of_splits(m), **_clips(m)} for m in (a, b))
+        for over in of_a:
+            if over in of_b and of_a[over]["frames"] and of_b[over]["frames"]:
+                out.append({"a": a.name, "b": b.name, "over": over, **pair(of_a[over], of_b[over])})
     return out
 
 
@@ -61,7 +64,8 @@ def clip_means(found: Json, split: str) -> list[float]:
     return [c["mean"] for c in found["clips"] if c["split"] == split and c["mean"] is not None]
 
 
-def _splits(all_measured: Sequence[ConfigurationResults], published: Json) -> list[PublishedRow]:
+def _published_splits(all_measured: Sequence[ConfigurationResults], published: Json) -> list[PublishedRow]:
+    """Published errors of each configuration, next to ours of each split."""
     found = {m.name: m for m in all_measured}
     out = []
     for row in published["accuracy"]:
@@ -70,7 +74,7 @@ def _splits(all_measured: Sequence[ConfigurationResults], published: Json) -> li
             ours = m.found(NAME)[split]["mean_of_clips"] if m else None
             out.append(published_row(f"relative error, {WORDS[split]} clips", row, row["mean"], ours))
             if "sd" in row:
-                in_text = {**row, "table": None}
+                in_text = {**row, "table": None}  # published in the text, not in the table
                 means = clip_means(m.found(NAME), split) if m else []
                 sd = float(np.std(means)) if len(means) > 1 else None
                 what = f"standard deviation of the means of {WORDS[split]} clips"

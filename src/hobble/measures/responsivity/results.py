@@ -68,7 +68,7 @@ class Lap(LapWalk):
 class LapPath(TypedDict):
     """The path of a lap, stored every `seconds_between`.
 
-    x, z: m. off_cm: largest distance from the line between waypoints since the place before.
+    x, z: m. off_cm: largest distance from the line between waypoints since the stored place before.
     """
 
     lap: int
@@ -78,7 +78,7 @@ class LapPath(TypedDict):
     off_cm: list[float]
 
 
-class ModeTimes(TypedDict):
+class ModeResults(TypedDict):
     """All laps of one phase mode.
 
     waypoints: how many there are in all laps. foot_slide_cm is the mean over laps; path_overshoot_cm and both
@@ -99,10 +99,10 @@ class ModeTimes(TypedDict):
     milliseconds: Milliseconds
 
 
-class LapsOfMode(TypedDict):
+class PieceResults(TypedDict):
     """The file of a piece: all laps of a phase mode, and the paths of the first ones."""
 
-    laps: ModeTimes
+    laps: ModeResults
     runs: list[LapPath]
 
 
@@ -116,7 +116,7 @@ class Track(TypedDict):
     z: list[float]
 
 
-class Responsivity(ModeTimes):
+class Responsivity(ModeResults):
     """responsivity.json. The values of the configured phase mode are at the top, `modes` has those of all.
 
     runs: the paths of the first laps in the configured mode. parameters: see `parameter_counts`; None for a
@@ -132,4 +132,4 @@ class Responsivity(ModeTimes):
     bytes_each: int
     exact: str
     laps_other_modes: int
-    modes: list[ModeTimes]
+    modes: list[ModeResults]

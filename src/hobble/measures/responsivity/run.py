@@ -15,7 +15,7 @@ import numpy as np
 from hobble.measures.inputs import MeasureInputs, Outcome, Row
 from hobble.measures.responsivity import Options
 from hobble.measures.responsivity.laps import FPS, walk_laps
-from hobble.measures.responsivity.results import Lap, LapsOfMode, ModeTimes, Responsivity, Spread
+from hobble.measures.responsivity.results import Lap, ModeResults, PieceResults, Responsivity, Spread
 from hobble.measures.responsivity.times import milliseconds, timed_frames
 from hobble.models.load import load_network
 from hobble.models.network import Network
@@ -36,7 +36,7 @@ def responsivity(
     laps_other_modes: int | None = None,
     modes: Sequence[str] | None = None,
     track: Sequence[Waypoint] = TRACK,
-    done: Mapping[str, LapsOfMode] | None = None,
+    done: Mapping[str, PieceResults] | None = None,
 ) -> Responsivity:
     """Laps of the track of Segerstedt 2021: `laps` in the runtime's phase mode, fewer in other `modes`.
 
@@ -85,7 +85,7 @@ def laps_of_mode(
     laps: int,
     lap_seconds: float,
     track: Sequence[Waypoint] = TRACK,
-) -> LapsOfMode:
+) -> PieceResults:
     """All laps in the mode of `runtime`. For the arguments see `responsivity`."""
     longest = int(lap_seconds * FPS)
     times = timed_frames(network, runtime, laps, longest, track)
@@ -94,7 +94,7 @@ def laps_of_mode(
         {**lap, "milliseconds": milliseconds(seconds)}
         for (lap, _), seconds in zip(walked, times, strict=True)
     ]
-    entry: ModeTimes = {
+    entry: ModeResults = {
         "mode": runtime.mode,
         "laps": results,
         "laps_finished": sum(lap["finished"] for lap in results),
@@ -144,7 +144,7 @@ def lap_rows(result: Responsivity) -> list[Row]:
     return rows
 
 
-def run_piece(inputs: MeasureInputs, options: Options, piece: str) -> LapsOfMode:
+def run_piece(inputs: MeasureInputs, options: Options, piece: str) -> PieceResults:
     """The laps in one phase mode."""
     laps = options.laps if piece == inputs.runtime.mode else min(options.laps, options.laps_other_modes)
     runtime = inputs.runtime.model_copy(update={"mode": piece})
