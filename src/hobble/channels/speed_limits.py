@@ -20,8 +20,8 @@ LEVELS = 5  # number of values, from 0 to the channel's highest, for which a spe
 TOP = 95  # percentile of the speeds of healthy cycles in a gait: the limit of a healthy body
 # Percentile of these speeds that counts as the usual speed. The median is too low: clips start and stop.
 USUAL = 65
-# If an injury leaves at most this share of the usual speed, what it leaves is the limit. If it leaves all,
-# the limit is that of a healthy body. In between, the limit is interpolated.
+# If an injury leaves at most this share of the usual speed, the limit is that lower speed. If it leaves the
+# whole usual speed, the limit is that of a healthy body, which is higher. In between, it is interpolated.
 CANNOT_HURRY = 0.85
 AHEAD = 0.9  # a cycle counts if at least this share of its speed is forward
 STEADY = 0.35  # a cycle is left out if a value changes in it by more than this share of the highest value
@@ -255,7 +255,7 @@ def _of_label(label: int, values: Array, across: np.ndarray) -> Sequence[tuple[n
     """The cycles that count for a label, as (indices, values), first of one side of the body, then the other.
 
     values: (n, L) of all cycles. A cycle counts if no other label has a value above 0 in it. If there is no
-    such cycle, it counts if no other label has a higher value.
+    such cycle, those count in which no other label has a higher value.
     """
     sides = sorted({label, int(across[label])})
     alone = [np.flatnonzero((values[:, k] > 0) & ((values > 0).sum(axis=1) == 1)) for k in sides]

@@ -11,7 +11,7 @@ from hobble.core.quat import Array
 from hobble.figure.solids import Solid, subtracted, united
 
 FAR = 12.0  # cm; larger distances to the surface are clipped to this
-NEAR = 7.0  # cm; a solid has no effect farther away; larger than all blends
+NEAR = 7.0  # cm; a solid has no effect farther away than this. Each `Solid.blend` must be smaller
 # The corners of a cell, and its edges as pairs of them.
 CORNERS = np.array([[i, j, k] for i in (0, 1) for j in (0, 1) for k in (0, 1)])
 EDGES = [(a, b) for a in range(8) for b in range(a + 1, 8) if (CORNERS[a] != CORNERS[b]).sum() == 1]
@@ -56,7 +56,7 @@ def _gentle(at: float, band: tuple[float, float, float]) -> float:
 
 
 def field(solids: Sequence[Solid], axes: Sequence[Array]) -> Array:
-    """(X, Y, Z) distances from the blended solids on the grid of three axes, cm; FAR away from all solids."""
+    """(X, Y, Z) distances from the blended solids on a grid of three axes, cm; FAR if none is near."""
     out = np.full([len(axis) for axis in axes], FAR, np.float64)
     for solid in solids:
         low, high = solid.bounds()

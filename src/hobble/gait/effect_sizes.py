@@ -68,7 +68,7 @@ def effects(walk: Profile, healthy: Profile, side: str = RIGHT) -> dict[str, flo
 def effects_of_people(known: People) -> Mapping[str, Mapping[str, tuple[float, float]]]:
     """For each impairment and each of the EFFECTS, the mean and the standard deviation over people."""
     out = {}
-    for gait in GAITS:
+    for gait in GAITS:  # in people's data: the normal walk and the impaired ones
         if gait == NORMAL:
             continue
         each = [

@@ -98,9 +98,9 @@ def rows_of_landings(events: list[tuple[float, int]]) -> Array:
 def find_cycles(footsteps: Array, frames: int, zero: str, margins: str) -> tuple[np.ndarray, int]:
     """First and last frame (C, 2) of each cycle between landings of the foot `zero`, and the number left out.
 
-    Cycles in marked rows are left out, and so are cycles too near an end of the clip. With `margins` "drop",
-    as in the original, a cycle is too near if it starts before frame 60 or ends within 61 frames of the
-    clip's end. With "extend", it is too near if there is no frame before it or less than two after.
+    A cycle is left out if its row or the next row is marked, or if it is too near an end of the clip. With
+    `margins` "drop", as in the original, it is too near if it starts before frame 60 or ends within 61 frames
+    of the clip's end. With "extend", it is too near if there is no frame before it or less than two after.
     """
     margin = MARGINS[margins]
     own = 0 if zero == "right" else 1

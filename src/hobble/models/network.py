@@ -60,8 +60,9 @@ class Network(ABC):
 
     kind: ClassVar[str] = ""  # its folder in hobble.models
     phase: ClassVar[bool] = True  # whether a prediction depends on the phase
-    # Whether poses are recorded frames: feet slide unless the root moves exactly as predicted. Then the
-    # runtime does not reduce this movement while the character stands or moves away from the target.
+    # Whether poses are recorded frames, as in motion matching. Their feet slide unless the root moves exactly
+    # as predicted. So the runtime does not hold the root back while the character stands or moves
+    # away from the target.
     rooted: ClassVar[bool] = False
     modes: ClassVar[tuple[str, ...]] = ("exact",)  # of the predictor; the last one is exact
     storage: ClassVar[str] = "float32"  # of the predictor's weights by default, one of STORAGES
@@ -90,7 +91,7 @@ class Network(ABC):
 
     @property
     def memory(self) -> int:
-        """How many numbers the network keeps in each character between frames; see `Predictor`."""
+        """How many numbers the caller keeps for each character between frames; see `Predictor`."""
         return 0
 
     @classmethod

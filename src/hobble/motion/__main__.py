@@ -57,7 +57,7 @@ def main() -> int:
         "--picture",
         type=Path,
         metavar="SVG",
-        help="for one file: draw it beside what is made of it, with the joint that differs most in red",
+        help="for one file: write a picture of it and the retargeted motion, with the worst joint in red",
     )
     given = parser.parse_args()
     try:

@@ -1,4 +1,4 @@
-"""Draws a clip beside what was made of it, as stick figures from the side and from the front."""
+"""Draws a clip beside the retargeted motion, as stick figures from the side and from the front."""
 
 from __future__ import annotations
 

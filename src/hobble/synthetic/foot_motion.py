@@ -49,7 +49,7 @@ def move_foot(steps: list[PlannedStance], style: Style, side: int, ground: Groun
     rest = np.radians(style.rest_pitch)
     rolls = [_Roll.of(step, style, side, rest) for step in steps]
     for i, (here, there) in enumerate(pairwise(rolls)):
-        stays = not there.step.swings
+        stays = not there.step.swings  # without a swing, the foot stands at the same place until then
         leave = there.step.land if stays else here.step.leave
         t = _frames(here.step.land, leave)
         pitch = here.pitch(t, lands=here.step.swings or i == 0, leaves=not stays)
@@ -69,7 +69,7 @@ class _Roll:
 
     land, off: radians of pitch as the foot lands and as it leaves. rest: (F,) radians, the pitch of a
     standing foot; one array for all stances. flat, heel_off: shares of the stance after which the toe is down
-    and the heel leaves. power: of the heel's rise over time.
+    and the heel leaves. power: exponent of the heel's rise over time.
     """
 
     step: PlannedStance
@@ -97,7 +97,11 @@ class _Roll:
         )
 
     def pitch(self, t: Array | float, lands: bool = True, leaves: bool = True) -> Array:
-        """Radians, positive for toe up, at frames `t` in or just outside the stance."""
+        """Radians, positive for toe up, at frames `t` in or just outside the stance.
+
+        lands, leaves: whether the stance begins with a landing and ends with a swing. If not, the foot
+        keeps the pitch of standing at that end.
+        """
         u = (np.asarray(t, float) - self.step.land) / (self.step.leave - self.step.land)
         down = u / self.flat
         rise = np.clip((u - self.heel_off) / (1 - self.heel_off), 0, None)

@@ -28,7 +28,7 @@ class PlannedStance:
     """A foot on the ground from frame `land` to frame `leave` (of the padded path, with fractions).
 
     ankle: (3,) position of the ankle while the foot is flat, cm. turn: (4,) world rotation of the flat foot.
-    swings: whether the foot swung to this place.
+    swings: whether the foot swung to this place; if not, it stood there before.
     """
 
     land: float

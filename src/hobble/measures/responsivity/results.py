@@ -41,8 +41,8 @@ class LapWalk(TypedDict):
 
     path_overshoot_cm, path_distance_cm: the largest and the mean distance from the line between waypoints.
     foot_slide_cm: mean slide of a toe in a stance. steps: number of stances. largest_turn_degrees: largest
-    turn of a joint in one frame as drawn; predicted_turn_degrees: the same as predicted by the network.
-    turns_held_back: frames in which the runtime limited a turn.
+    turn of a joint in one frame, as drawn. predicted_turn_degrees: the largest before the runtime limits
+    turns. turns_held_back: frames in which the runtime limited a turn.
     """
 
     lap: int
@@ -68,7 +68,7 @@ class Lap(LapWalk):
 class LapPath(TypedDict):
     """The path of a lap, stored every `seconds_between`.
 
-    x, z: m. off_cm: largest distance from the line between waypoints since the stored place before.
+    x, z: m. off_cm: largest distance from the line between waypoints since the previous stored place.
     """
 
     lap: int
@@ -119,9 +119,10 @@ class Track(TypedDict):
 class Responsivity(ModeResults):
     """responsivity.json. The values of the configured phase mode are at the top, `modes` has those of all.
 
-    runs: the paths of the first laps in the configured mode. parameters: see `parameter_counts`; None for a
-    network without layers. stored: mode -> how many numbers it keeps in memory, of `bytes_each` bytes. exact:
-    the mode that evaluates the network without approximation. laps_other_modes: laps in each other mode.
+    runs: the paths of the first laps in the configured mode. parameters: weights and biases that one frame
+    uses, see `run.parameter_counts`; None for a network without layers. stored: mode -> how many numbers it
+    keeps in memory, of `bytes_each` bytes. exact: the mode that evaluates the network without approximation.
+    laps_other_modes: laps in each other mode.
     """
 
     configuration: str
