@@ -79,6 +79,6 @@ def test_injuries_are_named_in_words(play: dict[str, Any], holden31: Skeleton) -
     assert play["scenarios"][-1]["description"] == "Walks while the left thigh hurts more and more"
     words = spoken_links(holden31, holden31.link_names)
     assert len(set(words)) == len(words)
-    assert words[:2] == ["left hip", "left hip (LHipJoint-LeftUpLeg)"]
-    assert {"left thigh", "right foot", "lower back", "neck", "left hand"} <= set(words)
+    assert words[:2] == ["left hip (Hips-LHipJoint)", "left hip (LHipJoint-LeftUpLeg)"]
+    assert {"left thigh", "right foot", "upper back", "head", "left forearm"} <= set(words)
     assert spoken_links(Skeleton("x", ("a", "b"), (-1, 0), np.zeros((2, 3))), ("a-b",)) == ["a-b"]

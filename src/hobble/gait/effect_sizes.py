@@ -14,9 +14,9 @@ from hobble.gait.recogniser import LEFT, RIGHT
 EFFECTS: dict[str, str] = {
     "speed": "speed, share of healthy",
     "stride": "stride time, share of healthy",
-    "stance": "stance of the sound leg minus that of the hurt leg, share of the cycle, change from healthy",
-    "step_hurt": "step onto the hurt foot, share of healthy",
-    "step_sound": "step onto the sound foot, share of healthy",
+    "stance": "how much longer the sound leg stands than the hurt one, share of the cycle, minus healthy",
+    "step_hurt": "length of the step onto the hurt foot, share of healthy",
+    "step_sound": "length of the step onto the sound foot, share of healthy",
     "knee_hurt": "knee range of the hurt leg, share of healthy",
     "knee_sound": "knee range of the sound leg, share of healthy",
     "hip_hurt": "hip flexion range of the hurt leg, share of healthy",

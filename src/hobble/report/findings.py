@@ -52,13 +52,19 @@ def key_figures(material: ReportMaterial) -> list[KeyFigure]:
         value, _, unit = duration(seconds).partition(" ")
         figures.append(KeyFigure("Motion data", value, unit, note, 30))
     network = material.network
-    note = f"parameters per phase; layers of {'–'.join(map(str, network['sizes']))}"
+    # For a PFNN they are counted for one of its control points, for other kinds of network all are counted.
+    which = " at each control point" if "control points" in network["described"] else ""
+    note = f"parameters{which}; layers of {'–'.join(map(str, network['sizes']))}"
     note = f"{note if network['sizes'] else 'numbers in its tables'}; {size(network['bytes'])} on disk"
     figures.append(KeyFigure("Network", number(network["parameters"] / 1e6, 3), "M", note, 40))
     total = material.pipeline.get("total_seconds")
     if total:
         value, _, unit = duration(total).partition(" ")
-        note = f"from clips to measurements, all jobs; {size(material.pipeline.get('total_bytes'))} written"
+        written = size(material.pipeline.get("total_bytes"))
+        note = (
+            "sum over all jobs, from clips to measurements; jobs can run in parallel, so the run can be "
+            f"shorter; {written} written"
+        )
         figures.append(KeyFigure("Whole pipeline", value, unit, note, 50))
     return sorted(figures, key=lambda figure: figure.at)
 

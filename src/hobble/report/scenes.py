@@ -92,15 +92,16 @@ def _scenario(
     one, column = (str(v) for v in data.get(f"{name}/swept", ("", "")))
     if column in channels.get(one, ()):
         at, highest = list(channels[one]).index(column), channel(one).highest
+        word = next((s for s, c in faces[one].sliders.items() if c == column), faces[one].spoken[at])
         share = np.asarray(data[f"{name}/swept_values"])[::stride] / highest
         out["swept"] = {
             "column": at,
-            "spoken": faces[one].spoken[at],
+            "spoken": word,
             "highest": highest,
             "placed": bool(faces[one].regions),
             "values": packed(np.clip(np.round(250 * share), 0, 250).astype(np.uint8)),
         }
-        out["description"] = words(one).grows.format(faces[one].spoken[at])
+        out["description"] = words(one).grows.format(word)
     return out
 
 

@@ -135,8 +135,8 @@ def fit_table(found: list[ShownFits]) -> Table:
     columns = [
         Column("clip"),
         Column.count("cycles"),
-        Column.number("mean fitting error of the best patch of each cycle, cm²"),
-        Column.number("mean fitting error of the worst patch used, cm²"),
+        Column.number("mean fitting error of the best ground of each cycle, cm²"),
+        Column.number("mean fitting error of the worst ground used, cm²"),
         Column.number("mean distance of a foot, cm"),
         Column.number("largest distance, cm"),
     ]

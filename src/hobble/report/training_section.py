@@ -10,6 +10,9 @@ from hobble.report.formats import number
 from hobble.report.gather import ReportMaterial
 from hobble.report.tables import Column, Table
 
+# Names of the parts of the output whose own names do not say that they belong to the path.
+PATH_PARTS = {"position": "path position", "direction": "path direction"}
+
 
 def passes_axis(material: ReportMaterial) -> list[float]:
     """For each section of training, the passes done at its end: section 10 of 10 in pass 1 ends at 1.0."""
@@ -49,7 +52,7 @@ def block_curves(material: ReportMaterial) -> ChartGroup | None:
     x, history = passes_axis(material), material.history
     whole = [v for v in history.get("held_out_mse", ()) if v is not None]
     blocks = {
-        name.removeprefix("held_out_").removesuffix("_mse").replace("_", " "): history[name]
+        part_in_words(name.removeprefix("held_out_").removesuffix("_mse")): history[name]
         for name in material.blocks
         if any(v is not None for v in history[name])
     }
@@ -76,6 +79,16 @@ def block_curves(material: ReportMaterial) -> ChartGroup | None:
     )
 
 
+def _column_in_words(name: str) -> str:
+    part = name.removeprefix("held_out_")
+    return part_in_words(part) if part == name else f"held out {part_in_words(part)}"
+
+
+def part_in_words(name: str) -> str:
+    """A part of the output in words, such as "joint velocity" or "path position"."""
+    return PATH_PARTS.get(name, name.replace("_", " "))
+
+
 def _log_span(values: Sequence[float | None]) -> list[float]:
     """Range of a logarithmic axis around the values, as exponents of ten, with a small margin."""
     powers = [math.log10(v) for v in values if v is not None and v > 0] or [0.0]
@@ -88,7 +101,7 @@ def history_table(material: ReportMaterial) -> Table:
     names = list(material.history)
     whole = ("pass", "section", "samples")
     columns = [
-        Column.count(name) if name in whole else Column.number(name.replace("_", " "), 4) for name in names
+        Column.count(name) if name in whole else Column.number(_column_in_words(name), 4) for name in names
     ]
     rows = list(zip(*material.history.values(), strict=False))
     return Table(f"{material.name}-history", columns, rows, "Every section (part of a pass) of training")

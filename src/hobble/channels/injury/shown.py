@@ -166,12 +166,12 @@ def spoken(skeleton: Skeleton, link: str) -> str:
 
 
 def spoken_links(skeleton: Skeleton, links: Sequence[str]) -> list[str]:
-    """A name for each link. If several links have the same name, the label is added to the later ones."""
-    out: list[str] = []
-    for link in links:
-        word = spoken(skeleton, link)
-        out.append(word if word not in out or word == link else f"{word} ({link})")
-    return out
+    """A name for each link. If several links have the same name, their labels are added."""
+    found = [spoken(skeleton, link) for link in links]
+    return [
+        word if found.count(word) == 1 or word == link else f"{word} ({link})"
+        for word, link in zip(found, links, strict=True)
+    ]
 
 
 def _above(skeleton: Skeleton, joint: int) -> list[str]:

@@ -250,8 +250,8 @@ def _centimetres(error: float, split: str, material: ReportMaterial) -> str:
     if drawn is None:
         return f"{number(error)} cm per joint on average"
     return (
-        f"{number(error)} cm per joint as predicted; {number(drawn)} cm as drawn (predicted position and "
-        "velocity averaged)"
+        f"{number(error)} cm per joint as predicted; {number(drawn)} cm as drawn (mean of the "
+        "predicted position and of the last position moved on by the predicted velocity)"
     )
 
 

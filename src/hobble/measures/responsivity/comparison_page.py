@@ -32,16 +32,16 @@ def columns(compared: Compared) -> Iterator[Overview]:
 
 
 def verdicts(compared: Compared) -> Iterator[Verdict]:
-    """Which configuration stays closest to the path, and which is smoothest, fastest and smallest."""
+    """Which configuration stays closest to the track, and which is smoothest, fastest and smallest."""
     exact = in_exact_mode(compared)
     whole = {name: e for name, e in exact.items() if e["waypoints_reached"] == e["waypoints"]}
     astray = [name for name in exact if name not in whole]
     lost = f" Did not reach every waypoint: {', '.join(astray)}." if astray else ""
     yield from best(
         20,
-        "Closest to the path",
+        "Closest to the track",
         {name: e["path_overshoot_cm"] for name, e in whole.items()},
-        lambda name, v: f"{name} is never more than {number(v, 3)} cm off the path",
+        lambda name, v: f"{name} is never more than {number(v, 3)} cm off the track",
         lost,
     )
     yield from best(

@@ -32,8 +32,8 @@ LAP_COLUMNS = {
     "waypoints_reached": Column.count("waypoints reached"),
     "seconds": Column.number("seconds", 4),
     "frames": Column.count("frames"),
-    "path_distance_cm": Column.number("mean distance from the path, cm"),
-    "path_overshoot_cm": Column.number("largest distance from the path, cm"),
+    "path_distance_cm": Column.number("mean distance from the track, cm"),
+    "path_overshoot_cm": Column.number("largest distance from the track, cm"),
     "steps": Column.count("steps"),
     "foot_slide_cm": Column.number("mean foot slide of a step, cm"),
     "predicted_turn_degrees": Column.number("largest turn of a joint in a frame as predicted, °"),
@@ -114,7 +114,7 @@ def track_figures(found: Json) -> list[KeyFigure]:
     return [
         KeyFigure("Waypoints reached", reached, "", laps),
         KeyFigure(
-            "Largest distance from the path",
+            "Largest distance from the track",
             number(found.get("path_overshoot_cm")),
             "cm",
             "usually at a turn",
@@ -206,8 +206,8 @@ def _speed(found: Json) -> Iterator[Hint]:
     elif slow is not None:
         yield Hint(
             "good",
-            f"A frame takes {100 * share:.1f} % of the 16.7 ms that 60 Hz allows; 1 % of the frames take "
-            f"{100 * slow / FRAME_BUDGET_MS:.0f} % or more.",
+            f"A frame takes {100 * share:.1f} % of the 16.7 ms that 60 Hz allows; the slowest 1 % of "
+            f"the frames take at least {100 * slow / FRAME_BUDGET_MS:.0f} % of it.",
             "That is fast enough for a game.",
         )
     else:

@@ -27,7 +27,7 @@ export const createPanel = (host, actor, title = "") => {
     make(part, "dt", "", label);
     return make(part, "dd");
   };
-  const speed = row("Speed"), phase = row("Phase"), down = row("On the ground"), gait = row("Gait"), lab = row("Contacts and knee angles, last 4 s"), steps = row("Length of the last step"), looks = spec.recogniser ? row(`Looks like, last ${SECONDS} s`) : null, cost = row("Time per frame");
+  const speed = row("Speed"), phase = row("Phase"), down = row("On the ground"), gait = row("Gait"), lab = row("Contacts and knee angles, last 4 s"), steps = row("Length of the last step"), looks = spec.recogniser ? row(`Limp recognised, last ${SECONDS} s`) : null, cost = row("Time per frame");
   const chart = make(lab, "canvas", "lab"), bends = make(lab, "span", "words"), lengths = make(steps, "span", "words");
   chart.setAttribute("role", "img");
   chart.setAttribute("aria-label", "When each foot was on the ground, left above right, and the angle of its knee");

@@ -19,14 +19,14 @@ from hobble.report.tables import Column, Table
 SHOWN = ("speed", "stance", "step_hurt", "knee_hurt", "hip_hurt", "lean", "pelvis_drop", "arm_hurt")
 MOST_NAMED = 8  # links that a sentence lists
 RECOGNISERS = (
-    "Two recognisers judge each walk, four seconds at a time. The linear one learnt from people's strong "
+    "Two recognisers judge each walk in pieces of four seconds. The linear one learnt from people's strong "
     "limps, the graded one also from milder versions of them."
 )
-# Columns of a table; shares of the windows of four seconds.
+# Columns of a table; the pieces are the windows of four seconds.
 RECOGNISED = (
-    Column.number("share in which the linear recogniser finds a limp"),
-    Column.number("share in which the graded recogniser finds one on the hurt side"),
-    Column.number("share in which the graded one names the wrong side"),
+    Column.number("share of pieces in which the linear recogniser finds a limp"),
+    Column.number("share of pieces in which the graded recogniser finds a limp on the hurt side"),
+    Column.number("share of pieces in which the graded recogniser names the wrong side"),
 )
 COLOURS = {"hip": "@g1", "thigh": "@g2", "shank": "@g3", "foot": "@g4", "back": "@g5"}  # of parts; arms: @g0
 # Part of the body -> the impairment of people that is most like its limp.
@@ -71,12 +71,12 @@ def section(found: Json, material: ReportMaterial) -> PageSection:
 def provenance(hurt_seconds: Mapping[str, Mapping[str, float]], say: Callable[[str], str] = str) -> str:
     """Which injuries of the training data were captured and which were generated from healthy clips."""
     sentences = []
-    for kind, words in (("captured", "were captured"), ("made", "were generated from healthy clips")):
+    for kind, words in (("captured", "captured"), ("made", "generated from healthy clips")):
         if some := hurt_seconds[kind]:
-            names = f": {', '.join(map(say, sorted(some)))}" if len(some) <= MOST_NAMED else ""
-            links = f"{len(some)} links" if len(some) != 1 else "one link"
+            names = f" ({', '.join(map(say, sorted(some)))})" if len(some) <= MOST_NAMED else ""
+            links = f"summed over {len(some)} links" if len(some) != 1 else "of one link"
             seconds = number(sum(some.values()), 3)
-            sentences.append(f"Injuries of {links} in training {words} ({seconds} s in all{names}).")
+            sentences.append(f"Hurt motion in training, {words}: {seconds} s, {links}{names}.")
     return " ".join(sentences) or "No link was hurt in training."
 
 

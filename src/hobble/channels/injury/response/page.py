@@ -294,6 +294,7 @@ def sweep_table(name: str, rows: Sequence[Mapping[str, Any]]) -> Table | None:
     if not rows:
         return None
     keys = list(rows[0])
-    columns = [Column(k) if isinstance(rows[0][k], str) else Column.number(k.replace("_", " ")) for k in keys]
+    words = {key: key.replace("_", " ") for key in keys} | {"from_worst": "from severity 10"}
+    columns = [Column(k) if isinstance(rows[0][k], str) else Column.number(words[k]) for k in keys]
     table = [[row.get(k) for k in keys] for row in rows]
-    return Table(f"{name}-injury", columns, table, "Every walk measured (worst: severity 10)")
+    return Table(f"{name}-injury", columns, table, "Every walk and jog measured, at each severity")

@@ -79,9 +79,10 @@ def divided_chart(rows: Sequence[Mapping[str, Any]]) -> Chart | None:
         return None
     return Chart(
         "divided",
-        "Divided severities",
-        "Distance of the pose from the healthy walk. One line for each divisor: the severities are divided "
-        "by it before the network gets them.",
+        "Weaker inputs",
+        "This shows how much of the effect remains if the severities are divided before the network gets "
+        "them. Each line belongs to one divisor. Its height is the distance of the pose from the "
+        "healthy walk.",
         layout={"xaxis": axis("severity", dtick=2), "yaxis": axis("cm per joint", rangemode="tozero")},
         choose="Link",
         options=options,
@@ -107,7 +108,10 @@ def jog_chart(rows: Sequence[Mapping[str, Any]], untrained: Collection[str] = ()
         traces.append(line("never hurt in training", list(found), means, "@muted", dash="dot", width=1.4))
     if not traces:
         return None
-    caption = "Distance of the jog from the healthy jog."
+    caption = (
+        "The character walks hurt, then jogs and is still hurt. The chart shows how far its jog is from the "
+        "healthy jog."
+    )
     if found:
         caption += (
             " The dotted line is the mean of links that were never hurt in training, so it shows how much "
