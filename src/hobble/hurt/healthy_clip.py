@@ -73,9 +73,8 @@ def measure_healthy_clip(clip: Clip, labels: Labels) -> HealthyClip:
     found = find_swings(clip, options)
     stances, swinging, swing = [], np.zeros((frames, 2), bool), np.zeros((frames, 2))
     for side in (LEFT, RIGHT):
-        own = [
-            (s.start, min(s.end, frames - 1)) for s in found if s.foot == 1 - side
-        ]  # in swings the right foot is 0
+        # In swings the right foot is 0.
+        own = [(s.start, min(s.end, frames - 1)) for s in found if s.foot == 1 - side]
         touches = np.asarray(labels.contacts[:, 2 * side : 2 * side + 2].any(axis=1))
         own = [_in_the_air(start, end, touches) for start, end in own]
         for start, end in own:

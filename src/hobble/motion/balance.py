@@ -15,6 +15,7 @@ import numpy as np
 from hobble.core.clip import Clip
 from hobble.core.quat import Array
 from hobble.core.smooth import gaussian
+from hobble.motion.body import SIDES
 from hobble.motion.rig import leg_length
 from hobble.motion.root import facing
 
@@ -37,7 +38,6 @@ SMOOTH = 0.04  # seconds: positions are smoothed by a Gaussian of this width bef
 SLOW = 0.4
 UPRIGHT = 0.6  # leg lengths: the hips of a figure that does not sit or kneel are further above the ankle
 SHORTEST = 0.06  # least number of seconds that the figure stands on each foot alone
-SIDES = ("left", "right")
 # The point between ankle (0) and ball (1) at which the ground's force acts, at three speeds forward (divided
 # by the square root of gravity times leg length). Means over 172 clips of CMU, styles, patients, Ferre et al.
 # and the original release.

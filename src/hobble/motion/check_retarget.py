@@ -10,9 +10,9 @@ import numpy as np
 from hobble.core.clip import Clip
 from hobble.core.errors import InputError
 from hobble.core.quat import Array
+from hobble.motion.body import SIDES
 
 MOST = 15.0  # degrees: a result with a larger mean difference is refused
-SIDES = ("left", "right")
 # Joint -> three roles. The angle is the one between the bone from the first to the second and the bone from
 # the second to the third: 0 if they are in line.
 ANGLES = {

@@ -22,12 +22,12 @@ from hobble.core.ik import aim, two_bone_knee
 from hobble.core.quat import Array
 from hobble.core.skeleton import Skeleton, local_rotations, rest_positions
 from hobble.motion.axes import rest_frame
+from hobble.motion.body import SIDES
 from hobble.motion.heel_tilt import level_heels
 from hobble.motion.rig import leg_length, missing_bone
 
 # Bones of limbs: role of the joint -> role of the bone's other end.
 LIMB_BONES = {"shoulder": "elbow", "elbow": "wrist", "hip": "knee", "knee": "heel"}
-SIDES = ("left", "right")
 # Distance from hip to ankle, as a share of the leg's length. If that of the source is NEARLY_STRAIGHT or
 # more, the hips come down so that the target's leg is no straighter. If it is BENT or less, they do not.
 # Between the two, the rule sets in gradually.
