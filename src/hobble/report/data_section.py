@@ -83,7 +83,7 @@ def speed_chart(material: ReportMaterial) -> Chart | None:
         "yaxis": axis("seconds", rangemode="tozero"),
     }
     caption = "Seconds at each speed. Where there is little or no data, the network has to interpolate."
-    return Chart("speeds", "Speed", caption, traces, layout, 300)
+    return Chart("speeds", "Speed over the ground", caption, traces, layout, 300)
 
 
 def retarget_chart(material: ReportMaterial) -> Chart | None:
@@ -113,9 +113,9 @@ def retarget_chart(material: ReportMaterial) -> Chart | None:
         "yaxis": axis("difference, degrees", rangemode="tozero"),
     }
     caption = (
-        "These clips were retargeted to the skeleton of the data set. Each bar is the joint or limb whose "
-        f"direction differs most from the file, averaged over the clip. Clips with {MOST:.0f} degrees or "
-        "more are refused."
+        "These clips were retargeted to the skeleton of the data set. Each bar is the joint or limb that "
+        "differs most from the file, in degrees averaged over the clip. Clips with more than "
+        f"{MOST:.0f} degrees are refused."
     )
     if every > len(found):
         caption += f" Shown are the {len(found)} of {every:,} clips that differ most."

@@ -41,10 +41,10 @@ def section(found: Json, material: ReportMaterial) -> PageSection:
 
 
 def summary(found: ChannelResult) -> str:
-    """A paragraph: how much the classifier recognises in generated walks, and in captured walks of others."""
+    """A paragraph: how much the recogniser recognises in generated walks, and in captured walks of others."""
     captured = found["captured"]
     text = (
-        f"A classifier trained on captured clips finds the right {found['title'].lower()} in "
+        f"A recogniser trained on captured clips finds the right {found['title'].lower()} in "
         f"{_percent(found['right_at_1'])} of the windows of generated walks with a value of 1, and in "
         f"{_percent(captured['right'])} of the windows of captured clips that it was not trained on "
         f"({captured['people']} clips or people, each left out in turn). All generated walks had the same "
@@ -52,7 +52,7 @@ def summary(found: ChannelResult) -> str:
     )
     if alone := [m for m, count in captured["people_of"].items() if count < 2]:
         text += f" Only one clip or person shows {', '.join(alone)}. "
-        text += "While that one is left out, the classifier cannot learn it."
+        text += "While that one is left out, the recogniser cannot learn it."
     return text
 
 
@@ -85,7 +85,7 @@ def together_chart(found: ChannelResult, say: Callable[[str], str] = str) -> Cha
         "yaxis": {"type": "category", "automargin": True, "dtick": 1, "showgrid": False},
     }
     words = (
-        f"The share of windows in which the classifier names the right {found['title'].lower()} while the "
+        f"The share of windows in which the recogniser names the right {found['title'].lower()} while the "
         "value named at the left is at its highest. The darker a field, the larger the share. "
         f'The mean of all columns but "{NONE}" is {_percent(manner / whole)}.'
     )

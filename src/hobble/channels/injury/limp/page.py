@@ -77,6 +77,8 @@ def provenance(hurt_seconds: Mapping[str, Mapping[str, float]], say: Callable[[s
             links = f"summed over {len(some)} links" if len(some) != 1 else "of one link"
             seconds = number(sum(some.values()), 3)
             sentences.append(f"Hurt motion in training, {words}: {seconds} s, {links}{names}.")
+    if any(len(some) > 1 for some in hurt_seconds.values()):
+        sentences.append("A second in which two links hurt counts twice.")
     return " ".join(sentences) or "No link was hurt in training."
 
 
