@@ -32,9 +32,9 @@ INPUTS = ("weights", "clips", "summaries", "skeleton", "published")
 class Cost:
     """Memory and time that a job requests on a cluster.
 
-    memory_mb: MB for any data. memory_each: MB added for each thousand frames of 31 joints in the longest
-    clip. seconds_each: seconds for each thousand frames of 31 joints in all clips together. minutes: the
-    least time.
+    memory_mb: MB that it needs however little data there is. memory_each: MB added for each thousand frames
+    of 31 joints in the longest clip. seconds_each: seconds for each thousand frames of 31 joints in all clips
+    together. minutes: the least time.
     """
 
     memory_mb: float = 0.0
