@@ -27,7 +27,7 @@ Export = Callable[[Path, str], str]
 class Predictor(Protocol):
     """A network prepared for fast evaluation, called in every frame.
 
-    It may keep buffers between calls, so characters that are not evaluated together need another predictor.
+    It may keep buffers between calls, so each group of characters that is evaluated together needs its own.
     It keeps no state of a character. If `Network.memory` is above 0, the caller keeps that state: an array
     (C, Network.memory) float64 for C characters, zero before a character's first frame. `evaluate` and
     `predict` then take it as one more argument `memory`, which the signatures below leave out, and change it

@@ -41,8 +41,8 @@ class LapWalk(TypedDict):
 
     path_overshoot_cm, path_distance_cm: the largest and the mean distance from the line between waypoints.
     foot_slide_cm: mean slide of a toe in a stance. steps: number of stances. largest_turn_degrees: largest
-    turn of a joint in one frame, as drawn. predicted_turn_degrees: the largest before the runtime limits
-    turns. turns_held_back: frames in which the runtime limited a turn.
+    turn of a joint in one frame, as drawn. predicted_turn_degrees: the same before the runtime limits turns.
+    turns_held_back: frames in which the runtime limited a turn.
     """
 
     lap: int
