@@ -14,7 +14,7 @@ from hobble.gait.recogniser import LEFT, RIGHT
 EFFECTS: dict[str, str] = {
     "speed": "speed, share of healthy",
     "stride": "stride time, share of healthy",
-    "stance": "stance of the sound leg minus stance of the hurt leg, share of the cycle, change from healthy",
+    "stance": "stance of the sound leg minus that of the hurt leg, share of the cycle, change from healthy",
     "step_hurt": "length of the step onto the hurt foot, share of healthy",
     "step_sound": "length of the step onto the sound foot, share of healthy",
     "knee_hurt": "knee range of the hurt leg, share of healthy",
@@ -68,7 +68,7 @@ def effects(walk: Profile, healthy: Profile, side: str = RIGHT) -> dict[str, flo
 def effects_of_people(known: People) -> Mapping[str, Mapping[str, tuple[float, float]]]:
     """For each impairment and each of the EFFECTS, the mean and the standard deviation over people."""
     out = {}
-    for gait in GAITS:  # in people's data: the normal walk and the impaired ones
+    for gait in GAITS:  # these GAITS are the normal walk and the impaired walks of the recorded people
         if gait == NORMAL:
             continue
         each = [

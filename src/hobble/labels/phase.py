@@ -18,7 +18,7 @@ from hobble.core.quat import Array
 from hobble.labels.read_files import whole_frame
 
 BREAK = (np.nan, np.nan, 1.0)
-IDLE_RATE = 0.0017  # cycles a frame: a tenth of the usual rate, the same as for a standing character
+IDLE_RATE = 0.0017  # cycles a frame: a tenth of the usual rate, as for a standing character at run time
 FASTEST = 0.25  # cycles a frame: a larger change of a hand-made phase is a jump, not movement
 # Option `margins` -> least number of frames before a cycle; after it, this number plus one. "extend" uses the
 # cycles near an end of the clip, "drop" leaves them out.

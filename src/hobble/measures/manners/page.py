@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Literal
 
-from hobble.channels.shown import speaker
+from hobble.channels.shown import shown_names
 from hobble.measures.clip_parts import captured_sampled
 from hobble.measures.inputs import Json
 from hobble.measures.manners.results import ChannelResult
@@ -29,9 +29,9 @@ def section(found: Json, material: ReportMaterial) -> PageSection:
     """
     if not found.get("applies"):
         return PageSection("manners", [])
-    parts, say = [], speaker(material.network["skeleton"])
+    parts, shown_name = [], shown_names(material.network["skeleton"])
     for i, one in enumerate(found["channels"]):
-        charts = [together_chart(one, say), *(effect_chart(one, effect) for effect in EFFECTS)]
+        charts = [together_chart(one, shown_name), *(effect_chart(one, effect) for effect in EFFECTS)]
         parts += [
             SectionPart(10 * i, Paragraph(summary(one) + captured_sampled(found))),
             *(SectionPart(10 * i + 1 + k, c) for k, c in enumerate(charts)),
@@ -56,14 +56,14 @@ def summary(found: ChannelResult) -> str:
     return text
 
 
-def together_chart(found: ChannelResult, say: Callable[[str], str] = str) -> Chart | None:
+def together_chart(found: ChannelResult, shown_name: Callable[[str], str] = str) -> Chart | None:
     """The share of windows in which each manner is named while a column of another channel is highest."""
     rows = found["together"]
     if not rows:
         return None
     manners = list(dict.fromkeys(row["manner"] for row in rows))
     columns = list(dict.fromkeys(row["column"] for row in rows))
-    spoken = [say(column) for column in columns]
+    spoken = [shown_name(column) for column in columns]
     shares = {(row["manner"], row["column"]): row["share"] for row in rows}
     trace = {
         "type": "heatmap",
