@@ -1,5 +1,8 @@
 """Speed limits of a hurt or sad body, learnt from the rows of a database and saved with the network.
 
+A channel is a group of inputs of the network that tell how hurt or how sad a body is. Each of its columns has
+a label, such as the name of a bone or of a mood, and values from 0 (no effect) to the channel's highest.
+
 A hurt body cannot go as fast as a healthy one. The rows show how fast it goes: the speed of a cycle of a hurt
 version relative to the same cycle of the healthy clip. A captured injury has no healthy counterpart, so it is
 compared with the usual speed of its gait.
@@ -16,24 +19,25 @@ import numpy as np
 from hobble.core.quat import Array
 
 UNLIMITED = 1e4  # cm a frame: limit of a gait in which no healthy clip goes forward
-LEVELS = 5  # number of values, from 0 to the channel's highest, for which a speed is stored
+LEVELS = 5  # number of values of a column, from 0 to the highest, for which a speed is stored
 TOP = 95  # percentile of the speeds of healthy cycles in a gait: the limit of a healthy body
 # Percentile of these speeds that counts as the usual speed. The median is too low: clips start and stop.
 USUAL = 65
-# If an injury leaves at most this share of the usual speed, the limit is that lower speed. If it leaves the
-# whole usual speed, the limit is that of a healthy body, which is higher. In between, it is interpolated.
+# A body that an injury slows to this share of the usual speed or less cannot hurry: its limit is the slowed
+# speed. A body that keeps the whole usual speed can hurry up to the limit of a healthy one (TOP). Between
+# these two shares the limit is interpolated.
 CANNOT_HURRY = 0.85
 AHEAD = 0.9  # a cycle counts if at least this share of its speed is forward
 STEADY = 0.35  # a cycle is left out if a value changes in it by more than this share of the highest value
 FAINT = 0.05  # a mean over a cycle below this share of the highest value counts as 0
 MOVING = 0.1  # cm a frame: slower cycles of a healthy body are left out
 EXPECTED_WEIGHT = 2.0  # at each level, the expected share counts as much as this many cycles (`_fitted`)
-SLOWEST = 0.1  # least share of the healthy speed
+SLOWEST = 0.1  # a smaller share of the healthy speed counts as this
 
 
 @dataclass(frozen=True)
 class Limits:
-    """Speed limits of a channel with L labels in G gaits. A label names a column, such as a link or a mood.
+    """Speed limits of a channel with L labels in G gaits.
 
     levels: (K,) values from 0 to the channel's highest. speeds: (G, L, K) highest speeds, cm a frame, for
     each gait, label and level; a higher level is never faster. usual: (G,) usual speeds of a healthy body, cm
@@ -83,7 +87,7 @@ class Limits:
         if not ((speeds > 0) & (speeds <= UNLIMITED)).all():
             raise ValueError(f"speeds are not all above 0 and at most {UNLIMITED:g}")
         if (np.diff(speeds, axis=2) > 0).any():
-            raise ValueError("a higher value goes faster than a lower one")
+            raise ValueError("speeds rise with the level; a higher level must not be faster")
         if not ((usual >= 0) & (usual <= UNLIMITED)).all():
             raise ValueError(f"usual speeds are not all from 0 to {UNLIMITED:g}")
         return cls(levels, speeds, usual)
@@ -189,7 +193,8 @@ class LimitLearner:
 
         For each label, the share of the healthy speed is fitted as a function of the value in three steps: a
         straight line through the cycles of all gaits, a curve through these cycles that is drawn towards the
-        line, and for each gait a curve through its own cycles that is drawn towards that curve (`_fitted`).
+        line, and for each gait a curve through its own cycles that is drawn towards the curve of all gaits
+        (`_fitted`).
         """
         levels = np.linspace(0, self.highest, LEVELS)
         healthy = self._healthy()
@@ -252,7 +257,7 @@ class LimitLearner:
 
 
 def _of_label(label: int, values: Array, across: np.ndarray) -> Sequence[tuple[np.ndarray, Array]]:
-    """The cycles that count for a label, as (indices, values), first of one side of the body, then the other.
+    """The cycles that count for a label, as (indices, values) for each side of the body that has this label.
 
     values: (n, L) of all cycles. A cycle counts if no other label has a value above 0 in it. If there is no
     such cycle, those count in which no other label has a higher value.
@@ -269,8 +274,8 @@ def _fitted(levels: Array, values: Array, shares: Array, expected: Array) -> Arr
     """(K,) shares of the healthy speed at `levels` (K,), fitted to n cycles by least squares.
 
     values, shares: (n,) value and share of each cycle. Shares between two levels are interpolated. The first
-    share is 1, and a higher level never has a higher share. expected: (K,) shares that count at each level
-    like EXPECTED_WEIGHT cycles.
+    share is 1, and a higher level never has a higher share. expected: (K,) share at each level, which counts
+    as much as EXPECTED_WEIGHT cycles there.
     """
     at = np.clip(np.searchsorted(levels, values, side="right") - 1, 0, len(levels) - 2)
     far = (values - levels[at]) / (levels[at + 1] - levels[at])

@@ -1,4 +1,4 @@
-"""Commands for files before there is a data set: `python -m hobble.motion rig` and `look`."""
+"""Commands for BVH files that are in no data set yet: `python -m hobble.motion rig` and `look`."""
 
 from __future__ import annotations
 
@@ -57,7 +57,7 @@ def main() -> int:
         "--picture",
         type=Path,
         metavar="SVG",
-        help="for one file: write a picture of it and the retargeted motion, with the worst joint in red",
+        help="for one file: picture of its motion and the retargeted one, with the worst joint in red",
     )
     given = parser.parse_args()
     try:

@@ -12,16 +12,16 @@ from hobble.core.skeleton import Skeleton
 from hobble.motion.names import part_of
 from hobble.motion.tree import above
 
-AWAY = (0.1, 0.7)  # range of the distance from wrist to the base of a finger, in forearm lengths
+AWAY = (0.1, 0.7)  # range of the distance from the wrist to the base of a finger, in forearm lengths
 EQUAL = 0.03  # forearm lengths: fingers whose lengths differ by less are equally long
 
 
 def pointing_fingers(skeleton: Skeleton, wrists: Mapping[str, int]) -> dict[str, int]:
-    """Side -> the base of the hand's longest finger. Sides without one are left out.
+    """Side -> the base of the hand's longest finger. Sides without a finger are left out.
 
-    A thumb does not count, nor a chain longer than the forearm: that is an object held in the hand. Fingers
-    with meaningful names come first. Of several fingers that are about equally long, the one in the middle
-    points where the hand does.
+    A thumb does not count, nor a chain longer than the forearm: that is an object held in the hand. A finger
+    that `_points` knows by its name comes before all others. Of fingers that are about equally long, the one
+    in the middle points where the hand does.
     """
     lengths = np.linalg.norm(skeleton.offsets, axis=-1)
     fingers = {}
@@ -62,7 +62,7 @@ def _fingers(skeleton: Skeleton, wrist: int, fore: float) -> list[tuple[float, i
 
 
 def _chains(parents: Sequence[int], wrist: int) -> list[list[int]]:
-    """The chains from below the wrist to each joint under it."""
+    """For each joint below the wrist, the chain of joints from the wrist's child to it."""
     out = []
     for end in range(len(parents)):
         chain = above(parents, end)

@@ -28,8 +28,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
     parser.add_argument(
         "to",
         choices=("onnx", "bin", "bvh"),
-        help="onnx: one file, checked with onnxruntime; bin: the original release's files; bvh: the scripted "
-        "walks that the network generates, one BVH file each",
+        help="onnx: one file, checked with onnxruntime; bin: .bin files as in the release of Holden et al. "
+        "(2017); bvh: the scripted walks that the network generates, one BVH file each",
     )
     parser.add_argument("network", help="weights.npz, its folder, or a folder of .bin files")
     parser.add_argument("target", help="the file or folder to write")

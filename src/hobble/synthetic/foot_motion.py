@@ -41,7 +41,8 @@ class FootPoses:
 def move_foot(steps: list[PlannedStance], style: Style, side: int, ground: Ground) -> FootPoses:
     """The path of one foot through its stances.
 
-    Frames before the first stance, and from the last one on, stay 0.
+    Frames before the first landing, and from the last landing on, are not set: there positions are 0 and
+    rotations the identity.
     """
     frames = len(style.duty)
     turns = np.tile(quat.IDENTITY, (frames, 1))
@@ -49,7 +50,7 @@ def move_foot(steps: list[PlannedStance], style: Style, side: int, ground: Groun
     rest = np.radians(style.rest_pitch)
     rolls = [_Roll.of(step, style, side, rest) for step in steps]
     for i, (here, there) in enumerate(pairwise(rolls)):
-        stays = not there.step.swings  # without a swing, the foot stands at the same place until then
+        stays = not there.step.swings  # no swing to the next stance: the foot stands until it begins
         leave = there.step.land if stays else here.step.leave
         t = _frames(here.step.land, leave)
         pitch = here.pitch(t, lands=here.step.swings or i == 0, leaves=not stays)
@@ -69,7 +70,7 @@ class _Roll:
 
     land, off: radians of pitch as the foot lands and as it leaves. rest: (F,) radians, the pitch of a
     standing foot; one array for all stances. flat, heel_off: shares of the stance after which the toe is down
-    and the heel leaves. power: exponent of the heel's rise over time.
+    and the heel leaves the ground. power: exponent of the heel's rise over time.
     """
 
     step: PlannedStance

@@ -1,7 +1,8 @@
 """The training loop.
 
-A pass goes once through all training rows. It has sections, and a section has batches. Each batch is changed,
-then the network takes a step. After each section the training logs, measures and saves.
+A pass goes once through all training samples. It has sections, and a section has batches. Each batch is
+augmented (slower or faster, other poses, the network's own errors), then the network takes a step. After each
+section the training logs, measures and saves.
 """
 
 from __future__ import annotations
@@ -61,14 +62,14 @@ def train(
     use_threads(threads, training.batch)
     if (training.patience or training.keep == "best") and not database.rows(SPLIT):
         raise HobbleError(
-            "training.keep: best and training.patience need the held-out error, but no clip is held out. "
+            "training.keep (best) and training.patience need the held-out error, but no clip is held out. "
             "List some under held_out in the data set."
         )
     if training.symmetric and network.asymmetric:
         raise HobbleError(f"training.symmetric: {network.asymmetric}")
-    pairs, sections = database.pairs(TRAIN), training.sections
-    if pairs < sections:
-        raise HobbleError(f"{pairs} training samples are fewer than training.sections, {sections}")
+    samples, sections = database.samples(TRAIN), training.sections
+    if samples < sections:
+        raise HobbleError(f"{samples} training samples are fewer than training.sections, {sections}")
     recipe = recipe_hash(network, training, database, code)
     state, path = begin(database, network, training, recipe, Path(checkpoints), start, processes)
     if not processes.first:
@@ -99,7 +100,7 @@ def _run(
     versions = VersionPoses(database, training.version_poses, len(places), device, places.start)
     paces = OtherPaces(database, training.other_paces, len(places), device, places.start)
     roll_out = RollOut(database, training.rollout, len(places), device, places.start)
-    pairs = database.pairs(TRAIN)
+    samples = database.samples(TRAIN)
     for turn in range(state.sections, training.all_sections):
         if training.patience and processes.numbers_of_first(state.since_best)[0] >= training.patience:
             log.info("no lower held-out error for %d sections: training ends", training.patience)
@@ -113,13 +114,13 @@ def _run(
         paces.begin()
         roll_out.begin()
         for batch in rows.batches(pass_index, section, sections, seed, batch_size):
-            # Play the motion slower or faster; move poses towards those of other channel values, then towards
-            # those of hurt or healthy versions of the clip; add the network's own errors.
+            # Play the motion slower or faster; mix in poses of rows with other channel values, then poses of
+            # hurt or healthy versions of the same clip; add the network's own errors.
             paces.play(batch.x, batch.y)
             others.mix(batch.x, batch.p)
             versions.mix(batch.x, batch.p, batch.clip)
             roll_out.add(batch.x)
-            rate = learning_rate_share(training, (state.samples + watch.seen) / pairs)
+            rate = learning_rate_share(training, (state.samples + watch.seen) / samples)
             watch.add(update(batch.x, batch.y, batch.p, rate, batch.total), batch)
             roll_out.remember(step.error)
             if symmetry:
@@ -153,9 +154,9 @@ class TrainingRecorder:
 
     def __init__(self, state: State, database: Database, training: Training, saver: Saver) -> None:
         self.state, self.saver = state, saver
-        pairs = database.pairs(TRAIN)
-        self.held_out = HeldOut(database, state.network.flat.device, pairs // training.sections)
-        self.goal, self.first, self.before = round(training.passes * pairs), state.samples, state.seconds
+        samples = database.samples(TRAIN)
+        self.held_out = HeldOut(database, state.network.flat.device, samples // training.sections)
+        self.goal, self.first, self.before = round(training.passes * samples), state.samples, state.seconds
         self.began = time.perf_counter()
         self.bar = tqdm(
             total=self.goal, initial=state.samples, unit=" samples", unit_scale=True, disable=None

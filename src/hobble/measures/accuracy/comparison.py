@@ -40,9 +40,9 @@ def tables(compared: Json) -> dict[str, list[Row]]:
 
 
 def accuracy_differences(all_measured: Sequence[ConfigurationResults]) -> list[DifferenceOf]:
-    """The difference of each pair (eq. 3.2 of Segerstedt 2021).
+    """The difference of each pair of configurations (eq. 3.2 of Segerstedt 2021).
 
-    It is given for each split, and for each clip that both were measured on.
+    It is given for each split, and for each clip on which both configurations were measured.
     """
     out: list[DifferenceOf] = []
     for a, b in combinations(all_measured, 2):

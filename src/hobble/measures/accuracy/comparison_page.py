@@ -14,7 +14,8 @@ from hobble.report.measure_sections import Overview
 from hobble.report.page_parts import PageSection, SectionPart
 from hobble.report.tables import Column
 
-# Which standard deviation eq. 3.2 divides by.
+# The two standard deviations (sd) by which eq. 3.2 of Segerstedt (2021) may divide the difference of two
+# configurations.
 KINDS = {"difference_of_means": "sd of the means of clips", "difference": "sd of single frames"}
 
 

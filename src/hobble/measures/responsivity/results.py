@@ -41,8 +41,8 @@ class LapWalk(TypedDict):
 
     path_overshoot_cm, path_distance_cm: the largest and the mean distance from the line between waypoints.
     foot_slide_cm: mean slide of a toe in a stance. steps: number of stances. largest_turn_degrees: largest
-    turn of a joint in one frame, as drawn. predicted_turn_degrees: the largest before the runtime limits
-    turns. turns_held_back: frames in which the runtime limited a turn.
+    turn of a joint in one frame, as drawn. predicted_turn_degrees: the same before the runtime limits turns.
+    turns_held_back: frames in which the runtime limited a turn.
     """
 
     lap: int
@@ -100,7 +100,7 @@ class ModeResults(TypedDict):
 
 
 class PieceResults(TypedDict):
-    """The file of a piece: all laps of a phase mode, and the paths of the first ones."""
+    """The file of a piece: all laps of a phase mode, and the paths of the first laps."""
 
     laps: ModeResults
     runs: list[LapPath]
@@ -120,9 +120,9 @@ class Responsivity(ModeResults):
     """responsivity.json. The values of the configured phase mode are at the top, `modes` has those of all.
 
     runs: the paths of the first laps in the configured mode. parameters: weights and biases that one frame
-    uses, see `run.parameter_counts`; None for a network without layers. stored: mode -> how many numbers it
-    keeps in memory, of `bytes_each` bytes. exact: the mode that evaluates the network without approximation.
-    laps_other_modes: laps in each other mode.
+    uses, see `run.parameter_counts`; None for a network without layers. stored: mode -> how many numbers of
+    `bytes_each` bytes the network keeps in memory. exact: the mode that evaluates the network without
+    approximation. laps_other_modes: laps in each other mode.
     """
 
     configuration: str
