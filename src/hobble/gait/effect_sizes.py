@@ -14,8 +14,8 @@ from hobble.gait.recogniser import LEFT, RIGHT
 EFFECTS: dict[str, str] = {
     "speed": "speed, share of healthy",
     "stride": "stride time, share of healthy",
-    "stance": "share of the cycle by which stance is longer on the sound leg than on the hurt leg, minus the same "
-    "share in the healthy walk",
+    "stance": "share of the cycle by which stance is longer on the sound leg than on the hurt leg, minus the "
+    "same share in the healthy walk",
     "step_hurt": "length of the step onto the hurt foot, share of healthy",
     "step_sound": "length of the step onto the sound foot, share of healthy",
     "knee_hurt": "knee range of the hurt leg, share of healthy",
