@@ -54,7 +54,7 @@ class Pieces(Protocol):
 class Measure:
     """A measurement. Its `name` is also the name of its JSON file and of its folder of tables.
 
-    package: where its parts lie (`__name__` of the package). inputs: of INPUTS, or names of other
+    package: where its parts lie (`__name__` of the package). inputs: names of INPUTS or of other
     measurements. options: its keys of the section `evaluation`. runtime: the keys of the section `runtime`
     that it depends on. pieces: a measurement that takes long may have pieces, and each runs as a job of its
     own if there are several; see `Pieces`. people: whether it has to know who walks in which clip.

@@ -105,9 +105,7 @@ def error_boxes(compared: Compared) -> Chart | None:
 def clip_dots(compared: Compared) -> Chart | None:
     """The mean error of every clip, a dot for each configuration."""
     clips = {(row["split"], row["clip"]) for entry in compared["accuracy"] for row in entry["clips"]}
-    order = [
-        clip for _, clip in sorted(clips, key=lambda pair: (pair[0] == "held_out", pair[1]), reverse=False)
-    ]
+    order = [clip for _, clip in sorted(clips, key=lambda pair: (pair[0] == "held_out", pair[1]))]
     if not order:
         return None
     traces = []

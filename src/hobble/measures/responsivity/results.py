@@ -66,7 +66,7 @@ class Lap(LapWalk):
 
 
 class LapPath(TypedDict):
-    """The path of a lap, stored every `seconds_between`.
+    """The path of a lap, stored every `seconds_between` seconds.
 
     x, z: m. off_cm: largest distance from the line between waypoints since the previous stored place.
     """
@@ -107,7 +107,10 @@ class PieceResults(TypedDict):
 
 
 class Track(TypedDict):
-    """The track. x, z: places of the waypoints, m. metres: its length. gaits: one for each waypoint."""
+    """The track.
+
+    metres: its length. gaits: one for each waypoint. x, z: places of the waypoints, m.
+    """
 
     waypoints: int
     metres: float
@@ -117,7 +120,7 @@ class Track(TypedDict):
 
 
 class Responsivity(ModeResults):
-    """responsivity.json. The values of the configured phase mode are at the top, `modes` has those of all.
+    """responsivity.json: the results of the configured phase mode, and in `modes` those of all modes.
 
     runs: the paths of the first laps in the configured mode. parameters: weights and biases that one frame
     uses, see `run.parameter_counts`; None for a network without layers. stored: mode -> how many numbers of
