@@ -65,7 +65,9 @@ class Network(ABC):
     # slows the root while the character stands or moves against the target velocity. With these it does not,
     # because the feet of recorded frames slide if the root moves less than predicted.
     recorded_poses: ClassVar[bool] = False
-    modes: ClassVar[tuple[str, ...]] = ("exact",)  # of the predictor; the last one is exact
+    # Names of the ways to evaluate the network, such as constant, linear and cubic interpolation over the
+    # phase. The last one is exact.
+    modes: ClassVar[tuple[str, ...]] = ("exact",)
     storage: ClassVar[str] = "float32"  # of the predictor's weights by default, one of STORAGES
 
     x_mean: Array = field(repr=False)

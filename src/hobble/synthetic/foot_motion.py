@@ -18,10 +18,10 @@ from hobble.synthetic.style import Style
 X_AXIS = np.array([1.0, 0.0, 0.0])
 HEEL = np.array([0.0, -4.2, -3.0])  # cm from the ankle: approximate place of the heel
 READY = 0.95  # share of the swing by which the foot has reached the pitch of its landing
-KICK = 0.68  # at less than 1 the foot is highest in the first half of the swing
+KICK = 0.68  # exponent of the time in the swing, 0 to 1: below 1, the foot is highest in the first half
 FOLLOW = 0.45  # share of its pitch rate that the foot keeps as it leaves
 LANDING_SPEED = 0.36  # speed of the foot as it lands, as a share of its mean speed in the swing
-EARLY = 0.81  # at less than 1 the foot covers more than half of its distance in the first half of the swing
+EARLY = 0.81  # exponent of the same time: below 1, the foot covers most of its way in the first half
 RISE, SETTLE = 0.36, 0.3  # shares of the swing in which the foot rises to its clearance and comes down again
 SOLE_HEIGHT = 2.0  # cm: heel, toe joint and toe tip count as this high above the sole
 

@@ -6,7 +6,9 @@ from typing import TypedDict
 
 
 class Spread(TypedDict):
-    """Spread of the total of a frame's steps, ms: standard deviation, median and 99th percentile.
+    """Spread of the time of a frame, summed over its `Steps`, ms.
+
+    sd, median, p99: standard deviation, median and 99th percentile.
 
     whole_call: mean time of a call of `next_pose`, ms. It includes what is done between the steps.
     """
