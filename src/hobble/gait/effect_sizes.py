@@ -10,11 +10,12 @@ from hobble.gait.people import GAITS, NORMAL, People
 from hobble.gait.profile import Profile, mirrored
 from hobble.gait.recogniser import LEFT, RIGHT
 
-# name -> meaning. "hurt" and "sound" are the two sides of the body.
+# name -> meaning. "hurt" and "sound" are the two sides of the body; "healthy" is the healthy walk.
 EFFECTS: dict[str, str] = {
     "speed": "speed, share of healthy",
     "stride": "stride time, share of healthy",
-    "stance": "stance of the sound leg minus that of the hurt leg, share of the cycle, change from healthy",
+    "stance": "share of the cycle by which stance is longer on the sound leg than on the hurt leg, minus the "
+    "same share in the healthy walk",
     "step_hurt": "length of the step onto the hurt foot, share of healthy",
     "step_sound": "length of the step onto the sound foot, share of healthy",
     "knee_hurt": "knee range of the hurt leg, share of healthy",
@@ -28,7 +29,7 @@ EFFECTS: dict[str, str] = {
     "sway_sideways": "range of the trunk's sideways lean in a cycle, degrees more than healthy",
     "pelvis_drop": "mean drop of the pelvis on the sound side, degrees more than healthy",
     "arm_hurt": "swing of the arm of the hurt side, share of healthy",
-    "arm_sound": "swing of the other arm, share of healthy",
+    "arm_sound": "swing of the arm of the sound side, share of healthy",
 }
 
 

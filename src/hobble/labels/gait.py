@@ -21,14 +21,14 @@ CROUCHED_HEAD = 0.8
 CROUCHED_HIPS = 0.85
 
 # Weights of measures in the log odds of jog against walk. They were fitted to the hand-made labels of Holden
-# et al. (2017) and of Ferre (2019), and to the clip descriptions of the data set `cmu`. No measure has a
-# unit, so the weights hold for any size of body.
+# et al. (2017) and of Ferre (2019), and to the clip descriptions of the data set `cmu`. No measure
+# depends on the size of the body, so the weights hold for all bodies.
 JOG_SPRING = 3.7  # `_spring`: 1 if the hips are lowest over the standing foot, -1 if they are highest there
 JOG_FLIGHT = 9.0  # share of the time without a foot down
 JOG_DOUBLE_SUPPORT = -9.0  # share of the time with both feet down
 JOG_BOUNCE = 12.5  # vertical acceleration of the hips, g
 MOST_BOUNCE = 0.5  # g: a larger acceleration counts as this, because happy walks bounce
-JOG_FROUDE = 6.0  # per Froude number above FASTEST_WALK
+JOG_FROUDE = 6.0  # Froude number minus FASTEST_WALK, from 0 to 1
 FASTEST_WALK = 0.5  # Froude number of the fastest walk that people keep up for long
 JOG_CONSTANT = -3.2
 # A figure walks, however much it bounces, if both feet are down for at least this share of the time, and
@@ -37,8 +37,8 @@ LEAST_DOUBLE_SUPPORT = 0.1
 NO_FLIGHT = 0.01
 CLEAR_SPRING = 0.5
 # A figure whose Froude number, flight and spring are all below these limits walks, too. In the data set
-# `styles`, flight is at most .06 in the happy walks and .16 in the slowest run. With a limit of .25 for the
-# spring, slow jogs of Holden et al. (2017) would count as walks.
+# `styles`, the mean flight of each happy walk is .06 or less, that of the slowest run is .16. With a limit of
+# .25 for the spring, slow jogs of Holden et al. (2017) would count as walks.
 SLOW, SOME_FLIGHT, SOME_SPRING = 0.35, 0.1, 0.2
 MOST_ODDS_OF_A_WALK = -1.0  # highest log odds of jogging for a figure that walks by one of these two rules
 CERTAIN_ODDS = 2.0  # log odds that count as full evidence
@@ -46,7 +46,7 @@ DATA_SET_ODDS = 1.0  # log odds added if the data set says that a clip is mainly
 SWITCH_COST = 18.0  # a change of gait costs as much as this many frames of full evidence
 FADE_FRAMES = 31  # length of the fade from one gait to the next
 LONGEST_START = 180  # frames: a doubtful walk from standing to a jog counts as jog if it is at most this long
-CLEARLY_WALKING = -4.0  # such a walk is doubtful if the median log odds of its second half is above this
+CLEARLY_WALKING = -4.0  # such a walk is doubtful if the median log odds of its second half are above this
 # Frames. Any other walk between standing and jogging is split if it is at most this long: the half next to
 # standing counts as standing, the half next to jogging as jogging.
 LONGEST_SHORT_WALK = 75
@@ -133,7 +133,7 @@ def _spring(clip: Clip) -> Array:
     """(F,) correlation of the height of the hips with the distance between the ankles over about a cycle.
 
     A walking leg is an inverted pendulum: the hips are highest over the standing foot, as the other foot
-    passes it. A jogging leg is a spring: there the hips are lowest (Cavagna et al. 1977).
+    passes it. A jogging leg is a spring: the hips are lowest there (Cavagna et al. 1977).
     """
     skeleton, positions = clip.skeleton, clip.positions
     height = gaussian(positions[:, skeleton.role("hips"), 1], 1.5)
@@ -145,7 +145,10 @@ def _spring(clip: Clip) -> Array:
 
 
 def _relative_heights(clip: Clip) -> tuple[Array, Array]:
-    """(F,) heights of head and hips above the lowest foot, each divided by the length of the bones below."""
+    """(F,) heights of head and hips above the floor, each divided by the length of the bones below.
+
+    The floor is the mean of the lowest heights of both toes in the 61 frames around each frame.
+    """
     skeleton, y = clip.skeleton, clip.positions[..., 1]
     toes = y[:, [skeleton.role("left_toe"), skeleton.role("right_toe")]]
     floor = lowest(toes, 61).mean(axis=1)

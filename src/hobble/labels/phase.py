@@ -17,11 +17,12 @@ import numpy as np
 from hobble.core.quat import Array
 from hobble.labels.read_files import whole_frame
 
-BREAK = (np.nan, np.nan, 1.0)
+BREAK = (np.nan, np.nan, 1.0)  # the row that ends a bout of walking
 IDLE_RATE = 0.0017  # cycles a frame: a tenth of the usual rate, as for a standing character at run time
 FASTEST = 0.25  # cycles a frame: a larger change of a hand-made phase is a jump, not movement
-# Option `margins` -> least number of frames before a cycle; after it, this number plus one. "extend" uses the
-# cycles near an end of the clip, "drop" leaves them out.
+# Option `margins` -> least number of frames that a clip must have before a cycle. After the cycle it must
+# have this number plus one.
+# "extend" uses the cycles near an end of the clip, "drop" leaves them out.
 MARGINS = {"extend": 1, "drop": 60}
 
 
@@ -101,9 +102,8 @@ def find_cycles(footsteps: Array, frames: int, zero: str, margins: str) -> tuple
     """First and last frame (C, 2) of each cycle between landings of the foot `zero`, and the number left out.
 
     A cycle is left out if its row or the next row is marked, or if it is too near an end of the clip. With
-    `margins` "drop", as in Holden et al. (2017), it is too near if it starts before frame 60 or ends within
-    61 frames of the clip's end. With "extend", it is too near if there is no frame before it, or fewer than
-    two after it.
+    `margins` "drop", as in Holden et al. (2017), the clip must have 60 frames before the cycle and 61 after
+    it. With "extend", one before and two after are enough.
     """
     margin = MARGINS[margins]
     own = 0 if zero == "right" else 1
@@ -143,7 +143,10 @@ def mirrored_footsteps(footsteps: Array) -> Array:
 
 
 def _landings(footsteps: Array) -> tuple[Array, Array, np.ndarray]:
-    """Frame (n,) and phase (n,), 0 or .5, of each landing; bool (n - 1,): the next is in the same bout."""
+    """Frame (n,) and phase (n,), 0 or .5, of each of the n landings.
+
+    Also bool (n - 1,), whether a landing and the next one are in the same bout of walking.
+    """
     when: list[float] = []
     value: list[float] = []
     joined: list[bool] = []

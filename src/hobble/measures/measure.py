@@ -47,14 +47,16 @@ class Pieces(Protocol):
     """Returns the names of a measurement's pieces. A name consists of letters only."""
 
     def __call__(self, options: Any, runtime: Runtime, modes: Sequence[str]) -> tuple[str, ...]:
-        """options: of the type `Measure.options`. modes: the phase modes of the kind of network."""
+        """options: of the type `Measure.options`. modes: names of the ways to evaluate this
+        kind of network, such as constant, linear and cubic (`Network.modes`).
+        """
 
 
 @dataclass(frozen=True)
 class Measure:
     """A measurement. Its `name` is also the name of its JSON file and of its folder of tables.
 
-    package: where its parts lie (`__name__` of the package). inputs: of INPUTS, or names of other
+    package: where its parts lie (`__name__` of the package). inputs: names of INPUTS or of other
     measurements. options: its keys of the section `evaluation`. runtime: the keys of the section `runtime`
     that it depends on. pieces: a measurement that takes long may have pieces, and each runs as a job of its
     own if there are several; see `Pieces`. people: whether it has to know who walks in which clip.

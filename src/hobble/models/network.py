@@ -1,4 +1,4 @@
-"""The interface of a trained network of any kind, as runtime, measurements and page use it."""
+"""The interface of trained networks of any kind. The runtime, the measurements and the report use it."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from hobble.models.training_facts import TrainingFacts
 from hobble.rows.layout import GAITS, RowLayout
 
 TERRAIN_SIDE = 25.0  # cm from the path to the side heights, if the file does not say
-STORAGES = ("float32", "int16")
+STORAGES = ("float32", "int16")  # types in which a predictor can keep its weights
 
 Export = Callable[[Path, str], str]
 
@@ -61,11 +61,13 @@ class Network(ABC):
 
     kind: ClassVar[str] = ""  # its folder in hobble.models
     phase: ClassVar[bool] = True  # whether a prediction depends on the phase
-    # Whether the predicted poses are recorded frames, as in motion matching. Their feet slide if the root
-    # moves less than predicted. So the runtime does not slow the root while the character stands or moves
-    # against the target velocity, as it does with other networks.
+    # Whether the predicted poses are recorded frames, as in motion matching. With other networks, the runtime
+    # slows the root while the character stands or moves against the target velocity. With these it does not,
+    # because the feet of recorded frames slide if the root moves less than predicted.
     recorded_poses: ClassVar[bool] = False
-    modes: ClassVar[tuple[str, ...]] = ("exact",)  # of the predictor; the last one is exact
+    # Names of the ways to evaluate the network, such as constant, linear and cubic interpolation over the
+    # phase. The last one is exact.
+    modes: ClassVar[tuple[str, ...]] = ("exact",)
     storage: ClassVar[str] = "float32"  # of the predictor's weights by default, one of STORAGES
 
     x_mean: Array = field(repr=False)
@@ -110,7 +112,7 @@ class Network(ABC):
     @property
     @abstractmethod
     def sizes(self) -> tuple[int, ...]:
-        """Units of each layer, the input first: (342, 512, 512, 311); () where there are no layers."""
+        """Units of each layer, the input first, such as (342, 512, 512, 311); () without layers."""
 
     @property
     @abstractmethod

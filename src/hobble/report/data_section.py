@@ -205,8 +205,8 @@ def strips(material: ReportMaterial, clips: frozenset[str]) -> list[dict[str, An
     """Label curves and channel values of each clip in `clips` that has label curves; mirrors are left out."""
     of_clip: dict[str, dict[str, Any]] = {}
     for report in material.channels:
-        highest = {"highest": report.get("highest", 10.0)}
-        found = {label: (value, highest) for label, value in report["values"].items()}
+        channel_highest = report.get("highest", 10.0)
+        found = {label: (value, channel_highest) for label, value in report["values"].items()}
         of_clip.setdefault(report["clip"], {}).update(found)
     shown_name = shown_names(material.network["skeleton"])
     lengths = {report["clip"]: report.get("seconds") for report in material.motion}
@@ -222,9 +222,9 @@ def strips(material: ReportMaterial, clips: frozenset[str]) -> list[dict[str, An
             {
                 "name": shown_name(label),
                 "spans": value.get("spells") or [[0, length, value["highest"]]],
-                **highest,
+                "highest": channel_highest,
             }
-            for label, (value, highest) in of_clip.get(clip, {}).items()
+            for label, (value, channel_highest) in of_clip.get(clip, {}).items()
         ]
         out.append({**curves, "clip": clip, "length": length, "status": status})
     return out

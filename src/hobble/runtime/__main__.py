@@ -1,4 +1,8 @@
-"""Export a network to other formats: python -m hobble.runtime onnx|bin|bvh NETWORK TARGET.
+"""Export a network (onnx, bin), or walks that it generates (bvh).
+
+python -m hobble.runtime onnx|bin|bvh NETWORK TARGET
+
+Examples:
 
 python -m hobble.runtime onnx results/holden/network holden.onnx --mode cubic
 python -m hobble.runtime bin results/holden/network pfnn
@@ -23,7 +27,8 @@ from hobble.runtime.scenarios import write_motions
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run the command; returns the exit status."""
     parser = argparse.ArgumentParser(
-        prog="python -m hobble.runtime", description="Export a network to other formats."
+        prog="python -m hobble.runtime",
+        description="Export a network (onnx, bin), or walks that it generates (bvh).",
     )
     parser.add_argument(
         "to",

@@ -195,7 +195,7 @@ def section(found: Json, material: ReportMaterial) -> PageSection:
         "accuracy",
         [
             SectionPart(0, Paragraph(INTRODUCTION + endings(found) + sampled(found))),
-            SectionPart(9, Paragraph(caveat(material))),
+            SectionPart(9, Paragraph(caveat(found, material))),
             SectionPart(10, published_table(found, material), open=True, short=True),
             SectionPart(20, clip_bars(found, material), tall=True),
             SectionPart(30, clip_boxes(found), tall=True),
@@ -214,13 +214,15 @@ def endings(found: Json) -> str:
     return "".join(text for ending, text in ENDINGS.items() if any(ending in clip for clip in clips))
 
 
-def caveat(material: ReportMaterial) -> str:
+def caveat(found: Json, material: ReportMaterial) -> str:
     """A paragraph: why these errors must not be compared with the published ones."""
-    seconds = sum(clip["seconds"] or 0.0 for clip in material.motion)
+    # Only frames of gait cycles are measured, so this is less than the length of the clips.
+    frames = sum((found.get(split) or {}).get("frames") or 0 for split in ("held_out", "train"))
     return (
         "Do not compare these errors with the published ones as if the clips were the same. Ours are "
-        f"measured on {duration(seconds)} of the data set {material.dataset}, the published ones on 80 clips "
-        "of Holden et al. (2017). A small error may only mean that the clips are easy to predict."
+        f"measured on {duration(frames / 60)} of gait cycles in the data set {material.dataset}, the "
+        "published ones on 80 clips of Holden et al. (2017). A small error may only mean that the clips are "
+        "easy to predict."
     )
 
 

@@ -6,7 +6,9 @@ from typing import TypedDict
 
 
 class Spread(TypedDict):
-    """Spread of the total of a frame's steps, ms: standard deviation, median and 99th percentile.
+    """Spread of the time of a frame, summed over its `Steps`, ms.
+
+    sd, median, p99: standard deviation, median and 99th percentile.
 
     whole_call: mean time of a call of `next_pose`, ms. It includes what is done between the steps.
     """
@@ -66,7 +68,7 @@ class Lap(LapWalk):
 
 
 class LapPath(TypedDict):
-    """The path of a lap, stored every `seconds_between`.
+    """The path of a lap, stored every `seconds_between` seconds.
 
     x, z: m. off_cm: largest distance from the line between waypoints since the previous stored place.
     """
@@ -107,7 +109,10 @@ class PieceResults(TypedDict):
 
 
 class Track(TypedDict):
-    """The track. x, z: places of the waypoints, m. metres: its length. gaits: one for each waypoint."""
+    """The track.
+
+    metres: its length. gaits: one for each waypoint. x, z: places of the waypoints, m.
+    """
 
     waypoints: int
     metres: float
@@ -117,7 +122,7 @@ class Track(TypedDict):
 
 
 class Responsivity(ModeResults):
-    """responsivity.json. The values of the configured phase mode are at the top, `modes` has those of all.
+    """responsivity.json: the results of the configured phase mode, and in `modes` those of all modes.
 
     runs: the paths of the first laps in the configured mode. parameters: weights and biases that one frame
     uses, see `run.parameter_counts`; None for a network without layers. stored: mode -> how many numbers of

@@ -52,7 +52,8 @@ def rollout_chart(found: Json) -> Chart | None:
         "Mean distance between a joint and its captured position when the network continues from its own "
         "poses, as at run time, for this many frames (60 frames are one second). If the line flattens, the "
         "character stays stable. This chart measures the pose as drawn: a joint is drawn halfway "
-        "between its predicted position and its last position moved on by the predicted velocity. "
+        "between two estimates: its predicted position, and the place to which its predicted velocity takes "
+        "it from its last position. "
         "The charts above measure the predicted position, so their error is not the value at 1 frame in this "
         "chart." + sampled(found),
         traces,
