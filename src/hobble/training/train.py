@@ -49,7 +49,7 @@ def train(
 ) -> State:
     """Train to `training.passes` passes over the database's training clips; returns the final state.
 
-    network, training: these sections of a configuration. checkpoints: a folder with one subfolder for each
+    network, training: the options of a configuration. checkpoints: a folder with one subfolder for each
     run, named by the hash of everything that determines it; a run resumes from its own checkpoint there.
     start: a checkpoint to start from if the run has none of its own; it is part of the hash, as is `code`,
     the hash of the code. processes: those that train together, each of which calls this; the first reads and

@@ -83,8 +83,8 @@ class LapPath(TypedDict):
 class ModeResults(TypedDict):
     """All laps of one phase mode.
 
-    waypoints: how many there are in all laps. foot_slide_cm is the mean over laps; path_overshoot_cm and both
-    turns are the largest of all laps. See `Lap`.
+    waypoints: how many there are in all laps. foot_slide_cm: mean over laps. path_overshoot_cm,
+    largest_turn_degrees, predicted_turn_degrees: the largest values of all laps. See `LapWalk`.
     """
 
     mode: str
