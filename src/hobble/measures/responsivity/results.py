@@ -125,9 +125,9 @@ class Responsivity(ModeResults):
     """responsivity.json: the results of the configured phase mode, and in `modes` those of all modes.
 
     runs: the paths of the first laps in the configured mode. parameters: weights and biases that one frame
-    uses, counted in three ways (`run.parameter_counts`); None for a network without layers. stored: mode -> how many numbers of
-    `bytes_each` bytes the network keeps in memory. exact: the mode that evaluates the network without
-    approximation. laps_other_modes: laps in each other mode.
+    uses, counted in three ways (`run.parameter_counts`); None for a network without layers. stored: mode ->
+    how many numbers of `bytes_each` bytes the network keeps in memory. exact: the mode that evaluates the
+    network without approximation. laps_other_modes: laps in each other mode.
     """
 
     configuration: str
