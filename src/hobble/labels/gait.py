@@ -31,12 +31,13 @@ MOST_BOUNCE = 0.5  # g: a larger acceleration counts as this, because happy walk
 JOG_FROUDE = 6.0  # Froude number minus FASTEST_WALK, from 0 to 1
 FASTEST_WALK = 0.5  # Froude number of the fastest walk that people keep up for long
 JOG_CONSTANT = -3.2
-# A figure walks, however much it bounces, if both feet are down for at least this share of the time, and
-# flight and spring are below these limits.
+# A jog has a flight phase or no double support. So a figure walks, however much it bounces, if both feet are
+# down for at least this share of the time, and flight and spring are below these limits.
 LEAST_DOUBLE_SUPPORT = 0.1
 NO_FLIGHT = 0.01
 CLEAR_SPRING = 0.5
-# A figure whose Froude number, flight and spring are all below these limits walks, too. In the data set
+# Some people hop a little in a slow, happy walk. So a figure whose Froude number, flight and spring are all
+# below these limits walks, too: it is slow, and its hips rise over the standing foot. In the data set
 # `styles`, the mean flight of each happy walk is .06 or less, that of the slowest run is .16. With a limit of
 # .25 for the spring, slow jogs of Holden et al. (2017) would count as walks.
 SLOW, SOME_FLIGHT, SOME_SPRING = 0.35, 0.1, 0.2
