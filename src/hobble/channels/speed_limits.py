@@ -19,7 +19,7 @@ UNLIMITED = 1e4  # cm a frame: limit of a gait in which no healthy clip goes for
 LEVELS = 5  # number of values, from 0 to the channel's highest, for which a speed is stored
 TOP = 95  # percentile of the speeds of healthy cycles in a gait: the limit of a healthy body
 # Percentile of these speeds that counts as the usual speed. The median is too low: clips start and stop.
-USUAL = 65
+USUAL = 70
 # If an injury leaves at most this share of the usual speed, the limit is that lower speed. If it leaves the
 # whole usual speed, the limit is that of a healthy body, which is higher. In between, it is interpolated.
 CANNOT_HURRY = 0.85
