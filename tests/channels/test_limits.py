@@ -135,11 +135,11 @@ def test_without_channel_values_no_limit_is_learnt() -> None:
     ("changes", "says"),
     [
         ({"levels": np.array([0.0, 5.0, 9.0])}, "rise from 0 to 10"),
-        ({"levels": np.array([0.0, 5.0])}, "for 1 gaits, 2 labels"),
+        ({"levels": np.array([0.0, 5.0])}, "do not fit 1 gaits and 2 labels"),
         ({"speeds": -LIMITS.speeds}, "above 0"),
         ({"speeds": LIMITS.speeds * np.nan}, "above 0"),
         ({"speeds": LIMITS.speeds[..., ::-1]}, "faster"),
-        ({"usual": np.array([3.5, 3.5])}, "for 1 gaits, 2 labels"),
+        ({"usual": np.array([3.5, 3.5])}, "do not fit 1 gaits and 2 labels"),
         ({"usual": np.array([-1.0])}, "usual speeds"),
     ],
 )

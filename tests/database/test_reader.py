@@ -66,7 +66,7 @@ def test_a_pass_has_every_standardised_pair_and_flat_rows_ten_times(path, source
     s = db.statistics
     for split, names in (("train", ("flat", "mixed", "rocky")), ("held_out", ("kept",))):
         got = whole_pass(db, split, 0, 10)
-        assert len(got.p) == db.pairs(split) == 10 * db.rows(split)
+        assert len(got.p) == db.samples(split) == 10 * db.rows(split)
         for name in names:
             rows = sources[name]
             mine = got.clip == db.clips.index(name)
@@ -140,7 +140,7 @@ def test_severities_are_columns_only_if_they_are_inputs(path, sources, tmp_path)
     assert healthy.layout.x_size == injured.layout.x_size - 2
     block = next(iter(healthy.blocks("train", 0, 0, 10, 1)))
     assert block.x.shape[1] == healthy.layout.x_size == len(healthy.statistics.x_mean)
-    assert healthy.rows("held_out") == healthy.pairs("held_out") == 0
+    assert healthy.rows("held_out") == healthy.samples("held_out") == 0
     assert list(healthy.blocks("held_out", 0, 0, 10, 1)) == []
 
 

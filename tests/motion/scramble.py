@@ -27,7 +27,7 @@ from .rewrite import Scramble, stretched, written
 Array = np.ndarray
 # A floor 3.1 cm off is moved to 0 and one 2.9 cm off is not. Such a difference is no error of the rig.
 NEAR = 3.5  # cm
-BALL = 3.0  # cm: allowed error of the height of a figure whose balls of the feet had to be guessed
+BALL = 1.2  # cm: allowed error of the height of a figure whose balls of the feet had to be guessed
 
 
 @dataclass(frozen=True)

@@ -13,6 +13,7 @@ from hobble.motion import look_page as module
 from hobble.motion.look_page import chosen, figure, foot_down, look_page
 
 REPORT = {"rig": "<rig>", "source_fps": 120.0, "seconds": 4.0, "sha256": "a", "repairs": [], "retarget": None}
+REPORT |= {"scale": 1.0}
 
 
 def many(count: int, **changes: dict[int, Any]) -> tuple[list[dict[str, Any]], list[dict[str, Any]]]:

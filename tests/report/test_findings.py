@@ -109,7 +109,7 @@ def test_links_never_hurt_in_training_only_show_the_drift_of_the_walk(material: 
     head = "1 of 2 links was hurt in training."
     assert found[head] == "good"
     texts = {hint.head: hint.text for hint in hints(changed(material, injury=caught))}
-    assert texts[head].startswith("Severity 10 of it changes the walk by 11.0 cm per joint. A link is")
+    assert texts[head].startswith("At severity 10, it changes the walk by 11.0 cm per joint. A link is")
 
 
 def test_the_time_of_a_frame_is_a_median(material: ReportMaterial) -> None:

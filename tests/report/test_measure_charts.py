@@ -7,6 +7,7 @@ import pytest
 from hobble.channels.injury.recognition.page import recognition_chart
 from hobble.channels.injury.response import page as injury_page
 from hobble.channels.injury.response import page_cases
+from hobble.measures.accuracy.page import caveat
 from hobble.measures.responsivity import lap_charts
 from hobble.measures.responsivity import page as responsivity_page
 from hobble.report.charts import ChartGroup
@@ -124,3 +125,8 @@ def test_runs_are_drawn_over_the_track_in_red_where_they_left_it() -> None:
     assert kept is not None
     assert "The largest distance from the track was 10 cm" in kept.caption
     assert lap_charts.track_chart({"track": {"waypoints": 6}}) is None
+
+
+def test_the_length_of_what_was_measured_is_that_of_the_measured_frames(material: ReportMaterial) -> None:
+    found = {"held_out": {"frames": 600}, "train": {"frames": 5400}}
+    assert "measured on 1 min 40 s of gait cycles" in caveat(found, material)

@@ -47,13 +47,13 @@ def move(
     phase=None,
     target=(0.0, 1.0),
     loss: float = 0.0,
-    rooted=False,
+    recorded_poses=False,
     pull: float = 0.0,
 ) -> np.ndarray:
     phase = np.zeros(1) if phase is None else phase
     columns = advance.advance_columns(LAYOUT)
     targets = np.array([target], float)
-    advance.advance(y, columns, targets, loss, rooted, pull, (position, direction, gait), phase)
+    advance.advance(y, columns, targets, loss, recorded_poses, pull, (position, direction, gait), phase)
     return phase
 
 
@@ -95,9 +95,9 @@ def test_a_standing_figure_does_not_drift() -> None:
     assert phase[0] == pytest.approx(0.1 * 0.02)
 
 
-def test_a_rooted_network_may_move_while_standing() -> None:
+def test_a_network_of_recorded_poses_may_move_while_standing() -> None:
     position, direction, gait = path(stand=1.0)
-    phase = move(prediction(speed=2.0, turn=-0.1), position, direction, gait, rooted=True)
+    phase = move(prediction(speed=2.0, turn=-0.1), position, direction, gait, recorded_poses=True)
     np.testing.assert_allclose(position[0, MIDDLE], [0, 2.0], atol=1e-6)
     np.testing.assert_allclose(direction[0, MIDDLE], [np.sin(0.1), np.cos(0.1)], atol=1e-6)
     assert phase[0] == pytest.approx(0.02)
@@ -133,7 +133,7 @@ def test_movement_against_the_target_is_reduced(target, moved) -> None:
 def test_movement_is_changed_toward_the_target_by_at_most_a_share_of_itself(target, moved) -> None:
     """Half of the share along the target, all of it across."""
     position, direction, gait = path(stand=0.5)
-    move(prediction(speed=2.0), position, direction, gait, target=target, rooted=True, pull=0.2)
+    move(prediction(speed=2.0), position, direction, gait, target=target, recorded_poses=True, pull=0.2)
     np.testing.assert_allclose(position[0, MIDDLE], moved, atol=1e-6)
 
 

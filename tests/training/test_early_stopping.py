@@ -58,12 +58,12 @@ def test_training_ends_after_that_many_sections_without_a_lower_error(
     expected = first_end(whole, patience)
     stopped = go("stopped", patience=patience)
     assert held_out(stopped) == whole[:expected], "the same training, cut short"
-    assert stopped.sections == expected
+    assert stopped.sections_done == expected
     if patience == 1:
         assert expected < len(whole), "the example gets worse at some time"
     again = go("stopped", patience=patience)
-    assert again.sections == expected, "called again it stays ended"
-    assert go("stopped").sections == len(whole), "without patience it goes on"
+    assert again.sections_done == expected, "called again it stays ended"
+    assert go("stopped").sections_done == len(whole), "without patience it goes on"
 
 
 def test_sections_are_counted_since_the_lowest_error(go: Callable[..., State]) -> None:

@@ -65,7 +65,7 @@ def test_batches_are_the_sections_samples_in_order(data: Database, kind: type[Ho
     *columns, whole = zip(*seen, strict=True)
     for mine, theirs in zip(columns, zip(*blocks, strict=True), strict=True):
         assert np.array_equal(np.concatenate(mine), np.concatenate(theirs))
-    assert sum(len(batch.p) for batch in seen) == sum(whole) == data.section_pairs("train", 2, 3)
+    assert sum(len(batch.p) for batch in seen) == sum(whole) == data.section_samples("train", 2, 3)
 
 
 @pytest.mark.parametrize("dtype", ["float32", "float16", "bfloat16"])

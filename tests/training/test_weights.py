@@ -79,7 +79,7 @@ def test_the_ranges_cover_every_row_with_every_fit(small_database: Path, memory:
     data = Database.open(small_database, memory)
     s = data.statistics
     seen = TrainingFacts.of(data.layout, data.each_row("train"), s)
-    (block,) = data.blocks("train", 0, 0, 1, 0, data.pairs("train"))
+    (block,) = data.blocks("train", 0, 0, 1, 0, data.samples("train"))
     x, y = block.x * s.x_std + s.x_mean, block.y * s.y_std + s.y_mean
     for name, values in (("x", x), ("y", y)):
         np.testing.assert_array_equal(getattr(seen, f"{name}_low"), values.min(axis=0))

@@ -105,7 +105,7 @@ def loops(
     ]
 
 
-def speaker(skeleton: Mapping[str, Any]) -> Callable[[str], str]:
+def shown_names(skeleton: Mapping[str, Any]) -> Callable[[str], str]:
     """A function that turns a column's label into the name that readers see, and leaves other texts alone.
 
     skeleton: as in a network's file; empty if unknown.

@@ -1,8 +1,12 @@
 """Speed limits of a hurt or sad body, learnt from the rows of a database and saved with the network.
 
-A hurt body cannot go as fast as a healthy one. The rows show how fast it goes: the speed of a cycle of a hurt
-version relative to the same cycle of the healthy clip. A captured injury has no healthy counterpart, so it is
-compared with the usual speed of its gait.
+A channel is a group of inputs of the network that tell how hurt or how sad a body is. Each of its columns has
+a label, such as the name of a bone or mood, and values from 0 (no effect) to the channel's highest value.
+
+A hurt body cannot go as fast as a healthy one. The rows show how fast it goes. Some hurt clips are made from
+a healthy clip: a hurt version shows this clip as a hurt person would walk it. Each of its cycles is compared
+with the same cycle of the healthy clip. A captured injury has no healthy counterpart, so its cycles are
+compared with the usual speed of their gait.
 """
 
 from __future__ import annotations
@@ -16,24 +20,27 @@ import numpy as np
 from hobble.core.quat import Array
 
 UNLIMITED = 1e4  # cm a frame: limit of a gait in which no healthy clip goes forward
-LEVELS = 5  # number of values, from 0 to the channel's highest, for which a speed is stored
+LEVELS = 5  # number of values of a column, from 0 to the highest, for which a speed is stored
 TOP = 95  # percentile of the speeds of healthy cycles in a gait: the limit of a healthy body
 # Percentile of these speeds that counts as the usual speed. The median is too low: clips start and stop.
 USUAL = 70
-# If an injury leaves at most this share of the usual speed, the limit is that lower speed. If it leaves the
-# whole usual speed, the limit is that of a healthy body, which is higher. In between, it is interpolated.
+# A body that an injury slows to this share of the usual speed or less cannot hurry: its limit is the slowed
+# speed. A body that keeps the whole usual speed can hurry up to the limit of a healthy one (TOP). Between
+# these two shares the limit is interpolated.
 CANNOT_HURRY = 0.85
 AHEAD = 0.9  # a cycle counts if at least this share of its speed is forward
 STEADY = 0.35  # a cycle is left out if a value changes in it by more than this share of the highest value
 FAINT = 0.05  # a mean over a cycle below this share of the highest value counts as 0
 MOVING = 0.1  # cm a frame: slower cycles of a healthy body are left out
-EXPECTED_WEIGHT = 2.0  # at each level, the expected share counts as much as this many cycles (`_fitted`)
-SLOWEST = 0.1  # least share of the healthy speed
+# Weight of the curve towards which a fit is drawn (see `LimitLearner.learn`): at each level, the curve counts
+# as much as this many cycles.
+EXPECTED_WEIGHT = 2.0
+SLOWEST = 0.1  # a smaller share of the healthy speed counts as this
 
 
 @dataclass(frozen=True)
 class Limits:
-    """Speed limits of a channel with L labels in G gaits. A label names a column, such as a link or a mood.
+    """Speed limits of a channel with L labels in G gaits.
 
     levels: (K,) values from 0 to the channel's highest. speeds: (G, L, K) highest speeds, cm a frame, for
     each gait, label and level; a higher level is never faster. usual: (G,) usual speeds of a healthy body, cm
@@ -76,14 +83,14 @@ class Limits:
             raise ValueError("`levels` and `speeds` have to be tables of numbers") from None
         shapes = [table.shape for table in (levels, speeds, usual)]
         if levels.size < 2 or shapes != [(levels.size,), (gaits, labels, levels.size), (gaits,)]:
-            of = "levels {}, speeds {}, usual {}".format(*shapes)
-            raise ValueError(f"{of} for {gaits} gaits, {labels} labels")
+            found = "levels {}, speeds {}, usual {}".format(*shapes)
+            raise ValueError(f"shapes do not fit {gaits} gaits and {labels} labels: {found}")
         if levels[0] != 0 or levels[-1] != highest or not (np.diff(levels) > 0).all():
             raise ValueError(f"levels do not rise from 0 to {highest:g}")
         if not ((speeds > 0) & (speeds <= UNLIMITED)).all():
             raise ValueError(f"speeds are not all above 0 and at most {UNLIMITED:g}")
         if (np.diff(speeds, axis=2) > 0).any():
-            raise ValueError("a higher value goes faster than a lower one")
+            raise ValueError("speeds rise with the level; a higher level must not be faster")
         if not ((usual >= 0) & (usual <= UNLIMITED)).all():
             raise ValueError(f"usual speeds are not all from 0 to {UNLIMITED:g}")
         return cls(levels, speeds, usual)
@@ -92,9 +99,9 @@ class Limits:
 def together(allowed: Sequence[Array], usual: Array) -> Array:
     """(C, G) highest speeds of C characters in each gait under the limits of several channels, cm a frame.
 
-    allowed: (C, G) highest speeds for each channel. usual: (G,) usual speeds of a healthy body. Each channel
-    leaves a share of the usual speed, and the shares multiply: a sad person who limps is slower than one who
-    is only sad or only limps. A channel that allows the usual speed does not count.
+    allowed: for each channel, the highest speeds (C, G). usual: (G,) usual speeds of a healthy body. Each
+    channel leaves a share of the usual speed, and the shares multiply: a sad person who limps is slower than
+    one who is only sad or only limps. A channel that allows the usual speed does not count.
     """
     shares = [
         np.minimum(1.0, np.divide(one, usual, out=np.ones_like(one), where=usual > 0)) for one in allowed
@@ -107,8 +114,8 @@ def together(allowed: Sequence[Array], usual: Array) -> Array:
 class _Cycles:
     """N cycles of one clip.
 
-    gait: (N,) index of the main gait. speed: (N,) mean speed, cm a frame. ahead: (N,) mean of its forward
-    part, cm a frame. values: (N, L) mean value of each label. number: (N,) number of the cycle in the clip.
+    gait: (N,) index of the main gait. speed: (N,) mean speed, cm a frame. ahead: (N,) mean forward speed,
+    cm a frame. values: (N, L) mean value of each label. number: (N,) number of the cycle in the clip.
     others: (N,) bool, whether another channel has a value above 0.
     """
 
@@ -146,8 +153,8 @@ class LimitLearner:
 
         gait: (R, G) shares of the gaits. velocity: (R, 2) of the root, to the side and forward in root
         coordinates, cm per frame. values: (R, L) of this channel. cycle: (R,) number of the row's cycle.
-        others: (R,) bool, whether another channel has a value above 0. source: the healthy clip, if this clip
-        is a hurt version of it.
+        others: (R,) bool, whether another channel has a value above 0. source: name of the healthy clip, if
+        this clip is a hurt version of it.
         """
         numbers, of_row, count = np.unique(cycle, return_inverse=True, return_counts=True)
 
@@ -189,7 +196,8 @@ class LimitLearner:
 
         For each label, the share of the healthy speed is fitted as a function of the value in three steps: a
         straight line through the cycles of all gaits, a curve through these cycles that is drawn towards the
-        line, and for each gait a curve through its own cycles that is drawn towards that curve (`_fitted`).
+        line, and for each gait a curve through its own cycles that is drawn towards the curve of all gaits
+        (`_fitted`).
         """
         levels = np.linspace(0, self.highest, LEVELS)
         healthy = self._healthy()
@@ -204,14 +212,15 @@ class LimitLearner:
         labels = values.shape[1]
         speeds = np.repeat(top[:, None, None], labels, axis=1).repeat(LEVELS, axis=2)
         for label in range(labels):
-            of = _of_label(label, values, self.across)
-            value, left, gaits = (
-                np.concatenate(part) for part in zip(*((v, share[i], gait[i]) for i, v in of), strict=True)
+            sides = _of_label(label, values, self.across)
+            value, shares, gaits = (
+                np.concatenate(part) for part in zip(*((v, share[i], gait[i]) for i, v in sides), strict=True)
             )
-            fall = float(value @ (1 - left) / (value @ value)) if len(value) else 0.0
-            expected = _fitted(levels, value, left, np.maximum(1 - fall * levels, SLOWEST))
+            fall = float(value @ (1 - shares) / (value @ value)) if len(value) else 0.0
+            line = np.maximum(1 - fall * levels, SLOWEST)
+            curve = _fitted(levels, value, shares, line)
             for k in np.flatnonzero(top < UNLIMITED):
-                own = _fitted(levels, value[gaits == k], left[gaits == k], expected)
+                own = _fitted(levels, value[gaits == k], shares[gaits == k], curve)
                 hurries = np.maximum(own - CANNOT_HURRY, 0.0) / (1 - CANNOT_HURRY)
                 speeds[k, label] = usual[k] * own + (top[k] - usual[k]) * hurries
         return Limits(levels, speeds, usual)
@@ -235,9 +244,9 @@ class LimitLearner:
         for source, cycles in self._clips.values():
             changed = cycles.values.any(axis=1)
             if source is not None and source in self._clips:
-                own = self._clips[source][1]
-                neutral = np.where(own.values.any(axis=1), 0.0, own.speed)
-                speed_of = dict(zip(own.number.tolist(), neutral.tolist(), strict=True))
+                origin = self._clips[source][1]
+                neutral = np.where(origin.values.any(axis=1), 0.0, origin.speed)
+                speed_of = dict(zip(origin.number.tolist(), neutral.tolist(), strict=True))
                 healthy_speed = np.array([speed_of.get(n, 0.0) for n in cycles.number.tolist()])
             else:  # captured: only forward cycles can be compared with the usual speed
                 counts = (cycles.ahead >= AHEAD * cycles.speed) & ~cycles.others
@@ -252,8 +261,9 @@ class LimitLearner:
 
 
 def _of_label(label: int, values: Array, across: np.ndarray) -> Sequence[tuple[np.ndarray, Array]]:
-    """The cycles that count for a label, as (indices, values), first of one side of the body, then the other.
+    """The cycles that count for a label and for the same label on the other side of the body.
 
+    Returns (indices, values of the label) for each of the two, or for the label alone if it has no side.
     values: (n, L) of all cycles. A cycle counts if no other label has a value above 0 in it. If there is no
     such cycle, those count in which no other label has a higher value.
     """
@@ -269,8 +279,8 @@ def _fitted(levels: Array, values: Array, shares: Array, expected: Array) -> Arr
     """(K,) shares of the healthy speed at `levels` (K,), fitted to n cycles by least squares.
 
     values, shares: (n,) value and share of each cycle. Shares between two levels are interpolated. The first
-    share is 1, and a higher level never has a higher share. expected: (K,) shares that count at each level
-    like EXPECTED_WEIGHT cycles.
+    share is 1, and a higher level never has a higher share. expected: (K,) share at each level, which counts
+    as much as EXPECTED_WEIGHT cycles there.
     """
     at = np.clip(np.searchsorted(levels, values, side="right") - 1, 0, len(levels) - 2)
     far = (values - levels[at]) / (levels[at + 1] - levels[at])
@@ -278,7 +288,7 @@ def _fitted(levels: Array, values: Array, shares: Array, expected: Array) -> Arr
     rows = np.arange(len(values))
     basis[rows, at], basis[rows, at + 1] = 1 - far, far
     inner = basis[:, 1:]
-    left = inner.T @ inner + EXPECTED_WEIGHT * np.eye(len(levels) - 1)
-    right = inner.T @ (shares - basis[:, 0]) + EXPECTED_WEIGHT * expected[1:]
-    found = np.concatenate([[1.0], np.linalg.solve(left, right)])
+    matrix = inner.T @ inner + EXPECTED_WEIGHT * np.eye(len(levels) - 1)
+    vector = inner.T @ (shares - basis[:, 0]) + EXPECTED_WEIGHT * expected[1:]
+    found = np.concatenate([[1.0], np.linalg.solve(matrix, vector)])
     return np.minimum.accumulate(np.clip(found, SLOWEST, 1.0))

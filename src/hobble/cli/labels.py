@@ -24,7 +24,7 @@ from hobble.labels.write_files import write_label_files
 from hobble.motion.make import make_clip
 from hobble.motion.options import ClipMotion
 
-SKELETON = "holden31"  # clips are retargeted to this skeleton for labelling; the labels do not depend on it
+SKELETON = "holden31"  # clips are retargeted to it for labelling; the label files fit any skeleton
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -72,7 +72,8 @@ def write_labels(
         skeleton_name=SKELETON,
         options=ClipMotion(source_fps=source_fps),
     )
-    # The ground is unknown: on "flat" ground, the height of the head would decide about crouching.
+    # The ground is unknown, so it is called "rocky": on "flat" ground, the height of the head alone would
+    # decide about crouching.
     labels, checked = label_clip(clip, [], report, gait, "rocky", LabelOptions())
     time = SourceTime(report["source_frames"], report["source_fps"], report["source_start"])
     write_label_files(paths[0], paths[1], paths[2], labels, time)

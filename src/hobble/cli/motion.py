@@ -24,7 +24,9 @@ from hobble.motion.mirror import mirror_clip
 from hobble.motion.options import ClipMotion
 from hobble.motion.read import read_bvh
 
-ROLES_FROM = "holden31"  # without --skeleton, the roles that this skeleton has are looked for in the file
+# Roles tell which joint is which: hips, head, left heel and so on. Without --skeleton, the roles of this
+# skeleton are looked for among the joints of a file.
+ROLES_FROM = "holden31"
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:

@@ -127,13 +127,13 @@ class Database:
         """Number of rows (frames) of "train" or "held_out"."""
         return self.manifest.rows(split)
 
-    def pairs(self, split: str) -> int:
-        """Samples of a pass: the (frame, fit) pairs. The one pair of a flat row counts `visits` times."""
+    def samples(self, split: str) -> int:
+        """Number of samples of a pass: the (frame, fit) pairs. That of a flat row counts `visits` times."""
         return self.rows(split) * self.manifest.visits
 
-    def section_pairs(self, split: str, section: int, sections: int) -> int:
+    def section_samples(self, split: str, section: int, sections: int) -> int:
         """Number of samples of one section of a pass."""
-        total = self.pairs(split)
+        total = self.samples(split)
         return total * (section + 1) // sections - total * section // sections
 
     def blocks(
@@ -160,7 +160,7 @@ class Database:
             raise HobbleError(f"there is no section {section} in a pass of {sections}")
         if self.rows(split) == 0:
             return iter(())
-        total = self.section_pairs(split, section, sections)
+        total = self.section_samples(split, section, sections)
         stretch = stretch or SampleRange(0, total, total, 0, total)
         cut = stretch.start, stretch.stop
         spans = order.spans(self.rows(split), self.manifest.visits, section, sections, cut)

@@ -16,7 +16,7 @@ NEAR = 7.0  # cm; a solid has no effect farther away than this. Each `Solid.blen
 CORNERS = np.array([[i, j, k] for i in (0, 1) for j in (0, 1) for k in (0, 1)])
 EDGES = [(a, b) for a in range(8) for b in range(a + 1, 8) if (CORNERS[a] != CORNERS[b]).sum() == 1]
 
-# A box with finer steps: lowest and highest corner (3,), step in cm.
+# A box in which the grid is finer: its lowest and highest corner (3,), and the grid's step there, cm.
 Fine = tuple[Array, Array, float]
 
 
@@ -43,20 +43,20 @@ def grid_lines(low: float, high: float, step: float, bands: Sequence[tuple[float
     """Grid coordinates from low to high with spacing `step`, or finer near the `bands` (from, to, step)."""
     places, at = [low], low
     while at < high:
-        here = min([step, *(_gentle(at, band) for band in bands)])
+        here = min([step, *(_spacing(at, band) for band in bands)])
         at += here
         places.append(at)
     return np.array(places)
 
 
-def _gentle(at: float, band: tuple[float, float, float]) -> float:
+def _spacing(at: float, band: tuple[float, float, float]) -> float:
     """The largest spacing at a coordinate: the step of the band, plus a quarter of the distance from it."""
     low, high, step = band
     return step + 0.25 * max(low - at, at - high, 0.0)
 
 
 def field(solids: Sequence[Solid], axes: Sequence[Array]) -> Array:
-    """(X, Y, Z) distances from the blended solids on a grid of three axes, cm; FAR if none is near."""
+    """(X, Y, Z) distances from the blended solids on a grid of three axes, cm; FAR where no solid is near."""
     out = np.full([len(axis) for axis in axes], FAR, np.float64)
     for solid in solids:
         low, high = solid.bounds()
@@ -79,7 +79,7 @@ def field(solids: Sequence[Solid], axes: Sequence[Array]) -> Array:
 def surface(
     solids: Sequence[Solid], step: float, fine: Sequence[Fine] = ()
 ) -> tuple[Array, NDArray[np.int64]]:
-    """Corners (V, 3), cm, and triangles (T, 3), counter-clockwise seen from outside, of the closed surface.
+    """The closed surface: vertices (V, 3), cm, and triangles (T, 3), counter-clockwise seen from outside.
 
     step: cm between grid points, finer within the boxes `fine`.
     """
@@ -88,14 +88,14 @@ def surface(
     high = np.max([solid.bounds()[1] for solid in kept], axis=0) + 3 * step
     axes = [grid_lines(low[i], high[i], step, [(a[i], b[i], s) for a, b, s in fine]) for i in range(3)]
     values = without_touching_sheets(field(solids, axes))
-    corners, faces = surface_net(values, axes)
-    for _ in range(2):
-        corners = corners - offsets(solids, corners, 0.35 * step)
-    return corners, faces
+    vertices, triangles = surface_net(values, axes)
+    for _ in range(2):  # move the vertices closer to the surface
+        vertices = vertices - offsets(solids, vertices, 0.35 * step)
+    return vertices, triangles
 
 
 def offsets(solids: Sequence[Solid], points: Array, most: float) -> Array:
-    """(N, 3) vectors from the surface to points (N, 3), in the direction of the slope, at most `most` cm."""
+    """(N, 3) vectors from the surface to points (N, 3), along the slope, at most `most` cm long."""
     slope, away = slopes(solids, points)
     steep = (slope * slope).sum(axis=1)
     move = (away / np.maximum(steep, 0.25))[:, None] * slope
@@ -124,7 +124,7 @@ def without_touching_sheets(values: Array) -> Array:
     """
     values = values.copy()
     while True:
-        inside, closed = values < 0, 0
+        inside, touching = values < 0, 0
         for u, v in ((0, 1), (1, 2), (2, 0)):
             views = []
             for du in (0, 1):
@@ -135,11 +135,11 @@ def without_touching_sheets(values: Array) -> Array:
             a, b, c, d = (inside[view] for view in views)
             for first, second, crossed in ((1, 2, a & d & ~b & ~c), (0, 3, b & c & ~a & ~d)):
                 where = np.argwhere(crossed)
-                closed += len(where)
+                touching += len(where)
                 both = [values[view][tuple(where.T)] for view in (views[first], views[second])]
                 for which, lower in ((first, both[0] <= both[1]), (second, both[0] > both[1])):
                     values[views[which]][tuple(where[lower].T)] = -1e-3
-        if not closed:
+        if not touching:
             return values
 
 
@@ -166,10 +166,11 @@ def surface_net(values: Array, axes: Sequence[Array]) -> tuple[Array, NDArray[np
         pa, pb = (np.stack([axes[i][p[:, i]] for i in range(3)], axis=1) for p in (first, second))
         total += np.where(cross[:, None], pa + t * (pb - pa), 0.0)
         crossed += cross[:, None]
-    return total / crossed, _squares(inside, index)
+    return total / crossed, _triangles(inside, index)
 
 
-def _squares(inside: NDArray[np.bool_], index: NDArray[np.int64]) -> NDArray[np.int64]:
+def _triangles(inside: NDArray[np.bool_], index: NDArray[np.int64]) -> NDArray[np.int64]:
+    """Triangles (T, 3), two for each edge of the grid that the surface crosses. index: cell -> its vertex."""
     faces = []
     for axis in range(3):
         u, v = (axis + 1) % 3, (axis + 2) % 3

@@ -10,11 +10,12 @@ from hobble.gait.people import GAITS, NORMAL, People
 from hobble.gait.profile import Profile, mirrored
 from hobble.gait.recogniser import LEFT, RIGHT
 
-# name -> meaning. "hurt" and "sound" are the two sides of the body.
+# name -> meaning. "hurt" and "sound" are the two sides of the body; "healthy" is the healthy walk.
 EFFECTS: dict[str, str] = {
     "speed": "speed, share of healthy",
     "stride": "stride time, share of healthy",
-    "stance": "how much longer the sound leg stands than the hurt one, share of the cycle, minus healthy",
+    "stance": "share of the cycle by which stance is longer on the sound leg than on the hurt leg, minus the "
+    "same share in the healthy walk",
     "step_hurt": "length of the step onto the hurt foot, share of healthy",
     "step_sound": "length of the step onto the sound foot, share of healthy",
     "knee_hurt": "knee range of the hurt leg, share of healthy",
@@ -22,13 +23,13 @@ EFFECTS: dict[str, str] = {
     "hip_hurt": "hip flexion range of the hurt leg, share of healthy",
     "hip_sound": "hip flexion range of the sound leg, share of healthy",
     "lean": "change of the trunk's mean lean in any direction, degrees",
-    "lean_forward": "mean lean of the trunk forward, degrees from healthy",
-    "lean_hurt": "mean lean of the trunk to the hurt side, degrees from healthy",
-    "sway_forward": "range of the trunk's forward lean in a cycle, degrees above healthy",
-    "sway_sideways": "range of the trunk's sideways lean in a cycle, degrees above healthy",
-    "pelvis_drop": "mean drop of the pelvis on the sound side, degrees from healthy",
+    "lean_forward": "mean lean of the trunk forward, degrees more than healthy",
+    "lean_hurt": "mean lean of the trunk to the hurt side, degrees more than healthy",
+    "sway_forward": "range of the trunk's forward lean in a cycle, degrees more than healthy",
+    "sway_sideways": "range of the trunk's sideways lean in a cycle, degrees more than healthy",
+    "pelvis_drop": "mean drop of the pelvis on the sound side, degrees more than healthy",
     "arm_hurt": "swing of the arm of the hurt side, share of healthy",
-    "arm_sound": "swing of the other arm, share of healthy",
+    "arm_sound": "swing of the arm of the sound side, share of healthy",
 }
 
 
@@ -68,7 +69,7 @@ def effects(walk: Profile, healthy: Profile, side: str = RIGHT) -> dict[str, flo
 def effects_of_people(known: People) -> Mapping[str, Mapping[str, tuple[float, float]]]:
     """For each impairment and each of the EFFECTS, the mean and the standard deviation over people."""
     out = {}
-    for gait in GAITS:  # in people's data: the normal walk and the impaired ones
+    for gait in GAITS:  # these GAITS are the normal walk and the impaired walks of the recorded people
         if gait == NORMAL:
             continue
         each = [

@@ -22,9 +22,7 @@ MIXES: dict[str, dict[str, float]] = {
     "thigh": {"antalgic": 0.6, "stiff_legged": 0.4},
     "shank": {"antalgic": 0.95, "steppage": 0.05},
     "foot": {"antalgic": 0.65, "steppage": 0.35},
-    "back": {"lurch": 1.0},
 }
-UNSIDED = ("back",)  # parts without a side: their profile is applied to both sides alike
 # Factors on the mixed curves of trunk, pelvis and shoulders.
 CURVE_FACTOR: dict[str, float] = {"pelvis": 1.6, "hip": 2.1, "thigh": 1.25, "shank": 1.0, "foot": 0.9}
 # Part -> changes that the recordings do not show.
@@ -127,9 +125,6 @@ def _of_people(
 
     curves = sum(share * known[p].harmonics() for p, share in mix.items()) * CURVE_FACTOR.get(part, 1.0)
     ratios = {"stride": mean("stride"), "arm": mean("arm_hurt"), "arm_sound": min(mean("arm_sound"), 1.0)}
-    if part in UNSIDED:
-        # A hurt back has no side, so it takes neither curves nor shifts of landings from the profile.
-        return {"stride": mean("stride") ** 0.5, **own}, {"curves": np.zeros_like(curves)}
     speed = own["speed"]
     slower = speed * own.get("stride", mean("stride"))  # ratio of the stride length
     step = STEP_RATIO.get(part, mean("step_hurt"))

@@ -1,4 +1,4 @@
-"""Gait shares: the crouch rule for flat clips, and automatic gaits of unlabelled clips."""
+"""Gait of each frame: the crouch rule for clips on flat ground, and automatic gaits of unlabelled clips."""
 
 from __future__ import annotations
 
@@ -12,50 +12,51 @@ from hobble.core.smooth import gaussian, lowest, mean
 from hobble.labels.clip_labels import GAITS
 
 STAND, WALK, JOG, CROUCH = range(4)
-GRAVITY = 981.0 / 3600.0  # cm a frame, each frame
+GRAVITY = 981.0 / 3600.0  # cm per frame squared, at 60 frames per second
 
 STANDING_SPEED = 0.0019  # leg lengths a frame; a slower figure stands
-# A figure crouches if its head and its hips are both lower than this. Unit: length of the bones from there to
-# the ground.
+# A figure crouches if its head and its hips are both below these heights. The unit of each height is the
+# length of the bones between that joint and the ground.
 CROUCHED_HEAD = 0.8
 CROUCHED_HIPS = 0.85
 
-# Weights of measures in the log odds of jog against walk. They were fitted to the hand-made labels of the
-# original release and of Ferre et al., and to the descriptions of `cmu`. No measure has a unit, so the
-# weights hold for any size of body.
+# Weights of measures in the log odds of jog against walk. They were fitted to the hand-made labels of Holden
+# et al. (2017) and of Ferre (2019), and to the clip descriptions of the data set `cmu`. No measure
+# depends on the size of the body, so the weights hold for all bodies.
 JOG_SPRING = 3.7  # `_spring`: 1 if the hips are lowest over the standing foot, -1 if they are highest there
 JOG_FLIGHT = 9.0  # share of the time without a foot down
 JOG_DOUBLE_SUPPORT = -9.0  # share of the time with both feet down
-JOG_BOUNCE = 12.5  # vertical acceleration of the hips, g, at most MOST_BOUNCE, because happy walks bounce
-MOST_BOUNCE = 0.5
-JOG_FROUDE = 6.0  # per Froude number above FASTEST_WALK
+JOG_BOUNCE = 12.5  # vertical acceleration of the hips, g
+MOST_BOUNCE = 0.5  # g: a larger acceleration counts as this, because happy walks bounce
+JOG_FROUDE = 6.0  # Froude number minus FASTEST_WALK, from 0 to 1
 FASTEST_WALK = 0.5  # Froude number of the fastest walk that people keep up for long
 JOG_CONSTANT = -3.2
-# A figure walks if both feet are down for at least this share of the time, and flight and spring are below
-# these limits. Then bounce does not matter, as in happy walks.
+# A figure walks, however much it bounces, if both feet are down for at least this share of the time, and
+# flight and spring are below these limits.
 LEAST_DOUBLE_SUPPORT = 0.1
 NO_FLIGHT = 0.01
 CLEAR_SPRING = 0.5
-# A slow figure (Froude number) with little flight and little spring walks, too. In the happy walks of
-# `styles` flight is at most .06, in its slowest run .16. With a limit of .25 for the spring, slow jogs of the
-# original release would count as walks.
+# A figure whose Froude number, flight and spring are all below these limits walks, too. In the data set
+# `styles`, the mean flight of each happy walk is .06 or less, that of the slowest run is .16. With a limit of
+# .25 for the spring, slow jogs of Holden et al. (2017) would count as walks.
 SLOW, SOME_FLIGHT, SOME_SPRING = 0.35, 0.1, 0.2
-MOST_ODDS_OF_A_WALK = -1.0  # the highest log odds of jogging for a figure that walks by either rule
+MOST_ODDS_OF_A_WALK = -1.0  # highest log odds of jogging for a figure that walks by one of these two rules
 CERTAIN_ODDS = 2.0  # log odds that count as full evidence
-DATA_SET_ODDS = 1.0  # log odds that are added for the clip's main gait, which the data set tells
-SWITCH_COST = 18.0  # frames of full evidence that a change of gait costs
-FADE_FRAMES = 31
+DATA_SET_ODDS = 1.0  # log odds added if the data set says that a clip is mainly a jog; subtracted for a walk
+SWITCH_COST = 18.0  # a change of gait costs as much as this many frames of full evidence
+FADE_FRAMES = 31  # length of the fade from one gait to the next
 LONGEST_START = 180  # frames: a doubtful walk from standing to a jog counts as jog if it is at most this long
-CLEARLY_WALKING = -4.0  # a walk is not doubtful if the median of its log odds in its second half is lower
-# Frames. Any other walk between standing and jogging that is shorter is split: half counts as standing, half
-# as jogging.
+CLEARLY_WALKING = -4.0  # such a walk is doubtful if the median log odds of its second half are above this
+# Frames. Any other walk between standing and jogging is split if it is at most this long: the half next to
+# standing counts as standing, the half next to jogging as jogging.
 LONGEST_SHORT_WALK = 75
 
 
 def overwrite_crouch(gait: Array, clip: Clip) -> Array:
     """Gait (F, 6) of a clip on flat ground, with crouch = 1 - clip((head height - 80) / 50, 0, 1).
 
-    As in the original, the other columns do not change, so the sum may differ from 1.
+    Heights are in cm. As in the code of Holden et al. (2017), the other columns do not change, so the sum may
+    differ from 1.
     """
     head = clip.positions[:, clip.skeleton.role("head"), 1]
     out = gait.copy()
@@ -66,9 +67,9 @@ def overwrite_crouch(gait: Array, clip: Clip) -> Array:
 def automatic_gait(clip: Clip, down: np.ndarray, dominant: str | None) -> Array:
     """Gait shares (F, 6) with the sum 1.
 
-    down: (F, 4) contacts by `contacts.stance`. dominant: the clip's main gait; it decides between walk and
-    jog if both are about equally likely. Jumps and bumps are not recognised: if `dominant` is one of them,
-    all frames get it, except those in which the figure stands.
+    down: (F, 4) contacts by `contacts.stance`. dominant: the clip's main gait, or None. It decides between
+    walk and jog if both are about equally likely. Jumps and bumps are not recognised: if `dominant` is one of
+    them, all frames get it, except those in which the figure stands.
     """
     odds = jog_odds(clip, down) + {"jog": DATA_SET_ODDS, "walk": -DATA_SET_ODDS}.get(dominant or "", 0.0)
     gait = _likeliest_path(_evidence(clip, odds), SWITCH_COST)
@@ -132,7 +133,7 @@ def _spring(clip: Clip) -> Array:
     """(F,) correlation of the height of the hips with the distance between the ankles over about a cycle.
 
     A walking leg is an inverted pendulum: the hips are highest over the standing foot, as the other foot
-    passes it. A jogging leg is a spring: there the hips are lowest (Cavagna et al. 1977).
+    passes it. A jogging leg is a spring: the hips are lowest there (Cavagna et al. 1977).
     """
     skeleton, positions = clip.skeleton, clip.positions
     height = gaussian(positions[:, skeleton.role("hips"), 1], 1.5)
@@ -144,7 +145,10 @@ def _spring(clip: Clip) -> Array:
 
 
 def _relative_heights(clip: Clip) -> tuple[Array, Array]:
-    """(F,) heights of head and hips above the lowest foot, each divided by the length of the bones below."""
+    """(F,) heights of head and hips above the floor, each divided by the length of the bones below.
+
+    The floor is the mean of the lowest heights of both toes in the 61 frames around each frame.
+    """
     skeleton, y = clip.skeleton, clip.positions[..., 1]
     toes = y[:, [skeleton.role("left_toe"), skeleton.role("right_toe")]]
     floor = lowest(toes, 61).mean(axis=1)

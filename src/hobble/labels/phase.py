@@ -1,7 +1,7 @@
 """Converts footsteps to phase and back, and finds locomotion cycles.
 
-The right foot lands at phase 0 and the left one at .5, as in the original. `phase_zero="left"` shifts this
-by half a cycle.
+The right foot lands at phase 0 and the left one at .5, as in Holden et al. (2017). With the option
+`phase_zero: left` the left foot lands at 0 and the right one at .5.
 
 Footsteps are an array (N, 3). Each row holds the frame in which the right foot lands, the next frame in which
 the left foot lands, and a mark: 1 if the frames from this row's right landing to the next row's must not be
@@ -17,17 +17,19 @@ import numpy as np
 from hobble.core.quat import Array
 from hobble.labels.read_files import whole_frame
 
-BREAK = (np.nan, np.nan, 1.0)
-IDLE_RATE = 0.0017  # cycles a frame: a tenth of the usual rate, the same as for a standing character
+BREAK = (np.nan, np.nan, 1.0)  # the row that ends a bout of walking
+IDLE_RATE = 0.0017  # cycles a frame: a tenth of the usual rate, as for a standing character at run time
 FASTEST = 0.25  # cycles a frame: a larger change of a hand-made phase is a jump, not movement
-MARGINS = {"extend": 1, "drop": 60}  # least number of frames before a cycle; one more is needed after it
+# Option `margins` -> how many frames a clip must have before a cycle. After the cycle it must have one more.
+# "extend" uses the cycles near an end of the clip, "drop" leaves them out.
+MARGINS = {"extend": 1, "drop": 60}
 
 
 def phase_of_footsteps(footsteps: Array, frames: int) -> tuple[Array, np.ndarray]:
     """Phase (frames,) in 0..1, 0 as the right foot lands, and bool (frames,) where it is known.
 
-    It is known and linear between the landings of a bout of walking. Elsewhere it advances by about
-    IDLE_RATE, or a little faster, to have the right value at the next landing.
+    It is known and linear between the landings of a bout of walking. Elsewhere it advances at IDLE_RATE;
+    between two bouts this rate is adjusted, so that the phase has the right value at the next landing.
     """
     when, value, joined = _landings(footsteps)
     frame = np.arange(frames)
@@ -55,7 +57,7 @@ def dropped_frames(footsteps: Array, frames: int) -> np.ndarray:
 
 
 def footsteps_of_phase(phase: Array) -> tuple[Array, np.ndarray]:
-    """Footsteps (N, 3) at which a hand-made phase (F,) passes 0 and .5, and bool (F,): where it moves."""
+    """Footsteps (N, 3) at which a hand-made phase (F,) passes 0 and .5, and bool (F,), whether it moves."""
     step = np.diff(phase) % 1.0
     moving = np.concatenate([[False], (step > 0) & (step < FASTEST), [False]])
     edges = np.flatnonzero(np.diff(moving))
@@ -72,7 +74,7 @@ def footsteps_of_phase(phase: Array) -> tuple[Array, np.ndarray]:
 
 
 def rows_of_landings(events: list[tuple[float, int]]) -> Array:
-    """Footsteps (N, 3) of (frame, foot) in order of time. Foot 0 is right, 1 left, -1 ends a bout.
+    """Footsteps (N, 3) of landings (frame, foot) in order of time. Foot 0 is right, 1 left, -1 ends a bout.
 
     The same foot twice in a row also ends a bout.
     """
@@ -99,8 +101,8 @@ def find_cycles(footsteps: Array, frames: int, zero: str, margins: str) -> tuple
     """First and last frame (C, 2) of each cycle between landings of the foot `zero`, and the number left out.
 
     A cycle is left out if its row or the next row is marked, or if it is too near an end of the clip. With
-    `margins` "drop", as in the original, it is too near if it starts before frame 60 or ends within 61 frames
-    of the clip's end. With "extend", it is too near if there is no frame before it or less than two after.
+    `margins` "drop", as in Holden et al. (2017), the clip must have 60 frames before the cycle and 61 after
+    it. With "extend", one before and two after are enough.
     """
     margin = MARGINS[margins]
     own = 0 if zero == "right" else 1
@@ -120,8 +122,8 @@ def find_cycles(footsteps: Array, frames: int, zero: str, margins: str) -> tuple
 def mirrored_footsteps(footsteps: Array) -> Array:
     """The footsteps (M, 3) of the mirrored clip, with left and right exchanged.
 
-    A row of the mirrored clip starts with its right landing, which was a left landing before. The row takes
-    the mark of the old row with that landing.
+    A row of the mirrored clip starts with a right landing, which is a left landing of the original clip. The
+    new row takes the mark of the original row with that landing.
     """
     landings: list[tuple[float, int]] = []
     marks: list[float] = []
@@ -140,7 +142,10 @@ def mirrored_footsteps(footsteps: Array) -> Array:
 
 
 def _landings(footsteps: Array) -> tuple[Array, Array, np.ndarray]:
-    """Frame (n,) and phase (n,), 0 or .5, of each landing, and (n - 1,) whether the next is in its bout."""
+    """Frame (n,) and phase (n,), 0 or .5, of each of the n landings.
+
+    Also bool (n - 1,), whether a landing and the next one are in the same bout of walking.
+    """
     when: list[float] = []
     value: list[float] = []
     joined: list[bool] = []
@@ -161,7 +166,7 @@ def _landings(footsteps: Array) -> tuple[Array, Array, np.ndarray]:
 def _climbing(when: Array, value: Array, joined: np.ndarray) -> Array:
     """(n,) phase of each landing, not wrapped to 0..1.
 
-    It rises by half a cycle in a step, and by about IDLE_RATE per frame where no steps are known.
+    It rises by half a cycle in each step of a bout, and by about IDLE_RATE per frame between two bouts.
     """
     level = [value[0]]
     for i, together in enumerate(joined):

@@ -32,9 +32,9 @@ INPUTS = ("weights", "clips", "summaries", "skeleton", "published")
 class Cost:
     """Memory and time that a job requests on a cluster.
 
-    memory_mb: MB for any data. memory_each: MB added for each thousand frames of 31 joints in the longest
-    clip. seconds_each: seconds for each thousand frames of 31 joints in all clips together. minutes: the
-    least time.
+    memory_mb: MB that it needs however little data there is. memory_each: MB added for each thousand frames
+    of the longest clip. seconds_each: seconds for each thousand frames of all clips together. Both rates are
+    for 31 joints and grow in proportion to the number of joints. minutes: the least time.
     """
 
     memory_mb: float = 0.0
@@ -52,9 +52,9 @@ class Pieces(Protocol):
 
 @dataclass(frozen=True)
 class Measure:
-    """A measurement: its `name` is that of its JSON, and of its folder of tables.
+    """A measurement. Its `name` is also the name of its JSON file and of its folder of tables.
 
-    package: where its parts lie (`__name__` of the package). inputs: of INPUTS, or names of other
+    package: where its parts lie (`__name__` of the package). inputs: names of INPUTS or of other
     measurements. options: its keys of the section `evaluation`. runtime: the keys of the section `runtime`
     that it depends on. pieces: a measurement that takes long may have pieces, and each runs as a job of its
     own if there are several; see `Pieces`. people: whether it has to know who walks in which clip.

@@ -1,4 +1,4 @@
-"""The interface of a trained network of any kind, as runtime, measurements and page use it."""
+"""The interface of trained networks of any kind. The runtime, the measurements and the report use it."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from hobble.models.training_facts import TrainingFacts
 from hobble.rows.layout import GAITS, RowLayout
 
 TERRAIN_SIDE = 25.0  # cm from the path to the side heights, if the file does not say
-STORAGES = ("float32", "int16")
+STORAGES = ("float32", "int16")  # types in which a predictor can keep its weights
 
 Export = Callable[[Path, str], str]
 
@@ -27,10 +27,11 @@ Export = Callable[[Path, str], str]
 class Predictor(Protocol):
     """A network prepared for fast evaluation, called in every frame.
 
-    Use one predictor for one crowd: it may keep buffers between calls. It keeps nothing of a
-    character. If `Network.memory` is above 0, the caller keeps an array of that many numbers for each
-    character, zero before its first frame, and passes them to `evaluate` and `predict` as a last argument
-    `memory`, (C, Network.memory) float64. They change it in place.
+    It may keep buffers between calls, so each group of characters that is evaluated together needs its own.
+    It keeps no state of a character. If `Network.memory` is above 0, the caller keeps that state: an array
+    (C, Network.memory) float64 for C characters, zero before a character's first frame. `evaluate` and
+    `predict` then take it as one more argument `memory`, which the signatures below leave out, and change it
+    in place.
     """
 
     @property
@@ -60,10 +61,10 @@ class Network(ABC):
 
     kind: ClassVar[str] = ""  # its folder in hobble.models
     phase: ClassVar[bool] = True  # whether a prediction depends on the phase
-    # Whether poses are recorded frames, as in motion matching. Their feet slide unless the root moves exactly
-    # as predicted. So the runtime does not hold the root back while the character stands or moves
-    # away from the target.
-    rooted: ClassVar[bool] = False
+    # Whether the predicted poses are recorded frames, as in motion matching. With other networks, the runtime
+    # slows the root while the character stands or moves against the target velocity. With these it does not,
+    # because the feet of recorded frames slide if the root moves less than predicted.
+    recorded_poses: ClassVar[bool] = False
     modes: ClassVar[tuple[str, ...]] = ("exact",)  # of the predictor; the last one is exact
     storage: ClassVar[str] = "float32"  # of the predictor's weights by default, one of STORAGES
 
@@ -109,7 +110,7 @@ class Network(ABC):
     @property
     @abstractmethod
     def sizes(self) -> tuple[int, ...]:
-        """Units of each layer, the input first: (342, 512, 512, 311); () where there are no layers."""
+        """Units of each layer, the input first, such as (342, 512, 512, 311); () without layers."""
 
     @property
     @abstractmethod

@@ -16,6 +16,6 @@ class Options(Section):
         return ()
 
     @property
-    def asymmetric(self) -> str:
+    def why_asymmetric(self) -> str:
         """Why such a network cannot be trained with `training.symmetric`; empty if it can."""
         return f"a network of kind {self.kind} cannot treat left and right alike"

@@ -1,4 +1,4 @@
-"""Commands for files before there is a data set: `python -m hobble.motion rig` and `look`."""
+"""Commands for BVH files that are in no data set yet: `python -m hobble.motion rig` and `look`."""
 
 from __future__ import annotations
 
@@ -38,26 +38,30 @@ def main() -> int:
     """Run the command line. Returns 1 if a file is refused, else 0."""
     parser = argparse.ArgumentParser(prog="python -m hobble.motion", description=__doc__)
     commands = parser.add_subparsers(dest="command", required=True)
-    one = commands.add_parser("rig", help="write a draft of a rig file: which joint of a BVH file is which")
-    one.add_argument("file", type=Path, help="a BVH file")
-    one.add_argument("--to", type=Path, help="the file to write (default: print it)")
-    many = commands.add_parser("look", help="one line about each clip of a folder, or about one file")
-    many.add_argument("folder", type=Path, help="a folder of BVH files, or one file")
-    many.add_argument(
+    for_rig = commands.add_parser(
+        "rig", help="write a draft of a rig file: which joint of a BVH file is which"
+    )
+    for_rig.add_argument("file", type=Path, help="a BVH file")
+    for_rig.add_argument("--to", type=Path, help="the file to write (default: print it)")
+    for_look = commands.add_parser("look", help="one line about each clip of a folder, or about one file")
+    for_look.add_argument("folder", type=Path, help="a folder of BVH files, or one file")
+    for_look.add_argument(
         "--skeleton", default="holden31", help="skeleton to put the clips on, by name (default holden31)"
     )
-    many.add_argument("--skeletons", type=Path, default=SKELETONS, help="the folder of the skeleton files")
-    many.add_argument(
+    for_look.add_argument(
+        "--skeletons", type=Path, default=SKELETONS, help="the folder of the skeleton files"
+    )
+    for_look.add_argument(
         "--handedness",
         choices=["auto", "right", "left"],
         default="auto",
         help="handedness of the files' coordinates, as motion.handedness of a data set",
     )
-    many.add_argument(
+    for_look.add_argument(
         "--picture",
         type=Path,
         metavar="SVG",
-        help="for one file: write a picture of it and the retargeted motion, with the worst joint in red",
+        help="for one file: picture of its motion before and after retargeting, the worst joint in red",
     )
     given = parser.parse_args()
     try:

@@ -7,7 +7,7 @@ does both gets a second joint at the same place, so that the target's spine can 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -17,8 +17,9 @@ from hobble.core.quat import Array
 from hobble.motion.body import SIDES, Body
 
 # Offset from an ankle to the ball that is added below it, as a share of the length of thigh and shank, along
-# the axes of a body that stands upright and faces +Z.
-BALL = np.array([0.0, -0.045, 0.14])
+# the axes of a foot that stands and points to +Z. OUTWARD: radians by which feet point outward. Means over
+# seven subjects of CMU, with standard deviations of .006 (height), .010 (length) and 2 degrees.
+BALL, OUTWARD = np.array([0.0, -0.034, 0.136]), np.radians(5.0)
 
 
 def with_balls(clip: Clip, body: Body, frames: dict[int, Array]) -> tuple[Clip, Body]:
@@ -36,43 +37,73 @@ def with_balls(clip: Clip, body: Body, frames: dict[int, Array]) -> tuple[Clip, 
             for a, b in ((hip, knee), (knee, heel))
         )
         new = len(clip.skeleton.joints) + i
-        frames[new] = frames[heel]
+        outward = quat.yaw(np.array(OUTWARD if side == "left" else -OUTWARD))
+        frames[new] = frames[heel] = quat.mul(frames[heel], outward)
         legs[side] = (hip, knee, heel, new)
         offsets.append(quat.rotate(frames[heel], BALL * (thigh + shank)))
     heels = [body.legs[side][2] for side in without]
     return _with_joints(clip, "ball", heels, offsets), replace(body, legs=legs)
 
 
+@dataclass(frozen=True)
+class Bend:
+    """The bone above hips or chest. end: the joint where it ends. bone: (3,) its mean vector, in the
+    coordinates of the joint where it begins. frame: (4,) its frame, as `BodySample` defines it.
+    """
+
+    end: int
+    bone: Array
+    frame: Array
+
+
 def with_split_joints(
-    clip: Clip, body: Body, frames: dict[int, Array], bends: Mapping[int, Array]
+    clip: Clip, body: Body, frames: dict[int, Array], bends: Mapping[int, Bend]
 ) -> tuple[Clip, Body]:
     """The clip and the body with further joints at the places of hips and chest.
 
     frames: joint -> (4,) frame, as `BodySample` defines it. Those of the new joints are added to it. bends:
-    hips or chest, or both -> (4,) frame of the bone above that joint, which the new joint gets.
+    hips or chest, or both -> the bone above that joint, which the new joint follows. If the bone's end moves
+    relative to the joint, the new joint turns with it.
     """
     trunk, neck = body.trunk, body.neck
-    for new, (joint, turn) in enumerate(bends.items(), len(clip.skeleton.joints)):
-        frames[new] = turn
+    turns = [_turns(clip, joint, bend) for joint, bend in bends.items()]
+    for new, (joint, bend) in enumerate(bends.items(), len(clip.skeleton.joints)):
+        frames[new] = bend.frame
         if joint == body.chest:
             neck = (new, *neck)
         else:
             trunk = (new, *trunk)
-    return _with_joints(clip, "bend", list(bends), [np.zeros(3)] * len(bends)), replace(
-        body, trunk=trunk, neck=neck
+    grown = _with_joints(clip, "bend", list(bends), [np.zeros(3)] * len(bends), turns)
+    return grown, replace(body, trunk=trunk, neck=neck)
+
+
+def _turns(clip: Clip, joint: int, bend: Bend) -> Array:
+    """(F, 4) rotations of a bone relative to the joint where it begins."""
+    if clip.translations is None:
+        return _still(clip)
+    bones = quat.rotate(
+        quat.inv(clip.global_rotations[:, joint]), clip.positions[:, bend.end] - clip.positions[:, joint]
     )
+    return quat.between(np.broadcast_to(bend.bone, bones.shape), bones)
 
 
-def _with_joints(clip: Clip, word: str, parents: Sequence[int], offsets: Sequence[Array]) -> Clip:
-    """The clip with a new joint below each of `parents`, at an offset (3,) from it. The new joints never move
-    relative to their parents. word: end of their names.
+def _still(clip: Clip) -> Array:
+    return np.broadcast_to(quat.IDENTITY, (len(clip), 4))
+
+
+def _with_joints(
+    clip: Clip, word: str, parents: Sequence[int], offsets: Sequence[Array], turns: Sequence[Array] = ()
+) -> Clip:
+    """The clip with a new joint below each of `parents`, at an offset (3,) from it.
+
+    word: end of their names. turns: (F, 4) rotations of each relative to its parent; none by default.
     """
     if not parents:
         return clip
     skeleton = clip.skeleton
     names = (*skeleton.joints, *(f"{skeleton.joints[p]}_{word}" for p in parents))
     tail = np.array(offsets)
-    still = np.broadcast_to(quat.IDENTITY, (len(clip), len(parents), 4))
+    new = np.stack(turns or [_still(clip)] * len(parents), axis=1)
     moved = clip.translations
     if moved is not None:
         moved = np.concatenate([moved, np.broadcast_to(tail, (len(clip), *tail.shape))], axis=1)
@@ -82,5 +113,5 @@ def _with_joints(clip: Clip, word: str, parents: Sequence[int], offsets: Sequenc
         parents=(*skeleton.parents, *parents),
         offsets=np.concatenate([skeleton.offsets, tail]),
     )
-    rotations = np.concatenate([clip.rotations, still], axis=1)
+    rotations = np.concatenate([clip.rotations, new], axis=1)
     return replace(clip, skeleton=grown, rotations=rotations, translations=moved)

@@ -13,7 +13,8 @@ from hobble.core import quat
 from hobble.core.quat import Array
 from hobble.motion.body import Body
 from hobble.motion.orient import pointed_along, robust_mean, unit
-from hobble.motion.spine import SHORT, Spine
+from hobble.motion.spine import SHORT
+from hobble.motion.target_build import TargetBuild
 
 LEFT = np.array([1.0, 0.0, 0.0])
 FLEXED = 0.05  # a knee or elbow whose bend has a larger mean sine shows about which axis it bends
@@ -28,8 +29,8 @@ class BodySample:
 
     positions: (S, J, 3) cm, kept as `at`. rotations: (S, J, 4) in the world, kept as `turned`. speeds: (S, J)
     cm a second. rest: (J, 3) positions in the zero pose. ends: side -> (3,) position of the end site below
-    the ankle, or None. spine: the shape of the target's trunk in that stance. target_tilt: radians by which
-    the bones from ankle to ball point down on the target. seconds: length of the clip.
+    the ankle, or None. target: the build of the figure to which the motion will go. seconds: length of the
+    clip.
     """
 
     def __init__(
@@ -40,13 +41,11 @@ class BodySample:
         speeds: Array,
         rest: Array,
         ends: Mapping[str, tuple[float, float, float] | None],
-        spine: Spine,
-        target_tilt: float,
+        target: TargetBuild,
         seconds: float,
     ) -> None:
         self.body, self.at, self.turned, self.speeds = body, positions, rotations, speeds
-        self.rest, self.ends, self.spine, self.target_tilt = rest, ends, spine, target_tilt
-        self.seconds = seconds
+        self.rest, self.ends, self.target, self.seconds = rest, ends, target, seconds
         self.hips_left = self.line(body.legs["right"][0], body.legs["left"][0])
         self.chest_left = self.line(body.arms["right"][1], body.arms["left"][1])
 

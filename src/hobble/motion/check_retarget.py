@@ -34,7 +34,7 @@ SHAPED = ("hip", "ankle", "knee")
 OFFSET = 25.0  # degrees: a larger constant difference of a knee is an error and is not subtracted
 STANDS = 0.6  # cm a frame at 60 Hz: the ball of a standing foot is slower
 # Least mean cosine between the directions of a bent knee and of the front of the trunk. In 172 clips of CMU,
-# styles, patients, Ferre et al. and the original release it is .7 or more.
+# styles, patients, Ferre et al. and the release of Holden et al. it is .57 or more.
 KNEE_AHEAD = 0.25
 BENT = 20.0  # degrees: only where a knee bends more does it show where it points
 

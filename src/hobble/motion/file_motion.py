@@ -2,11 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from itertools import pairwise
 from pathlib import Path
-from typing import TypeVar
 
 import numpy as np
 
@@ -14,12 +12,11 @@ from hobble.core.clip import Clip
 from hobble.core.errors import InputError
 from hobble.core.skeleton import Skeleton, rest_positions
 from hobble.motion.axes import RigAxes, straighten
-from hobble.motion.body import SIDES, Body, body_by_roles, pairs, with_fingers
+from hobble.motion.body import Body, body_by_roles, pairs
+from hobble.motion.body_in_file import body_in_file, notes_on_names
 from hobble.motion.decode import Decoded, check_angles, decode, frame_rate
 from hobble.motion.defects import Repaired, flips, repair
-from hobble.motion.doubt import Doubt, TwoFigures, check_height
-from hobble.motion.draft import refusal
-from hobble.motion.find_body import FoundBody, find_body
+from hobble.motion.doubt import check_height
 from hobble.motion.floor import on_floor
 from hobble.motion.four_legs import on_four_legs
 from hobble.motion.hips_root import below_hips, decode_below
@@ -39,7 +36,6 @@ from hobble.motion.standing import why_not_standing
 from hobble.motion.upright_rest import upright
 
 STILL = 0.1  # cm: a joint whose position stays nearer to its offset than this does not move in its parent
-Limb = TypeVar("Limb")
 FOUND = "found"  # name in reports of a rig without a skeleton file
 
 
@@ -123,7 +119,7 @@ def _on_unknown_rig(
     rig = rig_of(file)
     decoded = _decoded(file)
     raw = Clip(file.path.stem, rig, 1.0, decoded.rotations, decoded.root, decoded.translations)
-    found = _find_body(file, rig, raw, known, options)
+    found = body_in_file(file, rig, raw, known, options)
     body = found.body
     for a, b in (pair for leg in body.legs.values() for pair in pairwise(leg[:3])):
         if np.median(np.linalg.norm(raw.positions[:, b] - raw.positions[:, a], axis=-1)) < 1e-6:
@@ -155,7 +151,7 @@ def _on_unknown_rig(
         False,
         named or pairs(standing_clip.clip.skeleton, standing_clip.body, target.skeleton, theirs),
     )
-    notes = decoded.notes + straight.notes + ([] if known else _notes_on_names(found, options.handedness))
+    notes = decoded.notes + straight.notes + ([] if known else notes_on_names(found, options.handedness))
     source = FileMotion(
         standing_clip.clip,
         match,
@@ -171,40 +167,6 @@ def _on_unknown_rig(
         unsure=straight.unsure + standing_clip.notes,
     )
     return _repaired(file, source, options)
-
-
-def _find_body(file: Bvh, rig: Skeleton, raw: Clip, known: RigMatch | None, options: ClipMotion) -> FoundBody:
-    if known is not None:
-        return FoundBody(body_by_roles(replace(rig, roles=known.roles)), True)
-    try:
-        found = find_body(rig.joints, rig.parents, raw.positions)
-    except TwoFigures as error:
-        raise InputError(file.path, str(error), fix="Export each figure on its own.") from None
-    except Doubt as doubt:
-        raise refusal(file, rig, doubt) from None
-    if not found.sided and options.handedness == "auto":
-        raise InputError(
-            file.path,
-            "its joint names do not say left and right, and its mirror image would move as well",
-            fix="Set motion.handedness in the data set: right, the standard of BVH files, or left, if the "
-            "program that wrote the file has left-handed coordinates.",
-        )
-    body = found.body
-    if not found.sided and options.handedness == "left":
-        body = replace(body, arms=_swapped(body.arms), legs=_swapped(body.legs))
-    return replace(found, body=with_fingers(body, rig))
-
-
-def _swapped(limbs: Mapping[str, Limb]) -> dict[str, Limb]:
-    return {a: limbs[b] for a, b in (SIDES, SIDES[::-1])}
-
-
-def _notes_on_names(found: FoundBody, handedness: str) -> list[str]:
-    """Sentences on how the parts of the rig and its left side were found."""
-    out = ["No skeleton file describes this rig: its parts were found from structure, motion and names."]
-    if not found.sided:
-        out.append(f"Its joint names do not say left and right, so motion.handedness: {handedness} was used.")
-    return out
 
 
 def _repaired(file: Bvh, source: FileMotion, options: ClipMotion) -> FileMotion:

@@ -7,42 +7,64 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
+from hobble.core.quat import Array
 from hobble.core.skeleton import Skeleton
 from hobble.motion.names import part_of
 from hobble.motion.tree import above
 
-AWAY = (0.1, 0.7)  # range of the distance from wrist to the base of a finger, in forearm lengths
+AWAY = (0.1, 0.7)  # range of the distance from the wrist to the base of a finger, in forearm lengths
+EQUAL = 0.03  # forearm lengths: a finger counts as longest, too, if it is shorter by less than this
 
 
 def pointing_fingers(skeleton: Skeleton, wrists: Mapping[str, int]) -> dict[str, int]:
-    """Side -> the base of the hand's longest finger. Sides without one are left out.
+    """Side -> the base of the hand's longest finger. Sides without a finger are left out.
 
     A thumb does not count, nor a chain longer than the forearm: that is an object held in the hand. Fingers
-    with meaningful names come first.
+    that `_points` knows by their names come before all others. Of several longest fingers, the one in the
+    middle of them is taken.
     """
     lengths = np.linalg.norm(skeleton.offsets, axis=-1)
     fingers = {}
     for side, wrist in wrists.items():
-        fore, best = float(lengths[wrist]), 0.0
-        chains = _chains(skeleton.parents, wrist)
-        numbers = {_number([skeleton.joints[j] for j in chain]) for chain in chains} - {None}
-        thumb = min((n for n in numbers if n is not None), default=None) if len(numbers) > 1 else None
-        for chain in chains:
-            names = [skeleton.joints[j] for j in chain]
-            number = _number(names)
-            if "thumb" in "".join(names).lower() or (number is not None and number == thumb):
-                continue
-            length = float(lengths[chain].sum())
-            ways = np.linalg.norm(np.cumsum(skeleton.offsets[chain], axis=0), axis=-1)
-            far = [j for j, way in zip(chain, ways, strict=True) if AWAY[0] * fore < way < AWAY[1] * fore]
-            named = fore if _points(names, skeleton.joints[wrist]) else 0.0
-            if far and length < fore and length + named > best:
-                best, fingers[side] = length + named, far[0]
+        forearm = float(lengths[wrist])
+        found = _fingers(skeleton, wrist, forearm)
+        if not found:
+            continue
+        longest = max(length for length, _, _ in found)
+        bases = {joint: place for length, joint, place in found if length > longest - EQUAL * forearm}
+        middle = np.mean(list(bases.values()), axis=0)
+        fingers[side] = min(bases, key=lambda joint: float(np.linalg.norm(bases[joint] - middle)))
     return fingers
 
 
+def _fingers(skeleton: Skeleton, wrist: int, forearm: float) -> list[tuple[float, int, Array]]:
+    """Length, base, and (3,) position of the base relative to the wrist, of each chain that can be a finger.
+
+    The forearm's length is added to that of a finger that `_points` knows by its name, so that the finger
+    comes first.
+    """
+    found = []
+    chains = _chains(skeleton.parents, wrist)
+    numbers = {_number([skeleton.joints[j] for j in chain]) for chain in chains} - {None}
+    # The lowest number is the thumb's.
+    thumb = min((n for n in numbers if n is not None), default=None) if len(numbers) > 1 else None
+    for chain in chains:
+        names = [skeleton.joints[j] for j in chain]
+        number = _number(names)
+        if "thumb" in "".join(names).lower() or (number is not None and number == thumb):
+            continue
+        length = float(np.linalg.norm(skeleton.offsets[chain], axis=-1).sum())
+        places = np.cumsum(skeleton.offsets[chain], axis=0)
+        ways = np.linalg.norm(places, axis=-1)
+        far = np.flatnonzero((ways > AWAY[0] * forearm) & (ways < AWAY[1] * forearm))
+        named = forearm if _points(names, skeleton.joints[wrist]) else 0.0
+        if len(far) and length < forearm:
+            found.append((length + named, chain[far[0]], places[far[0]]))
+    return found
+
+
 def _chains(parents: Sequence[int], wrist: int) -> list[list[int]]:
-    """The chains from below the wrist to each joint under it."""
+    """For each joint below the wrist, the chain of joints from the wrist's child to that joint."""
     out = []
     for end in range(len(parents)):
         chain = above(parents, end)
@@ -54,7 +76,8 @@ def _chains(parents: Sequence[int], wrist: int) -> list[list[int]]:
 def _points(names: Sequence[str], wrist: str) -> bool:
     """Whether the names of a chain say that it points where the hand does.
 
-    That is an index or middle finger, a numbered finger that is not the thumb, or a hand below a wrist.
+    They do if a name says index, middle or finger with a number, or if the wrist joint is named a wrist and a
+    joint below it is named a hand.
     """
     text = "".join(names).lower()
     hand = part_of(wrist) == "wrist" and any(part_of(name) == "hand" for name in names)

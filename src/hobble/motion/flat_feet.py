@@ -17,12 +17,11 @@ from numpy.typing import NDArray
 
 from hobble.core import quat
 from hobble.core.quat import Array
-from hobble.core.skeleton import Skeleton, rest_positions
-from hobble.motion.axes import rest_frame
-from hobble.motion.body import SIDES, Body
+from hobble.motion.body import SIDES
 from hobble.motion.body_sample import BodySample
 from hobble.motion.orient import degrees_between, mean_rotation, unit
 from hobble.motion.spine import SHORT
+from hobble.motion.target_build import limb_bones
 
 UP, AHEAD, LEFT = np.array([0.0, 1.0, 0.0]), np.array([0.0, 0.0, 1.0]), np.array([1.0, 0.0, 0.0])
 STANCE = 0.2  # a foot counts as standing in this share of the frames: those with the lowest and slowest ball
@@ -44,10 +43,10 @@ EXACT_ERROR = np.radians(0.5)
 # Standard deviation of the difference between the tilt of a captured foot that stands and of the same foot in
 # the rig's zero pose: 3 degrees over seven subjects of CMU, and a little more for differences between clips.
 CAPTURED_ERROR = np.radians(3.5)
-# A captured rig's feet are built either about like the target's or in any way. In the first case their tilt
-# differs from the target's by LIKE_TARGET, root mean square (of the seven subjects' feet from those of
-# `holden31`). In the second case, all tilts in a range of ANY_FOOT are equally likely.
-LIKE_TARGET, ANY_FOOT = np.radians(4.5), np.radians(42.0)
+# The feet of a rig are built either like those of people in the CMU database or in any way. In the first case
+# their tilt in the zero pose is PERSON, with the standard deviation PERSONS (of seven subjects: 15.0 and 2.0
+# degrees). In the second case, all tilts in a range of ANY_FOOT are equally likely.
+PERSON, PERSONS, ANY_FOOT = np.radians(15.0), np.radians(2.5), np.radians(42.0)
 # In a clip shorter than BRIEF seconds, the feet may never stand. The standard deviation of their tilt is then
 # BRIEF_ERROR radians: clips of a third of a second or less were 10 to 15 degrees off.
 BRIEF, BRIEF_ERROR = 0.5, np.radians(12.0)
@@ -109,7 +108,7 @@ def feet_tilt(sample: BodySample) -> Tilt:
         alike = len(zero_tilts) == len(SIDES) and np.ptp(zero_tilts) < SAME
         if alike and 0 < np.mean(zero_tilts) < np.mean(measured_tilts):
             return Tilt(sides, zero, CAPTURED_ERROR)
-        return Tilt(sides, _both(sides, sample.target_tilt), BRIEF_ERROR)
+        return Tilt(sides, _both(sides, sample.target.tilt), BRIEF_ERROR)
     if exact := [tilt for side, tilt in sides.items() if tilt is not None and _exact(sample, side)]:
         return Tilt(sides, _both(sides, float(np.mean(exact))), EXACT_ERROR)
     raised = RAISED if runs(sample) else 0.0
@@ -119,15 +118,23 @@ def feet_tilt(sample: BodySample) -> Tilt:
         best_foot = min(abs(a - b + raised) for a, b in zip(zero_tilts, measured_tilts, strict=True))
         if min(abs(np.mean(zero_tilts) - measured), 2 * best_foot) < AGREE:
             return Tilt(sides, zero, EXACT_ERROR)
+    if _is_target(sample):
+        return Tilt(sides, _both(sides, sample.target.tilt), EXACT_ERROR)
     error = float(np.hypot(CAPTURED_ERROR, 0.25 * np.ptp(measured_tilts)))
-    angle, error = _likeliest(measured, error, sample.target_tilt)
+    angle, error = _likeliest(measured, error)
     return Tilt(sides, _both(sides, angle), error if sample.seconds >= BRIEF else BRIEF_ERROR)
+
+
+def _is_target(sample: BodySample) -> bool:
+    """Whether the rig has the target's proportions, so that its feet are the target's."""
+    bones = limb_bones(sample.body)
+    return sample.target.is_built_like(np.array([sample.length(*bone) for bone in bones]))
 
 
 def _on_tiptoe(sample: BodySample, measured_tilts: Sequence[float]) -> bool:
     """Whether the body squats on feet that are much steeper than the target's flat ones."""
     low = not any(upright_while_flat(sample, side) for side in SIDES)
-    return low and bool(np.mean(measured_tilts) > sample.target_tilt + TIPTOE)
+    return low and bool(np.mean(measured_tilts) > sample.target.tilt + TIPTOE)
 
 
 def _both(sides: dict[str, float | None], angle: float) -> dict[str, float | None]:
@@ -143,19 +150,19 @@ def _both(sides: dict[str, float | None], angle: float) -> dict[str, float | Non
     }
 
 
-def _likeliest(measured: float, error: float, target: float) -> tuple[float, float]:
+def _likeliest(measured: float, error: float) -> tuple[float, float]:
     """The expected tilt of a captured rig's feet and its standard deviation, radians.
 
-    measured: the measured tilt. error: its standard deviation. target: the tilt of the target's feet. The
-    feet are built either about like the target's or in any way. Both cases are weighted by how well they
-    explain the measured tilt: a mixture of a normal and an even distribution.
+    measured: the measured tilt. error: its standard deviation. The feet are built either like a person's or
+    in any way. Both cases are weighted by how well they explain the measured tilt: a mixture of a normal and
+    an even distribution.
     """
-    apart, both = target - measured, float(np.hypot(error, LIKE_TARGET))
-    alike = np.exp(-0.5 * (apart / both) ** 2) / (np.sqrt(2 * np.pi) * both)
-    alike /= alike + 1 / ANY_FOOT
+    apart, both = PERSON - measured, float(np.hypot(error, PERSONS))
+    person = np.exp(-0.5 * (apart / both) ** 2) / (np.sqrt(2 * np.pi) * both)
+    person /= person + 1 / ANY_FOOT
     pull = (error / both) ** 2
-    variance = error**2 * (1 - alike * pull) + alike * (1 - alike) * (pull * apart) ** 2
-    return measured + alike * pull * apart, float(np.sqrt(variance))
+    variance = error**2 * (1 - person * pull) + person * (1 - person) * (pull * apart) ** 2
+    return measured + person * pull * apart, float(np.sqrt(variance))
 
 
 def height_error(sample: BodySample, zero: bool) -> float:
@@ -196,13 +203,6 @@ def doubt(sample: BodySample, zero: bool) -> str | None:
         f"The height of its ankles is uncertain, because {why}. It was estimated from standing feet: "
         f"the figure may stand {most:.1f} cm too high or low."
     )
-
-
-def rest_tilt(skeleton: Skeleton, body: Body) -> float:
-    """The tilt of the feet in a skeleton's standing rest pose, in radians: the mean of both."""
-    rest = quat.rotate(quat.inv(rest_frame(skeleton)), rest_positions(skeleton))
-    bones = [rest[toe] - rest[heel] for *_, heel, toe in body.legs.values() if toe is not None]
-    return float(np.mean(_steep(np.array(bones))))
 
 
 def runs(sample: BodySample) -> bool:

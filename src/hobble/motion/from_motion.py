@@ -9,6 +9,7 @@ import numpy as np
 
 from hobble.core import quat
 from hobble.core.quat import Array
+from hobble.motion.added_joints import Bend
 from hobble.motion.body_sample import LEFT, BodySample
 from hobble.motion.flat_feet import flat_feet
 from hobble.motion.no_neck import lacks_neck, neck_bone
@@ -32,13 +33,13 @@ def from_motion(sample: BodySample, trunk: BodySample, zero: Array | None) -> di
     return frames | flat_feet(sample)
 
 
-def bends(sample: BodySample) -> dict[int, Array]:
-    """Hips and chest -> (4,) rotation of the bone above each; left out where that bone has no length."""
+def bends(sample: BodySample) -> dict[int, Bend]:
+    """Hips and chest -> the bone above each; left out where that bone has no length."""
     body, out = sample.body, {}
     for joint, following in ((body.hips, body.trunk), (body.chest, (*body.neck, body.head))):
         if following and sample.length(joint, following[0]) > SHORT:
             bone, axis, left = _bone(sample, joint)
-            out[joint] = frame(bone, axis, left, LEFT)
+            out[joint] = Bend(following[0], sample.bone(joint, following[0]), frame(bone, axis, left, LEFT))
     return out
 
 
@@ -49,7 +50,7 @@ def trunk_frames(sample: BodySample, zero: Array | None) -> dict[int, Array]:
     for joint in chain:
         bone, axis, left = _bone(sample, joint)
         if body.trunk and joint == body.chest and lacks_neck(sample):
-            bone, axis = neck_bone(sample, left, zero), sample.spine.neck
+            bone, axis = neck_bone(sample, left, zero), sample.target.spine.neck
         # For hips and chest, left is more reliable than the bone: limbs begin level there, but spines of
         # captured rigs bend sideways by some degrees.
         carries = joint in (body.hips, body.chest)
@@ -70,14 +71,14 @@ def _bone(sample: BodySample, joint: int) -> tuple[Array, Array, Array]:
     share = dict(zip(chain, spine_shares(lengths, len(body.trunk)), strict=True))
     following = chain[chain.index(joint) + 1 :]
     # A rig with many short bones has kinks. One bone of the target follows several of them, up to its end.
-    reach = [j for j in following if share[j] <= sample.spine.end(share[joint]) + 1e-6]
+    reach = [j for j in following if share[j] <= sample.target.spine.end(share[joint]) + 1e-6]
     bone, end = sample.first_long(joint, [*reach[-1:], *following])
     left = sample.chest_left
     if joint == body.hips:
         left = sample.hips_left
     elif joint in trunk and joint != body.chest:
         left = unit(sample.hips_left + sample.chest_left)
-    return bone, sample.spine.direction(share[joint], share[end]), sample.local(joint, left)
+    return bone, sample.target.spine.direction(share[joint], share[end]), sample.local(joint, left)
 
 
 def _head(sample: BodySample, frames: dict[int, Array], chain: Sequence[int]) -> Array:

@@ -25,7 +25,7 @@ def lacks_neck(sample: BodySample) -> bool:
 
     A joint at the same place as the chest is no neck.
     """
-    body, target = sample.body, sample.spine
+    body, target = sample.body, sample.target.spine
     return target.has_neck and all(sample.length(body.chest, joint) <= SHORT for joint in body.neck)
 
 

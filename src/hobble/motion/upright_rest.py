@@ -20,14 +20,15 @@ from hobble.core.skeleton import Skeleton, rest_positions
 from hobble.motion.added_joints import with_balls, with_split_joints
 from hobble.motion.body import Body, body_by_roles
 from hobble.motion.body_sample import LEFT, BodySample
-from hobble.motion.flat_feet import doubt, height_error, rest_tilt
+from hobble.motion.flat_feet import doubt, height_error
 from hobble.motion.from_motion import bends, from_motion, trunk_frames
 from hobble.motion.from_rest import TRUSTED, add_rest, from_rest, zero_doubt
 from hobble.motion.no_neck import lean_doubt
 from hobble.motion.orient import degrees_between, mean_rotation, pointed_along
 from hobble.motion.rebase import rebased
-from hobble.motion.spine import SHORT, Spine
+from hobble.motion.spine import SHORT
 from hobble.motion.standing import why_not_standing
+from hobble.motion.target_build import TargetBuild
 from hobble.motion.tree import above
 from hobble.motion.trunk_sample import stoop_doubt, trunk_sample
 
@@ -64,7 +65,7 @@ def upright(clip: Clip, body: Body, target: Skeleton, others: Collection[int] = 
         side: clip.skeleton.end_sites.get(clip.skeleton.joints[leg[2]]) for side, leg in body.legs.items()
     }
     speeds = _speeds(clip)[every]
-    rest, theirs = rest_positions(clip.skeleton), body_by_roles(target)
+    rest = rest_positions(clip.skeleton)
     sample = BodySample(
         body,
         clip.positions[every],
@@ -72,8 +73,7 @@ def upright(clip: Clip, body: Body, target: Skeleton, others: Collection[int] = 
         speeds,
         rest,
         ends,
-        Spine.of(target, theirs),
-        rest_tilt(target, theirs),
+        TargetBuild.of(target, body_by_roles(target)),
         len(clip) / clip.fps,
     )
     problem = why_not_standing(body, rest)

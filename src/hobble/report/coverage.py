@@ -121,27 +121,27 @@ def both_chart(found: Mapping[str, Any]) -> Chart | None:
     return Chart("speed-turn", "Speed and turn combined", caption + found["estimate"], [trace], layout, 300)
 
 
-def channel_charts(found: Mapping[str, Any], say: Callable[[str], str] = str) -> list[Chart]:
+def channel_charts(found: Mapping[str, Any], shown_name: Callable[[str], str] = str) -> list[Chart]:
     """A chart for each channel that has a value above 0 in any clip: seconds at each value of each column.
 
-    say: column -> its name on the page.
+    shown_name: column -> its name on the page.
     """
     return [
-        _channel_chart(name, seconds, found["estimate"], say)
+        _channel_chart(name, seconds, found["estimate"], shown_name)
         for name, seconds in found["channels"].items()
         if seconds
     ]
 
 
 def _channel_chart(
-    name: str, seconds: Mapping[str, Array], estimate: str, say: Callable[[str], str]
+    name: str, seconds: Mapping[str, Array], estimate: str, shown_name: Callable[[str], str]
 ) -> Chart:
     one, columns = channel(name), list(seconds)[::-1]
     tenth = one.highest / 10
     trace = {
         "type": "heatmap",
         "x": np.round(LEVELS * tenth, 6).tolist(),
-        "y": [say(column) for column in columns],
+        "y": [shown_name(column) for column in columns],
         "z": [[round(float(v), 3) or None for v in seconds[column]] for column in columns],
         "colorscale": [[0, "@hurt-low"], [1, "@hurt-high"]],
         "xgap": 3,

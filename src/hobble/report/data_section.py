@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from hobble.channels.shown import speaker
+from hobble.channels.shown import shown_names
 from hobble.motion.check_retarget import MOST, worst
 from hobble.report.charts import Chart, Trace, axis
 from hobble.report.formats import size
@@ -17,7 +17,7 @@ from hobble.report.tables import Column, Table
 GAIT_COLOURS = {"stand": "@g0", "walk": "@g1", "jog": "@g2", "crouch": "@g3", "jump": "@g4", "bump": "@g5"}
 MOST_BARS = 200  # clips with a bar of their own, at most
 MOST_REMARKS = 500  # rows of the table of repairs and warnings, at most
-MOST_NAMED = 30  # bars, at most, with a name under each
+MOST_NAMED = 30  # if there are more bars than this, none has a name under it
 SPLIT_NAMES = {"train": "training", "held_out": "held out"}
 
 
@@ -83,7 +83,7 @@ def speed_chart(material: ReportMaterial) -> Chart | None:
         "yaxis": axis("seconds", rangemode="tozero"),
     }
     caption = "Seconds at each speed. Where there is little or no data, the network has to interpolate."
-    return Chart("speeds", "Speed", caption, traces, layout, 300)
+    return Chart("speeds", "Speed over the ground", caption, traces, layout, 300)
 
 
 def retarget_chart(material: ReportMaterial) -> Chart | None:
@@ -113,9 +113,9 @@ def retarget_chart(material: ReportMaterial) -> Chart | None:
         "yaxis": axis("difference, degrees", rangemode="tozero"),
     }
     caption = (
-        "These clips were retargeted to the skeleton of the data set. Each bar is the joint or limb whose "
-        f"direction differs most from the file, averaged over the clip. Clips with {MOST:.0f} degrees or "
-        "more are refused."
+        "These clips were retargeted to the skeleton of the data set. Each bar is the joint or limb that "
+        "differs most from the file, in degrees averaged over the clip. Clips with more than "
+        f"{MOST:.0f} degrees are refused."
     )
     if every > len(found):
         caption += f" Shown are the {len(found)} of {every:,} clips that differ most."
@@ -202,13 +202,13 @@ def _by_kind(rows: list[list[str]]) -> list[list[Any]]:
 
 
 def strips(material: ReportMaterial, clips: frozenset[str]) -> list[dict[str, Any]]:
-    """The label curves and channel values of each of `clips` that has any; mirror clips are left out."""
+    """Label curves and channel values of each clip in `clips` that has label curves; mirrors are left out."""
     of_clip: dict[str, dict[str, Any]] = {}
     for report in material.channels:
-        highest = {"highest": report.get("highest", 10.0)}
-        found = {label: (value, highest) for label, value in report["values"].items()}
+        channel_highest = report.get("highest", 10.0)
+        found = {label: (value, channel_highest) for label, value in report["values"].items()}
         of_clip.setdefault(report["clip"], {}).update(found)
-    say = speaker(material.network["skeleton"])
+    shown_name = shown_names(material.network["skeleton"])
     lengths = {report["clip"]: report.get("seconds") for report in material.motion}
     known = {report["clip"] for report in material.labels}
     out = []
@@ -219,8 +219,12 @@ def strips(material: ReportMaterial, clips: frozenset[str]) -> list[dict[str, An
             continue
         length = lengths.get(clip) or curves["seconds"][-1]
         status = [
-            {"name": say(label), "spans": value.get("spells") or [[0, length, value["highest"]]], **highest}
-            for label, (value, highest) in of_clip.get(clip, {}).items()
+            {
+                "name": shown_name(label),
+                "spans": value.get("spells") or [[0, length, value["highest"]]],
+                "highest": channel_highest,
+            }
+            for label, (value, channel_highest) in of_clip.get(clip, {}).items()
         ]
         out.append({**curves, "clip": clip, "length": length, "status": status})
     return out

@@ -37,8 +37,8 @@ def lead(material: ReportMaterial) -> str:
         else f"A character driven by {network['described']}, built"
     )
     text += f" for {passes:g} passes" if passes and network["sizes"] else ""
-    text += f" on {len(clips) - kept} clips of {material.dataset}"
-    text += f" and tested on {kept} held-out clips" if kept else ""
+    text += f" on {len(clips) - kept} clips of the data set {material.dataset}"
+    text += f", and tested on {kept} held-out clips" if kept else ""
     return f"{text}. All clips together have {frames:,} frames at 60\u00a0Hz."
 
 

@@ -7,7 +7,7 @@ from typing import Any
 
 import yaml
 
-from hobble.channels.shown import speaker
+from hobble.channels.shown import shown_names
 from hobble.core.skeleton import Skeleton
 from hobble.figure.mesh import key
 from hobble.figure.pack import packed_body
@@ -141,7 +141,7 @@ def _sections(
             "speeds": data.speed_chart(material),
             "turns": coverage.turn_chart(found),
             "both": coverage.both_chart(found),
-            "channels": coverage.channel_charts(found, speaker(material.network["skeleton"])),
+            "channels": coverage.channel_charts(found, shown_names(material.network["skeleton"])),
             "retarget": data.retarget_chart(material),
             "clips": data.clip_table(material, clips),
             "remarks": data.remarks_table(material),

@@ -50,7 +50,7 @@ def playable(network: Network, runtime: Runtime) -> dict[str, Any]:
     carried = feet.carried(skeleton, legs)
     return {
         "network": {"kind": network.kind, **network.page(read, rows)},
-        "rooted": network.rooted,
+        "recordedPoses": network.recorded_poses,
         "inputColumns": read.tolist(),
         "xMean": packed(network.x_mean[read].astype(np.float32)),
         "xScale": packed(scale[read].astype(np.float32)),

@@ -118,8 +118,9 @@ def distances(found: list[ShownFits]) -> Chart:
     return Chart(
         "terrain-feet",
         "Distance of the feet from the ground",
-        "Mean distance of a foot in contact from the fitted ground, which was corrected to meet the feet. "
-        "Each box covers the cycles and fits of a clip. Less than a centimetre is invisible.",
+        "The fitted ground was corrected to meet the feet. This is the mean distance that remains between it "
+        "and a foot in contact. Each box covers the cycles and fits of a clip. Less than a "
+        "centimetre is invisible.",
         traces,
         {
             "xaxis": axis("cm", rangemode="tozero"),

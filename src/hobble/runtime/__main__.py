@@ -1,4 +1,8 @@
-"""Export a network to other formats: python -m hobble.runtime onnx|bin|bvh NETWORK TARGET.
+"""Export a network (onnx, bin), or walks that it generates (bvh).
+
+python -m hobble.runtime onnx|bin|bvh NETWORK TARGET
+
+Examples:
 
 python -m hobble.runtime onnx results/holden/network holden.onnx --mode cubic
 python -m hobble.runtime bin results/holden/network pfnn
@@ -23,13 +27,14 @@ from hobble.runtime.scenarios import write_motions
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run the command; returns the exit status."""
     parser = argparse.ArgumentParser(
-        prog="python -m hobble.runtime", description="Export a network to other formats."
+        prog="python -m hobble.runtime",
+        description="Export a network (onnx, bin), or walks that it generates (bvh).",
     )
     parser.add_argument(
         "to",
         choices=("onnx", "bin", "bvh"),
-        help="onnx: one file, checked with onnxruntime; bin: the original release's files; bvh: the scripted "
-        "walks that the network generates, one BVH file each",
+        help="onnx: one file, checked with onnxruntime; bin: .bin files as in the release of Holden et al. "
+        "(2017); bvh: the scripted walks that the network generates, one BVH file each",
     )
     parser.add_argument("network", help="weights.npz, its folder, or a folder of .bin files")
     parser.add_argument("target", help="the file or folder to write")

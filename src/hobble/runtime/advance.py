@@ -18,8 +18,8 @@ from hobble.runtime.trajectory import STILL, Trajectory
 
 phase_change, moving_share = register_jitable(rule.phase_change), register_jitable(rule.moving)
 
-# With `Network.rooted`: largest change of the root's movement at right angles to the target, as a share of
-# the movement.
+# With `Network.recorded_poses`: largest change of the root's movement at right angles to the target, as a
+# share of the movement.
 PULL = 0.2
 # Largest change along the target, as a share of PULL. With more, the character takes corners faster and
 # wider.
@@ -60,13 +60,13 @@ def _without_backward(
 
 @njit
 def advance(
-    y: Any, at: Any, target: Any, loss: float, rooted: bool, pull: float, path: Trajectory, phase: Any
+    y: Any, at: Any, target: Any, loss: float, recorded_poses: bool, pull: float, path: Trajectory, phase: Any
 ) -> None:
     """Advance one frame: shift the past, move and turn the root, take the predicted future and phase change.
 
     y: (C, Y) prediction. at: first columns in y of root velocity, turn, phase change, position and direction,
     then the number of future samples and the frames between two samples. target: (C, 2) velocity.
-    rooted: see `Network.rooted`. If false, the movement is scaled by (1 - stand)^.25.
+    recorded_poses: see `Network.recorded_poses`. If false, the movement is scaled by (1 - stand)^.25.
     loss: share of the movement against the target that is removed; if the target is to stand, that share of
     all movement. The original runtime removes nothing.
     pull: largest change of the movement toward the target, as a share of the movement. It is needed because
@@ -84,7 +84,7 @@ def advance(
                 direction[c, i, k] = direction[c, i + 1, k]
             for k in range(gait.shape[2]):
                 gait[c, i, k] = gait[c, i + 1, k]
-        moving = 1.0 if rooted else moving_share(gait[c, middle, 0])
+        moving = 1.0 if recorded_poses else moving_share(gait[c, middle, 0])
         yaw = np.arctan2(direction[c, middle, 0], direction[c, middle, 1])
         sin, cos = np.sin(yaw), np.cos(yaw)
         vx, vz = y[c, at[0]], y[c, at[0] + 1]

@@ -226,11 +226,13 @@ class Controller:
         )  # fmt: skip
 
     def _update(self, velocity: Array) -> None:
-        rooted = self.predictor.network.rooted
+        recorded_poses = self.predictor.network.recorded_poses
         steered = self.steering > 0
-        loss = BACKWARD_LOSS if steered and not rooted else 0.0
-        pull = PULL if steered and rooted else 0.0
-        advance(self.y, self._y_columns, velocity, loss, rooted, pull, self._path, self.character.phase)
+        loss = BACKWARD_LOSS if steered and not recorded_poses else 0.0
+        pull = PULL if steered and recorded_poses else 0.0
+        advance(
+            self.y, self._y_columns, velocity, loss, recorded_poses, pull, self._path, self.character.phase
+        )
 
 
 def _heights(ground: Ground, x: Array, z: Array) -> Array:

@@ -16,14 +16,14 @@ from hobble.synthetic.planned_ground import Ground
 from hobble.synthetic.style import Style
 
 X_AXIS = np.array([1.0, 0.0, 0.0])
-HEEL = np.array([0.0, -4.2, -3.0])  # approximate back of the sole, from the ankle
-READY = 0.95  # share of the swing after which the foot is pitched for its landing
+HEEL = np.array([0.0, -4.2, -3.0])  # cm from the ankle: approximate place of the heel
+READY = 0.95  # share of the swing by which the foot has reached the pitch of its landing
 KICK = 0.68  # at less than 1 the foot is highest in the first half of the swing
 FOLLOW = 0.45  # share of its pitch rate that the foot keeps as it leaves
-LANDING_SPEED = 0.36  # speed of the foot as it lands, as a share of its mean speed
+LANDING_SPEED = 0.36  # speed of the foot as it lands, as a share of its mean speed in the swing
 EARLY = 0.81  # at less than 1 the foot covers more than half of its distance in the first half of the swing
 RISE, SETTLE = 0.36, 0.3  # shares of the swing in which the foot rises to its clearance and comes down again
-SOLE_HEIGHT = 2.0  # cm: a joint of the swinging foot stays at least this plus the clearance above the ground
+SOLE_HEIGHT = 2.0  # cm: heel, toe joint and toe tip count as this high above the sole
 
 
 @dataclass(frozen=True)
@@ -41,7 +41,8 @@ class FootPoses:
 def move_foot(steps: list[PlannedStance], style: Style, side: int, ground: Ground) -> FootPoses:
     """The path of one foot through its stances.
 
-    Frames before the first stance, and from the last one on, stay 0.
+    Frames before the first landing, and from the last landing on, are not set: there positions are 0 and
+    rotations the identity.
     """
     frames = len(style.duty)
     turns = np.tile(quat.IDENTITY, (frames, 1))
@@ -49,7 +50,7 @@ def move_foot(steps: list[PlannedStance], style: Style, side: int, ground: Groun
     rest = np.radians(style.rest_pitch)
     rolls = [_Roll.of(step, style, side, rest) for step in steps]
     for i, (here, there) in enumerate(pairwise(rolls)):
-        stays = not there.step.swings  # without a swing, the foot stands at the same place until then
+        stays = not there.step.swings  # no swing to the next stance: the foot stands until then
         leave = there.step.land if stays else here.step.leave
         t = _frames(here.step.land, leave)
         pitch = here.pitch(t, lands=here.step.swings or i == 0, leaves=not stays)
@@ -67,14 +68,14 @@ def _frames(start: float, end: float) -> np.ndarray:
 class _Roll:
     """A stance, and the pitch of the foot in it: the toe comes down, the foot is flat, then the heel goes up.
 
-    land, off: radians of pitch as the foot lands and as it leaves. rest: (F,) radians, the pitch of a
+    land_pitch, off_pitch: radians, as the foot lands and as it leaves. rest: (F,) radians, the pitch of a
     standing foot; one array for all stances. flat, heel_off: shares of the stance after which the toe is down
-    and the heel leaves. power: exponent of the heel's rise over time.
+    and the heel leaves the ground. power: exponent of the heel's rise over time.
     """
 
     step: PlannedStance
-    land: float
-    off: float
+    land_pitch: float
+    off_pitch: float
     rest: Array
     flat: float
     heel_off: float
@@ -106,8 +107,8 @@ class _Roll:
         down = u / self.flat
         rise = np.clip((u - self.heel_off) / (1 - self.heel_off), 0, None)
         rest = value_at(self.rest, t)
-        landing = (self.land - rest) * (1 - _ease(down)) if lands else 0.0
-        return np.asarray(rest + landing + ((self.off - rest) * rise**self.power if leaves else 0.0))
+        landing = (self.land_pitch - rest) * (1 - _ease(down)) if lands else 0.0
+        return np.asarray(rest + landing + ((self.off_pitch - rest) * rise**self.power if leaves else 0.0))
 
     def toe(self, pitch: Array) -> Array:
         """(3,) position of the toe joint.
@@ -160,7 +161,7 @@ def _swing(foot: FootPoses, here: _Roll, there: _Roll, style: Style, side: int, 
 
 
 def _lack(toe: Array, rotation: Array, toes: Array, clearance: Array, ground: Ground) -> Array:
-    """(N,) how much higher the swing must be for heel, toe joint and toe tip to clear the ground."""
+    """(N,) how much higher, cm, the swing must be for heel, toe joint and toe tip to clear the ground."""
     tip = toe + quat.rotate(toes, np.array([0.0, 0.0, 6.0]))
     heel = toe + quat.rotate(rotation, HEEL - FOOT)
     lack = np.zeros(len(toe))

@@ -56,7 +56,7 @@ class TrainingRows:
 
     def sharing(self, section: int, sections: int, size: int) -> PassSharing:
         """How the processes share a section in batches of `size`."""
-        total = self.database.section_pairs(TRAIN, section, sections)
+        total = self.database.section_samples(TRAIN, section, sections)
         return self.processes.sharing(total, size, self.stretches)
 
 

@@ -21,7 +21,7 @@ HELD_OUT = COLUMNS.index("held_out_mse")
 
 @dataclass
 class State:
-    """The state of a training after `sections` whole sections, counted from its start.
+    """The state of a training after `sections_done` whole sections, counted from its start.
 
     adam: the optimiser. recipe: hash of everything that determines the result
     (`hobble.training.start.run_name`). samples, seconds: used so far. best, best_mse: the flat weights with
@@ -32,7 +32,7 @@ class State:
 
     network: Trainable
     adam: Adam
-    sections: int = 0
+    sections_done: int = 0
     samples: int = 0
     seconds: float = 0.0
     best_mse: float = float("inf")
@@ -62,7 +62,7 @@ def pack(state: State) -> dict[str, np.ndarray]:
         "best": _copied(best),
         "best_mse": np.array(state.best_mse),
         "steps": np.array(state.adam.steps),
-        "sections": np.array(state.sections),
+        "sections": np.array(state.sections_done),
         "samples": np.array(state.samples),
         "seconds": np.array(state.seconds),
         "history": np.array(state.history, float),
@@ -86,7 +86,7 @@ def unpack(data: Mapping[str, np.ndarray], state: State, path: Path) -> None:
         state.adam.second.copy_(torch.from_numpy(data["second"]))
         state.adam.steps = int(data["steps"])
         state.best, state.best_mse = torch.from_numpy(data["best"]), float(data["best_mse"])
-        state.sections, state.samples = int(data["sections"]), int(data["samples"])
+        state.sections_done, state.samples = int(data["sections"]), int(data["samples"])
         state.seconds = float(data["seconds"])
         state.history = data["history"].tolist()
     except KeyError as error:

@@ -88,9 +88,11 @@ def _write(
     facts = _facts(state, training) | {"terrain_side": terrain_side}
     if training.keep == "best" and state.best is not None:
         state.network.flat.copy_(state.best)
-        facts["best_section"] = state.sections - state.since_best
+        facts["best_section"] = state.sections_done - state.since_best
         log.info(
-            "best weights: section %d of %d, by the held-out error", facts["best_section"], state.sections
+            "best weights: section %d of %d, by the held-out error",
+            facts["best_section"],
+            state.sections_done,
         )
     blocks = data.layout.blocks("y")
     errors = HeldOut(data, state.network.flat.device, 0).every_row(state.network)
@@ -106,7 +108,7 @@ def _write(
 def _facts(state: State, training: Training) -> dict[str, Any]:
     """Numbers about a training, for the meta data of its weights."""
     return {
-        "passes": passes_of(state.sections, training.sections),
+        "passes": passes_of(state.sections_done, training.sections),
         "samples": state.samples,
         "steps": state.adam.steps,
     }

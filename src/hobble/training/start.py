@@ -116,8 +116,8 @@ def begin(
 def _send_state(state: State, processes: Processes) -> State:
     """Copy the first process's state to all processes."""
     processes.take_from_first(state.network.flat, state.adam.first, state.adam.second)
-    numbers = processes.numbers_of_first(state.adam.steps, state.sections, state.samples)
-    state.adam.steps, state.sections, state.samples = numbers
+    numbers = processes.numbers_of_first(state.adam.steps, state.sections_done, state.samples)
+    state.adam.steps, state.sections_done, state.samples = numbers
     return state
 
 
@@ -140,7 +140,7 @@ def _restored(
         data = load_npz(own)
         if int(data.get("sections", 0)) <= goal:
             unpack(data, state, own)
-            log.info("resuming from %s, after section %d of %d", own, state.sections, goal)
+            log.info("resuming from %s, after section %d of %d", own, state.sections_done, goal)
             return state, own
         log.warning("%s is past %g passes; starting again", own, training.passes)
     if start is not None and begun is not None:
@@ -148,7 +148,7 @@ def _restored(
         _check_start(state, training, start)
         if state.recipe != recipe:
             log.warning("%s was made with other settings, data or code; training resumes from it", start)
-        log.info("resuming from %s, after section %d of %d", start, state.sections, goal)
+        log.info("resuming from %s, after section %d of %d", start, state.sections_done, goal)
     return state, own
 
 
@@ -161,8 +161,8 @@ def _check_start(state: State, training: Training, path: Path) -> None:
             f"was trained with {sections} sections a pass, but training.sections is {training.sections}",
             fix=f"Set training.sections to {sections}, or remove training.continues.",
         )
-    if state.sections > training.all_sections:
-        passes = f"{state.sections / sections:g}"
+    if state.sections_done > training.all_sections:
+        passes = f"{state.sections_done / sections:g}"
         raise InputError(
             path,
             f"has {passes} passes, but training.passes is {training.passes:g}",

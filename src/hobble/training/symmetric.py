@@ -18,7 +18,7 @@ EVERY = 16  # steps; after each step it would take longer and the weights would 
 
 
 class Symmetry:
-    """The symmetry of a network that trains on a database, for options that are not `asymmetric`.
+    """The symmetry of a network that trains on a database, for options whose `why_asymmetric` is empty.
 
     Raises HobbleError if the skeleton has no mirror image, or if the rows are scaled differently on both
     sides.

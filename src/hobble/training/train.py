@@ -1,7 +1,8 @@
 """The training loop.
 
-A pass goes once through all training rows. It has sections, and a section has batches. Each batch is changed,
-then the network takes a step. After each section the training logs, measures and saves.
+A pass goes once through all training samples. It has `training.sections` sections, and a section has
+batches. Each batch is augmented (slower or faster, other poses, the network's own errors), then the network
+takes a step. After each section the training logs, measures and saves.
 """
 
 from __future__ import annotations
@@ -55,20 +56,21 @@ def train(
     writes checkpoints and the history.
 
     The result depends on the arguments and the number of threads, never on interruptions. Raises HobbleError
-    if an error is not finite (the message names the batch, and the last checkpoint stays), if there are fewer
-    samples than sections, and if `keep` or `patience` need a held-out error but no clip is held out.
+    if the training error is not finite (the message names the batch, and the last checkpoint stays), if there
+    are fewer samples than sections, if `keep` or `patience` need a held-out error but no clip is held out,
+    and if `symmetric` is set for a network that cannot be symmetric.
     """
     use_threads(threads, training.batch)
     if (training.patience or training.keep == "best") and not database.rows(SPLIT):
         raise HobbleError(
-            "training.keep: best and training.patience need the held-out error, but no clip is held out. "
+            "training.keep (best) and training.patience need the held-out error, but no clip is held out. "
             "List some under held_out in the data set."
         )
-    if training.symmetric and network.asymmetric:
-        raise HobbleError(f"training.symmetric: {network.asymmetric}")
-    pairs, sections = database.pairs(TRAIN), training.sections
-    if pairs < sections:
-        raise HobbleError(f"{pairs} training samples are fewer than training.sections, {sections}")
+    if training.symmetric and network.why_asymmetric:
+        raise HobbleError(f"training.symmetric: {network.why_asymmetric}")
+    samples, sections = database.samples(TRAIN), training.sections
+    if samples < sections:
+        raise HobbleError(f"{samples} training samples are fewer than training.sections, {sections}")
     recipe = recipe_hash(network, training, database, code)
     state, path = begin(database, network, training, recipe, Path(checkpoints), start, processes)
     if not processes.first:
@@ -99,27 +101,27 @@ def _run(
     versions = VersionPoses(database, training.version_poses, len(places), device, places.start)
     paces = OtherPaces(database, training.other_paces, len(places), device, places.start)
     roll_out = RollOut(database, training.rollout, len(places), device, places.start)
-    pairs = database.pairs(TRAIN)
-    for turn in range(state.sections, training.all_sections):
+    samples = database.samples(TRAIN)
+    for index in range(state.sections_done, training.all_sections):
         if training.patience and processes.numbers_of_first(state.since_best)[0] >= training.patience:
             log.info("no lower held-out error for %d sections: training ends", training.patience)
             break
-        pass_index, section = divmod(turn, sections)
+        pass_index, section = divmod(index, sections)
         where = f"pass {pass_index + 1} of {training.passes:g}, section {section + 1} of {sections}"
         watch = LossWatch(where, database.clips, processes)
-        step.seed(section_seed(seed, turn))
+        step.seed(section_seed(seed, index))
         others.begin()
         versions.begin()
         paces.begin()
         roll_out.begin()
         for batch in rows.batches(pass_index, section, sections, seed, batch_size):
-            # Play the motion slower or faster; move poses towards those of other channel values, then towards
-            # those of hurt or healthy versions of the clip; add the network's own errors.
+            # Play the motion slower or faster; mix in poses of rows with other channel values, then poses of
+            # hurt or healthy versions of the same clip; add the network's own errors.
             paces.play(batch.x, batch.y)
             others.mix(batch.x, batch.p)
             versions.mix(batch.x, batch.p, batch.clip)
             roll_out.add(batch.x)
-            rate = learning_rate_share(training, (state.samples + watch.seen) / pairs)
+            rate = learning_rate_share(training, (state.samples + watch.seen) / samples)
             watch.add(update(batch.x, batch.y, batch.p, rate, batch.total), batch)
             roll_out.remember(step.error)
             if symmetry:
@@ -130,7 +132,7 @@ def _run(
             symmetry.enforce()
         train_mse = watch.mean()
         processes.check_same(state.network.flat)
-        state.sections, state.samples = turn + 1, state.samples + watch.samples
+        state.sections_done, state.samples = index + 1, state.samples + watch.samples
         if record:
             record.section(where, [pass_index + 1, section + 1], train_mse)
     if record:
@@ -143,9 +145,9 @@ def _kept(database: Database, training: Training) -> list[slice]:
     return [layout.x_channel(name) for name, _ in layout.channels] if training.keep_channels else []
 
 
-def section_seed(seed: int, turn: int) -> int:
-    """The seed of dropout in section `turn`, counted from the start of the training."""
-    return int(np.random.SeedSequence([seed, 1, turn]).generate_state(1, np.uint64)[0] >> 1)
+def section_seed(seed: int, index: int) -> int:
+    """The seed of dropout in a section. index: of the section, counted from the start of the training."""
+    return int(np.random.SeedSequence([seed, 1, index]).generate_state(1, np.uint64)[0] >> 1)
 
 
 class TrainingRecorder:
@@ -153,9 +155,10 @@ class TrainingRecorder:
 
     def __init__(self, state: State, database: Database, training: Training, saver: Saver) -> None:
         self.state, self.saver = state, saver
-        pairs = database.pairs(TRAIN)
-        self.held_out = HeldOut(database, state.network.flat.device, pairs // training.sections)
-        self.goal, self.first, self.before = round(training.passes * pairs), state.samples, state.seconds
+        samples = database.samples(TRAIN)
+        self.held_out = HeldOut(database, state.network.flat.device, samples // training.sections)
+        self.goal = round(training.passes * samples)
+        self.samples_before, self.seconds_before = state.samples, state.seconds
         self.began = time.perf_counter()
         self.bar = tqdm(
             total=self.goal, initial=state.samples, unit=" samples", unit_scale=True, disable=None
@@ -164,7 +167,7 @@ class TrainingRecorder:
     def section(self, where: str, place: list[int], train_mse: float) -> None:
         """Measure the network after a section, add to the history, save. place: pass and section, from 1."""
         state = self.state
-        state.seconds = self.before + time.perf_counter() - self.began
+        state.seconds = self.seconds_before + time.perf_counter() - self.began
         errors = self.held_out.errors(state.network)
         state.keep_best(errors[0])
         state.history.append([*place, state.samples, state.seconds, train_mse, *errors])
@@ -179,7 +182,7 @@ class TrainingRecorder:
     def _report(self, where: str) -> None:
         """Log speed, time left and errors."""
         state, seconds = self.state, time.perf_counter() - self.began
-        speed = (state.samples - self.first) / seconds
+        speed = (state.samples - self.samples_before) / seconds
         left = duration((self.goal - state.samples) / speed)
         train, held_out = state.history[-1][4:6]
         errors = f"error {train:.4f}, held out {held_out:.4f}"

@@ -98,8 +98,8 @@ def _check_configuration(project: Project, name: str) -> None:
 
 def _check_symmetric(project: Project, name: str, model: Configuration) -> None:
     """Check that the network can be symmetric and that the data set has mirrored clips."""
-    if model.network.asymmetric:
-        raise HobbleError(f"configuration {name}: training.symmetric: {model.network.asymmetric}")
+    if model.network.why_asymmetric:
+        raise HobbleError(f"configuration {name}: training.symmetric: {model.network.why_asymmetric}")
     if not project.catalogue.dataset(model.dataset).mirror:
         raise HobbleError(
             f"configuration {name}: training.symmetric: data set {model.dataset} has no mirrored clips, so "

@@ -13,7 +13,7 @@ from hobble.measures.accuracy.run import SPLITS, clip_rows
 from hobble.measures.inputs import Json, Row
 
 NAME = "accuracy"
-WORDS = {"train": "training", "held_out": "held-out"}
+SPLIT_NAMES = {"train": "training", "held_out": "held-out"}
 
 
 def compared(all_measured: Sequence[ConfigurationResults], published: Json) -> SideBySide:
@@ -40,9 +40,9 @@ def tables(compared: Json) -> dict[str, list[Row]]:
 
 
 def accuracy_differences(all_measured: Sequence[ConfigurationResults]) -> list[DifferenceOf]:
-    """The difference of each pair (eq. 3.2 of Segerstedt 2021).
+    """The difference of each pair of configurations (eq. 3.2 of Segerstedt 2021).
 
-    It is given for each split, and for each clip that both were measured on.
+    It is given for each split, and for each clip on which both configurations were measured.
     """
     out: list[DifferenceOf] = []
     for a, b in combinations(all_measured, 2):
@@ -72,18 +72,22 @@ def _published_splits(all_measured: Sequence[ConfigurationResults], published: J
         m = found.get(row["configuration"])
         for split in SPLITS:
             ours = m.found(NAME)[split]["mean_of_clips"] if m else None
-            out.append(published_row(f"relative error, {WORDS[split]} clips", row, row["mean"], ours))
+            out.append(published_row(f"relative error, {SPLIT_NAMES[split]} clips", row, row["mean"], ours))
             if "sd" in row:
                 in_text = {**row, "table": None}  # published in the text, not in the table
                 means = clip_means(m.found(NAME), split) if m else []
                 sd = float(np.std(means)) if len(means) > 1 else None
-                what = f"standard deviation of the means of {WORDS[split]} clips"
+                what = f"standard deviation of the means of {SPLIT_NAMES[split]} clips"
                 out.append(published_row(what, in_text, row["sd"], sd))
     return out
 
 
 def _published_clips(all_measured: Sequence[ConfigurationResults], published: Json) -> list[PublishedRow]:
-    """Published errors of single clips, next to our clips of the same names."""
+    """Published errors of single clips, next to ours of the clips with the same names.
+
+    Segerstedt (2021) published the errors of two networks: "segerstedt" is his own, "release" is the network
+    that Holden et al. (2017) released.
+    """
     out = []
     for row in published["clips"]:
         for m in all_measured:

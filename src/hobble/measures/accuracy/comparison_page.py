@@ -14,7 +14,8 @@ from hobble.report.measure_sections import Overview
 from hobble.report.page_parts import PageSection, SectionPart
 from hobble.report.tables import Column
 
-# Which standard deviation eq. 3.2 divides by.
+# The two standard deviations (sd) by which eq. 3.2 of Segerstedt (2021) may divide the difference of two
+# configurations.
 KINDS = {"difference_of_means": "sd of the means of clips", "difference": "sd of single frames"}
 
 
@@ -104,9 +105,7 @@ def error_boxes(compared: Compared) -> Chart | None:
 def clip_dots(compared: Compared) -> Chart | None:
     """The mean error of every clip, a dot for each configuration."""
     clips = {(row["split"], row["clip"]) for entry in compared["accuracy"] for row in entry["clips"]}
-    order = [
-        clip for _, clip in sorted(clips, key=lambda pair: (pair[0] == "held_out", pair[1]), reverse=False)
-    ]
+    order = [clip for _, clip in sorted(clips, key=lambda pair: (pair[0] == "held_out", pair[1]))]
     if not order:
         return None
     traces = []

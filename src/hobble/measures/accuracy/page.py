@@ -21,6 +21,12 @@ INTRODUCTION = (
     "The network gets the captured input of a frame and predicts the next frame. The error is measured on "
     "every frame that belongs to a gait cycle."
 )
+# What the endings of clip names say. A reader may take the number of a hurt version for a severity.
+ENDINGS = {
+    "_hurt1": " A clip whose name ends in _hurt1 is the first hurt version of a healthy clip; the number is "
+    "not its severity.",
+    "_mirror": " A clip whose name ends in _mirror is mirrored.",
+}
 COLOURS = {"train": "@muted", "held_out": "@accent"}
 NAMES = {"train": "training", "held_out": "held out"}
 QUANTILES = ("p05", "p25", "p50", "p75", "p95")
@@ -188,8 +194,8 @@ def section(found: Json, material: ReportMaterial) -> PageSection:
     return PageSection(
         "accuracy",
         [
-            SectionPart(0, Paragraph(INTRODUCTION + sampled(found))),
-            SectionPart(9, Paragraph(caveat(material))),
+            SectionPart(0, Paragraph(INTRODUCTION + endings(found) + sampled(found))),
+            SectionPart(9, Paragraph(caveat(found, material))),
             SectionPart(10, published_table(found, material), open=True, short=True),
             SectionPart(20, clip_bars(found, material), tall=True),
             SectionPart(30, clip_boxes(found), tall=True),
@@ -202,13 +208,21 @@ def section(found: Json, material: ReportMaterial) -> PageSection:
     )
 
 
-def caveat(material: ReportMaterial) -> str:
+def endings(found: Json) -> str:
+    """Sentences on the endings of clip names; empty if no clip has one."""
+    clips = [row["clip"] for row in _rows(found)]
+    return "".join(text for ending, text in ENDINGS.items() if any(ending in clip for clip in clips))
+
+
+def caveat(found: Json, material: ReportMaterial) -> str:
     """A paragraph: why these errors must not be compared with the published ones."""
-    seconds = sum(clip["seconds"] or 0.0 for clip in material.motion)
+    # Only frames of gait cycles are measured, so this is less than the length of the clips.
+    frames = sum((found.get(split) or {}).get("frames") or 0 for split in ("held_out", "train"))
     return (
         "Do not compare these errors with the published ones as if the clips were the same. Ours are "
-        f"measured on {duration(seconds)} of the data set {material.dataset}, the published ones on 80 clips "
-        "of the original data set. A small error may only mean that the clips are easy to predict."
+        f"measured on {duration(frames / 60)} of gait cycles in the data set {material.dataset}, the "
+        "published ones on 80 clips of Holden et al. (2017). A small error may only mean that the clips are "
+        "easy to predict."
     )
 
 
@@ -236,7 +250,8 @@ def figures(found: Json, material: ReportMaterial) -> Iterator[KeyFigure]:
         part = found.get(split)
         if part and part.get("mean") is not None:
             error = part.get("position_error_cm")
-            note = _centimetres(error, split, material) if error is not None else ""
+            note = "of a joint's distance from the root"
+            note += f"; {_centimetres(error, split, material)}" if error is not None else ""
             theirs = material.published_entry("accuracy") if split == "held_out" else None
             if theirs:
                 note += f"; published for {theirs['label']}: {100 * theirs['mean']:.2f} %, on other clips"
@@ -250,8 +265,7 @@ def _centimetres(error: float, split: str, material: ReportMaterial) -> str:
     if drawn is None:
         return f"{number(error)} cm per joint on average"
     return (
-        f"{number(error)} cm per joint as predicted; {number(drawn)} cm as drawn (mean of the "
-        "predicted position and of the last position moved on by the predicted velocity)"
+        f"{number(error)} cm per joint as predicted; {number(drawn)} cm as drawn (explained under Accuracy)"
     )
 
 

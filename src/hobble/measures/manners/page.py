@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Literal
 
-from hobble.channels.shown import speaker
+from hobble.channels.shown import shown_names
 from hobble.measures.clip_parts import captured_sampled
 from hobble.measures.inputs import Json
 from hobble.measures.manners.results import ChannelResult
@@ -29,9 +29,9 @@ def section(found: Json, material: ReportMaterial) -> PageSection:
     """
     if not found.get("applies"):
         return PageSection("manners", [])
-    parts, say = [], speaker(material.network["skeleton"])
+    parts, shown_name = [], shown_names(material.network["skeleton"])
     for i, one in enumerate(found["channels"]):
-        charts = [together_chart(one, say), *(effect_chart(one, effect) for effect in EFFECTS)]
+        charts = [together_chart(one, shown_name), *(effect_chart(one, effect) for effect in EFFECTS)]
         parts += [
             SectionPart(10 * i, Paragraph(summary(one) + captured_sampled(found))),
             *(SectionPart(10 * i + 1 + k, c) for k, c in enumerate(charts)),
@@ -41,10 +41,10 @@ def section(found: Json, material: ReportMaterial) -> PageSection:
 
 
 def summary(found: ChannelResult) -> str:
-    """A paragraph: how much the classifier recognises in generated walks, and in captured walks of others."""
+    """A paragraph: how much the recogniser recognises in generated walks, and in captured walks of others."""
     captured = found["captured"]
     text = (
-        f"A classifier trained on captured clips finds the right {found['title'].lower()} in "
+        f"A recogniser trained on captured clips finds the right {found['title'].lower()} in "
         f"{_percent(found['right_at_1'])} of the windows of generated walks with a value of 1, and in "
         f"{_percent(captured['right'])} of the windows of captured clips that it was not trained on "
         f"({captured['people']} clips or people, each left out in turn). All generated walks had the same "
@@ -52,18 +52,18 @@ def summary(found: ChannelResult) -> str:
     )
     if alone := [m for m, count in captured["people_of"].items() if count < 2]:
         text += f" Only one clip or person shows {', '.join(alone)}. "
-        text += "While that one is left out, the classifier cannot learn it."
+        text += "While that one is left out, the recogniser cannot learn it."
     return text
 
 
-def together_chart(found: ChannelResult, say: Callable[[str], str] = str) -> Chart | None:
+def together_chart(found: ChannelResult, shown_name: Callable[[str], str] = str) -> Chart | None:
     """The share of windows in which each manner is named while a column of another channel is highest."""
     rows = found["together"]
     if not rows:
         return None
     manners = list(dict.fromkeys(row["manner"] for row in rows))
     columns = list(dict.fromkeys(row["column"] for row in rows))
-    spoken = [say(column) for column in columns]
+    spoken = [shown_name(column) for column in columns]
     shares = {(row["manner"], row["column"]): row["share"] for row in rows}
     trace = {
         "type": "heatmap",
@@ -85,7 +85,7 @@ def together_chart(found: ChannelResult, say: Callable[[str], str] = str) -> Cha
         "yaxis": {"type": "category", "automargin": True, "dtick": 1, "showgrid": False},
     }
     words = (
-        f"The share of windows in which the classifier names the right {found['title'].lower()} while the "
+        f"The share of windows in which the recogniser names the right {found['title'].lower()} while the "
         "value named at the left is at its highest. The darker a field, the larger the share. "
         f'The mean of all columns but "{NONE}" is {_percent(manner / whole)}.'
     )

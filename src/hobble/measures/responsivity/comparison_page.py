@@ -17,7 +17,7 @@ from hobble.report.verdicts import Verdict, best
 def section(compared: Compared) -> PageSection:
     """Two charts: the times of the laps, and the time of a frame over the size of the network."""
     parts = [SectionPart(10, lap_lines(compared)), SectionPart(20, fit_chart(compared))]
-    return PageSection("speed", parts, title="Speed and response", at=30, nav="Speed")
+    return PageSection("speed", parts, title="Time per frame", at=30)
 
 
 def columns(compared: Compared) -> Iterator[Overview]:

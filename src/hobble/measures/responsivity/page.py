@@ -56,9 +56,9 @@ def section(found: Json, material: ReportMaterial) -> PageSection:
             SectionPart(30, speed_published(found, material), open=True, short=True),
             SectionPart(60, lap_table(found, material.name)),
         ],
-        title="Speed and response",
+        title="Steering and time per frame",
         at=30,
-        nav="Speed",
+        nav="Steering and time",
     )
 
 
@@ -220,7 +220,7 @@ def _track(found: Json) -> Iterator[Hint]:
         yield Hint(
             "warn",
             f"The character reached {reached} of {total} waypoints.",
-            "It circles around a waypoint or stops before it. See the laps under Speed and response.",
+            "It circles around a waypoint or stops before it. See the laps in the section on steering.",
         )
     drawn, predicted = (found.get(key) for key in ("largest_turn_degrees", "predicted_turn_degrees"))
     if drawn is not None and drawn > 60:

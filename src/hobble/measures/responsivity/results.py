@@ -41,8 +41,8 @@ class LapWalk(TypedDict):
 
     path_overshoot_cm, path_distance_cm: the largest and the mean distance from the line between waypoints.
     foot_slide_cm: mean slide of a toe in a stance. steps: number of stances. largest_turn_degrees: largest
-    turn of a joint in one frame, as drawn. predicted_turn_degrees: the largest before the runtime limits
-    turns. turns_held_back: frames in which the runtime limited a turn.
+    turn of a joint in one frame, as drawn. predicted_turn_degrees: the same before the runtime limits turns.
+    turns_held_back: frames in which the runtime limited a turn.
     """
 
     lap: int
@@ -66,7 +66,7 @@ class Lap(LapWalk):
 
 
 class LapPath(TypedDict):
-    """The path of a lap, stored every `seconds_between`.
+    """The path of a lap, stored every `seconds_between` seconds.
 
     x, z: m. off_cm: largest distance from the line between waypoints since the previous stored place.
     """
@@ -100,14 +100,17 @@ class ModeResults(TypedDict):
 
 
 class PieceResults(TypedDict):
-    """The file of a piece: all laps of a phase mode, and the paths of the first ones."""
+    """The file of a piece: all laps of a phase mode, and the paths of the first laps."""
 
     laps: ModeResults
     runs: list[LapPath]
 
 
 class Track(TypedDict):
-    """The track. x, z: places of the waypoints, m. metres: its length. gaits: one for each waypoint."""
+    """The track.
+
+    metres: its length. gaits: one for each waypoint. x, z: places of the waypoints, m.
+    """
 
     waypoints: int
     metres: float
@@ -117,12 +120,12 @@ class Track(TypedDict):
 
 
 class Responsivity(ModeResults):
-    """responsivity.json. The values of the configured phase mode are at the top, `modes` has those of all.
+    """responsivity.json: the results of the configured phase mode, and in `modes` those of all modes.
 
     runs: the paths of the first laps in the configured mode. parameters: weights and biases that one frame
-    uses, see `run.parameter_counts`; None for a network without layers. stored: mode -> how many numbers it
-    keeps in memory, of `bytes_each` bytes. exact: the mode that evaluates the network without approximation.
-    laps_other_modes: laps in each other mode.
+    uses, see `run.parameter_counts`; None for a network without layers. stored: mode -> how many numbers of
+    `bytes_each` bytes the network keeps in memory. exact: the mode that evaluates the network without
+    approximation. laps_other_modes: laps in each other mode.
     """
 
     configuration: str

@@ -51,10 +51,11 @@ def rollout_chart(found: Json) -> Chart | None:
         "Error when the network continues from its own poses",
         "Mean distance between a joint and its captured position when the network continues from its own "
         "poses, as at run time, for this many frames (60 frames are one second). If the line flattens, the "
-        "character stays stable. This chart measures the pose as drawn. There a joint is at the mean "
-        "of two points: its predicted position, and its last position moved on by the predicted velocity. "
-        "The charts above measure only the predicted position, so their error differs from this chart's "
-        "error after one frame." + sampled(found),
+        "character stays stable. This chart measures the pose as drawn: a joint is drawn halfway "
+        "between two estimates: its predicted position, and the place to which its predicted velocity takes "
+        "it from its last position. "
+        "The charts above measure the predicted position, so their error is not the value at 1 frame in this "
+        "chart." + sampled(found),
         traces,
         {
             "xaxis": log_axis("frames", [x for trace in traces for x in trace["x"]]),

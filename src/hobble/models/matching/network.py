@@ -38,7 +38,7 @@ class Matching(Network):
 
     kind: ClassVar[str] = "matching"
     phase: ClassVar[bool] = False
-    rooted: ClassVar[bool] = True
+    recorded_poses: ClassVar[bool] = True
 
     features: Array = field(repr=False)
     frames: Array = field(repr=False)

@@ -18,7 +18,7 @@ class PfnnOptions(Options):
     control_points: Annotated[int, Field(ge=4, le=16)] = 4
 
     @property
-    def asymmetric(self) -> str:
+    def why_asymmetric(self) -> str:
         """As in `Options`. Half a cycle after a control point there must be another."""
         odd = f"it needs an even number of network.control_points, not {self.control_points}"
         return odd if self.control_points % 2 else ""

@@ -17,7 +17,7 @@ class PlainOptions(Options):
     units: Annotated[int, Field(gt=0, le=8192)] = 512
 
     @property
-    def asymmetric(self) -> str:
+    def why_asymmetric(self) -> str:
         """As in `Options`."""
         return ""
 

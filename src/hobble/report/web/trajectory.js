@@ -78,7 +78,7 @@ export const createTrajectory = (spec, c) => {
   // The movement [a, b] of the root without half of its part against the target, or, while the target is to stand, without half of
   // all movement.
   const limited = (a, b, target) => {
-    const loss = spec.steering > 0 && !spec.rooted ? k.backwardLoss : 0, squared = target[0] ** 2 + target[1] ** 2;
+    const loss = spec.steering > 0 && !spec.recordedPoses ? k.backwardLoss : 0, squared = target[0] ** 2 + target[1] ** 2;
     if (squared < k.still ** 2) return [(1 - loss) * a, (1 - loss) * b];
     const against = loss * min(0, a * target[0] + b * target[1]) / squared;
     return [a - against * target[0], b - against * target[1]];
@@ -86,7 +86,7 @@ export const createTrajectory = (spec, c) => {
   // With motion matching, change the movement a little toward the target, because clips have only some directions and speeds:
   // across the target by a share of the movement, and along it by half of that.
   const pulled = ([a, b], target) => {
-    const most = spec.steering > 0 && spec.rooted ? k.pull * hypot(a, b) : 0, size = hypot(...target);
+    const most = spec.steering > 0 && spec.recordedPoses ? k.pull * hypot(a, b) : 0, size = hypot(...target);
     const ahead = size >= k.still ? target.map((v) => v / size) : [0, 0], lack = [target[0] - a, target[1] - b];
     const along = lack[0] * ahead[0] + lack[1] * ahead[1], across = lack.map((v, i) => v - along * ahead[i]);
     const share = min(1, most / max(hypot(...across), 1e-9)), more = min(max(along, -k.pullAhead * most), k.pullAhead * most);
@@ -102,7 +102,7 @@ export const createTrajectory = (spec, c) => {
       c.dz[i] = c.dz[i + 1];
       for (let g = 0; g < G; g++) c.gait[i * G + g] = c.gait[(i + 1) * G + g];
     }
-    const moving = spec.rooted ? 1 : max(0, 1 - c.gait[M * G]) ** .25, [vx, vz] = [y[Y.root_velocity], y[Y.root_velocity + 1]];
+    const moving = spec.recordedPoses ? 1 : max(0, 1 - c.gait[M * G]) ** .25, [vx, vz] = [y[Y.root_velocity], y[Y.root_velocity + 1]];
     let yaw = atan2(c.dx[M], c.dz[M]);
     const [a, b] = pulled(limited(moving * (vx * cos(yaw) + vz * sin(yaw)), moving * (vz * cos(yaw) - vx * sin(yaw)), target), target);
     c.px[M] += a;

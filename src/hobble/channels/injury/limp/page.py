@@ -6,7 +6,7 @@ from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 from hobble.channels.injury.response.page import in_words
-from hobble.channels.shown import speaker
+from hobble.channels.shown import shown_names
 from hobble.measures.clip_parts import captured_sampled
 from hobble.measures.inputs import Json
 from hobble.report.charts import Chart, Trace, axis, line
@@ -44,11 +44,14 @@ def section(found: Json, material: ReportMaterial) -> PageSection:
     """Where the training data came from, the chart of sizes, the recognition, and all tables."""
     if not found.get("applies"):
         return PageSection("injury", [])
-    name, say, found = material.name, speaker(material.network["skeleton"]), in_words(found, material)
+    name, shown_name = material.name, shown_names(material.network["skeleton"])
+    found = in_words(found, material)
     return PageSection(
         "injury",
         [
-            SectionPart(1, Paragraph(provenance(found["hurt_seconds"], say) + captured_sampled(found))),
+            SectionPart(
+                1, Paragraph(provenance(found["hurt_seconds"], shown_name) + captured_sampled(found))
+            ),
             SectionPart(2, size_chart(found)),
             SectionPart(3, Paragraph(RECOGNISERS)),
             SectionPart(
@@ -60,23 +63,27 @@ def section(found: Json, material: ReportMaterial) -> PageSection:
                 ),
             ),
             SectionPart(5, together_table(name, found["named_together"])),
-            SectionPart(4, held_out_table(name, found["held_out_limps"], say)),
+            SectionPart(4, held_out_table(name, found["held_out_limps"], shown_name)),
             SectionPart(80, size_table(name, found["sizes"])),
-            SectionPart(81, captured_table(name, found["captured"], say)),
+            SectionPart(81, captured_table(name, found["captured"], shown_name)),
             SectionPart(82, second_table(name, found["second"])),
         ],
     )
 
 
-def provenance(hurt_seconds: Mapping[str, Mapping[str, float]], say: Callable[[str], str] = str) -> str:
+def provenance(
+    hurt_seconds: Mapping[str, Mapping[str, float]], shown_name: Callable[[str], str] = str
+) -> str:
     """Which injuries of the training data were captured and which were generated from healthy clips."""
     sentences = []
     for kind, words in (("captured", "captured"), ("made", "generated from healthy clips")):
         if some := hurt_seconds[kind]:
-            names = f" ({', '.join(map(say, sorted(some)))})" if len(some) <= MOST_NAMED else ""
+            names = f" ({', '.join(map(shown_name, sorted(some)))})" if len(some) <= MOST_NAMED else ""
             links = f"summed over {len(some)} links" if len(some) != 1 else "of one link"
             seconds = number(sum(some.values()), 3)
             sentences.append(f"Hurt motion in training, {words}: {seconds} s, {links}{names}.")
+    if any(len(some) > 1 for some in hurt_seconds.values()):
+        sentences.append("A second in which two links hurt counts twice.")
     return " ".join(sentences) or "No link was hurt in training."
 
 
@@ -134,7 +141,9 @@ def _named(rows: Sequence[Mapping[str, Any]]) -> tuple[list[Column], list[list[A
     return columns, [[r["severity"], r["walks"], r["impaired"], r["named"], r["wrong_side"]] for r in rows]
 
 
-def held_out_table(name: str, rows: Sequence[Mapping[str, Any]], say: Callable[[str], str]) -> Table | None:
+def held_out_table(
+    name: str, rows: Sequence[Mapping[str, Any]], shown_name: Callable[[str], str]
+) -> Table | None:
     """Captured limps that were held out of training, compared with the character."""
     if not rows:
         return None
@@ -149,7 +158,7 @@ def held_out_table(name: str, rows: Sequence[Mapping[str, Any]], say: Callable[[
     table = [
         [
             r["clip"],
-            ", ".join(f"{say(k)} {v:g}" for k, v in r["hurt_links"].items()),
+            ", ".join(f"{shown_name(k)} {v:g}" for k, v in r["hurt_links"].items()),
             r["compared_with"],
             r["healthy"],
             r["hurt"],
@@ -192,7 +201,9 @@ def together_table(name: str, rows: Sequence[Mapping[str, Any]]) -> Table | None
     return Table(f"{name}-limp-together", columns, [[row.get(key) for key in keys] for row in rows], title)
 
 
-def captured_table(name: str, rows: Sequence[Mapping[str, Any]], say: Callable[[str], str]) -> Table | None:
+def captured_table(
+    name: str, rows: Sequence[Mapping[str, Any]], shown_name: Callable[[str], str]
+) -> Table | None:
     """The SHOWN effects of captured limps."""
     if not rows:
         return None
@@ -205,7 +216,7 @@ def captured_table(name: str, rows: Sequence[Mapping[str, Any]], say: Callable[[
     table = [
         [
             r["clip"],
-            ", ".join(f"{say(k)} {v:g}" for k, v in r["hurt"].items()),
+            ", ".join(f"{shown_name(k)} {v:g}" for k, v in r["hurt"].items()),
             r["healthy"],
             *(r[k] for k in SHOWN),
         ]

@@ -54,7 +54,7 @@ def injury_hints(found: Json) -> Iterator[Hint]:
             "good",
             f"{len(walks)} of {_plural(len(responses), 'link')} {'was' if len(walks) == 1 else 'were'} hurt "
             "in training.",
-            f"Severity 10 of {'it' if len(walks) == 1 else 'each of them'} changes the walk by "
+            f"At severity 10, {'it' if len(walks) == 1 else 'each of them'} changes the walk by "
             f"{_span(min(felt), max(felt))} cm per joint. A link is the piece of the body between two "
             "neighbouring joints.",
         )

@@ -7,7 +7,7 @@ from typing import Any
 
 from hobble.channels.injury.response import page_cases as cases
 from hobble.channels.injury.response.hints import injury_hints
-from hobble.channels.shown import speaker
+from hobble.channels.shown import shown_names
 from hobble.measures.inputs import Json
 from hobble.report.charts import Chart, ChartGroup, Trace, axis, line
 from hobble.report.gather import ReportMaterial
@@ -70,14 +70,14 @@ def hints(found: Json, material: ReportMaterial) -> Iterator[Hint]:
 
 def in_words(found: Json, material: ReportMaterial) -> dict[str, Any]:
     """The results with names for readers in place of the labels of links."""
-    say = speaker(material.network["skeleton"])
+    shown_name = shown_names(material.network["skeleton"])
 
     def named(value: Any, key: str = "") -> Any:
         if isinstance(value, Mapping):
             return {k: named(v, k) for k, v in value.items()}
         if isinstance(value, list | tuple):
             return [named(item) for item in value]
-        return say(value) if key in LINKS and isinstance(value, str) else value
+        return shown_name(value) if key in LINKS and isinstance(value, str) else value
 
     return {key: named(value) for key, value in found.items()}
 

@@ -1,0 +1,62 @@
+"""Finds the body in a file, or refuses the file if its parts are in doubt."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import replace
+from typing import TypeVar
+
+from hobble.core.clip import Clip
+from hobble.core.errors import InputError
+from hobble.core.skeleton import Skeleton
+from hobble.motion.body import SIDES, body_by_roles, with_fingers
+from hobble.motion.doubt import Doubt, TwoFigures
+from hobble.motion.draft import refusal
+from hobble.motion.find_body import FoundBody, find_body
+from hobble.motion.options import ClipMotion
+from hobble.motion.read import Bvh
+from hobble.motion.rig import RigMatch
+
+Limb = TypeVar("Limb")
+
+
+def body_in_file(
+    file: Bvh, rig: Skeleton, raw: Clip, known: RigMatch | None, options: ClipMotion
+) -> FoundBody:
+    """The body of a file's rig.
+
+    rig: the file's joints. raw: its motion, in any unit and axes. known: the skeleton file that describes the
+    rig, if there is one. Raises InputError if the parts are in doubt (with a draft of a rig file), if there
+    are two figures, or if nothing tells left from right.
+    """
+    if known is not None:
+        return FoundBody(body_by_roles(replace(rig, roles=known.roles)), True)
+    try:
+        found = find_body(rig.joints, rig.parents, raw.positions)
+    except TwoFigures as error:
+        raise InputError(file.path, str(error), fix="Export each figure on its own.") from None
+    except Doubt as doubt:
+        raise refusal(file, rig, doubt) from None
+    if not found.sided and options.handedness == "auto":
+        raise InputError(
+            file.path,
+            "its joint names do not say left and right, and its mirror image would move as well",
+            fix="Set motion.handedness in the data set: right, the standard of BVH files, or left, if the "
+            "program that wrote the file has left-handed coordinates.",
+        )
+    body = found.body
+    if not found.sided and options.handedness == "left":
+        body = replace(body, arms=_swapped(body.arms), legs=_swapped(body.legs))
+    return replace(found, body=with_fingers(body, rig))
+
+
+def _swapped(limbs: Mapping[str, Limb]) -> dict[str, Limb]:
+    return {a: limbs[b] for a, b in (SIDES, SIDES[::-1])}
+
+
+def notes_on_names(found: FoundBody, handedness: str) -> list[str]:
+    """Sentences on how the parts of the rig and its left side were found."""
+    out = ["No skeleton file describes this rig: its parts were found from structure, motion and names."]
+    if not found.sided:
+        out.append(f"Its joint names do not say left and right, so motion.handedness: {handedness} was used.")
+    return out

@@ -1,0 +1,56 @@
+"""The build of the figure to which a motion will go: its spine, how its feet stand, and its limbs."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from itertools import pairwise
+
+import numpy as np
+
+from hobble.core import quat
+from hobble.core.quat import Array
+from hobble.core.skeleton import Skeleton, rest_positions
+from hobble.motion.axes import rest_frame
+from hobble.motion.body import SIDES, Body
+from hobble.motion.spine import Spine
+
+# A rig whose bones have the target's lengths, up to one factor and this share, is the target's own figure.
+SAME = 0.01
+
+
+@dataclass(frozen=True)
+class TargetBuild:
+    """The build of a skeleton with a standing rest pose.
+
+    spine: the shape of its trunk in that pose. tilt: radians by which the bones from ankle to ball point
+    down. limbs: (B,) lengths of `limb_bones`, cm.
+    """
+
+    spine: Spine
+    tilt: float
+    limbs: Array
+
+    @classmethod
+    def of(cls, skeleton: Skeleton, body: Body) -> TargetBuild:
+        """The build of a skeleton. body: its joints."""
+        rest = quat.rotate(quat.inv(rest_frame(skeleton)), rest_positions(skeleton))
+        feet = np.array([rest[toe] - rest[heel] for *_, heel, toe in body.legs.values() if toe is not None])
+        tilt = float(np.mean(np.arctan2(-feet[:, 1], np.linalg.norm(feet[:, [0, 2]], axis=-1))))
+        limbs = np.array([float(np.linalg.norm(rest[b] - rest[a])) for a, b in limb_bones(body)])
+        return cls(Spine.of(skeleton, body), tilt, limbs)
+
+    def is_built_like(self, limbs: Array) -> bool:
+        """Whether a rig has the target's proportions. limbs: lengths of its `limb_bones`, in any unit."""
+        if len(limbs) != len(self.limbs):
+            return False
+        share = np.maximum(limbs, 1e-9) / self.limbs
+        return bool(share.max() < (1 + SAME) * share.min())
+
+
+def limb_bones(body: Body) -> list[tuple[int, int]]:
+    """The bones of legs, feet and arms as pairs of joints. A foot without a ball is left out."""
+    bones: list[tuple[int, int]] = []
+    for side in SIDES:
+        for limb in (body.legs[side], body.arms[side][1:]):
+            bones += pairwise(joint for joint in limb if joint is not None)
+    return bones
