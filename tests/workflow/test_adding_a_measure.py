@@ -77,14 +77,14 @@ def compared(all_measured, published):
 def tables(compared):
     return {"hips": compared["hips"]}
 """
-COMPARISON_PAGE = """from hobble.report.measure_sections import Overview
+COMPARISON_PAGE = """from hobble.report.measure_sections import OverviewColumn
 from hobble.report.page_parts import PageSection, Paragraph, SectionPart
 from hobble.report.tables import Column
 
 
 def columns(compared):
     values = {entry["configuration"]: entry["highest"] for entry in compared["hips"]}
-    yield Overview(25, Column.number("highest hips, cm", 4), values)
+    yield OverviewColumn(25, Column.number("highest hips, cm", 4), values)
 
 
 def section(compared):

@@ -32,9 +32,7 @@ AHEAD = 0.9  # a cycle counts if at least this share of its speed is forward
 STEADY = 0.35  # a cycle is left out if a value changes in it by more than this share of the highest value
 FAINT = 0.05  # a mean over a cycle below this share of the highest value counts as 0
 MOVING = 0.1  # cm a frame: slower cycles of a healthy body are left out
-# Weight of the curve towards which a fit is drawn (see `LimitLearner.learn`): at each level, the curve counts
-# as much as this many cycles.
-EXPECTED_WEIGHT = 2.0
+EXPECTED_WEIGHT = 2.0  # in a fit, the expected share at a level counts as much as this many cycles
 SLOWEST = 0.1  # a smaller share of the healthy speed counts as this
 
 
@@ -194,10 +192,10 @@ class LimitLearner:
     def learn(self) -> Limits | None:
         """The limits, or None if no cycle has a value above 0.
 
-        For each label, the share of the healthy speed is fitted as a function of the value in three steps: a
-        straight line through the cycles of all gaits, a curve through these cycles that is drawn towards the
-        line, and for each gait a curve through its own cycles that is drawn towards the curve of all gaits
-        (`_fitted`).
+        For each label, the share of the healthy speed is fitted as a function of the value, in three steps.
+        First, a straight line is fitted to the cycles of all gaits. Second, a curve is fitted to these
+        cycles; where there are few, it stays near the line. Third, a curve is fitted to the cycles of each
+        gait; where there are few, it stays near the curve of all gaits.
         """
         levels = np.linspace(0, self.highest, LEVELS)
         healthy = self._healthy()

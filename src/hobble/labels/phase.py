@@ -20,7 +20,8 @@ from hobble.labels.read_files import whole_frame
 BREAK = (np.nan, np.nan, 1.0)  # the row that ends a bout of walking
 IDLE_RATE = 0.0017  # cycles a frame: a tenth of the usual rate, as for a standing character at run time
 FASTEST = 0.25  # cycles a frame: a larger change of a hand-made phase is a jump, not movement
-# Option `margins` -> how many frames a clip must have before a cycle. After the cycle it must have one more.
+# Option `margins` -> least number of frames that a clip must have before a cycle. After the cycle it must
+# have this number plus one.
 # "extend" uses the cycles near an end of the clip, "drop" leaves them out.
 MARGINS = {"extend": 1, "drop": 60}
 

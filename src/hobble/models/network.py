@@ -65,8 +65,10 @@ class Network(ABC):
     # slows the root while the character stands or moves against the target velocity. With these it does not,
     # because the feet of recorded frames slide if the root moves less than predicted.
     recorded_poses: ClassVar[bool] = False
-    modes: ClassVar[tuple[str, ...]] = ("exact",)  # of the predictor; the last one is exact
-    storage: ClassVar[str] = "float32"  # of the predictor's weights by default, one of STORAGES
+    # Names of the ways to evaluate the network, such as constant, linear and cubic interpolation over the
+    # phase. The last one is exact.
+    modes: ClassVar[tuple[str, ...]] = ("exact",)
+    storage: ClassVar[str] = "float32"  # how a predictor keeps its weights by default; one of STORAGES
 
     x_mean: Array = field(repr=False)
     x_std: Array = field(repr=False)
@@ -140,7 +142,9 @@ class Network(ABC):
 
     @abstractmethod
     def page(self, inputs: NDArray[np.int64], outputs: NDArray[np.int64]) -> dict[str, Any]:
-        """The JSON that `network.js` needs to predict columns `outputs` of Y from columns `inputs` of X.
+        """The JSON with which the report's page evaluates the network in a browser (`network.js`).
+
+        It predicts the columns `outputs` of Y from the columns `inputs` of X.
 
         The weights of the other inputs are left out.
         """

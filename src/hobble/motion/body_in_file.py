@@ -6,6 +6,8 @@ from collections.abc import Mapping
 from dataclasses import replace
 from typing import TypeVar
 
+import numpy as np
+
 from hobble.core.clip import Clip
 from hobble.core.errors import InputError
 from hobble.core.skeleton import Skeleton
@@ -15,9 +17,12 @@ from hobble.motion.draft import refusal
 from hobble.motion.find_body import FoundBody, find_body
 from hobble.motion.options import ClipMotion
 from hobble.motion.read import Bvh
+from hobble.motion.retarget import LIMB_BONES
 from hobble.motion.rig import RigMatch
 
 Limb = TypeVar("Limb")
+BONES = [(f"{side}_{start}", f"{side}_{end}") for side in SIDES for start, end in LIMB_BONES.items()]
+STRETCH = 0.06  # share of a bone's length by which it may change; in 172 real clips it is 0
 
 
 def body_in_file(
@@ -30,6 +35,7 @@ def body_in_file(
     are two figures, or if nothing tells left from right.
     """
     if known is not None:
+        _check_bones(file, raw, known)
         return FoundBody(body_by_roles(replace(rig, roles=known.roles)), True)
     try:
         found = find_body(rig.joints, rig.parents, raw.positions)
@@ -48,6 +54,21 @@ def body_in_file(
     if not found.sided and options.handedness == "left":
         body = replace(body, arms=_swapped(body.arms), legs=_swapped(body.legs))
     return replace(found, body=with_fingers(body, rig))
+
+
+def _check_bones(file: Bvh, raw: Clip, known: RigMatch) -> None:
+    """Raise InputError if a limb's bone changes its length, because then a role has a wrong joint."""
+    for start, end in BONES:
+        if start in known.roles and end in known.roles:
+            a, b = (raw.positions[:, raw.skeleton.index(known.roles[role])] for role in (start, end))
+            low, middle, high = np.percentile(np.linalg.norm(b - a, axis=-1), [3, 50, 97])
+            if high - low > STRETCH * middle:
+                raise InputError(
+                    file.path,
+                    f"{known.roles[end]} ({end}) is {low:.3g} to {high:.3g} units from {known.roles[start]} "
+                    f"({start}), so a joint between them bends, or one of them is not the joint of its role",
+                    fix=f"Correct the roles in the skeleton file {known.rig}.yaml.",
+                )
 
 
 def _swapped(limbs: Mapping[str, Limb]) -> dict[str, Limb]:

@@ -85,7 +85,7 @@ def _points(names: Sequence[str], wrist: str) -> bool:
 
 
 def _number(names: Sequence[str]) -> int | None:
-    """The number of a finger, as 2 of "LeftFinger2Proximal" and 0 of "Bip01 L Finger01"."""
+    """The number of a finger in its joints' names: 2 in "LeftFinger2Proximal", 0 in "Bip01 L Finger01"."""
     for name in names:
         if match := re.search(r"finger[ _.]*(\d)", name, re.IGNORECASE):
             return int(match[1])

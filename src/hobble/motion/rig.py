@@ -16,6 +16,7 @@ from hobble.core.errors import InputError
 from hobble.core.quat import Array
 from hobble.core.skeleton import Skeleton, rest_positions
 from hobble.core.untrusted import printable, read_text, read_yaml
+from hobble.motion.check_rig_file import check_rig_file
 
 # Centimetres per unit of the file. The unit of CMU files is an inch / 0.45.
 UNITS = {"cm": 1.0, "inch": 2.54, "m": 100.0, "mm": 0.1, "CMU": 5.6444, "foot": 30.48}
@@ -26,7 +27,6 @@ NAME = re.compile(r"^ +['\"]?([^\s'\":{}][^'\":{}]*)['\"]?\s*:", re.MULTILINE)
 # Two rest poses count as equal if bones differ by at most this many degrees, by the role at the bone's end.
 LIKE = {"elbow": 20.0, "wrist": 25.0, "knee": 35.0, "heel": 35.0, "toe": 35.0}
 LEG_RANGE = (35.0, 125.0)  # cm: from small children to giants
-FARTHEST = 1e5  # cm from a joint to its parent
 LIMBS = ("shoulder", "hip", "knee", "heel", "toe")
 MANDATORY = ("hips", "head", *(f"{side}_{part}" for side in ("left", "right") for part in LIMBS))
 
@@ -70,11 +70,10 @@ def _loaded(path: Path, name: str, changed: int, size: int) -> TargetSkeleton:
     The arguments `changed` and `size` make the cache read it again after a change.
     """
     data: Any = read_yaml(path)
+    check_rig_file(path, data, read_text(path))
     try:
         maps = data.pop("maps", None) or {}
         skeleton = Skeleton.from_dict({**data, "name": name})
-        if not (np.abs(skeleton.offsets) <= FARTHEST).all():
-            raise ValueError(f"an offset is not three numbers of {FARTHEST:g} cm at most")
         return TargetSkeleton(skeleton, maps)
     except (AttributeError, KeyError, TypeError, ValueError, OverflowError) as error:
         raise InputError(path, f"not a skeleton file: {printable(error)}") from None
@@ -135,7 +134,12 @@ def match_rig(rig: Skeleton, target: TargetSkeleton, folder: str | Path) -> RigM
 
 
 def rest_alike(rig: Skeleton, known: Skeleton) -> bool:
-    """Whether the bones of two rest poses have equal directions. Turned or mirrored bodies count as equal."""
+    """Whether the bones of two rest poses have equal directions. Turned or mirrored bodies count as equal.
+
+    A rig without toes never counts as equal, because its balls of the feet have to be added.
+    """
+    if "left_toe" not in rig.roles:
+        return False
     mine, theirs = (_bones(skeleton) for skeleton in (rig, known))
     for bone, wanted in theirs.items():
         if bone in mine and mine[bone] @ wanted < np.cos(np.radians(LIKE[bone[1].partition("_")[2]])):
@@ -198,7 +202,8 @@ def _unfit(rig: Skeleton, known: Skeleton) -> list[str]:
     It may lack fingers or eyes, but no mandatory role. It may have unknown joints.
     """
     roles = _roles(rig, known)
-    found = [f"joint {known.roles[role]} ({role}) is missing" for role in MANDATORY if role not in roles]
+    needed = [role for role in MANDATORY if role in known.roles]
+    found = [f"joint {known.roles[role]} ({role}) is missing" for role in needed if role not in roles]
     mine, wanted = _nearest(rig, known), _nearest(known, rig)
     return found + [
         f"joint {n} hangs from {mine[n]}, not from {p}" for n, p in wanted.items() if mine[n] != p

@@ -6,7 +6,7 @@ from typing import Any
 
 from hobble.report.comparison_charts import Compared
 from hobble.report.formats import duration, number, size
-from hobble.report.measure_sections import Overview, compared_columns
+from hobble.report.measure_sections import OverviewColumn, compared_columns
 from hobble.report.published import cited
 from hobble.report.tables import Column, Table
 
@@ -42,11 +42,11 @@ def configuration_table(compared: Compared) -> Table:
     names = {name: ", ".join(channels) or "none" for name, channels in of("channels").items()}
     columns = [
         *compared_columns(compared),
-        Overview(50, Column("channels"), names),
-        Overview(60, Column("data set"), of("dataset")),
-        Overview(80, Column.count("layers"), of("hidden_layers")),
-        Overview(90, Column.count("units"), of("units")),
-        Overview(100, Column.number("passes"), of("passes")),
+        OverviewColumn(50, Column("channels"), names),
+        OverviewColumn(60, Column("data set"), of("dataset")),
+        OverviewColumn(80, Column.count("layers"), of("hidden_layers")),
+        OverviewColumn(90, Column.count("units"), of("units")),
+        OverviewColumn(100, Column.number("passes"), of("passes")),
     ]
     columns.sort(key=lambda column: column.at)
     rows = [[name, *(column.values.get(name) for column in columns)] for name in entries]

@@ -10,7 +10,8 @@ where `found` is the measurement's JSON ({} if it was not run) and `material` is
 about the configuration. Its `comparison_page.py` may have
 
 - `section(compared) -> PageSection`: its part of the comparison page,
-- `columns(compared) -> Iterable[Overview]`: columns of the table of configurations at the top of that page,
+- `columns(compared) -> Iterable[OverviewColumn]`: columns of the table of configurations at the top of that
+  page,
 - `verdicts(compared) -> Iterable[Verdict]`: sentences on which configuration is best, for the summary,
 
 where `compared` is compare.json.
@@ -32,7 +33,7 @@ from hobble.report.verdicts import Verdict
 
 
 @dataclass(frozen=True)
-class Overview:
+class OverviewColumn:
     """A column of the table of configurations.
 
     values: configuration -> value. at: its place; columns are sorted by it.
@@ -69,7 +70,7 @@ def compared_verdicts(compared: Json) -> list[Verdict]:
     return sorted(found, key=lambda verdict: verdict.at)
 
 
-def compared_columns(compared: Json) -> list[Overview]:
+def compared_columns(compared: Json) -> list[OverviewColumn]:
     """The columns of the table of configurations."""
     return [column for _, show in _each("comparison_page", "columns") for column in show(compared)]
 

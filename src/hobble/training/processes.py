@@ -62,8 +62,8 @@ class Processes:
             for tensor in tensors:
                 torch.distributed.broadcast(tensor, 0)
 
-    def numbers_of_first(self, *numbers: int) -> list[int]:
-        """The first process's numbers."""
+    def from_first(self, *numbers: int) -> list[int]:
+        """These numbers, as the first process has them; the others get its numbers."""
         shared: list[Any] = [numbers]
         if not self.alone:
             torch.distributed.broadcast_object_list(shared, 0)

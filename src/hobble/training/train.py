@@ -49,7 +49,7 @@ def train(
 ) -> State:
     """Train to `training.passes` passes over the database's training clips; returns the final state.
 
-    network, training: these sections of a configuration. checkpoints: a folder with one subfolder for each
+    network, training: the options of a configuration. checkpoints: a folder with one subfolder for each
     run, named by the hash of everything that determines it; a run resumes from its own checkpoint there.
     start: a checkpoint to start from if the run has none of its own; it is part of the hash, as is `code`,
     the hash of the code. processes: those that train together, each of which calls this; the first reads and
@@ -103,7 +103,7 @@ def _run(
     roll_out = RollOut(database, training.rollout, len(places), device, places.start)
     samples = database.samples(TRAIN)
     for index in range(state.sections_done, training.all_sections):
-        if training.patience and processes.numbers_of_first(state.since_best)[0] >= training.patience:
+        if training.patience and processes.from_first(state.since_best)[0] >= training.patience:
             log.info("no lower held-out error for %d sections: training ends", training.patience)
             break
         pass_index, section = divmod(index, sections)

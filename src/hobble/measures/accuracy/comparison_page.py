@@ -10,7 +10,7 @@ from hobble.measures.accuracy.page import quantiles
 from hobble.report.charts import Chart, Trace, axis
 from hobble.report.compare_tables import difference_table
 from hobble.report.comparison_charts import SPLITS, Compared, colours, dots, names
-from hobble.report.measure_sections import Overview
+from hobble.report.measure_sections import OverviewColumn
 from hobble.report.page_parts import PageSection, SectionPart
 from hobble.report.tables import Column
 
@@ -35,13 +35,13 @@ def section(compared: Compared) -> PageSection:
     )
 
 
-def columns(compared: Compared) -> Iterator[Overview]:
+def columns(compared: Compared) -> Iterator[OverviewColumn]:
     """The error of each split, and the number of joints that were measured."""
     found = {entry["configuration"]: entry for entry in compared["accuracy"]}
     for at, split, label in ((10, "held_out", "held-out error"), (20, "train", "training error")):
         values = {name: entry[split]["mean"] for name, entry in found.items()}
-        yield Overview(at, Column(label, _percent, "n"), values)
-    yield Overview(70, Column.count("joints"), {name: entry["joints"] for name, entry in found.items()})
+        yield OverviewColumn(at, Column(label, _percent, "n"), values)
+    yield OverviewColumn(70, Column.count("joints"), {name: entry["joints"] for name, entry in found.items()})
 
 
 def error_boxes(compared: Compared) -> Chart | None:

@@ -8,7 +8,7 @@ from typing import Any
 from hobble.report.charts import Chart, Trace, axis, line
 from hobble.report.comparison_charts import Compared, colours, dots, names
 from hobble.report.formats import number, size
-from hobble.report.measure_sections import Overview
+from hobble.report.measure_sections import OverviewColumn
 from hobble.report.page_parts import PageSection, SectionPart
 from hobble.report.tables import Column
 from hobble.report.verdicts import Verdict, best
@@ -20,15 +20,15 @@ def section(compared: Compared) -> PageSection:
     return PageSection("speed", parts, title="Time per frame", at=30)
 
 
-def columns(compared: Compared) -> Iterator[Overview]:
+def columns(compared: Compared) -> Iterator[OverviewColumn]:
     """Median time per frame (in the exact phase mode if it was run), and the size of the network."""
     exact = in_exact_mode(compared)
     frames = {name: entry["milliseconds"]["spread"]["median"] for name, entry in exact.items()}
-    yield Overview(30, Column.number("ms per frame, median"), frames)
+    yield OverviewColumn(30, Column.number("ms per frame, median"), frames)
     about = {entry["configuration"]: entry for entry in compared["configurations"]}
     counts = {name: (entry["computations"] or {}).get("true") for name, entry in about.items()}
-    yield Overview(40, Column.count("parameters of one frame"), counts)
-    yield Overview(110, Column("in memory", lambda v: size(float(v)), "n"), _bytes(compared))
+    yield OverviewColumn(40, Column.count("parameters of one frame"), counts)
+    yield OverviewColumn(110, Column("in memory", lambda v: size(float(v)), "n"), _bytes(compared))
 
 
 def verdicts(compared: Compared) -> Iterator[Verdict]:

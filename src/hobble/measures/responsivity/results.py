@@ -6,7 +6,9 @@ from typing import TypedDict
 
 
 class Spread(TypedDict):
-    """Spread of the total of a frame's steps, ms: standard deviation, median and 99th percentile.
+    """Spread of the time of a frame, summed over its `Steps`, ms.
+
+    sd, median, p99: standard deviation, median and 99th percentile.
 
     whole_call: mean time of a call of `next_pose`, ms. It includes what is done between the steps.
     """
@@ -81,8 +83,8 @@ class LapPath(TypedDict):
 class ModeResults(TypedDict):
     """All laps of one phase mode.
 
-    waypoints: how many there are in all laps. foot_slide_cm is the mean over laps; path_overshoot_cm and both
-    turns are the largest of all laps. See `Lap`.
+    waypoints: how many there are in all laps. foot_slide_cm: mean over laps. path_overshoot_cm,
+    largest_turn_degrees, predicted_turn_degrees: the largest values of all laps. See `LapWalk`.
     """
 
     mode: str

@@ -1,0 +1,141 @@
+"""Rig files written by hand: each mistake is refused with the file, and with its line if it has one."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from hobble.core.errors import InputError
+from hobble.motion.draft import draft, guessed
+from hobble.motion.file_motion import rig_of
+from hobble.motion.read import read_bvh
+from hobble.motion.rig import load_skeleton
+
+
+def role(name: str, joint: str):
+    """An edit of a rig file: the role gets another joint."""
+    return lambda text: re.sub(rf"^  {name}: \w+$", f"  {name}: {joint}", text, flags=re.MULTILINE)
+
+
+def swapped(first: str, second: str):
+    """An edit of a rig file: two roles on each side exchange their joints."""
+
+    def edit(text: str) -> str:
+        for side in ("left", "right"):
+            a, b = (
+                re.search(rf"^  {side}_{part}: (\w+)$", text, re.MULTILINE)[1] for part in (first, second)
+            )
+            text = role(f"{side}_{second}", a)(role(f"{side}_{first}", b)(text))
+        return text
+
+    return edit
+
+
+def without(*roles: str):
+    return lambda text: re.sub(rf"^  ({'|'.join(roles)}): \w+\n", "", text, flags=re.MULTILINE)
+
+
+def sides_swapped(text: str) -> str:
+    return re.sub(
+        r"^(  (?:left|right)_\w+: \w+_)([LR])$", lambda m: m[1] + "LR"["RL".index(m[2])], text, flags=re.M
+    )
+
+
+def knees_crossed(text: str) -> str:
+    return role("right_knee", "LowerLeg_L")(role("left_knee", "LowerLeg_R")(text))
+
+
+def replaced(old: str, new: str):
+    return lambda text: text.replace(old, new, 1)
+
+
+@pytest.mark.parametrize(
+    ("edit", "line", "problem"),
+    [
+        (
+            swapped("elbow", "wrist"),
+            "left_wrist",
+            "LowerArm_L, which does not hang from Hand_L, the left_elbow",
+        ),
+        (swapped("hip", "knee"), "left_knee", "left_knee is UpperLeg_L, which does not hang from LowerLeg_L"),
+        (swapped("heel", "toe"), "left_toe", "left_toe is Foot_L, which does not hang from Toes_L"),
+        (knees_crossed, "left_knee", "LowerLeg_R, which does not hang from UpperLeg_L, the left_hip"),
+        (sides_swapped, "left_shoulder", "left_shoulder is UpperArm_R, whose name says right"),
+        (role("head", "Chest"), "head", "head is Chest, which does not hang from Neck, the neck"),
+        (role("head", "Neck"), "head", "head and neck are the same joint, Neck"),
+        (role("chest", "Chest"), "chest", "chest is Chest, but the arms hang from UpperChest"),
+        (role("hips", "Spine"), "spine", "spine and hips are the same joint, Spine"),
+        (role("left_elbow", "Hand_L"), "left_wrist", "left_wrist and left_elbow are the same joint, Hand_L"),
+        (role("left_knee", "LowerLeg"), "left_knee", "there is no joint 'LowerLeg' (is it 'LowerLeg_"),
+        (replaced("left_knee:", "left_kne:"), "left_kne", "there is no role left_kne (is it left_knee?)"),
+        (without("left_elbow", "head"), "roles", "these roles are missing: head, left_elbow"),
+        (without("left_toe"), "roles", "these roles are missing: left_toe"),
+        (replaced("{parent: null", "{parent: Spine"), "Hips", "its parent 'Spine' must be listed above it"),
+        (replaced("{parent: Hips", "{parent: null"), "Spine", "only the first joint may have no parent"),
+        (replaced("[0, 10, 0]", "[0, 10]"), "Spine", "its offset must be three numbers of 100000 cm at most"),
+        (replaced("[0, 10, 0]", "[0, .nan, 0]"), "Spine", "its offset must be three numbers"),
+        (replaced("{parent: Hips, offset: [0, 10, 0]}", "Hips"), "Spine", "joint Spine: expected {parent"),
+        (replaced("roles:", "rolls:"), None, "needs a section `roles`"),
+        (lambda text: "- Hips\n", None, "needs a section `joints`"),
+    ],
+)
+def test_a_mistake_in_a_rig_file_is_refused_in_its_line(root, tmp_path, edit, line, problem):
+    text = edit((root / "config/skeletons/rig22.yaml").read_text())
+    file = tmp_path / "mine.yaml"
+    file.write_text(text)
+    with pytest.raises(InputError) as refused:
+        load_skeleton(file)
+    assert problem in str(refused.value)
+    where = re.search(r"mine\.yaml, line (\d+):", str(refused.value))
+    assert (where is None) == (line is None)
+    if line is not None:
+        own = text.split("\n")[int(where[1]) - 1]
+        assert re.match(rf"\s*{line}\s*:", own), own
+
+
+def test_hips_far_above_the_legs_are_refused(root, tmp_path):
+    text = (root / "config/skeletons/rig22.yaml").read_text()
+    root_joint = "  Root: {parent: null, offset: [0, 0, 0]}"
+    text = text.replace(
+        "  Hips: {parent: null, offset: [0,", f"{root_joint}\n  Hips: {{parent: Root, offset: [95,"
+    )
+    text = role("hips", "Root")(text)
+    (tmp_path / "mine.yaml").write_text(text)
+    with pytest.raises(InputError, match="hips is Root, but the legs hang from Hips"):
+        load_skeleton(tmp_path / "mine.yaml")
+
+
+@pytest.mark.shared
+@pytest.mark.parametrize(
+    ("parts", "refused"),
+    [({}, ""), ({"shoulder": "LeftShoulder1"}, "a joint between them bends"), ({"toe": None}, "")],
+)
+def test_a_joint_of_a_wrong_role_shows_in_the_motion(shared, root, tmp_path, parts, refused):
+    from hobble.motion.make import make_clip
+    from hobble.motion.options import ClipMotion
+
+    clip, folder = shared / "mocap/patients/SubjectA1_Cycle1.bvh", tmp_path / "skeletons"
+    rig = rig_of(read_bvh(clip))
+    text = draft(rig, guessed(rig))
+    for part, joint in parts.items():
+        if joint is None:
+            text = re.sub(rf"^  (left|right)_{part}: .*\n", "", text, flags=re.MULTILINE)
+        else:
+            text = re.sub(rf"^  left_{part}: .*$", f"  left_{part}: {joint}", text, flags=re.MULTILINE)
+    folder.mkdir()
+    target = root / "config/skeletons/holden31.yaml"
+    (folder / "mine.yaml").write_text(text)
+    if refused:
+        with pytest.raises(InputError, match=refused) as error:
+            make_clip(clip, target, folder, "a", "holden31", ClipMotion())
+        assert "LeftForeArm (left_elbow)" in str(error.value)
+        assert str(error.value).endswith("mine.yaml.")
+        return
+    made, report = make_clip(clip, target, folder, "a", "holden31", ClipMotion())
+    plain, _ = make_clip(clip, target, Path(root / "config/skeletons"), "a", "holden31", ClipMotion())
+    assert report["rig"] == "mine"
+    apart = np.linalg.norm(made.positions - plain.positions, axis=-1).mean()
+    assert apart < (1e-9 if not parts else 3.0)
