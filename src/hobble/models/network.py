@@ -18,7 +18,9 @@ from hobble.core.skeleton import Skeleton
 from hobble.models.training_facts import TrainingFacts
 from hobble.rows.layout import GAITS, RowLayout
 
-TERRAIN_SIDE = 25.0  # cm from the path to the side heights, if the file does not say
+# The ground's height is an input on the character's path and at this distance (cm) left and right of it, if
+# the network's file does not say another.
+TERRAIN_SIDE = 25.0
 STORAGES = ("float32", "int16")  # types in which a predictor can keep its weights
 
 Export = Callable[[Path, str], str]
@@ -61,9 +63,10 @@ class Network(ABC):
 
     kind: ClassVar[str] = ""  # its folder in hobble.models
     phase: ClassVar[bool] = True  # whether a prediction depends on the phase
-    # Whether the predicted poses are recorded frames, as in motion matching. With other networks, the runtime
-    # slows the root while the character stands or moves against the target velocity. With these it does not,
-    # because the feet of recorded frames slide if the root moves less than predicted.
+    # Whether the predicted poses are recorded frames, as in motion matching. With other networks, the
+    # runtime slows the root while the character stands or moves against the target velocity. With networks
+    # of recorded poses it does not, because the feet of recorded frames slide if the root moves less than
+    # predicted.
     recorded_poses: ClassVar[bool] = False
     # Names of the ways to evaluate the network, such as constant, linear and cubic interpolation over the
     # phase. The last one is exact.

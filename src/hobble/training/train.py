@@ -1,8 +1,9 @@
 """The training loop.
 
 A pass goes once through all training samples. It has `training.sections` sections, and a section has
-batches. Each batch is augmented (slower or faster, other poses, the network's own errors), then the network
-takes a step. After each section the training logs, measures and saves.
+batches. Each batch is augmented: its motion is played slower or faster, other poses are mixed in, and errors
+that the network made are added. Then the network takes a step. After each section the training logs, measures
+and saves.
 """
 
 from __future__ import annotations
