@@ -203,7 +203,8 @@ def test_the_memory_of_a_job_does_not_grow_with_the_shards(rows_of, tmp_path, mo
 
 
 def test_of_hurt_versions_only_every_nth_row_is_used_and_each_version_starts_with_another(rows_of, tmp_path):
-    clips = {name: rows_of(name, 70, None, seed=i) for i, name in enumerate(("a", "a1", "a2", "a3", "k", "k1"))}
+    names = ("a", "a1", "a2", "a3", "k", "k1")
+    clips = {name: rows_of(name, 70, None, seed=i) for i, name in enumerate(names)}
     sources = {"a1": "a", "a2": "a", "a3": "a", "k1": "k"}
     splits = {name: "held_out" if name[0] == "k" else "train" for name in clips}
     write_database(tmp_path / "db", clips, splits, sources=sources, every=2, **OPTIONS)
