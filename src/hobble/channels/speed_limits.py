@@ -23,7 +23,7 @@ UNLIMITED = 1e4  # cm a frame: limit of a gait in which no healthy clip goes for
 LEVELS = 5  # number of values of a column, from 0 to the highest, for which a speed is stored
 TOP = 95  # percentile of the speeds of healthy cycles in a gait: the limit of a healthy body
 # Percentile of these speeds that counts as the usual speed. The median is too low: clips start and stop.
-USUAL = 65
+USUAL = 70
 # A body that an injury slows to this share of the usual speed or less cannot hurry: its limit is the slowed
 # speed. A body that keeps the whole usual speed can hurry up to the limit of a healthy one (TOP). Between
 # these two shares the limit is interpolated.
