@@ -88,3 +88,16 @@ def test_a_frame_of_zeros_does_not_turn_the_spine(both, nodding):
     first, second, names = both(nodding, named(trunk), with_zeros, six=True)
     assert len(second) == pytest.approx(len(first), abs=1)
     assert compare(first, second, names).mean() < 1.0
+
+
+def test_a_very_short_bone_above_the_chest_does_not_turn_it(both, walk):
+    """The chest lies 3 cm below the neck and 1.2 cm behind it. By this bone alone, arms are 2.5 cm off."""
+    rig = named("Hips=Hips Low=LowerBack Mid=Spine High=Spine1 Neck=Neck1 Head=Head")
+    rig = rig.replace("Neck|High|", "Chest|High|Spine1+0,12,-0.7\nNeck|Chest|")
+    rig = rig.replace("LeftShoulder|High|", "LeftShoulder|Chest|").replace(
+        "RightShoulder|High|", "RightShoulder|Chest|"
+    )
+    first, second, names = both(walk, rig)
+    off = dict(zip(names, compare(first, second, names), strict=True))
+    assert off["LeftArm"] < 1.5
+    assert off["Head"] < 1.5

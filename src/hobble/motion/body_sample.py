@@ -83,13 +83,13 @@ class BodySample:
         ways = (self.at[:, b] - self.at[:, a] for a, b in pairwise(joints))
         return sum(float(np.median(np.linalg.norm(way, axis=-1))) for way in ways)
 
-    def first_long(self, joint: int, following: Sequence[int]) -> tuple[Array, int]:
-        """(3,) `bone` from a joint to the first of `following` that is not at the same place, and that joint.
+    def first_long(self, joint: int, following: Sequence[int], least: float = SHORT) -> tuple[Array, int]:
+        """(3,) `bone` from a joint to the first of `following` that is more than `least` cm away, and that joint.
 
-        If all are at the same place, the last of them.
+        If all are nearer, the last of them.
         """
         bones = [(self.bone(joint, end), end) for end in following]
-        return next((found for found in bones if np.linalg.norm(found[0]) > SHORT), bones[-1])
+        return next((found for found in bones if np.linalg.norm(found[0]) > least), bones[-1])
 
     def hinge(self, start: int, middle: int, end: int, otherwise: Array) -> Array:
         """(S, 3) axis about which a limb of three joints bends, or `otherwise` (S, 3) if it hardly bends.

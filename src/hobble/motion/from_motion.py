@@ -17,6 +17,7 @@ from hobble.motion.orient import frame, mean_rotation, unit
 from hobble.motion.spine import SHORT, spine_shares
 
 UP, AHEAD = np.array([0.0, 1.0, 0.0]), np.array([0.0, 0.0, 1.0])
+KINK = 0.06  # leg lengths: a bone above the chest that is shorter is skipped
 AGREE = np.radians(25.0)  # trunk joints that differ by less have the same rest pose
 
 
@@ -73,7 +74,10 @@ def _bone(sample: BodySample, joint: int) -> tuple[Array, Array, Array]:
     following = chain[chain.index(joint) + 1 :]
     # A rig with many short bones has kinks. One bone of the target follows several of them, up to its end.
     reach = [j for j in following if share[j] <= sample.target.spine.end(share[joint]) + 1e-6]
-    bone, end = sample.first_long(joint, [*reach[-1:], *following])
+    # The chest is stiff up to the shoulders. A very short bone above it does not show how it is turned.
+    leg = sample.length(*body.legs["left"][:3])
+    least = max(SHORT, KINK * leg) if joint == body.chest else SHORT
+    bone, end = sample.first_long(joint, [*reach[-1:], *following], least)
     left = sample.chest_left
     if joint == body.hips:
         left = sample.hips_left
