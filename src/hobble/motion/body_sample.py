@@ -84,7 +84,7 @@ class BodySample:
         return sum(float(np.median(np.linalg.norm(way, axis=-1))) for way in ways)
 
     def first_long(self, joint: int, following: Sequence[int], least: float = SHORT) -> tuple[Array, int]:
-        """(3,) `bone` from a joint to the first of `following` that is more than `least` cm away, and that joint.
+        """(3,) `bone` from a joint to the first of `following` that is over `least` cm away, and that joint.
 
         If all are nearer, the last of them.
         """
