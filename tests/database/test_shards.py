@@ -15,7 +15,7 @@ from hobble.database import plan
 from hobble.database.merge import merge_shards, write_database
 from hobble.database.reader import Block, Database
 from hobble.database.shard import write_shard
-from hobble.rows.clip_rows import save_clip_rows
+from hobble.rows.clip_rows import load_clip_rows, save_clip_rows
 from hobble.rows.layout import GAITS, RowLayout
 
 OPTIONS = {"channels": ["injury"], "joint_weight": 0.1, "chunk_bytes": 20_000}
@@ -200,3 +200,44 @@ def test_the_memory_of_a_job_does_not_grow_with_the_shards(rows_of, tmp_path, mo
         peaks.append(tracemalloc.get_traced_memory()[1])
         tracemalloc.stop()
     assert peaks[1] < 1.1 * peaks[0]
+
+
+def test_of_hurt_versions_only_every_nth_row_is_used_and_each_version_starts_with_another(rows_of, tmp_path):
+    names = ("a", "a1", "a2", "a3", "k", "k1")
+    clips = {name: rows_of(name, 70, None, seed=i) for i, name in enumerate(names)}
+    sources = {"a1": "a", "a2": "a", "a3": "a", "k1": "k"}
+    splits = {name: "held_out" if name[0] == "k" else "train" for name in clips}
+    write_database(tmp_path / "db", clips, splits, sources=sources, every=2, **OPTIONS)
+    used = {"a": slice(None), "a1": slice(0, None, 2), "a2": slice(1, None, 2), "a3": slice(0, None, 2)}
+    expected = {(name, int(frame)) for name, part in used.items() for frame in clips[name].frame[part]}
+    block = a_pass(tmp_path / "db", "train", MEMORY)
+    found = set(zip(block.clip.tolist(), block.frame.tolist(), strict=True))
+    assert found == expected
+    db = Database.open(tmp_path / "db", MEMORY)
+    assert db.rows("train") == 70 + 3 * 35
+    assert db.rows("held_out") == 140  # measured in full
+
+
+def test_a_row_that_is_used_keeps_its_values_and_its_ground(rows_of):
+    rows = rows_of("a", 23, None, seed=3)
+    kept = rows.every(4, 2)
+    kept.check("a")
+    for new, old in enumerate(range(2, 23, 4)):
+        for field in ("x", "y", "p", "frame", "cycle", "fits"):
+            np.testing.assert_array_equal(getattr(kept, field)[new], getattr(rows, field)[old])
+        np.testing.assert_array_equal(kept.channels["injury"][new], rows.channels["injury"][old])
+        mine, his = (slice(r.first_fit[i], r.first_fit[i] + r.fits[i]) for r, i in ((kept, new), (rows, old)))
+        np.testing.assert_array_equal(kept.heights[mine], rows.heights[his])
+        np.testing.assert_array_equal(kept.mean[mine], rows.mean[his])
+
+
+def test_speed_limits_are_learnt_from_all_rows(clips, tmp_path):
+    """Speeds are means over whole cycles."""
+    for file in clips.values():  # a clip that becomes faster in each cycle
+        rows = load_clip_rows(file)
+        rows.y[:, rows.layout.y_root_velocity] *= 1 + np.arange(len(rows))[:, None] % 15 / 30
+        save_clip_rows(file, rows)
+    whole = write_database(tmp_path / "whole", clips, SPLITS, sources=SOURCES, **OPTIONS)
+    part = write_database(tmp_path / "part", clips, SPLITS, sources=SOURCES, every=3, **OPTIONS)
+    assert part.limits == whole.limits
+    assert part.rows("train") < whole.rows("train")

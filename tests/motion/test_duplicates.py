@@ -41,6 +41,14 @@ def test_turned_shortened_and_mirrored_copies_are_found(walker, holden31):
     }
 
 
+@pytest.mark.shared
+def test_a_mirrored_file_of_the_original_release_is_found(shared, make):
+    """Its mirror program exchanged the angles of the two sides, whose bones differ by some millimetres."""
+    names = ("LocomotionFlat09_000", "LocomotionFlat09_000_mirror")
+    clips = [make(shared / f"mocap/pfnn/{name}.bvh")[0] for name in names]
+    assert same_pairs([digest(clip, clip.name) for clip in clips]) == [(*names, "mirrors of each other")]
+
+
 def test_the_data_for_comparing_clips_survives_its_file(walker, holden31, tmp_path):
     clip = walker(holden31, 120, 60.0)
     found = [digest(replace(clip, name=name), name) for name in "ab"]

@@ -51,7 +51,7 @@ def test_a_refused_file_is_listed_with_its_message(root, folder):
 
 
 def test_a_warning_of_many_clips_is_printed_once():
-    rare, common = "1 repaired", "The same for all."
+    rare, common = "repaired: its floor", "The same for all."
     clips = [ClipSummary(str(i), warnings=(common, rare)) for i in range(6)]
     short, notes = shared_warnings(clips)
     assert notes == [f"6 of 6 clips: {common}"]

@@ -26,6 +26,7 @@ with job(snakemake) as log:
             snakemake.params.splits,
             channels=snakemake.params.channels,
             sources=snakemake.params.sources,
+            every=snakemake.params.every,
             joint_weight=options.joint_weight,
             dtype=options.dtype,
             seed=options.seed,

@@ -23,7 +23,7 @@ UNLIMITED = 1e4  # cm a frame: limit of a gait in which no healthy clip goes for
 LEVELS = 5  # number of values of a column, from 0 to the highest, for which a speed is stored
 TOP = 95  # percentile of the speeds of healthy cycles in a gait: the limit of a healthy body
 # Percentile of these speeds that counts as the usual speed. The median is too low: clips start and stop.
-USUAL = 65
+USUAL = 70
 # A body that an injury slows to this share of the usual speed or less cannot hurry: its limit is the slowed
 # speed. A body that keeps the whole usual speed can hurry up to the limit of a healthy one (TOP). Between
 # these two shares the limit is interpolated.
@@ -32,8 +32,8 @@ AHEAD = 0.9  # a cycle counts if at least this share of its speed is forward
 STEADY = 0.35  # a cycle is left out if a value changes in it by more than this share of the highest value
 FAINT = 0.05  # a mean over a cycle below this share of the highest value counts as 0
 MOVING = 0.1  # cm a frame: slower cycles of a healthy body are left out
-# Weight of the curve that pulls a fit towards itself (see `LimitLearner.learn`): at each level, the curve
-# counts as much as this many cycles.
+# When a curve is fitted, the line or curve that it should stay near (`expected` in `_fitted`) counts as much
+# as this many cycles at each level.
 EXPECTED_WEIGHT = 2.0
 SLOWEST = 0.1  # a smaller share of the healthy speed counts as this
 
@@ -101,7 +101,8 @@ def together(allowed: Sequence[Array], usual: Array) -> Array:
 
     allowed: for each channel, the highest speeds (C, G). usual: (G,) usual speeds of a healthy body. Each
     channel leaves a share of the usual speed, and the shares multiply: a sad person who limps is slower than
-    one who is only sad or only limps. A channel that allows the usual speed does not count.
+    one who is only sad or only limps. A channel that allows the usual speed has
+    the share 1. If all channels allow it, the lowest of their limits counts.
     """
     shares = [
         np.minimum(1.0, np.divide(one, usual, out=np.ones_like(one), where=usual > 0)) for one in allowed
@@ -194,10 +195,10 @@ class LimitLearner:
     def learn(self) -> Limits | None:
         """The limits, or None if no cycle has a value above 0.
 
-        For each label, the share of the healthy speed is fitted as a function of the value in three steps: a
-        straight line through the cycles of all gaits, a curve through these cycles that the line pulls
-        towards itself, and for each gait a curve through its own cycles that the curve of all gaits pulls
-        towards itself (`_fitted`).
+        For each label, the share of the healthy speed is fitted as a function of the value, in three steps.
+        First, a straight line is fitted to the cycles of all gaits. Second, a curve is fitted to these
+        cycles; where there are few, it stays near the line. Third, a curve is fitted to the cycles of each
+        gait; where there are few, it stays near the curve of all gaits.
         """
         levels = np.linspace(0, self.highest, LEVELS)
         healthy = self._healthy()
@@ -237,8 +238,9 @@ class LimitLearner:
     def _shares(self, usual: Array) -> tuple[np.ndarray, Array, Array]:
         """Gait (n,), share of the healthy speed (n,) and values (n, L) of the cycles with a value above 0.
 
-        A cycle of a hurt version is compared with the same cycle of its source, which has the same values in
-        the other channels. It is left out if that cycle of the source has a value of this channel, too.
+        A cycle of a hurt version is compared with the same cycle of its source. They differ in one channel
+        only. If the source's cycle has a value of this channel too, the cycle is left out: a hurt version of
+        a sad clip says nothing about the limits of sadness.
         """
         parts = []
         for source, cycles in self._clips.values():

@@ -34,6 +34,7 @@ def write_database(
     *,
     channels: Sequence[str],
     sources: Mapping[str, str] | None = None,
+    every: int = 1,
     joint_weight: float,
     dtype: str = "float32",
     seed: int = 1,
@@ -42,8 +43,9 @@ def write_database(
     """Build a database with one shard in folder `path` from the rows of clips, or from files of rows.
 
     clips: clip name -> rows or file. splits: clip name -> "train" or "held_out". channels: the network's
-    input channels, in the order of their columns. sources: hurt version -> its healthy clip. dtype: float32,
-    float16 or bfloat16. chunk_bytes: size of a chunk. The statistics are those of the training clips. The
+    input channels, in the order of their columns. sources: hurt version -> its healthy clip. every: of the
+    training rows of hurt versions, only every `every`-th is used. dtype: float32, float16 or bfloat16.
+    chunk_bytes: size of a chunk. The statistics are those of the training clips. The
     same rows and options give the same bytes. Raises HobbleError if no training clip has rows, InputError if
     a clip does not fit the others.
     """
@@ -55,6 +57,7 @@ def write_database(
             splits,
             channels=channels,
             sources=sources,
+            every=every,
             joint_weight=joint_weight,
             dtype=dtype,
             seed=seed,

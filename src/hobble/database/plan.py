@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -23,8 +24,9 @@ class Plan:
     """What a shard will contain.
 
     layout: of its rows. visits: how often a pass over the data uses each row. clips: for each clip `clip`
-    (its name), `split`, `rows` and `pairs` (of a row and a terrain fit), and for a hurt version `source`, its
-    healthy clip. chunk_rows, bucket_rows: number of rows of a chunk and of a bucket.
+    (its name), `split`, `rows` and `pairs` (of a row and a terrain fit), for a hurt version `source`, its
+    healthy clip, and if only some of its rows are used `every` and `first_row`: every how many rows one is
+    used, and the first. chunk_rows, bucket_rows: number of rows of a chunk and of a bucket.
     """
 
     layout: RowLayout
@@ -58,6 +60,7 @@ def make_plan(
     item: int,
     chunk_bytes: int,
     sources: Mapping[str, str],
+    every: int = 1,
 ) -> Plan | None:
     """The plan of a shard with the rows of `clips`; None if there are no clips.
 
@@ -67,6 +70,7 @@ def make_plan(
     entries: list[dict[str, Any]] = []
     first: Outline | None = None
     visits, pairs, rows = 1, 0, 0
+    made: Counter[str] = Counter()  # versions of each healthy clip so far: each starts with another row
     for name in sorted(clips):
         one = outline(clips[name])
         first = first or one
@@ -74,13 +78,16 @@ def make_plan(
             source = clips[name]
             where = name if isinstance(source, ClipRows) else source
             raise InputError(where, f"the layout of its rows differs from that of {min(clips)}")
-        fits = int(one.fits.sum())
-        source_of = {"source": sources[name]} if name in sources else {}
-        entries.append(
-            {"clip": name, "split": splits[name], "rows": len(one.fits), "pairs": fits, **source_of}
-        )
-        visits = max(visits, one.visits, int(one.fits.max(initial=1)))
-        rows, pairs = rows + len(one.fits), pairs + fits
+        entry: dict[str, Any] = {"clip": name, "split": splits[name]}
+        if name in sources:
+            entry["source"] = sources[name]
+            if every > 1 and splits[name] == "train":
+                entry |= {"every": every, "first_row": made[sources[name]] % every}
+                made[sources[name]] += 1
+        fits = one.fits[used_rows(entry)]
+        entries.append(entry | {"rows": len(fits), "pairs": int(fits.sum())})
+        visits = max(visits, one.visits, int(fits.max(initial=1)))
+        rows, pairs = rows + len(fits), pairs + int(fits.sum())
     if first is None:
         return None
     layout = first.layout.with_channels(channels)
@@ -88,6 +95,11 @@ def make_plan(
     chunk_rows = max(1, int(chunk_bytes / (item * values + 16)))
     each = max(1, int(BUCKET_BYTES / (chunk_rows * 4 * values)))
     return Plan(layout, first.skeleton, visits, entries, chunk_rows, chunk_rows * each)
+
+
+def used_rows(entry: Mapping[str, Any]) -> slice:
+    """Which rows of a clip are used. entry: the clip's in `Plan.clips`."""
+    return slice(entry.get("first_row", 0), None, entry.get("every", 1))
 
 
 def fit_together(one: Outline | Plan, other: Outline | Plan) -> bool:

@@ -11,7 +11,7 @@ import numpy as np
 from hobble.core.quat import Array
 from hobble.database.buckets import INDEX, Buckets
 from hobble.database.manifest import SPLITS
-from hobble.database.plan import Plan, RowSource
+from hobble.database.plan import Plan, RowSource, used_rows
 from hobble.rows.clip_rows import ClipRows, load_clip_rows
 from hobble.rows.compose import fit_columns, frame_inputs, x_columns
 from hobble.rows.layout import RowLayout
@@ -30,8 +30,9 @@ def make_buckets(folder: Path, plan: Plan) -> dict[str, Buckets]:
 
 def scatter(
     buckets: Mapping[str, Buckets], clips: Mapping[str, RowSource], plan: Plan, seed: int
-) -> Iterator[tuple[dict[str, Any], ClipRows]]:
-    """Put each clip into the buckets of its split, then yield its entry in the plan and its rows.
+) -> Iterator[tuple[dict[str, Any], ClipRows, ClipRows]]:
+    """Put each clip into the buckets of its split, then yield its entry in the plan, all its rows, and the
+    rows that are used.
 
     One permutation of all rows of a split determines the place of each row.
     """
@@ -44,7 +45,9 @@ def scatter(
         split, start = entry["split"], done[entry["split"]]
         done[split] += entry["rows"]
         source = clips[entry["clip"]]
-        clip = source if isinstance(source, ClipRows) else load_clip_rows(source)
+        whole = source if isinstance(source, ClipRows) else load_clip_rows(source)
+        used = used_rows(entry)
+        clip = whole if used.step == 1 else whole.every(used.step, used.start)
         index = np.zeros(len(clip), INDEX)
         index["place"] = places[split][start : done[split]]
         index["count"], index["clip"] = clip.fits, number
@@ -52,7 +55,7 @@ def scatter(
         for first in range(0, len(clip), PART_ROWS):
             part = slice(first, first + PART_ROWS)
             buckets[split].add(*_tables(clip, part, plan.layout), index[part])
-        yield entry, clip
+        yield entry, whole, clip
 
 
 def _tables(clip: ClipRows, part: slice, layout: RowLayout) -> tuple[Array, Array]:

@@ -38,6 +38,7 @@ def write_shard(
     *,
     channels: Sequence[str],
     sources: Mapping[str, str] | None = None,
+    every: int = 1,
     joint_weight: float,
     dtype: str = "float32",
     seed: int = 1,
@@ -48,7 +49,7 @@ def write_shard(
     There may be no clips, or none with rows. Raises InputError if a clip does not fit the others, HobbleError
     if the disk is full.
     """
-    plan = make_plan(clips, splits, channels, STORED[dtype].itemsize, chunk_bytes, sources or {})
+    plan = make_plan(clips, splits, channels, STORED[dtype].itemsize, chunk_bytes, sources or {}, every)
     try:
         for split in SPLITS:  # a chunk may be linked from a database, so it is deleted and not overwritten
             shutil.rmtree(folder / split, ignore_errors=True)
@@ -60,9 +61,9 @@ def write_shard(
         nothing = Moments.nothing(plan.layout.x_size), Moments.nothing(plan.layout.y_size)
         sums: dict[str, Sums] = dict.fromkeys(SPLITS, nothing)
         learners = limit_learners(plan.layout, plan.skeleton)
-        for entry, clip in scatter(buckets, clips, plan, seed):
-            sums[entry["split"]] = add(sums[entry["split"]], clip_moments(clip, plan.layout))
-            if entry["split"] == "train":
+        for entry, clip, used in scatter(buckets, clips, plan, seed):
+            sums[entry["split"]] = add(sums[entry["split"]], clip_moments(used, plan.layout))
+            if entry["split"] == "train":  # speeds are means over whole cycles
                 add_rows(learners, clip, (sources or {}).get(entry["clip"]))
         own = sums["train"] if sums["train"][0].weight else sums["held_out"]
         scale = statistics_of(plan, own, joint_weight)

@@ -22,6 +22,11 @@ class Hurt(Section):
         description="an injury has the highest in half of its time and one of the others in the other half",
     )
     versions: Annotated[int, Field(ge=0, le=9)] = Field(1, description="hurt versions of each healthy clip")
+    every: Annotated[int, Field(ge=1, le=9)] = Field(
+        1,
+        description="of the frames of hurt versions, training uses every n-th; with n `versions` they are as "
+        "many as with one, but have n times as many injuries",
+    )
     at_once: Annotated[int, Field(ge=1, le=30)] = Field(2, description="links hurt at once, at most")
     seconds: Annotated[float, Field(ge=1, le=3600)] = Field(3.0, description="about how long an injury lasts")
     longest: Annotated[float, Field(gt=0, le=10)] = Field(

@@ -31,16 +31,17 @@ MOST_BOUNCE = 0.5  # g: a larger acceleration counts as this, because happy walk
 JOG_FROUDE = 6.0  # Froude number minus FASTEST_WALK, from 0 to 1
 FASTEST_WALK = 0.5  # Froude number of the fastest walk that people keep up for long
 JOG_CONSTANT = -3.2
-# A figure walks, however much it bounces, if both feet are down for at least this share of the time, and
-# flight and spring are below these limits.
+# A jog has a flight phase or no double support. So a figure walks, however much it bounces, if both feet are
+# down for at least this share of the time, and flight and spring are below these limits.
 LEAST_DOUBLE_SUPPORT = 0.1
 NO_FLIGHT = 0.01
 CLEAR_SPRING = 0.5
-# A figure whose Froude number, flight and spring are all below these limits walks, too. In the data set
+# Some people hop a little in a slow, happy walk. So a figure whose Froude number, flight and spring are all
+# below these limits walks, too: it is slow, and its hips rise over the standing foot. In the data set
 # `styles`, the mean flight of each happy walk is .06 or less, that of the slowest run is .16. With a limit of
 # .25 for the spring, slow jogs of Holden et al. (2017) would count as walks.
 SLOW, SOME_FLIGHT, SOME_SPRING = 0.35, 0.1, 0.2
-MOST_ODDS_OF_A_WALK = -1.0  # highest log odds of jogging for a figure that walks by one of these two rules
+WALK_ODDS = -1.0  # the log odds of jogging are at most this for a figure that walks by one of these rules
 CERTAIN_ODDS = 2.0  # log odds that count as full evidence
 DATA_SET_ODDS = 1.0  # log odds added if the data set says that a clip is mainly a jog; subtracted for a walk
 SWITCH_COST = 18.0  # a change of gait costs as much as this many frames of full evidence
@@ -98,7 +99,7 @@ def jog_odds(clip: Clip, down: np.ndarray) -> Array:
     )
     walks = (double_support >= LEAST_DOUBLE_SUPPORT) & (flight <= NO_FLIGHT) & (spring < CLEAR_SPRING)
     slow_walk = (froude < SLOW) & (flight <= SOME_FLIGHT) & (spring < SOME_SPRING)
-    return np.where(walks | slow_walk, np.minimum(odds, MOST_ODDS_OF_A_WALK), odds)
+    return np.where(walks | slow_walk, np.minimum(odds, WALK_ODDS), odds)
 
 
 def _evidence(clip: Clip, odds: Array) -> Array:

@@ -3,8 +3,9 @@
 A measurement is a package. Its `__init__` holds `MEASURE`, a `Measure`, and must not import anything slow.
 The other modules of the package are found by name:
 
-- `run.py`: `run(inputs, options) -> Outcome` measures (see `hobble.measures.inputs`), and
-  `run_piece(inputs, options, piece) -> Json` measures one piece, if there are pieces;
+- `run.py`: `run(inputs, options) -> Outcome` measures (see `hobble.measures.inputs`). A long measurement may
+  be split into pieces, which run as jobs of their own: `run_piece(inputs, options, piece) -> Json` measures
+  one piece, and `run` puts them together;
 - `page.py`: what the report shows of it (see `hobble.report.measure_sections`), if anything;
 - `comparison.py`: what it says of configurations side by side
   (see `hobble.evaluation.compare_configurations`), if anything;
@@ -58,8 +59,8 @@ class Measure:
 
     package: where its parts lie (`__name__` of the package). inputs: names of INPUTS or of other
     measurements. options: its keys of the section `evaluation`. runtime: the keys of the section `runtime`
-    that it depends on. pieces: a measurement that takes long may have pieces, and each runs as a job of its
-    own if there are several; see `Pieces`. people: whether it has to know who walks in which clip.
+    that it depends on. pieces: for a measurement that is split, what gives the names of its pieces. people:
+    whether it has to know who walks in which clip.
     """
 
     name: str

@@ -18,7 +18,9 @@ from hobble.core.skeleton import Skeleton
 from hobble.models.training_facts import TrainingFacts
 from hobble.rows.layout import GAITS, RowLayout
 
-TERRAIN_SIDE = 25.0  # cm from the path to the side heights, if the file does not say
+# The ground's height is an input on the character's path and at this distance (cm) left and right of it, if
+# the network's file does not say another.
+TERRAIN_SIDE = 25.0
 STORAGES = ("float32", "int16")  # types in which a predictor can keep its weights
 
 Export = Callable[[Path, str], str]
@@ -61,14 +63,15 @@ class Network(ABC):
 
     kind: ClassVar[str] = ""  # its folder in hobble.models
     phase: ClassVar[bool] = True  # whether a prediction depends on the phase
-    # Whether the predicted poses are recorded frames, as in motion matching. With other networks, the runtime
-    # slows the root while the character stands or moves against the target velocity. With these it does not,
-    # because the feet of recorded frames slide if the root moves less than predicted.
+    # Whether the predicted poses are recorded frames, as in motion matching. With other networks, the
+    # runtime slows the root while the character stands or moves against the target velocity. With networks
+    # of recorded poses it does not, because the feet of recorded frames slide if the root moves less than
+    # predicted.
     recorded_poses: ClassVar[bool] = False
     # Names of the ways to evaluate the network, such as constant, linear and cubic interpolation over the
     # phase. The last one is exact.
     modes: ClassVar[tuple[str, ...]] = ("exact",)
-    storage: ClassVar[str] = "float32"  # of the predictor's weights by default, one of STORAGES
+    storage: ClassVar[str] = "float32"  # how a predictor keeps its weights by default; one of STORAGES
 
     x_mean: Array = field(repr=False)
     x_std: Array = field(repr=False)
@@ -142,7 +145,9 @@ class Network(ABC):
 
     @abstractmethod
     def page(self, inputs: NDArray[np.int64], outputs: NDArray[np.int64]) -> dict[str, Any]:
-        """The JSON that `network.js` needs to predict columns `outputs` of Y from columns `inputs` of X.
+        """The JSON with which the report's page evaluates the network in a browser (`network.js`).
+
+        It predicts the columns `outputs` of Y from the columns `inputs` of X.
 
         The weights of the other inputs are left out.
         """

@@ -78,13 +78,15 @@ def with_split_joints(
 
 
 def _turns(clip: Clip, joint: int, bend: Bend) -> Array:
-    """(F, 4) rotations of a bone relative to the joint where it begins."""
+    """(F, 4) rotations of a bone relative to the joint where it begins; none where the bone has no length."""
     if clip.translations is None:
         return _still(clip)
     bones = quat.rotate(
         quat.inv(clip.global_rotations[:, joint]), clip.positions[:, bend.end] - clip.positions[:, joint]
     )
-    return quat.between(np.broadcast_to(bend.bone, bones.shape), bones)
+    usual = np.broadcast_to(bend.bone, bones.shape)
+    long = np.linalg.norm(bones, axis=-1, keepdims=True) > 0.5 * np.linalg.norm(bend.bone)
+    return quat.between(usual, np.where(long, bones, usual))
 
 
 def _still(clip: Clip) -> Array:

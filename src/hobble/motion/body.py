@@ -26,6 +26,8 @@ class Body:
     carries both arms; empty if the hips carry the arms. neck: the joints between chest and head. arms: side
     -> clavicle (or None), shoulder, elbow and wrist. legs: side -> hip, knee, heel (the ankle) and toe (the
     ball of the foot, or None). fingers: side -> joint at the base of a finger, if a hand has one.
+    arms_on_neck: whether the arms hang from the first joint of the neck, as in rigs of 3ds Max, and it
+    lies below the shoulders. Then the bone from the chest to that joint belongs to the trunk.
     """
 
     hips: int
@@ -35,11 +37,17 @@ class Body:
     arms: Mapping[str, tuple[int | None, int, int, int]]
     legs: Mapping[str, tuple[int, int, int, int | None]]
     fingers: Mapping[str, int] = field(default_factory=dict)
+    arms_on_neck: bool = False
 
     @property
     def chest(self) -> int:
         """The joint that carries the arms."""
         return self.trunk[-1] if self.trunk else self.hips
+
+    @property
+    def top_bones(self) -> int:
+        """Number of the bones of the trunk, from the hips to where the neck begins."""
+        return len(self.trunk) + int(self.arms_on_neck)
 
     @property
     def joints(self) -> list[int]:
@@ -62,7 +70,8 @@ class Body:
         legs = {s: (new[a], new[b], new[c], one(d)) for s, (a, b, c, d) in self.legs.items()}
         fingers = {s: new[j] for s, j in self.fingers.items() if j in new}
         trunk, neck = (tuple(new[j] for j in chain) for chain in (self.trunk, self.neck))
-        return Body(new[self.hips], trunk, neck, new[self.head], arms, legs, fingers)
+        hips, head = new[self.hips], new[self.head]
+        return Body(hips, trunk, neck, head, arms, legs, fingers, self.arms_on_neck)
 
     def roles(self, names: Sequence[str]) -> dict[str, str]:
         """Role -> name of its joint, as in a skeleton file. names: of all joints, by index."""
@@ -125,7 +134,9 @@ def pairs(source: Skeleton, source_body: Body, target: Skeleton, target_body: Bo
     out |= _joints_along(target, target_trunk, source, (source_body.hips, *source_body.trunk))
     if source_body.neck:
         target_neck = (target_body.chest, *target_body.neck, target_body.head)
-        source_neck = (source_body.chest, *source_body.neck, source_body.head)
+        source_neck = (*source_body.neck, source_body.head)
+        if not source_body.arms_on_neck:
+            source_neck = (source_body.chest, *source_neck)
         out |= _joints_along(target, target_neck, source, source_neck)
     for side in SIDES:
         for target_joint, source_joint in zip(target_body.arms[side], source_body.arms[side], strict=True):

@@ -36,7 +36,8 @@ def from_motion(sample: BodySample, trunk: BodySample, zero: Array | None) -> di
 def bends(sample: BodySample) -> dict[int, Bend]:
     """Hips and chest -> the bone above each; left out where that bone has no length."""
     body, out = sample.body, {}
-    for joint, following in ((body.hips, body.trunk), (body.chest, (*body.neck, body.head))):
+    above_chest = () if body.arms_on_neck else (*body.neck, body.head)
+    for joint, following in ((body.hips, body.trunk), (body.chest, above_chest)):
         if following and sample.length(joint, following[0]) > SHORT:
             bone, axis, left = _bone(sample, joint)
             out[joint] = Bend(following[0], sample.bone(joint, following[0]), frame(bone, axis, left, LEFT))
@@ -68,7 +69,7 @@ def _bone(sample: BodySample, joint: int) -> tuple[Array, Array, Array]:
     trunk = (body.hips, *body.trunk)
     chain = (*trunk, *body.neck, body.head)
     lengths = np.array([sample.length(a, b) for a, b in pairwise(chain)])
-    share = dict(zip(chain, spine_shares(lengths, len(body.trunk)), strict=True))
+    share = dict(zip(chain, spine_shares(lengths, body.top_bones), strict=True))
     following = chain[chain.index(joint) + 1 :]
     # A rig with many short bones has kinks. One bone of the target follows several of them, up to its end.
     reach = [j for j in following if share[j] <= sample.target.spine.end(share[joint]) + 1e-6]

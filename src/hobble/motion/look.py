@@ -7,6 +7,7 @@ rate of the file that would explain it.
 
 from __future__ import annotations
 
+import re
 from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
@@ -100,8 +101,13 @@ def _summary_of_file(file: Path, skeleton: Path, maps: Path, options: ClipMotion
     try:
         clip, report = make_clip(file, skeleton, maps, file.stem, skeleton.stem, options)
     except HobbleError as error:
-        return ClipSummary(file.stem, refused=str(error).split("\n")[0])
+        return ClipSummary(file.stem, refused=_without_path(str(error).split("\n")[0], file))
     return seen(clip, report)
+
+
+def _without_path(message: str, file: Path) -> str:
+    """A message about a file without its path, because the clip's name stands before it."""
+    return message.removeprefix(str(file)).lstrip(":, ")
 
 
 def reported(report: Mapping[str, Any]) -> ClipSummary:
@@ -141,8 +147,11 @@ def seen(clip: Clip, report: Mapping[str, Any]) -> ClipSummary:
 
 
 def _first(report: Mapping[str, Any]) -> list[str]:
-    """The number of repairs, as a short warning."""
-    return [f"{len(report['repairs'])} repaired"] if report["repairs"] else []
+    """The beginning of the first repair and the number of others, as a short warning."""
+    if not (repairs := report["repairs"]):
+        return []
+    more = f" and {len(repairs) - 1} more" if len(repairs) > 1 else ""
+    return [f"repaired: {re.split('[;.,] ', repairs[0])[0].rstrip('.')}{more}"]
 
 
 def step_count(clip: Clip) -> int:

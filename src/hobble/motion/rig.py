@@ -17,6 +17,7 @@ from hobble.core.quat import Array
 from hobble.core.skeleton import Skeleton, rest_positions
 from hobble.core.untrusted import printable, read_text, read_yaml
 from hobble.motion.check_rig_file import check_rig_file
+from hobble.motion.tree import path
 
 # Centimetres per unit of the file. The unit of CMU files is an inch / 0.45.
 UNITS = {"cm": 1.0, "inch": 2.54, "m": 100.0, "mm": 0.1, "CMU": 5.6444, "foot": 30.48}
@@ -128,6 +129,9 @@ def match_rig(rig: Skeleton, target: TargetSkeleton, folder: str | Path) -> RigM
     if _share(rig, known.skeleton) < KNOWN or _unfit(rig, known.skeleton):
         return None
     roles = _roles(rig, known.skeleton)
+    if _trunk(rig, roles) != _trunk(known.skeleton, known.skeleton.roles):
+        # With fewer or more joints in the spine, names like Neck may mean other joints than in the file.
+        return RigMatch(known.skeleton.name, roles, False, {}, False)
     sources = {a: b for a, b in joint_pairs(known, target).items() if b in rig.joints}
     alike = rest_alike(replace(rig, roles=roles), known.skeleton)
     return RigMatch(known.skeleton.name, roles, False, sources, alike)
@@ -194,6 +198,12 @@ def _parent_names(skeleton: Skeleton) -> dict[str, str | None]:
 
 def _roles(rig: Skeleton, known: Skeleton) -> dict[str, str]:
     return {role: joint for role, joint in known.roles.items() if joint in rig.joints}
+
+
+def _trunk(skeleton: Skeleton, roles: Mapping[str, str]) -> list[str]:
+    """The names of the joints from the hips to the head."""
+    ends = (skeleton.index(roles[role]) for role in ("hips", "head"))
+    return [skeleton.joints[j] for j in path(skeleton.parents, *ends)]
 
 
 def _unfit(rig: Skeleton, known: Skeleton) -> list[str]:

@@ -35,7 +35,7 @@ class Spine:
         places = rest[list(chain)]
         lengths = np.linalg.norm(np.diff(places, axis=0), axis=-1)
         long = [0, *(k for k, length in enumerate(lengths, 1) if length > SHORT)]
-        return cls(spine_shares(lengths, len(body.trunk))[long], places[long])
+        return cls(spine_shares(lengths, body.top_bones)[long], places[long])
 
     def direction(self, start: float, end: float) -> Array:
         """(3,) direction of a bone between two positions along the body, `start` and `end` (see `shares`).
@@ -74,8 +74,8 @@ class Spine:
 def spine_shares(lengths: Array, trunk: int) -> Array:
     """(N,) position of each joint along the body, where hips are at 0, chest at 1 and head at 2.
 
-    lengths: (N-1,) of the bones from the hips through trunk and neck to the head. trunk: number of trunk
-    joints above the hips; the last one is the chest.
+    lengths: (N-1,) of the bones from the hips through trunk and neck to the head. trunk: number of bones of
+    the trunk; at the end of the last one is the chest.
     """
     way = np.concatenate([[0.0], np.cumsum(lengths)])
     below, above = way[: trunk + 1], way[trunk:] - way[trunk]

@@ -83,8 +83,8 @@ def check_tilt(path: Path, clip: Clip, leave: bool) -> None:
         raise InputError(
             path,
             f"the ground under the feet or the body is tilted by {found:.0f} degrees: the world seems tilted",
-            fix="Level the floor where the clip comes from and export it again. If the figure really leans "
-            "that far, set motion.defects: leave.",
+            fix="Level the floor where the clip comes from and export it again. If the figure walked on a "
+            "slope or really leans that far, set motion.defects: leave.",
         )
 
 

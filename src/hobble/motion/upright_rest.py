@@ -9,7 +9,7 @@ an arm or up the trunk. Knees and elbows show the front of a limb, and standing 
 from __future__ import annotations
 
 from collections.abc import Collection
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -60,6 +60,7 @@ def upright(clip: Clip, body: Body, target: Skeleton, others: Collection[int] = 
     gives the same result on any rig. A standing zero pose adds what no bone shows: how head, clavicles and
     hands are turned.
     """
+    body = replace(body, arms_on_neck=_arms_on_neck(clip, body))
     every = np.unique(np.linspace(0, len(clip) - 1, SAMPLES).round().astype(int))
     ends = {
         side: clip.skeleton.end_sites.get(clip.skeleton.joints[leg[2]]) for side, leg in body.legs.items()
@@ -95,6 +96,16 @@ def upright(clip: Clip, body: Body, target: Skeleton, others: Collection[int] = 
     made = rebased(clip, body, [*body.joints, *kept], frames, roles)
     notes = [note for note in unsure if note]
     return UprightMotion(*made, source, notes, height_error(sample, problem is None))
+
+
+def _arms_on_neck(clip: Clip, body: Body) -> bool:
+    """Whether the arms hang from the first joint of the neck, and it lies below the shoulders."""
+    shoulders = [arm[1] for arm in body.arms.values()]
+    parents, p = clip.skeleton.parents, clip.positions
+    if not body.neck or any(body.neck[0] not in above(parents, joint) for joint in shoulders):
+        return False
+    way = np.mean([p[:, joint] for joint in shoulders], axis=0) - p[:, body.neck[0]]
+    return bool(np.median(np.sum(way * (p[:, body.head] - p[:, body.hips]), axis=-1)) > 0)
 
 
 def _twisted(sample: BodySample, zero: dict[int, Array]) -> bool:

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -59,6 +59,20 @@ class ClipRows:
     def first_fit(self) -> np.ndarray:
         """(R,) index of each row's first fit in `heights` and `mean`."""
         return np.cumsum(self.fits) - self.fits
+
+    def every(self, step: int, first: int = 0) -> ClipRows:
+        """Every `step`-th row from row `first` on, with its fits."""
+        kept = np.zeros(len(self), bool)
+        kept[first::step] = True
+        of_fits = np.repeat(kept, self.fits)
+        of_rows = {name: getattr(self, name)[kept] for name in ("x", "y", "p", "frame", "cycle", "fits")}
+        return replace(
+            self,
+            **of_rows,
+            channels={name: values[kept] for name, values in self.channels.items()},
+            heights=self.heights[of_fits],
+            mean=self.mean[of_fits],
+        )
 
     def check(self, where: str | Path) -> None:
         """Check shapes and numbers of fits, and that all values are finite.

@@ -18,10 +18,11 @@ from hobble.synthetic.style import Style
 X_AXIS = np.array([1.0, 0.0, 0.0])
 HEEL = np.array([0.0, -4.2, -3.0])  # cm from the ankle: approximate place of the heel
 READY = 0.95  # share of the swing by which the foot has reached the pitch of its landing
-KICK = 0.68  # exponent of the time in the swing, 0 to 1: below 1, the foot is highest in the first half
+# Exponents of the time in a swing, which runs from 0 to 1. Because they are below 1, the foot is highest in
+# the first half (KICK), and covers most of its way in the first half (EARLY).
+KICK, EARLY = 0.68, 0.81
 FOLLOW = 0.45  # share of its pitch rate that the foot keeps as it leaves
 LANDING_SPEED = 0.36  # speed of the foot as it lands, as a share of its mean speed in the swing
-EARLY = 0.81  # exponent of the same time: below 1, the foot covers most of its way in the first half
 RISE, SETTLE = 0.36, 0.3  # shares of the swing in which the foot rises to its clearance and comes down again
 SOLE_HEIGHT = 2.0  # cm: heel, toe joint and toe tip count as this high above the sole
 
@@ -147,7 +148,7 @@ def _swing(foot: FootPoses, here: _Roll, there: _Roll, style: Style, side: int, 
     rotation = quat.mul(turn, quat.from_axis_angle(X_AXIS, -pitch))
     bend = np.minimum(pitch, 0) * (1 - 0.4 * bump)
     toes = quat.mul(rotation, quat.from_axis_angle(X_AXIS, bend))
-    # The toe joint starts at rest, and still moves as it lands. Its position and the pitch give the ankle.
+    # The toe joint starts at rest and is moving when it lands. Its position and the pitch give the ankle.
     going = _hermite(0.0, 0.0, 1.0, LANDING_SPEED / EARLY, u**EARLY)
     share = np.stack([going, _ease(u), going], axis=1)
     toe = here.toe(p0) + (there.toe(p1) - here.toe(p0)) * share

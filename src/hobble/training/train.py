@@ -1,8 +1,9 @@
 """The training loop.
 
 A pass goes once through all training samples. It has `training.sections` sections, and a section has
-batches. Each batch is augmented (slower or faster, other poses, the network's own errors), then the network
-takes a step. After each section the training logs, measures and saves.
+batches. Each batch is augmented: its motion is played slower or faster, other poses are mixed in, and errors
+that the network made are added. Then the network takes a step. After each section the training logs, measures
+and saves.
 """
 
 from __future__ import annotations
@@ -49,7 +50,7 @@ def train(
 ) -> State:
     """Train to `training.passes` passes over the database's training clips; returns the final state.
 
-    network, training: these sections of a configuration. checkpoints: a folder with one subfolder for each
+    network, training: the options of a configuration. checkpoints: a folder with one subfolder for each
     run, named by the hash of everything that determines it; a run resumes from its own checkpoint there.
     start: a checkpoint to start from if the run has none of its own; it is part of the hash, as is `code`,
     the hash of the code. processes: those that train together, each of which calls this; the first reads and

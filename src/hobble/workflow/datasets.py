@@ -112,6 +112,11 @@ class Datasets:
         """As `selected`, for the clips of one shard only. shard: its number, from 0."""
         return self._splits_by_shard(dataset, tuple(channels))[shard]
 
+    def every_row(self, dataset: str) -> int:
+        """Of the rows of hurt versions, training uses every how many."""
+        hurt = self.catalogue.dataset(dataset).hurt
+        return hurt.every if hurt else 1
+
     def sources(self, chosen: Iterable[str]) -> dict[str, str]:
         """Hurt version -> the healthy clip it is made from, for the chosen clips."""
         chosen = list(chosen)

@@ -14,8 +14,8 @@ from hobble.report.measure_sections import OverviewColumn
 from hobble.report.page_parts import PageSection, SectionPart
 from hobble.report.tables import Column
 
-# The two standard deviations (sd) by which eq. 3.2 of Segerstedt (2021) may divide the difference of two
-# configurations.
+# Key of compare.json -> the kind of standard deviation (sd) by which that difference of two configurations is
+# divided (eq. 3.2 of Segerstedt 2021).
 KINDS = {"difference_of_means": "sd of the means of clips", "difference": "sd of single frames"}
 
 

@@ -6,7 +6,7 @@ from typing import TypedDict
 
 
 class Spread(TypedDict):
-    """Spread of the time of a frame, summed over its `Steps`, ms.
+    """Spread of the time of a frame, ms. The time of a frame is the sum of its `Steps`.
 
     sd, median, p99: standard deviation, median and 99th percentile.
 
@@ -83,8 +83,8 @@ class LapPath(TypedDict):
 class ModeResults(TypedDict):
     """All laps of one phase mode.
 
-    waypoints: how many there are in all laps. foot_slide_cm is the mean over laps; path_overshoot_cm and both
-    turns are the largest of all laps. See `Lap`.
+    waypoints: how many there are in all laps. foot_slide_cm: mean over laps. path_overshoot_cm,
+    largest_turn_degrees, predicted_turn_degrees: the largest values of all laps. See `LapWalk`.
     """
 
     mode: str
@@ -125,9 +125,9 @@ class Responsivity(ModeResults):
     """responsivity.json: the results of the configured phase mode, and in `modes` those of all modes.
 
     runs: the paths of the first laps in the configured mode. parameters: weights and biases that one frame
-    uses, see `run.parameter_counts`; None for a network without layers. stored: mode -> how many numbers of
-    `bytes_each` bytes the network keeps in memory. exact: the mode that evaluates the network without
-    approximation. laps_other_modes: laps in each other mode.
+    uses, counted in three ways (`run.parameter_counts`); None for a network without layers. stored: mode ->
+    how many numbers of `bytes_each` bytes the network keeps in memory. exact: the mode that evaluates the
+    network without approximation. laps_other_modes: laps in each other mode.
     """
 
     configuration: str
