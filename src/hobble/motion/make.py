@@ -46,7 +46,7 @@ def make_clip(
     skeleton: the target's file. maps: the folder of the skeleton files. clip: name of the new clip. options:
     the `motion` section of the data set, with the values of the clip's entry.
 
-    Returns the clip and its report (`motion/<clip>.json` in docs/artefacts.md). Raises InputError for a file
+    Returns the clip and its report (the content of `motion/<clip>.json`). Raises InputError for a file
     that cannot be read, for an unsuitable skeleton, and for defects that cannot be repaired; with
     `defects: refuse`, for all defects.
     """

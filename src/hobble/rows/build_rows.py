@@ -33,7 +33,7 @@ def clip_rows(
 ) -> ClipRows:
     """The rows of a clip's locomotion cycles, one cycle after another. See `ClipRows` for their form.
 
-    labels, terrain: arrays of these stages, see docs/artefacts.md. channels: name -> values (F, columns).
+    labels, terrain: arrays of these stages (`Labels`, `ClipFits`). channels: name -> values (F, columns).
     window: frames of the trajectory before and after the row's frame. step: frames between two samples of the
     trajectory. facing_sigma: sigma of the Gaussian that smooths the facing direction, frames. Past the ends
     of the clip the root moves on (`continued`), and the gait of the first or the last frame is repeated.
