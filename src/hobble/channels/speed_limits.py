@@ -238,9 +238,9 @@ class LimitLearner:
     def _shares(self, usual: Array) -> tuple[np.ndarray, Array, Array]:
         """Gait (n,), share of the healthy speed (n,) and values (n, L) of the cycles with a value above 0.
 
-        A cycle of a hurt version is compared with the same cycle of its source. They differ in one channel
-        only. If the source's cycle has a value of this channel too, the cycle is left out: a hurt version of
-        a sad clip says nothing about the limits of sadness.
+        A cycle of a hurt version is compared with the same cycle of its source. It is left out if the source
+        has a value of this channel already. For example, a sad clip and its hurt version are equally sad, so
+        they say nothing about the limits of sadness.
         """
         parts = []
         for source, cycles in self._clips.values():

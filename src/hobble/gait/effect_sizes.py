@@ -14,15 +14,14 @@ from hobble.gait.recogniser import LEFT, RIGHT
 EFFECTS: dict[str, str] = {
     "speed": "speed, share of healthy",
     "stride": "stride time, share of healthy",
-    "stance": "share of the cycle by which stance is longer on the sound leg than on the hurt leg, minus the "
-    "same share in the healthy walk",
+    "stance": "stance of the sound leg minus stance of the hurt leg, share of the cycle, more than healthy",
     "step_hurt": "length of the step onto the hurt foot, share of healthy",
     "step_sound": "length of the step onto the sound foot, share of healthy",
     "knee_hurt": "knee range of the hurt leg, share of healthy",
     "knee_sound": "knee range of the sound leg, share of healthy",
     "hip_hurt": "hip flexion range of the hurt leg, share of healthy",
     "hip_sound": "hip flexion range of the sound leg, share of healthy",
-    "lean": "change of the trunk's mean lean in any direction, degrees",
+    "lean": "angle between the mean directions of the trunk in this walk and in the healthy walk, degrees",
     "lean_forward": "mean lean of the trunk forward, degrees more than healthy",
     "lean_hurt": "mean lean of the trunk to the hurt side, degrees more than healthy",
     "sway_forward": "range of the trunk's forward lean in a cycle, degrees more than healthy",

@@ -48,8 +48,8 @@ class Pieces(Protocol):
     """Returns the names of a measurement's pieces. A name consists of letters only."""
 
     def __call__(self, options: Any, runtime: Runtime, modes: Sequence[str]) -> tuple[str, ...]:
-        """options: of the type `Measure.options`. modes: names of the ways to evaluate this
-        kind of network, such as constant, linear and cubic (`Network.modes`).
+        """options: of the type `Measure.options`. modes: names of the ways to evaluate
+        the network that is measured, such as constant, linear and cubic (`Network.modes`).
         """
 
 

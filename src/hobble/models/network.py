@@ -18,8 +18,8 @@ from hobble.core.skeleton import Skeleton
 from hobble.models.training_facts import TrainingFacts
 from hobble.rows.layout import GAITS, RowLayout
 
-# The ground's height is an input on the character's path and at this distance (cm) left and right of it, if
-# the network's file does not say another.
+# The inputs include the height of the ground on the character's path, and at this distance (cm) to the left
+# and right of it, unless the network's file gives another distance.
 TERRAIN_SIDE = 25.0
 STORAGES = ("float32", "int16")  # types in which a predictor can keep its weights
 

@@ -206,8 +206,8 @@ def _speed(found: Json) -> Iterator[Hint]:
     elif slow is not None:
         yield Hint(
             "good",
-            f"A frame takes {100 * share:.1f} % of the 16.7 ms that 60 Hz allows; the slowest 1 % of "
-            f"the frames take at least {100 * slow / FRAME_BUDGET_MS:.0f} % of it.",
+            f"A frame takes {100 * share:.1f} % of the 16.7 ms that 60 Hz allows. 99 of 100 frames take at "
+            f"most {100 * slow / FRAME_BUDGET_MS:.0f} % of that time.",
             "That is fast enough for a game.",
         )
     else:

@@ -62,7 +62,7 @@ class LapWalk(TypedDict):
 
 
 class Lap(LapWalk):
-    """One lap, and the times of its first frames."""
+    """One lap, and the mean times of the steps over its first frames."""
 
     milliseconds: Milliseconds
 
@@ -124,10 +124,11 @@ class Track(TypedDict):
 class Responsivity(ModeResults):
     """responsivity.json: the results of the configured phase mode, and in `modes` those of all modes.
 
-    runs: the paths of the first laps in the configured mode. parameters: weights and biases that one frame
-    uses, counted in three ways (`run.parameter_counts`); None for a network without layers. stored: mode ->
-    how many numbers of `bytes_each` bytes the network keeps in memory. exact: the mode that evaluates the
-    network without approximation. laps_other_modes: laps in each other mode.
+    runs: the paths of the first laps in the configured mode. parameters: number of weights and biases that
+    one frame uses; `true`: as they are, `table_6_1` and `table_6_1_as_printed`: as Segerstedt counts them;
+    None for a network without layers. stored: mode -> how many numbers of `bytes_each` bytes the network
+    keeps in memory. exact: the mode that evaluates the network without approximation. laps_other_modes: laps
+    in each other mode.
     """
 
     configuration: str
