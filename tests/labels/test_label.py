@@ -139,7 +139,7 @@ def test_joints_that_do_not_move_are_in_contact(walker, options):
 
 def test_a_clip_without_a_whole_cycle_gets_a_warning(walker, options):
     _, report = label_clip(walker(frames=120), [], MOTION, "walk", "flat", options)
-    assert "no locomotion cycle" in report.warnings[0]
+    assert "no whole gait cycle" in report.warnings[0]
 
 
 def test_a_wrong_file_is_named_with_its_line(walker, options, write):

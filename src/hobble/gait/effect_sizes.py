@@ -14,7 +14,8 @@ from hobble.gait.recogniser import LEFT, RIGHT
 EFFECTS: dict[str, str] = {
     "speed": "speed, share of healthy",
     "stride": "stride time, share of healthy",
-    "stance": "stance of the sound leg minus stance of the hurt leg, share of the cycle, more than healthy",
+    "stance": "how much longer the sound leg stands than the hurt leg, as a share of the cycle. The same "
+    "difference in the healthy walk is subtracted",
     "step_hurt": "length of the step onto the hurt foot, share of healthy",
     "step_sound": "length of the step onto the sound foot, share of healthy",
     "knee_hurt": "knee range of the hurt leg, share of healthy",

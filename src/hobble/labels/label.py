@@ -89,7 +89,7 @@ def _left_out(given: Mapping[str, Path]) -> str:
 
 def _no_cycle(margins: str) -> str:
     where = f" with {MARGINS[margins]} frames of the clip before and {MARGINS[margins] + 1} after it"
-    return f"no locomotion cycle{where if margins == 'drop' else ''}"
+    return f"no whole gait cycle{where if margins == 'drop' else ''}, so no frame of the clip is trained on"
 
 
 def mirror_labels(labels: Labels, report: LabelReport, clip: Clip) -> tuple[Labels, LabelReport]:

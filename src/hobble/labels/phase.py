@@ -58,7 +58,10 @@ def dropped_frames(footsteps: Array, frames: int) -> np.ndarray:
 
 
 def footsteps_of_phase(phase: Array) -> tuple[Array, np.ndarray]:
-    """Footsteps (N, 3) at which a hand-made phase (F,) passes 0 and .5, and bool (F,), whether it moves."""
+    """The footsteps (N, 3) of a hand-made phase (F,), and (F,) bool, in which frames the phase changes.
+
+    A foot lands where the phase passes 0 or .5.
+    """
     step = np.diff(phase) % 1.0
     moving = np.concatenate([[False], (step > 0) & (step < FASTEST), [False]])
     edges = np.flatnonzero(np.diff(moving))

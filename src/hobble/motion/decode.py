@@ -177,9 +177,10 @@ def _judge_channels(
             "value was used."
         )
     if moving:
+        others = "" if len(moving) == len(joints) else ", those of the others do not"
         notes.append(
-            f"{len(moving)} of {len(joints)} joints with position channels really move in their parents "
-            f"({_list(bvh, moving)})."
+            f"{len(joints)} joints below the root have position channels. Those of {_list(bvh, moving)} "
+            f"change{others}."
         )
     else:
         notes.append(

@@ -192,7 +192,7 @@ def doubt(sample: BodySample, zero: bool) -> str | None:
     most = height_error(sample, zero)
     if most < NOTED:
         return None
-    why = "nobody could stand in its zero pose"
+    why = "nobody could stand in the zero pose of its file"
     if sample.seconds < BRIEF:
         why += f" and {sample.seconds:.2f} s are too short for a step of each foot"
     if _on_tiptoe(sample, [float(np.radians(x)) for x in tilts]):
@@ -200,7 +200,7 @@ def doubt(sample: BodySample, zero: bool) -> str | None:
     if abs(tilts[0] - tilts[1]) > APART:
         why += f" and its feet stand at different angles ({tilts[0]:.0f} and {tilts[1]:.0f} degrees)"
     return (
-        f"The height of its ankles is uncertain, because {why}. It was estimated from standing feet: "
+        f"The height of its ankles is uncertain, because {why}. It was estimated from the feet while they stand: "
         f"the figure may stand {most:.1f} cm too high or low."
     )
 

@@ -159,7 +159,11 @@ def clip_table(material: ReportMaterial, clips: frozenset[str]) -> Table:
             ]
         )
     every = len(material.motion)
-    which = f"All {every} clips" if len(rows) == every else f"{len(rows)} of {every:,} clips"
+    which = (
+        f"All {every} clips"
+        if len(rows) == every
+        else f"{len(rows)} of {every:,} clips (more would make the page slow)"
+    )
     return Table(f"{material.name}-clips", columns, rows, f"{which}, with checksums")
 
 
@@ -182,7 +186,7 @@ def remarks_table(material: ReportMaterial) -> Table | None:
     if not rows:
         return None
     columns = [Column("clip"), Column("stage"), Column("message", kind="long")]
-    title = f"{len(rows):,} repairs and warnings"
+    title = f"{len(rows):,} messages on repairs and warnings"
     if len(rows) <= MOST_REMARKS:
         return Table(f"{material.name}-remarks", columns, rows, title)
     columns = [Column.count("clips"), Column("stage"), Column("example"), Column("message", kind="long")]

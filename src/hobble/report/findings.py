@@ -135,8 +135,8 @@ def _coverage(material: ReportMaterial) -> Iterator[Hint]:
         yield Hint(
             "note",
             f"There is little data of {' and '.join(sorted(thin))}:",
-            "less than three per cent of the time each. Add clips, or expect the character to be unsteady "
-            "there.",
+            f"less than three per cent of the time{' each' if len(thin) > 1 else ''}. Add clips, or expect the "
+            "character to be unsteady there.",
         )
 
 
@@ -150,8 +150,8 @@ def _turning(turns: Mapping[str, Array]) -> Iterator[Hint]:
             "warn",
             f"Hardly anybody turns in these clips: only {100 * share:.1f} % of the time has turns of "
             f"{TURNING:.0f} degrees per second or more.",
-            "So the character's feet slide when it is steered around a turn, and more training will not "
-            "change that. Add clips in which somebody turns to both sides.",
+            "So the character turns badly, and more training will not change that. Add clips in which "
+            "somebody turns to both sides.",
         )
 
 
@@ -161,8 +161,8 @@ def _repairs(material: ReportMaterial) -> Iterator[Hint]:
     if repaired or warned:
         yield Hint(
             "note",
-            f"Check {len(repaired | warned)} clips. Repaired: {len(repaired)}. With warnings: {len(warned)}.",
-            "They are listed under Data. The network also learns the errors in a clip.",
+            f"{len(repaired)} clips were repaired, and {len(warned)} have warnings.",
+            "Look at them: the network also learns the errors in a clip. They are listed under Data.",
         )
 
 

@@ -30,15 +30,20 @@ def learning_curve(material: ReportMaterial) -> Chart:
     """Training and held-out error, on a logarithmic scale."""
     x, history = passes_axis(material), material.history
     traces = [line("training", x, history.get("train_mse", []), "@muted")]
-    if any(v is not None for v in history.get("held_out_mse", ())):
+    held_out = any(v is not None for v in history.get("held_out_mse", ()))
+    if held_out:
         traces.append(line("held out", x, history["held_out_mse"], "@accent"))
     return Chart(
         "learning-curve",
         "Error over the passes",
         "Mean squared error of the standardised output, on a logarithmic scale. A network that always "
-        "predicts the mean has error 1. The training error is measured with dropout, so it can be above the "
-        "held-out error. If the held-out line still falls, train longer. If it rises again, the network "
-        "overfits.",
+        "predicts the mean has error 1. The training error is measured with dropout"
+        + (
+            ", so it can be above the held-out error. If the held-out line still falls, train longer. If it "
+            "rises again, the network overfits."
+            if held_out
+            else ". No clips were held out, so there is no held-out error."
+        ),
         traces,
         {
             "xaxis": axis("pass", rangemode="tozero"),

@@ -80,7 +80,12 @@ def clip_bars(found: Json, material: ReportMaterial) -> Chart | None:
         "Error of each clip",
         "The distance between the predicted and the captured position of a joint, divided by the joint's "
         "distance from the root, averaged over frames and joints (eq. 3.1 of Segerstedt). Whiskers are one "
-        "standard deviation long. Held-out clips come first: the network was not trained on them.",
+        "standard deviation long."
+        + (
+            " Held-out clips come first: the network was not trained on them."
+            if any(row["split"] == "held_out" for row in rows)
+            else ""
+        ),
         traces,
         {
             "xaxis": axis("relative error, %", rangemode="tozero"),

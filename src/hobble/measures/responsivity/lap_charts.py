@@ -63,8 +63,9 @@ def lap_chart(found: Json, material: ReportMaterial) -> Chart | None:
         "Each bar is one lap of the track. Its segments are the steps of a frame, averaged over the first "
         "seconds of the lap. Prepare: the target, the path and the ground; input: write the network's input; "
         "insert: standardise it; predict: evaluate the network; output: turn its output into a pose; update: "
-        "move on by a frame. A diamond is the median of whole frames: a few frames that another program "
-        "delayed raise the bar but not the diamond. At 60 Hz, a frame may take 16.7 ms." + fewer,
+        "move on by a frame. A diamond is the median time of a whole frame. If another program delays a few "
+        "frames, the bar becomes higher, but the diamond does not. At 60 Hz, a frame may take 16.7 ms."
+        + fewer,
         layout={
             "barmode": "stack",
             "xaxis": axis("lap", dtick=1 if laps < 25 else None),

@@ -117,7 +117,7 @@ def track_figures(found: Json) -> list[KeyFigure]:
             "Largest distance from the track",
             number(found.get("path_overshoot_cm")),
             "cm",
-            "usually at a turn",
+            "the largest of all laps",
         ),
         KeyFigure("Foot slide", number(slide), "cm" if slide is not None else "", measured),
         _turn(found),
