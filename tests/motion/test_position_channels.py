@@ -22,8 +22,8 @@ def test_position_channels_that_move_are_kept_and_reported(walk, bvh, make):
     assert clip.translations is not None
     np.testing.assert_allclose(clip.translations[:, 3], moving[::2, 3], atol=1e-5)
     assert (
-        "30 joints below the root have position channels. Those of LeftLeg change, those of the others do not."
-        in report["repairs"][0]
+        "30 joints below the root have position channels. Those of LeftLeg change, "
+        "those of the others do not." in report["repairs"][0]
     )
     assert "kept" in report["repairs"][1]
 
@@ -73,7 +73,7 @@ def test_position_channels_around_0_are_added_to_the_offset(walk, bvh, make):
     added[:, arm, 0] = 0.3 + np.sin(np.arange(len(walk)) / 9)
     clip, report = make(bvh(replace(walk, translations=added)), proportions="clip")
     assert (
-        "30 joints below the root have position channels. Those of LeftForeArm change, those of the others do not."
-        in report["repairs"][1]
+        "30 joints below the root have position channels. Those of LeftForeArm change, "
+        "those of the others do not." in report["repairs"][1]
     )
     np.testing.assert_allclose(clip.translations, (walk.skeleton.offsets + added)[::2], atol=1e-5)

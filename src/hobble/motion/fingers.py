@@ -20,8 +20,8 @@ def pointing_fingers(skeleton: Skeleton, wrists: Mapping[str, int]) -> dict[str,
     """Side -> the base of the hand's longest finger. Sides without a finger are left out.
 
     A thumb does not count, nor a chain longer than the forearm: that is an object held in the hand. Fingers
-    whose names say that they point where the hand does (`_points`) come before all others. Of several longest fingers, the one in the
-    middle of them is taken.
+    whose names say that they point where the hand does (`_points`) come before all others. Of several longest
+    fingers, the one in the middle of them is taken.
     """
     lengths = np.linalg.norm(skeleton.offsets, axis=-1)
     fingers = {}

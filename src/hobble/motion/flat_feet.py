@@ -200,8 +200,8 @@ def doubt(sample: BodySample, zero: bool) -> str | None:
     if abs(tilts[0] - tilts[1]) > APART:
         why += f" and its feet stand at different angles ({tilts[0]:.0f} and {tilts[1]:.0f} degrees)"
     return (
-        f"The height of its ankles is uncertain, because {why}. It was estimated from the feet while they stand: "
-        f"the figure may stand {most:.1f} cm too high or low."
+        f"The height of its ankles is uncertain, because {why}. It was estimated from the feet while they "
+        f"stand: the figure may stand {most:.1f} cm too high or low."
     )
 
 

@@ -135,8 +135,8 @@ def _coverage(material: ReportMaterial) -> Iterator[Hint]:
         yield Hint(
             "note",
             f"There is little data of {' and '.join(sorted(thin))}:",
-            f"less than three per cent of the time{' each' if len(thin) > 1 else ''}. Add clips, or expect the "
-            "character to be unsteady there.",
+            f"less than three per cent of the time{' each' if len(thin) > 1 else ''}. Add clips, or expect "
+            "the character to be unsteady there.",
         )
 
 
