@@ -113,7 +113,7 @@ class Datasets:
         return self._splits_by_shard(dataset, tuple(channels))[shard]
 
     def every_row(self, dataset: str) -> int:
-        """Of the rows of hurt versions, training uses every how many."""
+        """n, if training uses every n-th row of hurt versions."""
         hurt = self.catalogue.dataset(dataset).hurt
         return hurt.every if hurt else 1
 
