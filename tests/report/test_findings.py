@@ -133,7 +133,7 @@ def test_problems_come_first_and_data_comes_before_training(material: ReportMate
     assert kinds == sorted(kinds, key=["warn", "note", "good", "fact"].index)
     todo = [hint.head for hint in found if hint.kind == "note"]
     check, train = (
-        next(i for i, head in enumerate(todo) if word in head) for word in ("Check", "still fell")
+        next(i for i, head in enumerate(todo) if word in head) for word in ("were repaired", "still fell")
     )
     assert check < train
     assert found[-1].head.endswith("of the time.")
