@@ -52,7 +52,7 @@ ATTACKS: dict[str, tuple[str, str, tuple[str, ...]]] = {
         UNHARMED,
         ("tests/runtime/test_bounds.py::test_a_state_that_is_not_finite_restarts_and_warns_once",),
     ),
-    "a cache or folder that cannot be written": (
+    "a cache of compiled code that cannot be written": (
         "an import",
         UNHARMED,
         ("tests/core/test_compiled.py",),

@@ -174,7 +174,7 @@ def _files(root: Path) -> list[Path]:
 
 def no_permission(lab: Lab, rng: Random) -> Throw:
     """For a user who is not root, forbid reading an input or writing in a folder."""
-    what = rng.choice(("an input that may not be read", "a folder that may not be written in"))
+    what = rng.choice(("an input that may not be read", "a results folder that cannot be written"))
     if os.getuid():
         return Throw(what, "-", SKIPPED, "not root, so that no job can be run as somebody else")
     jobs = [job for job in lab.jobs if any(p.startswith("results/") for p in job.inputs)]
