@@ -44,7 +44,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument("--loops", type=int, default=1, help="repeat a clip of one cycle this many times")
     parser.add_argument(
-        "--refuse", action="store_true", help="refuse broken frames instead of repairing them"
+        "--refuse", action="store_true", help="refuse a file with broken frames instead of repairing them"
     )
 
 

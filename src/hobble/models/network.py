@@ -33,7 +33,7 @@ class Predictor(Protocol):
     It keeps no state of a character. If `Network.memory` is above 0, the caller keeps that state: an array
     (C, Network.memory) float64 for C characters, zero before a character's first frame. `evaluate` and
     `predict` then take it as one more argument `memory`, which the signatures below leave out, and change it
-    in place.
+    in place. X are inputs and Y outputs; in shapes, X and Y are the numbers of their columns.
     """
 
     @property

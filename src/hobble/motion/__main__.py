@@ -43,10 +43,14 @@ def main() -> int:
     )
     for_rig.add_argument("file", type=Path, help="a BVH file")
     for_rig.add_argument("--to", type=Path, help="the file to write (default: print it)")
-    for_look = commands.add_parser("look", help="one line about each clip of a folder, or about one file")
+    for_look = commands.add_parser(
+        "look", help="try to read each clip of a folder, or one file; print a line about each"
+    )
     for_look.add_argument("folder", type=Path, help="a folder of BVH files, or one file")
     for_look.add_argument(
-        "--skeleton", default="holden31", help="skeleton to put the clips on, by name (default holden31)"
+        "--skeleton",
+        default="holden31",
+        help="the skeleton for which the clips are read, by name (default holden31)",
     )
     for_look.add_argument(
         "--skeletons", type=Path, default=SKELETONS, help="the folder of the skeleton files"

@@ -85,6 +85,7 @@ def _published_splits(all_measured: Sequence[ConfigurationResults], published: J
 def _published_clips(all_measured: Sequence[ConfigurationResults], published: Json) -> list[PublishedRow]:
     """Published errors of single clips, next to ours of the clips with the same names.
 
+    Our names may end in _000, as files of the release do.
     Segerstedt (2021) published the errors of two networks: "segerstedt" is his own, "release" is the network
     that Holden et al. (2017) released.
     """

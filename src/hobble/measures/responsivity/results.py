@@ -81,7 +81,7 @@ class LapPath(TypedDict):
 
 
 class ModeResults(TypedDict):
-    """All laps of one phase mode.
+    """All laps of one phase mode, such as cubic (`Network.modes`).
 
     waypoints: how many there are in all laps. foot_slide_cm: mean over laps. path_overshoot_cm,
     largest_turn_degrees, predicted_turn_degrees: the largest values of all laps. See `LapWalk`.
@@ -125,10 +125,10 @@ class Responsivity(ModeResults):
     """responsivity.json: the results of the configured phase mode, and in `modes` those of all modes.
 
     runs: the paths of the first laps in the configured mode. parameters: number of weights and biases that
-    one frame uses; `true`: as they are, `table_6_1` and `table_6_1_as_printed`: as Segerstedt counts them;
-    None for a network without layers. stored: mode -> how many numbers of `bytes_each` bytes the network
-    keeps in memory. exact: the mode that evaluates the network without approximation. laps_other_modes: laps
-    in each other mode.
+    one frame uses, None for a network without layers. Its keys: `true`, the real number; `table_6_1`, by the
+    formula of Segerstedt's table 6.1; `table_6_1_as_printed`, by that formula with one hidden layer fewer.
+    stored: mode -> how many numbers of `bytes_each` bytes the network keeps in memory. exact: the mode that
+    evaluates the network without approximation. laps_other_modes: laps in each other mode.
     """
 
     configuration: str
