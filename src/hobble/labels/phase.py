@@ -27,7 +27,7 @@ MARGINS = {"extend": 1, "drop": 60}
 
 
 def phase_of_footsteps(footsteps: Array, frames: int) -> tuple[Array, np.ndarray]:
-    """Phase (frames,) in 0..1, 0 as the right foot lands, and bool (frames,) where it is known.
+    """Phase (frames,) in 0..1, 0 as the right foot lands, and (frames,) bool, whether it is known.
 
     It is known and linear between the landings of a bout of walking. Elsewhere it advances at IDLE_RATE;
     between two bouts this rate is adjusted, so that the phase has the right value at the next landing.

@@ -222,7 +222,7 @@ def strips(material: ReportMaterial, clips: frozenset[str]) -> list[dict[str, An
         if clip not in clips or mirrors or not curves or not curves.get("seconds"):
             continue
         length = lengths.get(clip) or curves["seconds"][-1]
-        status = [
+        channel_values = [
             {
                 "name": shown_name(label),
                 "spans": value.get("spells") or [[0, length, value["highest"]]],
@@ -230,5 +230,5 @@ def strips(material: ReportMaterial, clips: frozenset[str]) -> list[dict[str, An
             }
             for label, (value, channel_highest) in of_clip.get(clip, {}).items()
         ]
-        out.append({**curves, "clip": clip, "length": length, "status": status})
+        out.append({**curves, "clip": clip, "length": length, "status": channel_values})
     return out

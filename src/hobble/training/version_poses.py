@@ -78,18 +78,19 @@ class VersionPoses:
         """
         if not self.share or not len(x) or not len(self.key):
             return
-        rows = len(x)
-        wanted = torch.from_numpy(self.other[clip]).to(x.device) + p.double()
+        parts = self._parts(len(x))
+        self.batches += 1
+        moved = torch.nonzero(parts).flatten()
+        wanted = torch.from_numpy(self.other[clip]).to(x.device)[moved] + p[moved].double()
         some = torch.searchsorted(self.key, wanted)[:, None] + self.near
         some = some.clamp(0, len(self.key) - 1)
         alike = ((self.key[some] - wanted[:, None]).abs() < NEAR) & (wanted >= 0)[:, None]
-        away = torch.linalg.vector_norm(self.ways[some] - x[:, None, self.way], dim=2)
+        away = torch.linalg.vector_norm(self.ways[some] - x[moved, self.way][:, None], dim=2)
         nearest, chosen = torch.where(alike, away, torch.inf).min(dim=1)
-        part = torch.where(nearest < torch.inf, self._parts(rows), 0.0).to(x.dtype)
+        part = torch.where(nearest < torch.inf, parts[moved], 0.0).to(x.dtype)
         other = self.poses[some.gather(1, chosen[:, None])[:, 0]]
         for block, wanted_pose in zip(self.pose, other.chunk(2, dim=1), strict=True):
-            x[:, block].lerp_(wanted_pose, part[:, None])
-        self.batches += 1
+            x[moved, block] = torch.lerp(x[moved, block], wanted_pose, part[:, None])
 
     def _parts(self, rows: int) -> Tensor:
         """(rows,) how far each pose moves: 0, or in `share` of the rows evenly spread from -1 to 1."""

@@ -62,7 +62,7 @@ class LapWalk(TypedDict):
 
 
 class Lap(LapWalk):
-    """One lap, and the mean times of the steps over its first frames."""
+    """One lap, and the mean time of each step of a frame's computation (`Steps`) in its first frames."""
 
     milliseconds: Milliseconds
 
@@ -124,11 +124,11 @@ class Track(TypedDict):
 class Responsivity(ModeResults):
     """responsivity.json: the results of the configured phase mode, and in `modes` those of all modes.
 
-    runs: the paths of the first laps in the configured mode. parameters: number of weights and biases that
-    one frame uses, None for a network without layers. Its keys: `true`, the real number; `table_6_1`, by the
-    formula of Segerstedt's table 6.1; `table_6_1_as_printed`, by that formula with one hidden layer fewer.
-    stored: mode -> how many numbers of `bytes_each` bytes the network keeps in memory. exact: the mode that
-    evaluates the network without approximation. laps_other_modes: laps in each other mode.
+    runs: the paths of the first laps in the configured mode. parameters: three counts of the weights and
+    biases that one frame uses, None for a network without layers. `true`: the actual count; `table_6_1`: by
+    the formula of Segerstedt's table 6.1; `table_6_1_as_printed`: by that formula with one hidden layer
+    fewer. stored: mode -> how many numbers of `bytes_each` bytes the network keeps in memory. exact: the mode
+    that evaluates the network without approximation. laps_other_modes: laps in each other mode.
     """
 
     configuration: str
