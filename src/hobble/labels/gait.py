@@ -131,7 +131,7 @@ def _bounce(clip: Clip) -> Array:
 
 
 def _spring(clip: Clip) -> Array:
-    """(F,) correlation of the height of the hips with the distance between the ankles over about a cycle.
+    """(F,) correlation of the hips' height with the distance between the heel joints, over about a cycle.
 
     A walking leg is an inverted pendulum: the hips are highest over the standing foot, as the other foot
     passes it. A jogging leg is a spring: the hips are lowest there (Cavagna et al. 1977).

@@ -1,7 +1,7 @@
 """Converts footsteps to phase and back, and finds locomotion cycles.
 
-The right foot lands at phase 0 and the left one at .5, as in Holden et al. (2017). With the option
-`phase_zero: left` the left foot lands at 0 and the right one at .5.
+The right foot lands at phase 0 and the left one at .5, as in Holden et al. (2017). (`hobble.labels.label`
+shifts the phase by half a cycle if the option `phase_zero` is `left`.)
 
 Footsteps are an array (N, 3). Each row holds the frame in which the right foot lands, the next frame in which
 the left foot lands, and a mark: 1 if the frames from this row's right landing to the next row's must not be
@@ -58,7 +58,7 @@ def dropped_frames(footsteps: Array, frames: int) -> np.ndarray:
 
 
 def footsteps_of_phase(phase: Array) -> tuple[Array, np.ndarray]:
-    """The footsteps (N, 3) of a hand-made phase (F,), and (F,) bool, in which frames the phase changes.
+    """The footsteps (N, 3) of a hand-made phase (F,), and (F,) bool, whether the phase changes in each frame.
 
     A foot lands where the phase passes 0 or .5.
     """

@@ -16,7 +16,7 @@ from hobble.synthetic.planned_ground import Ground
 from hobble.synthetic.style import Style
 
 X_AXIS = np.array([1.0, 0.0, 0.0])
-HEEL = np.array([0.0, -4.2, -3.0])  # cm from the ankle: approximate place of the heel; FOOT: of the toe joint
+HEEL = np.array([0.0, -4.2, -3.0])  # cm from the ankle joint to the heel, approximately
 READY = 0.95  # share of the swing by which the foot has reached the pitch of its landing
 # Exponents of the time in a swing, which runs from 0 to 1. Because they are below 1, the foot is highest in
 # the first half (KICK), and covers most of its way in the first half (EARLY).

@@ -14,7 +14,7 @@ from hobble.synthetic.planned_path import PlannedPath
 from hobble.synthetic.style import LEFT, RIGHT, SIGN, Style
 
 ANKLE_HEIGHT = 7.0  # cm, of the ankle joint above the sole; the toe joint is 4.5 cm lower
-FOOT = np.array([0.0, -4.5, 13.5])  # from ankle to toe joint in a flat foot
+FOOT = np.array([0.0, -4.5, 13.5])  # cm from the ankle joint to the toe joint in a flat foot
 STAY = (7.0, np.radians(12.0))  # cm and radians: a standing figure takes no step that is smaller than both
 APART = 8.0  # cm: least sideways distance between the ankles
 STILL = 12.0  # cm/s: a slower figure stands

@@ -109,7 +109,7 @@ def track_chart(found: Json) -> Chart | None:
         }
     )
     largest = max(row[2] for row in off)
-    where = f"Red marks places more than {OFF_TRACK:.0f} cm from the track. " if left else ""
+    where = f"Places more than {OFF_TRACK:.0f} cm from the track are red. " if left else ""
     return Chart(
         "track",
         "The track, and the path of the character",

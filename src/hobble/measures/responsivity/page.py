@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
 from typing import Any
 
@@ -207,7 +208,7 @@ def _speed(found: Json) -> Iterator[Hint]:
         yield Hint(
             "good",
             f"A frame takes {100 * share:.1f} % of the 16.7 ms that 60 Hz allows. 99 of 100 frames take at "
-            f"most {100 * slow / FRAME_BUDGET_MS:.0f} % of that time.",
+            f"most {math.ceil(100 * slow / FRAME_BUDGET_MS)} % of that time.",
             "That is fast enough for a game.",
         )
     else:
