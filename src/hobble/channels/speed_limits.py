@@ -247,8 +247,8 @@ class LimitLearner:
             changed = cycles.values.any(axis=1)
             if source is not None and source in self._clips:
                 origin = self._clips[source][1]
-                neutral = np.where(origin.values.any(axis=1), 0.0, origin.speed)
-                speed_of = dict(zip(origin.number.tolist(), neutral.tolist(), strict=True))
+                source_speed = np.where(origin.values.any(axis=1), 0.0, origin.speed)  # 0: left out below
+                speed_of = dict(zip(origin.number.tolist(), source_speed.tolist(), strict=True))
                 healthy_speed = np.array([speed_of.get(n, 0.0) for n in cycles.number.tolist()])
             else:  # captured: only forward cycles can be compared with the usual speed
                 counts = (cycles.ahead >= AHEAD * cycles.speed) & ~cycles.others

@@ -104,9 +104,9 @@ def rows_of_landings(events: list[tuple[float, int]]) -> Array:
 def find_cycles(footsteps: Array, frames: int, zero: str, margins: str) -> tuple[np.ndarray, int]:
     """First and last frame (C, 2) of each cycle between landings of the foot `zero`, and the number left out.
 
-    A cycle is left out if its row or the next row is marked, or if it is too near an end of the clip. With
-    `margins` "drop", as in Holden et al. (2017), the clip must have 60 frames before the cycle and 61 after
-    it. With "extend", one before and two after are enough.
+    A marked row leaves out its cycle and the one before, as in Holden et al. (2017). A cycle that is too near
+    an end of the clip is left out, too. With `margins` "drop", as in Holden et al. (2017), the clip must have
+    60 frames before the cycle and 61 after it. With "extend", one before and two after are enough.
     """
     margin = MARGINS[margins]
     own = 0 if zero == "right" else 1

@@ -25,7 +25,8 @@ from typing import Any, Protocol
 from hobble.core.section import Section
 from hobble.runtime.options import Runtime
 
-# Inputs of a measurement. Any other name is that of another measurement, whose JSON is the input.
+# Inputs of a measurement: the network, the rows of the clips, summaries of these rows, the skeleton, figures
+# from publications. Any other name is that of another measurement, whose JSON is the input.
 INPUTS = ("weights", "clips", "summaries", "skeleton", "published")
 
 

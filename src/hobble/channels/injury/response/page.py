@@ -130,7 +130,8 @@ def curves(
         "The character moves on while the severity of one link rises from 0 to 10 and falls again. Each "
         "point is measured over whole gait cycles at one severity. A smooth curve means that the walk "
         "changes gradually. A gap between left and right is a limp. A jump between neighbours means that "
-        "the network switches between two gaits. Pose distances are means over joints at the same phase."
+        "the network switches between two gaits. Pose distances are distances from the healthy walk at the "
+        "same phase, means over joints."
     )
     if back:
         caption += " Dotted lines: falling severity."
