@@ -119,8 +119,8 @@ def slopes(solids: Sequence[Solid], points: Array, h: float = 0.06) -> tuple[Arr
 def without_touching_sheets(values: Array) -> Array:
     """The distances, changed so that two sheets of the surface never touch along an edge.
 
-    They touch at a square of the grid of which two opposite corners are inside and the other two outside.
-    There the outer corner nearest to the surface becomes an inner one, which joins the two sheets.
+    Two sheets would touch at a square of the grid of which two opposite corners are inside and the other two
+    outside. There the outer corner nearest to the surface becomes an inner one, which joins the two sheets.
     """
     values = values.copy()
     while True:

@@ -22,7 +22,8 @@ IDLE_RATE = 0.0017  # cycles a frame: a tenth of the usual rate, as for a standi
 FASTEST = 0.25  # cycles a frame: a larger change of a hand-made phase is a jump, not movement
 # Option `margins` -> least number of frames that a clip must have before a cycle. After the cycle it must
 # have this number plus one.
-# "extend" uses the cycles near an end of the clip, "drop" leaves them out.
+# With "extend", cycles near an end of the clip are used too, because the path can be extended past the end.
+# With "drop" they are left out.
 MARGINS = {"extend": 1, "drop": 60}
 
 

@@ -62,7 +62,7 @@ class LapWalk(TypedDict):
 
 
 class Lap(LapWalk):
-    """One lap, and the mean time of each step of a frame's computation (`Steps`) in its first frames."""
+    """One lap, with the mean time of each of the `Steps` of a frame, over the first frames of the lap."""
 
     milliseconds: Milliseconds
 
@@ -126,10 +126,10 @@ class Responsivity(ModeResults):
 
     runs: the paths of the first laps in the configured mode. parameters: three counts of the weights and
     biases that one frame uses, None for a network without layers. `true`: the actual count; `table_6_1`: by
-    the formula of Segerstedt (2021, table 6.1); `table_6_1_as_printed`: by the same formula, but with one
-    hidden layer fewer than the network has, because his text says that the networks have one fewer. stored:
-    mode -> how many numbers of `bytes_each` bytes the network keeps in memory. exact: the mode that evaluates
-    the network without approximation. laps_other_modes: laps in each other mode.
+    the formula of Segerstedt (2021, table 6.1); `table_6_1_as_printed`: by the same formula, with one hidden
+    layer fewer than the network has, which gives the numbers that his table prints. stored: mode -> how many
+    numbers of `bytes_each` bytes the network keeps in memory. exact: the mode that evaluates the network
+    without approximation. laps_other_modes: laps in each other mode.
     """
 
     configuration: str
