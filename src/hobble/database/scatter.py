@@ -31,8 +31,9 @@ def make_buckets(folder: Path, plan: Plan) -> dict[str, Buckets]:
 def scatter(
     buckets: Mapping[str, Buckets], clips: Mapping[str, RowSource], plan: Plan, seed: int
 ) -> Iterator[tuple[dict[str, Any], ClipRows, ClipRows]]:
-    """Put each clip into the buckets of its split, then yield its entry in the plan, all its rows, and the
-    rows that are used.
+    """Put the used rows of each clip into the buckets of its split.
+
+    Yields, clip by clip, its entry in the plan, all its rows, and its used rows.
 
     One permutation of all rows of a split determines the place of each row.
     """

@@ -13,6 +13,7 @@ from hobble.motion.fingers import pointing_fingers
 from hobble.motion.tree import common, path
 
 SIDES = ("left", "right")
+TRUNK = ("hips", "spine", "chest", "neck", "head")  # roles of its joints, from below
 # A joint may follow a source joint that lies higher in the trunk (or neck) than itself by up to this share of
 # its length.
 REACH = 0.2

@@ -13,12 +13,11 @@ import numpy as np
 
 from hobble.core.errors import InputError
 from hobble.core.untrusted import printable
-from hobble.motion.body import SIDES
+from hobble.motion.body import SIDES, TRUNK
 from hobble.motion.names import side_of
 from hobble.motion.tree import above, common, path
 
 FARTHEST = 1e5  # cm from a joint to its parent
-TRUNK = ("hips", "spine", "chest", "neck", "head")
 ARM, LEG = ("shoulder", "elbow", "wrist"), ("hip", "knee", "heel", "toe")
 LIMBS = [tuple(f"{side}_{part}" for part in limb) for side in SIDES for limb in (ARM, LEG)]
 ROLES = (*TRUNK, *(role for limb in LIMBS for role in limb))
@@ -76,6 +75,7 @@ def check_rig_file(where: Path, data: Any, text: str) -> None:
 def _check_joints(file: RigFile, joints: Mapping[Any, Any]) -> dict[str, int]:
     """Check the section `joints`. Returns each joint's name with the index of its parent, -1 for the root."""
     parents: dict[str, int] = {}
+    numbers: dict[str, int] = {}
     for name, joint in joints.items():
         if not isinstance(name, str) or not isinstance(joint, Mapping):
             file.refuse(f"joint {name}: expected {{parent: ..., offset: [x, y, z]}}", "joints", str(name))
@@ -87,7 +87,8 @@ def _check_joints(file: RigFile, joints: Mapping[Any, Any]) -> dict[str, int]:
         if not _three_numbers(offset):
             problem = f"joint {name}: its offset must be three numbers of {FARTHEST:g} cm at most"
             file.refuse(problem, "joints", name)
-        parents[name] = -1 if parent is None else list(parents).index(parent)
+        parents[name] = -1 if parent is None else numbers[parent]
+        numbers[name] = len(numbers)
     return parents
 
 

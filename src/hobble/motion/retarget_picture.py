@@ -13,7 +13,7 @@ import numpy as np
 from hobble.core.clip import Clip
 from hobble.core.errors import InputError
 from hobble.core.quat import Array
-from hobble.motion.body import SIDES
+from hobble.motion.body import SIDES, TRUNK
 from hobble.motion.check_retarget import ANGLES, BONES, worst
 from hobble.motion.file_motion import load_source
 from hobble.motion.make import fit_skeleton, resample
@@ -22,7 +22,6 @@ from hobble.motion.read import read_bvh
 from hobble.motion.rig import load_skeleton
 from hobble.motion.root import facing
 
-TRUNK = ("hips", "spine", "chest", "neck", "head")
 LIMBS = (("hips", "hip", "knee", "heel", "toe"), ("chest", "shoulder", "elbow", "wrist"))
 POSES = 6
 WIDE, HIGH, EDGE = 150, 260, 46  # pixels of one figure, and of the captions

@@ -151,8 +151,8 @@ def _channel_chart(
     }
     across = axis(one.value, dtick=tenth, range=[0.4 * tenth, 10.6 * tenth])
     caption = (
-        f"Seconds of data for each row and {one.value}, with mirrored clips. The network was not trained "
-        "on empty cells and has to interpolate there."
+        f"Each cell has the seconds of data at one {one.value}, including mirrored clips. The network was "
+        "not trained on empty cells and has to interpolate there."
     )
     title, height = f"{one.title}: amount of data", 120 + 24 * len(columns)
     layout = {"xaxis": across, "yaxis": {"automargin": True}}

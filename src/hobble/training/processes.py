@@ -63,7 +63,7 @@ class Processes:
                 torch.distributed.broadcast(tensor, 0)
 
     def from_first(self, *numbers: int) -> list[int]:
-        """These numbers, as the first process has them; the others get its numbers."""
+        """In every process, the numbers that the first process passed."""
         shared: list[Any] = [numbers]
         if not self.alone:
             torch.distributed.broadcast_object_list(shared, 0)

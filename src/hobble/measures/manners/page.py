@@ -41,7 +41,7 @@ def section(found: Json, material: ReportMaterial) -> PageSection:
 
 
 def summary(found: ChannelResult) -> str:
-    """A paragraph: how much the recogniser recognises in generated walks, and in captured walks of others."""
+    """A paragraph: how often the recogniser is right on generated walks, and on captured walks of others."""
     captured = found["captured"]
     text = (
         f"A recogniser trained on captured clips finds the right {found['title'].lower()} in "
