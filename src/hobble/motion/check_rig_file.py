@@ -75,20 +75,19 @@ def check_rig_file(where: Path, data: Any, text: str) -> None:
 def _check_joints(file: RigFile, joints: Mapping[Any, Any]) -> dict[str, int]:
     """Check the section `joints`. Returns each joint's name with the index of its parent, -1 for the root."""
     parents: dict[str, int] = {}
-    numbers: dict[str, int] = {}
+    numbers = {name: number for number, name in enumerate(joints)}
     for name, joint in joints.items():
         if not isinstance(name, str) or not isinstance(joint, Mapping):
             file.refuse(f"joint {name}: expected {{parent: ..., offset: [x, y, z]}}", "joints", str(name))
         parent, offset = joint.get("parent"), joint.get("offset")
         if parent is None and parents:
             file.refuse(f"joint {name}: only the first joint may have no parent", "joints", name)
-        if parent is not None and parent not in parents:
+        if parent is not None and (not isinstance(parent, str) or parent not in parents):
             file.refuse(f"joint {name}: its parent {parent!r} must be listed above it", "joints", name)
         if not _three_numbers(offset):
             problem = f"joint {name}: its offset must be three numbers of {FARTHEST:g} cm at most"
             file.refuse(problem, "joints", name)
         parents[name] = -1 if parent is None else numbers[parent]
-        numbers[name] = len(numbers)
     return parents
 
 
@@ -107,7 +106,7 @@ def _check_roles(file: RigFile, roles: Mapping[Any, Any], parents: Mapping[str, 
             near = get_close_matches(str(role), ROLES, 1)
             more = f" (is it {near[0]}?)" if near else ""
             file.refuse(f"there is no role {role}{more}", "roles", str(role))
-        if joint not in parents:
+        if not isinstance(joint, str) or joint not in parents:
             near = get_close_matches(str(joint), list(parents), 1)
             more = f" (is it {near[0]!r}?)" if near else ""
             file.refuse(f"{role}: there is no joint {joint!r}{more}", "roles", role)
