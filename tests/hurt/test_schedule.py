@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import csv
+import itertools
 
 import numpy as np
 import pytest
@@ -11,7 +12,7 @@ import yaml
 from hobble.core.errors import HobbleError
 from hobble.hurt.body_parts import part_of_link
 from hobble.hurt.options import Hurt
-from hobble.hurt.schedule import severities
+from hobble.hurt.schedule import ARMS, severities
 from hobble.hurt.version import UNCUT_SECONDS
 from hobble.workflow.project import Project
 
@@ -53,20 +54,36 @@ def test_hurt_versions_of_the_captured_clips_hurt_all_thirty_links(root, shared,
     with open(shared / "mocap/clips.csv") as file:
         known = {row["file"]: int(row["frames"]) // 2 for row in csv.DictReader(file)}
     frames = {clip: known[f"cmu/{clip}.bvh"] for clip, e in data["clips"].items() if "channels" not in e}
-    versions = {f"{clip}_hurt1": turn for turn, clip in enumerate(frames) if clip not in data["held_out"]}
     options = Hurt.model_validate(data["hurt"])
-    assert seconds_hurt(holden31, versions, frames, lambda clip: options).min() > 2
+    every = itertools.product(frames, range(1, options.versions + 1))
+    versions = {
+        f"{clip}_hurt{number}": turn
+        for turn, (clip, number) in enumerate(every)
+        if clip not in data["held_out"]
+    }
+    assert seconds_hurt(holden31, versions, frames, lambda clip: options).min() > 15
 
 
 def test_an_injury_has_the_highest_severity_for_half_of_its_time(holden31) -> None:
     options = Hurt(links=("LeftUpLeg-LeftLeg",), at_once=1)
-    out = severities(holden31, 180 * 40, 60.0, options, "a", 0)
-    column = out[:, holden31.link_names.index("LeftUpLeg-LeftLeg")].reshape(40, 2, 90)
-    assert np.ptp(column, axis=2).max() == 0  # two halves of a second and a half
+    out = severities(holden31, 360 * 40, 60.0, options, "a", 0)
+    column = out[:, holden31.link_names.index("LeftUpLeg-LeftLeg")].reshape(40, 2, 180)
+    assert np.ptp(column, axis=2).max() == 0  # two halves of three seconds
     halves = column[:, :, 0]
     assert (halves.max(axis=1) == 10).all()
     assert set(halves.min(axis=1)) == {3.0, 5.0, 7.0}
     assert {tuple(pair) for pair in halves == 10} == {(True, False), (False, True)}
+
+
+def test_arms_are_often_hurt_beside_another_part_but_never_too_many_at_once(holden31) -> None:
+    arms = [part_of_link(holden31, link).name in ARMS for link in holden31.links]
+    out = severities(holden31, 360 * 400, 60.0, Hurt(), "a", 0)[::180] > 0  # each half of each stretch
+    assert 0.3 < (out[:, arms].any(axis=1) & (out.sum(axis=1) == 2)).mean() < 0.7
+    assert out.sum(axis=1).max() == 2
+    alone = severities(holden31, 360 * 400, 60.0, Hurt(at_once=1), "a", 0)[::180] > 0
+    assert alone.sum(axis=1).max() == 1
+    legs = severities(holden31, 360 * 400, 60.0, Hurt(links=("LeftUpLeg-LeftLeg",)), "a", 0)
+    assert not legs[:, arms].any()
 
 
 def test_a_clip_s_severities_are_its_own_and_always_the_same(holden31) -> None:

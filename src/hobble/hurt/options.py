@@ -28,7 +28,7 @@ class Hurt(Section):
         "many as with one, but have n times as many injuries",
     )
     at_once: Annotated[int, Field(ge=1, le=30)] = Field(2, description="links hurt at once, at most")
-    seconds: Annotated[float, Field(ge=1, le=3600)] = Field(3.0, description="about how long an injury lasts")
+    seconds: Annotated[float, Field(ge=1, le=3600)] = Field(6.0, description="about how long an injury lasts")
     longest: Annotated[float, Field(gt=0, le=10)] = Field(
         0.9, description="greatest length of a version relative to its clip, for clips of 6 seconds or more"
     )

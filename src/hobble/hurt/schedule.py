@@ -13,11 +13,15 @@ from hobble.core.skeleton import Skeleton
 from hobble.hurt.body_parts import part_of_link
 from hobble.hurt.options import Hurt
 
-# Part -> how often each of its links is in the deck (see `severities`). Parts that change the motion little
-# are in it once.
-OFTEN = {"hip": 3, "thigh": 3, "shank": 3, "foot": 3, "back": 2}
+# Part -> how often each of its links is in the deck (see `severities`). Other parts are in it once.
+OFTEN = {"hip": 3, "thigh": 3, "shank": 3, "foot": 3, "back": 2, "upper arm": 2, "forearm": 2}
 GOLDEN = (math.sqrt(5) - 1) / 2  # its multiples, modulo 1, spread evenly
-TOGETHER = 0.25  # share of the stretches with several hurt links, if that is allowed
+TOGETHER = 0.25  # share of the stretches in which any other links hurt as well, if that is allowed
+# Share of the other stretches in which an arm hurts as well. People swing their arms in very different ways.
+# If few of them have a hurt arm, a network takes their swing for the injury's. An injury of an arm hardly
+# changes the legs, so both can be learnt from the same stretch.
+ARM_TOO = 0.6
+ARMS = ("upper arm", "forearm")
 SHORTEST = 0.4  # share of `seconds`: a rest of a clip that is shorter belongs to the stretches before
 
 
@@ -31,6 +35,7 @@ def severities(skeleton: Skeleton, frames: int, fps: float, options: Hurt, clip:
     """
     rng = np.random.default_rng([options.seed, zlib.crc32(clip.encode())])
     deck = _deck(skeleton, options)
+    arms = [card for card in deck if part_of_link(skeleton, skeleton.links[card[0]]).name in ARMS]
     out = np.zeros((frames, len(skeleton.links)), np.float32)
     first = int(math.modf((turn + 1) * GOLDEN)[0] * len(deck))
     begin = 0
@@ -38,6 +43,8 @@ def severities(skeleton: Skeleton, frames: int, fps: float, options: Hurt, clip:
         hurt = [deck[(first + i) % len(deck)]]
         if options.at_once > 1 and rng.random() < TOGETHER:
             hurt += [deck[j] for j in rng.permutation(len(deck))[: rng.integers(1, options.at_once)]]
+        if arms and len(hurt) < options.at_once and rng.random() < ARM_TOO:
+            hurt += [arms[rng.integers(len(arms))]]
         for link, first_half, second_half in hurt[::-1]:
             half = begin + length // 2
             out[begin:half, link] = first_half

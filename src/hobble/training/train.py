@@ -68,7 +68,7 @@ def train(
             "List some under held_out in the data set."
         )
     if training.symmetric and network.why_asymmetric:
-        raise HobbleError(f"training.symmetric: {network.why_asymmetric}")
+        raise HobbleError(f"training.symmetric: {network.why_asymmetric}. Write `symmetric: false`.")
     samples, sections = database.samples(TRAIN), training.sections
     if samples < sections:
         raise HobbleError(f"{samples} training samples are fewer than training.sections, {sections}")

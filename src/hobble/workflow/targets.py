@@ -99,7 +99,10 @@ def _check_configuration(project: Project, name: str) -> None:
 def _check_symmetric(project: Project, name: str, model: Configuration) -> None:
     """Check that the network can be symmetric and that the data set has mirrored clips."""
     if model.network.why_asymmetric:
-        raise HobbleError(f"configuration {name}: training.symmetric: {model.network.why_asymmetric}")
+        raise HobbleError(
+            f"configuration {name}: training.symmetric: {model.network.why_asymmetric}. "
+            "Write `symmetric: false`."
+        )
     if not project.catalogue.dataset(model.dataset).mirror:
         raise HobbleError(
             f"configuration {name}: training.symmetric: data set {model.dataset} has no mirrored clips, so "
