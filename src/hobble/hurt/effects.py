@@ -13,10 +13,10 @@ from hobble.hurt.amounts import amounts
 from hobble.hurt.body_parts import LEFT, RIGHT, part_of_link
 
 HIGHEST = 10.0
-POWER = 0.85  # strength = (severity / 10) ** POWER: .36 at 3, .55 at 5, .74 at 7
+POWER = 0.82  # strength = (severity / 10) ** POWER: .37 at 3, .57 at 5, .75 at 7
 # Changes of when a foot lands and leaves (`land`, `off`) grow with strength ** TIMING_POWER. With 1, a network's
 # character has nearly as uneven stances at 5 as at 10.
-TIMING_POWER = 2.0
+TIMING_POWER = 1.3
 LEAST_RATIO = 0.02  # smaller ratios are raised to this
 SETTLING = 0.3  # seconds: sigma of the Gaussian that smooths changes of severity
 LEAST_SEVERITY = 0.05  # smaller severities count as 0
