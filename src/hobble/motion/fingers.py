@@ -40,8 +40,8 @@ def pointing_fingers(skeleton: Skeleton, wrists: Mapping[str, int]) -> dict[str,
 def _fingers(skeleton: Skeleton, wrist: int, forearm: float) -> list[tuple[float, int, Array]]:
     """Length, base, and (3,) position of the base relative to the wrist, of each chain that can be a finger.
 
-    The forearm's length is added to that of a finger that `_points` knows by its name, so that the finger
-    comes first.
+    If the names say that a finger points where the hand does (`_points`), the returned length is larger by
+    the forearm's. Then no other finger is longer.
     """
     found = []
     chains = _chains(skeleton.parents, wrist)
