@@ -76,8 +76,8 @@ def _chains(parents: Sequence[int], wrist: int) -> list[list[int]]:
 def _points(names: Sequence[str], wrist: str) -> bool:
     """Whether the names of a chain say that it points where the hand does.
 
-    They do if a name contains "index" or "middle", or "finger" and a number, or if the wrist joint is named a
-    wrist and a joint below it is named a hand.
+    They do if a name contains "index" or "middle", or "finger" and a number, or if the wrist's name says
+    wrist and a name of the chain says hand.
     """
     text = "".join(names).lower()
     hand = part_of(wrist) == "wrist" and any(part_of(name) == "hand" for name in names)
