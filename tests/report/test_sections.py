@@ -111,10 +111,10 @@ def test_turns_speeds_and_severities_are_counted_in_seconds(
 def test_strips_show_the_injured_parts(material: ReportMaterial) -> None:
     strips = {strip["clip"]: strip for strip in data_section.strips(material, shown_clips.shown(material))}
     assert len(strips) == 8, "a mirror says the same again"
-    (row,) = strips["hurt_left_knee"]["status"]
+    (row,) = strips["hurt_left_knee"]["channels"]
     assert row["name"] == "left thigh"
     assert row["spans"][0][2] == 7.0
-    assert strips["jog"]["status"] == []
+    assert strips["jog"]["channels"] == []
 
 
 def test_stages_are_listed_with_published_values_of_the_same_configuration(material: ReportMaterial) -> None:

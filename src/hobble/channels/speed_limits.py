@@ -154,8 +154,8 @@ class LimitLearner:
 
         gait: (R, G) shares of the gaits. velocity: (R, 2) of the root, to the side and forward in root
         coordinates, cm per frame. values: (R, L) of this channel. cycle: (R,) number of the row's cycle.
-        others: (R,) bool, whether another channel has a value above 0. source: name of the healthy clip, if
-        this clip is a hurt version of it.
+        others: (R,) bool, whether another channel has a value above 0. source: name of the clip
+        that this clip is a hurt version of, if it is one.
         """
         numbers, of_row, count = np.unique(cycle, return_inverse=True, return_counts=True)
 
@@ -239,8 +239,8 @@ class LimitLearner:
         """Gait (n,), share of the healthy speed (n,) and values (n, L) of the cycles with a value above 0.
 
         A cycle of a hurt version is compared with the same cycle of its source. It is left out if the source
-        has a value of this channel already. For example, a sad clip and its hurt version are equally sad, so
-        they say nothing about the limits of sadness.
+        has a value above 0 in this channel, too. For example, a sad clip and its hurt version are equally
+        sad, so they say nothing about the limits of sadness.
         """
         parts = []
         for source, cycles in self._clips.values():

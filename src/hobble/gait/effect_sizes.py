@@ -46,7 +46,7 @@ def effects(walk: Profile, healthy: Profile, side: str = RIGHT) -> dict[str, flo
 
     forward, left = change("mean trunk_forward"), change("mean trunk_left")
     return {
-        "speed": share("speed_per_leg"),
+        "speed": share("speed_per_leg"),  # in leg lengths a second
         "stride": share("stride_seconds"),
         "stance": change("stance_share_L") - change("stance_share_R"),
         "step_hurt": share("step_R"),

@@ -3,9 +3,9 @@
 A measurement is a package. Its `__init__` holds `MEASURE`, a `Measure`, and must not import anything slow.
 The other modules of the package are found by name:
 
-- `run.py`: `run(inputs, options) -> Outcome` measures (see `hobble.measures.inputs`). A long measurement may
-  be split into pieces, which run as jobs of their own: `run_piece(inputs, options, piece) -> Json` measures
-  one piece, and `run` puts them together;
+- `run.py`: its function `run(inputs, options)` measures and returns an `Outcome` (see
+  `hobble.measures.inputs`). A long measurement may be split into pieces, which run as jobs of their own:
+  `run_piece(inputs, options, piece) -> Json` measures one piece, and `run` puts them together;
 - `page.py`: what the report shows of it (see `hobble.report.measure_sections`), if anything;
 - `comparison.py`: what it says of configurations side by side
   (see `hobble.evaluation.compare_configurations`), if anything;

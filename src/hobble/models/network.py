@@ -64,9 +64,8 @@ class Network(ABC):
     kind: ClassVar[str] = ""  # its folder in hobble.models
     phase: ClassVar[bool] = True  # whether a prediction depends on the phase
     # Whether the predicted poses are recorded frames, as in motion matching. With other networks, the
-    # runtime slows the root while the character stands or moves against the target velocity. With networks
-    # of recorded poses it does not, because the feet of recorded frames slide if the root moves less than
-    # predicted.
+    # runtime shortens the predicted movement of the root where the character should stand or go another way.
+    # With recorded frames the feet would slide.
     recorded_poses: ClassVar[bool] = False
     # Names of the ways to evaluate the network, such as constant, linear and cubic interpolation over the
     # phase. The last one is exact.

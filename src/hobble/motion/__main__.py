@@ -50,7 +50,7 @@ def main() -> int:
     for_look.add_argument(
         "--skeleton",
         default="holden31",
-        help="the skeleton for which the clips are read, by name (default holden31)",
+        help="name of the skeleton to which the clips are retargeted (default holden31)",
     )
     for_look.add_argument(
         "--skeletons", type=Path, default=SKELETONS, help="the folder of the skeleton files"

@@ -40,8 +40,8 @@ def pointing_fingers(skeleton: Skeleton, wrists: Mapping[str, int]) -> dict[str,
 def _fingers(skeleton: Skeleton, wrist: int, forearm: float) -> list[tuple[float, int, Array]]:
     """Length, base, and (3,) position of the base relative to the wrist, of each chain that can be a finger.
 
-    The forearm's length is added to that of a finger that `_points` knows by its name, so that the finger
-    comes first.
+    If the names say that a finger points where the hand does (`_points`), the returned length is larger by
+    the forearm's. Then no other finger is longer.
     """
     found = []
     chains = _chains(skeleton.parents, wrist)
@@ -76,8 +76,8 @@ def _chains(parents: Sequence[int], wrist: int) -> list[list[int]]:
 def _points(names: Sequence[str], wrist: str) -> bool:
     """Whether the names of a chain say that it points where the hand does.
 
-    They do if a name contains "index" or "middle", or "finger" and a number, or if the wrist joint is named a
-    wrist and a joint below it is named a hand.
+    They do if a name contains "index" or "middle", or "finger" and a number, or if the wrist's name says
+    wrist and a name of the chain says hand.
     """
     text = "".join(names).lower()
     hand = part_of(wrist) == "wrist" and any(part_of(name) == "hand" for name in names)

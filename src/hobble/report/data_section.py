@@ -206,7 +206,10 @@ def _by_kind(rows: list[list[str]]) -> list[list[Any]]:
 
 
 def strips(material: ReportMaterial, clips: frozenset[str]) -> list[dict[str, Any]]:
-    """Label curves and channel values of each clip in `clips` that has label curves; mirrors are left out."""
+    """Data for the strips, one chart over time for each clip: label curves and channel values.
+
+    Clips that are not in `clips`, mirrors, and clips without label curves are left out.
+    """
     of_clip: dict[str, dict[str, Any]] = {}
     for report in material.channels:
         channel_highest = report.get("highest", 10.0)
@@ -230,5 +233,5 @@ def strips(material: ReportMaterial, clips: frozenset[str]) -> list[dict[str, An
             }
             for label, (value, channel_highest) in of_clip.get(clip, {}).items()
         ]
-        out.append({**curves, "clip": clip, "length": length, "status": channel_values})
+        out.append({**curves, "clip": clip, "length": length, "channels": channel_values})
     return out

@@ -5,8 +5,8 @@ python -m hobble.runtime onnx|bin|bvh NETWORK TARGET
 Examples:
 
 python -m hobble.runtime onnx results/holden/network holden.onnx --mode cubic
-python -m hobble.runtime bin results/holden/network pfnn
-python -m hobble.runtime bvh pfnn motions --skeleton config/skeletons/holden31.yaml
+python -m hobble.runtime bin results/holden/network exported
+python -m hobble.runtime bvh exported motions --skeleton config/skeletons/holden31.yaml
 """
 
 from __future__ import annotations
@@ -34,7 +34,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         "to",
         choices=("onnx", "bin", "bvh"),
         help="onnx: one file, checked with onnxruntime; bin: .bin files as in the release of Holden et al. "
-        "(2017); bvh: the scripted walks that the network generates, one BVH file each",
+        "(2017); bvh: a few walks that the network generates (straight, turning, ...), one BVH file each",
     )
     parser.add_argument("network", help="weights.npz, its folder, or a folder of .bin files")
     parser.add_argument("target", help="the file or folder to write")

@@ -14,8 +14,8 @@ from hobble.report.measure_sections import OverviewColumn
 from hobble.report.page_parts import PageSection, SectionPart
 from hobble.report.tables import Column
 
-# compare.json has eq. 3.2 of Segerstedt (2021) under two keys. Key -> the standard deviations (sd) that it
-# divides by.
+# The difference between two configurations is a difference of means, divided by standard deviations (eq. 3.2
+# of Segerstedt 2021). compare.json has it twice. Key -> whose standard deviations (sd) were taken.
 KINDS = {"difference_of_means": "sd of the means of clips", "difference": "sd of single frames"}
 
 

@@ -1,4 +1,8 @@
-"""The types of responsivity.json."""
+"""The types of responsivity.json.
+
+The character walks laps of a closed track of waypoints. The results say how fast it is and how closely it
+follows the track.
+"""
 
 from __future__ import annotations
 
@@ -102,14 +106,14 @@ class ModeResults(TypedDict):
 
 
 class PieceResults(TypedDict):
-    """The file of a piece: all laps of a phase mode, and the paths of the first laps."""
+    """The file of one job of this measurement: all laps of a phase mode, and the paths of the first laps."""
 
     laps: ModeResults
     runs: list[LapPath]
 
 
 class Track(TypedDict):
-    """The track.
+    """The closed track, a line through waypoints.
 
     metres: its length. gaits: one for each waypoint. x, z: places of the waypoints, m.
     """

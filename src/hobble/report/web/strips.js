@@ -64,7 +64,7 @@ export const startStrips = () => {
     const fastest = Math.max(.5, ...strip.speed.filter((v) => v !== null));
     curve("speed", strip.speed, 34, fastest, colour("soft"));
     label(`up to ${fastest.toPrecision(2)} m/s`, y - 5, 10);
-    strip.status.forEach((row) => {
+    strip.channels.forEach((row) => {
       y += 4;
       label(row.name.length > 15 ? `…${row.name.slice(-14)}` : row.name, y + 10, 10);
       add(svg, "title", {}, row.name);
