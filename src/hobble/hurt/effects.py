@@ -14,8 +14,8 @@ from hobble.hurt.body_parts import LEFT, RIGHT, part_of_link
 
 HIGHEST = 10.0
 POWER = 0.82  # strength = (severity / 10) ** POWER: .37 at 3, .57 at 5, .75 at 7
-# Changes of when a foot lands and leaves (`land`, `off`) grow with strength ** TIMING_POWER. With 1, a network's
-# character has nearly as uneven stances at 5 as at 10.
+# Changes of when a foot lands and leaves (`land`, `off`) grow with strength ** TIMING_POWER. With 1, the
+# stances of a network's character are nearly as uneven at 5 as at 10.
 TIMING_POWER = 1.3
 LEAST_RATIO = 0.02  # smaller ratios are raised to this
 SETTLING = 0.3  # seconds: sigma of the Gaussian that smooths changes of severity
