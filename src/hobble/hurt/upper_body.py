@@ -20,9 +20,9 @@ PELVIS_CALM = 0.7  # the pelvis loses this share of the movement that a stiff ba
 MEAN = 0.5  # seconds: sigma of the Gaussian that gives a joint's mean posture
 LOOK = {"neck": 0.5, "head": 0.85}  # share of the trunk's lean that neck and head undo, to look ahead
 STILL = 0.93  # a held arm loses up to this share of its movement
-# An arm is held with (strength of the injury) ** power, so a mildly hurt arm swings nearly as far as a
-# healthy one. With powers of 1, a network's character holds its arms too still at 5, the forearm most.
-HOLD_POWER = {"upper": 1.6, "fore": 2.4, "carry": 1.6}
+# An arm is held with (strength of the injury) ** HOLD_POWER, so a mildly hurt arm swings nearly as far as a
+# healthy one. With 1, a network's character holds its arms too still at 5.
+HOLD_POWER = 1.6
 # How a hurt left arm is held: directions of upper arm and forearm (forward, left, up), relative to the
 # heading. `fore`, for a hurt forearm, lies across the belly: the mean of the jog with a hurt forearm by Ferre
 # et al. (Injured_Jog_LLA). `upper`, for a hurt upper arm, is closer to the body, with the forearm ahead.
@@ -136,9 +136,7 @@ def _lean(source: HealthyClip, turn: Array, roll: Array, forward: Array) -> Arra
 def _hold_arm(source: HealthyClip, effects: Effects, world: Array, side: int) -> None:
     """Hold a hurt arm with a bent elbow, against the body or in front of the chest. Changes `world`."""
     skeleton = source.clip.skeleton
-    weights = {
-        name: np.clip(effects.sided[name][:, side], 0.0, 1.0) ** HOLD_POWER[name] for name in HELD_ARMS
-    }
+    weights = {name: np.clip(effects.sided[name][:, side], 0.0, 1.0) ** HOLD_POWER for name in HELD_ARMS}
     weights["carry"] = HAND * weights["carry"]
     held = STILL * np.max(list(weights.values()), axis=0)
     if not held.any():
