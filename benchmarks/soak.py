@@ -28,6 +28,8 @@ def main() -> int:
         "--skeleton", default="config/skeletons/holden31.yaml", help="where the network has none"
     )
     arguments = parser.parse_args()
+    if arguments.characters < 2:
+        parser.error("--characters: at least 2")
     try:
         network = load_network(arguments.network, arguments.skeleton)
     except HobbleError as error:

@@ -56,7 +56,7 @@ def _spacing(at: float, band: tuple[float, float, float]) -> float:
 
 
 def field(solids: Sequence[Solid], axes: Sequence[Array]) -> Array:
-    """(X, Y, Z) distances from the blended solids on a grid of three axes, cm; FAR where no solid is near."""
+    """(X, Y, Z) distances from the blended solids on a grid of three axes, cm; FAR where no solid reaches."""
     out = np.full([len(axis) for axis in axes], FAR, np.float64)
     for solid in solids:
         low, high = solid.bounds()
