@@ -321,9 +321,12 @@ def _worst_clips(found: Json) -> Iterator[Hint]:
     median = float(np.median([row["mean"] for row in rows]))
     worst = max(rows, key=lambda row: row["mean"])
     if worst["mean"] > 1.8 * median:
+        # The sections Labels and Data show no mirrors.
+        source = worst["clip"].removesuffix("_mirror")
+        whose = "its labels" if source == worst["clip"] else f"the labels of {source}, which it mirrors,"
         yield Hint(
             "note",
             f"{worst['clip']} has the largest error,",
             f"{worst['mean'] / median:.1f} times the median over all clips. "
-            "Check its labels under Labels, and its repairs under Data.",
+            f"Check {whose} under Labels, and the repairs under Data.",
         )
