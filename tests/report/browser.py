@@ -90,8 +90,11 @@ class Browser:
 
     def open(self, url: str) -> None:
         """Go to a page and wait until it is loaded and all its parts have started."""
+        # The same page may be open already, and complete. The mark tells the old document from the new one.
+        self.run("globalThis.leaving = true")
         self.send("Page.navigate", url=url)
-        while self.run("document.readyState + location.href.startsWith('about:')") != "completefalse":
+        loaded = "document.readyState + location.href.startsWith('about:') + !!globalThis.leaving"
+        while self.run(loaded) != "completefalsefalse":
             time.sleep(0.05)
         self.until("globalThis.Hobble?.ready ?? true", 60)
 
