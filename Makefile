@@ -31,7 +31,8 @@ faults: env      ## test the workflow with N random faults (make faults N=200 SE
 cluster-test: env ## run the test configuration on a SLURM cluster of one node (needs root on Debian)
 	tests/cluster/run.sh
 
-# The tests that open the report need a browser. As root on Debian this installs one; elsewhere these tests are skipped.
+# The tests that open the report need a browser. If there is none, this installs one as root on Debian. Elsewhere these tests
+# are then skipped.
 browser:         ## find or install the browser for the tests
 	@for name in chromium chromium-browser google-chrome; do command -v $$name >/dev/null && exit 0; done; \
 	if [ "$$(id -u)" = 0 ] && command -v apt-get >/dev/null; then \

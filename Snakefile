@@ -47,7 +47,7 @@ except HobbleError as error:
 lifetime.set_run_variable()
 lifetime.clear_stale_lock()
 
-# The rules use these objects. Each has a module in hobble.workflow.
+# The objects that the rules use, see hobble.workflow.project.
 catalogue = project.catalogue
 clips = project.clips
 datasets = project.datasets
@@ -84,14 +84,14 @@ def keep_local(files):
 
 
 def for_each(batch, files):
-    """The files, from `files(dataset, clip)`, of all clips of a batch."""
+    """The files of all clips of a batch. files: function (dataset, clip) -> list of the clip's files."""
     return keep_local(
         [file for clip in batch.clips for file in files(batch.dataset, clip)]
     )
 
 
 def counted(batch, files):
-    """How many files each clip of a batch has."""
+    """The number of files of each clip of a batch. files: as in `for_each`."""
     return [len(files(batch.dataset, clip)) for clip in batch.clips]
 
 

@@ -114,7 +114,7 @@ def test_all_problems_are_reported_at_once() -> None:
     ("values", "message"),
     [
         ({"skeleton": "s"}, "needs `folder`"),
-        ({"skeleton": "s", "synthetic": {}}, "lists its clips"),
+        ({"skeleton": "s", "synthetic": {}}, "a list of its `clips`"),
         ({"skeleton": "s", "folder": "f", "clips": {"a": None}, "held_out": ["b"]}, "not in `clips`: b"),
         ({"skeleton": "s", "folder": "f", "database": {"window": 55}}, "multiple of step"),
         ({"skeleton": "s", "folder": "f", "motion": {"fps": 30}}, r"motion\.fps: clips must have 60"),

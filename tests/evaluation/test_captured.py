@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from hobble.evaluation.captured import captured, root_path, unbroken
-from hobble.evaluation.motion_measures import acceleration, in_root_frame
+from hobble.evaluation.motion_measures import acceleration, in_root_coordinates
 from hobble.measures.clip_parts import captured_motion
 from hobble.measures.stratified_sample import Sample, Stratum
 from hobble.rows.clip_rows import ClipRows, save_clip_rows
@@ -31,7 +31,7 @@ def world() -> dict[str, np.ndarray]:
 
 def level(vectors: np.ndarray, yaw: np.ndarray) -> np.ndarray:
     """World vectors (..., 3), relative to a root with this yaw."""
-    return in_root_frame(vectors, np.zeros((*vectors.shape[:-2], 3)), yaw)
+    return in_root_coordinates(vectors, np.zeros((*vectors.shape[:-2], 3)), yaw)
 
 
 @pytest.fixture
@@ -42,7 +42,7 @@ def rows(world) -> ClipRows:
     here = yaw[:-1]
     y[:, LAYOUT.y_root_velocity] = level(np.diff(root, axis=0)[:, None], here)[:, 0, ::2]
     y[:, LAYOUT.y_turn] = -np.diff(yaw)[:, None]
-    y[:, LAYOUT.y_joint_position] = in_root_frame(joints[:-1], root[:-1], here).reshape(FRAMES, -1)
+    y[:, LAYOUT.y_joint_position] = in_root_coordinates(joints[:-1], root[:-1], here).reshape(FRAMES, -1)
     y[:, LAYOUT.y_joint_velocity] = level(np.diff(joints, axis=0), here).reshape(FRAMES, -1)
     x = np.zeros((FRAMES, LAYOUT.x_terrain.start))
     gait = np.zeros((FRAMES, len(GAITS), LAYOUT.samples))

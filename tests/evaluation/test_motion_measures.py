@@ -13,7 +13,7 @@ from hobble.evaluation.motion_measures import (
     bend,
     foot_slide,
     gait_measures,
-    in_root_frame,
+    in_root_coordinates,
     largest_turn,
     runs,
     skating,
@@ -77,7 +77,7 @@ def test_poses_in_the_root_frame_do_not_depend_on_place_and_heading() -> None:
     root = np.array([[0, 0, 0], [5.0, 0, -3]])
     body = np.array([[1.0, 2, 3], [-1, 0, 4]])
     world = np.stack([quat.rotate(quat.yaw(a), body) + r for a, r in zip(yaw, root, strict=True)])
-    np.testing.assert_allclose(in_root_frame(world, root, yaw), [body, body], atol=1e-12)
+    np.testing.assert_allclose(in_root_coordinates(world, root, yaw), [body, body], atol=1e-12)
 
 
 def test_cadence_stance_and_step_length_of_a_known_walk_are_exact(holden31: Skeleton) -> None:

@@ -47,7 +47,7 @@ ATTACKS: dict[str, tuple[str, str, tuple[str, ...]]] = {
             "tests/runtime/test_wrong_calls.py::test_a_terrain_that_raises_leaves_the_state_as_it_was",
         ),
     ),
-    "a state that is not finite": (
+    "a character whose state is not finite": (
         "a character",
         UNHARMED,
         ("tests/runtime/test_bounds.py::test_a_state_that_is_not_finite_restarts_and_warns_once",),

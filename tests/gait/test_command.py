@@ -63,7 +63,7 @@ def test_the_command_prints_a_result_for_each_clip(walker, file, capsys):
     healthy, slow = file(walker(125)), file(walker(80))
     assert main([slow, healthy, "--healthy", healthy, "--side", "left"]) == 0
     said = capsys.readouterr().out
-    assert said.count("effects, hurt side left") == 2
+    assert said.count("effects if the left side is hurt") == 2
     assert "at-80: normal" in said
     assert "at-125: normal" in said
     assert "No healthy walk" not in said

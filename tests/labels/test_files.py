@@ -63,7 +63,8 @@ def test_footsteps_count_from_one(write):
         ("1 2 3\n", 1, "a line holds"),
         ("*\n", 1, "a line holds"),
         ("1 20\n30\n40 50\n", 2, "only the last line"),
-        ("1 20\n30 242\n", 2, "past the clip's last, 240"),
+        ("1 20\n30\n\n\n40 50\n", 2, "only the last line"),
+        ("1 20\n30 242\n", 2, "past the clip's last frame, 240"),
     ],
 )
 def test_wrong_footsteps_are_refused_with_their_line(write, text, line, word):

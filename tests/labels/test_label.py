@@ -54,8 +54,8 @@ def test_label_files_of_a_looped_clip_are_ignored_with_a_note(walker, options, w
     labels, report = label_clip(clip, files, {**MOTION, "loops": 2}, "walk", "rocky", options)
     assert (report.phase_source, report.gait_source) == ("automatic", "automatic")
     assert report.warnings == (
-        "w_footsteps.txt, w_gait.txt left out: the frames counted there are those of one cycle, and the clip "
-        "repeats it",
+        "w_footsteps.txt, w_gait.txt not used: their frame numbers are those of one cycle, but the clip "
+        "repeats this cycle",
     )
     unread = label_clip(
         clip, files, {**MOTION, "loops": 2}, "walk", "rocky", options.model_copy(update={"files": False})

@@ -195,6 +195,6 @@ def test_a_network_walks_in_every_manner_and_mixture(both: Network, motion: list
 
 
 def test_missing_results_are_explained(hurtable, both: Network, motion: list[Captured]) -> None:
-    assert measured(hurtable, [])["reason"] == run.REASON
+    assert measured(hurtable, [])["reason"] == run.NO_MANNERS
     assert measured(both, motion[:6:2])["reason"] == run.TOO_FEW
     assert page.section(measured(hurtable, []), SimpleNamespace(network={"skeleton": {}})).parts == []

@@ -139,8 +139,8 @@ def test_a_lap_is_the_same_alone_and_in_a_crowd(network) -> None:
 def test_no_more_frames_are_timed_than_a_lap_may_take_or_its_part_of_all(
     steady, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(times, "OF_LAP", 8)
-    monkeypatch.setattr(times, "OF_ALL", 20)
+    monkeypatch.setattr(times, "TIMED_OF_LAP", 8)
+    monkeypatch.setattr(times, "TIMED_OF_ALL", 20)
     for laps, longest, expected in ((2, 100, 8), (4, 100, 5), (2, 3, 3)):
         found = times.timed_frames(steady, RUNTIME, laps, longest, AHEAD)
         assert [len(each) for each in found] == [expected] * laps

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from hobble.core.errors import InputError
-from hobble.evaluation.motion_measures import in_root_frame
+from hobble.evaluation.motion_measures import in_root_coordinates
 from hobble.measures.inputs import MeasureInputs
 from hobble.measures.measure import Measure
 from hobble.measures.registry import MEASURES
@@ -43,7 +43,7 @@ def recorded(network: Network, frames: int, ground: Any) -> tuple[RollOutInputs,
         target = (speed * np.sin(f / 40), speed * np.cos(f / 40))
         figure.next_pose(target, injury={"LeftUpLeg-LeftLeg": 4}, terrain=ground)
         root, yaw = controller.root[0].copy(), float(controller.yaw[0])
-        local = in_root_frame(state.joint_position[0], root, np.array(yaw))
+        local = in_root_coordinates(state.joint_position[0], root, np.array(yaw))
         rows["x"].append(controller.x[0].copy())
         rows["y"].append(controller.y[0].copy())
         rows["stand"].append(controller.x[0, network.layout.x_gait][network.layout.samples // 2])

@@ -167,7 +167,7 @@ def test_a_crawling_figure_is_right_or_refused_with_a_question(outcome, clip):
     crawl = crawling(clip)
     first, (second, _), names = outcome(PLAIN, crawl)
     assert compare(first, second, names).mean() < 1.0
-    with pytest.raises(InputError, match=r"what is up is in doubt.*Set motion.up"):
+    with pytest.raises(InputError, match=r"the up axis is in doubt.*Set motion.up"):
         outcome(PLAIN, crawl, rest="heap")
 
 

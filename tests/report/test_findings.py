@@ -100,7 +100,7 @@ def test_links_never_hurt_in_training_only_show_the_drift_of_the_walk(material: 
     drift = swept("never", False, 10.0, 7.0)
     like_it = {"responses": [drift, swept("hurt", True, 11.0, 6.5, 0.3)]}
     found = heads(material, injury=like_it)
-    assert found["A healthy walk also drifts, by 10.0 cm per joint."] == "warn"
+    assert found["Even a healthy walk changes, by 10.0 cm per joint."] == "warn"
     assert "1 of 1 link hardly changes the walk at severity 10" in found
     assert not [head for head in found if "stays changed" in head]
     caught = {"responses": [swept("never", False, 0.1, 0.1), swept("hurt", True, 11.0, 6.5)]}
@@ -147,8 +147,8 @@ def test_a_limited_turn_is_reported(material: ReportMaterial) -> None:
     ]
     figure = next(f for f in track_figures(limited) if f.label == "Largest predicted turn")
     assert figure.value == "170"
-    assert "which changed 3 of" in figure.note
-    assert "largest turn drawn: 25.0°" in figure.note
+    assert "did so in 3 of" in figure.note
+    assert "as drawn, with the feet placed, at most 25.0°" in figure.note
 
 
 def test_errors_of_the_prediction_and_of_the_drawn_pose_are_shown(material: ReportMaterial) -> None:

@@ -83,7 +83,7 @@ def test_seconds_are_estimated_from_random_excerpts_of_clips(
     for path in paths:
         examples.rows(path, holden31)
     every = coverage.seconds_of_data(paths, {})
-    monkeypatch.setattr(coverage, "MOST", 3)
+    monkeypatch.setattr(coverage, "MOST_EXCERPTS", 3)
     few = coverage.seconds_of_data(paths, {}, of=8)
     np.testing.assert_allclose(few["both"], 2 * every["both"])
     assert few["estimate"] == " Estimated from 4 of 8 clips and 75 % of their frames."

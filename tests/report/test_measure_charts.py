@@ -120,10 +120,10 @@ def test_runs_are_drawn_over_the_track_in_red_where_they_left_it() -> None:
     assert by_name["waypoints"]["text"] == ["0, walk", "1, jog", "2, crouch"]
     left = by_name["more than 100 cm off"]
     assert (left["x"], left["y"], left["customdata"]) == ([5.0], [-2.0], [[200.0, 2]])
-    assert "The largest distance from the track was 200 cm" in chart.caption
+    assert "On these laps, the largest distance from the track was 200 cm" in chart.caption
     kept = lap_charts.track_chart({"track": track, "runs": [near]})
     assert kept is not None
-    assert "The largest distance from the track was 10 cm" in kept.caption
+    assert "On these laps, the largest distance from the track was 10 cm" in kept.caption
     assert lap_charts.track_chart({"track": {"waypoints": 6}}) is None
 
 

@@ -128,7 +128,7 @@ def test_orders_differ_and_a_reopened_page_continues(tab: Any) -> None:
     tab.run("document.getElementById('next').click()")
     order = tab.run("Study.state.order")
     again(tab)
-    assert "answered 1 of 4" in tab.run("document.getElementById('resumed').textContent")
+    assert tab.until("document.getElementById('resumed').textContent.includes('answered 1 of 4')")
     tab.run("document.getElementById('begin').click()")
     assert tab.run("document.getElementById('which').textContent") == "Film 2 of 4"
     assert tab.run("Study.state.order") == order

@@ -41,11 +41,11 @@ def standing(holden31: Skeleton) -> np.ndarray:
 
 def test_there_are_thirteen_walks_of_the_study_and_one_for_each_preset(network: Network) -> None:
     wanted = [loop for *_, loop in stimuli.all_loops(network)]
-    assert len(injury_shown.STUDY) == 13
+    assert len(injury_shown.PLAIN_LOOPS) == 13
     assert [loop.coloured for loop in wanted] == [False] * 13 + [True] * 4
     hurt = [tuple(sorted(loop.values)) for loop in wanted if not loop.coloured]
     assert len(set(hurt)) == 13, "no two are the same"
-    assert dict(wanted[1].values) == {"LeftUpLeg-LeftLeg": injury_shown.SEVERITY}
+    assert dict(wanted[1].values) == {"LeftUpLeg-LeftLeg": injury_shown.LOOP_SEVERITY}
 
 
 def test_the_body_stands_where_the_camera_says(studio: BodyRenderer, standing: np.ndarray) -> None:
@@ -138,7 +138,7 @@ def test_stimuli_without_a_visible_injury_get_a_warning() -> None:
 def test_a_loop_is_written_as_pictures_and_bvh(
     network: Network, examples: ModuleType, tmp_path: Path, monkeypatch
 ) -> None:
-    monkeypatch.setattr(injury_shown, "STUDY", {"healthy": (), "left-foot": ("left foot",)})
+    monkeypatch.setattr(injury_shown, "PLAIN_LOOPS", {"healthy": (), "left-foot": ("left foot",)})
     monkeypatch.setattr(injury_shown, "PRESETS", {"Bad back": {"lower back": 8}})
     x_mean = network.x_mean.copy()
     x_mean[network.layout.x_channel("injury")][network.channels["injury"].index("LeftFoot-LeftToeBase")] = 0.5
@@ -154,7 +154,7 @@ def test_a_loop_is_written_as_pictures_and_bvh(
     assert listed[0]["from_plain_cm"] == 0 != listed[1]["from_plain_cm"]
     with Image.open(tmp_path / "a/left-foot.webp") as image:
         frames = len(read_bvh(tmp_path / "a/left-foot.bvh"))
-        assert image.n_frames == frames // stimuli.STRIDE
+        assert image.n_frames == frames // stimuli.FRAME_STEP
         assert image.info["loop"] == 0
         assert image.size == (64, 64)
         assert frames / 60 == pytest.approx(listed[1]["seconds"])

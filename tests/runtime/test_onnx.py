@@ -87,7 +87,7 @@ def test_the_file_of_another_network_is_detected(make_network, tmp_path: Path) -
     network = make_network(scale=20.0)
     export_onnx(tmp_path / "network.onnx", network)
     other = replace(network, biases=tuple(b + np.float32(1e-3) for b in network.biases))
-    with pytest.raises(InputError, match=r"network.onnx: onnxruntime and the runtime differ by"):
+    with pytest.raises(InputError, match=r"network.onnx: onnxruntime and Hobble's runtime differ by"):
         check_onnx(tmp_path / "network.onnx", other)
     with pytest.raises(ValueError, match="not one of constant, linear, cubic"):
         export_onnx(tmp_path / "other.onnx", network, "quadratic")
@@ -100,7 +100,7 @@ def test_the_command_exports_onnx(
     skeleton = ["--skeleton", str(root / "config" / "skeletons" / "holden31.yaml")]
     target = tmp_path / "out" / "network.onnx"
     assert main(["onnx", str(tmp_path / "pfnn"), str(target), "--mode", "linear", *skeleton]) == 0
-    assert "network.onnx: within" in capsys.readouterr().out
+    assert "network.onnx: differs from" in capsys.readouterr().out
     assert target.exists()
     assert main(["bin", str(tmp_path / "pfnn"), str(tmp_path / "copy"), *skeleton]) == 0
     for path in (tmp_path / "pfnn").iterdir():

@@ -54,7 +54,7 @@ def test_missing_clips_are_downloaded(base: Path) -> None:
         ("https://host/", "https://host/\u202e", "must be an address like"),
         ("{clip}", "{clip", "download: url: "),
         ("far.sha256", "../far.sha256", "checksums: must be relative"),
-        ("clips: {'2_1': }\n", "", "lists them and names a `folder`"),
+        ("clips: {'2_1': }\n", "", "needs a list of its `clips` and a `folder`"),
     ],
 )
 def test_a_bad_address_is_reported(base: Path, old: str, new: str, message: str) -> None:

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import json
+import re
 from pathlib import Path
 
 import pytest
 
 from hobble.channels import channel
 from hobble.core.errors import HobbleError
-from hobble.workflow.project import Project
+from hobble.workflow.project import RESERVED, Project
 from hobble.workflow.targets import check
 from tests.workflow.small_project import DATASET
 
@@ -143,7 +144,13 @@ def test_configurations_that_cannot_be_compared_are_refused(
         check(project, ["results/compare/report.html"])
 
 
-@pytest.mark.parametrize("name", ["compare", "datasets"])
+def test_the_folders_that_rules_name_are_reserved(root: Path) -> None:
+    rules = "".join(path.read_text() for path in (root / "workflow/rules").glob("*.smk"))
+    named = set(re.findall(r"\bresults/(\w+)/", rules))
+    assert {"compare", "datasets", "page"} <= named <= set(RESERVED)
+
+
+@pytest.mark.parametrize("name", RESERVED)
 def test_names_of_results_folders_are_reserved(base: Path, name: str) -> None:
     (base / f"config/{name}.yaml").write_text("extends: one\n")
     with pytest.raises(HobbleError, match=f"no configuration can be called {name}"):

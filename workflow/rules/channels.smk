@@ -12,7 +12,7 @@ def of_channels(batch, paths):
 
 
 def channel_files(batch):
-    """The files that each channel reads for each clip."""
+    """The files that each channel reads for each clip: one list for each channel and clip."""
     return [
         datasets.channel_sources.files(batch.dataset, clip, name)
         for name in channels_of(batch)

@@ -3,7 +3,7 @@ from hobble.database.options import Merging, RowOptions
 for batch in [*batches_of_clips, *batches_of_versions]:
 
     rule:
-        """The rows of X, Y and P of clips."""
+        """The rows of clips: inputs X, outputs Y and phase P of a network."""
         name:
             batch.rule("database_clips")
         input:
@@ -62,7 +62,7 @@ def clips_of(dataset, channels, file, shard=None):
 
 
 def compared(w, file):
-    """The path `file` for each clip that is compared with others, so that no motion is on both sides of the split.
+    """The path `file` for each clip that is compared with others, so that no motion is both trained on and held out.
 
     If the rule makes a shard, only clips of this shard are in the list.
     """
@@ -125,7 +125,7 @@ rule database_merge:
             if shards_of(w)
             else clips_of(w.dataset, w.channels, "database/clips/{clip}.npz")
         ),
-        # To check that no motion is on both sides of the split.
+        # To check that no motion is both trained on and held out.
         compared=lambda w: [] if shards_of(w) else compared(w, "motion/{clip}.npz"),
         reports=lambda w: [] if shards_of(w) else compared(w, "motion/{clip}.json"),
         shards=shards_of,

@@ -33,7 +33,7 @@ rule measure:
 
 
 rule measure_piece:
-    """A piece of a measurement that takes long, such as the laps in one phase mode."""
+    """A piece of a long measurement, such as the laps in one phase mode."""
     input:
         unpack(lambda w: keep_local(measurements.inputs(w.configuration, w.measure))),
     output:

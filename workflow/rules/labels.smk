@@ -59,7 +59,7 @@ rule look_page:
         reports=lambda w: for_listed_clips(w.dataset, "motion/{clip}.json"),
         labels=lambda w: for_listed_clips(w.dataset, "labels/{clip}.json"),
         contacts=lambda w: for_listed_clips(w.dataset, "labels/{clip}.npz"),
-        # Channels are not shown. They are inputs because the page is the check of a folder: they are read and checked.
+        # The page does not show channels. They are inputs so that their files are checked when a user looks at the page.
         channels=lambda w: [
             file
             for channel in datasets.channel_sources.channels(w.dataset)

@@ -20,7 +20,7 @@ rule download_clip:
 for batch in batches_of_clips:
 
     rule:
-        """Clips from their BVH files: checked, on the data set's skeleton, at 60 Hz; and with left and right swapped."""
+        """Clips from their BVH files: checked, on the data set's skeleton, at 60 Hz. Also their mirrors."""
         name:
             batch.rule("motion_clips")
         input:

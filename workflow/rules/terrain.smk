@@ -25,7 +25,7 @@ rule terrain_patches:
 for batch in [*batches_of_clips, *batches_of_versions]:
 
     rule:
-        """The ten patches that fit each cycle of a clip best, and their heights under it."""
+        """The ten patches that fit each cycle of a clip best, and the heights of these patches along its path."""
         name:
             batch.rule("terrain_fits")
         input:

@@ -1,4 +1,4 @@
-"""Channels: inputs of the network besides motion and ground. Each has a folder here, listed in NAMES."""
+"""Channels: inputs of the network besides motion and ground, such as an injury. NAMES lists them."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ __all__ = [
     "shown_modules",
 ]
 
-# All channels. Each is a package beside this file, and its CHANNEL is the channel.
+# All channels. Each name is a package in this folder. The package's CHANNEL is an instance of `Channel`.
 NAMES = ("injury", "mood", "diagnosis")
 
 
@@ -28,8 +28,8 @@ NAMES = ("injury", "mood", "diagnosis")
 def channel(name: str) -> Channel:
     """The channel `name`. Raises KeyError with all names if there is no such channel.
 
-    The module is imported here and not at the top, so that a job depends only on the code of its own
-    channels.
+    The module is imported here and not at the top, so that a job depends only on the code of the channels
+    that it uses.
     """
     if name not in NAMES:
         raise KeyError(f"no channel {name!r}: there are {', '.join(NAMES)}")
@@ -45,12 +45,12 @@ def all_channels() -> tuple[Channel, ...]:
 
 
 def modules_of(names: Iterable[str]) -> list[str]:
-    """Full names of the modules of these channels. A job with the channels depends on them."""
+    """Full names of the packages of these channels. A job that uses the channels depends on their code."""
     return [f"{__name__}.{name}" for name in names]
 
 
 def shown_modules() -> list[str]:
-    """Full names of the modules `shown` that channels have (see `hobble.channels.shown`)."""
+    """Full names of the existing modules channels.<name>.shown, which say how a page shows a channel."""
     found = (f"{__name__}.{name}.shown" for name in NAMES)
     return [module for module in found if importlib.util.find_spec(module) is not None]
 

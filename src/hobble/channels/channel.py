@@ -21,7 +21,7 @@ class HasLinks(Protocol):
 
     @property
     def links(self) -> Sequence[tuple[str, str]]:
-        """Pairs of joints (parent, child) that can have a value."""
+        """The links: pairs of neighbouring joints (parent, child). A channel may have a column for each."""
 
 
 @dataclass(frozen=True)
@@ -44,15 +44,17 @@ class ClipSource:
 class Channel(ABC):
     """An input of the network besides motion and ground. Each channel is a subclass in channels/<name>/.
 
-    name: the name of its folder, in configurations, and as a keyword of `next_pose`. title, value: words on
-    the page for the channel and for one of its values. highest: the highest value. rate: how much a value may
-    change in a second at run time, unless the configuration says otherwise. suffix: how the name of a file of
-    values beside a clip ends, or None. old_keys: keys of this channel in old files. Options: model of the
-    data set's section `channels.<name>`. If it is None, every data set has the channel, else only those with
-    the section. slows: whether values above 0 make the body slower. Then its speed limits are learnt from the
-    rows (see `hobble.channels.speed_limits`). manner: whether a column stands for a way in which a whole clip
-    walks, such as a mood. Then `hobble.measures.manners` measures whether a recogniser sees it. targets:
-    folders of results/<configuration>/ that only a configuration with this channel can have.
+    name: the name of the channel's folder, also used in configurations and as keyword argument of
+    `next_pose`. title, value: words on the page for the channel and for one of its values. highest: the
+    highest value. rate: how much a value may change in a second at run time, unless the configuration says
+    otherwise. suffix: the file beside a clip that holds its values is called <clip><suffix>; None if there
+    are no such files. old_keys: keys that stand for this channel in old configurations and network files.
+    Options: pydantic model of the data set's section `channels.<name>`. If `Options` is None, every data set
+    has the channel, else only those with the section. slows: whether values above 0 make the body slower.
+    Then `hobble.channels.speed_limits` learns from the database how fast such a body goes. manner: whether
+    each column is a way of walking that lasts for a whole clip, such as a mood. Then
+    `hobble.measures.manners` measures whether a recogniser finds it in generated walks. targets: folders of
+    results/<configuration>/ that only a configuration with this channel can have.
     """
 
     name: str
@@ -73,14 +75,15 @@ class Channel(ABC):
 
     @abstractmethod
     def is_neutral(self, source: ClipSource) -> bool:
-        """Whether the values are 0 in all frames. Every network may train on such a clip.
+        """Whether the values are 0 in all frames.
 
-        Raises InputError if the source cannot be read.
+        A network without this channel trains only on such clips. Raises InputError if the source cannot be
+        read.
         """
 
     @abstractmethod
     def read(self, clip: Clip, source: ClipSource, motion: Mapping[str, Any]) -> tuple[Array, list[str]]:
-        """Values (F, C) float32 of a clip with F frames, one column for each label, and warnings.
+        """Values (F, C) float32 of a clip with F frames, in the order of `columns`, and warnings.
 
         motion: the report of the motion stage. Raises InputError if the source cannot be read.
         """
@@ -89,7 +92,7 @@ class Channel(ABC):
         """Raise InputError if the clip's entry or the options are wrong. Called before any job runs."""
 
     def source(self, fields: Mapping[str, Any], files: Sequence[str | Path] = ()) -> ClipSource:
-        """A source from plain data: the fields of a `ClipSource` without `files`.
+        """A `ClipSource` from plain data. fields: all but `files`, with `options` as a plain mapping.
 
         Raises pydantic.ValidationError for options that the channel does not have.
         """
@@ -111,17 +114,17 @@ class Channel(ABC):
         """(C,) divisors of the network's input columns. std: (C,) standard deviations of the columns.
 
         All columns get the same divisor: the length of the vector `std`, but at least a tenth of `highest`.
-        If each were divided by its own deviation, a column that is above 0 in 1 frame of 1,000 would become
-        an input of 30 deviations. A column that never varies gets a divisor so large that it has no effect,
+        If each were divided by its own deviation, a column that is above 0 in 1 frame of 1,000 would reach 30
+        in this frame. A column that never varies gets a divisor so large that it has no effect,
         because the network cannot know its meaning.
         """
         import numpy as np
 
-        whole = float(np.sqrt(np.sum(std**2)))
-        return np.where(std > CONSTANT, max(self.highest / 10, whole), SILENT)
+        length = float(np.sqrt(np.sum(std**2)))
+        return np.where(std > CONSTANT, max(self.highest / 10, length), SILENT)
 
     def summary(self, values: Array, labels: Sequence[str], fps: float) -> dict[str, Any]:
-        """For the clip's report: label -> `seconds` above 0, `highest` value, and `spells` (see `spells`).
+        """For the clip's report: label -> seconds above 0, highest value, and `spells` (stretches above 0).
 
         Labels whose values are all 0 are left out.
         """
@@ -140,7 +143,7 @@ class Channel(ABC):
 
 SILENT = 1e10  # divisor of an input that must have no effect
 JUMP = 0.05  # a larger change between two frames starts a new spell; share of the channel's highest value
-CONSTANT = 1e-6  # a column with a smaller deviation does not vary
+CONSTANT = 1e-6  # a column with a smaller standard deviation counts as constant
 
 
 def spells(column: Array, fps: float, highest: float) -> list[list[float]]:

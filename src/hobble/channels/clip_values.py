@@ -56,7 +56,7 @@ def load_values(path: str | Path) -> tuple[Array, tuple[str, ...]]:
 def write_report(
     path: str | Path, name: str, clip: Clip, values: Array, labels: Sequence[str], warnings: Sequence[str]
 ) -> None:
-    """Write the JSON beside the values: `Channel.summary`, the channel's highest value, and warnings."""
+    """Write a clip's report as JSON: `Channel.summary`, the channel's highest value, and warnings."""
     one = channel(name)
     summary = one.summary(values, labels, clip.fps)
     report = {"clip": clip.name, "channel": name, "title": one.title, "values": summary}

@@ -1,9 +1,10 @@
 """How channels are shown for a skeleton: words, sliders, presets, sweeps and loops.
 
-A sweep is a walk in which one column rises from 0 to its highest value. A loop is a walk for a looping
-picture. A channel may have a module channels/<name>/shown.py with its own WORDS, `shown`, `sweeps` and
-`loops`. The functions here find them by name and have defaults. Neither training nor measurements depend on
-them.
+A channel is a group of inputs of the network, such as the severities of injuries, with a label for each
+column. A sweep is a walk in which one column rises from 0 to its highest value. A loop is a walk for a
+looping picture. "Trained" columns are those that were above 0 in training. A channel may have a module
+channels/<name>/shown.py with its own WORDS, `shown`, `sweeps` and `loops`. The functions here find these by
+name, or return defaults. Neither training nor measurements depend on these modules.
 """
 
 from __future__ import annotations
@@ -21,13 +22,13 @@ from hobble.core.skeleton import Skeleton
 
 @dataclass(frozen=True)
 class ChannelWords:
-    """Words of a channel on the page. {} stands for the name of a column.
+    """Words of a channel on the report page. {} stands for the name of a column.
 
     rest: label of the button that sets all values to 0. step: step of a slider. key: name of the values in
-    the address of a page, by default the channel's name. grows: says that a column rises. never: says that a
-    column was 0 in all of training. headline: headline of the page. says: what the page says about the
-    network's input for a figure with a value above 0. on: a word for such a figure; if it is empty, the
-    column's name is used.
+    the address of the page, by default the channel's name. grows: says that a column rises. never: says that
+    a column was 0 in all of training. headline: headline of the page. says: what the network is told when a
+    value is above 0. on: a word for a character with a value above 0; if it is empty, the column's name is
+    used.
     """
 
     rest: str = "Neutral"
@@ -45,8 +46,8 @@ class ChannelDisplay:
     """How a channel is shown.
 
     spoken: a name for each column. sliders: label -> column, for the sliders that are there at the start.
-    presets: button -> column -> value. regions: for each bone, the indices of the columns that lie in the
-    part of the body that it moves; empty for a channel without places on the body.
+    presets: button -> column -> value. regions: for each bone, the indices of the columns that stand
+    for a place on the part of the body that this bone moves; empty if columns stand for no places.
     """
 
     spoken: Sequence[str]
@@ -65,39 +66,39 @@ class SampleWalk:
 
 
 def words(name: str) -> ChannelWords:
-    """The words of a channel."""
-    found = _from_module(name, "WORDS")
-    return found if isinstance(found, ChannelWords) else ChannelWords()
+    """The words of the channel `name`."""
+    own_words = _from_module(name, "WORDS")
+    return own_words if isinstance(own_words, ChannelWords) else ChannelWords()
 
 
 def shown(name: str, skeleton: Skeleton, columns: Sequence[str], trained: Collection[str]) -> ChannelDisplay:
-    """How a channel is shown. By default there is a slider for each column that was above 0 in training.
+    """How the channel `name` is shown. By default there is a slider for each trained column.
 
-    columns: all labels of the channel. trained: the labels that were above 0 in training.
+    columns: the labels of all columns. trained: the labels of the trained columns.
     """
-    if own := _from_module(name, "shown"):
-        return own(skeleton, columns, trained)
+    if of_channel := _from_module(name, "shown"):
+        return of_channel(skeleton, columns, trained)
     return ChannelDisplay(tuple(columns), {column: column for column in columns if column in trained})
 
 
 def sweeps(
     name: str, skeleton: Skeleton, columns: Sequence[str], trained: Collection[str]
 ) -> Mapping[str, str]:
-    """Name -> column of each sweep. By default there is one for each trained column."""
-    if own := _from_module(name, "sweeps"):
-        return own(skeleton, columns, trained)
+    """Name of each sweep -> its column. By default there is one for each trained column."""
+    if of_channel := _from_module(name, "sweeps"):
+        return of_channel(skeleton, columns, trained)
     return {column.replace(" ", "_"): column for column in columns if column in trained}
 
 
 def loops(
     name: str, skeleton: Skeleton, columns: Sequence[str], trained: Collection[str]
 ) -> list[SampleWalk]:
-    """Walks for looping pictures. All values are 0 in the first.
+    """Walks for looping pictures.
 
-    By default there is one more for each trained column, at its highest value.
+    By default all values are 0 in the first. Then there is one for each trained column, at its highest value.
     """
-    if own := _from_module(name, "loops"):
-        return own(skeleton, columns, trained)
+    if of_channel := _from_module(name, "loops"):
+        return of_channel(skeleton, columns, trained)
     used, highest = [column for column in columns if column in trained], channel(name).highest
     return [
         SampleWalk(words(name).rest.lower(), {}),
@@ -108,15 +109,15 @@ def loops(
 def shown_names(skeleton: Mapping[str, Any]) -> Callable[[str], str]:
     """A function that turns a column's label into the name that readers see, and leaves other texts alone.
 
-    skeleton: as in a network's file; empty if unknown.
+    skeleton: the entry `skeleton` of a network's file; empty if the file has none.
     """
     if not skeleton:
         return str
-    figure = Skeleton.from_dict({"name": "", **skeleton})
+    rig = Skeleton.from_dict({"name": "", **skeleton})
     names: dict[str, str] = {}
-    for one in all_channels():
-        columns = one.columns(figure)
-        names |= dict(zip(columns, shown(one.name, figure, columns, columns).spoken, strict=True))
+    for each in all_channels():
+        columns = each.columns(rig)
+        names |= dict(zip(columns, shown(each.name, rig, columns, columns).spoken, strict=True))
     return lambda column: names.get(column, column)
 
 
@@ -127,4 +128,5 @@ def module(name: str) -> ModuleType | None:
 
 
 def _from_module(name: str, what: str) -> Any:
+    """`what` of the channel's own module `shown`, or None if there is no such module or attribute."""
     return getattr(module(name), what, None)

@@ -1,12 +1,14 @@
 """Speed limits of a hurt or sad body, learnt from the rows of a database and saved with the network.
 
 A channel is a group of inputs of the network that tell how hurt or how sad a body is. Each of its columns has
-a label, such as the name of a bone or mood, and values from 0 (no effect) to the channel's highest value.
+a label, such as the name of a bone or mood, and values from 0 (no effect) to the channel's highest value. A
+body is healthy if the values of all channels are 0.
 
-A hurt body cannot go as fast as a healthy one. The rows show how fast it goes. Some hurt clips are made from
-a healthy clip: a hurt version shows this clip as a hurt person would walk it. Each of its cycles is compared
-with the same cycle of the healthy clip. A captured injury has no healthy counterpart, so its cycles are
-compared with the usual speed of their gait.
+A hurt body cannot go as fast as a healthy one. The rows of the database, one for each frame of a clip, show
+how fast it goes. Some hurt clips are computed from a healthy clip, as a hurt person would walk it: they are
+hurt versions of this clip. Each cycle of a hurt version is compared with the same cycle of the healthy clip.
+Captured hurt clips have no healthy counterpart, so their cycles are compared with the usual speed of their
+gait.
 """
 
 from __future__ import annotations
@@ -20,22 +22,22 @@ import numpy as np
 from hobble.core.quat import Array
 
 UNLIMITED = 1e4  # cm a frame: limit of a gait in which no healthy clip goes forward
-LEVELS = 5  # number of values of a column, from 0 to the highest, for which a speed is stored
-TOP = 95  # percentile of the speeds of healthy cycles in a gait: the limit of a healthy body
-# Percentile of these speeds that counts as the usual speed. The median is too low: clips start and stop.
-USUAL = 70
+LEVELS = 5  # the limits are stored for this many values of a column, evenly spaced from 0 to the highest
+# Percentiles of the speeds of all healthy cycles in a gait: the limit of a healthy body, and its usual speed.
+# The median would be too low for the usual speed, because clips also contain starts and stops.
+TOP, USUAL = 95, 70
 # A body that an injury slows to this share of the usual speed or less cannot hurry: its limit is the slowed
 # speed. A body that keeps the whole usual speed can hurry up to the limit of a healthy one (TOP). Between
 # these two shares the limit is interpolated.
 CANNOT_HURRY = 0.85
 AHEAD = 0.9  # a cycle counts if at least this share of its speed is forward
 STEADY = 0.35  # a cycle is left out if a value changes in it by more than this share of the highest value
-FAINT = 0.05  # a mean over a cycle below this share of the highest value counts as 0
+FAINT = 0.05  # if the mean value in a cycle is below this share of the highest value, it counts as 0
 MOVING = 0.1  # cm a frame: slower cycles of a healthy body are left out
-# When a curve is fitted, the line or curve that it should stay near (`expected` in `_fitted`) counts as much
-# as this many cycles at each level.
+# A curve is fitted to cycles, but it should stay near an expected curve, which counts as much as this many
+# cycles at each level.
 EXPECTED_WEIGHT = 2.0
-SLOWEST = 0.1  # a smaller share of the healthy speed counts as this
+SLOWEST = 0.1  # lower shares of the healthy speed are raised to this
 
 
 @dataclass(frozen=True)
@@ -52,9 +54,9 @@ class Limits:
     usual: Array = field(repr=False)
 
     def allowed(self, values: Array) -> Array:
-        """(C, G) highest speeds of C characters in each gait, cm a frame, for their values (C, L).
+        """(C, G) highest speeds of C characters in each gait, cm a frame. values: (C, L).
 
-        If several values are above 0, the lowest of their limits counts. If none is, the speed is inf.
+        If several values are above 0, the lowest of their limits counts. If all are 0, the speed is inf.
         """
         at = np.clip(np.searchsorted(self.levels, values, side="right") - 1, 0, len(self.levels) - 2)
         low, high = self.levels[at], self.levels[at + 1]
@@ -71,7 +73,7 @@ class Limits:
 
     @classmethod
     def from_dict(cls, data: Mapping[str, Any], gaits: int, labels: int, highest: float) -> Limits:
-        """The inverse of `to_dict`. Older files have no `usual`; then each gait's highest speed is used.
+        """The inverse of `to_dict`. In older files without `usual`, each gait's highest speed is used.
 
         highest: the highest value of the channel. Raises ValueError if a key is missing, a shape does not fit
         the number of gaits and labels, or a number is not possible.
@@ -101,23 +103,24 @@ def together(allowed: Sequence[Array], usual: Array) -> Array:
 
     allowed: for each channel, the highest speeds (C, G). usual: (G,) usual speeds of a healthy body. Each
     channel leaves a share of the usual speed, and the shares multiply: a sad person who limps is slower than
-    one who is only sad or only limps. A channel that allows the usual speed has
-    the share 1. If all channels allow it, the lowest of their limits counts.
+    one who is only sad or only limps. A channel that allows the usual speed has the share 1. If all channels
+    allow the usual speed, the lowest of their limits counts.
     """
     shares = [
-        np.minimum(1.0, np.divide(one, usual, out=np.ones_like(one), where=usual > 0)) for one in allowed
+        np.minimum(1.0, np.divide(speed, usual, out=np.ones_like(speed), where=usual > 0))
+        for speed in allowed
     ]
-    least = np.min(allowed, axis=0)
-    return np.where(least < usual, usual * np.prod(shares, axis=0), least)
+    lowest = np.min(allowed, axis=0)
+    return np.where(lowest < usual, usual * np.prod(shares, axis=0), lowest)
 
 
 @dataclass(frozen=True)
 class _Cycles:
     """N cycles of one clip.
 
-    gait: (N,) index of the main gait. speed: (N,) mean speed, cm a frame. ahead: (N,) mean forward speed,
-    cm a frame. values: (N, L) mean value of each label. number: (N,) number of the cycle in the clip.
-    others: (N,) bool, whether another channel has a value above 0.
+    gait: (N,) index of the main gait. speed: (N,) mean speed, cm a frame. ahead: (N,) mean forward speed, cm
+    a frame; negative: backwards. values: (N, L) mean value of each label. number: (N,) number of the cycle in
+    the clip. others: (N,) bool, whether another channel has a value above 0.
     """
 
     gait: np.ndarray
@@ -221,9 +224,9 @@ class LimitLearner:
             line = np.maximum(1 - fall * levels, SLOWEST)
             curve = _fitted(levels, value, shares, line)
             for k in np.flatnonzero(top < UNLIMITED):
-                own = _fitted(levels, value[gaits == k], shares[gaits == k], curve)
-                hurries = np.maximum(own - CANNOT_HURRY, 0.0) / (1 - CANNOT_HURRY)
-                speeds[k, label] = usual[k] * own + (top[k] - usual[k]) * hurries
+                in_gait = _fitted(levels, value[gaits == k], shares[gaits == k], curve)
+                hurries = np.maximum(in_gait - CANNOT_HURRY, 0.0) / (1 - CANNOT_HURRY)
+                speeds[k, label] = usual[k] * in_gait + (top[k] - usual[k]) * hurries
         return Limits(levels, speeds, usual)
 
     def _healthy(self) -> Array:
@@ -231,16 +234,16 @@ class LimitLearner:
         found = [np.zeros((0, 2))]
         for _, cycles in self._clips.values():
             neutral = ~cycles.values.any(axis=1) & ~cycles.others
-            on = neutral & (cycles.ahead >= AHEAD * cycles.speed) & (cycles.speed > MOVING)
-            found.append(np.stack([cycles.gait[on], cycles.speed[on]], axis=1))
+            kept = neutral & (cycles.ahead >= AHEAD * cycles.speed) & (cycles.speed > MOVING)
+            found.append(np.stack([cycles.gait[kept], cycles.speed[kept]], axis=1))
         return np.concatenate(found)
 
     def _shares(self, usual: Array) -> tuple[np.ndarray, Array, Array]:
         """Gait (n,), share of the healthy speed (n,) and values (n, L) of the cycles with a value above 0.
 
-        A cycle of a hurt version is compared with the same cycle of its source. It is left out if the source
-        has a value above 0 in this channel, too. For example, a sad clip and its hurt version are equally
-        sad, so they say nothing about the limits of sadness.
+        A cycle of a hurt version is compared with the same cycle of its source, the clip that it was computed
+        from. The cycle is left out if the source already has a value above 0 in this channel. For example, a
+        sad clip and its hurt version are equally sad, so they say nothing about the limits of sadness.
         """
         parts = []
         for source, cycles in self._clips.values():
@@ -253,9 +256,9 @@ class LimitLearner:
             else:  # captured: only forward cycles can be compared with the usual speed
                 counts = (cycles.ahead >= AHEAD * cycles.speed) & ~cycles.others
                 healthy_speed = np.where(counts, usual[cycles.gait], 0.0)
-            on = changed & (healthy_speed > MOVING)
-            share = np.clip(cycles.speed[on] / healthy_speed[on], SLOWEST, 1.0)
-            parts.append((cycles.gait[on], share, cycles.values[on]))
+            kept = changed & (healthy_speed > MOVING)
+            share = np.clip(cycles.speed[kept] / healthy_speed[kept], SLOWEST, 1.0)
+            parts.append((cycles.gait[kept], share, cycles.values[kept]))
         if not parts:
             return np.zeros(0, int), np.zeros(0), np.zeros((0, len(self.across)))
         gait, share, values = (np.concatenate(column) for column in zip(*parts, strict=True))
@@ -263,26 +266,27 @@ class LimitLearner:
 
 
 def _of_label(label: int, values: Array, across: np.ndarray) -> Sequence[tuple[np.ndarray, Array]]:
-    """The cycles that count for a label and for the same label on the other side of the body.
+    """The cycles that count for a label and for its counterpart on the other side of the body.
 
-    Returns (indices, values of the label) for each of the two, or for the label alone if it has no side.
-    values: (n, L) of all cycles. A cycle counts if no other label has a value above 0 in it. If there is no
-    such cycle, those count in which no other label has a higher value.
+    Returns (indices of cycles, values of the label in them) for both labels, or for the label alone if it has
+    no counterpart. values: (n, L) of all cycles. across: (L,) index of each label's counterpart. A cycle
+    counts for a label if all other labels are 0 in it. If there is no such cycle for either label, a cycle
+    counts if no other label has a higher value in it.
     """
     sides = sorted({label, int(across[label])})
     alone = [np.flatnonzero((values[:, k] > 0) & ((values > 0).sum(axis=1) == 1)) for k in sides]
     if not any(len(found) for found in alone):
-        worst = values.max(axis=1, initial=0.0)
-        alone = [np.flatnonzero((values[:, k] > 0) & (values[:, k] >= worst)) for k in sides]
+        highest = values.max(axis=1, initial=0.0)
+        alone = [np.flatnonzero((values[:, k] > 0) & (values[:, k] >= highest)) for k in sides]
     return [(found, values[found, k]) for found, k in zip(alone, sides, strict=True)]
 
 
 def _fitted(levels: Array, values: Array, shares: Array, expected: Array) -> Array:
     """(K,) shares of the healthy speed at `levels` (K,), fitted to n cycles by least squares.
 
-    values, shares: (n,) value and share of each cycle. Shares between two levels are interpolated. The first
-    share is 1, and a higher level never has a higher share. expected: (K,) share at each level, which counts
-    as much as EXPECTED_WEIGHT cycles there.
+    values, shares: (n,) value of the label and share of the healthy speed in each cycle. Shares between two
+    levels are interpolated. The first share is 1, and a higher level never has a higher share. expected: (K,)
+    share at each level, which counts as much as EXPECTED_WEIGHT cycles there.
     """
     at = np.clip(np.searchsorted(levels, values, side="right") - 1, 0, len(levels) - 2)
     far = (values - levels[at]) / (levels[at + 1] - levels[at])

@@ -1,9 +1,9 @@
 """How a prediction changes the character's state, as in the runtime of Holden et al. 2017.
 
-The functions take numbers, numpy arrays or tensors. The runtime compiles them; roll-outs and training call
-them directly. The only other implementation is the page's JavaScript. numba caches compiled callers on disk
-and renews them only when the caller's own file changes. After a change here, delete the callers'
-`__pycache__`.
+The functions take numbers, numpy arrays or tensors. The runtime compiles them with numba; roll-outs and
+training call them directly. The only other implementation is in the report page's JavaScript. numba caches
+the runtime's compiled functions on disk, and compiles each again only when its own file changes. So after a
+change here, delete the `__pycache__` of the package `hobble.runtime`.
 """
 
 from __future__ import annotations
@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-CARRIED_SHARE = 0.5  # weight of each of the two places whose mean is a joint's new place
+CARRIED_SHARE = 0.5  # weight of `carried` and of `predicted` in a joint's new position
 STANDING_SHARE = 0.1  # share of the predicted change of phase that a standing figure keeps
 
 
@@ -27,5 +27,8 @@ def moving(stand: Any) -> Any:
 
 
 def phase_change(share: Any, predicted: Any) -> Any:
-    """The change of phase that is applied, cycles. share: from `moving`. predicted: the network's, cycles."""
+    """The change of phase that is applied, cycles.
+
+    share: from `moving`. predicted: the change that the network predicts, cycles.
+    """
     return ((1.0 - STANDING_SHARE) * share + STANDING_SHARE) * predicted

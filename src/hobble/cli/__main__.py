@@ -14,7 +14,10 @@ COMMANDS = {"motion": motion, "labels": labels, **channel_commands(), "play": pl
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Run the command. Returns 0, or 1 if something failed. Wrong arguments exit with status 2."""
+    """Run the command. Returns 0, 1 if something failed, or 130 after Ctrl+C.
+
+    arguments: by default those of the command line. Wrong arguments exit with status 2.
+    """
     parser = argparse.ArgumentParser(
         prog="hobble",
         description="Converts and labels clips, and opens a trained character. "

@@ -1,6 +1,6 @@
-"""What subcommands share: work on every BVH file of a folder, and the skeleton files.
+"""What several subcommands share: work on every BVH file of a folder, and the search for skeleton files.
 
-A bad file does not stop the work on the others.
+A bad BVH file does not stop the work on the other files.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ def add_folders(parser: argparse.ArgumentParser, out: str) -> None:
 
 
 def clips_in(folder: Path) -> dict[str, Path]:
-    """BVH files by clip name: those in a folder and its subfolders, or the one file that `folder` names.
+    """Clip name -> BVH file, for all files in a folder and its subfolders. `folder` may also be one file.
 
     Raises InputError if there are none, or if two files have the same clip name.
     """
@@ -39,10 +39,10 @@ def clips_in(folder: Path) -> dict[str, Path]:
 
 
 def for_each(clips: dict[str, Path], work: Callable[[str, Path], list[str]]) -> int:
-    """Call `work(name, file)` for every clip. Print the notes that it returns, and a summary.
+    """Call `work(name, file)` for every clip. Print the notes that `work` returns, and a summary.
 
-    clips: name -> file. If a clip fails, its message is printed and the next one follows. Returns the exit
-    status, 1 if a clip failed.
+    clips: name -> file. If a clip fails, the message of its error is printed, and the next clip follows.
+    Returns the exit status: 1 if a clip failed, else 0.
     """
     failed = 0
     bar = tqdm(clips.items(), unit=" clips", disable=None, file=sys.stderr)
@@ -82,6 +82,9 @@ def skeleton_file(name: str) -> Path:
 
 
 def skeleton(name: str) -> TargetSkeleton:
-    """The skeleton as a target of retargeting. Raises InputError if its file is missing or wrong."""
+    """The skeleton, with its maps to other skeletons. name: a skeleton's name, or a path to a YAML file.
+
+    Raises InputError if the skeleton's file is missing or wrong.
+    """
     path = skeleton_file(name)
     return load_skeleton(path, path.stem)

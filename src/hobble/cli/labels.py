@@ -24,7 +24,8 @@ from hobble.labels.write_files import write_label_files
 from hobble.motion.make import make_clip
 from hobble.motion.options import ClipMotion
 
-SKELETON = "holden31"  # clips are retargeted to it for labelling; the label files fit any skeleton
+# Clips are retargeted to this skeleton for labelling. The label files fit any skeleton.
+SKELETON = "holden31"
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -32,7 +33,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     batch.add_folders(
         parser, "the folder to write into; it may be FOLDER, so that the files lie beside the clips"
     )
-    parser.add_argument("--gait", choices=GAITS, help="the main gait of the clips, used in unclear cases")
+    parser.add_argument("--gait", choices=GAITS, help="the main gait of the clips; decides unclear cases")
     parser.add_argument(
         "--source-fps", type=float, help="frame rate of the files, if their Frame Time is wrong"
     )
@@ -72,11 +73,11 @@ def write_labels(
         skeleton_name=SKELETON,
         options=ClipMotion(source_fps=source_fps),
     )
-    # The ground is unknown, so it is called "rocky": on "flat" ground, the height of the head alone would
-    # decide about crouching.
+    # The ground is unknown. It must not be called "flat", because on flat ground the height of the head alone
+    # decides whether a person crouches.
     labels, checked = label_clip(clip, [], report, gait, "rocky", LabelOptions())
     time = SourceTime(report["source_frames"], report["source_fps"], report["source_start"])
     write_label_files(paths[0], paths[1], paths[2], labels, time)
     seconds = np.bincount(labels.gait.argmax(axis=1), minlength=len(GAITS)) / clip.fps
-    main = ", ".join(f"{s:.1f} s {g}" for s, g in zip(seconds, GAITS, strict=True) if s > 0)
-    return [f"{len(labels.cycles)} cycles, {main}", *report["repairs"], *checked.warnings]
+    gaits = ", ".join(f"{s:.1f} s {g}" for s, g in zip(seconds, GAITS, strict=True) if s > 0)
+    return [f"{len(labels.cycles)} cycles, {gaits}", *report["repairs"], *checked.warnings]

@@ -24,8 +24,8 @@ from hobble.motion.mirror import mirror_clip
 from hobble.motion.options import ClipMotion
 from hobble.motion.read import read_bvh
 
-# Roles tell which joint is which: hips, head, left heel and so on. Without --skeleton, the roles of this
-# skeleton are looked for among the joints of a file.
+# Roles tell which joint is which: hips, head, left heel and so on. Without --skeleton, the joints of a file
+# are matched with the roles of this skeleton.
 ROLES_FROM = "holden31"
 
 
@@ -40,7 +40,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--skeleton", help="put the motion on this skeleton: a name of config/skeletons or a file"
     )
     parser.add_argument(
-        "--mirror", action="store_true", help="write each clip's mirror as CLIP_mirror.bvh too"
+        "--mirror", action="store_true", help="also write each clip's mirror image, as CLIP_mirror.bvh"
     )
     parser.add_argument("--loops", type=int, default=1, help="repeat a clip of one cycle this many times")
     parser.add_argument(
@@ -65,13 +65,13 @@ def run(options: argparse.Namespace) -> int:
 def converted(name: str, file: Path, options: argparse.Namespace) -> tuple[Clip, list[str]]:
     """The converted clip of a file, and notes on repairs. Raises InputError for a bad file."""
     defects: Literal["repair", "refuse"] = "refuse" if options.refuse else "repair"
-    keys = ClipMotion(source_fps=options.source_fps, defects=defects, loops=options.loops)
+    settings = ClipMotion(source_fps=options.source_fps, defects=defects, loops=options.loops)
     folder = batch.skeleton_folder()
     if options.skeleton:
         target = batch.skeleton_file(options.skeleton)
-        clip, report = make_clip(file, target, folder, clip=name, skeleton_name=target.stem, options=keys)
+        clip, report = make_clip(file, target, folder, clip=name, skeleton_name=target.stem, options=settings)
         return resample(clip, options.fps), report["repairs"] + report["unsure"] + report["notes"]
-    source = load_source(read_bvh(file), batch.skeleton(ROLES_FROM), folder, keys)
+    source = load_source(read_bvh(file), batch.skeleton(ROLES_FROM), folder, settings)
     clip = resample(source.clip, options.fps)
     if options.loops > 1:
         clip = loop_clip(clip, options.loops, None)

@@ -31,7 +31,10 @@ def run(options: argparse.Namespace) -> int:
 
 
 def report_of(results: Path | None) -> Path:
-    """The report file. If there is none, raises InputError with the command that makes it."""
+    """The report file. results: a folder of results or a report; None for the newest report under results/.
+
+    Raises InputError, with the command that makes a report, if there is none.
+    """
     if results is None:
         found = sorted(Path("results").glob(f"*/{REPORT}"), key=lambda path: path.stat().st_mtime)
         if not found:

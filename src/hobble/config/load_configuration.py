@@ -19,8 +19,9 @@ from hobble.models import DEFAULT, MODELS
 Model = TypeVar("Model", bound=BaseModel)
 # Names that cannot lead out of their folder and are not too long for a file name.
 NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9_.-]{0,99}")
-MOST_PROBLEMS = 20  # listed for each file
-NOT_STRINGS = (bool, int, float, date)  # types that YAML makes of unquoted 02_01, 1e5, 2020-01-01 or on
+MOST_PROBLEMS = 20  # a message lists at most this many problems of a configuration, data set or skeleton
+# What YAML makes of on, 02_01, 1e5 and 2020-01-01 without quotes.
+NOT_STRINGS = (bool, int, float, date)
 QUOTES_HINT = 'Put the name in quotes, as in "02_01"; otherwise YAML reads it as a number or a date.'
 NAME_HINT = "Names may have letters, digits, dots, dashes and underscores, 100 at most."
 
@@ -28,25 +29,25 @@ NAME_HINT = "Names may have letters, digits, dots, dashes and underscores, 100 a
 def merge(base: Mapping[str, Any], over: Mapping[str, Any]) -> dict[str, Any]:
     """Put `over` on top of `base`: mappings are merged recursively, everything else is replaced.
 
-    If `over` chooses another kind of network, its section `network` replaces that of `base`, because kinds
-    have different keys.
+    If `over` chooses another kind of network, its section `network` replaces the whole section of `base`,
+    because each kind has its own keys.
     """
     out = copy.deepcopy(dict(base))
     for key, value in over.items():
-        both = isinstance(value, Mapping) and isinstance(out.get(key), Mapping)
-        if both and key == "network" and _kind(value, out[key]) != _kind(out[key]):
-            both = False
-        out[key] = merge(out[key], value) if both else copy.deepcopy(value)
+        mergeable = isinstance(value, Mapping) and isinstance(out.get(key), Mapping)
+        if mergeable and key == "network" and _kind(value, out[key]) != _kind(out[key]):
+            mergeable = False
+        out[key] = merge(out[key], value) if mergeable else copy.deepcopy(value)
     return out
 
 
 def _kind(network: Mapping[str, Any], below: Mapping[str, Any] | None = None) -> Any:
-    """The kind that a section `network` names. Without one, it is that of the section `below`, or DEFAULT."""
+    """The kind in a section `network`. If it has none: the kind in the section `below`, or else DEFAULT."""
     return network.get("kind", _kind(below) if below is not None else DEFAULT)
 
 
 def read_yaml(path: Path) -> dict[str, Any]:
-    """Read a YAML mapping. Raises InputError, with the line if it does not parse."""
+    """Read a YAML mapping. Raises InputError; if a line does not parse, with its number."""
     if not path.is_file():
         there = ", ".join(sorted(p.stem for p in path.parent.glob("*.yaml"))) or "none"
         raise InputError(path, "no such file", fix=f"There are: {there}.")
@@ -59,9 +60,10 @@ def read_yaml(path: Path) -> dict[str, Any]:
 
 
 def read_layers(folder: Path, name: str, within: tuple[str, ...] = ()) -> tuple[dict[str, Any], list[Path]]:
-    """The values of `<folder>/<name>.yaml` over those of the file that it `extends`, and the files read.
+    """The values of `<folder>/<name>.yaml` merged over those of the file that it `extends`.
 
-    within: names of the configurations that are being read, so that a loop is found.
+    Also returns the files that were read. within: names of the configurations whose `training: NAME` led to
+    this one, to find a loop of such references.
     """
     files: list[Path] = []
     chain: list[dict[str, Any]] = []
@@ -83,7 +85,10 @@ def read_layers(folder: Path, name: str, within: tuple[str, ...] = ()) -> tuple[
 
 
 def with_training(folder: Path, values: dict[str, Any], within: tuple[str, ...] = ()) -> dict[str, Any]:
-    """Replace `training: NAME` in `values` by the training section of configuration NAME."""
+    """Replace `training: NAME` in `values` by the training section of configuration NAME.
+
+    within: names of the configurations that led to this section; see `read_layers`.
+    """
     name = values.get("training")
     if not isinstance(name, str):
         return values
@@ -97,7 +102,7 @@ def with_training(folder: Path, values: dict[str, Any], within: tuple[str, ...] 
 
 
 def validate(model: type[Model], values: Mapping[str, Any], where: str) -> Model:
-    """Validate `values`. Raises one HobbleError that lists every problem as `file: key: what is allowed`."""
+    """Validate `values`. Raises one HobbleError that lists the problems as `where: key: what is allowed`."""
     try:
         return model.model_validate(values)
     except ValidationError as error:
@@ -109,13 +114,14 @@ def validate(model: type[Model], values: Mapping[str, Any], where: str) -> Model
 
 
 def _problem(item: Any, model: type[BaseModel]) -> str:
+    """The message for one of pydantic's errors: the key and what is allowed."""
     key = ".".join(str(part) for part in item["loc"]) or "(whole file)"
     if item["type"] == "extra_forbidden":
         allowed = ", ".join(_keys_at(model, item["loc"][:-1])) or "none"
         return f"{key}: there is no such key. Allowed here: {allowed}."
     message = item["msg"].removeprefix("Value error, ")
     of_a_section = isinstance(item["input"], Mapping)
-    if item["type"] == "value_error" and of_a_section:  # such a message is complete
+    if item["type"] == "value_error" and of_a_section:  # a section's own message needs no `not ...`
         return f"{key}: {message}." if item["loc"] else f"{message}."
     text = f"{key}: {message[0].lower()}{message[1:]}, not {item['input']!r:.80}."
     if item["type"] == "string_type" and isinstance(item["input"], NOT_STRINGS):
@@ -124,6 +130,7 @@ def _problem(item: Any, model: type[BaseModel]) -> str:
 
 
 def _keys_at(model: Any, location: tuple[Any, ...]) -> list[str]:
+    """The keys that a model allows in the section at a location, which is a path of keys and indices."""
     for part in location:
         field = getattr(model, "model_fields", {}).get(part)
         if field is not None:

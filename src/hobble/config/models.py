@@ -22,7 +22,10 @@ def _clip_name(name: str) -> str:
 
 
 def _refuse_old_keys(values: Any, model: type[s.Section], how: str) -> Any:
-    """Raise ValueError for a key from before channels. how: what to write instead, {} for the channel."""
+    """Raise ValueError for a key in OLD_KEYS. how: what to write instead, with {} for the channel's name.
+
+    values: a section before validation. model: the section's model. Returns `values`.
+    """
     for key in values if isinstance(values, dict) else ():
         if key not in model.model_fields and isinstance(key, str) and key in OLD_KEYS:
             raise ValueError(f"`{key}` is now `{how.format(OLD_KEYS[key])}`")
@@ -38,8 +41,10 @@ def _channel(name: str) -> str:
 Name = Annotated[str, Field(pattern=r"^[A-Za-z0-9][A-Za-z0-9_.-]{0,99}$")]
 ClipName = Annotated[str, AfterValidator(_clip_name)]
 ChannelName = Annotated[str, AfterValidator(_channel)]
-OLD_KEYS = {key: one.name for one in all_channels() for key in one.old_keys}
-WALKER_KEYS = ("recipe", "share")  # keys of a clip that only the generator of synthetic clips reads
+# Key of older files -> the channel that replaces it.
+OLD_KEYS = {key: each.name for each in all_channels() for key in each.old_keys}
+# Keys of a clip that only the generator of synthetic clips reads. It computes clips of a walker.
+WALKER_KEYS = ("recipe", "share")
 
 
 class ClipEntry(s.Section):
@@ -49,15 +54,15 @@ class ClipEntry(s.Section):
     ground: s.Ground = "flat"
     channels: dict[ChannelName, Any] = Field({}, description="channel -> its value in all frames of the clip")
     person: Name | None = Field(
-        None, description="who walks; measurements that leave out whole people need it"
+        None, description="who walks; needed by measurements that leave out all clips of a person"
     )
-    recipe: str | None = Field(None, description="synthetic: which plan the walker follows")
-    share: s.PositiveFloat = Field(1.0, description="synthetic: length relative to the other clips")
+    recipe: str | None = Field(None, description="for synthetic clips: which plan the walker follows")
+    share: s.PositiveFloat = Field(1.0, description="for synthetic clips: length relative to the other clips")
     source_fps: s.PositiveFloat | None = Field(None, description="overrides the file's Frame Time")
     hurt: Annotated[float, Field(ge=0, le=9, allow_inf_nan=False)] | None = Field(
         None,
-        description="how many times its length its hurt versions last together; overrides `hurt.versions` "
-        "and `hurt.longest` of the data set",
+        description="total length of the clip's hurt versions, as a multiple of its own length; overrides "
+        "`hurt.versions` and `hurt.longest` of the data set",
     )
     loops: s.Positive | None = Field(None, description="overrides motion.loops")
     heading: s.Finite | None = Field(None, description="overrides motion.heading")
@@ -73,7 +78,7 @@ class Dataset(s.Section):
 
     extends: Name | None = None
     skeleton: Name
-    source: Name | None = Field(None, description="the data set whose generated source files are read")
+    source: Name | None = Field(None, description="data set whose generated or downloaded BVH files are used")
     folder: s.MocapPath | None = Field(None, description="folder of the BVH files, inside the mocap folder")
     download: s.Download | None = Field(None, description="address of clips that are not in the folder")
     clips: dict[ClipName, ClipEntry | None] = Field(
@@ -107,9 +112,9 @@ class Dataset(s.Section):
         if self.synthetic is None and self.folder is None:
             raise ValueError("a data set needs `folder` (BVH files) or `synthetic` (generated clips)")
         if self.synthetic is not None and not self.clips:
-            raise ValueError("a synthetic data set lists its clips")
+            raise ValueError("a synthetic data set needs a list of its `clips`")
         if self.download is not None and not (self.folder and self.clips):
-            raise ValueError("a data set that downloads its clips lists them and names a `folder`")
+            raise ValueError("a data set that downloads its clips needs a list of its `clips` and a `folder`")
         if self.synthetic is None:
             self._no_walker_keys()
         unknown = [c for c in self.held_out if self.clips and c not in self.clips]
@@ -139,7 +144,7 @@ class Configuration(s.Section):
         (), description="inputs of the network; clips with values of another channel are left out"
     )
     network_of: Name | None = Field(None, description="use another configuration's network, train none")
-    network: Options = model(DEFAULT).options()()  # `configuration_of` gives it the type of its kind
+    network: Options = model(DEFAULT).options()()  # its type depends on its kind: `configuration_of`
     training: s.Training = s.Training()
     runtime: s.Runtime = s.Runtime()
     evaluation: s.Evaluation = s.Evaluation()
@@ -165,14 +170,14 @@ def configuration_of(kind: str) -> type[Configuration]:
 
 
 class JointEntry(s.Section):
-    """A joint of a skeleton."""
+    """A joint of a skeleton. offset: from the parent, in the rest pose, cm."""
 
     parent: str | None
     offset: tuple[float, float, float]
 
 
 class SkeletonFile(s.Section):
-    """A skeleton file. See `hobble.core.skeleton.Skeleton` for its keys."""
+    """A skeleton file. `hobble.core.skeleton.Skeleton` explains all keys but `maps`."""
 
     joints: dict[str, JointEntry]
     roles: dict[str, str]
@@ -180,7 +185,7 @@ class SkeletonFile(s.Section):
     links: tuple[tuple[str, str], ...] = ()
     unseen: tuple[str, ...] = ()
     maps: dict[Name, dict[str, str]] = Field(
-        {}, description="for retargeting: skeleton -> {this rig's joint: the joint of that skeleton}"
+        {}, description="for retargeting: name of another skeleton -> {joint of this one: joint of the other}"
     )
 
     @model_validator(mode="after")

@@ -1,7 +1,8 @@
 """Collects the typed sections of data sets and configurations from the stages that read them.
 
-The `options.py` of a stage has the keys of its section with defaults, units and ranges. Sections are
-validated before Snakemake plans, and each job gets its section as the same type.
+A stage is a package such as `hobble.motion`. Its `options.py` has the keys of its section with defaults,
+units and ranges. Sections are validated before Snakemake plans its jobs, and each job gets its section as the
+same type.
 """
 
 from hobble.core.section import (

@@ -12,14 +12,16 @@ from hobble.core.errors import InputError
 from hobble.core.files import DAMAGE_ERRORS, DELETE_IT, HEADER_READERS, check_archive, check_header
 from hobble.core.untrusted import check_regular, printable
 
-LOCAL_HEADER = 30  # bytes before the name of an entry; the lengths of name and extra field are its last four
+# Before each array, a zip file has a header: 30 bytes, then the array's file name, then an extra field. The
+# last four of the 30 bytes hold the lengths of the name and of the extra field.
+LOCAL_HEADER = 30
 
 
 class ArrayParts:
-    """The arrays of an uncompressed npz, as `save_npz` writes it.
+    """The arrays of an uncompressed npz, such as `hobble.core.files.save_npz` writes.
 
-    Checksums are not verified (`load_npz` does), because they cover whole arrays. Raises InputError if the
-    file is missing or damaged.
+    Unlike `hobble.core.files.load_npz`, this class does not verify checksums, because each checksum covers a
+    whole array. Raises InputError if the file is missing or damaged.
     """
 
     def __init__(self, path: str | Path) -> None:
@@ -64,8 +66,8 @@ class ArrayParts:
         if not shape:
             raise InputError(self.path, f"{printable(name)} has no rows", fix=DELETE_IT)
         first, stop, _ = slice(first, stop).indices(shape[0])
-        each = int(np.prod(shape[1:], dtype=np.int64)) * dtype.itemsize
-        return self._read(name, at + first * each, (max(0, stop - first), *shape[1:]), dtype)
+        row_bytes = int(np.prod(shape[1:], dtype=np.int64)) * dtype.itemsize
+        return self._read(name, at + first * row_bytes, (max(0, stop - first), *shape[1:]), dtype)
 
     def _of(self, name: str) -> tuple[int, tuple[int, ...], np.dtype]:
         if name not in self._places:
@@ -84,20 +86,20 @@ class ArrayParts:
     def _place(
         self, archive: zipfile.ZipFile, entry: zipfile.ZipInfo
     ) -> tuple[int, tuple[int, ...], np.dtype]:
-        """Where the numbers of an array begin in the file, its shape and its type."""
+        """Where the numbers of an array begin in the file, and the shape and type of the array."""
         if entry.compress_type != zipfile.ZIP_STORED:
             raise ValueError(f"{entry.filename} is compressed")
         if entry.header_offset + entry.file_size > archive.start_dir:
             raise EOFError(f"{entry.filename} does not fit into the file")
         with open(self.path, "rb") as file:
             file.seek(entry.header_offset)
-            name, extra = struct.unpack("<26xHH", file.read(LOCAL_HEADER))
-            start = entry.header_offset + LOCAL_HEADER + name + extra
+            name_length, extra_length = struct.unpack("<26xHH", file.read(LOCAL_HEADER))
+            start = entry.header_offset + LOCAL_HEADER + name_length + extra_length
         with archive.open(entry) as file:
             check_header(file, entry.file_size)
-            length = file.tell()
+            header_length = file.tell()
             file.seek(0)
             shape, by_columns, dtype = HEADER_READERS[np.lib.format.read_magic(file)](file)
         if by_columns and len(shape) > 1:
             raise ValueError(f"{entry.filename} is stored column by column")
-        return start + length, shape, dtype
+        return start + header_length, shape, dtype

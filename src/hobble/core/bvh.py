@@ -1,4 +1,4 @@
-"""Writes BVH files. `hobble.motion` reads them."""
+"""Writes BVH files. The module that reads them is `hobble.motion.read`."""
 
 from __future__ import annotations
 
@@ -15,8 +15,8 @@ from hobble.core.skeleton import Skeleton
 def write_bvh(path: str | Path, clip: Clip, order: str = "ZYX", decimals: int = 5) -> None:
     """Write a clip in centimetres. The root has six channels, every other joint three rotation channels.
 
-    If the clip has joint translations, every joint has six channels. order: the sequence of the rotation
-    channels.
+    If the clip has joint translations, every joint has six channels. order: order of the rotation channels,
+    such as ZYX. decimals: number of decimals of positions (cm) and angles (degrees).
     """
     moving = clip.translations is not None
     lines = ["HIERARCHY", *_hierarchy(clip.skeleton, 0, order, moving, 0)]
@@ -41,6 +41,7 @@ def _depth_first(skeleton: Skeleton, joint: int) -> list[int]:
 
 
 def _hierarchy(skeleton: Skeleton, joint: int, order: str, moving: bool, depth: int) -> list[str]:
+    """The lines of a joint and all joints below it. moving: whether every joint has translations."""
     pad = "\t" * depth
     kind = "ROOT" if joint == 0 else "JOINT"
     offset = skeleton.offsets[joint] if joint else np.zeros(3)

@@ -18,9 +18,9 @@ from hobble.core.skeleton import Skeleton, forward_kinematics
 class Clip:
     """F frames of a skeleton of J joints: centimetres, right-handed, Y up, +Z forward.
 
-    fps: frames per second. rotations: (F, J, 4) local unit quaternions, w first. root: (F, 3) position of the
-    root joint. translations: (F, J, 3) positions of the joints relative to their parents, if these change in
-    the source, else None.
+    fps: frames per second. rotations: (F, J, 4) local unit quaternions, w first. root: (F, 3) positions of
+    the root joint. translations: (F, J, 3) positions of the joints relative to their parents, or None if all
+    joints but the root keep their offsets.
     """
 
     name: str

@@ -1,4 +1,4 @@
-"""Finds the BVH files of a folder, by clip name, and label files that belong to no clip."""
+"""Finds the BVH file of each clip in a folder, and the label files that belong to no clip."""
 
 from __future__ import annotations
 
@@ -13,14 +13,15 @@ from hobble.core.errors import InputError
 from hobble.core.untrusted import check_regular
 
 SUFFIX = ".bvh"
-# The name of a label or status file is that of its clip plus one of these. Longer suffixes come first.
+# The name of a label or status file is the name of its clip with one of these at the end.
 SIDE_FILE_SUFFIXES = ("_footsteps.txt", "_injuries.txt", "_injuries", "_gait.txt", ".phase", ".gait")
 VALID_NAME = re.compile(r"(?![.\s])[^{}<>\\/]+(?<!\s)")  # Snakemake fills in {x} and <x>
 CLIP_NAME_RULE = (
     "no control characters, braces, angle brackets, slashes or backslashes, no dot or space first and no "
     "space last, 200 bytes at most"
 )
-LONGEST_CLIP_NAME = 200  # bytes; a file of the clip has a name up to 50 bytes longer while it is written
+# Bytes. Files of a clip have names that are up to 50 bytes longer, and systems allow 255 bytes.
+LONGEST_CLIP_NAME = 200
 
 
 def is_valid_clip_name(clip: str) -> bool:
@@ -55,7 +56,7 @@ def find_clips(folder: Path) -> dict[str, list[Path]]:
 
 
 def only_file(clip: str, files: list[Path]) -> Path:
-    """The one file of a clip. Raises InputError if there are two, or if it is a device or a pipe."""
+    """The one file of a clip. Raises InputError if there are more, or if the file is a device or a pipe."""
     if len(files) > 1:
         raise InputError(
             files[1],

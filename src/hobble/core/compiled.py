@@ -1,9 +1,9 @@
 """numba's `njit` with a disk cache that may fail.
 
-numba writes compiled functions next to the package, or into the user's home if it cannot write there. If it
-can write to neither, it raises an error at import. If the disk is full or a cached file is damaged, it raises
-an error at the first call. With the `njit` of this module there is only one warning, and the functions are
-compiled again.
+numba stores compiled functions next to the package, or in the user's home if it cannot write there. If it can
+write to neither, it raises an error at import. If the disk is full or a cached file is damaged, it raises an
+error at the first call. The `njit` of this module only warns in these cases, once in a process, and the
+functions are compiled again.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ def njit(function: Callable | None = None, **options: Any) -> Any:
     if caches:
         try:
             dispatcher.enable_caching()
-        except (RuntimeError, OSError) as error:  # numba found no folder that it may write
+        except (RuntimeError, OSError) as error:  # numba found no folder that it may write to
             _warn(error)
         else:
             dispatcher._cache = ForgivingCache(dispatcher._cache)
@@ -61,6 +61,7 @@ class ForgivingCache:
 
 @functools.cache
 def _warn_once(text: str) -> None:
+    """Warn. `_warn` looks into the cache of this function to see whether it was called before."""
     warnings.warn(text, RuntimeWarning, stacklevel=4)
 
 

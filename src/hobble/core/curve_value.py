@@ -10,8 +10,8 @@ from hobble.core.quat import Array
 def value_at(curve: Array, when: Array | float) -> Array:
     """Linear interpolation of a curve (F,) at times in frames: `np.interp(when, np.arange(F), curve)`.
 
-    np.interp reads the whole curve at every call. Called for each step of a long clip, it would take time in
-    proportion to the square of the clip's length. This reads only the frames around `when`.
+    np.interp reads the whole curve at every call. If it were called for each step of a long clip, the time
+    would grow with the square of the clip's length. This function reads only the frames around `when`.
 
     >>> float(value_at(np.array([0.0, 10.0, 40.0]), 1.5))
     25.0

@@ -1,4 +1,4 @@
-"""Errors that a user can mend. Each is one message with the file, the place in it, and what to do."""
+"""Errors that a user can mend. Each is one message with the file, the place in the file, and what to do."""
 
 from __future__ import annotations
 

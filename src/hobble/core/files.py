@@ -1,4 +1,4 @@
-"""Writes files so that they are whole or absent, and reads JSON, npz and npy files that may be damaged.
+"""Writes files completely or not at all, and reads JSON, npz and npy files that may be damaged.
 
 A file is written under a temporary name and then renamed.
 """
@@ -22,22 +22,25 @@ import numpy as np
 from hobble.core.errors import HobbleError, InputError
 from hobble.core.untrusted import check_regular, printable, read_text
 
-MAX_INFLATED_BYTES = 1 << 30  # of all compressed arrays of a file, unpacked; Hobble itself does not compress
+# Limit for all compressed arrays of a file together, after unpacking. Hobble itself does not compress arrays.
+MAX_INFLATED_BYTES = 1 << 30
 MAX_JSON_BYTES = 1 << 30
 DELETE_IT = "Delete it; the next run makes it again."
+# version of the npy format -> NumPy's function that reads the header of an array
 HEADER_READERS = {
     (1, 0): np.lib.format.read_array_header_1_0,
     (2, 0): np.lib.format.read_array_header_2_0,
 }
+# What zipfile and NumPy raise for a damaged file.
 DAMAGE_ERRORS = (
     zipfile.BadZipFile,
     zlib.error,
     struct.error,
     EOFError,
     KeyError,
-    NotImplementedError,  # a flipped bit in the compression method
+    NotImplementedError,  # a flipped bit in the number of the compression method
     OverflowError,
-    RuntimeError,  # a flipped bit in the password flag
+    RuntimeError,  # a flipped bit, so that the array counts as encrypted
     ValueError,
 )
 
@@ -88,7 +91,7 @@ def _remove_leftovers(path: Path) -> None:
 
 
 def write_error(error: OSError, path: Path) -> HobbleError:
-    """An error for a failed write that says what a person can do about it."""
+    """The error to raise for a failed write; its message says what the user can do."""
     reasons = {
         errno.ENOSPC: ("the disk is full", "Free some space and run the same command again."),
         errno.EDQUOT: ("the disk quota is used up", "Free some space and run the same command again."),
@@ -138,7 +141,7 @@ class Arrays(dict[str, np.ndarray]):
 
 
 def load_npz(path: str | Path, names: Iterable[str] | None = None) -> Arrays:
-    """Read all arrays of an npz, or those in `names`. Verifies checksums and never unpickles.
+    """Read all arrays of an npz, or those in `names`. Checks all checksums and refuses pickles.
 
     Raises InputError if the file or an array is missing or damaged, or if a header claims more data than the
     file holds.
@@ -159,14 +162,14 @@ def load_npz(path: str | Path, names: Iterable[str] | None = None) -> Arrays:
 
 
 def check_archive(path: str | Path, archive: zipfile.ZipFile) -> None:
-    """Raise ValueError or BadZipFile if the directory of an archive is damaged or claims too much data."""
+    """Raise ValueError or BadZipFile if an archive's list of files is damaged or claims too much data."""
     if _entry_count(path, archive) != len(archive.infolist()):
         raise zipfile.BadZipFile("its directory has lost an entry")
     _check_sizes(path, archive)
 
 
 def _entry_count(path: str | Path, archive: zipfile.ZipFile) -> int:
-    """The number of files that the archive's end record states. zipfile does not compare it with the list."""
+    """The number of files that the archive's end record states. zipfile does not check this number."""
     with open(path, "rb") as file:
         file.seek(-22 - len(archive.comment), os.SEEK_END)
         (count,) = struct.unpack("<10xH10x", file.read(22))
@@ -176,8 +179,8 @@ def _entry_count(path: str | Path, archive: zipfile.ZipFile) -> int:
 def _check_sizes(path: str | Path, archive: zipfile.ZipFile) -> None:
     """Raise ValueError if the entries would need too much memory.
 
-    All entries together may not be larger than the file; they are if several share the same bytes. Compressed
-    entries may not unpack to more than MAX_INFLATED_BYTES.
+    All entries together may not be larger than the file; they would be if several entries shared the same
+    bytes. Compressed entries may not unpack to more than MAX_INFLATED_BYTES.
     """
     entries = archive.infolist()
     if any(entry.compress_type not in (zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED) for entry in entries):
@@ -191,7 +194,7 @@ def _check_sizes(path: str | Path, archive: zipfile.ZipFile) -> None:
 
 
 def _array(archive: zipfile.ZipFile, member: str) -> np.ndarray:
-    """One array. Before memory is allocated, its header is compared with its number of bytes."""
+    """Read the array in file `member` of the archive, after its header was checked against its size."""
     info = archive.getinfo(member)
     if not info.compress_type and info.header_offset + info.file_size > archive.start_dir:
         raise EOFError(f"{member} does not fit into the file")
@@ -223,7 +226,8 @@ def load_npy(path: str | Path) -> np.ndarray:
 def check_header(file: IO[bytes], size: int) -> None:
     """Raise ValueError if an array's header is damaged or does not match the `size` bytes of the array.
 
-    NumPy parses the header as Python, which raises many kinds of errors if it is damaged.
+    file: open at the start of the header. NumPy parses a header as a Python expression, so a damaged one can
+    raise almost any error.
     """
     try:
         shape, _, dtype = HEADER_READERS[np.lib.format.read_magic(file)](file)

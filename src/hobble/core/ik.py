@@ -1,4 +1,4 @@
-"""Two-bone inverse kinematics: bends a leg or an arm so that its end reaches a point."""
+"""Inverse kinematics: bends a leg or an arm so that its end reaches a point, and turns single bones."""
 
 from __future__ import annotations
 
@@ -9,11 +9,11 @@ from hobble.core.quat import Array
 
 
 def two_bone_knee(hip: Array, target: Array, pole: Array, upper: float, lower: float) -> tuple[Array, Array]:
-    """Positions of knee and ankle by the law of cosines, each (..., 3).
+    """Positions of knee and ankle, each (..., 3), by the law of cosines. An arm works in the same way.
 
-    hip: (..., 3) its position. target: (..., 3) where the ankle should be. pole: (..., 3) direction in which
-    the knee points; it must not be along the leg. upper, lower: lengths of thigh and shank. If the target is
-    out of reach, the leg stretches to 99.9 % of its length.
+    hip: (..., 3) position of the hip. target: (..., 3) where the ankle should be. pole: (..., 3) direction in
+    which the knee points; it must not be parallel to the line from hip to target. upper, lower: lengths of
+    thigh and shank. If the target is out of reach, the leg stretches to 99.9 % of its length.
     """
     reach = target - hip
     distance = np.linalg.norm(reach, axis=-1, keepdims=True)
@@ -21,14 +21,14 @@ def two_bone_knee(hip: Array, target: Array, pole: Array, upper: float, lower: f
     distance = np.clip(distance, abs(upper - lower) * 1.001 + 1e-6, (upper + lower) * 0.999)
     cosine = (upper**2 + distance**2 - lower**2) / (2 * upper * distance)
     cosine = np.clip(cosine, -1.0, 1.0)
-    out = pole - along * np.sum(pole * along, axis=-1, keepdims=True)
-    out = out / np.maximum(np.linalg.norm(out, axis=-1, keepdims=True), 1e-9)
-    knee = hip + upper * (along * cosine + out * np.sqrt(1 - cosine**2))
+    bend = pole - along * np.sum(pole * along, axis=-1, keepdims=True)
+    bend = bend / np.maximum(np.linalg.norm(bend, axis=-1, keepdims=True), 1e-9)
+    knee = hip + upper * (along * cosine + bend * np.sqrt(1 - cosine**2))
     return knee, hip + along * distance
 
 
 def aim(rotation: Array, bone: Array, direction: Array) -> Array:
-    """Turn a joint by the smallest angle after which its bone points in a direction.
+    """Turn a joint, by the smallest possible angle, so that its bone points in a given direction.
 
     rotation: (..., 4) of the joint in the world. bone: (..., 3) in the joint's own axes. direction: (..., 3)
     in the world. Returns the new world rotation (..., 4).

@@ -42,7 +42,7 @@ def inv(q: ArrayLike) -> Array:
 
 def rotate(q: ArrayLike, v: ArrayLike) -> Array:
     """Rotate vectors (..., 3) by unit quaternions (..., 4)."""
-    # By components: np.cross takes two to three times as long for the same numbers.
+    # Written out, because np.cross takes two to three times as long for the same numbers.
     q, v = np.asarray(q), np.asarray(v)
     w, x, y, z = q[..., 0], q[..., 1], q[..., 2], q[..., 3]
     a, b, c = v[..., 0], v[..., 1], v[..., 2]
@@ -65,8 +65,8 @@ def from_axis_angle(axis: ArrayLike, angle: ArrayLike) -> Array:
 def between(a: ArrayLike, b: ArrayLike) -> Array:
     """The shortest rotation (..., 4) from direction `a` to direction `b`, each (..., 3) of any length.
 
-    For opposite directions every axis at right angles to `a` is right. The one nearest to Y is used, or to X
-    if `a` itself is near Y.
+    For opposite directions, any axis at right angles to `a` would do. The axis nearest to Y is used, or the
+    one nearest to X if `a` itself is near Y.
     """
     a = np.asarray(a, float) / np.linalg.norm(a, axis=-1, keepdims=True)
     b = np.asarray(b, float) / np.linalg.norm(b, axis=-1, keepdims=True)
@@ -84,8 +84,8 @@ def between(a: ArrayLike, b: ArrayLike) -> Array:
 def from_euler(angles: ArrayLike, order: str) -> Array:
     """Rotations (..., 4) from intrinsic Euler angles (..., 3) in radians.
 
-    order: the axes of the three angles; "ZYX" means Z first. The channels of a BVH file mean the same:
-    R = R_first R_second R_third.
+    order: the axes of the three angles, as in the channels of a BVH file: R = R_first R_second R_third. In
+    "ZYX" the first axis is Z.
     """
     angles = np.asarray(angles, float)
     q = None
@@ -121,7 +121,8 @@ def to_matrix(q: ArrayLike) -> Array:
 def from_matrix(m: ArrayLike) -> Array:
     """Rotation matrices (..., 3, 3) -> (..., 4), w >= 0.
 
-    Computed from the largest of the four components, which is precise at any angle (Shepperd 1978).
+    The largest of the four components is computed first, and the others from it. This is precise at any angle
+    (Shepperd 1978).
     """
     m = np.asarray(m, float)
     a, b, c = m[..., 0, 0], m[..., 1, 1], m[..., 2, 2]
@@ -164,7 +165,10 @@ def exp(v: ArrayLike) -> Array:
 
 
 def slerp(a: ArrayLike, b: ArrayLike, t: ArrayLike) -> Array:
-    """Rotations on the shorter arc from `a` (t = 0) to `b` (t = 1). `t` broadcasts against the other axes."""
+    """Rotations on the shorter arc from `a` (t = 0) to `b` (t = 1).
+
+    t: broadcasts against the leading axes of `a` and `b`.
+    """
     a, b = np.asarray(a), np.asarray(b)
     return mul(a, exp(log(mul(inv(a), b)) * np.asarray(t)[..., None]))
 

@@ -7,17 +7,17 @@ from typing import Annotated, Literal
 
 from pydantic import AfterValidator, BaseModel, ConfigDict, Field
 
-LONGEST_FILE_NAME = 255  # bytes; the limit of Linux and other systems
-LONGEST_PATH = 1000  # characters
+LONGEST_FILE_NAME = 255  # bytes of a file's or folder's name; the limit of Linux and other systems
+LONGEST_PATH = 1000  # characters of a path in the mocap folder
 
 
 def _inside(path: str) -> str:
-    """Check that a path is relative and does not leave the mocap folder."""
+    """Check that a path is relative to the mocap folder, does not leave it, is printable and not too long."""
     if Path(path).is_absolute() or ".." in Path(path).parts or not path.isprintable():
         raise ValueError("must be relative to the mocap folder and stay in it")
     if any(len(part.encode()) > LONGEST_FILE_NAME for part in Path(path).parts) or len(path) > LONGEST_PATH:
         raise ValueError(
-            f"must be a path of {LONGEST_PATH} letters at most, with names of {LONGEST_FILE_NAME}"
+            f"must have at most {LONGEST_PATH} characters, and each name in it {LONGEST_FILE_NAME} bytes"
         )
     return path
 

@@ -1,4 +1,4 @@
-"""A skeleton: joints, parents, rest offsets, roles of joints, and the links that can be hurt."""
+"""A skeleton: joints, parents, rest offsets, roles of joints, and the bones that can be hurt (its links)."""
 
 from __future__ import annotations
 
@@ -14,7 +14,8 @@ from hobble.core.errors import HobbleError
 from hobble.core.quat import Array
 
 SIDE_WORDS = (("Left", "Right"), ("left", "right"), ("LEFT", "RIGHT"))
-# The letter of the side: apart, as in L_Leg, leg.r and Bip01 L Leg, or first, as in LLeg and rLeg.
+# The letter of the side: alone, as in L_Leg, leg.r and Bip01 L Leg, or at the start of a name, as in LLeg and
+# rLeg.
 SIDE_LETTER = re.compile(r"(?<![^_. -])[LRlr](?![^_. -])|^[LRlr](?=[A-Z])")
 OTHER_LETTER = str.maketrans("LRlr", "RLrl")
 PAIRED_NAMES = "the same except for Left and Right, or L and R, as in LeftLeg, L_Leg, Leg.L, LLeg"
@@ -42,8 +43,9 @@ class Skeleton:
     parents: J indices, -1 for the root.
     offsets: (J, 3) from the parent to the joint in the rest pose (every rotation is the identity), cm.
     roles: role ("hips", "left_heel", ...) -> name of the joint; see config/skeletons/README.md.
-    links: pairs (upper joint, lower joint) that can be hurt, in the order of the severity columns.
-    unseen: joints that the network predicts but does not get as input (their input weight is 1e-10).
+    links: (upper joint, lower joint) of each bone that can be hurt. Arrays of severities (how badly the bones
+    are hurt) have a column for each link.
+    unseen: joints that the network predicts but in effect does not see: their inputs have the weight 1e-10.
     end_sites: joint without children -> (x, y, z) from the joint to the end of its bone, cm.
     """
 
@@ -100,7 +102,7 @@ class Skeleton:
 
     @property
     def leg_length(self) -> float:
-        """Length of the left thigh and shank together, cm: a unit in which bodies of any size compare."""
+        """Length of the left thigh and shank together, cm: a unit for comparing bodies of any size."""
         bones = np.linalg.norm(self.offsets, axis=1)
         knee, heel = self.role("left_knee"), self.role("left_heel")
         length, joint = 0.0, heel
@@ -111,14 +113,14 @@ class Skeleton:
 
     @property
     def link_names(self) -> tuple[str, ...]:
-        """Names of the links, as in status files: "LeftUpLeg-LeftLeg"."""
+        """Names of the links, such as "LeftUpLeg-LeftLeg"."""
         return tuple(f"{a}-{b}" for a, b in self.links)
 
     @property
     def mirror_joints(self) -> np.ndarray:
         """(J,) index of each joint's counterpart on the other side, found by name.
 
-        Raises HobbleError if the names do not pair the joints of a left and a right role.
+        Raises HobbleError if the names do not pair the joints of roles such as "left_knee" and "right_knee".
         """
         swap = np.array([self._counterpart(name) for name in self.joints])
         for role, left in self.roles.items():
@@ -142,7 +144,7 @@ class Skeleton:
         for link, other in zip(self.links, across, strict=True):
             if other not in self.links:
                 raise self._mirror_error(
-                    f"its links have {'-'.join(link)} but not {'-'.join(other)}. Add that link."
+                    f"its links have {'-'.join(link)} but not {'-'.join(other)}. Add the missing link."
                 )
         return np.array([self.links.index(other) for other in across], int)
 

@@ -33,9 +33,9 @@ def median_of_three(values: Array) -> Array:
 
 
 def smooth_above(values: Array, frames: int) -> Array:
-    """(F,) a smooth curve that is nowhere below `values` (F,): their running maximum, smoothed.
+    """(F,) a smooth curve that is nowhere below `values` (F,): the running maximum of the values, smoothed.
 
-    The maximum is taken over 2 `frames` before and after each frame, and so reaches as far as the smoothing.
+    The maximum and the smoothing both reach over 2 * `frames` frames before and after each frame.
     """
     highest = _windows(values, 4 * frames + 1).max(axis=-1)
     kernel = np.convolve(np.ones(2 * frames + 1), np.ones(2 * frames + 1))
@@ -43,6 +43,7 @@ def smooth_above(values: Array, frames: int) -> Array:
 
 
 def _weighted(values: Array, weights: Array) -> Array:
+    """Weighted sum of the values around each frame; the middle weight is that of the frame."""
     columns = np.reshape(values, (len(values), -1)).T
     reach = len(weights) // 2
     padded = np.pad(columns, ((0, 0), (reach, reach)), mode="edge")
@@ -52,5 +53,5 @@ def _weighted(values: Array, weights: Array) -> Array:
 
 def _windows(values: Array, width: int) -> Array:
     """(F, ..., width) values around each frame."""
-    reach = [(width // 2, width // 2)] + [(0, 0)] * (np.ndim(values) - 1)
-    return np.lib.stride_tricks.sliding_window_view(np.pad(values, reach, mode="edge"), width, axis=0)
+    padding = [(width // 2, width // 2)] + [(0, 0)] * (np.ndim(values) - 1)
+    return np.lib.stride_tricks.sliding_window_view(np.pad(values, padding, mode="edge"), width, axis=0)

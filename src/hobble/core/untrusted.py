@@ -13,25 +13,27 @@ from hobble.core.errors import InputError
 if TYPE_CHECKING:
     import yaml
 
-MB = 1 << 20
+MB = 1 << 20  # bytes
 MAX_TEXT_BYTES = 64 * MB  # enough for a label file of ten minutes at 100 Hz with 1 kB for each frame
 MAX_YAML_BYTES = 4 * MB  # enough for a data set of 20,000 clips with five keys each
-MAX_YAML_DEPTH = 100
-MAX_YAML_NODES = 1_000_000  # values, after aliases are replaced by what they stand for; about 100 MB
+MAX_YAML_DEPTH = 100  # lists and mappings within each other
+# At most this many values in a file, counted after aliases are replaced by what they stand for. They take
+# about 100 MB of memory.
+MAX_YAML_NODES = 1_000_000
 
 
 def check_regular(path: str | Path) -> os.stat_result:
     """The stat result of a regular file, or of the file that a link points to.
 
-    Raises InputError for a folder, and for a device or a pipe, because reading them may never end. Raises
+    Raises InputError for a folder, a device or a pipe: reading from a device or a pipe may never end. Raises
     OSError if there is no such file.
     """
-    kind = os.stat(path)
-    if not stat.S_ISREG(kind.st_mode):
+    status = os.stat(path)
+    if not stat.S_ISREG(status.st_mode):
         raise InputError(
-            path, "not a file" if stat.S_ISDIR(kind.st_mode) else "a device or a pipe, not a file"
+            path, "not a file" if stat.S_ISDIR(status.st_mode) else "a device or a pipe, not a file"
         )
-    return kind
+    return status
 
 
 def printable(text: object, most: int = 200) -> str:
@@ -46,16 +48,16 @@ def read_bytes(path: str | Path, most: int) -> bytes:
     Raises InputError if it is missing, unreadable, too large, or not a regular file.
     """
     try:
-        kind = check_regular(path)
+        size = check_regular(path).st_size
         with open(path, "rb") as file:
-            # read(n) allocates n bytes, so n is the file's size and not `most`.
-            data = file.read(kind.st_size + 1) if kind.st_size <= most else b""
+            # read(n) allocates n bytes, so n comes from the file's size and not from `most`.
+            data = file.read(size + 1) if size <= most else b""
     except FileNotFoundError:
         raise InputError(path, "no such file") from None
     except (OSError, ValueError) as error:
         reason = getattr(error, "strerror", None) or error
         raise InputError(path, f"cannot be read: {reason}") from None
-    if kind.st_size > most or len(data) > most:
+    if size > most or len(data) > most:
         raise InputError(path, f"larger than {most / MB:g} MB, the limit for such a file")
     return data
 
@@ -80,10 +82,10 @@ def read_yaml(path: str | Path) -> Any:
     import yaml  # imported here because most jobs do not need it
 
     text = read_text(path, MAX_YAML_BYTES)
-    kind = getattr(yaml, "CSafeLoader", yaml.SafeLoader)
-    loader = kind(text)
+    loader_class = getattr(yaml, "CSafeLoader", yaml.SafeLoader)
+    loader = loader_class(text)
     try:
-        _check_depth(yaml.parse(text, kind))
+        _check_depth(yaml.parse(text, loader_class))
         node = loader.get_single_node()
         if node is None:
             return None
@@ -103,7 +105,7 @@ def read_yaml(path: str | Path) -> Any:
 
 
 def _check_depth(events: Iterable[yaml.Event]) -> None:
-    """Raise RecursionError for deep nesting, before libyaml recurses and crashes the process."""
+    """Raise RecursionError for deep nesting, on which libyaml would recurse and crash the process."""
     import yaml
 
     depth = 0
@@ -142,8 +144,8 @@ def _children(node: yaml.Node) -> list[yaml.Node]:
 def _size_without_aliases(node: yaml.Node, known: dict[int, int], above: set[int]) -> int:
     """Number of values in a node after every alias is replaced by what it stands for.
 
-    known: sizes of the nodes counted so far, by id. above: ids of the nodes that contain this one. Raises
-    RecursionError for an alias that contains itself.
+    known: id of each node counted so far -> its number of values. above: ids of the nodes that contain this
+    one. Raises RecursionError for an alias that contains itself.
     """
     if not isinstance(node.value, list):
         return 1

@@ -1,4 +1,7 @@
-"""Buckets: files of rows, each for a part of the new order. They shuffle more rows than fit in memory."""
+"""Buckets: files through which more rows than fit in memory are shuffled.
+
+Each bucket collects the rows of one stretch of the final order.
+"""
 
 from __future__ import annotations
 
@@ -10,15 +13,16 @@ import numpy as np
 from hobble.core.errors import InputError
 from hobble.core.quat import Array
 
-HINT = "Delete the folder; the next run makes it again."
-# For each row: its place in the final order, its number of terrain fits, its clip, frame and phase.
+HINT = "Delete the folder of this file; the next run makes it again."
+# For each row: its place in the final order, number of terrain fits, number of its clip, frame, phase.
 INDEX = np.dtype([("place", "<i8"), ("count", "<i4"), ("clip", "<i4"), ("frame", "<i4"), ("phase", "<f4")])
 
 
 def gather_fits(fits: Array, count: np.ndarray, order: np.ndarray) -> Array:
-    """The terrain fits (S, columns) of R rows after the rows are put in a new order.
+    """The terrain fits of some rows, in the order of these rows.
 
-    fits: (S, columns), row after row. count: (R,) number of fits of each row. order: indices of the rows.
+    fits: (S, columns) fits of R rows, row after row. count: (R,) number of fits of each row. order: indices
+    of the rows.
     """
     first = np.cumsum(count) - count
     taken = count[order]
@@ -27,9 +31,10 @@ def gather_fits(fits: Array, count: np.ndarray, order: np.ndarray) -> Array:
 
 
 class Buckets:
-    """Files of up to `rows_each` rows for consecutive places in the final order. Rows arrive in any order.
+    """Buckets in the folder `folder`, each for `rows_each` consecutive places in the final order.
 
-    rows: number of all rows. columns, fit_columns: numbers of columns of a row and of a terrain fit.
+    Rows can be added in any order. rows: number of all rows. columns, fit_columns: numbers of columns of a
+    row and of a terrain fit.
     """
 
     def __init__(self, folder: Path, rows: int, rows_each: int, columns: int, fit_columns: int) -> None:
@@ -39,7 +44,10 @@ class Buckets:
         folder.mkdir(parents=True)
 
     def add(self, frames: Array, fits: Array, index: np.ndarray) -> None:
-        """Add rows to their buckets: frames (R, columns), fits (S, fit_columns) and index (R,) of INDEX."""
+        """Add R rows, with S terrain fits together, to their buckets.
+
+        frames: (R, columns) the rows. fits: (S, fit_columns). index: (R,) of type INDEX.
+        """
         bucket = index["place"] // self.rows_each
         order = np.argsort(bucket, kind="stable")
         edges = np.searchsorted(bucket[order], np.arange(self.count + 1))
@@ -77,7 +85,7 @@ class Buckets:
         return frames.reshape(-1, self.columns), fits.reshape(-1, self.fit_columns), index
 
     def drain(self) -> Iterator[tuple[Array, Array, np.ndarray]]:
-        """Each bucket's frames, fits and index in the final order. Removes the files after reading."""
+        """Each bucket's frames, fits and index in the final order. Removes the files once they are read."""
         for b in range(self.count):
             frames, fits, index = self.read(b)
             for table in ("index", "frames", "fits"):

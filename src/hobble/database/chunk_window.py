@@ -23,8 +23,11 @@ Buffers = Mapping[str, np.ndarray]
 class ChunkWindow:
     """The rows of some chunks, in memory one after another.
 
-    chunks: their numbers in the split. rows: number of rows of each chunk. first: (R,) index of each row's
-    first fit in `fits`. The other fields are the arrays of the chunks.
+    chunks: their numbers in the split. rows: number of rows of each chunk. The arrays hold R rows, and S
+    patches of terrain fitted under them, in the types of the chunk files. x: (R, columns of X without
+    terrain). y: (R, Y). count: (R,) number of fits of each row. fits: (S, columns) the fits, row after row.
+    first: (R,) index of each row's first fit in `fits`. clip, frame, phase: (R,) each row's clip (its
+    number in the database), frame in this clip, and phase.
     """
 
     chunks: Sequence[int]
@@ -40,7 +43,10 @@ class ChunkWindow:
 
 
 def empty_buffers(manifest: Manifest, split: str, count: int) -> dict[str, np.ndarray]:
-    """Empty arrays that are large enough for any `count` chunks of a split, in the order of the file."""
+    """Empty arrays that are large enough for any `count` chunks of a split.
+
+    Their order is that of the arrays in a chunk file.
+    """
     chunks = manifest.chunks[split]
     rows = sum(sorted(chunk.rows for chunk in chunks)[-count:])
     fits = sum(sorted(chunk.fits for chunk in chunks)[-count:])
@@ -60,26 +66,26 @@ def load_chunks(
     folder: Path,
     manifest: Manifest,
     split: str,
-    some: Sequence[int],
+    numbers: Sequence[int],
     into: Buffers,
     shards: Shards,
     verified: set[str],
 ) -> ChunkWindow:
-    """Read the chunks numbered `some` of a split, one after another, directly into the arrays `into`.
+    """Read the chunks with these numbers of a split, one after another, directly into the arrays `into`.
 
-    folder: of the chunks. shards: converts them to rows of the whole database. verified: files whose checksum
-    was checked before and is not checked again; files that pass are added. Raises InputError, which names the
-    file, if one is damaged.
+    folder: the chunks' folder. shards: converts the chunks to the statistics of the whole database. verified:
+    names of chunk files with a correct checksum. They are not checked again; newly checked ones are added.
+    Raises InputError, which names the file, if a chunk is damaged.
     """
-    wanted = [manifest.chunks[split][i] for i in some]
+    wanted = [manifest.chunks[split][i] for i in numbers]
     all_rows, all_fits = sum(c.rows for c in wanted), sum(c.fits for c in wanted)
     tables = {name: table[: all_fits if name == "fits" else all_rows] for name, table in into.items()}
     row = fit = 0
-    for number, chunk in zip(some, wanted, strict=True):
+    for number, chunk in zip(numbers, wanted, strict=True):
         rows, fits = slice(row, row + chunk.rows), slice(fit, fit + chunk.fits)
         parts = {name: table[fits if name == "fits" else rows] for name, table in tables.items()}
         read_chunk(folder, chunk, parts, verify=chunk.file not in verified)
         verified.add(chunk.file)
         shards.convert(split, number, parts)
         row, fit = rows.stop, fits.stop
-    return ChunkWindow(some, [c.rows for c in wanted], order.starts(tables["count"]), **tables)
+    return ChunkWindow(numbers, [c.rows for c in wanted], order.starts(tables["count"]), **tables)

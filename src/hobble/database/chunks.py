@@ -1,7 +1,7 @@
-"""One chunk of a database: a safetensors file, which other tools can open. The manifest has its checksum.
+"""Chunks: a database stores its rows in files of a few MB, each with a checksum in the database's manifest.
 
-A safetensors file has the length of its header (8 bytes, little-endian), the header (JSON: type, shape and
-place of each array), then the arrays.
+A chunk is a safetensors file, which other tools can open. Such a file has the length of its header (8 bytes,
+little-endian), the header (JSON: type, shape and place of each array), then the arrays.
 """
 
 from __future__ import annotations
@@ -18,10 +18,11 @@ import numpy as np
 
 from hobble.core.errors import InputError
 
-LENGTH = 8  # bytes of the header's length
-MOST_PARTS = 16  # buffers in one vectored read; POSIX guarantees at least this many
+LENGTH = 8  # bytes of the number, at the start of the file, that says how long the header is
+MOST_PARTS = 16  # at most this many buffers in one vectored read; every POSIX system allows as many
+# NumPy's name of a type -> its name in safetensors. uint16 numbers hold the bits of bfloat16.
 TYPES = {"<f2": "F16", "<u2": "BF16", "<f4": "F32", "<i4": "I32"}
-HINT = "Delete the folder of the database, and those of its shards. The next run makes them again."
+HINT = "Delete the folders of the database and of its shards. The next run makes them again."
 
 
 @dataclass(frozen=True)
@@ -29,6 +30,7 @@ class Chunk:
     """A chunk's entry in the manifest.
 
     file: its path in the database. rows, fits, bytes: its numbers of rows, of terrain fits and of bytes.
+    crc32: its checksum.
     """
 
     file: str
@@ -43,7 +45,7 @@ class Chunk:
 
 
 def write_chunk(folder: Path, file: str, arrays: Mapping[str, np.ndarray]) -> Chunk:
-    """Write arrays to folder/file. Their types are those of TYPES; `x` and `fits` have to be among them."""
+    """Write arrays to folder/file. `x` and `fits` have to be among them, and each type has to be in TYPES."""
     header: dict[str, Any] = {}
     place = 0
     for name, array in arrays.items():
@@ -71,8 +73,8 @@ def write_chunk(folder: Path, file: str, arrays: Mapping[str, np.ndarray]) -> Ch
 def read_chunk(folder: Path, chunk: Chunk, arrays: Mapping[str, np.ndarray], verify: bool = True) -> None:
     """Read a chunk directly into `arrays`, which have the names, order, shapes and types that were written.
 
-    Each array has to be contiguous. Raises InputError with the file's name if it is missing, has another
-    length or, with `verify`, another checksum.
+    Each array has to be contiguous. Raises InputError with the file's name if the file is missing, if its
+    length or its arrays differ from the manifest or, with `verify`, if its checksum is wrong.
     """
     path = folder / chunk.file
     other_bytes = chunk.bytes - sum(array.nbytes for array in arrays.values())
@@ -99,17 +101,17 @@ def _bytes(array: np.ndarray) -> memoryview:
 
 
 def _fill(descriptor: int, parts: Sequence[memoryview]) -> None:
-    """Fill the buffers from the file, with as few system calls as possible."""
-    left, place = [part for part in parts if len(part)], 0
-    while left:
-        count = os.preadv(descriptor, left[:MOST_PARTS], place)
+    """Fill the buffers `parts`, one after another, from the file, with as few system calls as possible."""
+    unfilled, place = [part for part in parts if len(part)], 0
+    while unfilled:
+        count = os.preadv(descriptor, unfilled[:MOST_PARTS], place)
         if count == 0:
             raise OSError(0, "the file ended early")
         place += count
-        while left and count >= len(left[0]):
-            count -= len(left.pop(0))
+        while unfilled and count >= len(unfilled[0]):
+            count -= len(unfilled.pop(0))
         if count:
-            left[0] = left[0][count:]
+            unfilled[0] = unfilled[0][count:]
 
 
 def _checksum(parts: Sequence[memoryview]) -> int:

@@ -1,4 +1,4 @@
-"""Collect the speeds of clips with channel values while their rows are stored, to learn speed limits."""
+"""While the rows of clips are stored, collects their speeds and channel values, to learn speed limits."""
 
 from __future__ import annotations
 
@@ -18,38 +18,41 @@ from hobble.rows.layout import GAITS, RowLayout
 
 
 def limit_learners(layout: RowLayout, skeleton: Mapping[str, Any]) -> dict[str, LimitLearner]:
-    """For each channel of the layout whose values slow a body: what learns its speed limits."""
-    slowing = [(one, columns) for name, columns in layout.channels if (one := channel(name)).slows]
+    """Channel -> learner of its speed limits, for each channel of the layout whose values slow a body."""
+    slowing = [(slow, columns) for name, columns in layout.channels if (slow := channel(name)).slows]
     if not slowing:
         return {}
     rig = Skeleton.from_dict(skeleton)
     return {
-        one.name: LimitLearner(one.highest, _other_side(one, columns, rig), len(GAITS))
-        for one, columns in slowing
+        slow.name: LimitLearner(slow.highest, _other_side(slow, columns, rig), len(GAITS))
+        for slow, columns in slowing
     }
 
 
-def _other_side(one: Channel, columns: int, rig: Skeleton) -> np.ndarray:
+def _other_side(slow: Channel, columns: int, rig: Skeleton) -> np.ndarray:
     """(columns,) for each column of a channel, the column of the same part on the other side of the body.
 
-    A column is its own partner if the rig does not pair left and right.
+    If the rig does not pair left and right, each column is its own other side.
     """
-    own = np.arange(columns, dtype=float)
+    numbers = np.arange(columns, dtype=float)
     try:
-        return one.mirror(own[None], rig)[0].astype(int)
-    except HobbleError:  # each side is learnt separately
-        return own.astype(int)
+        return slow.mirror(numbers[None], rig)[0].astype(int)
+    except HobbleError:  # then the limits of each side are learnt separately
+        return numbers.astype(int)
 
 
 def add_rows(learners: Mapping[str, LimitLearner], rows: ClipRows, source: str | None) -> None:
-    """Add the rows of a clip. source: the healthy clip that a hurt version was made from; None for others."""
+    """Add the rows of a clip to all learners.
+
+    source: the healthy clip from which a hurt version was made; None for other clips.
+    """
     if not learners or not len(rows):
         return
     layout = rows.layout
     shares = rows.x[:, body_layout(layout).x_gait].reshape(len(rows), len(GAITS), layout.samples)
-    active = {name: rows.channels[name].any(axis=1) for name, _ in layout.channels}
+    above_0 = {name: rows.channels[name].any(axis=1) for name, _ in layout.channels}
     for name, learner in learners.items():
-        others = [on for other, on in active.items() if other != name]
+        others = [rows_on for other, rows_on in above_0.items() if other != name]
         learner.add(
             rows.clip,
             gait=shares[:, :, layout.samples // 2],

@@ -18,13 +18,13 @@ from hobble.rows.layout import RowLayout
 FILE = "manifest.json"
 STATISTICS = "statistics.npz"
 SCALES = "scales.npz"  # for each shard, the statistics by which its chunks are standardised
-VERSION = 2
+VERSION = 2  # of the database's format
 SPLITS = ("train", "held_out")
 
 
 @dataclass(frozen=True)
 class ShardCounts:
-    """How many clips a shard has, and how many chunks of each split."""
+    """How many clips a shard has, and how many chunks in the splits `train` and `held_out`."""
 
     clips: int
     train: int
@@ -35,13 +35,16 @@ class ShardCounts:
 class Manifest:
     """What a database contains.
 
-    folder: subfolder of chunks and statistics, named by a hash of their content. layout: of the rows that a
-    network gets. visits: how often a pass over the data uses each row. dtype: type of the numbers on disk.
-    joint_weight: see `hobble.database.options`. clips: one entry for each clip: `clip` (its name), `split`,
-    `rows`, `pairs` (of a row and a terrain fit), and for a hurt version `source`, its healthy clip. shards:
-    in the order of their clips and chunks. chunks: those of each split; in a chunk, the clip of a row is a
-    number among the clips of its shard. original_bytes: size of the same pairs in the original's layout.
-    bytes: of all chunks. limits: channel -> speed limits (`hobble.channels.speed_limits`).
+    folder: subfolder of chunks and statistics, named by a hash of their content.
+    layout: the columns of the rows that a network gets. skeleton: as plain data.
+    visits: how often a pass over the data uses each row. dtype: type of the numbers on disk.
+    joint_weight: weight of the joints in the network's input.
+    clips: one entry for each clip, shard after shard: `clip` (its name), `split`, number of `rows` and of
+    `pairs` (of a row and a terrain fit), and for a hurt version `source`, the healthy clip it was made from.
+    shards: numbers of clips and of chunks of each shard.
+    chunks: split -> its chunks, shard after shard. Each chunk file numbers the clips of its shard from 0.
+    original_bytes: size of the same data in the layout of Holden et al. (2017), with each row `visits` times.
+    bytes: size of all chunks. limits: channel -> speed limits (`hobble.channels.speed_limits`).
     """
 
     folder: str
@@ -74,16 +77,15 @@ class Manifest:
         """Write manifest.json into the database's folder, atomically."""
         values = {**vars(self), "format": "hobble database", "version": VERSION}
         values["layout"] = self.layout.to_dict()
-        values["skeleton"] = json.dumps(
-            self.skeleton
-        )  # as text, because keys are sorted and the joints have to keep their order
+        # The skeleton as text: write_json sorts keys, but the joints have to keep their order.
+        values["skeleton"] = json.dumps(self.skeleton)
         values["shards"] = [asdict(shard) for shard in self.shards]
         values["chunks"] = {split: [c.to_dict() for c in chunks] for split, chunks in self.chunks.items()}
         write_json(path / FILE, values)
 
     @classmethod
     def load(cls, path: Path) -> Manifest:
-        """Read the manifest of the database folder `path`. Raises InputError if it is not complete."""
+        """Read the manifest of the database folder `path`. Raises InputError if it is missing or wrong."""
         file = path / FILE
         if not file.exists():
             raise InputError(

@@ -1,8 +1,9 @@
 """Merge shards into a database, without reading their rows.
 
 The chunks of the shards get a second name (a hard link) in the database's folder. The statistics of all
-training rows are computed from the moments of the shards. The manifest is written last and atomically. So a
-killed merge leaves the previous database, or none.
+training rows are computed from the moments (weights, means, squared differences from the mean) that each
+shard stores. The manifest is written last and atomically. So a killed merge leaves the previous database, or
+none.
 """
 
 from __future__ import annotations
@@ -43,11 +44,12 @@ def write_database(
     """Build a database with one shard in folder `path` from the rows of clips, or from files of rows.
 
     clips: clip name -> rows or file. splits: clip name -> "train" or "held_out". channels: the network's
-    input channels, in the order of their columns. sources: hurt version -> its healthy clip. every: of the
-    training rows of hurt versions, only every `every`-th is used. dtype: float32, float16 or bfloat16.
-    chunk_bytes: size of a chunk. The statistics are those of the training clips. The
-    same rows and options give the same bytes. Raises HobbleError if no training clip has rows, InputError if
-    a clip does not fit the others.
+    input channels, in the order of their columns. sources: name of a hurt version -> name of the healthy clip
+    it was made from. every: of the training rows of a hurt version, only each `every`-th is used.
+    joint_weight: weight of the joints in the network's input. dtype: type of the numbers on disk. seed: of
+    the order of the rows. chunk_bytes: about the size of a chunk. The statistics are those of the training
+    clips. The same rows and options give the same bytes. Raises HobbleError if no training clip has rows,
+    InputError if the rows of the clips differ in columns or joints.
     """
     with _work(Path(path)) as work:
         shard = work / "0"
@@ -71,7 +73,8 @@ def merge_shards(
 ) -> Manifest:
     """Build the database folder `path` from the folders of its shards, in order.
 
-    Raises HobbleError if no training clip has rows, InputError if a shard does not fit the others.
+    Raises HobbleError if no training clip has rows, InputError if the rows of the shards differ in columns or
+    joints.
     """
     with _work(Path(path)) as work:
         return _merged(Path(path), work, shards, joint_weight, dtype)
@@ -79,9 +82,9 @@ def merge_shards(
 
 @contextlib.contextmanager
 def _work(path: Path) -> Iterator[Path]:
-    """Make a folder for unfinished files in the database's folder, and remove it at the end.
+    """Make a folder for unfinished files in the database's folder `path`, and remove it at the end.
 
-    Folders that killed builds left are removed first. Raises HobbleError for a file that cannot be written.
+    Folders left by killed builds are removed first. Raises HobbleError for a file that cannot be written.
     """
     path.mkdir(parents=True, exist_ok=True)
     _remove_others(path, keep=None)
@@ -96,7 +99,7 @@ def _work(path: Path) -> Iterator[Path]:
 
 
 def _merged(path: Path, work: Path, folders: Sequence[Path], joint_weight: float, dtype: str) -> Manifest:
-    """Merge shards in the folder `work`, then put the database in its place."""
+    """Merge shards in the folder `work`, then move the result to the folder `path`."""
     shards = [shard for folder in folders if (shard := Shard.load(folder)) is not None]
     _check(shards)
     plan, clips = shards[0].plan, [entry for shard in shards for entry in shard.plan.clips]
@@ -106,12 +109,14 @@ def _merged(path: Path, work: Path, folders: Sequence[Path], joint_weight: float
     save_npz(rows / STATISTICS, **vars(statistics))
     scales = [shard.scale() for shard in shards]
     save_npz(
-        rows / SCALES, **{name: np.stack([vars(one)[name] for one in scales]) for name in vars(statistics)}
+        rows / SCALES,
+        **{name: np.stack([vars(scale)[name] for scale in scales]) for name in vars(statistics)},
     )
     learners = limit_learners(plan.layout, plan.skeleton)
     for shard in shards:
         shard.add_speeds(learners)
-    visits, values = max(shard.plan.visits for shard in shards), plan.layout.x_size + plan.layout.y_size + 1
+    visits = max(shard.plan.visits for shard in shards)
+    numbers = plan.layout.x_size + plan.layout.y_size + 1  # of a row: X, Y and the phase
     manifest = Manifest(
         folder=_folder_name(rows, chunks),
         layout=plan.layout,
@@ -122,16 +127,16 @@ def _merged(path: Path, work: Path, folders: Sequence[Path], joint_weight: float
         clips=clips,
         shards=[ShardCounts(len(s.plan.clips), *(len(s.chunks[split]) for split in SPLITS)) for s in shards],
         chunks=chunks,
-        original_bytes=4 * values * visits * sum(entry["rows"] for entry in clips),
+        original_bytes=4 * numbers * visits * sum(entry["rows"] for entry in clips),
         bytes=sum(chunk.bytes for split in SPLITS for chunk in chunks[split]),
-        limits={name: found.to_dict() for name, learner in learners.items() if (found := learner.learn())},
+        limits={name: learnt.to_dict() for name, learner in learners.items() if (learnt := learner.learn())},
     )
     _put_in_place(path, rows, manifest)
     return manifest
 
 
 def _check(shards: Sequence[Shard]) -> None:
-    """Check that there is something to train on, and that the rows of all shards have the same columns."""
+    """Check that there is something to train on, and that all shards have the same columns and joints."""
     trained = (entry["rows"] for s in shards for entry in s.plan.clips if entry["split"] == "train")
     if not any(trained):
         raise HobbleError(
@@ -146,8 +151,8 @@ def _check(shards: Sequence[Shard]) -> None:
 
 
 def _linked(shards: Sequence[Shard], rows: Path) -> dict[str, list[Chunk]]:
-    """Give the chunks of all shards a second name in `rows`, or copy them if there are no hard links."""
-    found: dict[str, list[Chunk]] = {split: [] for split in SPLITS}
+    """Give the chunks of all shards a second name in the folder `rows`, or copy them if hard links fail."""
+    linked: dict[str, list[Chunk]] = {split: [] for split in SPLITS}
     for shard in shards:
         for split, chunks in shard.chunks.items():
             for chunk in chunks:
@@ -160,12 +165,12 @@ def _linked(shards: Sequence[Shard], rows: Path) -> dict[str, list[Chunk]]:
                     raise
                 except OSError:
                     shutil.copyfile(shard.folder / chunk.file, target)
-                found[split].append(named)
-    return found
+                linked[split].append(named)
+    return linked
 
 
 def _remove_others(path: Path, keep: str | None) -> None:
-    """Remove leftovers of killed builds and, with `keep`, all builds but that one."""
+    """Remove what killed builds left. If `keep` names the folder of a build, also remove all other builds."""
     for entry in path.iterdir():
         if entry.is_dir() and (entry.name.startswith("part-") or (keep is not None and entry.name != keep)):
             shutil.rmtree(entry, ignore_errors=True)
@@ -174,7 +179,7 @@ def _remove_others(path: Path, keep: str | None) -> None:
 
 
 def _folder_name(rows: Path, chunks: Mapping[str, list[Chunk]]) -> str:
-    """The name of a build, from a hash of its content."""
+    """The name of a build's folder, from a hash of its content."""
     digest = hashlib.sha256((rows / STATISTICS).read_bytes() + (rows / SCALES).read_bytes())
     digest.update(repr(chunks).encode())
     return f"rows-{digest.hexdigest()[:12]}"
@@ -186,7 +191,8 @@ def _put_in_place(path: Path, rows: Path, manifest: Manifest) -> None:
     if final.exists():  # the same rows were built before: replace every file, since some may be damaged
         for file in sorted(p for p in rows.rglob("*") if p.is_file()):
             place = final / file.relative_to(rows)
-            place.parent.mkdir(parents=True, exist_ok=True)  # a killed removal may have left a part
+            # The subfolder is gone if an earlier process was killed while it removed this build.
+            place.parent.mkdir(parents=True, exist_ok=True)
             os.replace(file, place)
         sync_folder(final)
     else:

@@ -1,4 +1,4 @@
-"""The keys of the section `database`."""
+"""The keys of the section `database` of the configuration."""
 
 from __future__ import annotations
 
@@ -41,7 +41,7 @@ class DatabaseOptions(RowOptions, Merging):
     shards: Annotated[int, Field(gt=0, le=1000)] = Field(
         1,
         description="shards of the database, each made by a job from the rows of some clips; a new clip "
-        "changes only one of them. The order in which training sees the rows depends on their number",
+        "changes only one of them. The order in which training sees the rows depends on the number of shards",
     )
 
     terrain_side: PositiveFloat = Field(25.0, description="cm from the path to the ground heights beside it")

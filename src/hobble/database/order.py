@@ -1,10 +1,10 @@
 """The order in which a pass over the data visits rows and their terrain fits: pure functions of the seed.
 
-A pass has `visits` layers. A layer visits every row once: in layer l, row r has fit number
-picks[r, l % fits of r], where picks is a permutation drawn for each row and pass. So a pass has every
-(frame, fit) pair once (the one fit of a flat row: once in each layer), and no batch has a frame twice.
-Sections cut the sequence of layers into nearly equal parts; with as many sections as visits, a section is a
-layer.
+A pass uses every row `visits` times, so it has `visits` layers. A layer has every row once, with one of the
+row's terrain fits. Each pass permutes the fits of every row anew. In layer l, a row with n fits has the fit
+at place l % n of its permutation. So a pass has each pair of a row and a fit once. Only a row on flat ground
+has a single fit, which comes in every layer. The layers of a pass, one after another, are cut into sections
+of nearly equal length. With `visits` sections, each section is a layer.
 """
 
 from __future__ import annotations
@@ -13,11 +13,15 @@ from collections.abc import Iterator, Sequence
 
 import numpy as np
 
-CHUNKS, ROWS, FITS = 1, 2, 3  # purpose of a generator, so that no two draw the same numbers
+# What random numbers are drawn for. Part of the generator's seed, so that each purpose gets other numbers.
+CHUNKS, ROWS, FITS = 1, 2, 3
 
 
 def generator(seed: int, *purpose: int) -> np.random.Generator:
-    """A generator seeded by the configuration's seed and by its purpose, independent of earlier draws."""
+    """A new random generator, whose numbers depend only on the arguments.
+
+    seed: the seed in the configuration. purpose: CHUNKS, ROWS or FITS, then the numbers of pass, layer etc.
+    """
     return np.random.default_rng([seed, *purpose])
 
 
@@ -26,7 +30,8 @@ def spans(
 ) -> Iterator[tuple[int, int, int]]:
     """The parts of layers that a section consists of: (layer, first place, last place + 1).
 
-    rows: number of rows of a layer. part: (start, stop), to get only these samples of the section.
+    rows: number of rows of a layer. visits: number of layers. section: number of the section, from 0.
+    sections: how many there are. part: (start, stop), to get only these samples of the section; None: all.
     """
     total = rows * visits
     start, stop = total * section // sections, total * (section + 1) // sections
@@ -40,13 +45,13 @@ def spans(
 
 
 def groups(shards: np.ndarray, window: int, seed: int, pass_index: int, layer: int) -> list[np.ndarray]:
-    """Groups of chunks that are read and mixed together, in random order: each twice as large as the one
-    before, up to `window` chunks.
+    """Groups of chunks, in random order. The chunks of a group are read together and their rows are mixed.
 
-    shards: (chunks,) the shard of each chunk. The first group has as many chunks as there are shards. Each
-    group has chunks of all shards in proportion, to within a chunk. So the first rows of a layer are ready
-    soon, and small groups mix as well as large ones, because the rows of a shard were permuted when they were
-    written.
+    shards: (chunks,) the shard of each chunk. window: largest number of chunks of a group. The first group
+    has as many chunks as there are shards, each further group twice as many as the one before, up to
+    `window`. Small groups come first so that the first rows of a layer are ready soon. Their rows are mixed
+    as well as those of large groups: each group has chunks of all shards in proportion, to within a chunk,
+    and the rows of a shard were permuted when they were written.
     """
     draw = generator(seed, CHUNKS, pass_index, layer)
     order = draw.permutation(len(shards))
@@ -64,7 +69,7 @@ def _places(shards: np.ndarray, of_each: np.ndarray, first: np.ndarray) -> np.nd
     """(chunks,) places from 0 to 1 that spread the chunks of each shard evenly.
 
     shards: (chunks,) the shard of each chunk. of_each: (shards,) number of chunks of each shard. first:
-    (shards,) from 0 to 1: the first chunk of a shard with n chunks is at first / n.
+    (shards,) numbers from 0 to 1: the first chunk of a shard with n chunks gets the place first / n.
     """
     number, by_shard = np.empty(len(shards)), np.argsort(shards, kind="stable")
     number[by_shard] = np.arange(len(shards)) - np.repeat(np.cumsum(of_each) - of_each, of_each)
@@ -77,9 +82,9 @@ def row_order(rows: int, seed: int, pass_index: int, layer: int, group: int) -> 
 
 
 def picks(count: np.ndarray, visits: int, seed: int, pass_index: int, layer: int, chunk: int) -> np.ndarray:
-    """(R,) the number of the fit that each of the R rows of a chunk has in this layer.
+    """(R,) which of its fits, numbered from 0, each of the R rows of a chunk has in a layer.
 
-    count: (R,) number of fits of each row, at most `visits`.
+    count: (R,) number of fits of each row, at most `visits`. chunk: number of the chunk.
     """
     if np.all(count <= 1):
         return np.zeros(len(count), np.int64)
@@ -104,16 +109,16 @@ def rows_and_fits(
     count: np.ndarray,
     first: np.ndarray,
     visits: int,
-    place: tuple[int, int, int, int],
+    where: tuple[int, int, int, int],
     part: slice,
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Rows of a group of chunks in the order of a layer, and the fit of each: both (n,).
+    """Indices (n,) of rows of a group of chunks, in the order of a layer, and (n,) of the fit of each row.
 
     chunks: their numbers. rows: number of rows of each chunk. count, first: (R,) number of fits and index of
-    the first fit (`starts`) of each row of the group. place: seed, pass, layer and group. part: the n places
-    of the order to return.
+    the first fit (`starts`) of each row of the group. where: seed, pass, layer and group. part: which n
+    places of the group's order to return.
     """
-    seed, pass_index, layer, group = place
+    seed, pass_index, layer, group = where
     picked = [
         picks(count[end - n : end], visits, seed, pass_index, layer, int(chunk))
         for chunk, n, end in zip(chunks, rows, np.cumsum(rows), strict=True)

@@ -14,8 +14,11 @@ from hobble.rows.clip_rows import ClipRows, Outline, outline
 from hobble.rows.compose import fit_columns, x_columns
 from hobble.rows.layout import RowLayout
 
-BUCKET_BYTES = 64 << 20  # size of a bucket; sorting one needs a few times as much memory
+# Size of a bucket (`hobble.database.buckets`). Sorting a bucket needs a few times as much memory.
+BUCKET_BYTES = 64 << 20
+INDEX_BYTES = 16  # of a row: its number of fits, clip, frame and phase
 
+# The rows of a clip, or the file with them.
 RowSource = ClipRows | str | Path
 
 
@@ -23,10 +26,11 @@ RowSource = ClipRows | str | Path
 class Plan:
     """What a shard will contain.
 
-    layout: of its rows. visits: how often a pass over the data uses each row. clips: for each clip `clip`
-    (its name), `split`, `rows` and `pairs` (of a row and a terrain fit), for a hurt version `source`, its
-    healthy clip, and if only some of its rows are used `every` and `first_row`: every how many rows one is
-    used, and the first. chunk_rows, bucket_rows: number of rows of a chunk and of a bucket.
+    layout: the columns of its rows. skeleton: as plain data. visits: how often a pass over the data uses each
+    row. clips: one entry for each clip: `clip` (its name), `split`, number of used `rows` and of `pairs` (of
+    a row and a terrain fit), and for a hurt version `source`, the healthy clip it was made from. An entry
+    with `every` and `first_row` uses only each `every`-th row from row `first_row` on. chunk_rows,
+    bucket_rows: number of rows of a chunk and of a bucket.
     """
 
     layout: RowLayout
@@ -64,17 +68,17 @@ def make_plan(
 ) -> Plan | None:
     """The plan of a shard with the rows of `clips`; None if there are no clips.
 
-    item: bytes of a number on disk. For the other arguments see `hobble.database.merge.write_database`.
-    Raises InputError if a clip does not fit the others.
+    item: bytes of a number on disk. The other arguments are those of `hobble.database.merge.write_database`.
+    Raises InputError if the rows of a clip have other columns or joints than those of the first clip.
     """
     entries: list[dict[str, Any]] = []
     first: Outline | None = None
     visits, pairs, rows = 1, 0, 0
-    made: Counter[str] = Counter()  # versions of each healthy clip so far: each starts with another row
+    versions: Counter[str] = Counter()  # healthy clip -> number of its hurt versions so far
     for name in sorted(clips):
-        one = outline(clips[name])
-        first = first or one
-        if not fit_together(one, first):
+        current = outline(clips[name])
+        first = first or current
+        if not fit_together(current, first):
             source = clips[name]
             where = name if isinstance(source, ClipRows) else source
             raise InputError(where, f"the layout of its rows differs from that of {min(clips)}")
@@ -82,26 +86,27 @@ def make_plan(
         if name in sources:
             entry["source"] = sources[name]
             if every > 1 and splits[name] == "train":
-                entry |= {"every": every, "first_row": made[sources[name]] % every}
-                made[sources[name]] += 1
-        fits = one.fits[used_rows(entry)]
+                entry |= {"every": every, "first_row": versions[sources[name]] % every}
+                versions[sources[name]] += 1
+        fits = current.fits[used_rows(entry)]
         entries.append(entry | {"rows": len(fits), "pairs": int(fits.sum())})
-        visits = max(visits, one.visits, int(fits.max(initial=1)))
+        visits = max(visits, current.visits, int(fits.max(initial=1)))
         rows, pairs = rows + len(fits), pairs + int(fits.sum())
     if first is None:
         return None
     layout = first.layout.with_channels(channels)
+    # how many numbers a row has, with the mean number of fits
     values = x_columns(layout) + layout.y_size + fit_columns(layout) * pairs / max(rows, 1)
-    chunk_rows = max(1, int(chunk_bytes / (item * values + 16)))
-    each = max(1, int(BUCKET_BYTES / (chunk_rows * 4 * values)))
-    return Plan(layout, first.skeleton, visits, entries, chunk_rows, chunk_rows * each)
+    chunk_rows = max(1, int(chunk_bytes / (item * values + INDEX_BYTES)))
+    bucket_chunks = max(1, int(BUCKET_BYTES / (chunk_rows * 4 * values)))
+    return Plan(layout, first.skeleton, visits, entries, chunk_rows, chunk_rows * bucket_chunks)
 
 
 def used_rows(entry: Mapping[str, Any]) -> slice:
-    """Which rows of a clip are used. entry: the clip's in `Plan.clips`."""
+    """Which rows of a clip are used. entry: the clip's entry in `Plan.clips`."""
     return slice(entry.get("first_row", 0), None, entry.get("every", 1))
 
 
 def fit_together(one: Outline | Plan, other: Outline | Plan) -> bool:
-    """Whether the rows of both have the same columns and joints."""
+    """Whether the rows of `one` and `other` have the same columns and joints."""
     return one.layout == other.layout and list(one.skeleton["joints"]) == list(other.skeleton["joints"])

@@ -1,7 +1,7 @@
 """Types of numbers on disk: float32, or float16 or bfloat16 with half the bytes.
 
-float16 has 11 significant bits and a largest value of 65,504; bfloat16 has 8 bits and the range of float32.
-NumPy has no bfloat16, so it is stored as the upper 16 bits of a float32, in uint16.
+float16 has 11 significant bits and a largest value of 65,504; bfloat16 has 8 significant bits
+and the range of float32. NumPy has no bfloat16, so a bfloat16 is the upper 16 bits of a float32, in uint16.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ STORED: dict[str, np.dtype[Any]] = {
 
 
 def narrow(values: Array, precision: str) -> np.ndarray:
-    """The values in their storage type, rounded to nearest even.
+    """The values in the type that is stored for `precision` (STORED), rounded to nearest even.
 
     Raises HobbleError if a value is too large for float16.
     """

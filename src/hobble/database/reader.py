@@ -1,4 +1,4 @@
-"""Read a database: shuffled, standardised blocks of rows, prefetched, within a memory limit."""
+"""Reads a database as shuffled, standardised blocks of rows, ahead of their use and within a memory limit."""
 
 from __future__ import annotations
 
@@ -25,16 +25,17 @@ from hobble.rows.compose import compose
 from hobble.rows.layout import RowLayout
 
 Item = TypeVar("Item")
+# A window, (n,) indices of rows in it, and (n,) the index of each row's fit.
 Part = tuple[ChunkWindow, np.ndarray, np.ndarray]
-BLOCK_ROWS = 4096
+BLOCK_ROWS = 4096  # rows of a block, unless the caller asks for another number
 BLOCKS = 3  # blocks in memory at a time: one being made, one waiting, one in use
 
 
 class Block(NamedTuple):
     """n rows as a network gets them: x (n, X) and y (n, Y), standardised float32; p (n,) phase 0 to 1.
 
-    They are composed of frame, channels and a terrain fit (`hobble.rows.compose`). clip: (n,) index into
-    `Database.clips`; frame: (n,) frame of the clip at 60 Hz.
+    A row is composed of a frame, the channels and a terrain fit. clip: (n,) index into `Database.clips`;
+    frame: (n,) frame of the clip at 60 Hz.
     """
 
     x: Array
@@ -45,10 +46,10 @@ class Block(NamedTuple):
 
 
 class RawRows(NamedTuple):
-    """n rows before composing, standardised float32: x (n, X without terrain), y (n, Y), p (n,) phase.
+    """n rows without terrain, standardised float32: x (n, X without terrain), y (n, Y), p (n,) phase.
 
-    fits: (m, columns) of all terrain fits of these rows: heights, then the lift in cm (see
-    `hobble.database.standardise`). first: (n,) index of each row's first fit.
+    fits: (m, columns) all terrain fits of these rows: heights, then the lift in cm (by how much the mean
+    height of this fit is above the mean of all fits of the row). first: (n,) index of each row's first fit.
     """
 
     x: Array
@@ -60,7 +61,11 @@ class RawRows(NamedTuple):
 
 @dataclass(frozen=True)
 class Database:
-    """A database opened for reading; see `open`. phase_weight: see `with_phase_weight`."""
+    """A database opened for reading with the method `open`.
+
+    path: its folder. memory_mb: MiB of memory for rows. phase_weight: by how much the standardised change of
+    phase is multiplied.
+    """
 
     path: Path
     manifest: Manifest
@@ -75,8 +80,9 @@ class Database:
     def open(cls, path: str | Path, memory_mb: int = 512) -> Database:
         """Open the database folder `path`.
 
-        memory_mb: memory for rows, for each reader of a section. A database that fits is loaded once; a
-        larger one is read again and again, chunk by chunk. Raises InputError if the database is not complete.
+        memory_mb: MiB of memory for rows, for each section that is being read. A database that fits is loaded
+        once; a larger one is read again and again, chunk by chunk. Raises InputError if the database is not
+        complete.
         """
         path = Path(path)
         manifest = Manifest.load(path)
@@ -84,9 +90,9 @@ class Database:
         return cls(path, manifest, statistics, memory_mb, Shards(path, manifest, statistics))
 
     def with_phase_weight(self, weight: float) -> Database:
-        """The same rows, with the change of phase divided by 1/`weight` of its standard deviation.
+        """The same rows, with the standardised change of phase multiplied by `weight`.
 
-        Its error then counts `weight`^2 times in a mean over the standardised columns.
+        Its squared error then counts `weight`^2 times in a mean over the standardised columns.
         """
         if weight == 1.0:
             return self
@@ -128,7 +134,7 @@ class Database:
         return self.manifest.rows(split)
 
     def samples(self, split: str) -> int:
-        """Number of samples of a pass: the (frame, fit) pairs. That of a flat row counts `visits` times."""
+        """Number of samples of a pass: (frame, fit) pairs. A flat row's one fit counts `visits` times."""
         return self.rows(split) * self.manifest.visits
 
     def section_samples(self, split: str, section: int, sections: int) -> int:
@@ -153,8 +159,9 @@ class Database:
         `visits` times). The blocks depend only on the arguments (and on memory_mb, if the split does not fit
         in memory), not on what was read before. The next block is made in a thread.
 
-        stretch: the part of the section to read; None: all. window: chunks in memory at a time; None: as many
-        as the method `window` says. Raises InputError, which names the file, if a chunk is damaged.
+        section: number of the section, from 0. stretch: the part of the section to read; None: all. window:
+        number of chunks in memory at a time; None: as the method `window` says. Raises InputError, which
+        names the file, if a chunk is damaged.
         """
         if not 0 <= section < sections:
             raise HobbleError(f"there is no section {section} in a pass of {sections}")
@@ -177,8 +184,8 @@ class Database:
         chunks = len(self.manifest.chunks[split])
         window = self.window(split, BLOCK_ROWS)
         if window < chunks:
-            every, buffers = range(chunks), self._buffers(split, window)
-            groups = (every[start : start + window] for start in range(0, chunks, window))
+            numbers, buffers = range(chunks), self._buffers(split, window)
+            groups = (numbers[start : start + window] for start in range(0, chunks, window))
             windows = read_ahead(self.load(split, some, next(buffers)) for some in groups)
         else:
             windows = iter([self._whole(split)] if chunks else [])
@@ -199,14 +206,15 @@ class Database:
         window: int,
         buffers: Iterator[Buffers],
     ) -> Iterator[Part]:
-        """Places start to stop of a layer: windows, the rows to use in order, and the fit of each row.
+        """The rows at places `start` to `stop` - 1 of a layer.
 
-        of: seed, pass and layer. buffers: two. A window is loaded into one of them while the previous window,
-        in the other, is in use. So a window must not be used after the next one is requested.
+        of: seed, pass and layer. window: number of chunks in memory at a time. buffers: two sets of buffers
+        in turn. The next window is loaded into one set while the present one, in the other set, is in use. So
+        do not use a window after requesting the next part.
         """
-        every = range(len(self.manifest.chunks[split]))
-        if window >= len(every):
-            wanted: list[tuple[int, Sequence[int], int, int]] = [(0, every, start, stop)]
+        all_chunks = range(len(self.manifest.chunks[split]))
+        if window >= len(all_chunks):
+            wanted: list[tuple[int, Sequence[int], int, int]] = [(0, all_chunks, start, stop)]
             windows = iter([self._whole(split)])
         else:
             wanted = list(self._wanted(split, of, start, stop, window))
@@ -218,13 +226,13 @@ class Database:
     def _wanted(
         self, split: str, of: tuple[int, int, int], start: int, stop: int, window: int
     ) -> Iterator[tuple[int, Sequence[int], int, int]]:
-        """The groups of chunks that have places start to stop of a layer.
+        """The groups of chunks with the rows at places `start` to `stop` - 1 of a layer.
 
         Yields (number of the group, chunks, first place in the group, last place + 1).
         """
         rows = [chunk.rows for chunk in self.manifest.chunks[split]]
         done = 0
-        for group, some in enumerate(order.groups(self._shards.of[split], window, *of)):
+        for group, some in enumerate(order.groups(self._shards.of_chunks[split], window, *of)):
             n = sum(rows[i] for i in some)
             low, high = max(start - done, 0), min(stop - done, n)
             if low < high:
@@ -232,9 +240,9 @@ class Database:
             done += n
 
     def block_rows(self, batch: int = 1) -> int:
-        """A good length of blocks: about 4,096 rows, or fewer, so that blocks take a quarter of the memory.
+        """A good number of rows for a block: a multiple of `batch`, about 4,096.
 
-        It is a multiple of `batch`.
+        It is lower if the blocks would otherwise take more than a quarter of the memory.
         """
         row = 4 * (self.layout.x_size + self.layout.y_size)
         limit = min(BLOCK_ROWS, (self.memory_mb << 20) // (4 * BLOCKS * row))
@@ -243,8 +251,8 @@ class Database:
     def window(self, split: str, block_rows: int) -> int:
         """How many chunks are in memory at a time: all if both splits fit, else as many as fit twice.
 
-        Twice, because the next window is read while one is in use. At least one. Memory for the blocks is
-        subtracted first.
+        Twice, because the next chunks are read while the present ones are in use. At least one. Memory
+        for the blocks is subtracted first.
         """
         memory = self.memory_mb << 20
         memory -= BLOCKS * block_rows * 4 * (self.layout.x_size + self.layout.y_size)
@@ -258,15 +266,16 @@ class Database:
         return cycle([empty_buffers(self.manifest, split, window) for _ in range(2)])
 
     def _whole(self, split: str) -> ChunkWindow:
+        """All chunks of a split, which are read once."""
         if split not in self._loaded:
-            every = range(len(self.manifest.chunks[split]))
-            self._loaded[split] = self.load(split, every, empty_buffers(self.manifest, split, len(every)))
+            numbers = range(len(self.manifest.chunks[split]))
+            self._loaded[split] = self.load(split, numbers, empty_buffers(self.manifest, split, len(numbers)))
         return self._loaded[split]
 
-    def load(self, split: str, some: Sequence[int], into: Buffers) -> ChunkWindow:
-        """Read chunks of a split into the buffers `into` (`hobble.database.chunk_window.empty_buffers`)."""
+    def load(self, split: str, numbers: Sequence[int], into: Buffers) -> ChunkWindow:
+        """Read the chunks with these numbers of a split into buffers from `empty_buffers`."""
         folder = self.path / self.manifest.folder
-        return load_chunks(folder, self.manifest, split, some, into, self._shards, self._verified)
+        return load_chunks(folder, self.manifest, split, numbers, into, self._shards, self._verified)
 
     def _composed(self, parts: Iterator[Part], total: int, block_rows: int) -> Iterator[Block]:
         """Blocks of `block_rows` rows from parts of any length."""
@@ -285,15 +294,16 @@ class Database:
                     block, filled = self._empty(min(block_rows, total)), 0
 
     def _compose(self, window: ChunkWindow, rows: np.ndarray, fit: np.ndarray, x: Array, y: Array) -> None:
-        """Fill x and y by indexing: 2 million rows a second on one core, with 31 joints."""
+        """Fill x and y with `rows`, each with its `fit`; 2 million rows (31 joints) a second on one core."""
         frames, ground = widen(window.x[rows]), widen(window.fits[fit])
         if window.y.dtype == y.dtype:
-            np.take(window.y, rows, axis=0, out=y, mode="clip")  # other modes make another copy
+            np.take(window.y, rows, axis=0, out=y, mode="clip")  # the default mode makes another copy
         else:
             y[...] = widen(window.y[rows])
         lift = ground[:, -1:].astype(np.float32)
-        some = lift if lift.any() else None
-        compose(self.layout, frames, ground[:, :-1], some, x, y, self.statistics.x_std, self.statistics.y_std)
+        lift_or_none = lift if lift.any() else None
+        stds = self.statistics.x_std, self.statistics.y_std
+        compose(self.layout, frames, ground[:, :-1], lift_or_none, x, y, *stds)
 
     def _empty(self, rows: int) -> Block:
         x = np.empty((rows, self.layout.x_size), np.float32)
@@ -303,10 +313,10 @@ class Database:
 
 def _for_this_process(parts: Iterator[Part], stretch: SampleRange) -> Iterator[Part]:
     """Only the samples of a stretch that this process reads."""
-    at = 0
+    done = 0
     for window, rows, fits in parts:
-        some = stretch.kept(at, len(rows))
-        at += len(rows)
+        some = stretch.kept(done, len(rows))
+        done += len(rows)
         yield window, rows[some], fits[some]
 
 

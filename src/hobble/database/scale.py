@@ -16,21 +16,24 @@ from hobble.database.manifest import SCALES, SPLITS, Manifest
 from hobble.database.precision import narrow, widen
 from hobble.database.statistics import Statistics
 
-PART_ROWS = 256  # rows of half precision that are widened at a time
+PART_ROWS = 256  # so many rows of half precision are converted at a time
 
-Line = tuple[Array, Array]  # factor and summand of each column, float32
+Line = tuple[Array, Array]  # factor and summand of each column, float32: v becomes v * factor + summand
 
 
 @dataclass(frozen=True)
 class Scale:
-    """The conversion of a shard's x, y and fits to the database's: v * factor + summand, by column."""
+    """The conversion of a shard's rows to the statistics of the whole database.
+
+    x, y, fits: factors and summands of the columns of X without terrain, of Y and of the terrain fits.
+    """
 
     x: Line = field(repr=False)
     y: Line = field(repr=False)
     fits: Line = field(repr=False)
 
     def apply(self, x: np.ndarray, y: np.ndarray, fits: np.ndarray, dtype: str) -> None:
-        """Change rows of a chunk in place. dtype: of the database."""
+        """Convert the arrays of a chunk in place. dtype: type of the numbers on disk."""
         for values, line in ((x, self.x), (y, self.y), (fits, self.fits)):
             _apply(values, line, dtype)
 
@@ -47,13 +50,13 @@ def _apply(values: np.ndarray, line: Line, dtype: str) -> None:
 
 
 def _line(mean: Array, std: Array, to_mean: Array, to_std: Array) -> Line:
-    """Converts values standardised by mean and std to values standardised by to_mean and to_std."""
+    """The conversion of values standardised by mean and std to values standardised by to_mean and to_std."""
     factor, summand = np.float64(std) / to_std, (np.float64(mean) - to_mean) / to_std
     return factor.astype(np.float32), summand.astype(np.float32)
 
 
 def scale_to(whole: Statistics, own: Statistics, terrain: slice) -> Scale | None:
-    """The conversion from a shard's statistics (`own`) to the database's; None if they are equal.
+    """The conversion from a shard's statistics (`own`) to those of the database (`whole`); None if equal.
 
     terrain: the terrain columns of X.
     """
@@ -69,8 +72,8 @@ def scale_to(whole: Statistics, own: Statistics, terrain: slice) -> Scale | None
 class Shards:
     """The conversions of all shards of a database.
 
-    scale: the conversion of each shard, or None. first: (shards,) number of each shard's first clip. of:
-    split -> (chunks,) the shard of each chunk.
+    dtype: type of the numbers on disk. scale: the conversion of each shard, or None if it needs none. first:
+    (shards,) number of each shard's first clip. of_chunks: split -> (chunks,) the shard of each chunk.
     """
 
     def __init__(self, path: Path, manifest: Manifest, whole: Statistics) -> None:
@@ -79,14 +82,16 @@ class Shards:
         count, terrain = len(manifest.shards), manifest.layout.x_terrain
         if any(data[name].shape != (count, *values.shape) for name, values in vars(whole).items()):
             raise InputError(path / manifest.folder / SCALES, f"not the scales of {count} shards", fix=HINT)
-        owns = [Statistics(**{name: data[name][n] for name in vars(whole)}) for n in range(count)]
-        self.dtype, self.scale = manifest.dtype, [scale_to(whole, own, terrain) for own in owns]
+        of_shards = [Statistics(**{name: data[name][n] for name in vars(whole)}) for n in range(count)]
+        self.dtype, self.scale = manifest.dtype, [scale_to(whole, own, terrain) for own in of_shards]
         self.first = manifest.first_clip()
-        self.of = {split: manifest.shard_of_chunk(split) for split in SPLITS}
+        self.of_chunks = {split: manifest.shard_of_chunk(split) for split in SPLITS}
 
     def convert(self, split: str, chunk: int, tables: Mapping[str, np.ndarray]) -> None:
-        """Convert the arrays of a chunk, as read from its shard, to rows of the whole database, in place."""
-        shard = self.of[split][chunk]
+        """Convert the arrays of a chunk in place: its rows to the statistics of the whole database, its clip
+        numbers from those of its shard to those of the database.
+        """
+        shard = self.of_chunks[split][chunk]
         if (scale := self.scale[shard]) is not None:
             scale.apply(tables["x"], tables["y"], tables["fits"], self.dtype)
         tables["clip"][...] += np.int32(self.first[shard])

@@ -16,14 +16,14 @@ from hobble.rows.clip_rows import ClipRows, load_clip_rows
 from hobble.rows.compose import fit_columns, frame_inputs, x_columns
 from hobble.rows.layout import RowLayout
 
-PART_ROWS = 8192  # rows of a clip that are scattered at a time
+PART_ROWS = 8192  # so many rows of a clip are scattered at a time
 
 
 def make_buckets(folder: Path, plan: Plan) -> dict[str, Buckets]:
-    """Buckets for each split."""
-    columns, of_fits = x_columns(plan.layout) + plan.layout.y_size, fit_columns(plan.layout)
+    """Empty buckets for each split, in subfolders of `folder`."""
+    columns, fit_size = x_columns(plan.layout) + plan.layout.y_size, fit_columns(plan.layout)
     return {
-        split: Buckets(folder / f"buckets-{split}", plan.rows(split), plan.bucket_rows, columns, of_fits)
+        split: Buckets(folder / f"buckets-{split}", plan.rows(split), plan.bucket_rows, columns, fit_size)
         for split in SPLITS
     }
 
@@ -33,9 +33,8 @@ def scatter(
 ) -> Iterator[tuple[dict[str, Any], ClipRows, ClipRows]]:
     """Put the used rows of each clip into the buckets of its split.
 
-    Yields, clip by clip, its entry in the plan, all its rows, and its used rows.
-
-    One permutation of all rows of a split determines the place of each row.
+    A permutation of all rows of a split gives each row its place in the final order. Yields for each clip its
+    entry in the plan, all its rows, and its used rows.
     """
     places = {
         split: np.random.default_rng([seed, number]).permutation(plan.rows(split))
@@ -60,7 +59,11 @@ def scatter(
 
 
 def _tables(clip: ClipRows, part: slice, layout: RowLayout) -> tuple[Array, Array]:
-    """The frames and fits of a part of a clip's rows, raw."""
+    """Arrays of some rows for `Buckets.add`, not standardised.
+
+    The frames (n, columns) have the columns of X without terrain, then those of Y. The fits have the ground
+    heights, then their mean.
+    """
     values = {name: clip.channels[name][part] for name, _ in layout.channels}
     frames = np.concatenate([frame_inputs(layout, clip.x[part], values), clip.y[part]], axis=1)
     first = clip.first_fit[part]

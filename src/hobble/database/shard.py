@@ -1,8 +1,9 @@
-"""A shard: the rows of some clips of a database, shuffled and in chunks. Its job reads only these clips.
+"""A shard: the rows of some clips of a database, shuffled and in chunks.
 
-Its rows are standardised by its own statistics, so that half precision stores them well. The reader converts
-them to the statistics of the whole database (`hobble.database.scale`). The clip of a row is a number among
-the clips of the shard. So a shard stays the same to the byte when another shard changes.
+The job that makes a shard reads only its clips. The rows are standardised by the shard's own statistics, so
+that half precision stores them well. The reader converts them to the statistics of the whole database
+(`hobble.database.scale`). A shard numbers its own clips from 0. So it stays the same to the byte when another
+shard changes.
 """
 
 from __future__ import annotations
@@ -26,9 +27,10 @@ from hobble.database.scatter import make_buckets, scatter
 from hobble.database.statistics import Moments, Statistics, clip_moments, statistics_of_moments, unseen_joints
 from hobble.database.write_in_order import write_chunks
 
-CHUNK_BYTES = 4 << 20  # read in one go: large enough to be fast on any disk, small enough for any memory
-INDEX, MOMENTS, SCALE = "shard.json", "moments.npz", "scale.npz"
-Sums = tuple[Moments, Moments]  # of X and of Y
+# Size of a chunk, which is read in one go: fast on any disk, and small enough for any memory.
+CHUNK_BYTES = 4 << 20
+INDEX, MOMENTS, SCALE = "shard.json", "moments.npz", "scale.npz"  # names of a shard's files
+Sums = tuple[Moments, Moments]  # of the columns of X, and of Y
 
 
 def write_shard(
@@ -44,14 +46,14 @@ def write_shard(
     seed: int = 1,
     chunk_bytes: int = CHUNK_BYTES,
 ) -> None:
-    """Write the shard of `clips` to `folder`. For the arguments see `hobble.database.merge.write_database`.
+    """Write the shard of `clips` to `folder`. Arguments as in `hobble.database.merge.write_database`.
 
-    There may be no clips, or none with rows. Raises InputError if a clip does not fit the others, HobbleError
-    if the disk is full.
+    There may be no clips, or none with rows. Raises InputError if the rows of the clips differ in columns or
+    joints, HobbleError if the disk is full.
     """
     plan = make_plan(clips, splits, channels, STORED[dtype].itemsize, chunk_bytes, sources or {}, every)
     try:
-        for split in SPLITS:  # a chunk may be linked from a database, so it is deleted and not overwritten
+        for split in SPLITS:  # delete chunks, do not overwrite them: a database may have hard links to them
             shutil.rmtree(folder / split, ignore_errors=True)
         folder.mkdir(parents=True, exist_ok=True)
         if plan is None:
@@ -63,24 +65,25 @@ def write_shard(
         learners = limit_learners(plan.layout, plan.skeleton)
         for entry, clip, used in scatter(buckets, clips, plan, seed):
             sums[entry["split"]] = add(sums[entry["split"]], clip_moments(used, plan.layout))
-            if entry["split"] == "train":  # speeds are means over whole cycles
+            if entry["split"] == "train":  # also rows left out of training: speeds are means of cycles
                 add_rows(learners, clip, (sources or {}).get(entry["clip"]))
-        own = sums["train"] if sums["train"][0].weight else sums["held_out"]
-        scale = statistics_of(plan, own, joint_weight)
+        # A shard with held-out rows only is standardised by these.
+        of_rows = sums["train"] if sums["train"][0].weight else sums["held_out"]
+        scale = statistics_of(plan, of_rows, joint_weight)
         chunks = {
             split: list(write_chunks(folder, split, buckets[split], plan, scale, dtype)) for split in SPLITS
         }
         for split in SPLITS:
             buckets[split].folder.rmdir()
         _save(folder, plan, sums["train"], scale, learners)
-        of_split = {split: [asdict(chunk) for chunk in found] for split, found in chunks.items()}
+        of_split = {split: [asdict(chunk) for chunk in some] for split, some in chunks.items()}
         write_json(folder / INDEX, {"plan": plan.to_dict(), "chunks": of_split})
     except OSError as error:
         raise write_error(error, folder) from error
 
 
 def add(one: Sums, other: Sums) -> Sums:
-    """The moments of both sets of rows together."""
+    """The moments of two sets of rows together."""
     return one[0] + other[0], one[1] + other[1]
 
 
@@ -92,7 +95,11 @@ def statistics_of(plan: Plan, sums: Sums, joint_weight: float) -> Statistics:
 def _save(
     folder: Path, plan: Plan, sums: Sums, scale: Statistics, learners: Mapping[str, LimitLearner]
 ) -> None:
-    """Save moments (weight (2,); mean and squares as x (2, X), y (2, Y)), statistics and speeds of clips."""
+    """Save the moments of the training rows, the statistics, and the speeds of the training clips.
+
+    Arrays of the moments: weight (2,) of X and of Y; x (2, X) and y (2, Y), first the mean,
+    then the sum of squared deviations from it.
+    """
     x, y = ((one.mean, one.squares) for one in sums)
     save_npz(folder / MOMENTS, weight=np.array([one.weight for one in sums]), x=np.array(x), y=np.array(y))
     save_npz(folder / SCALE, **vars(scale))
@@ -107,7 +114,7 @@ def _save(
 
 @dataclass(frozen=True)
 class Shard:
-    """A shard in its folder: its plan, and the chunks of each split."""
+    """A shard: its folder, its plan, and for each split its chunks."""
 
     folder: Path
     plan: Plan
@@ -126,17 +133,17 @@ class Shard:
             raise InputError(folder / INDEX, f"not a shard of a database ({error})", fix=HINT) from error
 
     def sums(self) -> Sums:
-        """The moments of its training rows."""
+        """The moments of the shard's training rows."""
         data = load_npz(self.folder / MOMENTS)
         x, y = (Moments(float(w), *data[name]) for w, name in zip(data["weight"], "xy", strict=True))
         return x, y
 
     def scale(self) -> Statistics:
-        """The statistics by which its rows are standardised."""
+        """The statistics by which the shard's rows are standardised."""
         return Statistics(**load_npz(self.folder / SCALE))
 
     def add_speeds(self, learners: Mapping[str, LimitLearner]) -> None:
-        """Add the speeds of its training clips to the learners of the channels."""
+        """Add the speeds of the shard's training clips to the learners of the channels."""
         for channel, learner in learners.items():
             data = load_npz(self.folder / f"pace-{channel}.npz")
             cycles: dict[int, dict[str, np.ndarray]] = {}

@@ -1,8 +1,8 @@
 """How processes share a section of a pass: which samples each one reads, batch by batch.
 
 The samples of a section have a fixed order, which is cut into consecutive stretches. Each batch takes an
-equal share of every stretch. With one stretch, batches are consecutive samples. A process owns some places of
-each batch, the same ones in all batches, and reads only the stretches that fill them. So the content of a
+equal share of every stretch. With one stretch, batches are consecutive samples. Each process fills certain
+places of a batch, the same in all batches, and reads only the stretches that fill them. So the content of a
 batch depends on the number of stretches, but not on the number of processes.
 """
 
@@ -19,7 +19,8 @@ import numpy as np
 class SampleRange:
     """A stretch: samples `start` to `stop` - 1 of a section; each batch gets `share` of them.
 
-    low, high: this process reads samples low to high - 1 of each `share` samples; others read the rest.
+    low, high: of the `share` samples of a batch, numbered from 0, this process reads low to high - 1; other
+    processes read the rest.
     """
 
     start: int
@@ -35,7 +36,10 @@ class SampleRange:
         return full * (self.high - self.low) + max(0, min(rest, self.high) - self.low)
 
     def kept(self, at: int, count: int) -> np.ndarray | slice:
-        """Which of `count` samples, from number `at` of the stretch on, this process reads."""
+        """Which samples this process reads, of the `count` samples from number `at` of the stretch on.
+
+        A mask (count,), or slice(None) for all.
+        """
         if self.high - self.low == self.share:
             return slice(None)
         place = (at + np.arange(count)) % self.share
@@ -46,7 +50,7 @@ class SampleRange:
 class PassSharing:
     """A section of `total` samples in batches of `batch`, as one process sees it.
 
-    stretches: their number, at most `batch`. own: the places in a batch, from 0, that this process fills.
+    stretches: number of stretches, at most `batch`. own: the places in a batch, from 0, that it fills.
     """
 
     total: int
@@ -58,7 +62,7 @@ class PassSharing:
     def of(cls, total: int, batch: int, stretches: int = 1, rank: int = 0, processes: int = 1) -> PassSharing:
         """The sharing as process `rank` (from 0) of `processes` sees it.
 
-        Their parts of a batch differ by 1 at most.
+        The processes read equal parts of a batch, to within one sample.
         """
         return cls(total, batch, stretches, own_places(batch, rank, processes))
 
@@ -72,13 +76,13 @@ class PassSharing:
         """The stretches that fill the process's places, in the order of the places."""
         full, rest = divmod(self.total, self.batch)
         edges = [self.batch * s // self.stretches for s in range(self.stretches + 1)]
-        found = []
+        ranges = []
         for first, end in pairwise(edges):
             low, high = (min(max(place, first), end) - first for place in (self.own.start, self.own.stop))
             if low < high:
                 start, stop = (full * edge + min(rest, edge) for edge in (first, end))
-                found.append(SampleRange(start, stop, end - first, low, high))
-        return found
+                ranges.append(SampleRange(start, stop, end - first, low, high))
+        return ranges
 
 
 def own_places(batch: int, rank: int, processes: int) -> range:

@@ -1,25 +1,31 @@
-"""Size of a database, compared with the original's layout, and scaled to the original's data."""
+"""Size of a database, and of the same data in the layout of Holden et al. (2017).
+
+Also estimates the size of a database of the clips that Holden et al. released.
+"""
 
 from __future__ import annotations
 
 from typing import TypedDict
 
 from hobble.database.manifest import Manifest
+from hobble.database.plan import INDEX_BYTES
 from hobble.database.precision import STORED
 from hobble.rows.compose import fit_columns, x_columns
 
-RELEASED_FRAMES = 465_990  # at 60 Hz, mirrors included, in the released clips of Holden, Komura, Saito (2017)
+# Number of frames at 60 Hz, mirrored ones included, in the clips released with Holden, Komura, Saito (2017).
+RELEASED_FRAMES = 465_990
 RELEASED_FLAT = 0.479  # share of these frames on flat ground: they have one terrain fit, the others ten
-INDEX_BYTES = 16  # bytes of a row besides its floats: count of fits, clip, frame, phase
 
 
 class Sizes(TypedDict):
     """Sizes of a database.
 
-    frames, pairs: numbers in both splits; a pass over the data has every pair once. bytes: of all chunks.
-    original_bytes: the same pairs as rows of X, Y and P in float32. share: bytes / original_bytes.
-    bytes_a_frame: bytes of a frame with its terrain fits. released_frames, released_bytes: number of frames
-    of the released clips, and their size in this layout and type.
+    joints: number of joints. dtype: type of the numbers on disk. frames: number of frames in both splits
+    together. pairs: number of (frame, terrain fit) pairs of a pass over these frames; a frame on flat ground
+    has its only fit several times. bytes: size of all chunks. original_bytes: size of the pairs as rows of X,
+    Y and P in float32. share: bytes / original_bytes. bytes_a_frame: bytes of a frame with its terrain fits.
+    released_frames, released_bytes: number of frames of the released clips, and their size with this layout
+    and type.
     """
 
     joints: int
@@ -38,9 +44,9 @@ def sizes(manifest: Manifest) -> Sizes:
     """The sizes of a database."""
     frames = sum(manifest.rows(split) for split in manifest.chunks)
     layout, item = manifest.layout, STORED[manifest.dtype].itemsize
-    a_frame = item * (x_columns(layout) + layout.y_size) + INDEX_BYTES
+    frame_bytes = item * (x_columns(layout) + layout.y_size) + INDEX_BYTES
     fits = RELEASED_FLAT + (1 - RELEASED_FLAT) * manifest.visits
-    released = RELEASED_FRAMES * (a_frame + fits * item * fit_columns(layout))
+    released = RELEASED_FRAMES * (frame_bytes + fits * item * fit_columns(layout))
     return {
         "joints": layout.joints,
         "dtype": manifest.dtype,

@@ -1,4 +1,4 @@
-"""Standardise raw rows for a database, so that composing them later is cheap."""
+"""Standardises raw rows for a database so that the reader can add a terrain fit to each at little cost."""
 
 from __future__ import annotations
 
@@ -15,10 +15,11 @@ def standardise_rows(
 ) -> tuple[Array, Array, Array]:
     """Standardised x, y and fits from raw ones.
 
-    x: (R, x columns) X without the terrain. y: (R, Y). fits: (S, fit columns) heights, then their mean, which
-    is to be subtracted from joint heights. count: (R,) number of fits of each row. In the result, the mean
-    over all fits of a row is subtracted from its joint heights. A fit's last column, the lift (cm), is the
-    fit's mean minus that mean over all fits. It is a small number, which half precision stores well.
+    x: (R, columns of X without terrain). y: (R, Y). fits: (S, columns of a terrain fit) ground heights, then
+    the mean height that has to be subtracted from the joint heights of the row. count: (R,) number of fits of
+    each row. In the result, the average of this mean over all fits of a row is subtracted from the row's
+    joint heights. The last column of a fit, its lift (cm), is what remains to be subtracted: the fit's mean
+    minus the average. This is a small number, which half precision stores well.
     """
     s, terrain = statistics, layout.x_terrain
     of_row = np.repeat(np.arange(len(count)), count)

@@ -1,4 +1,7 @@
-"""Means and standard deviations over every (frame, fit) pair, in one pass, without expanding the pairs."""
+"""Means and standard deviations over all pairs of a frame and a terrain fit, without storing the pairs.
+
+Below, a deviation is a standard deviation.
+"""
 
 from __future__ import annotations
 
@@ -15,20 +18,24 @@ from hobble.rows.clip_rows import ClipRows
 from hobble.rows.compose import TERRAIN, body_layout
 from hobble.rows.layout import RowLayout
 
-UNSEEN = 1e-10  # weight of a joint left out of the input, as in the original
-BATCH = 2048  # rows held in float64 at a time
+UNSEEN = 1e-10  # input weight of a joint that the network shall not see, as in Holden et al. (2017)
+BATCH = 2048  # so many rows of a clip are converted to float64 at a time
 
 
 @dataclass(frozen=True)
 class Moments:
-    """Weight, mean and sum of weighted squared deviations, (C,) each, of the rows so far; C columns."""
+    """Moments of rows with C columns.
+
+    weight: sum of the rows' weights. mean: (C,) weighted mean. squares: (C,) weighted sum of squared
+    differences from the mean.
+    """
 
     weight: float
     mean: Array = field(repr=False)
     squares: Array = field(repr=False)
 
     def __add__(self, other: Moments) -> Moments:
-        """The moments of both sets together (Chan, Golub, LeVeque, Updating formulae, 1979)."""
+        """The moments of two sets of rows together (Chan, Golub, LeVeque, Updating formulae, 1979)."""
         weight = self.weight + other.weight
         if weight == 0:
             return self
@@ -63,14 +70,17 @@ class Moments:
             return cls.nothing(values.shape[1])
         w = np.ones((len(values), 1)) if weights is None else np.asarray(weights, np.float64)[:, None]
         total = float(w.sum())
-        # Sums, not matrix products: the last bits of those depend on the arrays' memory addresses.
+        # Sums, not matrix products: the last bits of a product depend on the arrays' memory addresses.
         mean = (w * values).sum(axis=0) / total
         return cls(total, mean, (w * (values - mean) ** 2).sum(axis=0))
 
 
 @dataclass(frozen=True)
 class Statistics:
-    """float32 x_mean, x_std (X,), y_mean, y_std (Y,): rows are standardised by them. No deviation is 0."""
+    """The means and deviations by which rows are standardised, float32. No deviation is 0.
+
+    x_mean, x_std: (X,). y_mean, y_std: (Y,).
+    """
 
     x_mean: Array = field(repr=False)
     x_std: Array = field(repr=False)
@@ -81,7 +91,8 @@ class Statistics:
 def clip_moments(rows: ClipRows, layout: RowLayout) -> tuple[Moments, Moments]:
     """Moments of X and of Y over the clip's (frame, fit) pairs, with columns as in `layout`.
 
-    Each row has weight 1, shared equally by its fits. So the one fit of a flat cycle counts as much as ten.
+    Each row has weight 1, shared equally by its fits. So the one fit of a flat row counts as much as the ten
+    fits of another row together.
     """
     body = body_layout(layout)
     x, y = Moments.nothing(layout.x_size), Moments.nothing(layout.y_size)
@@ -105,10 +116,12 @@ def clip_moments(rows: ClipRows, layout: RowLayout) -> tuple[Moments, Moments]:
 
 
 def _lowered(values: Array, joints: slice, row_mean: Array, spread: float) -> Moments:
-    """Moments of values after each fit's mean height is subtracted from the joint heights.
+    """Moments of the pairs of R rows and their fits, with a fit's mean height subtracted from joint heights.
 
-    By the law of total variance: the variance between rows (of the mean over a row's fits) plus the variance
-    within rows.
+    values: (R, C) the rows without this subtraction. joints: columns of joint positions. row_mean: (R,) for
+    each row, the average over its fits of their mean heights. spread: weighted sum of the squared differences
+    between the mean heights of fits and the `row_mean` of their rows. By the law of total variance, `spread`
+    is added to the squares of the rows after `row_mean` is subtracted.
     """
     values = values.astype(np.float64)
     heights = slice(joints.start + 1, joints.stop, 3)
@@ -119,14 +132,14 @@ def _lowered(values: Array, joints: slice, row_mean: Array, spread: float) -> Mo
 
 
 def _joined(*parts: Moments) -> Moments:
-    """Moments of columns side by side, all of the same rows."""
+    """Moments of the same rows with the columns of all parts, side by side."""
     mean = np.concatenate([part.mean for part in parts])
     return Moments(parts[0].weight, mean, np.concatenate([part.squares for part in parts]))
 
 
 def x_groups(layout: RowLayout) -> list[slice]:
-    """Groups of columns of X that share the mean of their deviations, as in the original; no channels."""
-    half = layout.samples
+    """Groups of columns of X without channels. A group shares one deviation, as in Holden et al. (2017)."""
+    half = layout.samples  # a trajectory block has so many columns of x, then as many of z
     split = [
         slice(start, start + half)
         for block in (layout.x_position, layout.x_direction)
@@ -136,12 +149,12 @@ def x_groups(layout: RowLayout) -> list[slice]:
 
 
 def y_groups(layout: RowLayout) -> list[slice]:
-    """Groups of columns of Y that share the mean of their deviations: the layout's blocks."""
+    """Groups of columns of Y: the layout's blocks. The columns of a group share one deviation."""
     return list(layout.blocks("y").values())
 
 
 def grouped(std: Array, groups: Iterable[slice], constant: float) -> Array:
-    """(C,) the mean deviation of each column's group, or `constant` if the group never varies."""
+    """(C,) for each column the mean of `std` (C,) over its group, or `constant` if the group never varies."""
     out = np.array(std, np.float64)
     for group in groups:
         mean = float(np.mean(std[group]))
@@ -152,15 +165,16 @@ def grouped(std: Array, groups: Iterable[slice], constant: float) -> Array:
 def statistics_of_moments(
     layout: RowLayout, x: Moments, y: Moments, joint_weight: float, unseen: Sequence[int]
 ) -> Statistics:
-    """Means, and deviations that are shared within groups (`x_groups`, `y_groups`).
+    """Means, and deviations that are shared within groups of columns (`x_groups`, `y_groups`).
 
-    The deviation of a joint's inputs is divided by w * joint_weight, where w is 1e-10 if the joint is left
-    out of the input (`unseen`), else 1. Each channel defines the deviations of its own columns.
+    The deviation of a joint's inputs is divided by w * joint_weight, where w is 1e-10 if the joint is one of
+    `unseen`, which the network shall not see, else 1. Each channel defines the deviations of its own columns.
     """
     x_std = grouped(x.std, x_groups(layout), SILENT)
     w = np.ones(layout.joints)
     w[list(unseen)] = UNSEEN
     for block in (layout.x_joint_position, layout.x_joint_velocity):
+        # at most 1e30, to stay finite in float32
         x_std[block] = np.minimum(x_std[block] / np.repeat(w * joint_weight, 3), 1e30)
     for name, _ in layout.channels:
         block = layout.x_channel(name)
@@ -171,6 +185,6 @@ def statistics_of_moments(
 
 
 def unseen_joints(skeleton: Mapping[str, Any]) -> list[int]:
-    """Indices of the skeleton's joints that are left out of the network's input."""
+    """Indices of the skeleton's joints that the network shall not see in its input."""
     joints = list(skeleton["joints"])
     return [joints.index(name) for name in skeleton.get("unseen", ())]

@@ -1,4 +1,4 @@
-"""Second step of the shuffle: sort the rows of each bucket, standardise them and write chunks."""
+"""Second step of the shuffle: bring each bucket's rows into random order, standardise them, write chunks."""
 
 from __future__ import annotations
 
@@ -19,9 +19,13 @@ from hobble.rows.compose import x_columns
 def write_chunks(
     work: Path, split: str, buckets: Buckets, plan: Plan, statistics: Statistics, dtype: str
 ) -> Iterator[Chunk]:
-    """Write each bucket, sorted and standardised, as chunks of `plan.chunk_rows` rows to folder `work`."""
+    """Write the standardised rows to folder `work`. A chunk has up to `plan.chunk_rows` rows of one bucket.
+
+    split: "train" or "held_out", the folder of the chunks. dtype: type of the stored numbers. Yields a
+    description of each chunk.
+    """
     columns, number = x_columns(plan.layout), 0
-    for frames, fits, index in buckets.drain():
+    for frames, fits, index in buckets.drain():  # already in the final, random order
         ends = np.cumsum(index["count"])
         for start in range(0, len(index), plan.chunk_rows):
             part = slice(start, min(start + plan.chunk_rows, len(index)))

@@ -17,11 +17,11 @@ from hobble.rows.layout import GAITS
 class Captured:
     """F consecutive frames of a clip.
 
-    local: (F, J, 3) joint positions in root coordinates, heights above the ground, cm. contacts: (F, 4).
-    phase: (F,). channels: name -> (F, columns). gait: (F, 6) shares. velocity: (F, 2) of the root in root
-    coordinates, cm per frame. root: (F, 3) position on the ground in cm; the first is the origin.
-    acceleration: (F,) the largest of any joint, cm per frame squared, 0 in the first frame. rows: (F,) index
-    of each frame's row in `ClipRows`.
+    local: (F, J, 3) joint positions in root coordinates, heights above the ground, cm. contacts: (F, 4) of
+    left heel, left toe, right heel, right toe. phase: (F,). channels: name -> (F, columns). gait: (F, 6)
+    share of each of the GAITS. velocity: (F, 2) of the root in root coordinates, cm per frame. root: (F, 3)
+    position on the ground in cm; the first is the origin. acceleration: (F,) the largest of any joint, cm per
+    frame squared, 0 in the first frame. rows: (F,) index of each frame's row among the rows of the clip.
     """
 
     clip: str
@@ -40,7 +40,9 @@ class Captured:
 
 
 def unbroken(frame: np.ndarray) -> list[np.ndarray]:
-    """Row indices of each stretch of consecutive frames. A frame that two cycles share counts once.
+    """Row indices of each stretch of consecutive frames. frame: (R,) frame of each row.
+
+    The frame between two cycles has a row in each of them; only the first of these rows counts.
 
     >>> [run.tolist() for run in unbroken(np.array([3, 4, 7, 8, 8, 9]))]
     [[0, 1], [2, 3, 5]]
@@ -52,9 +54,9 @@ def unbroken(frame: np.ndarray) -> list[np.ndarray]:
 
 
 def captured(rows: ClipRows) -> Iterator[Captured]:
-    """The unbroken stretches of a clip's rows, with the first terrain fit of each row."""
+    """The unbroken stretches of a clip's rows. Heights are above the first terrain fit of each row."""
     layout = rows.layout
-    for chosen in unbroken(rows.frame):
+    for chosen in unbroken(rows.frame):  # indices of rows
         y = rows.y[chosen].astype(float)
         lower_joints(y, layout.y_joint_position, rows.mean[rows.first_fit[chosen]][:, None])
         local = y[:, layout.y_joint_position].reshape(len(chosen), -1, 3)
@@ -75,15 +77,15 @@ def captured(rows: ClipRows) -> Iterator[Captured]:
 
 
 def headings(turn: Array) -> Array:
-    """(F,) yaw of a root, starting at 0. turn: (F,) minus the root's change of yaw in each frame, radians."""
+    """(F,) yaw of a root, starting at 0, radians. turn: (F,) change of yaw in each frame, negated."""
     return np.concatenate([[0.0], -np.cumsum(turn)[:-1]])
 
 
 def root_path(velocity: Array, turn: Array) -> Array:
-    """(F, 3) path of a root from its velocity (F, 2) in root coordinates and turn (F,); see `headings`."""
-    steps = rotate_by_yaw(velocity, headings(turn))
+    """(F, 3) path of a root. velocity: (F, 2) in root coordinates. turn: (F,) as for `headings`."""
+    world_velocity = rotate_by_yaw(velocity, headings(turn))
     out = np.zeros((len(turn), 3))
-    out[1:, ::2] = np.cumsum(steps, axis=0)[:-1]
+    out[1:, ::2] = np.cumsum(world_velocity, axis=0)[:-1]
     return out
 
 
@@ -95,11 +97,11 @@ def rotate_by_yaw(vectors: Array, yaw: Array) -> Array:
 
 
 def _accelerations(velocity: Array, turn: Array) -> Array:
-    """(F,) largest change of any joint's velocity.
+    """(F,) largest change of any joint's velocity since the frame before, cm per frame squared.
 
-    velocity: (F, J, 3) in the root coordinates of each frame. turn: as in `headings`.
+    velocity: (F, J, 3) in the root coordinates of each frame. turn: (F,) as for `headings`.
     """
-    carried = velocity[:-1].copy()
-    carried[..., ::2] = rotate_by_yaw(velocity[:-1, :, ::2], turn[:-1, None])
-    change = np.linalg.norm(velocity[1:] - carried, axis=-1)
+    before = velocity[:-1].copy()  # in the root coordinates of the next frame
+    before[..., ::2] = rotate_by_yaw(velocity[:-1, :, ::2], turn[:-1, None])
+    change = np.linalg.norm(velocity[1:] - before, axis=-1)
     return np.concatenate([[0.0], change.max(axis=1)]) if len(velocity) else np.zeros(0)

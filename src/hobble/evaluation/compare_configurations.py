@@ -1,8 +1,8 @@
-"""Compares any number of configurations with each other and with published figures.
+"""Compares any number of configurations with each other and with published results.
 
-It calls the module `comparison.py` of each measurement. The module may have these functions:
+Each measurement may have a module `comparison.py` with these functions:
 
-- `compared(all_measured, published) -> SideBySide`: what it adds to compare.json (see `comparison_rows`),
+- `compared(all_measured, published) -> SideBySide`: what the measurement adds to compare.json,
 - `tables(compared) -> Mapping[str, Sequence[Row]]`: name -> rows of a CSV table with the same data.
 """
 
@@ -21,48 +21,51 @@ from hobble.models import network_options
 def compare(all_measured: Sequence[ConfigurationResults], published: Json) -> Json:
     """The content of compare.json. Configurations are in the order of `all_measured`.
 
-    `configurations`: how they differ. `training`: their histories. `stages`: time, memory and size of their
-    stages. The name of each measurement: its results. `difference`: of each pair (eq. 3.2 of Segerstedt
-    2021). `against_published`: published figures next to ours. `published`: all published figures.
-    `milliseconds`: what was measured with a clock, with its own `difference` and `against_published`.
+    `configurations`: a description of each. `training`: the history of each training. `stages`: time, memory
+    and size of each stage of the workflow. Under the name of each measurement: its results. `difference`: how
+    much each two configurations differ (eq. 3.2 of Segerstedt 2021). `against_published`: published numbers
+    next to ours. `published`: all published numbers. `milliseconds`: what was measured with a clock, with its
+    own `difference` and `against_published`.
     """
-    found = {name: put_together(all_measured, published) for name, put_together in each("compared")}
+    by_measure = {
+        name: compared(all_measured, published) for name, compared in comparison_functions("compared")
+    }
     times = SideBySide(milliseconds={"against_published": stage_times(all_measured, published)})
-    everything = [*found.values(), times]
-    clocked = dict.fromkeys(kind for one in everything for kind in one.milliseconds)
+    everything = [*by_measure.values(), times]
+    clocked = dict.fromkeys(key for added in everything for key in added.milliseconds)
     return {
-        "configurations": [describe(m, found.values()) for m in all_measured],
-        **{name: list(one.entries) for name, one in found.items()},
+        "configurations": [describe(m, by_measure.values()) for m in all_measured],
+        **{name: list(added.entries) for name, added in by_measure.items()},
         "training": [{"configuration": m.name, **m.history} for m in all_measured],
         "stages": [
             {"configuration": m.name, **{k: v for k, v in stage.items() if k != "rules"}}
             for m in all_measured
             for stage in m.pipeline["stages"]
         ],
-        "difference": [row for one in found.values() for row in one.differences],
+        "difference": [row for added in by_measure.values() for row in added.differences],
         "against_published": [
-            *(row for one in found.values() for row in one.against_published),
+            *(row for added in by_measure.values() for row in added.against_published),
             *stage_sizes(all_measured, published),
         ],
         "milliseconds": {
-            kind: [row for one in everything for row in one.milliseconds.get(kind, ())] for kind in clocked
+            key: [row for added in everything for row in added.milliseconds.get(key, ())] for key in clocked
         },
         "published": dict(published),
     }
 
 
-def each(function: str) -> Iterator[tuple[str, Callable[..., Any]]]:
-    """Yield the name and the function of each measurement whose `comparison.py` has this function."""
-    for one in MEASURES:
-        if (found := getattr(one.part("comparison"), function, None)) is not None:
-            yield one.name, found
+def comparison_functions(name: str) -> Iterator[tuple[str, Callable[..., Any]]]:
+    """(name of the measurement, function `name` of its `comparison.py`) for each measurement that has it."""
+    for measure in MEASURES:
+        if (function := getattr(measure.part("comparison"), name, None)) is not None:
+            yield measure.name, function
 
 
-def describe(measured: ConfigurationResults, found: Iterable[SideBySide]) -> Json:
-    """A description of a configuration: data set, network, training, and what the measurements add to it."""
+def describe(measured: ConfigurationResults, additions: Iterable[SideBySide]) -> Json:
+    """A description of a configuration: data set, network, training, and the `additions` of measurements."""
     model = measured.resolved["configuration"]
     hidden = network_options(model["network"]).hidden
-    about = {key: value for one in found for key, value in one.about.get(measured.name, {}).items()}
+    about = {key: value for added in additions for key, value in added.about.get(measured.name, {}).items()}
     return {
         "configuration": measured.name,
         "dataset": measured.dataset,
@@ -70,7 +73,7 @@ def describe(measured: ConfigurationResults, found: Iterable[SideBySide]) -> Jso
         "channels": list(model.get("channels") or ()),
         "hidden_layers": len(hidden) or None,
         "units": max(hidden, default=None),
-        # Motion matching has no layers and is not trained, even if the section `training` says passes.
+        # Motion matching has no layers and is not trained, even if the section `training` has passes.
         "passes": model["training"]["passes"] if hidden else None,
         **about,
     }
@@ -78,10 +81,10 @@ def describe(measured: ConfigurationResults, found: Iterable[SideBySide]) -> Jso
 
 def stage_sizes(all_measured: Sequence[ConfigurationResults], published: Json) -> list[PublishedRow]:
     """Published sizes of the database and of the terrain patches, next to ours."""
-    found = {m.name: m for m in all_measured}
+    by_name = {m.name: m for m in all_measured}
     out = []
     for row in published["stages"]:
-        m = found.get(row["configuration"])
+        m = by_name.get(row["configuration"])
         if row["stage"] == "database":
             database = m.pipeline.get("database") if m else None
             ours: float | None = database["bytes"] if database else None
@@ -94,10 +97,10 @@ def stage_sizes(all_measured: Sequence[ConfigurationResults], published: Json) -
 
 def stage_times(all_measured: Sequence[ConfigurationResults], published: Json) -> list[PublishedRow]:
     """Published seconds of whole stages, next to ours."""
-    found = {m.name: m for m in all_measured}
+    by_name = {m.name: m for m in all_measured}
     out = []
     for row in published["stages"]:
-        m = found.get(row["configuration"])
+        m = by_name.get(row["configuration"])
         ours = m.of_stage(row["stage"], "seconds") if m else None
         out.append(published_row(f"{row['stage']}, time", row, row["seconds"], ours, "s"))
     return out

@@ -4,13 +4,17 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 
-from hobble.evaluation.compare_configurations import each
+from hobble.evaluation.compare_configurations import comparison_functions
 from hobble.measures.inputs import Json, Row
 
 
 def tables(compared: Json) -> dict[str, Sequence[Row]]:
-    """Table name -> rows with equal keys, from the result of `compare`."""
-    of_measures = {name: rows for _, make in each("tables") for name, rows in make(compared).items()}
+    """Table name -> rows, from the content of compare.json. The rows of a table have the same keys."""
+    of_measures = {
+        name: rows
+        for _, measure_tables in comparison_functions("tables")
+        for name, rows in measure_tables(compared).items()
+    }
     return {
         "configurations": [flat(row) for row in compared["configurations"]],
         **of_measures,
@@ -29,7 +33,7 @@ def tables(compared: Json) -> dict[str, Sequence[Row]]:
 
 
 def flat(row: Row) -> Row:
-    """A row in which each inner mapping is replaced by keys `key_inner`."""
+    """A row without inner mappings: the entry `b` of a mapping at the key `a` gets the key `a_b`."""
     out: dict[str, object] = {}
     for key, value in row.items():
         if isinstance(value, Mapping):
@@ -40,6 +44,7 @@ def flat(row: Row) -> Row:
 
 
 def _training(compared: Json) -> list[Row]:
+    """A row for each pass of each training. A value that the training did not record is None."""
     rows: list[Row] = []
     names = list(dict.fromkeys(key for entry in compared["training"] for key in entry))
     for entry in compared["training"]:

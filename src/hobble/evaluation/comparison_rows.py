@@ -1,4 +1,4 @@
-"""What a measurement adds to the comparison of configurations, and the rows it consists of."""
+"""What a measurement adds to the comparison of configurations, and the types of its rows."""
 
 from __future__ import annotations
 
@@ -17,8 +17,8 @@ class SideBySide:
     """What one measurement adds to compare.json.
 
     entries: the list under the measurement's name. about: configuration -> what to add to its description.
-    differences: rows from `pair`. against_published: rows from `published_row`. milliseconds: what was
-    measured with a clock, with the keys `difference`, `against_published` and others.
+    differences: rows such as `DifferenceOf`. against_published: rows from `published_row`. milliseconds: rows
+    of what was measured with a clock, under the keys `difference`, `against_published` and others.
     """
 
     entries: Sequence[Json] = field(default=(), repr=False)
@@ -29,7 +29,10 @@ class SideBySide:
 
 
 class Difference(TypedDict):
-    """Means and standard deviations (sd) of two series, and their difference. See `pair`."""
+    """Means and standard deviations (sd) of two series a and b, and their difference. See `pair`.
+
+    sd_of_means: deviation of the means of single clips or laps.
+    """
 
     mean_a: float
     sd_a: float
@@ -42,7 +45,7 @@ class Difference(TypedDict):
 
 
 class DifferenceOf(Difference):
-    """The difference of configurations `a` and `b`. over: which clips, or laps of which mode."""
+    """The difference of configurations `a` and `b`. over: the split, clip or phase mode that was compared."""
 
     a: str
     b: str
@@ -50,7 +53,7 @@ class DifferenceOf(Difference):
 
 
 class PublishedRow(TypedDict):
-    """A published figure next to ours. See `published_row`."""
+    """A published number next to ours. See `published_row`."""
 
     measure: str
     configuration: str
@@ -65,16 +68,16 @@ class PublishedRow(TypedDict):
 def pair(a: Json, b: Json) -> Difference:
     """Means and standard deviations of two series, and their difference by eq. 3.2 of Segerstedt 2021.
 
-    a, b: `mean` and `sd` over single frames, and possibly `means` of clips or laps. `difference` divides by
-    the deviations over single frames. `difference_of_means` divides by the deviations over `means`, as the
-    published one does. It is None if a or b has fewer than two means.
+    a, b: `mean` and `sd` over single frames, and possibly `means`, the mean of each clip or lap. `difference`
+    divides by the deviations over single frames. `difference_of_means` divides by the deviations of `means`,
+    as the published difference does. It is None if a or b has fewer than two means.
     """
-    means = [np.asarray(one.get("means", ()), float) for one in (a, b)]
-    sds = [float(some.std()) if len(some) > 1 else None for some in means]
+    means = [np.asarray(series.get("means", ()), float) for series in (a, b)]
+    sds = [float(values.std()) if len(values) > 1 else None for values in means]
     of_means = None
     if sds[0] is not None and sds[1] is not None:
-        one, other = (float(some.mean()) for some in means)
-        of_means = difference(one, sds[0], other, sds[1])
+        mean_a, mean_b = (float(values.mean()) for values in means)
+        of_means = difference(mean_a, sds[0], mean_b, sds[1])
     return {
         "mean_a": a["mean"],
         "sd_a": a["sd"],
@@ -88,10 +91,10 @@ def pair(a: Json, b: Json) -> Difference:
 
 
 def published_row(measure: str, row: Json, theirs: float, ours: float | None, unit: str = "") -> PublishedRow:
-    """A published figure (`theirs`) next to ours, which is None if it was not measured.
+    """A published number (`theirs`) next to ours, which is None if it was not measured.
 
-    row: the published row. It has `configuration` and `source`. It may have the `table` that printed the
-    figure, and `other_figure`, a different value in the same publication.
+    row: the entry of published.yaml. It has `configuration` and `source`. It may have `table`, the number of
+    the table that printed the value, and `other_figure`, a different value in the same publication.
     """
     return {
         "measure": measure,

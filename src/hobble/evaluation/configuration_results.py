@@ -1,4 +1,4 @@
-"""The results of one configuration, for a comparison."""
+"""The results of one configuration, which are compared with those of other configurations."""
 
 from __future__ import annotations
 
@@ -19,8 +19,9 @@ from hobble.measures.inputs import Json
 class ConfigurationResults:
     """The results of one configuration.
 
-    resolved: the content of configuration.yaml. measured: measurement -> its JSON. pipeline: the content of
-    pipeline.json. history: column -> values of history.csv, None for empty fields.
+    resolved: the content of configuration.yaml. measured: name of a measurement -> the content of its JSON
+    file. pipeline: the content of pipeline.json. history: column -> values of history.csv, None for empty
+    fields.
     """
 
     name: str
@@ -30,23 +31,24 @@ class ConfigurationResults:
     history: Mapping[str, list[float | None]] = field(repr=False)
 
     def found(self, measure: str) -> Json:
-        """The JSON of a measurement."""
+        """The content of the JSON file of the measurement `measure`."""
         return self.measured[measure]
 
     @property
     def dataset(self) -> str:
-        """The name of its data set."""
+        """The name of the configuration's data set."""
         return self.resolved["configuration"]["dataset"]
 
     def of_stage(self, stage: str, key: Literal["seconds", "bytes"]) -> float | None:
-        """A value of one stage in pipeline.json; None without that stage."""
+        """The value `key` of a stage in pipeline.json; None if it does not list the stage."""
         return next((s[key] for s in self.pipeline["stages"] if s["stage"] == stage), None)
 
 
 def read_results(name: str, files: Mapping[str, str | Path]) -> ConfigurationResults:
-    """Read one configuration's files: `configuration`, `pipeline`, `history`, and one for each measurement.
+    """Read one configuration's results.
 
-    Raises InputError, which names the file, if one cannot be read.
+    files: paths of the files `configuration`, `pipeline`, `history`, and of one for each measurement. Raises
+    InputError, which names the file, if a JSON file or the history cannot be read.
     """
     paths = dict(files)
     resolved = yaml.safe_load(Path(paths.pop("configuration")).read_text(encoding="utf-8"))

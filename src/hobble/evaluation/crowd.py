@@ -8,22 +8,23 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from hobble.core.quat import Array
-from hobble.evaluation.motion_measures import in_root_frame
+from hobble.evaluation.motion_measures import in_root_coordinates
 from hobble.models.network import Network
 from hobble.runtime.animation import ProceduralAnimation
 from hobble.runtime.options import Runtime
 
 FPS = 60
 SPEEDS = {"walk": 2.5, "jog": 7.0}  # target speeds, cm a frame
-VELOCITY, GAIT = "target_velocity", "gait"  # the names of targets that are no channel
-SETTLING_SHARE = 0.25  # share of a stretch, at its beginning, in which channels and gait still change
+VELOCITY, GAIT = "target_velocity", "gait"  # the names of the targets that are not channels
+# Share of the frames of a `CrowdTarget` that pass before it is measured, as channels and gait still change.
+SETTLING_SHARE = 0.25
 
 
 @dataclass(frozen=True)
 class CrowdTarget:
-    """A number of frames with a constant target for each of C figures.
+    """A stretch of `frames` frames in which each of C figures has a constant target.
 
-    gait: (C,) names. channels: name -> (C, columns). speed: (C,) cm a frame; None: SPEEDS of each gait.
+    gait: (C,) names. channels: name -> (C, columns). speed: (C,) cm a frame; None: the SPEEDS of the gaits.
     """
 
     frames: int
@@ -49,7 +50,7 @@ class Walks:
     starts: np.ndarray
 
     def of(self, figures: slice) -> Walks:
-        """The walks of some figures."""
+        """The motion of some of the figures."""
         return Walks(
             self.local[:, figures],
             self.contacts[:, figures],
@@ -60,24 +61,25 @@ class Walks:
         )
 
     def measured(self, stretch: int, figure: int) -> slice:
-        """The frames of a stretch to measure: whole cycles of the figure at the end of the stretch.
+        """The frames of a stretch in which a figure is measured.
 
-        If there is no whole cycle after the settling time, all frames after it.
+        The first SETTLING_SHARE of the stretch is left out. Of the rest, the figure's last whole cycles are
+        measured, or all frames if there is no whole cycle.
         """
         start, stop = int(self.starts[stretch]), int(self.starts[stretch + 1])
         start += round(SETTLING_SHARE * (stop - start))
-        turned = np.concatenate([[0.0], np.cumsum(np.mod(np.diff(self.phase[start:stop, figure]), 1.0))])
-        whole = np.floor(turned[-1])
+        cycles = np.concatenate([[0.0], np.cumsum(np.mod(np.diff(self.phase[start:stop, figure]), 1.0))])
+        whole = np.floor(cycles[-1])
         if whole < 1:
             return slice(start, stop)
-        return slice(start + int(np.searchsorted(turned, turned[-1] - whole)), stop)
+        return slice(start + int(np.searchsorted(cycles, cycles[-1] - whole)), stop)
 
 
 def run(network: Network, script: Sequence[CrowdTarget], runtime: Runtime) -> Walks:
-    """Run figures through `script`. They begin standing and walk straight ahead on flat ground.
+    """The motion of figures that follow `script`. They begin standing and walk straight ahead on flat ground.
 
-    As long as figures have had the same targets from the beginning, they move in the same way, to the last
-    bit. So one character walks for all of them until their targets differ.
+    Figures with the same targets move in the same way, to the last bit, until their targets first differ. So
+    until then, one character of the animation walks for all of them.
     """
     assert network.skeleton is not None
     count, frames = len(script[0].gait), sum(s.frames for s in script)
@@ -86,7 +88,7 @@ def run(network: Network, script: Sequence[CrowdTarget], runtime: Runtime) -> Wa
     local = np.zeros((frames, count, len(network.skeleton.joints), 3), np.float32)
     contacts, root = np.zeros((frames, count, 4)), np.zeros((frames, count, 3))
     phase, acceleration = np.zeros((frames, count)), np.zeros((frames, count))
-    before: list[Array] = []
+    before: list[Array] = []  # joint positions of up to three frames
     f = 0
     for stretch in script:
         target = _targets(network, stretch)
@@ -100,14 +102,15 @@ def run(network: Network, script: Sequence[CrowdTarget], runtime: Runtime) -> Wa
         for _ in range(stretch.frames):
             pose = animation.next_pose(velocity, gait=shares, **target_now)
             # A single character has no leading axis.
-            positions, place = pose.positions.reshape(len(shares), -1, 3), np.atleast_2d(pose.root)
-            root[f], phase[f] = place[walker], np.atleast_1d(pose.phase)[walker]
+            positions, roots = pose.positions.reshape(len(shares), -1, 3), np.atleast_2d(pose.root)
+            root[f], phase[f] = roots[walker], np.atleast_1d(pose.phase)[walker]
             contacts[f] = np.atleast_2d(pose.contacts)[walker]
-            local[f] = in_root_frame(positions, place, np.atleast_1d(pose.yaw))[walker]
+            local[f] = in_root_coordinates(positions, roots, np.atleast_1d(pose.yaw))[walker]
             before = [*before[-2:], positions]
             if len(before) == 3:
-                bend = before[2] - 2 * before[1] + before[0]
-                acceleration[f - 1] = np.sqrt(np.max(np.einsum("cjk,cjk->cj", bend, bend), axis=1))[walker]
+                second = before[2] - 2 * before[1] + before[0]  # second difference
+                squared = np.einsum("cjk,cjk->cj", second, second)
+                acceleration[f - 1] = np.sqrt(np.max(squared, axis=1))[walker]
             f += 1
     starts = np.cumsum([0, *(s.frames for s in script)])
     return Walks(local, contacts, phase, root, acceleration, starts)
@@ -138,9 +141,9 @@ def _first_of(walker: np.ndarray) -> np.ndarray:
 
 
 def channel_values(network: Network, name: str, figures: Sequence[Mapping[str, float]]) -> dict[str, Array]:
-    """The values of channel `name` for a stretch, or {} if the network does not have that channel.
+    """{name: (C, columns) values} for `CrowdTarget.channels`, or {} if the network lacks the channel `name`.
 
-    figures: column -> value, for each figure.
+    figures: for each figure, name of a column -> value; the other columns are 0.
     """
     columns = network.channels.get(name)
     if columns is None:

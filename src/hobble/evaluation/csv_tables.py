@@ -18,9 +18,9 @@ if TYPE_CHECKING:
 def frame(rows: Sequence[Mapping[str, Any]]) -> pandas.DataFrame:
     """A data frame with a row for each mapping. Columns are in the order in which they first occur.
 
-    Values keep their types, so that a count stays an integer even if another row has no value.
+    Values keep their types: an integer stays one even if the column has no value in another row.
     """
-    import pandas  # takes .3 s, which only jobs that have a table should pay
+    import pandas  # here, because the import takes .3 s and most jobs have no table
 
     columns = list(dict.fromkeys(key for row in rows for key in row))
     return pandas.DataFrame(
@@ -41,7 +41,7 @@ def write_tables(folder: str | Path, tables: Mapping[str, Sequence[Mapping[str, 
 
 
 def read_numbers(path: str | Path) -> dict[str, list[float | None]]:
-    """Column -> values of a CSV of numbers, such as history.csv; None for an empty or infinite cell.
+    """Column -> values of a CSV of numbers, such as history.csv; None for an empty, NaN or infinite cell.
 
     Raises InputError, which names the column and the cell, if a cell is not a number.
     """
@@ -52,7 +52,9 @@ def read_numbers(path: str | Path) -> dict[str, list[float | None]]:
             io.StringIO(read_text(path)), dtype=str, keep_default_na=False, index_col=False
         )
     except (pandas.errors.EmptyDataError, pandas.errors.ParserError) as error:
-        raise InputError(path, f"not a table of numbers ({error})", fix="Delete it and run again.") from None
+        raise InputError(
+            path, f"not a table of numbers ({error})", fix="Delete the file and run again."
+        ) from None
     return {str(name): [_number(path, str(name), text) for text in table[name]] for name in table.columns}
 
 
@@ -62,5 +64,6 @@ def _number(path: str | Path, column: str, text: Any) -> float | None:
     try:
         value = float(text)
     except ValueError:
-        raise InputError(path, f"column {column} holds {text!r:.80}, which is not a number") from None
+        problem = f"column {column} holds {text!r:.80}, which is not a number"
+        raise InputError(path, problem, fix="Delete the file and run again.") from None
     return value if abs(value) < float("inf") else None

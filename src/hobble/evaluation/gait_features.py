@@ -1,4 +1,4 @@
-"""Describes a stretch of walking with about forty numbers. From them a classifier finds what hurts."""
+"""Describes a stretch of walking with fifty numbers, for recognisers of injuries, moods and diagnoses."""
 
 from __future__ import annotations
 
@@ -12,11 +12,11 @@ SIDES = ("left", "right")
 
 
 def features(skeleton: Skeleton, local: Array, contacts: Array, root: Array) -> dict[str, float]:
-    """The measures of the gait (`gait_measures`), and mean and standard deviation of the limbs' angles.
+    """The results of `gait_measures`, and means and standard deviations of angles, heights and sway.
 
-    local: (F, J, 3) joint positions in root coordinates, cm. contacts: (F, 4). root: (F, 3) positions of the
-    root in the world, cm. Returns degrees, cm and shares. Step lengths and asymmetries are 0 if there is no
-    step.
+    local: (F, J, 3) joint positions in root coordinates, cm. contacts: (F, 4) of left heel, left toe, right
+    heel, right toe. root: (F, 3) positions of the root in the world, cm. Returns name -> value in degrees,
+    cm, cm/s or as a share. Step lengths and asymmetries are 0 if there is no step.
     """
     measured = gait_measures(skeleton, local, contacts, root)
     out = {name: value if value is not None else 0.0 for name, value in measured.items()}
@@ -37,23 +37,23 @@ def features(skeleton: Skeleton, local: Array, contacts: Array, root: Array) -> 
             "elbow": bend(shoulder, elbow, wrist),
         }
         for name, angle in angles.items():
-            out |= _moves(f"{name}_{side}", angle)
+            out |= _mean_and_sd(f"{name}_{side}", angle)
         out[f"elbow_out_{side}"] = float(np.mean((elbow - shoulder)[:, 0]))
         out[f"wrist_height_{side}"] = float(np.mean((wrist - shoulder)[:, 1]))
         out[f"toe_lift_{side}"] = float(np.ptp(toe[:, 1]))
-    out |= _moves("pelvis_height", hips[:, 1])
-    out |= _moves("pelvis_sway", hips[:, 0])
-    out |= _moves("trunk_forward", _swing(hips - neck))
-    out |= _moves("trunk_side", np.degrees(np.arctan2((neck - hips)[:, 0], (neck - hips)[:, 1])))
+    out |= _mean_and_sd("pelvis_height", hips[:, 1])
+    out |= _mean_and_sd("pelvis_sway", hips[:, 0])
+    out |= _mean_and_sd("trunk_forward", _swing(hips - neck))  # negative if the trunk leans forward
+    out |= _mean_and_sd("trunk_side", np.degrees(np.arctan2((neck - hips)[:, 0], (neck - hips)[:, 1])))
     twist = at["left_shoulder"] - at["right_shoulder"]
-    out |= _moves("shoulder_twist", np.degrees(np.arctan2(twist[:, 2], twist[:, 0])))
+    out |= _mean_and_sd("shoulder_twist", np.degrees(np.arctan2(twist[:, 2], twist[:, 0])))
     return out
 
 
 def _swing(down: Array) -> Array:
-    """(F,) degrees by which a limb (F, 3) is swung forward from straight down."""
+    """(F,) degrees by which a limb is swung forward. down: (F, 3) from its upper to its lower end."""
     return np.degrees(np.arctan2(down[:, 2], -down[:, 1]))
 
 
-def _moves(name: str, values: Array) -> dict[str, float]:
+def _mean_and_sd(name: str, values: Array) -> dict[str, float]:
     return {f"{name}_mean": float(np.mean(values)), f"{name}_sd": float(np.std(values))}

@@ -1,6 +1,6 @@
 """Measures of generated motion: foot slide, turns, steps, angles. Centimetres, degrees, 60 frames a second.
 
-The first axis of arrays is the frame. contacts (F, 4) are left heel, left toe, right heel, right toe.
+F is the number of frames. The columns of contacts (F, 4) are left heel, left toe, right heel, right toe.
 """
 
 from __future__ import annotations
@@ -12,9 +12,9 @@ import numpy as np
 from hobble.core.quat import Array
 from hobble.core.skeleton import Skeleton
 
-STANCE = 0.5  # predicted contact from which a foot counts as standing
-SHORTEST_STANCE = 4  # frames; shorter contacts do not count as steps
-SKATING_BELOW = 2.5  # cm above a standing toe; a toe that moves lower than this skates (Zhang et al. 2018)
+STANCE = 0.5  # a foot counts as standing if its predicted contact is at least this
+SHORTEST_STANCE = 4  # frames; shorter contacts count as no stance and no step
+SKATING_BELOW = 2.5  # cm above its standing height; a toe that moves below this skates (Zhang et al. 2018)
 
 
 def runs(on: np.ndarray) -> np.ndarray:
@@ -28,12 +28,15 @@ def runs(on: np.ndarray) -> np.ndarray:
 
 
 def stance(contacts: Array) -> np.ndarray:
-    """(F, 2) whether the heel or the toe of the left and the right foot is in contact; contacts: (F, 4)."""
+    """(F, 2) whether the left and the right foot stand, on heel or toe. contacts: (F, 4)."""
     return np.maximum(contacts[:, ::2], contacts[:, 1::2]) >= STANCE
 
 
 def foot_slide(toes: Array, contacts: Array) -> Array:
-    """(N,) distance that the toe slides in each stance, cm. toes: (F, 2, 3), contacts: (F, 4)."""
+    """(N,) how far the toe slides in each of N stances, cm. Those of the left foot come first.
+
+    toes: (F, 2, 3) left and right, cm.
+    """
     out = []
     for side in range(2):
         step = np.linalg.norm(np.diff(toes[:, side, ::2], axis=0), axis=1)
@@ -46,10 +49,10 @@ def foot_slide(toes: Array, contacts: Array) -> Array:
 def skating(toes: Array, standing_height: float) -> Array:
     """(F - 1, 2) how far each toe skates over the ground in a frame, cm. Contacts do not matter.
 
-    After Zhang, Starke, Komura, Saito (2018): the horizontal movement v counts as
-    v (2 - 2^(h / SKATING_BELOW)) at a height h from 0 to SKATING_BELOW above that of a standing toe. h is the
-    larger height of the two frames. toes: (F, 2, 3), heights above the ground. standing_height: height of the
-    toe joint in a standing foot, cm.
+    After Zhang, Starke, Komura, Saito (2018): a horizontal movement v counts as
+    v (2 - 2^(h / SKATING_BELOW)). h is the height of the toe above `standing_height`, before or after the
+    movement, whichever is larger, clipped to 0 .. SKATING_BELOW. toes: (F, 2, 3) left and right, heights
+    above the ground. standing_height: height of the toe joint of a standing foot, cm.
     """
     moved = np.linalg.norm(np.diff(toes[..., ::2], axis=0), axis=-1)
     height = np.maximum(toes[1:, :, 1], toes[:-1, :, 1]) - standing_height
@@ -81,7 +84,7 @@ def bend(a: Array, b: Array, c: Array) -> Array:
     return np.degrees(np.arccos(np.clip(cosine, -1, 1)))
 
 
-def in_root_frame(positions: Array, root: Array, yaw: Array) -> Array:
+def in_root_coordinates(positions: Array, root: Array, yaw: Array) -> Array:
     """World positions (..., J, 3) in the coordinates of a root at `root` (..., 3) with `yaw` (...)."""
     p = positions - root[..., None, :]
     sin, cos = np.sin(yaw)[..., None], np.cos(yaw)[..., None]
@@ -102,10 +105,10 @@ def gait_measures(
     """Measures of one character's walk.
 
     local: (F, J, 3) joint positions in root coordinates, cm. contacts: (F, 4). travelled: (F, 3) positions of
-    the root in the world, cm. Returns speed (cm/s, from the straight distance between first and last frame),
-    stance shares, step lengths (how far the landing heel is ahead of the other, cm), knee and arm ranges
-    (degrees from the 5th to the 95th percentile), trunk lean (degrees, forward and to the left), hip height
-    (cm) and asymmetries (`asymmetry`). Step lengths are None if there is no step.
+    the root in the world, cm. Returns speed (cm/s, from the straight distance between first and last root),
+    stance shares (of the frames), step lengths (how far the landing heel is ahead of the other heel, cm),
+    knee and arm ranges (degrees from the 5th to the 95th percentile), trunk lean (degrees, forward and to the
+    left), hip height (cm) and asymmetries (`asymmetry`). Step lengths are None if there is no step.
     """
     role = skeleton.role
     seconds = (len(local) - 1) / 60

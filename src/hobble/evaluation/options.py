@@ -18,16 +18,17 @@ def joined_sections(sections: list[type[Section]]) -> type[Section]:
     owner: dict[str, type] = {}
     for section in sections:
         for key in section.model_fields:
-            defines = [c for c in section.__mro__ if key in getattr(c, "model_fields", {})][-1]
-            if owner.setdefault(key, defines) is not defines:
-                raise TypeError(f"{key} is a key of {owner[key].__module__} and of {defines.__module__}")
-    # pydantic takes the fields of the last base first.
-    different = list(dict.fromkeys(sections))
-    bases = [s for s in different if not any(o is not s and issubclass(o, s) for o in different)]
+            definer = [c for c in section.__mro__ if key in getattr(c, "model_fields", {})][-1]
+            if owner.setdefault(key, definer) is not definer:
+                raise TypeError(f"{key} is a key of {owner[key].__module__} and of {definer.__module__}")
+    unique = list(dict.fromkeys(sections))
+    # Python refuses a base that another base inherits from.
+    bases = [s for s in unique if not any(o is not s and issubclass(o, s) for o in unique)]
+    # The bases are reversed, because pydantic puts the fields of the last base first.
     return create_model("Evaluation", __base__=tuple(bases[::-1]) or Section, __doc__="The measurements.")
 
 
 if TYPE_CHECKING:
     Evaluation = Section
 else:
-    Evaluation = joined_sections([one.options for one in MEASURES])
+    Evaluation = joined_sections([measure.options for measure in MEASURES])

@@ -1,4 +1,4 @@
-"""The parts of pipeline.json. The report and the comparison read this file."""
+"""The types of pipeline.json. The report and the comparison read this file."""
 
 from __future__ import annotations
 
@@ -8,10 +8,10 @@ from hobble.database.sizes import Sizes
 
 
 class JobTotal(TypedDict):
-    """Some jobs together.
+    """Totals over some jobs of the workflow.
 
-    seconds, cpu_seconds: sums over the jobs. longest: seconds of the longest job. max_rss_mb: most memory of
-    a job, MB; None if not measured.
+    jobs: number of jobs. seconds, cpu_seconds: sums over the jobs. longest: seconds of the longest job.
+    max_rss_mb: memory of the job that used most, MB; None if not measured.
     """
 
     jobs: int
@@ -28,7 +28,7 @@ class RuleTotal(JobTotal):
 
 
 class StageTotal(JobTotal):
-    """All jobs of a stage, and the files that it wrote."""
+    """All jobs of a stage of the workflow, and number and total size of the files that they wrote."""
 
     stage: str
     files: int
@@ -37,7 +37,7 @@ class StageTotal(JobTotal):
 
 
 class Machine(TypedDict):
-    """The machine that wrote the file."""
+    """The machine on which pipeline.json was written."""
 
     system: str
     processor: str
@@ -46,7 +46,10 @@ class Machine(TypedDict):
 
 
 class Pipeline(TypedDict):
-    """pipeline.json. missing: files that do not exist. database: None if there is none."""
+    """The content of pipeline.json.
+
+    database: None without a database. missing: files of the stages that do not exist. versions: of packages.
+    """
 
     configuration: str
     stages: list[StageTotal]

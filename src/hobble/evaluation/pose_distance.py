@@ -1,4 +1,4 @@
-"""The distance between two walks: the distance of their poses at the same phase."""
+"""The distance between the poses of two walks at the same phase, and how soon a motion settles."""
 
 from __future__ import annotations
 
@@ -8,7 +8,8 @@ from hobble.core.quat import Array
 
 PHASES = 24  # phase bins of a cycle
 FPS = 60
-SETTLED_SHARE = 0.1  # a response is settled within this share of its final change
+# A value has settled when it differs from its last value by at most this share of the whole change.
+SETTLED_SHARE = 0.1
 SMALLEST_CHANGE_CM = 0.1  # smaller changes get no settling time
 
 
@@ -20,7 +21,7 @@ def phase_bins(phase: Array) -> np.ndarray:
 def mean_cycle(local: Array, phase: Array) -> Array:
     """(PHASES, J, 3) mean pose in each phase bin. local: (F, J, 3) joint positions, cm. phase: (F,).
 
-    An empty bin gets the pose of the nearest bin.
+    An empty bin gets the pose of the nearest bin that is not empty.
     """
     at = phase_bins(phase)
     mean = np.zeros((PHASES, *local.shape[1:]))
@@ -47,9 +48,9 @@ def period(phase: Array) -> int:
 def settling(distance: Array, normal: float, window: int) -> float | None:
     """Seconds until a motion has settled after a change: until `distance` stays close to its last value.
 
-    distance: (F,) cm to a reference motion, in each frame after the change. window: frames to average over,
-    usually a cycle. normal: the distance before the change. Close means within SETTLED_SHARE of the whole
-    change. None if the change is below SMALLEST_CHANGE_CM.
+    distance: (F,) cm to a reference motion, in each frame after the change. normal: the distance before the
+    change, cm. window: frames to average over, usually a cycle. Close means within SETTLED_SHARE of the
+    difference between `normal` and the last value. None if this difference is below SMALLEST_CHANGE_CM.
     """
     window = min(window, len(distance))
     smooth = np.convolve(distance, np.ones(window) / window, mode="valid")

@@ -14,12 +14,12 @@ def difference(mean_a: float, sd_a: float, mean_b: float, sd_b: float) -> float 
     >>> difference(3.0, 0.5, 1.0, 1.5)
     2.0
     """
-    spread = sd_a + sd_b
-    return 2 * abs(mean_a - mean_b) / spread if spread > 0 else None
+    deviations = sd_a + sd_b
+    return 2 * abs(mean_a - mean_b) / deviations if deviations > 0 else None
 
 
 class StraightLine(TypedDict):
-    """The line y = intercept + slope x through `points` points, and its r2. None for what does not exist."""
+    """The line y = intercept + slope x through `points` points, and its r2. Unknown values are None."""
 
     slope: float | None
     intercept: float | None

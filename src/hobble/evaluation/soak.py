@@ -1,4 +1,4 @@
-"""A long test for implausible poses: many characters with random targets, injuries and grounds."""
+"""A long test for implausible poses: many characters with random targets on random grounds."""
 
 from __future__ import annotations
 
@@ -19,6 +19,7 @@ FPS = 60
 GAITS = ("walk", "jog", "crouch")
 FASTEST_TARGET = 8.0  # cm a frame
 START_SPACING_CM = 4e4  # between the starts of the characters, each on its own ground
+# For the names see `soak`. No character may go beyond these limits in any frame.
 LIMITS = {"hips_lowest_cm": 60.0, "hips_highest_cm": 110.0, "added_turn_degrees": 30.0}
 
 
@@ -50,7 +51,7 @@ class Targets:
     def renew(self, rng: np.random.Generator) -> None:
         """Draw new targets for the characters whose targets have run out.
 
-        On average a third stand, and half face a random direction.
+        On average, a third of these characters stand still, and half of them face a random direction.
         """
         self.frames_left -= 1
         for c in np.flatnonzero(self.frames_left <= 0):
@@ -69,25 +70,25 @@ def grounds(characters: int, rng: np.random.Generator) -> Callable[[Array, Array
     """A function (x, z) -> height with a different ground around each character's start.
 
     The starts are START_SPACING_CM apart along x. On average a quarter of the grounds are flat; the others
-    have hills 2 to 8 m long with slopes of up to 0.35.
+    have hills 2 to 8 m long with slopes of up to 0.35 along x and along z.
     """
     length = rng.uniform(200, 800, characters)
     height = rng.uniform(0.05, 0.35, characters) * length / np.pi * (rng.random(characters) > 0.25)
-    pitch = 2 * np.pi / length
+    wave_number = 2 * np.pi / length
 
     def heights(x: Array, z: Array) -> Array:
         k = np.clip(np.rint(x / START_SPACING_CM), 0, characters - 1).astype(int)
-        return np.asarray(0.5 * height[k] * (np.sin(pitch[k] * x) + np.sin(pitch[k] * z)))
+        return np.asarray(0.5 * height[k] * (np.sin(wave_number[k] * x) + np.sin(wave_number[k] * z)))
 
     return heights
 
 
 @dataclass
 class StanceSlides:
-    """How far the toes of C characters slide in each stance, as in `motion_measures.foot_slide`.
+    """Adds up, frame by frame, how far the toes of C characters slide in each stance.
 
-    far: (C, 2) distance in the present stance, cm. frames: (C, 2) its frames so far. done: distances of past
-    stances.
+    far: (C, 2) distance in the present stance, cm. frames: (C, 2) frames of this stance so far. done: for
+    each frame, the distances of the stances that ended in it, cm.
     """
 
     far: Array
@@ -111,7 +112,7 @@ def turn_angles(now: Array, before: Array) -> Array:
 
 @dataclass
 class WorstPoses:
-    """The worst values of all characters in the frames so far. Names and units as in `soak`."""
+    """The worst values of all characters in the frames so far. Names as in `soak`, without the unit."""
 
     finite: bool = True
     hips_lowest: float = np.inf
@@ -130,12 +131,13 @@ class WorstPoses:
     def add_movement(self, now: tuple[Array, ...], before: tuple[Array, ...]) -> None:
         """Add what changed from one frame to the next.
 
-        now, before: positions (C, J, 3), rotations (C, J, 4) of the pose, rotations that the network holds.
+        now, before: positions (C, J, 3) and rotations (C, J, 4) as drawn, and rotations (C, J, 4) without the
+        placement of the feet.
         """
-        turn, predicted = turn_angles(now[1], before[1]), turn_angles(now[2], before[2])
-        added = turn - predicted
+        turn, unplaced = turn_angles(now[1], before[1]), turn_angles(now[2], before[2])
+        added = turn - unplaced
         self.turn = max(self.turn, float(turn.max()))
-        self.network_turn = max(self.network_turn, float(predicted.max()))
+        self.network_turn = max(self.network_turn, float(unplaced.max()))
         self.added_turn = max(self.added_turn, float(added.max()))
         self.fastest_joint = max(self.fastest_joint, float(np.linalg.norm(now[0] - before[0], axis=-1).max()))
         self.frames_beyond += int((added.max(axis=1) > LIMITS["added_turn_degrees"]).sum())
@@ -174,11 +176,12 @@ def soak(
     """The worst values over all characters and frames.
 
     `finite`: whether all numbers are finite. `hips_lowest_cm`, `hips_highest_cm`: height of the hips above
-    the ground under them. `network_turn_degrees`: largest turn of a joint in one frame as predicted by the
-    network; `turn_degrees`: as drawn; `added_turn_degrees`: largest difference, drawn minus predicted, of the
-    same joint and frame. `frames`, `frames_beyond`: frames of all characters, and those of them in which the
-    added turn exceeds its limit. `fastest_joint_cm`: largest movement of a joint in one frame. `slide_cm`:
-    mean slide of a toe in a stance. `stances`: their number. `holds`: whether all values are within LIMITS.
+    the ground under them. `network_turn_degrees`: largest turn of a joint in one frame before the feet are
+    placed; `turn_degrees`: the same as drawn, with the feet placed; `added_turn_degrees`: the most by which
+    placing the feet makes a turn larger. `frames`: number of frames of all characters together;
+    `frames_beyond`: number of those in which the added turn exceeds its limit. `fastest_joint_cm`: largest
+    movement of a joint in one frame. `slide_cm`: mean slide of a toe in a stance. `stances`: number of
+    stances. `holds`: whether all values are within LIMITS.
     """
     rng = np.random.default_rng(seed)
     skeleton = network.skeleton

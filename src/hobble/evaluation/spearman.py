@@ -23,5 +23,5 @@ def spearman(x: Sequence[float] | Array, y: Sequence[float | None]) -> float | N
 
 def _ranks(values: Array) -> Array:
     """Ranks from 1. Equal values get the mean of their ranks."""
-    _, place, count = np.unique(values, return_inverse=True, return_counts=True)
-    return (np.cumsum(count) - (count - 1) / 2)[place]
+    _, group, count = np.unique(values, return_inverse=True, return_counts=True)
+    return (np.cumsum(count) - (count - 1) / 2)[group]

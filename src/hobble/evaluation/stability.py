@@ -1,4 +1,4 @@
-"""Does the motion stay plausible? The worst values in minutes of walking, jogging, crouching and turning."""
+"""Does the motion stay plausible? The worst values in minutes of walking, jogging, crouching, turning."""
 
 from __future__ import annotations
 
@@ -25,6 +25,7 @@ KINDS: dict[str, tuple[float, bool, str]] = {
     "stop": (0.0, False, "walk"),
     "turn": (0.0, True, "walk"),
 }
+# The motion is stable if all values are within these limits. For the names see `stability`.
 LIMITS = {
     "hips_lowest_cm": 60.0,
     "hips_highest_cm": 110.0,
@@ -35,7 +36,10 @@ LIMITS = {
 
 @dataclass(frozen=True)
 class SteadyTarget:
-    """A constant target for `frames` frames: velocity (2,) cm a frame, facing (2,) or None, gait."""
+    """A constant target for `frames` frames. kind: one of KINDS.
+
+    velocity: (2,) cm a frame. facing: (2,) direction, or None for no target of the facing.
+    """
 
     kind: str
     velocity: Array
@@ -45,7 +49,7 @@ class SteadyTarget:
 
 
 class WorstMotion(TypedDict):
-    """The worst values of some frames. A value is None if there was nothing to measure. See `stability`."""
+    """The worst or mean values of some frames; None if there was nothing to measure. See `stability`."""
 
     frames: int
     finite: bool
@@ -60,22 +64,22 @@ class WorstMotion(TypedDict):
 
 
 class Stability(WorstMotion):
-    """The worst values of all frames, and of each kind of target."""
+    """The values of all frames together, and of the frames with each kind of target."""
 
     minutes: float
     kinds: dict[str, WorstMotion]
 
 
 def stretches(minutes: float, seed: int = 1) -> Iterator[SteadyTarget]:
-    """Random stretches of 2 to 8 seconds in random directions, `minutes` in total."""
+    """Random targets in random directions, each for 2 to 8 seconds, `minutes` in total."""
     rng = np.random.default_rng(seed)
     left = int(minutes * 60 * FPS)
     while left > 0:
         kind = str(rng.choice(list(KINDS)))
         frames = min(left, int(rng.integers(2 * FPS, 8 * FPS)))
         going, looking = rng.uniform(-np.pi, np.pi, 2)
-        speed, aside, gait = KINDS[kind]
-        facing = np.array([np.sin(looking), np.cos(looking)]) if aside else None
+        speed, faces, gait = KINDS[kind]
+        facing = np.array([np.sin(looking), np.cos(looking)]) if faces else None
         yield SteadyTarget(kind, speed * np.array([np.sin(going), np.cos(going)]), facing, gait, frames)
         left -= frames
 
@@ -83,13 +87,13 @@ def stretches(minutes: float, seed: int = 1) -> Iterator[SteadyTarget]:
 def stability(
     network: Network, minutes: float = 10.0, seed: int = 1, runtime: Runtime | None = None
 ) -> Stability:
-    """The worst values in `minutes` on flat ground: of all frames, and of each of KINDS.
+    """The worst values in `minutes` of random targets on flat ground: of all frames, and of each of KINDS.
 
-    `finite`: whether all numbers are finite. `hips_lowest_cm`, `hips_highest_cm`: above the ground.
+    `finite`: whether all numbers are finite. `hips_lowest_cm`, `hips_highest_cm`: hips above the ground.
     `largest_turn_degrees`: largest turn of a joint in one frame, in the world. `foot_slide_cm`: mean slide of
-    a toe in a step. `steps`: their number. `foot_down_share`: share of the frames in which a foot stands.
-    `skating_cm`: mean over feet and frames (`motion_measures.skating`). `stable`: whether all values are
-    within LIMITS.
+    a toe in a stance. `steps`: number of stances. `foot_down_share`: share of the frames in which a foot
+    stands. `skating_cm`: how far a toe skates in a frame, mean over feet and frames. `stable`: whether all
+    values are within LIMITS.
     """
     animation = ProceduralAnimation(network, **dict(runtime or Runtime()))
     assert network.skeleton is not None
@@ -97,7 +101,7 @@ def stability(
     toes = [role("left_toe"), role("right_toe")]
     toe_height = float(sole_heights(network, leg_joints(network.skeleton))[1])
     parts: dict[str, list[dict[str, Array]]] = {kind: [] for kind in KINDS}
-    last = None
+    last = None  # rotations of the frame before the stretch
     for stretch in stretches(minutes, seed):
         poses = [
             animation.next_pose(stretch.velocity, stretch.facing, stretch.gait) for _ in range(stretch.frames)
@@ -119,26 +123,27 @@ def stability(
             }
         )
         last = rotations[-1:]
-    worst = _worst([part for each in parts.values() for part in each])
+    worst = _worst([part for of_kind in parts.values() for part in of_kind])
     return {
         "minutes": minutes,
         **worst,
-        "kinds": {kind: _worst(each) for kind, each in parts.items() if each},
+        "kinds": {kind: _worst(of_kind) for kind, of_kind in parts.items() if of_kind},
     }
 
 
 def _worst(parts: list[dict[str, Array]]) -> WorstMotion:
-    one = {key: np.concatenate([part[key] for part in parts]) for key in parts[0]}
+    """The values of some stretches. parts: name -> values, for each stretch."""
+    joined = {key: np.concatenate([part[key] for part in parts]) for key in parts[0]}
     out: WorstMotion = {
-        "frames": len(one["hips"]),
-        "finite": bool(one["finite"].all() and np.isfinite(one["turn"]).all()),
-        "hips_lowest_cm": round(float(one["hips"].min()), 2),
-        "hips_highest_cm": round(float(one["hips"].max()), 2),
-        "largest_turn_degrees": round(float(one["turn"].max()), 2),
-        "foot_slide_cm": round(float(one["slide"].mean()), 3) if len(one["slide"]) else None,
-        "steps": len(one["slide"]),
-        "foot_down_share": round(float(one["down"].mean()), 3),
-        "skating_cm": round(float(one["skating"].mean()), 3) if len(one["skating"]) else None,
+        "frames": len(joined["hips"]),
+        "finite": bool(joined["finite"].all() and np.isfinite(joined["turn"]).all()),
+        "hips_lowest_cm": round(float(joined["hips"].min()), 2),
+        "hips_highest_cm": round(float(joined["hips"].max()), 2),
+        "largest_turn_degrees": round(float(joined["turn"].max()), 2),
+        "foot_slide_cm": round(float(joined["slide"].mean()), 3) if len(joined["slide"]) else None,
+        "steps": len(joined["slide"]),
+        "foot_down_share": round(float(joined["down"].mean()), 3),
+        "skating_cm": round(float(joined["skating"].mean()), 3) if len(joined["skating"]) else None,
         "stable": False,
     }
     out["stable"] = (

@@ -8,19 +8,20 @@ from hobble.core import quat
 from hobble.core.quat import Array
 from hobble.core.skeleton import Skeleton
 
-APART = 0.1  # cm; joints closer together than this count as one place
+SAME_PLACE = 0.1  # cm; joints that are closer together count as being at the same place
 
 
 def fitted_rotations(skeleton: Skeleton, positions: Array) -> Array:
-    """World rotations (F, J, 4) with which the bones point as well as possible to the positions (F, J, 3).
+    """World rotations (F, J, 4) that turn the bones to the joint positions (F, J, 3) as well as possible.
 
-    A joint with one joint below it starts at its parent's rotation and turns the shortest way. A joint with
-    several gets the best fit to all of them (Kabsch, 1976).
+    A joint with one bone starts at the rotation of its parent and turns by the smallest angle to the
+    direction of the bone. A joint with several bones gets the rotation that fits them best (Kabsch, 1976). A
+    joint without bones below it turns with its parent.
     """
     out = np.tile(quat.IDENTITY, (*positions.shape[:2], 1))
     for j, parent in enumerate(skeleton.parents):
         above = out[:, parent] if parent >= 0 else out[:, j]
-        below = [(k, rest) for k, rest in _reached(skeleton, j) if np.linalg.norm(rest) > APART]
+        below = [(k, rest) for k, rest in _bones_below(skeleton, j) if np.linalg.norm(rest) > SAME_PLACE]
         if not below:
             out[:, j] = above
         elif len(below) == 1:
@@ -34,15 +35,15 @@ def fitted_rotations(skeleton: Skeleton, positions: Array) -> Array:
     return out
 
 
-def _reached(skeleton: Skeleton, joint: int) -> list[tuple[int, Array]]:
-    """The nearest descendants at another place, each with the vector (3,) from the joint to it at rest."""
+def _bones_below(skeleton: Skeleton, joint: int) -> list[tuple[int, Array]]:
+    """(joint, its offset (3,) in the rest pose) of the nearest descendants at another place."""
     out: list[tuple[int, Array]] = []
     for child in skeleton.children(joint):
         offset = np.asarray(skeleton.offsets[child], float)
-        if np.linalg.norm(offset) > APART:
+        if np.linalg.norm(offset) > SAME_PLACE:
             out.append((child, offset))
         else:
-            out += [(k, offset + rest) for k, rest in _reached(skeleton, child)]
+            out += [(k, offset + rest) for k, rest in _bones_below(skeleton, child)]
     return out
 
 

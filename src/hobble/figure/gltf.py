@@ -21,16 +21,16 @@ from hobble.figure.mesh import NEEDED, Mesh, body
 from hobble.figure.pack import whole_weights
 
 METRES = 0.01  # metres per centimetre
-LEAST_MOVEMENT = 1e-5  # a joint does not move if the components of its rotation vary by less than this
+LEAST_MOVEMENT = 1e-5  # a joint counts as still if each component of its rotation varies by less than this
 COLOUR = (0.72, 0.72, 0.69, 1.0)
-# Component types (FLOAT to INT) and buffer targets (ARRAY, ELEMENTS) of the format.
+# Codes of glTF: component types (float, unsigned byte, short, int), then buffer targets.
 FLOAT, BYTE, SHORT, INT = 5126, 5121, 5123, 5125
 ARRAY, ELEMENTS = 34962, 34963
 
 
 @dataclass(frozen=True)
 class BodyMotion:
-    """A motion of the body: root positions (F, 3) in cm, local rotations (F, J, 4), frames per second."""
+    """A motion of the body. root: (F, 3) positions, cm. local: (F, J, 4) local rotations of the joints."""
 
     name: str
     root: Array = field(repr=False)
@@ -39,7 +39,7 @@ class BodyMotion:
 
 
 class _Buffer:
-    """The buffer of the file, with the views and accessors of its arrays."""
+    """The buffer of the .glb file, with the views and accessors of its arrays."""
 
     def __init__(self) -> None:
         self.bytes = bytearray()
@@ -56,7 +56,12 @@ class _Buffer:
         normalized: bool = False,
         bounds: bool = False,
     ) -> int:
-        """Append an array; returns the index of its accessor."""
+        """Append an array. Returns the index of its accessor.
+
+        kind: the array's type in glTF, such as "VEC3". component: code of the type of its numbers. target:
+        code of its use. normalized: whether the integers stand for 0 to 1. bounds: whether the accessor
+        states the least and greatest values.
+        """
         data = np.ascontiguousarray(array)
         self.bytes += b"\0" * (-len(self.bytes) % 4)
         view: dict[str, object] = {"buffer": 0, "byteOffset": len(self.bytes), "byteLength": data.nbytes}
@@ -81,7 +86,10 @@ class _Buffer:
 
 
 def write_glb(path: str | Path, skeleton: Skeleton, motions: Iterable[BodyMotion] = ()) -> None:
-    """Write the body of a skeleton and its motions, as animations. The body stands on height 0."""
+    """Write the body of a skeleton, and its motions as animations.
+
+    In the bind pose, the body stands on the ground (height 0).
+    """
     mesh, buffer = body(skeleton), _Buffer()
     nodes = _nodes(skeleton, mesh)
     document: dict[str, object] = {
@@ -120,9 +128,9 @@ def write_glb(path: str | Path, skeleton: Skeleton, motions: Iterable[BodyMotion
 
 
 def _nodes(skeleton: Skeleton, mesh: Mesh) -> list[dict[str, object]]:
-    """The joints in the bind pose, standing on the ground."""
-    known = all(skeleton.roles.get(role) in skeleton.joints for role in NEEDED)
-    world = bind(skeleton).rotations if known else np.tile(quat.IDENTITY, (len(skeleton.joints), 1))
+    """A node for each joint in the bind pose. The body stands on the ground."""
+    is_person = all(skeleton.roles.get(role) in skeleton.joints for role in NEEDED)
+    world = bind(skeleton).rotations if is_person else np.tile(quat.IDENTITY, (len(skeleton.joints), 1))
     local = local_rotations(skeleton, world)
     offsets = np.array(skeleton.offsets, float)
     offsets[0] = [0.0, -mesh.corners[:, 1].min(), 0.0]
@@ -160,7 +168,7 @@ def _primitive(mesh: Mesh, buffer: _Buffer) -> dict[str, object]:
 
 
 def _inverse_bind_matrices(mesh: Mesh) -> NDArray[np.float32]:
-    """Inverse bind matrices (B, 16), column by column."""
+    """Inverse bind matrices (B, 16) of the bones, each column by column."""
     turn = quat.to_matrix(quat.inv(mesh.rotations))
     out = np.tile(np.eye(4), (len(mesh.bones), 1, 1))
     out[:, :3, :3] = turn
@@ -169,9 +177,10 @@ def _inverse_bind_matrices(mesh: Mesh) -> NDArray[np.float32]:
 
 
 def _animation(motion: BodyMotion, buffer: _Buffer) -> dict[str, object]:
+    """The animation of a motion. A joint that does not move has only the first and the last frame."""
     times = (np.arange(len(motion.root)) / motion.fps).astype(np.float32)
-    at = buffer.add(times, "SCALAR", FLOAT, bounds=True)
-    ends = buffer.add(times[[0, -1]], "SCALAR", FLOAT, bounds=True) if len(times) > 2 else at
+    all_times = buffer.add(times, "SCALAR", FLOAT, bounds=True)
+    end_times = buffer.add(times[[0, -1]], "SCALAR", FLOAT, bounds=True) if len(times) > 2 else all_times
     samplers: list[dict[str, object]] = []
     channels: list[dict[str, object]] = []
 
@@ -180,21 +189,22 @@ def _animation(motion: BodyMotion, buffer: _Buffer) -> dict[str, object]:
         samplers.append({"input": times, "output": output, "interpolation": "LINEAR"})
         channels.append({"sampler": len(samplers) - 1, "target": {"node": node, "path": path}})
 
-    add_channel(0, "translation", at, METRES * motion.root, "VEC3")
+    add_channel(0, "translation", all_times, METRES * motion.root, "VEC3")
     for j, turns in enumerate(np.moveaxis(_xyzw(quat.normalize(quat.continuous(motion.local))), 1, 0)):
         if len(times) > 2 and np.ptp(turns, axis=0).max() < LEAST_MOVEMENT:
-            add_channel(j, "rotation", ends, turns[[0, -1]], "VEC4")
+            add_channel(j, "rotation", end_times, turns[[0, -1]], "VEC4")
         else:
-            add_channel(j, "rotation", at, turns, "VEC4")
+            add_channel(j, "rotation", all_times, turns, "VEC4")
     return {"name": motion.name, "samplers": samplers, "channels": channels}
 
 
 def _xyzw(rotation: Array) -> Array:
+    """Quaternions in the order of glTF."""
     return rotation[..., [1, 2, 3, 0]]
 
 
 def _write(path: str | Path, document: dict[str, object], data: bytes) -> None:
-    """The .glb container: header, JSON padded with spaces, buffer padded with zeros."""
+    """Write the .glb container: header, JSON padded with spaces, buffer padded with zeros."""
     text = json.dumps(document, separators=(",", ":")).encode()
     text += b" " * (-len(text) % 4)
     data += b"\0" * (-len(data) % 4)

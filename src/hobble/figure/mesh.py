@@ -20,19 +20,17 @@ from hobble.figure.bind import SIDES, BindPose, bind
 from hobble.figure.shape import person, scale
 from hobble.figure.skin import owners, spread
 from hobble.figure.solids import Rod, Solid
-from hobble.figure.surface import FAR, Fine, distances, slopes, surface
+from hobble.figure.surface import LARGEST_DISTANCE, Fine, distances, slopes, surface
 
-STEP = 1.9  # cm between corners of the mesh on trunk and limbs
-FINE_STEPS = {"hand": 0.64, "face": 0.85, "foot": 1.2}  # cm between corners on finer parts
-# cm over which the weights of two bones blend; "": all other parts
+CORNER_SPACING = 1.9  # cm between corners of the mesh on trunk and limbs
+FINE_SPACING = {"hand": 0.64, "face": 0.85, "foot": 1.2}  # cm between corners on finer parts
+# cm over which the weights of two bones blend, for each part of the body. "": all other parts.
 BLEND_WIDTH = {"": 3.6, "hand": 0.8, "head": 2.6, "foot": 1.8}
-OCCLUSION_SAMPLES = (
-    (1.5, 0.30),
-    (4.0, 0.30),
-    (9.0, 0.25),
-)  # distances (cm) at which surroundings are sampled for shading, with weights
+# For shading: distances from the body (cm) at which its surroundings are sampled, each with a weight.
+OCCLUSION_SAMPLES = ((1.5, 0.30), (4.0, 0.30), (9.0, 0.25))
+# The roles that a skeleton must have for a body in the shape of a person.
 NEEDED = ("hips", "head", *(f"{s}_{r}" for s in SIDES for r in ("shoulder", "hip", "knee", "heel", "toe")))
-STICK = (2.6, 1.9)  # cm, half widths at both ends of a bone, for a skeleton without roles
+STICK = (2.6, 1.9)  # cm, half widths of a rod at its upper and lower end, if a role of NEEDED is missing
 
 
 @dataclass(frozen=True)
@@ -57,7 +55,7 @@ class Mesh:
     rotations: Array = field(repr=False)
 
     def posed(self, positions: Array, rotations: Array) -> Array:
-        """Corners (V, 3) with the bones at world positions (B, 3) and rotations (B, 4)."""
+        """Corners (V, 3) of the body for world positions (B, 3) and rotations (B, 4) of its bones."""
         turn = quat.to_matrix(quat.mul(rotations, quat.inv(self.rotations)))
         move = positions - np.einsum("bij,bj->bi", turn, self.positions)
         return _skinned(self.corners, self.bones_of_corner, self.weights, turn, move)
@@ -83,14 +81,14 @@ def _skinned(
 def body(skeleton: Skeleton) -> Mesh:
     """The body of a skeleton: a person if the skeleton has the roles NEEDED, else a rod for every bone.
 
-    It depends only on the joints (with their offsets) and the roles. Skeletons that agree in these share one
-    mesh.
+    The mesh depends only on the joints (with their parents and offsets) and the roles. Skeletons that agree
+    in these share one mesh.
     """
     return _mesh_of(_mesh_key_text(skeleton))
 
 
 def key(skeleton: Skeleton) -> str:
-    """A name for the body of a skeleton. Skeletons with the same body get the same name."""
+    """A hash that names the body of a skeleton. Skeletons with the same body get the same name."""
     return hashlib.sha256(_mesh_key_text(skeleton).encode()).hexdigest()[:12]
 
 
@@ -102,19 +100,20 @@ def _mesh_key_text(skeleton: Skeleton) -> str:
 @functools.lru_cache(maxsize=8)
 def _mesh_of(text: str) -> Mesh:
     skeleton = Skeleton.from_dict({"name": "body", **json.loads(text)})
-    known = all(skeleton.roles.get(role) in skeleton.joints for role in NEEDED)
-    if known:
-        stand = bind(skeleton)
-        solids, size, fine = list(person(stand)), scale(stand), _fine(stand)
-        bones = stand.bones
+    is_person = all(skeleton.roles.get(role) in skeleton.joints for role in NEEDED)
+    if is_person:
+        pose = bind(skeleton)
+        solids, size, fine = list(person(pose)), scale(pose), _fine(pose)
+        bones = pose.bones
     else:
-        stand, solids, bones = _sticks(skeleton)
+        pose, solids, bones = _sticks(skeleton)
         size, fine = 1.0, []
-    corners, faces = surface(solids, STEP * size, fine)
+    corners, faces = surface(solids, CORNER_SPACING * size, fine)
     slope, _ = slopes(solids, corners)
     normals = slope / np.maximum(np.linalg.norm(slope, axis=1, keepdims=True), 1e-9)
     owner = owners(solids, corners, bones)
-    bones_of_corner, weights = spread(corners, faces, owner, _reach(owner, stand, size) if known else 2.0)
+    blend_width = _blend_widths(owner, pose, size) if is_person else 2.0
+    bones_of_corner, weights = spread(corners, faces, owner, blend_width)
     used = np.unique(bones_of_corner)
     return Mesh(
         corners,
@@ -124,64 +123,63 @@ def _mesh_of(text: str) -> Mesh:
         used,
         np.searchsorted(used, bones_of_corner),
         weights,
-        stand.positions[used],
-        stand.rotations[used],
+        pose.positions[used],
+        pose.rotations[used],
     )
 
 
-def _fine(stand: BindPose) -> list[Fine]:
+def _fine(pose: BindPose) -> list[Fine]:
     """The boxes in which the mesh is finer: hands, face, feet."""
-    size, at = scale(stand), stand.at
+    size, at = scale(pose), pose.at
     out: list[Fine] = []
     head = at["head"]
     low, high = np.array([-8.0, -6.0, -1.0]), np.array([8.0, 12.0, 13.0])
-    out.append((head + size * low, head + size * high, FINE_STEPS["face"] * size))
+    out.append((head + size * low, head + size * high, FINE_SPACING["face"] * size))
     for side in SIDES:
         wrist = at[f"{side}_wrist"]
         ahead = wrist - at[f"{side}_elbow"]
         tip = wrist + 18 * size * ahead / max(float(np.linalg.norm(ahead)), 1e-9)
-        out.append(
-            (np.minimum(wrist, tip) - 4 * size, np.maximum(wrist, tip) + 4 * size, FINE_STEPS["hand"] * size)
-        )
+        low, high = np.minimum(wrist, tip) - 4 * size, np.maximum(wrist, tip) + 4 * size
+        out.append((low, high, FINE_SPACING["hand"] * size))
         ankle, ball = at[f"{side}_heel"], at[f"{side}_toe"]
         low, high = np.minimum(ankle, ball), np.maximum(ankle, ball)
         low = low - size * np.array([5.0, 3.5, 6.0])
         high = high + size * np.array([5.0, 0.0, 9.0])
-        out.append((low, high, FINE_STEPS["foot"] * size))
+        out.append((low, high, FINE_SPACING["foot"] * size))
     return out
 
 
-def _reach(owner: NDArray[np.int64], stand: BindPose, size: float) -> Array:
-    """The distance (V,) in cm over which the weights of two bones blend at each corner."""
+def _blend_widths(owner: NDArray[np.int64], pose: BindPose, size: float) -> Array:
+    """(V,) cm over which the weights of two bones blend at each corner. owner: (V,) nearest bone."""
     wide = np.full(len(owner), BLEND_WIDTH[""])
     for part, roles in (
         ("hand", ("left_wrist", "right_wrist")),
         ("head", ("head", "neck")),
         ("foot", ("left_toe", "right_toe", "left_heel", "right_heel")),
     ):
-        wide[np.isin(owner, [stand.bones[role] for role in roles])] = BLEND_WIDTH[part]
+        wide[np.isin(owner, [pose.bones[role] for role in roles])] = BLEND_WIDTH[part]
     return wide * size
 
 
 def _shade(solids: Sequence[Solid], corners: Array, normals: Array, size: float) -> Array:
-    """`Mesh.shade` (V,), from the distances to the body at points along each normal (OCCLUSION_SAMPLES)."""
+    """`Mesh.shade` (V,). A corner is dark if the body is near to points on its normal (OCCLUSION_SAMPLES)."""
     shade = np.ones(len(corners))
     for away, weight in OCCLUSION_SAMPLES:
-        reach = size * away
-        found = np.clip(distances(solids, corners + reach * normals), 0, min(reach, FAR))
-        shade -= weight * (1 - found / reach)
+        height = size * away
+        free = np.clip(distances(solids, corners + height * normals), 0, min(height, LARGEST_DISTANCE))
+        shade -= weight * (1 - free / height)
     return np.clip(shade, 0, 1)
 
 
 def _sticks(skeleton: Skeleton) -> tuple[BindPose, list[Solid], dict[str, int]]:
-    """The rest pose, a rod for every bone in it, and joint name -> index."""
+    """A body of rods: the rest pose, a rod for every bone, and the index of each joint by its name."""
     count = len(skeleton.joints)
     positions = np.zeros((count, 3))
     for j, p in enumerate(skeleton.parents):
         if p >= 0:
             positions[j] = positions[p] + skeleton.offsets[j]
     bones = {name: j for j, name in enumerate(skeleton.joints)}
-    stand = BindPose(positions, np.tile(quat.IDENTITY, (count, 1)), bones, {})
+    pose = BindPose(positions, np.tile(quat.IDENTITY, (count, 1)), bones, {})
 
     def rods() -> Iterator[Solid]:
         for j, p in enumerate(skeleton.parents):
@@ -189,7 +187,7 @@ def _sticks(skeleton: Skeleton) -> tuple[BindPose, list[Solid], dict[str, int]]:
                 yield Rod(1.0, ((-np.inf, skeleton.joints[p]),), positions[p], positions[j], *STICK)
 
     return (
-        stand,
+        pose,
         list(rods()) or [Rod(1.0, ((-np.inf, skeleton.joints[0]),), positions[0], positions[0], *STICK)],
         bones,
     )

@@ -1,4 +1,7 @@
-"""Packs a body for the page: its arrays as integers in base64, and the links that each bone moves."""
+"""Packs a body for a web page: its arrays as integers in base64.
+
+Also finds the links that move with each bone. A link is a pair of joints between which a body can be hurt.
+"""
 
 from __future__ import annotations
 
@@ -14,16 +17,16 @@ from hobble.core.skeleton import Skeleton
 from hobble.figure.mesh import Mesh, body
 from hobble.models.packing import packed
 
-UNIT = 0.01  # cm; positions of corners are multiples of this
-TURN = 32767  # integer that stands for 1 in a rotation
+UNIT = 0.01  # cm; positions of corners are stored as multiples of this
+TURN = 32767  # integer that stands for 1 in the components of a rotation
 
 
 def packed_body(skeleton: Skeleton) -> dict[str, Any]:
-    """The mesh of `mesh.body` with the data that moves it.
+    """The mesh of a skeleton's body, and the data with which a page moves it.
 
-    `unit`: UNIT. `wide`: whether `faces` are 32-bit. `keep`: the joints that are bones of the mesh. `places`,
-    `turns`: their positions and rotations in the bind pose. `balls`: see `part_spheres`. `bone`, `share`: the
-    `bones_of_corner` and `weights` of `Mesh`. Other keys: as in `Mesh`.
+    `unit`: UNIT. `wide`: whether `faces` are 32-bit. `bone`, `share`: the `bones_of_corner` and `weights` of
+    `Mesh`. `keep`: the joints that are bones of the mesh. `places`, `turns`: positions and rotations of these
+    joints in the bind pose. `balls`: result of `part_spheres`. Other keys: fields of `Mesh`.
     """
     mesh = body(skeleton)
     index_type = np.uint16 if len(mesh.corners) < 1 << 16 else np.uint32
@@ -44,39 +47,40 @@ def packed_body(skeleton: Skeleton) -> dict[str, Any]:
 
 
 def part_spheres(mesh: Mesh) -> Array:
-    """(B, 4) a sphere for the part that each bone moves: centre in the bone's coordinates, and radius, cm.
+    """(B, 4) a sphere for the part of the body that each bone moves.
 
-    The spheres replace the body where a rough shape is enough, as for its shadow on the ground.
+    Columns: centre in the coordinates of the bone, and radius, cm. All are 0 if no corner is moved mainly by
+    the bone. The spheres replace the body where a rough shape is enough, as for its shadow on the ground.
     """
     out = np.zeros((len(mesh.bones), 4))
     main_bone = np.take_along_axis(mesh.bones_of_corner, mesh.weights.argmax(axis=1)[:, None], axis=1)[:, 0]
     for b in range(len(mesh.bones)):
-        if not (own := main_bone == b).any():
+        if not (moved := main_bone == b).any():
             continue
-        local = quat.rotate(quat.inv(mesh.rotations[b]), mesh.corners[own] - mesh.positions[b])
+        local = quat.rotate(quat.inv(mesh.rotations[b]), mesh.corners[moved] - mesh.positions[b])
         low, high = local.min(axis=0), local.max(axis=0)
         out[b] = [*(low + high) / 2, float(np.prod((high - low) / 2) ** (1 / 3))]
     return out
 
 
 def whole_weights(weights: Array) -> NDArray[np.uint8]:
-    """Weights (V, 4) as integers (V, 4) that sum to 255. The rounding error is added to the largest."""
-    steps = np.floor(weights * 255).astype(np.int64)
-    steps[np.arange(len(steps)), weights.argmax(axis=1)] += 255 - steps.sum(axis=1)
-    return steps.astype(np.uint8)
+    """Weights (V, 4) as integers (V, 4) with the sum 255. The largest weight takes the rounding error."""
+    whole = np.floor(weights * 255).astype(np.int64)
+    whole[np.arange(len(whole)), weights.argmax(axis=1)] += 255 - whole.sum(axis=1)
+    return whole.astype(np.uint8)
 
 
 def regions(skeleton: Skeleton, links: Sequence[str]) -> list[list[int]]:
-    """For each bone of the body, the indices of the links in the part of the body that it moves.
+    """For each bone of the body, the indices of the links that move with it.
 
-    A link belongs to the bone that moves its upper joint. A link that starts at the hips or the chest belongs
-    to the bone of the limb, or of the part of the back, that it leads to.
+    A link belongs to the bone that moves its upper joint. But a link that starts at the hips or the chest,
+    where the body branches, belongs to the bone of the limb, or of the part of the back, to which it leads.
     """
     bones = body(skeleton).bones.tolist()
-    turning = {
+    branching = {
         skeleton.role(role) for role in ("hips", "chest") if skeleton.roles.get(role) in skeleton.joints
     }
-    found: list[list[int]] = [[] for _ in bones]
+    of_bones: list[list[int]] = [[] for _ in bones]
     for index, ends in enumerate(link_ends(skeleton.joints, links)):
         if ends is None:
             continue
@@ -84,11 +88,11 @@ def regions(skeleton: Skeleton, links: Sequence[str]) -> list[list[int]]:
         bone = upper
         while bone not in bones and skeleton.parents[bone] >= 0:
             bone = skeleton.parents[bone]
-        if bone in turning:
+        if bone in branching:
             bone = next((j for j in _below(skeleton, lower) if j in bones), bone)
         if bone in bones:
-            found[bones.index(bone)].append(index)
-    return found
+            of_bones[bones.index(bone)].append(index)
+    return of_bones
 
 
 def _below(skeleton: Skeleton, joint: int) -> list[int]:
@@ -100,7 +104,10 @@ def _below(skeleton: Skeleton, joint: int) -> list[int]:
 
 
 def link_ends(joints: Sequence[str], links: Sequence[str]) -> list[tuple[int, int] | None]:
-    """Joint indices of both ends of each link. Joint names may contain hyphens, so every hyphen is tried."""
+    """Joint indices of both ends of each link "upper-lower"; None if the skeleton lacks one of them.
+
+    Joint names may contain hyphens, so the name of a link is split at each of its hyphens in turn.
+    """
     pairs: list[tuple[int, int] | None] = []
     for link in links:
         pieces = link.split("-")
@@ -111,5 +118,5 @@ def link_ends(joints: Sequence[str], links: Sequence[str]) -> list[tuple[int, in
 
 
 def packed_turns(rotations: Array) -> str:
-    """Rotations (F, B, 4) as 16-bit integers in base64; TURN is 1."""
+    """Rotations (F, B, 4) as 16-bit integers in base64; TURN stands for 1."""
     return packed(np.round(np.clip(rotations, -1, 1) * TURN).astype(np.int16))

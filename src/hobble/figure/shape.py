@@ -1,6 +1,7 @@
-"""The shape of a person around the joints of a skeleton: all numbers of its proportions.
+"""The shape of a person around the joints of a skeleton.
 
-Tables are in centimetres for a body with LEG_LENGTH, and are scaled to the skeleton.
+The tables of proportions are in centimetres for a body whose legs are LEG_LENGTH long. They are scaled to the
+skeleton.
 """
 
 from __future__ import annotations
@@ -15,9 +16,11 @@ from hobble.figure.solids import Ball, Floor, Owner, Rod, Solid, SweptSolid
 
 LEG_LENGTH = 81.0  # cm from hip to ankle of the body that the tables describe
 TOE_HEIGHT = 2.5  # cm, height of the ball of the foot above the sole
-# Heights (cm) of hip joints, chest, neck and head in TRUNK. They are moved to those of the skeleton.
-LEVELS = (-8.0, 23.0, 38.0, 48.0)
+# Heights (cm) of hip joints, chest, neck and head in TRUNK, where 0 is 8 cm above the hip joints. TRUNK is
+# stretched so that these heights become the heights of the joints in the skeleton.
+JOINT_HEIGHTS = (-8.0, 23.0, 38.0, 48.0)
 
+# Each row of TRUNK, LEG, ARM, PALM and FOOT is one section of a solid. Its numbers in TRUNK:
 # height; half width; half depth; how far the centre is to the front; exponent of the superellipse
 TRUNK = (
     (-18.5, 3.5, 4.5, 0.2, 2.0),
@@ -81,11 +84,11 @@ PALM = (
     (9.2, 3.9, 1.3, 0.0),
     (10.2, 3.3, 1.0, 0.0),
 )
-# each finger: place across the palm; distance of its beginning from the wrist; length; half width
+# each finger, cm: how far its root is towards the thumb; how far it is from the wrist; length; half width
 FINGERS = ((3.1, 8.7, 7.0, 0.84), (1.0, 9.2, 7.8, 0.86), (-1.1, 8.9, 7.2, 0.83), (-3.05, 8.1, 5.6, 0.74))
 CURL = (0.16, 0.30, 0.26)  # radians, bend of each finger joint
-# place along the foot in two numbers (share of the way from ankle to ball, and cm to add); half width;
-# height; how far the centre is towards the other foot
+# The place along the foot is the sum of the first two numbers: share of the way from ankle to ball; cm. Then:
+# half width; height; how far the centre is towards the other foot
 FOOT = (
     (0.0, -6.0, 2.4, 4.6, 0.0),
     (0.0, -5.0, 3.2, 6.8, 0.0),
@@ -118,7 +121,7 @@ def person(bind: BindPose) -> Iterator[Solid]:
 
 
 def scale(bind: BindPose) -> float:
-    """Leg length of the body, divided by LEG_LENGTH. The tables are multiplied by this."""
+    """Leg length of the body, divided by LEG_LENGTH: the factor by which the tables are scaled."""
     legs = [np.linalg.norm(bind.at[f"{s}_{a}"] - bind.at[f"{s}_{b}"]) for s in SIDES for a, b in
             (("heel", "knee"), ("knee", "hip"))]  # fmt: skip
     return float(max(sum(legs) / 2 / LEG_LENGTH, 0.05))
@@ -129,7 +132,7 @@ def _levels(at: dict[str, Array], size: float) -> Array:
     hips = (at["left_hip"][1] + at["right_hip"][1]) / 2
     heights = [hips, at["chest"][1], at["neck"][1], at["head"][1]]
     for i in range(1, 4):
-        usual = size * (LEVELS[i] - LEVELS[i - 1])
+        usual = size * (JOINT_HEIGHTS[i] - JOINT_HEIGHTS[i - 1])
         heights[i] = max(heights[i], heights[i - 1] + 0.4 * usual)
     return np.array(heights)
 
@@ -138,20 +141,25 @@ def _trunk(at: dict[str, Array], size: float) -> Iterator[Solid]:
     heights = _levels(at, size)
 
     def level(y: float) -> float:
-        if y < LEVELS[0] or y > LEVELS[-1]:
-            end = 0 if y < LEVELS[0] else -1
-            return float(heights[end] + size * (y - LEVELS[end]))
-        return float(np.interp(y, LEVELS, heights))
+        """Height in the skeleton of the height `y` in TRUNK."""
+        if y < JOINT_HEIGHTS[0] or y > JOINT_HEIGHTS[-1]:
+            end = 0 if y < JOINT_HEIGHTS[0] else -1
+            return float(heights[end] + size * (y - JOINT_HEIGHTS[end]))
+        return float(np.interp(y, JOINT_HEIGHTS, heights))
 
     hip = (at["left_hip"] + at["right_hip"]) / 2
     start = np.array([hip[0], 0.0, hip[2]])
-    spine = [hip[2], at["spine"][2], at["chest"][2], at["neck"][2], at["head"][2]]
-    known = [heights[0], at["spine"][1], *heights[1:]]
+    # Height and depth (z) of the joints of the back, from which the centre of each section follows.
+    joint_depths = [hip[2], at["spine"][2], at["chest"][2], at["neck"][2], at["head"][2]]
+    joint_heights = [heights[0], at["spine"][1], *heights[1:]]
+
+    def middle_depth(y: float) -> float:
+        return float(np.interp(level(y), joint_heights, joint_depths))
+
     rows = [
-        (level(y), size * w, size * d, 0.0, float(np.interp(level(y), known, spine)) - hip[2] + size * f, n)
-        for y, w, d, f, n in TRUNK
+        (level(y), size * w, size * d, 0.0, middle_depth(y) - hip[2] + size * f, n) for y, w, d, f, n in TRUNK
     ]
-    up, left = np.array([0.0, 1.0, 0.0]), np.array([-1.0, 0.0, 0.0])
+    up, right = np.array([0.0, 1.0, 0.0]), np.array([-1.0, 0.0, 0.0])
     owners: tuple[Owner, ...] = (
         (-np.inf, "hips"),
         (0.5 * (at["hips"][1] + at["spine"][1]) + 2.0 * size, "spine"),
@@ -159,11 +167,11 @@ def _trunk(at: dict[str, Array], size: float) -> Iterator[Solid]:
         (heights[2] + 2.0 * size, "neck"),
         (heights[3] + 1.0 * size, "head"),
     )
-    yield SweptSolid(0.0, owners, start, up, left, rows)
+    yield SweptSolid(0.0, owners, start, up, right, rows)
 
     def place(x: float, y: float, z: float) -> Array:
-        middle = float(np.interp(level(y), known, spine))
-        return np.array([hip[0] + size * x, level(y), middle + size * z])
+        """The point at the height `y` in TRUNK that is (x, z) away from the middle of the trunk."""
+        return np.array([hip[0] + size * x, level(y), middle_depth(y) + size * z])
 
     for sign in (1.0, -1.0):
         for role, blend, centre, radii in (
@@ -188,12 +196,14 @@ def _limb(
 ) -> SweptSolid:
     """A solid along two bones, which are in one line in the bind pose.
 
-    places: the three joints. table: rows as in LEG. roles: of the two bones.
+    places: positions of the three joints. forward: direction in which the depth is measured. table: rows
+    with the columns of LEG. roles: the role of each of the two bones.
     """
     a, b, c = places
     axis = _unit(c - a)
     first, second = float((b - a) @ axis), float((c - b) @ axis)
-    across = _unit(np.cross(axis, forward))  # so that the third direction is `forward`
+    across = _unit(np.cross(axis, forward))
+    # The third direction, axis x across, has to point to `forward`.
     across = -across if np.cross(axis, across) @ forward < 0 else across
     rows = []
     for t, wide, deep, front in table:
@@ -207,8 +217,8 @@ def _leg(at: dict[str, Array], side: str, size: float) -> Iterator[Solid]:
     front = np.array([0.0, 0.0, 1.0])
     leg = _limb((hip, knee, heel), front, LEG, size, (f"{side}_hip", f"{side}_knee"))
     yield _with_blend(leg, 3.5 * size)
-    cap = knee + size * np.array([0.0, 0.4, 4.3])
-    yield Ball(3.0 * size, ((-np.inf, f"{side}_knee"),), cap, size * np.array([2.7, 3.4, 1.9]))
+    kneecap = knee + size * np.array([0.0, 0.4, 4.3])
+    yield Ball(3.0 * size, ((-np.inf, f"{side}_knee"),), kneecap, size * np.array([2.7, 3.4, 1.9]))
 
 
 def _with_blend(sweep: SweptSolid, blend: float) -> SweptSolid:
@@ -217,7 +227,7 @@ def _with_blend(sweep: SweptSolid, blend: float) -> SweptSolid:
 
 def _arm(at: dict[str, Array], side: str, sign: float, size: float) -> Iterator[Solid]:
     shoulder, elbow, wrist = (at[f"{side}_{role}"] for role in ("shoulder", "elbow", "wrist"))
-    # The third direction points outward, to the back of the hand. So the half width is from front to back.
+    # The depth of an arm is measured outward, towards the back of the hand, and the width from front to back.
     out = np.array([sign, 0.6, 0.0])
     table = [(t, wide, deep, 0.0) for t, wide, deep in ARM]
     arm = _limb((shoulder, elbow, wrist), out, tuple(table), size, (f"{side}_shoulder", f"{side}_elbow"))
@@ -234,7 +244,7 @@ def _foot(at: dict[str, Array], side: str, sign: float, size: float) -> Iterator
     ahead = way / length if length > 1.0 * size else np.array([0.0, 0.0, 1.0])
     up = np.array([0.0, 1.0, 0.0])
     inward = np.cross(up, ahead) * -sign
-    # The ankle's height above the sole decides how high the foot is there.
+    # The height of the foot at the ankle depends on the height of the ankle above the sole.
     tall = max((ankle[1] - sole) / 7.0, 0.5 * size)
     rows = []
     for t, cm, wide, height, aside in FOOT:
@@ -247,6 +257,7 @@ def _foot(at: dict[str, Array], side: str, sign: float, size: float) -> Iterator
         rows = [(s, w, d, -cu, cv, n) for s, w, d, cu, cv, n in rows]
     owners = ((-np.inf, f"{side}_heel"), (length - 0.5 * size, f"{side}_toe"))
     yield SweptSolid(2.5 * size, owners, start, ahead, across, rows)
+    # Cut off what is below the sole.
     heel_only = ((-np.inf, f"{side}_heel"),)
     middle = start + ahead * (0.6 * length)
     yield Floor(1.0 * size, heel_only, middle, up, (length + 12.0) * size, cut=True)
@@ -260,6 +271,7 @@ def _hand(at: dict[str, Array], side: str, sign: float, size: float) -> Iterator
     owner = ((-np.inf, f"{side}_wrist"),)
 
     def place(out: float, aside: float, deep: float) -> Array:
+        """The point `out` from the wrist along the hand, `aside` to the thumb, `deep` out of the palm."""
         return wrist + size * (out * ahead + aside * thumb + deep * palm)
 
     rows = [(size * s, size * w, size * d, size * u, 0.0, 2.5) for s, w, d, u in PALM]
@@ -274,6 +286,7 @@ def _hand(at: dict[str, Array], side: str, sign: float, size: float) -> Iterator
             a, b = thick * (1 - 0.08 * part), thick * (1 - 0.08 * (part + 1))
             yield Rod(0.5 * size, owner, knuckle, tip, a * size, b * size)
             knuckle = tip
+    # The thumb.
     root, joint, tip = place(2.4, 2.4, 0.5), place(5.8, 4.7, 1.3), place(9.3, 5.9, 1.9)
     yield Rod(1.4 * size, owner, root, joint, 1.5 * size, 1.12 * size)
     yield Rod(0.5 * size, owner, joint, tip, 1.12 * size, 0.86 * size)

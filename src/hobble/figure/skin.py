@@ -12,27 +12,31 @@ from scipy.sparse.linalg import splu
 from hobble.core.quat import Array
 from hobble.figure.solids import Solid
 
-MOST = 4  # most bones that move one corner
+MOST_BONES = 4  # at most this many bones move a corner
 
 
 def owners(solids: Sequence[Solid], points: Array, bones: Mapping[str, int]) -> NDArray[np.int64]:
-    """(V,) the joint whose part of the body is nearest to each of the points (V, 3)."""
-    best, found = np.full(len(points), np.inf), np.zeros(len(points), np.int64)
+    """(V,) the joint whose part of the body is nearest to each of the points (V, 3).
+
+    bones: role of an owner (`Solid.owners`) -> index of its joint.
+    """
+    nearest, owner = np.full(len(points), np.inf), np.zeros(len(points), np.int64)
     x, y, z = points.T
     for solid in solids:
         if solid.cut:
             continue
         low, high = (corner.reshape(3, 1) for corner in solid.bounds())
+        # Points more than 4 cm from the box around a solid belong to other solids.
         chosen = np.flatnonzero(((low - 4 < points.T) & (high + 4 > points.T)).all(axis=0))
         away = np.full(len(points), np.inf)
         away[chosen] = solid.distance(x[chosen], y[chosen], z[chosen])
-        nearer = away < best
+        nearer = away < nearest
         joint = np.zeros(len(points), np.int64)
         along = solid.along(points)
         for begin, role in solid.owners:
             joint[along >= begin] = bones[role]
-        found[nearer], best[nearer] = joint[nearer], away[nearer]
-    return found
+        owner[nearer], nearest[nearer] = joint[nearer], away[nearer]
+    return owner
 
 
 def spread(
@@ -40,9 +44,9 @@ def spread(
 ) -> tuple[NDArray[np.int64], Array]:
     """The joints (V, 4) that move each corner and their weights (V, 4), largest first. Weights sum to 1.
 
-    At first each corner has weight 1 for its `owner` (V,). Then the weights spread along the surface like
-    heat, over about `reach` cm (one number, or one for each corner). So a hand that hangs beside a thigh gets
-    no weight from it.
+    corners: (V, 3), faces: (T, 3) of the mesh. At first each corner has weight 1 for its `owner` (V,). Then
+    the weights spread like heat over about `reach` cm (one number, or one for each corner). They spread along
+    the surface only: none gets from a thigh to a hand that hangs beside it.
     """
     joints = np.unique(owner)
     shares = (owner[:, None] == joints).astype(float)
@@ -57,13 +61,13 @@ def spread(
     graph = coo_array((np.r_[flow, flow], (np.r_[a, b], np.r_[b, a])), (count, count)).tocsr()
     system = (diags_array(1 + np.asarray(graph.sum(axis=1)).ravel()) - graph).tocsc()
     solve = splu(system).solve
-    for _ in range(2):  # twice, to smooth the step at a joint
+    for _ in range(2):  # twice, because once leaves a kink in the weights at a joint
         shares = solve(shares)
-    order = np.argsort(-shares, axis=1)[:, :MOST]
+    order = np.argsort(-shares, axis=1)[:, :MOST_BONES]
     kept = np.take_along_axis(shares, order, axis=1)
-    if kept.shape[1] < MOST:
-        pad = MOST - kept.shape[1]
+    if kept.shape[1] < MOST_BONES:
+        pad = MOST_BONES - kept.shape[1]
         kept, order = np.pad(kept, ((0, 0), (0, pad))), np.pad(order, ((0, 0), (0, pad)))
-    # Along the surface, a weight then falls to 0 smoothly where another bone takes its place among the four.
+    # All weights are lowered. So the smallest of the four has faded to 0 where another bone replaces it.
     kept = np.maximum(kept - 0.01, 0)
     return joints[order], kept / kept.sum(axis=1, keepdims=True)

@@ -1,4 +1,4 @@
-"""The solids that a body is built from, as signed distances to their surface in cm, negative inside."""
+"""The solids of which a body is built, as signed distances to their surface: cm, negative inside."""
 
 from __future__ import annotations
 
@@ -19,8 +19,8 @@ Owner = tuple[float, str]
 class Solid:
     """A part of a body. Solids are added one after another; each is blended with the body so far.
 
-    blend: width of the blend, cm. owners: the bones that move it, in order along its length. cut: the solid
-    is removed from the body instead of added.
+    blend: width of the blend, cm. owners: the bones that move the solid, in order along its length. cut:
+    whether the solid is cut from the body instead of added.
     """
 
     blend: float
@@ -32,11 +32,11 @@ class Solid:
         raise NotImplementedError
 
     def bounds(self) -> tuple[Array, Array]:
-        """Lowest and highest corner (3,) of its bounding box."""
+        """Lowest and highest corner (3,) of the bounding box."""
         raise NotImplementedError
 
     def along(self, points: Array) -> Array:
-        """Position of points (N, 3) along the solid, in the units of `owners`."""
+        """(N,) position of points (N, 3) along the solid, cm, to find their owner; 0 if there is only one."""
         return np.zeros(len(points))
 
 
@@ -44,9 +44,10 @@ class Solid:
 class SweptSolid(Solid):
     """A solid that is given by sections across a straight line from `start` along the unit vector `axis`.
 
-    sections: rows of (position along the line, half width along `across`, half depth along the third
-    direction, centre along `across`, centre along the third direction, exponent of the superellipse: 2 is an
-    ellipse), cm. Cubic splines connect the sections, so that none is visible as an edge.
+    The third direction is the cross product of `axis` and the unit vector `across`. Each row of `sections`
+    has a position along the line, a half width along `across`, a half depth along the third direction, and
+    the centre along `across` and along the third direction, all in cm. Last comes the exponent of the
+    superellipse (2 is an ellipse). Cubic splines connect the sections, so that none is visible as an edge.
     """
 
     start: Array
@@ -94,7 +95,7 @@ class SweptSolid(Solid):
 
 @dataclass(frozen=True)
 class Ball(Solid):
-    """An ellipsoid with half axes `radii` (3,) along the rows of `axes` (3, 3)."""
+    """An ellipsoid around `centre`. Its half axes `radii` (3,), cm, lie along the rows of `axes` (3, 3)."""
 
     centre: Array
     radii: Array
@@ -116,7 +117,7 @@ class Ball(Solid):
 
 @dataclass(frozen=True)
 class Rod(Solid):
-    """A rod between two points with round ends. Its half width goes from `thick` to `thin` (cm)."""
+    """A rod with round ends. Its half width goes from `thick` at `start` to `thin` at `end` (cm)."""
 
     start: Array
     end: Array
@@ -139,7 +140,7 @@ class Rod(Solid):
 
 @dataclass(frozen=True)
 class Floor(Solid):
-    """What is below a plane through `place`, within `reach` cm of that point. up: normal of the plane."""
+    """All below the plane through `place` with the normal `up`, within about `reach` cm of `place`."""
 
     place: Array
     up: Array
@@ -148,7 +149,7 @@ class Floor(Solid):
     def distance(self, x: Any, y: Any, z: Any) -> Array:
         """As in `Solid`."""
         local = [x - self.place[0], y - self.place[1], z - self.place[2]]
-        return sum(p * self.up[i] for i, p in enumerate(local)) + 0 * (x + y + z)
+        return np.asarray(sum(p * self.up[i] for i, p in enumerate(local)))
 
     def bounds(self) -> tuple[Array, Array]:
         """As in `Solid`."""
@@ -156,11 +157,14 @@ class Floor(Solid):
 
 
 def united(a: Array, b: Array, blend: float) -> Array:
-    """Smooth minimum of two distances, blended where they differ by less than `blend` cm."""
+    """Smooth minimum of two distances `a` and `b`, blended where they differ by less than `blend` cm."""
     near = np.maximum(blend - np.abs(a - b), 0) / max(blend, 1e-9)
     return np.minimum(a, b) - 0.25 * blend * near * near
 
 
 def subtracted(a: Array, b: Array, blend: float) -> Array:
-    """Smooth difference of two distances: the part of `a` outside `b`, blended over `blend` cm."""
+    """Distance to what is left of a solid if another is cut from it, blended over `blend` cm.
+
+    a, b: distances to the solid and to the one that is cut from it.
+    """
     return -united(-a, b, blend)

@@ -10,26 +10,26 @@ from numpy.typing import NDArray
 from hobble.core.quat import Array
 from hobble.figure.solids import Solid, subtracted, united
 
-FAR = 12.0  # cm; larger distances to the surface are clipped to this
-NEAR = 7.0  # cm; a solid has no effect farther away than this. Each `Solid.blend` must be smaller
-# The corners of a cell, and its edges as pairs of them.
+LARGEST_DISTANCE = 12.0  # cm; larger distances to the surface are clipped to this
+SOLID_REACH = 7.0  # cm; farther than this from its box, a solid has no effect; `Solid.blend` must be smaller
+# The corners of a cell of the grid, and its edges as pairs of indices of CORNERS.
 CORNERS = np.array([[i, j, k] for i in (0, 1) for j in (0, 1) for k in (0, 1)])
 EDGES = [(a, b) for a in range(8) for b in range(a + 1, 8) if (CORNERS[a] != CORNERS[b]).sum() == 1]
 
-# A box in which the grid is finer: its lowest and highest corner (3,), and the grid's step there, cm.
+# A box in which the grid is finer: its lowest and highest corner (3,), and the grid's spacing there, cm.
 Fine = tuple[Array, Array, float]
 
 
 def distances(solids: Sequence[Solid], points: Array) -> Array:
-    """(N,) distance of points (N, 3) from the surface of the blended solids, cm. It is negative inside.
+    """(N,) distance of points (N, 3) from the surface of the blended solids, cm, at most LARGEST_DISTANCE.
 
-    The largest value is FAR.
+    It is negative inside.
     """
-    out = np.full(len(points), FAR)
+    out = np.full(len(points), LARGEST_DISTANCE)
     x, y, z = (np.ascontiguousarray(part) for part in points.T)
     for solid in solids:
         low, high = solid.bounds()
-        low, high = low - NEAR, high + NEAR
+        low, high = low - SOLID_REACH, high + SOLID_REACH
         near = (x > low[0]) & (x < high[0]) & (y > low[1]) & (y < high[1]) & (z > low[2]) & (z < high[2])
         chosen = np.flatnonzero(near)
         if len(chosen):
@@ -39,25 +39,27 @@ def distances(solids: Sequence[Solid], points: Array) -> Array:
     return out
 
 
-def grid_lines(low: float, high: float, step: float, bands: Sequence[tuple[float, float, float]]) -> Array:
-    """Grid coordinates from low to high with spacing `step`, or finer near the `bands` (from, to, step)."""
+def grid_lines(low: float, high: float, spacing: float, bands: Sequence[tuple[float, float, float]]) -> Array:
+    """Grid coordinates from low to high. They are closer together near the `bands` (from, to, spacing)."""
     places, at = [low], low
     while at < high:
-        here = min([step, *(_spacing(at, band) for band in bands)])
-        at += here
+        at += min([spacing, *(_largest_spacing(at, band) for band in bands)])
         places.append(at)
     return np.array(places)
 
 
-def _spacing(at: float, band: tuple[float, float, float]) -> float:
-    """The largest spacing at a coordinate: the step of the band, plus a quarter of the distance from it."""
-    low, high, step = band
-    return step + 0.25 * max(low - at, at - high, 0.0)
+def _largest_spacing(at: float, band: tuple[float, float, float]) -> float:
+    """The spacing that a band allows at `at`: its own, plus a quarter of the distance from the band."""
+    low, high, spacing = band
+    return spacing + 0.25 * max(low - at, at - high, 0.0)
 
 
-def field(solids: Sequence[Solid], axes: Sequence[Array]) -> Array:
-    """(X, Y, Z) distances from the blended solids on a grid of three axes, cm; FAR where no solid reaches."""
-    out = np.full([len(axis) for axis in axes], FAR, np.float64)
+def distance_grid(solids: Sequence[Solid], axes: Sequence[Array]) -> Array:
+    """(X, Y, Z) distances from the blended solids at the points of a grid, cm.
+
+    axes: coordinates of the grid lines along x, y, z. LARGEST_DISTANCE stands where no solid is near.
+    """
+    out = np.full([len(axis) for axis in axes], LARGEST_DISTANCE, np.float64)
     for solid in solids:
         low, high = solid.bounds()
         reach = max(solid.blend, 2.0) + 1.5
@@ -77,36 +79,37 @@ def field(solids: Sequence[Solid], axes: Sequence[Array]) -> Array:
 
 
 def surface(
-    solids: Sequence[Solid], step: float, fine: Sequence[Fine] = ()
+    solids: Sequence[Solid], spacing: float, fine: Sequence[Fine] = ()
 ) -> tuple[Array, NDArray[np.int64]]:
     """The closed surface: vertices (V, 3), cm, and triangles (T, 3), counter-clockwise seen from outside.
 
-    step: cm between grid points, finer within the boxes `fine`.
+    spacing: cm between grid points, finer within the boxes `fine`.
     """
     kept = [solid for solid in solids if not solid.cut]
-    low = np.min([solid.bounds()[0] for solid in kept], axis=0) - 3 * step
-    high = np.max([solid.bounds()[1] for solid in kept], axis=0) + 3 * step
-    axes = [grid_lines(low[i], high[i], step, [(a[i], b[i], s) for a, b, s in fine]) for i in range(3)]
-    values = without_touching_sheets(field(solids, axes))
+    low = np.min([solid.bounds()[0] for solid in kept], axis=0) - 3 * spacing
+    high = np.max([solid.bounds()[1] for solid in kept], axis=0) + 3 * spacing
+    axes = [grid_lines(low[i], high[i], spacing, [(a[i], b[i], s) for a, b, s in fine]) for i in range(3)]
+    values = without_touching_sheets(distance_grid(solids, axes))
     vertices, triangles = surface_net(values, axes)
     for _ in range(2):  # move the vertices closer to the surface
-        vertices = vertices - offsets(solids, vertices, 0.35 * step)
+        vertices = vertices - offsets(solids, vertices, 0.35 * spacing)
     return vertices, triangles
 
 
-def offsets(solids: Sequence[Solid], points: Array, most: float) -> Array:
-    """(N, 3) vectors from the surface to points (N, 3), along the slope, at most `most` cm long."""
+def offsets(solids: Sequence[Solid], points: Array, longest: float) -> Array:
+    """(N, 3) vectors from the surface to points (N, 3) along the slope, shortened to at most `longest` cm."""
     slope, away = slopes(solids, points)
     steep = (slope * slope).sum(axis=1)
     move = (away / np.maximum(steep, 0.25))[:, None] * slope
     size = np.linalg.norm(move, axis=1, keepdims=True)
-    return move * np.minimum(1.0, most / np.maximum(size, 1e-9))
+    return move * np.minimum(1.0, longest / np.maximum(size, 1e-9))
 
 
 def slopes(solids: Sequence[Solid], points: Array, h: float = 0.06) -> tuple[Array, Array]:
     """Slope (N, 3) of the distance at points (N, 3), and the distance (N,).
 
-    Both are estimated from the corners of a tetrahedron around each point, `h` cm away along each axis.
+    Both are estimated from the distances at the corners of a tetrahedron around each point. h: how far the
+    corners are from the point along each axis, cm.
     """
     slope, away = np.zeros_like(points), np.zeros(len(points))
     for corner in np.array([[1.0, -1, -1], [-1, -1, 1], [-1, 1, -1], [1, 1, 1]]):
@@ -129,9 +132,9 @@ def without_touching_sheets(values: Array) -> Array:
             views = []
             for du in (0, 1):
                 for dv in (0, 1):
-                    cut = [slice(None)] * 3
-                    cut[u], cut[v] = slice(du, -1 if du == 0 else None), slice(dv, -1 if dv == 0 else None)
-                    views.append(tuple(cut))
+                    view = [slice(None)] * 3
+                    view[u], view[v] = slice(du, -1 if du == 0 else None), slice(dv, -1 if dv == 0 else None)
+                    views.append(tuple(view))
             a, b, c, d = (inside[view] for view in views)
             for first, second, crossed in ((1, 2, a & d & ~b & ~c), (0, 3, b & c & ~a & ~d)):
                 where = np.argwhere(crossed)
@@ -147,7 +150,7 @@ def surface_net(values: Array, axes: Sequence[Array]) -> tuple[Array, NDArray[np
     """Vertices (V, 3) and triangles (T, 3) of the surface where the grid's `values` are 0.
 
     Each cell that the surface crosses gets one vertex of the mesh. Each edge of the grid that the surface
-    crosses is surrounded by four such cells; their vertices make two triangles.
+    crosses is surrounded by four such cells, whose vertices are the corners of two triangles.
     """
     inside = values < 0
     shape = np.array(values.shape) - 1
@@ -170,7 +173,10 @@ def surface_net(values: Array, axes: Sequence[Array]) -> tuple[Array, NDArray[np
 
 
 def _triangles(inside: NDArray[np.bool_], index: NDArray[np.int64]) -> NDArray[np.int64]:
-    """Triangles (T, 3), two for each edge of the grid that the surface crosses. index: cell -> its vertex."""
+    """Triangles (T, 3), two for each edge of the grid that the surface crosses.
+
+    inside: whether each point of the grid is in the body. index: the vertex of each cell; -1: none.
+    """
     faces = []
     for axis in range(3):
         u, v = (axis + 1) % 3, (axis + 2) % 3

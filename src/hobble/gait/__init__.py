@@ -1,1 +1,1 @@
-"""Compares a walk with a healthy one: its cycles, the sizes of effects, and the impairment it resembles."""
+"""Measures how a walk differs from a healthy walk, and recognises which impairment it resembles."""

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import contextlib
 import sys
 from collections.abc import Mapping, Sequence
 from pathlib import Path
@@ -15,7 +16,11 @@ from hobble.gait.profile import NO_CYCLE, Profile
 from hobble.gait.read_clip import SKELETONS, read_clip
 from hobble.gait.recogniser import RIGHT
 
-NO_HEALTHY = "No healthy walk was given. Compared with the mean of people, a person's build counts, too."
+FIX_NO_CYCLE = "Name a clip that walks straight ahead for three steps or more."
+NO_HEALTHY = (
+    "No healthy walk was given, so the clips were compared with the mean of ten healthy people. "
+    "A different build can then look like a limp. Name healthy walks of the same person after --healthy."
+)
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -29,7 +34,12 @@ def main(arguments: Sequence[str] | None = None) -> int:
         "--healthy", nargs="+", default=[], metavar="CLIP.bvh", help="healthy walks of the same person"
     )
     parser.add_argument("--side", choices=("right", "left"), help="the hurt side; by default as recognised")
-    parser.add_argument("--window", type=_seconds, default=4.0, help="length of a window, seconds")
+    parser.add_argument(
+        "--window",
+        type=_seconds,
+        default=4.0,
+        help="seconds; besides the whole clip, each window of this length is recognised on its own",
+    )
     parser.add_argument("--skeletons", default=SKELETONS, help="folder of the skeleton files")
     options = parser.parse_args(arguments)
     try:
@@ -46,58 +56,61 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 def _seconds(text: str) -> float:
     """A window's length from the command line, 1 to 3600 seconds."""
-    seconds = float(text)
-    if not 1.0 <= seconds <= 3600.0:
-        raise ValueError
-    return seconds
+    with contextlib.suppress(ValueError):
+        if 1.0 <= float(text) <= 3600.0:
+            return float(text)
+    raise argparse.ArgumentTypeError(f"{text!r} should be a number of seconds from 1 to 3600")
 
 
 def _healthy(paths: Sequence[str], skeletons: str) -> Profile:
     clips = [read_clip(path, skeletons) for path in paths]
     for path, clip in zip(paths, clips, strict=True):
         if not len(measure_clip(clip)):
-            raise InputError(
-                path, NO_CYCLE, fix="Name a clip that walks straight ahead for three steps or more."
-            )
+            raise InputError(path, NO_CYCLE, fix=FIX_NO_CYCLE)
     return healthy_profile(clips)
 
 
 def _compared(path: str, options: argparse.Namespace, healthy: Profile) -> WalkComparison:
     clip = read_clip(path, options.skeletons)
     if not len(measure_clip(clip)):
-        raise InputError(path, NO_CYCLE)
+        raise InputError(path, NO_CYCLE, fix=FIX_NO_CYCLE)
     return compare(clip, healthy, options.window)
 
 
 def describe(name: str, compared: WalkComparison, side: str | None = None) -> str:
-    """The recognisers' answers as text, and the effects next to those of people."""
+    """The recognisers' answers as text, and the effects of the limp next to the effects in people."""
     answer, grade = compared.answer, compared.grade
     side = side or answer.side or grade.side or RIGHT
     likely = ", ".join(f"{gait} {answer.probabilities[gait]:.2f}" for gait in GAITS)
     lines = [
         f"{name}: {answer.label} {answer.side or ''} ({len(compared.walk)} cycles)",
         f"  probabilities: {likely}",
-        f"  windows: {len(compared.windows)}, called {_listed(compared.named())}",
-        f"  mild limps too: {grade.label} {grade.side or ''}, {grade.strength:.2f} of what people showed, "
-        f"{grade.distance:.1f} standard deviations from it",
-        f"  what may hurt: {', '.join(grade.parts) or 'nothing'}; "
-        f"windows called {_listed(compared.graded())}",
-        f"  effects, hurt side {side}, beside people ({SOURCE}; mean, spread over people)",
+        f"  share of the {len(compared.windows)} windows with each answer: {_listed(compared.named())}",
+        f"  graded recogniser, also for mild limps: {grade.label} {grade.side or ''}, "
+        f"strength {grade.strength:.2f} (mean of people: 1), "
+        f"{grade.distance:.1f} standard deviations from the likeliest known walk",
+        f"  what may hurt: {', '.join(grade.parts) or 'nothing'}",
+        f"  share of the windows with each answer of the graded recogniser: {_listed(compared.graded())}",
+        f"  effects if the {side} side is hurt. "
+        f"At the right: mean ± standard deviation over people ({SOURCE})",
     ]
     return "\n".join([*lines, *_effects(compared.effects[side])])
 
 
 def _effects(sizes: Mapping[str, float]) -> list[str]:
-    known = effects_of_people(people())
-    lines = [" " * 60 + "".join(f"{gait[:13]:>15}" for gait in known)]
+    of_people = effects_of_people(people())
+    lines = [" " * 60 + "".join(f"{gait[:13]:>15}" for gait in of_people)]
     for key, text in EFFECTS.items():
-        columns = "".join("{:9.2f} ±{:4.2f}".format(*known[gait][key]) for gait in known)
+        columns = "".join("{:9.2f} ±{:4.2f}".format(*of_people[gait][key]) for gait in of_people)
         lines.append(f"  {key:14}{sizes[key]:8.2f}  {text[:36]:36}{columns}")
     return lines
 
 
 def _listed(shares: Mapping[str, float]) -> str:
-    return ", ".join(f"{name} {share:.2f}" for name, share in shares.items()) or "nothing: too few cycles"
+    return (
+        ", ".join(f"{name} {share:.2f}" for name, share in shares.items())
+        or "none, because no window has enough cycles"
+    )
 
 
 if __name__ == "__main__":

@@ -18,10 +18,10 @@ from hobble.gait.recogniser import RIGHT, SIDES, Impairment, recognise, windows
 class WalkComparison:
     """Measurements of a clip and the recognisers' answers.
 
-    walk: the clip's cycles. profile: their medians. answer: what the linear classifier says of the whole
-    clip. grade: what the graded recogniser, which knows mild limps, says of it. windows, grades: (first
-    frame, answer or grade) of each window. effects: side -> sizes of the effects if that side is the hurt
-    one.
+    walk: the clip's cycles. profile: medians over these cycles. answer: what the linear classifier
+    (recogniser.py) says of the whole clip. grade: what the graded recogniser (limp_grade.py) says of the
+    whole clip; it also recognises mild limps. windows: (first frame, answer) of each window. grades: (first
+    frame, grade) of each window. effects: side -> sizes of the effects if this side is hurt.
     """
 
     walk: WalkCycles = field(repr=False)
@@ -38,11 +38,11 @@ class WalkComparison:
         return self.answer.side or RIGHT
 
     def named(self) -> dict[str, float]:
-        """Share of windows for each label and side ("antalgic right") of the linear classifier."""
+        """Label and side by the linear classifier, as in "antalgic right" -> share of the windows."""
         return _shares([answer for _, answer in self.windows])
 
     def graded(self) -> dict[str, float]:
-        """Share of windows for each label and side of the graded recogniser."""
+        """Label and side by the graded recogniser -> share of the windows."""
         return _shares([answer for _, answer in self.grades])
 
 
@@ -57,28 +57,31 @@ def measure_clip(clip: Clip) -> WalkCycles:
 
 
 def healthy_profile(clips: Sequence[Clip]) -> Profile:
-    """The profile of all cycles of a figure's healthy clips. Without clips, the mean of normal people.
+    """The profile of all cycles of a figure's healthy clips.
 
-    Raises HobbleError if no clip has a cycle.
+    Without clips, the mean profile of people's normal walks. Raises HobbleError if no clip has a cycle.
     """
     return profile(joined(measure_clip(clip) for clip in clips)) if clips else people().normal()
 
 
 def compare(clip: Clip, healthy: Profile, seconds: float = 4.0) -> WalkComparison:
-    """Compare a clip with a healthy profile, in windows of `seconds`. Raises HobbleError without a cycle."""
+    """Compare a clip with a healthy profile: the whole clip, and each window of `seconds`.
+
+    Raises HobbleError if the clip has no cycle.
+    """
     return compare_walk(measure_clip(clip), len(clip), healthy, seconds)
 
 
 def compare_walk(walk: WalkCycles, frames: int, healthy: Profile, seconds: float = 4.0) -> WalkComparison:
     """Compare the cycles of a motion of `frames` frames with a healthy profile. See `compare`."""
-    own = profile(walk)
+    whole = profile(walk)
     parts = [(start, profile(part)) for start, part in windows(walk, frames, seconds)]
     return WalkComparison(
         walk,
-        own,
-        recognise(own, healthy),
-        grade(own, healthy),
+        whole,
+        recognise(whole, healthy),
+        grade(whole, healthy),
         [(start, recognise(part, healthy)) for start, part in parts],
         [(start, grade(part, healthy)) for start, part in parts],
-        {side: effects(own, healthy, side) for side in SIDES},
+        {side: effects(whole, healthy, side) for side in SIDES},
     )

@@ -1,7 +1,8 @@
-"""The cycles of a walk, from one landing of a foot to its next, and the numbers of each cycle.
+"""Finds the cycles of a walk, each from one landing of a foot to its next, and measures them.
 
-A foot lands where its ankle is furthest ahead of the hips. This also works for a foot that drags or is set
-down beside the other, where contacts, or zero crossings of the distance between the ankles, fail.
+A foot lands where its ankle is furthest ahead of the hips. This rule also finds the landings of a foot that
+drags or is set down beside the other foot. Contacts, or zero crossings of the distance between the ankles,
+would miss them.
 """
 
 from __future__ import annotations
@@ -16,31 +17,33 @@ from hobble.core.quat import Array
 from hobble.core.skeleton import Skeleton
 from hobble.gait.signals import CURVES, Signals, mirrored, signals
 
-SAMPLES = 50
+SAMPLES = 50  # number of samples of each curve in a cycle
 SCALARS = (
     "stride_seconds",
-    "speed_per_leg",
-    "left_strike_phase",
-    "stance_share_R",
+    "speed_per_leg",  # leg lengths a second
+    "left_strike_phase",  # share of the cycle that has passed as the left foot lands
+    "stance_share_R",  # share of the cycle in which the right ankle stands
     "stance_share_L",
-    "step_R",
+    "step_R",  # how far the right ankle is ahead of the left one as the right foot lands, leg lengths
     "step_L",
-    "step_width",
+    "step_width",  # sideways distance between the ankles at the landings, leg lengths
 )
-STANDING_SPEED = 0.35  # share of the walking speed; an ankle that is slower stands
-SHORTEST, LONGEST = 0.4, 3.5  # s, a cycle
-LEAST_TRAVEL = 0.2  # leg lengths that the hips travel in a cycle; less is standing
-LEAST_SWING = 0.12  # leg lengths that an ankle moves at least in a step, forward and then back
-LEAST_SWING_SHARE = 0.4  # the same as a share of the ankle's range; smaller movements are no step
-STRAIGHT = 25.0  # degrees that the path turns at most in a cycle; people were measured on straight paths
-AHEAD = 0.7  # least mean cosine between facing and travel; below it the walk is backward or sideways
+STANDING_SPEED = 0.35  # an ankle that is slower than this share of the walking speed stands
+SHORTEST_CYCLE, LONGEST_CYCLE = 0.4, 3.5  # seconds
+LEAST_TRAVEL = 0.2  # leg lengths: if the hips travel less than this in a cycle, the body stands
+# In a step, the ankle moves forward and then back relative to the hips, each time by at least both of these
+# limits. A smaller movement is no step.
+LEAST_SWING = 0.12  # leg lengths
+LEAST_SWING_SHARE = 0.4  # share of the ankle's range
+MOST_TURN = 25.0  # degrees that the path may turn in a cycle; recorded people walked straight (people.py)
+LEAST_AHEAD = 0.7  # mean cosine between facing and travel; with less, the walk is backward or sideways
 
 
 @dataclass(frozen=True)
 class Cycle:
-    """A cycle of the right leg, from its landing in frame `start` to the next in frame `end`.
+    """A cycle of the right leg, from a landing in frame `start` to the next landing in frame `end`.
 
-    scalars: the numbers of SCALARS. curves: (22, 50), rows as CURVES, at 50 equal steps from `start`.
+    scalars: name of SCALARS -> value. curves: (22, 50) signals.CURVES at 50 equal steps from `start`.
     """
 
     start: int
@@ -66,7 +69,7 @@ class WalkCycles:
         return min(len(self.right), len(self.left))
 
     def within(self, start: float, end: float) -> WalkCycles:
-        """The cycles that are completely between two frames."""
+        """The cycles that are completely between the frames `start` and `end`."""
         kept = ((c for c in side if start <= c.start and c.end <= end) for side in (self.right, self.left))
         return WalkCycles(self.fps, *map(tuple, kept))
 
@@ -82,7 +85,7 @@ def measure(skeleton: Skeleton, positions: Array, fps: float = 60.0) -> WalkCycl
     give no cycle. Between the two landings of a cycle the other foot must land exactly once. A clip that is
     shorter than a cycle has none.
     """
-    if len(positions) < SHORTEST * fps:
+    if len(positions) < SHORTEST_CYCLE * fps:
         return WalkCycles(fps, (), ())
     walk = signals(skeleton, positions, fps)
     return WalkCycles(fps, tuple(_cycles(walk)), tuple(_cycles(mirrored(walk))))
@@ -98,27 +101,28 @@ def joined(walks: Iterable[WalkCycles]) -> WalkCycles:
 
 
 def landings(forward: Array, fps: float) -> list[int]:
-    """Frames in which an ankle is furthest ahead of the hips. forward: (F,) how far, in leg lengths.
+    """Frames in which an ankle is furthest ahead of the hips.
 
-    The ankle must then go back by LEAST_SWING, and by LEAST_SWING_SHARE of its range in the LONGEST seconds
-    around.
+    forward: (F,) how far the ankle is ahead of the hips, leg lengths. After a landing the ankle must go back
+    by at least LEAST_SWING, and by at least LEAST_SWING_SHARE of its range. The range is taken over
+    LONGEST_CYCLE seconds, half of them before the landing and half after it.
     """
-    reach = int(LONGEST * fps / 2)
+    reach = int(LONGEST_CYCLE * fps / 2)
     least = np.maximum(LEAST_SWING, LEAST_SWING_SHARE * _ranges(forward, reach))
-    found: list[int] = []
+    landed: list[int] = []
     high = low = 0
     rising = True
     for i, value in enumerate(forward):
         if rising:
             high = i if value > forward[high] else high
             if forward[high] - value >= least[high]:
-                found.append(high)
+                landed.append(high)
                 rising, low = False, i
         else:
             low = i if value < forward[low] else low
             if value - forward[low] >= least[low]:
                 rising, high = True, i
-    return [i for i in found if i > 0]
+    return [i for i in landed if i > 0]
 
 
 def _ranges(values: Array, reach: int) -> Array:
@@ -131,14 +135,15 @@ def _cycles(walk: Signals) -> Iterable[Cycle]:
     right, left = (landings(walk.curves[f"ankle_forward_{side}"], walk.fps) for side in "RL")
     for a, b in itertools.pairwise(right):
         between = [i for i in left if a < i < b]
-        if len(between) == 1 and SHORTEST * walk.fps <= b - a <= LONGEST * walk.fps:
+        if len(between) == 1 and SHORTEST_CYCLE * walk.fps <= b - a <= LONGEST_CYCLE * walk.fps:
             travel = np.linalg.norm(np.diff(walk.hips[a : b + 1], axis=0), axis=1).sum()
-            straight = abs(walk.heading[b] - walk.heading[a]) <= STRAIGHT
-            if travel >= LEAST_TRAVEL and straight and walk.ahead[a:b].mean() >= AHEAD:
+            straight = abs(walk.heading[b] - walk.heading[a]) <= MOST_TURN
+            if travel >= LEAST_TRAVEL and straight and walk.ahead[a:b].mean() >= LEAST_AHEAD:
                 yield _cycle(walk, a, between[0], b)
 
 
 def _cycle(walk: Signals, a: int, other: int, b: int) -> Cycle:
+    """The cycle from frame `a` to frame `b`. other: the frame in which the other foot lands."""
     seconds = (b - a) / walk.fps
     speed = float(np.linalg.norm(walk.hips[b] - walk.hips[a])) / seconds
     apart = walk.curves["ankle_forward_R"] - walk.curves["ankle_forward_L"]

@@ -1,10 +1,9 @@
 """Writes healthy.npz from walks of the CMU database.
 
-python -m hobble.gait.derive_healthy CMU_FOLDER [OUT.npz]
+python -m hobble.gait.derive_healthy CMU_FOLDER [HEALTHY.npz]
 
-The file says how much the features of a healthy walk differ from those of other healthy walks of the same
-person: at other speeds, on slight curves, between windows. The motion was obtained from mocap.cs.cmu.edu,
-which was funded by NSF EIA-0196217.
+The file says how much the features of healthy walks vary within one person: with the speed, on slight curves,
+and from window to window. The motion was obtained from mocap.cs.cmu.edu, which was funded by NSF EIA-0196217.
 """
 
 from __future__ import annotations
@@ -27,7 +26,8 @@ from hobble.gait.profile import Profile, mirrored, profile
 from hobble.gait.read_clip import SKELETONS, read_clip
 from hobble.gait.recogniser import windows
 
-# performer -> reference walks, which count as the healthy ones; and other walks: slow, quick, on curves
+# Clips of CMU, all of healthy walks. REFERENCE: performer -> the walks with which this performer's walks are
+# compared. OTHERS: performer -> further walks: slow, quick, on curves.
 REFERENCE = {
     "105": ("105_29", "105_31", "105_34", "105_36"),
     "07": ("07_01", "07_02", "07_03", "07_06"),
@@ -46,7 +46,11 @@ SECONDS = 4.0  # length of a window
 def healthy_windows(
     folder: str | Path, performer: str, skeletons: str | Path = SKELETONS
 ) -> Iterator[tuple[str, Profile, Profile]]:
-    """For each window of a performer: clip, profile, and profile of the performer's other reference walks."""
+    """Yield (name of the clip, profile, profile of the reference) for each window of a performer's walks.
+
+    The reference is the performer's walks in REFERENCE without the clip itself. folder: BVH files of CMU.
+    skeletons: folder of the skeleton files.
+    """
     names = REFERENCE[performer] + OTHERS[performer]
     clips = {name: read_clip(Path(folder, f"{name}.bvh"), skeletons) for name in names}
     for name, clip in clips.items():
@@ -56,16 +60,16 @@ def healthy_windows(
 
 
 def _parts(clip: Clip) -> list[WalkCycles]:
-    """The cycles in each window of a clip. A clip without a window is one part if it has a cycle."""
+    """The cycles in each window of a clip, or all cycles as one part if no window has enough."""
     walk = measure_clip(clip)
-    found = [part for _, part in windows(walk, len(clip), SECONDS)]
-    return found or [walk] * bool(len(walk))
+    parts = [part for _, part in windows(walk, len(clip), SECONDS)]
+    return parts or [walk] * bool(len(walk))
 
 
 def covariance(seen: Iterable[tuple[str, Profile, Profile]]) -> tuple[Array, int]:
     """The mean of x x^T, (D, D), over the features x (D,) of windows, and the number of clips.
 
-    Left and right count equally, and so do all clips. seen: from `healthy_windows`.
+    Left and right count equally, and so do all clips. seen: what `healthy_windows` yields.
     """
     by_clip: dict[str, list[Array]] = {}
     for name, walk, healthy in seen:
@@ -76,7 +80,7 @@ def covariance(seen: Iterable[tuple[str, Profile, Profile]]) -> tuple[Array, int
 
 
 def derive(folder: str | Path, out: str | Path = HEALTHY) -> None:
-    """Write the covariance of each performer, and from how many clips it was computed."""
+    """Write each performer's covariance and its number of clips. folder: BVH files of CMU. out: the file."""
     each = [covariance(healthy_windows(folder, performer)) for performer in REFERENCE]
     save_npz(
         out,
@@ -90,7 +94,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     """Run the command. Returns the exit status."""
     given = sys.argv[1:] if arguments is None else list(arguments)
     if len(given) not in (1, 2):
-        print("python -m hobble.gait.derive_healthy CMU_FOLDER [HEALTHY.npz]", file=sys.stderr)
+        print("Usage: python -m hobble.gait.derive_healthy CMU_FOLDER [HEALTHY.npz]", file=sys.stderr)
         return 2
     try:
         derive(*given)

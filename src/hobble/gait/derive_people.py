@@ -1,8 +1,10 @@
-"""Writes people.npz from the curves of Jun et al.: python -m hobble.gait.derive_people WALKS.npz
-[PEOPLE.npz].
+"""Writes people.npz from the walks recorded by Jun et al. (2020), see people.py.
 
-WALKS.npz has, for each gait and person, the median over the cycles: `gaits` (6), `curves` (22 names),
-`scalars` (8 names), `curve` (6, people, 22, 50) and `scalar` (6, people, 8), as defined in profile.py.
+python -m hobble.gait.derive_people WALKS.npz [PEOPLE.npz]
+
+WALKS.npz has five arrays. `gaits`, `curves` and `scalars` are the names in people.GAITS, signals.CURVES and
+cycles.SCALARS. `curve` (6, people, 22, 50) and `scalar` (6, people, 8) are medians over the cycles of each
+gait and person.
 """
 
 from __future__ import annotations
@@ -22,14 +24,14 @@ from hobble.gait.signals import CURVES
 
 
 def derive(walks: str | Path, out: str | Path = FILE) -> None:
-    """Write mean and standard deviation over people, and each person's profile.
+    """Write the mean and standard deviation over people of each curve and scalar, and each person's profile.
 
-    Raises InputError if `walks` does not have these gaits, curves and scalars.
+    walks: path of WALKS.npz. Raises InputError if its gaits, curves or scalars are not the expected ones.
     """
     data = load_npz(walks)
-    for name, wanted in (("gaits", GAITS), ("curves", CURVES), ("scalars", SCALARS)):
-        if tuple(map(str, data[name])) != tuple(wanted):
-            raise InputError(walks, f"`{name}` should be {', '.join(wanted)}")
+    for name, expected in (("gaits", GAITS), ("curves", CURVES), ("scalars", SCALARS)):
+        if tuple(map(str, data[name])) != tuple(expected):
+            raise InputError(walks, f"`{name}` should be {', '.join(expected)}")
     curve, scalar = data["curve"].astype(float), data["scalar"].astype(float)
     each = [
         [list(of_curves(c, s).values()) for c, s in zip(*pair, strict=True)]
@@ -49,7 +51,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     """Run the command. Returns the exit status."""
     given = sys.argv[1:] if arguments is None else list(arguments)
     if len(given) not in (1, 2):
-        print(__doc__.splitlines()[0], file=sys.stderr)
+        print("Usage: python -m hobble.gait.derive_people WALKS.npz [PEOPLE.npz]", file=sys.stderr)
         return 2
     try:
         derive(*given)

@@ -66,16 +66,16 @@ def effects(walk: Profile, healthy: Profile, side: str = RIGHT) -> dict[str, flo
     }
 
 
-def effects_of_people(known: People) -> Mapping[str, Mapping[str, tuple[float, float]]]:
-    """For each impairment and each of the EFFECTS, the mean and the standard deviation over people."""
+def effects_of_people(recorded: People) -> Mapping[str, Mapping[str, tuple[float, float]]]:
+    """Impairment -> name of EFFECTS -> mean and standard deviation over the recorded people."""
     out = {}
-    for gait in GAITS:  # these GAITS are the normal walk and the impaired walks of the recorded people
+    for gait in GAITS:  # the normal walk and five impaired ones, see people.py
         if gait == NORMAL:
             continue
         each = [
-            effects(known.profile(gait, person), known.profile(NORMAL, person))
-            for person in range(known.count)
+            effects(recorded.profile(gait, person), recorded.profile(NORMAL, person))
+            for person in range(recorded.count)
         ]
-        values = {name: [one[name] for one in each] for name in EFFECTS}
+        values = {name: [of_person[name] for of_person in each] for name in EFFECTS}
         out[gait] = {name: (float(np.mean(v)), float(np.std(v))) for name, v in values.items()}
     return out

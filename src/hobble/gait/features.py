@@ -13,6 +13,7 @@ from hobble.gait.profile import Profile
 
 LEAST_RANGE = 3.0  # degrees: smaller ranges are raised to this, because ratios of tiny ranges are arbitrary
 MOST_RATIO = 5.0  # larger ratios are limited to this
+# Names of features.
 TRUNK_FORWARD, TRUNK_LEFT = "mean trunk_forward", "mean trunk_left"
 TRUNK = (TRUNK_FORWARD, TRUNK_LEFT, "range trunk_forward", "range trunk_left")
 ARMS = "range arm_forward R - L"
@@ -21,16 +22,18 @@ ARMS = "range arm_forward R - L"
 def features(walk: Profile, healthy: Profile) -> dict[str, float]:
     """The features of a walk relative to the same person's healthy walk.
 
-    They are changes in degrees, leg lengths and shares of the cycle. The flexion ranges of knees and hips are
-    shares of the healthy range. Those of the arms are logarithms of such shares.
+    Most are differences from the healthy walk in degrees, leg lengths or shares of the cycle. The flexion
+    ranges of knees and hips and the swing of the arms are first divided by their healthy values. The ratios
+    of knees and hips are compared as right minus left, the ratios of the arms as the logarithm of right over
+    left.
     """
 
     def change(name: str) -> float:
         return walk[name] - healthy[name]
 
     def share(name: str) -> float:
-        own, other = walk[f"range {name}"], healthy[f"range {name}"]
-        return min(max(own, LEAST_RANGE) / max(other, LEAST_RANGE), MOST_RATIO)
+        now, usual = walk[f"range {name}"], healthy[f"range {name}"]
+        return min(max(now, LEAST_RANGE) / max(usual, LEAST_RANGE), MOST_RATIO)
 
     def sides(name: str) -> float:
         return change(f"{name}_R") - change(f"{name}_L")
@@ -50,5 +53,5 @@ def features(walk: Profile, healthy: Profile) -> dict[str, float]:
     for part in ("knee_flexion", "hip_flexion", "hip_abduction"):
         out |= {f"mean {part} {side}": change(f"mean {part}_{side}") for side in "RL"}
     for part in ("trunk_forward", "trunk_left", "pelvis_left_up"):
-        out |= {f"{kind} {part}": change(f"{kind} {part}") for kind in ("range", "mean")}
+        out |= {f"{statistic} {part}": change(f"{statistic} {part}") for statistic in ("range", "mean")}
     return out

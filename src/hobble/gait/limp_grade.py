@@ -1,9 +1,9 @@
-"""Recognises limps, also mild ones: what hurts, the side, and the strength relative to people's strong limps.
+"""Recognises limps, also mild ones: what hurts, on which side, and how strong the limp is.
 
-An impairment is a direction in which people's walks differ from their normal walks. At strength s the mean of
-the features is s times their mean over people. The covariance is s^2 times that over people, plus that of
-healthy walks. So a mild limp is modelled as part of the way from a person's normal to their impaired walk,
-without a generator of limps. Impairments that the data cannot distinguish share a label (PARTS).
+The strength is 1 for the limps that the people of people.py imitated. A limp of strength s is modelled as a
+walk at the share s of the way from normal to impaired. The mean of its features is s times the mean over
+people. Their covariance is s^2 times the covariance over people, plus the covariance of healthy walks. Parts
+of the body whose pain the data cannot distinguish share a label (PARTS).
 """
 
 from __future__ import annotations
@@ -24,8 +24,9 @@ from hobble.gait.recogniser import RIGHT, SIDES, examples
 
 HEALTHY = Path(__file__).with_name("healthy.npz")
 GUARDED_ARM, LEANING = "guarded_arm", "leaning_trunk"
-WAYS = {"forward": (1, 0), "backward": (-1, 0), "to the left": (0, 1), "to the right": (0, -1)}
-# label -> the parts of the body that may hurt. Pain in thigh, shank or foot looks the same in people's data.
+# direction in which the trunk leans -> its (forward, left) components
+LEANS = {"forward": (1, 0), "backward": (-1, 0), "to the left": (0, 1), "to the right": (0, -1)}
+# label -> the parts of the body that may hurt. Pain in thigh, shank or foot looks the same in the data.
 # Pain anywhere in an arm is recognised only by the swing of the arm.
 PARTS: Mapping[str, tuple[str, ...]] = {
     NORMAL: (),
@@ -37,20 +38,22 @@ PARTS: Mapping[str, tuple[str, ...]] = {
     GUARDED_ARM: ("shoulder", "upper arm", "forearm", "hand"),
     LEANING: ("back",),
 }
-STRENGTHS = np.array([0.15, 0.3, 0.45, 0.6, 0.8, 1.0, 1.2])  # 1 is that of people; all are equally likely
-HEALTHY_SPREAD = 2.5  # factor on the measured covariance, because an unmeasured figure may vary more
-SHRINKAGE = 0.5  # of both covariances towards their diagonals
+# A walk is compared with limps of these strengths, all equally likely. 1 is the mean of people.
+STRENGTHS = np.array([0.15, 0.3, 0.45, 0.6, 0.8, 1.0, 1.2])
+HEALTHY_SPREAD = 2.5  # factor on the covariance of healthy walks, because an unknown figure may vary more
+SHRINKAGE = 0.5  # of the covariances (over people, of healthy walks) towards their diagonals
 
 
 @dataclass(frozen=True)
 class Grade:
-    """What hurts. label: a key of PARTS. side: "right", "left" or None.
+    """What hurts in a walk.
 
-    strength: 0 for normal; 1 is as much as in the people who imitated the impairment. distance: from the
-    nearest known walk, in standard deviations (root mean square over the features). For people who were left
-    out of the learning it is 0.7 on average and at most 1.5; beyond that the label is less reliable.
-    probabilities: of each label, both sides together. sides: probability of each (label, side or direction of
-    the lean).
+    label: a key of PARTS. side: "right", "left", or None for a normal walk or a leaning trunk. strength: 0
+    for normal; 1 is the mean of the people who imitated the impairment. distance: from the mean of the
+    likeliest limp or healthy walk, in standard deviations (root mean square over the features). For people
+    who were left out of the learning, the distance is 0.7 on average and at most 1.5; beyond 1.5 the label is
+    less reliable. probabilities: label -> probability, both sides together. sides: (label, side or direction
+    of the lean) -> probability.
     """
 
     label: str
@@ -62,7 +65,7 @@ class Grade:
 
     @property
     def parts(self) -> tuple[str, ...]:
-        """The parts that may hurt."""
+        """The parts of the body that may hurt."""
         return PARTS[self.label]
 
     @property
@@ -73,7 +76,7 @@ class Grade:
 
 @dataclass(frozen=True)
 class Grader:
-    """The known walks.
+    """The limps and the healthy walks with which a walk is compared.
 
     kinds: (label, side or direction of the lean) -> mean (D,) and covariance (D, D) of the D features at
     strength 1, over people. healthy: (D, D) covariance of healthy walks.
@@ -84,7 +87,7 @@ class Grader:
 
     @cached_property
     def _densities(self) -> tuple[Array, Array, Array]:
-        """Normal distributions, n = 1 + kinds * strengths: of a healthy walk, then of each kind and strength.
+        """n normal distributions: one of healthy walks, then one for each of `kinds` and each of STRENGTHS.
 
         Means (n, D), whitening matrices (n, D, D), and log of the peak density times prior (n,), up to a
         common term.
@@ -118,22 +121,26 @@ class Grader:
         return Grade(label, side, strength, distance, labels, sides)
 
 
-def learn_grader(known: People, whose: Iterable[int], healthy: Array) -> Grader:
-    """Learn from the walks of some people (`whose`) and the covariance (D, D) of healthy walks."""
-    values, classes = examples(known, whose)
-    names = list(features(known.normal(), known.normal()))
+def learn_grader(recorded: People, numbers: Iterable[int], healthy: Array) -> Grader:
+    """Learn from the walks of some people and the covariance (D, D) of healthy walks.
+
+    numbers: which people of `recorded`, from 0.
+    """
+    values, classes = examples(recorded, numbers)
+    names = list(features(recorded.normal(), recorded.normal()))
     labels = np.array(classes)
     means = {name: values[labels == name].mean(axis=0) for name in dict.fromkeys(classes) if name != NORMAL}
-    rest = np.concatenate([values[labels == name] - mean for name, mean in means.items()])
-    spread = _shrunk(rest.T @ rest / len(rest))
-    kinds = {tuple(name.split(" ")): (mean, spread) for name, mean in means.items()}
+    deviations = np.concatenate([values[labels == name] - mean for name, mean in means.items()])
+    covariance = _shrunk(deviations.T @ deviations / len(deviations))
+    kinds = {tuple(name.split(" ")): (mean, covariance) for name, mean in means.items()}
     for side in SIDES:
-        kinds[GUARDED_ARM, side] = _only(names, (ARMS,), kinds["antalgic", side][0], spread)
+        kinds[GUARDED_ARM, side] = _only(names, (ARMS,), kinds["antalgic", side][0], covariance)
+    # A leaning trunk of strength 1 leans as far as the trunk in the gait "lurch".
     lean = abs(kinds["lurch", RIGHT][0][names.index(TRUNK_FORWARD)])
-    for way, (forward, left) in WAYS.items():
+    for direction, (forward, left) in LEANS.items():
         mean = np.zeros(len(names))
         mean[[names.index(TRUNK_FORWARD), names.index(TRUNK_LEFT)]] = lean * forward, lean * left
-        kinds[LEANING, way] = _only(names, TRUNK, mean, spread)
+        kinds[LEANING, direction] = _only(names, TRUNK, mean, covariance)
     return Grader({(a, b): kind for (a, b), kind in kinds.items()}, HEALTHY_SPREAD * _shrunk(healthy))
 
 
@@ -144,9 +151,9 @@ def grader() -> Grader:
 
 
 def healthy_covariance() -> Array:
-    """(D, D) covariance of the features of healthy walks, relative to other healthy walks of the person."""
-    known = load_npz(HEALTHY)
-    return np.average(known["covariances"], axis=0, weights=known["clips"])
+    """(D, D) covariance of the features of healthy walks, relative to the same person's other walks."""
+    data = load_npz(HEALTHY)
+    return np.average(data["covariances"], axis=0, weights=data["clips"])
 
 
 def grade(walk: Profile, healthy: Profile) -> Grade:
@@ -154,10 +161,10 @@ def grade(walk: Profile, healthy: Profile) -> Grade:
     return grader().grade(walk, healthy)
 
 
-def _only(names: list[str], kept: Iterable[str], mean: Array, spread: Array) -> tuple[Array, Array]:
-    """A kind that differs from a healthy walk only in the features `kept`."""
-    on = np.isin(names, list(kept))
-    return mean * on, np.diag(np.diag(spread) * on)
+def _only(names: list[str], kept: Iterable[str], mean: Array, covariance: Array) -> tuple[Array, Array]:
+    """Mean and covariance of a limp that differs from a healthy walk only in the features `kept`."""
+    varies = np.isin(names, list(kept))
+    return mean * varies, np.diag(np.diag(covariance) * varies)
 
 
 def _shrunk(covariance: Array) -> Array:

@@ -1,8 +1,8 @@
-"""Statistics of people who walk with an impaired right leg.
+"""Statistics of ten people who walked normally and imitated impairments of the right leg.
 
-They come from skeleton recordings of ten people. Each walked normally and imitated five impairments: Jun
-et al. (2020), "Pathological gait classification using Kinect v2 and gated recurrent neural networks", IEEE
-Access 8. The statistics are in `people.npz`, which `derive_people.py` writes.
+They were recorded with a Kinect. Each imitated five impairments. Source: Jun et al. (2020), "Pathological
+gait classification using Kinect v2 and gated recurrent neural networks", IEEE Access 8. The statistics are in
+`people.npz`, which `derive_people.py` writes.
 """
 
 from __future__ import annotations
@@ -27,9 +27,10 @@ GAITS = (NORMAL, "antalgic", "stiff_legged", "steppage", "trendelenburg", "lurch
 class People:
     """Ten people walking in the six ways of GAITS, with the impaired leg on the right.
 
-    profiles: (6, 10, 52) of each person, columns as profile.NAMES. curve_mean, curve_spread: (6, 22, 50) mean
-    and standard deviation over people, rows as CURVES, phase 0 at the right landing, degrees and leg lengths.
-    scalar_mean, scalar_spread: (6, 8), columns as SCALARS.
+    profiles: (6, 10, 52) profile of each gait and person, columns as profile.NAMES. curve_mean, curve_spread:
+    (6, 22, 50) mean and standard deviation over people, for each gait, curve of CURVES and sample, in degrees
+    or leg lengths. A curve starts as the right foot lands. scalar_mean, scalar_spread: (6, 8) mean and
+    standard deviation for each gait and scalar of SCALARS.
     """
 
     profiles: Array = field(repr=False)
@@ -53,12 +54,12 @@ class People:
         return dict(zip(NAMES, map(float, self.profiles[0].mean(axis=0)), strict=True))
 
     def curve(self, gait: str, name: str) -> tuple[Array, Array]:
-        """Mean (50,) and spread (50,) over people of one curve."""
+        """Mean (50,) and standard deviation (50,) over people of one curve."""
         g, c = GAITS.index(gait), CURVES.index(name)
         return self.curve_mean[g, c], self.curve_spread[g, c]
 
     def scalar(self, gait: str, name: str) -> tuple[float, float]:
-        """Mean and spread over people of one scalar."""
+        """Mean and standard deviation over people of one scalar."""
         g, s = GAITS.index(gait), SCALARS.index(name)
         return float(self.scalar_mean[g, s]), float(self.scalar_spread[g, s])
 

@@ -13,11 +13,11 @@ from hobble.gait.signals import CURVES, SIGN_CHANGES
 
 Profile = Mapping[str, float]
 NO_CYCLE = "there is no whole cycle of straight walking to measure"
-NAMES = (*SCALARS, *(f"{kind} {curve}" for curve in CURVES for kind in ("range", "mean")))
+NAMES = (*SCALARS, *(f"{statistic} {curve}" for curve in CURVES for statistic in ("range", "mean")))
 
 
 def profile(walk: WalkCycles) -> dict[str, float]:
-    """The numbers of NAMES: each scalar, and range and mean of each curve over a cycle.
+    """The numbers of NAMES: each scalar, and the range and mean of each curve over a cycle.
 
     Scalars and curves are medians over the cycles. Cycles of the right leg and mirrored cycles of the left
     leg count equally, so the mirrored walk has exactly the mirrored profile. Units: degrees, leg lengths,
@@ -30,7 +30,7 @@ def profile(walk: WalkCycles) -> dict[str, float]:
 
 
 def of_curves(curves: Array, scalars: Array) -> dict[str, float]:
-    """The profile of curves (22, 50) in the order of CURVES and scalars (8,) in that of SCALARS."""
+    """The profile of curves (22, 50) in the order of CURVES, and scalars (8,) in the order of SCALARS."""
     out = {name: float(value) for name, value in zip(SCALARS, scalars, strict=True)}
     for name, curve in zip(CURVES, curves, strict=True):
         out[f"range {name}"] = float(np.ptp(curve))
@@ -42,10 +42,10 @@ def mirrored(values: Profile) -> dict[str, float]:
     """The profile of the mirrored walk."""
     out = {}
     for name in NAMES:
-        kind, _, curve = name.rpartition(" ")
+        statistic, _, curve = name.rpartition(" ")
         if name == "left_strike_phase":
             out[name] = 1 - values[name]
-        elif kind == "mean" and curve in SIGN_CHANGES:
+        elif statistic == "mean" and curve in SIGN_CHANGES:
             out[name] = -values[name]
         else:
             out[name] = values[_other_side(name)]

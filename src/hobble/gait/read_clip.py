@@ -1,4 +1,4 @@
-"""Reads clips for measurement. Each keeps its own rig and bone lengths."""
+"""Reads clips for measurement. Each clip keeps its own rig and bone lengths."""
 
 from __future__ import annotations
 
@@ -10,11 +10,11 @@ from hobble.motion.options import ClipMotion
 from hobble.motion.read import read_bvh
 from hobble.motion.rig import load_skeleton
 
-SKELETONS = "config/skeletons"
+SKELETONS = "config/skeletons"  # folder of the skeleton files
 
 
 def read_clip(path: str | Path, skeletons: str | Path = SKELETONS) -> Clip:
-    """A BVH file at 60 Hz on its own rig, which must have a skeleton file in the folder `skeletons`.
+    """Read a BVH file and resample it to 60 Hz. Its rig must have a skeleton file in the folder `skeletons`.
 
     Raises InputError for a file that cannot be read or an unknown rig.
     """

@@ -1,8 +1,9 @@
-"""Recognises which impairment of people a walk resembles, and the side.
+"""Recognises which of five impairments a walk resembles, and the side.
 
-It is a linear classifier that learnt from people's walks, each relative to the same person's normal walk. An
-impaired left leg is a mirrored right one. Speed and stride time are not used, and most features compare
-the two sides, because a healthy walk changes with its speed but stays symmetric.
+The recogniser is a linear classifier that learnt from people's walks, each relative to the same person's
+normal walk. Walks with an impaired left leg are mirrored walks with an impaired right leg. Speed and stride
+time are not used, and most features compare the two sides, because a healthy walk changes with its speed but
+stays symmetric.
 """
 
 from __future__ import annotations
@@ -20,8 +21,8 @@ from hobble.gait.features import features
 from hobble.gait.people import GAITS, NORMAL, People, people
 from hobble.gait.profile import Profile, mirrored
 
-SHRINKAGE = 0.2  # of the covariance towards its diagonal; there are 110 examples for some twenty features
-LEAST_CYCLES = 3  # in a window, both legs together; at least one of each leg
+SHRINKAGE = 0.2  # of the covariance towards its diagonal; there are 120 examples for some twenty features
+LEAST_CYCLES = 3  # a window must have this many cycles of both legs together, and at least one of each leg
 RIGHT, LEFT = "right", "left"
 SIDES = (RIGHT, LEFT)
 
@@ -30,9 +31,9 @@ SIDES = (RIGHT, LEFT)
 class Impairment:
     """The impairment of a walk.
 
-    label: one of people.GAITS. side: of the impaired leg, None if the label is normal. probabilities: of each
-    label, both sides together; their sum is 1. sides: of each impairment and side, such as ("antalgic",
-    "right").
+    label: one of people.GAITS. side: of the impaired leg, None if the label is normal. probabilities: label
+    -> probability, both sides together; their sum is 1. sides: (impairment, side), such as ("antalgic",
+    "right") -> probability.
     """
 
     label: str
@@ -46,16 +47,16 @@ class Impairment:
         return self.probabilities[NORMAL] < 0.5
 
 
-def examples(known: People, whose: Iterable[int]) -> tuple[Array, list[str]]:
-    """Features (n, D) and classes of the walks of some people, each as it is and mirrored.
+def examples(recorded: People, numbers: Iterable[int]) -> tuple[Array, list[str]]:
+    """Features (n, D) and classes of the walks of some people, each walk as it is and mirrored.
 
-    A class is "normal", or "antalgic right" and so on.
+    numbers: which people of `recorded`, from 0. A class is "normal", or "antalgic right" and so on.
     """
     values, classes = [], []
-    for person in whose:
-        healthy = known.profile(NORMAL, person)
+    for person in numbers:
+        healthy = recorded.profile(NORMAL, person)
         for gait in GAITS:
-            walk = known.profile(gait, person)
+            walk = recorded.profile(gait, person)
             for side, w, h in ((RIGHT, walk, healthy), (LEFT, mirrored(walk), mirrored(healthy))):
                 values.append(list(features(w, h).values()))
                 classes.append(gait if gait == NORMAL else f"{gait} {side}")
@@ -88,11 +89,11 @@ def recognise(walk: Profile, healthy: Profile, discriminant: Discriminant | None
 def windows(
     walk: WalkCycles, frames: int, seconds: float = 4.0, step: float = 1.0
 ) -> list[tuple[int, WalkCycles]]:
-    """(first frame, cycles) of each window that has LEAST_CYCLES. frames: number of frames of the clip.
+    """(first frame, cycles) of each window that has LEAST_CYCLES or more.
 
-    A window begins every `step` seconds and lasts `seconds`.
+    A window begins every `step` seconds and lasts `seconds`. frames: number of frames of the clip.
     """
-    long = round(seconds * walk.fps)
-    starts = range(0, max(frames - long, 0) + 1, max(1, round(step * walk.fps)))
-    parts = ((start, walk.within(start, start + long)) for start in starts)
+    length = round(seconds * walk.fps)
+    starts = range(0, max(frames - length, 0) + 1, max(1, round(step * walk.fps)))
+    parts = ((start, walk.within(start, start + length)) for start in starts)
     return [(a, p) for a, p in parts if len(p) and len(p.right) + len(p.left) >= LEAST_CYCLES]

@@ -1,4 +1,4 @@
-"""A walking body as 22 curves over time, the same as in the data of people with an impaired leg.
+"""A walking body as 22 curves over time, the same curves as in the data of people.py.
 
 Joints are found by role, so any rig of config/skeletons/ works. Angles are relative to the vertical and the
 direction of travel.
@@ -15,7 +15,8 @@ from hobble.core.skeleton import Skeleton
 from hobble.core.smooth import gaussian
 
 SIDES = ("L", "R")
-NAMES = {"L": "left", "R": "right"}
+SIDE_NAMES = {"L": "left", "R": "right"}
+# Curves of each side.
 LIMBS = (
     "hip_flexion",
     "hip_abduction",
@@ -26,6 +27,7 @@ LIMBS = (
     "arm_forward",
     "elbow_flexion",
 )
+# Curves of the whole body.
 MIDDLE = (
     "trunk_forward",
     "trunk_left",
@@ -35,9 +37,9 @@ MIDDLE = (
     "hips_height",
 )
 CURVES = (*(f"{limb}_{side}" for side in SIDES for limb in LIMBS), *MIDDLE)
-# Curves that change sign in a mirror.
+# Curves whose sign changes if the body is mirrored.
 SIGN_CHANGES = ("trunk_left", "pelvis_left_up", "pelvis_turn_left", "shoulders_turn_left")
-TRAVEL = 0.5  # seconds: sigma of the smoothing of the hips' velocity, which gives the direction of travel
+TRAVEL_SECONDS = 0.5  # sigma of the Gaussian that smooths the direction of travel and the facing
 
 
 @dataclass(frozen=True)
@@ -78,16 +80,17 @@ def mirrored(signals: Signals) -> Signals:
 def signals(skeleton: Skeleton, positions: Array, fps: float) -> Signals:
     """The curves of joint positions (F, J, 3), cm, Y up, at `fps` frames a second. F is 2 or more.
 
-    Hip flexion and abduction are the angles of the thigh to the vertical, forward and outward. The arm's
-    angle is that of the line from shoulder to elbow, forward. Knee and elbow flexion are 0 if straight. Foot
-    pitch is the angle of the line from ankle to toe, positive upward. The trunk is the line from hips to
-    neck. Elbow flexion is 0 on a rig without elbows or wrists, and so is the arm's angle on a rig without
-    both.
+    Hip flexion is the forward angle of the thigh from the vertical, hip abduction its outward angle. The
+    arm's angle is the forward angle of the line from shoulder to elbow, or to the wrist on a rig without
+    elbows. Knee and elbow flexion are 0 if straight. Foot pitch is the angle of the line from ankle to toe
+    above the horizontal. The trunk is the line from hips to neck. On a rig without elbows or without wrists,
+    elbow flexion is 0; on a rig with neither, the arm's angle is 0, too.
     """
     at = {role: positions[:, skeleton.role(role)].astype(float) for role in skeleton.roles}
     ahead, left = _travel(at["hips"], fps)
     leg = _leg(at)
-    side_curves = {side: _limb(at, NAMES[side], ahead, left if side == "L" else -left, leg) for side in SIDES}
+    outward = {"L": left, "R": -left}
+    side_curves = {side: _limb(at, SIDE_NAMES[side], ahead, outward[side], leg) for side in SIDES}
     curves = {f"{limb}_{side}": side_curves[side][limb] for side in SIDES for limb in LIMBS}
     trunk = at[_trunk_top(skeleton)] - at["hips"]
     pelvis, shoulders = (at[f"left_{part}"] - at[f"right_{part}"] for part in ("hip", "shoulder"))
@@ -101,9 +104,9 @@ def signals(skeleton: Skeleton, positions: Array, fps: float) -> Signals:
     }
     to_left = pelvis / np.maximum(np.linalg.norm(pelvis, axis=1, keepdims=True), 1e-9)
     to_left = to_left + shoulders / np.maximum(np.linalg.norm(shoulders, axis=1, keepdims=True), 1e-9)
-    facing = gaussian(np.cross(to_left, [0.0, 1.0, 0.0]), TRAVEL * fps)
+    facing = gaussian(np.cross(to_left, [0.0, 1.0, 0.0]), TRAVEL_SECONDS * fps)
     facing = facing / np.maximum(np.linalg.norm(facing, axis=1, keepdims=True), 1e-9)
-    ankles = {side: at[f"{NAMES[side]}_heel"] for side in SIDES}
+    ankles = {side: at[f"{SIDE_NAMES[side]}_heel"] for side in SIDES}
     return Signals(
         fps,
         leg,
@@ -118,18 +121,18 @@ def signals(skeleton: Skeleton, positions: Array, fps: float) -> Signals:
 
 def _travel(hips: Array, fps: float) -> tuple[Array, Array]:
     """Horizontal unit vectors (F, 3): the direction of travel, and the direction to its left."""
-    velocity = gaussian(np.gradient(hips, axis=0), TRAVEL * fps) * [1.0, 0.0, 1.0]
+    velocity = gaussian(np.gradient(hips, axis=0), TRAVEL_SECONDS * fps) * [1.0, 0.0, 1.0]
     ahead = velocity / np.maximum(np.linalg.norm(velocity, axis=1, keepdims=True), 1e-9)
     return ahead, np.cross([0.0, 1.0, 0.0], ahead)
 
 
 def _leg(at: dict[str, Array]) -> float:
-    """Length of thigh plus shank, mean of both sides, cm."""
+    """Length of thigh and shank together, cm, as the mean of both legs."""
     bones = [("hip", "knee"), ("knee", "heel")]
     return float(
         sum(
             np.median(np.linalg.norm(at[f"{side}_{a}"] - at[f"{side}_{b}"], axis=1))
-            for side in NAMES.values()
+            for side in SIDE_NAMES.values()
             for a, b in bones
         )
         / 2
@@ -143,21 +146,21 @@ def _trunk_top(skeleton: Skeleton) -> str:
 
 def _limb(at: dict[str, Array], side: str, ahead: Array, outward: Array, leg: float) -> dict[str, Array]:
     hip, knee, ankle, toe, shoulder = (at[f"{side}_{p}"] for p in ("hip", "knee", "heel", "toe", "shoulder"))
-    still = np.zeros(len(hip))
+    zero = np.zeros(len(hip))
     elbow, wrist = (at.get(f"{side}_{part}") for part in ("elbow", "wrist"))
     thigh, foot = knee - hip, toe - ankle
-    hand = elbow if elbow is not None else wrist
-    arm = None if hand is None else hand - shoulder
-    level = foot * [1.0, 0.0, 1.0]
+    arm_end = elbow if elbow is not None else wrist
+    arm = None if arm_end is None else arm_end - shoulder
+    foot_over_ground = foot * [1.0, 0.0, 1.0]
     return {
         "hip_flexion": _angle(_dot(thigh, ahead), -thigh[:, 1]),
         "hip_abduction": _angle(_dot(thigh, outward), -thigh[:, 1]),
         "knee_flexion": _bend(hip, knee, ankle),
-        "foot_pitch": _angle(foot[:, 1], np.linalg.norm(level, axis=1)),
+        "foot_pitch": _angle(foot[:, 1], np.linalg.norm(foot_over_ground, axis=1)),
         "ankle_height": ankle[:, 1] / leg,
         "ankle_forward": _dot(ankle - at["hips"], ahead) / leg,
-        "arm_forward": still if arm is None else _angle(_dot(arm, ahead), -arm[:, 1]),
-        "elbow_flexion": still if elbow is None or wrist is None else _bend(shoulder, elbow, wrist),
+        "arm_forward": zero if arm is None else _angle(_dot(arm, ahead), -arm[:, 1]),
+        "elbow_flexion": zero if elbow is None or wrist is None else _bend(shoulder, elbow, wrist),
     }
 
 
@@ -165,8 +168,9 @@ def _dot(a: Array, b: Array) -> Array:
     return np.sum(a * b, axis=-1)
 
 
-def _angle(part: Array, rest: Array) -> Array:
-    return np.degrees(np.arctan2(part, rest))
+def _angle(opposite: Array, adjacent: Array) -> Array:
+    """Degrees, from the two sides of a right triangle."""
+    return np.degrees(np.arctan2(opposite, adjacent))
 
 
 def _bend(a: Array, b: Array, c: Array) -> Array:
@@ -176,5 +180,5 @@ def _bend(a: Array, b: Array, c: Array) -> Array:
 
 
 def _speed(points: Array, fps: float) -> Array:
-    """(F,) speed of points (F, 3) over the ground, per second."""
+    """(F,) speed of a point (F, 3) over the ground, cm a second."""
     return np.linalg.norm(np.gradient(points, axis=0)[:, ::2], axis=1) * fps

@@ -1,9 +1,10 @@
 """How much a hurt part of the body changes the motion at severity 10.
 
-Two tables decide this: MIXES, the impairment profiles of people that a part mixes, and ADDED_CHANGES, for
-what the recordings do not show. In the recordings, feet and toes are inaccurate, and arms, shoulders, neck
-and back were not hurt. The lean of a hurt back and its bent knees (`forward`, `crouch`) are about those of
-CMU 105_26, which has severity 7. Values of one side are for a hurt right side; `_sound` is the other side.
+Two tables decide this: MIXES mixes impairment profiles, which were derived from recordings of people, and
+ADDED_CHANGES has what the recordings do not show. In the recordings, feet and toes are inaccurate, and arms,
+shoulders, neck and back were not hurt. With a hurt back, the body leans and bends its knees (`forward`,
+`crouch`) about as in clip 105_26 of CMU, which counts as severity 7. Values of one side are for a hurt right
+side; names that end with `_sound` are for the side that is not hurt.
 """
 
 from __future__ import annotations
@@ -23,7 +24,7 @@ MIXES: dict[str, dict[str, float]] = {
     "shank": {"antalgic": 0.95, "steppage": 0.05},
     "foot": {"antalgic": 0.65, "steppage": 0.35},
 }
-# Factors on the mixed curves of trunk, pelvis and shoulders.
+# Part -> factor on the mixed curves of trunk, pelvis and shoulders.
 CURVE_FACTOR: dict[str, float] = {"pelvis": 1.6, "hip": 2.1, "thigh": 1.25, "shank": 1.0, "foot": 0.9}
 # Part -> changes that the recordings do not show.
 # - Ratios to the healthy clip: speed; stride (time); lift (height of the swinging foot); push and strike
@@ -77,6 +78,7 @@ ADDED_CHANGES: dict[str, dict[str, float]] = {
     "forearm": {"speed": 0.90, "forward": 2.0},
     "hand": {"speed": 0.94},
 }
+# The changes that are ratios.
 RATIOS = (
     "speed",
     "stride",
@@ -90,10 +92,11 @@ RATIOS = (
     "back",
     "head",
 )
-# Factor on the changes of timing in the recordings. They count a slow ankle as stance, so they show only half
-# of an early landing. Besides, a network smooths the effect.
+# Factor on the changes of timing in the recordings. There a slow ankle counts as stance, so the recordings
+# show only half of an early landing. Besides, a network that is trained on hurt clips smooths the effect.
 TIMING_FACTOR = 1.85
-# Ratio of the length of the step onto the hurt foot, instead of the mixed one.
+# Part -> length of the step onto the hurt foot, as a ratio to the healthy clip. It replaces the ratio of the
+# profiles.
 STEP_RATIO = {"thigh": 0.44, "shank": 0.38, "foot": 0.44}
 
 
@@ -101,34 +104,36 @@ STEP_RATIO = {"thigh": 0.44, "shank": 0.38, "foot": 0.44}
 def amounts(part: str) -> dict[str, float | Array]:
     """Name -> change, for a part that is hurt on the right at severity 10.
 
-    Names are those of ADDED_CHANGES, where a ratio is given as what is added to 1, and these. `arm`,
-    `arm_sound`: ratios of the arms' swing. `off`, `off_sound`, `land_sound`: cycles by which a foot leaves
-    and lands later. `step`: ratio of the step onto the hurt foot, minus that of a body that is only slower.
-    `width`: leg lengths by which steps are wider. `curves`: (5, 5) factors of the CURVES (see `Profile`).
+    A ratio is given as its difference from 1. The names are those of ADDED_CHANGES and these: `arm`,
+    `arm_sound`: ratios of the arms' swing. `off`, `off_sound`, `land_sound`: cycles by which a foot leaves or
+    lands later. `step`: ratio of the step onto the hurt foot, minus the ratio in a body that is only slower.
+    `width`: leg lengths by which steps are wider. `curves`: (5, 5) factors of CURVES, as described in
+    `Profile` of `hobble.hurt.impairment_profiles`.
     """
-    own = dict(ADDED_CHANGES[part])
+    changes = dict(ADDED_CHANGES[part])
     out: dict[str, float | Array] = {"curves": np.zeros((len(CURVES), 1 + 2 * HARMONICS))}
     if mix := MIXES.get(part):
-        own, out = _of_people(part, mix, own)
-    for name, value in own.items():
+        changes, out = _of_people(part, mix, changes)
+    for name, value in changes.items():
         out[name] = value - 1.0 if name in RATIOS else value
     return out
 
 
 def _of_people(
-    part: str, mix: dict[str, float], own: dict[str, float]
+    part: str, mix: dict[str, float], changes: dict[str, float]
 ) -> tuple[dict[str, float], dict[str, float | Array]]:
-    known = profiles()
+    """Add a mix of profiles to `changes`. Returns the values of the mix that are no ratios separately."""
+    profile_of = profiles()
 
     def mean(name: str) -> float:
-        return float(sum(share * getattr(known[p], name) for p, share in mix.items()))
+        return float(sum(share * getattr(profile_of[p], name) for p, share in mix.items()))
 
-    curves = sum(share * known[p].harmonics() for p, share in mix.items()) * CURVE_FACTOR.get(part, 1.0)
+    curves = sum(share * profile_of[p].harmonics() for p, share in mix.items()) * CURVE_FACTOR.get(part, 1.0)
     ratios = {"stride": mean("stride"), "arm": mean("arm_hurt"), "arm_sound": min(mean("arm_sound"), 1.0)}
-    speed = own["speed"]
-    slower = speed * own.get("stride", mean("stride"))  # ratio of the stride length
+    speed = changes["speed"]
+    slower = speed * changes.get("stride", mean("stride"))  # ratio of the stride length
     step = STEP_RATIO.get(part, mean("step_hurt"))
-    return {**ratios, **own}, {
+    return {**ratios, **changes}, {
         "curves": curves,
         "land_sound": TIMING_FACTOR * mean("strike"),
         "off": TIMING_FACTOR * mean("stance_hurt"),

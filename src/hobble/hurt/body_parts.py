@@ -8,7 +8,8 @@ from hobble.core.skeleton import Skeleton
 
 LEFT, RIGHT = 0, 1
 SIDES = ("left", "right")
-# (role, part): links from the joint of the row before down to the joint with this role belong to the part.
+# (role, part): the part's links end at the joint with this role. They begin at the joint with the previous
+# role; those of the first part begin at the hips (LEG) or the chest (ARM).
 LEG = (("hip", "hip"), ("knee", "thigh"), ("heel", "shank"))
 ARM = (("shoulder", "shoulder"), ("elbow", "upper arm"), ("wrist", "forearm"))
 
@@ -33,8 +34,8 @@ def part_of_link(skeleton: Skeleton, link: tuple[str, str]) -> BodyPart:
             for role, name in table:
                 joint = skeleton.role(f"{word}_{role}")
                 if child in _chain(skeleton, joint, root):
-                    near = role == "hip" and child != joint
-                    return BodyPart("pelvis" if near else name, side)
+                    above_hip = role == "hip" and child != joint
+                    return BodyPart("pelvis" if above_hip else name, side)
                 root = joint
             if root in ancestors(skeleton, child):
                 return BodyPart(last, side)

@@ -12,16 +12,17 @@ from hobble.core.smooth import gaussian
 from hobble.hurt.amounts import amounts
 from hobble.hurt.body_parts import LEFT, RIGHT, part_of_link
 
-HIGHEST = 10.0
+HIGHEST = 10.0  # highest severity
 POWER = 0.82  # strength = (severity / 10) ** POWER: .37 at 3, .57 at 5, .75 at 7
 # Changes of when a foot lands and leaves (`land`, `off`) grow with strength ** TIMING_POWER. With 1, the
-# stances of a network's character are nearly as uneven at 5 as at 10.
+# stances of a network's character are nearly as uneven at severity 5 as at 10.
 TIMING_POWER = 1.3
-LEAST_RATIO = 0.02  # smaller ratios are raised to this
-SETTLING = 0.3  # seconds: sigma of the Gaussian that smooths changes of severity
+LEAST_RATIO = 0.02  # smaller ratios to the healthy clip are raised to this
+SETTLING_SECONDS = 0.3  # sigma of the Gaussian that smooths changes of severity
 LEAST_SEVERITY = 0.05  # smaller severities count as 0
-TOGETHER = 3.0  # how the effects of several injuries add: p of a p-norm (1: sum, infinity: maximum)
+SUM_NORM = 3.0  # effects of several injuries add like a p-norm with this p (1: sum, infinity: maximum)
 WHOLE_BODY = ("speed", "stride", "back", "head", "forward", "nod")  # changes of the whole body
+# Changes of one side. The last three say how much an arm is held in each way (HELD_ARM_OF_PART).
 SIDED = (
     *(
         "land",
@@ -42,11 +43,12 @@ SIDED = (
     *("upper", "fore", "carry"),
 )
 SOUND_SUFFIX = "_sound"  # names of changes of the side that is not hurt end with this
-FLIPPED = np.array([1.0, -1.0, -1.0, -1.0, -1.0])  # signs of CURVES in a mirror
+# Signs of the CURVES (see `hobble.hurt.impairment_profiles`) in a mirrored body.
+FLIPPED = np.array([1.0, -1.0, -1.0, -1.0, -1.0])
 # Signs of a curve's factors (mean, then cosine and sine of both harmonics) when it is shifted by half a
 # cycle.
 HALF_CYCLE_SIGNS = np.array([1.0, -1.0, -1.0, 1.0, 1.0])
-# How a hurt part of an arm makes a person hold this arm; see HELD_ARMS of `hobble.hurt.upper_body`.
+# Hurt part of an arm -> how a person holds this arm: a key of HELD_ARMS in `hobble.hurt.upper_body`.
 HELD_ARM_OF_PART = {"shoulder": "upper", "upper arm": "upper", "forearm": "fore", "hand": "carry"}
 
 
@@ -54,9 +56,10 @@ HELD_ARM_OF_PART = {"shoulder": "upper", "upper arm": "upper", "forearm": "fore"
 class Effects:
     """The changes of each of F frames of a clip, named as in `hobble.hurt.amounts`.
 
-    body: name -> (F,). sided: name -> (F, 2), left and right. curves: (F, 5, 5) factors of the CURVES.
-    strength: (F,) of the worst link, 0 to 1. shown_severity: (F, L) severities of the L links that the
-    frames show. They follow the requested severities over about a second.
+    body: name -> (F,). sided: name -> (F, 2), left and right. curves: (F, 5, 5) factors of CURVES, as in
+    `Profile` of `hobble.hurt.impairment_profiles`. strength: (F,) of the worst link, 0 to 1. shown_severity:
+    (F, L) severities of the L links, as the motion shows them: after a change of the requested severity they
+    follow over about a second.
     """
 
     body: dict[str, Array] = field(repr=False)
@@ -66,39 +69,39 @@ class Effects:
     shown_severity: Array = field(repr=False)
 
     def ratio(self, name: str) -> Array:
-        """(F,), or (F, 2) left and right: the factor that a change of RATIOS stands for."""
+        """A change of RATIOS (`hobble.hurt.amounts`) as a ratio to the healthy clip: (F,) or (F, 2)."""
         return np.maximum(1.0 + (self.body[name] if name in self.body else self.sided[name]), LEAST_RATIO)
 
 
 def effects(skeleton: Skeleton, severity: Array, fps: float) -> Effects:
     """The effects of severities (F, L), 0 to 10, of the skeleton's links.
 
-    If several links hurt, an effect is at least that of the worst link and less than the sum.
+    If several links hurt, the result is at least the effect of the worst link and less than the sum of all.
     """
     frames = len(severity)
-    strength = gaussian((np.clip(severity, 0, HIGHEST) / HIGHEST) ** POWER, SETTLING * fps)
+    strength = gaussian((np.clip(severity, 0, HIGHEST) / HIGHEST) ** POWER, SETTLING_SECONDS * fps)
     body = {name: _Sum(np.zeros(frames)) for name in WHOLE_BODY}
     sided = {name: _Sum(np.zeros((frames, 2))) for name in SIDED}
     curves = _Sum(np.zeros((frames, 5, 5)))
     parts: dict[tuple[str, int | None], Array] = {}
     for link, column in zip(skeleton.links, strength.T, strict=True):
-        where = part_of_link(skeleton, link)
+        body_part = part_of_link(skeleton, link)
         # Several links of one part, such as fingers, count as one link: the worst.
-        key = (where.name, where.side)
+        key = (body_part.name, body_part.side)
         parts[key] = np.maximum(parts.get(key, 0.0), column)
-    for (part, side), own in parts.items():
-        if not own.any():
+    for (part, side), part_strength in parts.items():
+        if not part_strength.any():
             continue
         for name, amount in amounts(part).items():
             if name == "curves":
-                curves.add(own[:, None, None] * _of_side(np.asarray(amount), side))
+                curves.add(part_strength[:, None, None] * _of_side(np.asarray(amount), side))
             elif name in WHOLE_BODY:
-                body[name].add(own * amount)
+                body[name].add(part_strength * amount)
             else:
-                grown = own**TIMING_POWER if name.startswith(("land", "off")) else own
-                _add_sided(sided, name, grown * amount, side)
+                size = part_strength**TIMING_POWER if name.startswith(("land", "off")) else part_strength
+                _add_sided(sided, name, size * amount, side)
         if part in HELD_ARM_OF_PART and side is not None:
-            _add_sided(sided, HELD_ARM_OF_PART[part], own, side)
+            _add_sided(sided, HELD_ARM_OF_PART[part], part_strength, side)
     return Effects(
         {name: total.value() for name, total in body.items()},
         {name: total.value() for name, total in sided.items()},
@@ -115,7 +118,7 @@ def _shown_severity(strength: Array) -> Array:
 
 
 def _add_sided(sided: dict[str, _Sum], name: str, values: Array, side: int | None) -> None:
-    if name == "arms":
+    if name == "arms":  # the change "arm" of both sides
         sided["arm"].add(np.stack([values, values], axis=1))
         return
     hurt = RIGHT if side is None else side
@@ -136,8 +139,8 @@ class _Sum:
         self.more, self.less = zero.copy(), zero.copy()
 
     def add(self, term: Array) -> None:
-        self.more += np.maximum(term, 0.0) ** TOGETHER
-        self.less += np.maximum(-term, 0.0) ** TOGETHER
+        self.more += np.maximum(term, 0.0) ** SUM_NORM
+        self.less += np.maximum(-term, 0.0) ** SUM_NORM
 
     def value(self) -> Array:
-        return self.more ** (1 / TOGETHER) - self.less ** (1 / TOGETHER)
+        return self.more ** (1 / SUM_NORM) - self.less ** (1 / SUM_NORM)

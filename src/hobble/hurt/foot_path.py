@@ -20,22 +20,30 @@ from hobble.hurt.healthy_clip import UP, HealthyClip, SourceStance
 from hobble.hurt.interpolate import smoothstep
 from hobble.hurt.shortened_path import ShortenedPath
 
-SIGN = (1.0, -1.0)  # +X is the figure's left
-# Radians of pitch over which the ratio changes from `strike` to `push`.
-LEVEL = np.radians(8.0)
-SHORT_SWING_CM = 12.0  # in swings shorter than this, progress is measured mainly by time, else by distance
-CLEARANCE_CM = 1.3  # least height of a swinging toe joint above its stance, unless the source's is lower
-UNEVEN_CM = 4.0  # the swing is lowered less, the more two stances differ in height; at this, by a factor of e
+SIGN = (1.0, -1.0)  # sign of X on the left and on the right side of the figure
+# The foot's pitch is multiplied by the effect `strike` while its toe is up, by `push` while its heel is up.
+# The factor changes from `strike` to `push` as the heel rises by this angle, radians.
+BLEND_PITCH = np.radians(8.0)
+# The progress of a swing is measured mainly by time if its distance is shorter than this, else mainly by the
+# distance that is covered.
+SHORT_SWING_CM = 12.0
+# In mid-swing the toe joint stays at least this much above its height in stance, or at its height in the
+# source if this is lower.
+CLEARANCE_CM = 1.3
+# A swing is lowered less if the stances before and after it differ in height: at this difference, 1 / e times
+# as much as on flat ground.
+UNEVEN_CM = 4.0
 JOGGING = 0.65  # in a jog, the change of a step's length is smaller by this share
-BLEND_SHARE = 0.22  # share of the swing, at both ends, over which its lower height is blended in and out
+# The lower height of a swing is blended in over this share of its frames, and out over as many at its end.
+BLEND_SHARE = 0.22
 
 
 @dataclass(frozen=True)
 class HurtFoot:
     """One foot over F source frames.
 
-    ankle, ball: (F, 3) positions of the heel and the toe joint, cm. turn: (F, 4) rotation of the foot in the
-    world. toes: (F, 4) local rotation of the toe joint.
+    ankle, ball: (F, 3) positions of the joints with the roles heel and toe, cm. turn: (F, 4) rotation of the
+    foot in the world. toes: (F, 4) local rotation of the toe joint.
     """
 
     ankle: Array = field(repr=False)
@@ -56,16 +64,16 @@ def rolled_foot(source: HealthyClip, effects: Effects, side: int) -> HurtFoot:
     middles = np.array([s.middle for s in source.stances[side]])
     flat = np.interp(np.arange(len(clip)), middles, [_middle(pitch, s) for s in source.stances[side]])
     raised = pitch - flat
-    heel_up = smoothstep(-raised / LEVEL)
+    heel_up = smoothstep(-raised / BLEND_PITCH)
     push, strike = (effects.ratio(name)[:, side] for name in ("push", "strike"))
     # Toes also point down before landing, when they reach for the ground. This is reduced like a push-off.
-    share = strike + (push - strike) * heel_up
-    tilt = quat.from_axis_angle(axis, raised * (share - 1))
+    pitch_ratio = strike + (push - strike) * heel_up
+    tilt = quat.from_axis_angle(axis, raised * (pitch_ratio - 1))
     new_along = quat.rotate(tilt, along)
     ankle = ankle + np.where(raised < 0, 1.0, 0.0)[:, None] * (along - new_along)
     ankle = ankle - UP * _lowered_push_off(source, ball[:, 1], push, side)[:, None]
     rest = quat.normalize(gaussian(quat.continuous(clip.rotations[:, toe]), 0.5 * clip.fps))
-    toes = quat.slerp(rest, clip.rotations[:, toe], share)
+    toes = quat.slerp(rest, clip.rotations[:, toe], pitch_ratio)
     return HurtFoot(ankle, ankle + new_along, quat.mul(tilt, turn), toes)
 
 
@@ -88,11 +96,14 @@ def _lowered_push_off(source: HealthyClip, ball: Array, push: Array, side: int) 
 
 
 def _hinge(turn: Array, along: Array, stands: np.ndarray) -> Array:
-    """(F, 3) axis of the foot's pitch, positive for toe up: horizontal and across a standing foot."""
+    """(F, 3) axis of the foot's pitch, positive for toe up: horizontal and across a standing foot.
+
+    turn: (F, 4) rotation of the foot. along: (F, 3) from ankle to ball. stands: (F,) bool.
+    """
     across = np.cross(along, UP)
     size = np.linalg.norm(across, axis=1)
-    own = quat.rotate(quat.inv(turn), across)[stands & (size > 0.3 * np.linalg.norm(along, axis=1))]
-    usual = own.sum(axis=0) if len(own) else np.array([-1.0, 0.0, 0.0])
+    in_foot = quat.rotate(quat.inv(turn), across)[stands & (size > 0.3 * np.linalg.norm(along, axis=1))]
+    usual = in_foot.sum(axis=0) if len(in_foot) else np.array([-1.0, 0.0, 0.0])
     return quat.rotate(turn, usual / max(float(np.linalg.norm(usual)), 1e-9))
 
 
@@ -103,29 +114,29 @@ def _middle(values: Array, stance: SourceStance) -> Array:
 
 
 def ankle_places(foot: HurtFoot, stances: list[SourceStance]) -> list[Array]:
-    """(3,) for each stance: where the ankle is."""
+    """For each stance, where the ankle is, (3,)."""
     return [_middle(foot.ankle, stance) for stance in stances]
 
 
 def move_foot(
     source: HealthyClip, effects: Effects, path: ShortenedPath, foot: HurtFoot, side: int
 ) -> HurtFoot:
-    """The path of a foot (`foot`, from `rolled_foot`) that follows the body's new path."""
+    """The foot that `rolled_foot` returned, moved so that it follows the body's new path."""
     stances = source.stances[side]
     old = ankle_places(foot, stances)
     new = [
         _moved(place, s.middle, source, effects, path, side) for place, s in zip(old, stances, strict=True)
     ]
     yaw = quat.yaw(np.radians(SIGN[side] * effects.sided["toe_out"][:, side]))
-    ankle, least = np.empty_like(foot.ankle), np.empty(len(source))
+    ankle, least_ball = np.empty_like(foot.ankle), np.empty(len(source))
     ball = source.clip.positions[:, source.clip.skeleton.role(f"{SIDES[side]}_toe"), 1]
     soles = [float(_middle(ball, stance)) for stance in stances]
     rises = [float(b[1] - a[1]) for a, b in zip(old, new, strict=True)]
     spans = [(int(s.land), int(s.off)) for s in stances]
-    for (first, last), place, there, sole, rise in zip(spans, old, new, soles, rises, strict=True):
+    for (first, last), place, new_place, sole, rise in zip(spans, old, new, soles, rises, strict=True):
         part = slice(first, last + 1)
-        least[part] = sole + rise + np.minimum(ball[part] - sole, 0.0)
-        ankle[part] = there + quat.rotate(yaw[part], foot.ankle[part] - place)
+        least_ball[part] = sole + rise + np.minimum(ball[part] - sole, 0.0)
+        ankle[part] = new_place + quat.rotate(yaw[part], foot.ankle[part] - place)
     along = quat.rotate(yaw, foot.ball - foot.ankle)
     lift = effects.ratio("lift")[:, side]
     out = effects.sided["out"][:, side] * source.leg * SIGN[side]
@@ -134,30 +145,33 @@ def move_foot(
         if land - off < 2:
             continue
         part = slice(off, land + 1)
-        way = _way(foot.ankle[part])
-        line = foot.ankle[off] + (foot.ankle[land] - foot.ankle[off]) * way
-        moved = ankle[off] + (ankle[land] - ankle[off]) * way + foot.ankle[part] - line
+        progress = _progress(foot.ankle[part])
+        line = foot.ankle[off] + (foot.ankle[land] - foot.ankle[off]) * progress
+        moved = ankle[off] + (ankle[land] - ankle[off]) * progress + foot.ankle[part] - line
         u = np.linspace(0.0, 1.0, land - off + 1)
         edge = smoothstep(u / BLEND_SHARE) * smoothstep((1 - u) / BLEND_SHARE)
         even = np.exp(-abs(foot.ankle[land, 1] - foot.ankle[off, 1]) / UNEVEN_CM)
         moved[:, 1] -= (1 - lift[part]) * even * edge * (foot.ankle[part, 1] - line[:, 1])
         moved += outward[part] * (np.sin(np.pi * u) ** 2)[:, None]
-        under = soles[i] + (soles[i + 1] - soles[i]) * way[:, 0]
-        up = rises[i] + (rises[i + 1] - rises[i]) * way[:, 0]
-        own = ball[part] - under
-        least[part] = under + up + np.minimum(own, CLEARANCE_CM * np.sin(np.pi * u))
+        ground = soles[i] + (soles[i + 1] - soles[i]) * progress[:, 0]
+        up = rises[i] + (rises[i + 1] - rises[i]) * progress[:, 0]
+        above = ball[part] - ground
+        least_ball[part] = ground + up + np.minimum(above, CLEARANCE_CM * np.sin(np.pi * u))
         ankle[part] = moved
-    ankle[:, 1] += smooth_above(np.maximum(least - ankle[:, 1] - along[:, 1], 0.0), 1)
+    ankle[:, 1] += smooth_above(np.maximum(least_ball - ankle[:, 1] - along[:, 1], 0.0), 1)
     return HurtFoot(ankle, ankle + along, quat.mul(yaw, foot.turn), foot.toes)
 
 
-def _way(ankle: Array) -> Array:
-    """(n, 1) share of the swing's horizontal distance that the foot has covered in each frame."""
-    level = ankle * [1, 0, 1]
-    way = level[-1] - level[0]
+def _progress(ankle: Array) -> Array:
+    """(n, 1) progress of a swing in each frame, from 0 to 1.
+
+    It is the covered share of the horizontal distance, and in short swings mainly that of the time.
+    """
+    over_ground = ankle * [1, 0, 1]
+    whole = over_ground[-1] - over_ground[0]
     time = smoothstep(np.linspace(0.0, 1.0, len(ankle)))
     by_time = SHORT_SWING_CM**2
-    return ((((level - level[0]) @ way) + by_time * time) / (way @ way + by_time))[:, None]
+    return ((((over_ground - over_ground[0]) @ whole) + by_time * time) / (whole @ whole + by_time))[:, None]
 
 
 def _moved(
@@ -165,10 +179,11 @@ def _moved(
 ) -> Array:
     """The new place (3,) of a footprint at `place` in source frame `when`.
 
-    It moves with the body. The hurt foot lands less far ahead, and both feet land wider apart.
+    Footprints move with the body. Besides, the hurt foot lands less far ahead, and both feet land wider
+    apart.
     """
     at = min(round(when), len(source) - 1)
-    # Only the frames around it are read, because a long clip has thousands of footprints.
+    # Only the frames around `when` are read, because a long clip has thousands of footprints.
     near = slice(max(at - 1, 0), at + 2)
     speed = np.gradient(source.path[near], axis=0)[at - near.start] if len(source) > 1 else np.zeros(2)
     step = effects.sided["step"][near] * (1 - JOGGING * source.jog[near])[:, None]

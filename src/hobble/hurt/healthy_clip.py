@@ -1,4 +1,4 @@
-"""Measures the healthy clip before it is changed: stances, heading, path, lengths of cycles."""
+"""Measures the healthy clip (the source) before it is changed: stances, heading, path, lengths of cycles."""
 
 from __future__ import annotations
 
@@ -19,8 +19,8 @@ from hobble.labels.phase import phase_of_footsteps
 
 UP = np.array([0.0, 1.0, 0.0])
 CYCLE_SECONDS = 1.1  # assumed length of a cycle in clips without one
-LONGEST_CYCLE_SECONDS = 2.5
-LEAST_SWING = 6  # frames
+LONGEST_CYCLE_SECONDS = 2.5  # a longer time between two landings of a foot is not a cycle
+LEAST_SWING = 6  # frames: contacts in the labels shorten a swing, but not below this length
 PATH_SECONDS = 0.25  # sigma of the Gaussian that smooths the hips' positions to a path
 FACING_SECONDS = 0.2  # sigma of the Gaussian that smooths the heading
 
@@ -42,11 +42,12 @@ class SourceStance:
 class HealthyClip:
     """A healthy clip of F frames and its measurements. Pairs are left and right.
 
-    stances: those of each foot in order, at least one. swinging: (F, 2) whether a foot swings. swing: (F, 2)
-    rises from 0 to 1 and falls back to 0 over a swing. phase: (F,) cycles, unwrapped; whole numbers as the
-    right foot lands. walking: (F,) from 0 to 1, where 1 means that the phase is known. jog: (F,) share.
-    cycle: (F,) length in frames of the cycle around each frame. path: (F, 2) horizontal path of the hips, x
-    and z, cm. heading: (F, 4) rotation about Y of the pelvis. leg: cm from hip to ankle of a straight leg.
+    stances: of each foot, in order, at least one. swinging: (F, 2) whether a foot swings. swing: (F, 2) 0 in
+    stance; it rises to 1 and falls back to 0 over a swing. phase: (F,) cycles, unwrapped; whole numbers as
+    the right foot lands. walking: (F,) from 0 to 1, where 1 means that the phase is known. jog: (F,) share of
+    jogging in the gait. cycle: (F,) length in frames of the cycle around each frame. path: (F, 2) horizontal
+    path of the hips, x and z, cm. heading: (F, 4) rotation of the pelvis about Y. leg: cm from hip to ankle
+    of a straight leg.
     """
 
     clip: Clip
@@ -70,18 +71,18 @@ def measure_healthy_clip(clip: Clip, labels: Labels) -> HealthyClip:
     """Measure a healthy clip with its labels."""
     frames, skeleton = len(clip), clip.skeleton
     options = LabelOptions()
-    found = find_swings(clip, options)
+    all_swings = find_swings(clip, options)
     stances, swinging, swing = [], np.zeros((frames, 2), bool), np.zeros((frames, 2))
     for side in (LEFT, RIGHT):
-        # In swings the right foot is 0.
-        own = [(s.start, min(s.end, frames - 1)) for s in found if s.foot == 1 - side]
+        # `find_swings` numbers the right foot 0, the left one 1.
+        swings = [(s.start, min(s.end, frames - 1)) for s in all_swings if s.foot == 1 - side]
         touches = np.asarray(labels.contacts[:, 2 * side : 2 * side + 2].any(axis=1))
-        own = [_in_the_air(start, end, touches) for start, end in own]
-        for start, end in own:
+        swings = [_in_the_air(start, end, touches) for start, end in swings]
+        for start, end in swings:
             swinging[start:end, side] = True
             u = (np.arange(start, end) - start + 0.5) / max(end - start, 1)
             swing[start:end, side] = np.sin(np.pi * u) ** 2
-        ends = [0, *(x for pair in own for x in pair), frames - 1]
+        ends = [0, *(x for pair in swings for x in pair), frames - 1]
         stances.append(
             [SourceStance(float(a), float(max(a, b))) for a, b in zip(ends[::2], ends[1::2], strict=True)]
         )
@@ -106,7 +107,7 @@ def measure_healthy_clip(clip: Clip, labels: Labels) -> HealthyClip:
 
 
 def _in_the_air(start: int, end: int, touches: np.ndarray) -> tuple[int, int]:
-    """The swing without those frames at its ends in which the labels have the foot in contact (`touches`)."""
+    """The swing without the frames at its ends in which the labels have a contact. touches: (F,) bool."""
     while end - start > LEAST_SWING and touches[start]:
         start += 1
     while end - start > LEAST_SWING and touches[end - 1]:
@@ -120,13 +121,13 @@ def _length(clip: Clip, side: str) -> float:
 
 
 def _cycles(stances: tuple[list[SourceStance], list[SourceStance]], frames: int, fps: float) -> Array:
-    """(frames,) length of the cycle around each frame: frames from a foot's landing to its next.
+    """(frames,) length of the cycle around each frame: frames from a foot's landing to its next landing.
 
-    The cycles of both feet count; the lengths are interpolated between their middles.
+    The cycles of both feet count; the lengths are interpolated between the middles of the cycles.
     """
     middles, lengths = [], []
-    for own in stances:
-        for a, b in itertools.pairwise(own[1:]):
+    for of_foot in stances:
+        for a, b in itertools.pairwise(of_foot[1:]):
             if b.land - a.land <= LONGEST_CYCLE_SECONDS * fps:
                 middles.append((a.land + b.land) / 2)
                 lengths.append(b.land - a.land)

@@ -24,17 +24,18 @@ from hobble.hurt.timing import Timing, retime
 from hobble.hurt.upper_body import change_body
 from hobble.labels.clip_labels import Labels
 
-# Radians of knee flexion. In the recordings the sound knee is bent by 8 to 10 degrees while a stiff leg
-# swings.
+# Radians of knee flexion: a knee that lifts the hips straightens at most to this. In the recordings of
+# impaired walks, the sound knee is bent by 8 to 10 degrees while a stiff leg swings.
 STRAIGHT = np.radians(9.0)
 
 
 @dataclass(frozen=True)
 class HurtClip:
-    """A hurt clip of N frames with its labels, and the severities (N, L) of its L links.
+    """A hurt clip of N frames.
 
-    when: (N,) the source frame, with fractions, that the body shows in each frame. The severities are those
-    that the motion shows: after a change of the requested severity they follow over about a second.
+    severity: (N, L) severities of the L links, as the motion shows them: after a change of the requested
+    severity they follow over about a second. labels: of the hurt clip. when: (N,) the frame of the healthy
+    clip, with fractions, that the body shows in each frame.
     """
 
     clip: Clip
@@ -54,13 +55,13 @@ def hurt_clip(
 ) -> HurtClip:
     """The clip as a person with these severities would walk it.
 
-    severity: (F, L), 0 to 10, of the skeleton's L links. labels: of the clip. flat: whether its ground is
-    flat; on other ground, climbs get lower as steps get shorter. zero, margins: `phase_zero` and `margins` of
-    the section `labels`.
+    labels: of the clip. severity: (F, L), 0 to 10, of the skeleton's L links. name: of the result; None: the
+    clip's name. flat: whether the ground is flat; on other ground, climbs get lower as steps get shorter.
+    zero, margins: the options `phase_zero` and `margins` of a data set's section `labels`.
 
     The clip gets longer if the cadence falls. The path keeps its shape, but gets shorter with the steps. If
-    all severities are 0, the clip is returned unchanged. Raises HobbleError for severities of another shape
-    or range, and for a clip whose bones change their length.
+    all severities are 0, or the clip has fewer than 3 frames, the motion is not changed. Raises HobbleError
+    for severities of another shape or range, and for a clip whose bones change their length.
     """
     severity = np.asarray(severity, float)
     if severity.shape != (len(clip), len(clip.skeleton.links)):
@@ -83,11 +84,12 @@ def hurt_clip(
     path = shorten(source, changes, timing.slower, None if flat else _ground(source, feet))
     feet = [move_foot(source, changes, path, feet[side], side) for side in (LEFT, RIGHT)]
     out = _assembled(source, changes, timing, path, feet, name)
-    which = np.clip(np.floor(timing.body + 1e-6).astype(int), 0, len(clip) - 1)
-    return HurtClip(out, changes.shown_severity[which], relabel(labels, timing, zero, margins), timing.body)
+    shown = np.clip(np.floor(timing.body + 1e-6).astype(int), 0, len(clip) - 1)
+    return HurtClip(out, changes.shown_severity[shown], relabel(labels, timing, zero, margins), timing.body)
 
 
 def _ground(source: HealthyClip, feet: list[HurtFoot]) -> Array:
+    """(F,) height of the ground below the body, cm, from the footprints."""
     heights = []
     for side in (LEFT, RIGHT):
         stances = source.stances[side]
@@ -105,7 +107,7 @@ def _assembled(
     feet: list[HurtFoot],
     name: str,
 ) -> Clip:
-    """The hurt motion at the new frames: body, height of the hips, and legs."""
+    """The hurt clip, put together from body, height of the hips, and legs, each at its times in `timing`."""
     clip, skeleton = source.clip, source.clip.skeleton
     world = turns_at(change_body(source, changes), timing.body)
     shift = np.stack(
@@ -150,11 +152,11 @@ def _reach(leg: Leg, changes: Effects, source: HealthyClip, timing: Timing, side
     The knee bends more if the leg is spared (`crouch`). It bends less while the other leg swings stiffly
     (`vault`), which lifts the hips.
     """
-    own, other = timing.legs[:, side], timing.legs[:, 1 - side]
+    when, other_when = timing.legs[:, side], timing.legs[:, 1 - side]
     crouch = np.radians(changes.sided["crouch"][:, side]) * (1 - source.swing[:, side])
-    bend = at_frames(knee_flexion(leg.reach, leg.upper, leg.lower) + crouch, own)
+    bend = at_frames(knee_flexion(leg.reach, leg.upper, leg.lower) + crouch, when)
     lifts = np.clip(changes.sided["vault"][:, side], 0.0, 1.0) * source.swing[:, 1 - side]
-    vault = at_frames(lifts, other)
+    vault = at_frames(lifts, other_when)
     bend = bend - vault * np.maximum(bend - STRAIGHT, 0.0)
-    changed = (at_frames(crouch, own) > 0) | (vault > 0)
-    return np.where(changed, reach_of(bend, leg.upper, leg.lower), at_frames(leg.reach, own))
+    changed = (at_frames(crouch, when) > 0) | (vault > 0)
+    return np.where(changed, reach_of(bend, leg.upper, leg.lower), at_frames(leg.reach, when))

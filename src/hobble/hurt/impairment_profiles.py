@@ -19,8 +19,9 @@ from hobble.core.files import load_npz, read_json, write_json
 from hobble.core.quat import Array
 
 FILE = Path(__file__).with_name("people.json")
+# Curves over a cycle, in degrees, whose changes a profile holds; named as in `hobble.gait.signals`.
 CURVES = ("trunk_forward", "trunk_left", "pelvis_left_up", "pelvis_turn_left", "shoulders_turn_left")
-HARMONICS = 2
+HARMONICS = 2  # a profile keeps the mean and this many harmonics of each curve
 NORMAL = "normal"
 SOURCE = "Jun et al. 2020, IEEE Access 8: means over ten people who imitated impairments of the right leg"
 
@@ -29,11 +30,12 @@ SOURCE = "Jun et al. 2020, IEEE Access 8: means over ten people who imitated imp
 class Profile:
     """An impairment of the right leg, relative to the same people's normal walk.
 
-    Ratios: speed, stride (time), step_hurt, step_sound (length of the step onto either foot), knee (range of
-    the hurt knee), arm_hurt, arm_sound (swing). strike: cycles by which the sound foot lands later.
-    stance_hurt, stance_sound: cycles by which a stance is longer. width: leg lengths by which steps are
-    wider. curves: for each of CURVES its change in degrees: the mean, then the factors of cosine and sine of
-    each harmonic. A cycle starts as the hurt foot lands; the sound foot lands half a cycle later.
+    Ratios: speed, stride (time), step_hurt, step_sound (length of the step onto the hurt or the sound foot),
+    knee (range of the hurt knee), arm_hurt, arm_sound (swing). strike: cycles by which the sound foot lands
+    later. stance_hurt, stance_sound: cycles by which a stance is longer. width: leg lengths by which steps
+    are wider. curves: for each of CURVES its change in degrees: the mean, then the factors of cosine and sine
+    of each harmonic. A cycle starts as the hurt foot lands; its time is warped so that the sound foot lands
+    half a cycle later.
     """
 
     speed: float
@@ -50,7 +52,7 @@ class Profile:
     curves: dict[str, list[float]]
 
     def harmonics(self) -> Array:
-        """(5, 1 + 2 HARMONICS) factors of CURVES."""
+        """(5, 1 + 2 * HARMONICS) factors of CURVES."""
         return np.array([self.curves[name] for name in CURVES])
 
 
@@ -64,17 +66,17 @@ def derive(walks: str | Path, path: str | Path = FILE) -> None:
     """Write the profiles of a file of impaired walks.
 
     walks: npz with `gaits`, `curves` and `scalars` (names), `curve` (gaits, people, curves, 50) over a cycle
-    from the right landing, and `scalar` (gaits, people, scalars). Raises InputError if one is missing.
+    from the right landing, and `scalar` (gaits, people, scalars). Raises InputError if an array is missing.
     """
     data = load_npz(walks)
     gaits = [str(name) for name in data["gaits"]]
-    own = {
+    derived = {
         gait: asdict(_profile(data, i, gaits.index(NORMAL))) for i, gait in enumerate(gaits) if gait != NORMAL
     }
-    for profile in own.values():
+    for profile in derived.values():
         for name, value in profile.items():
             profile[name] = _rounded(value)
-    write_json(path, {"source": SOURCE, "profiles": own})
+    write_json(path, {"source": SOURCE, "profiles": derived})
 
 
 def _profile(data: Any, gait: int, normal: int) -> Profile:
@@ -116,7 +118,7 @@ def _profile(data: Any, gait: int, normal: int) -> Profile:
 def _harmonics(curve: Array, strike: Array) -> Array:
     """(5,) factors of a curve (people, 50), mean over people.
 
-    Each person's time is warped so that the other foot lands at .5 and not at `strike` (people,).
+    Each person's time is warped so that the left foot lands at .5 and not at `strike` (people,).
     """
     steps = curve.shape[-1]
     phase = np.arange(steps) / steps
@@ -125,9 +127,9 @@ def _harmonics(curve: Array, strike: Array) -> Array:
         rows += [np.cos(2 * np.pi * h * phase), np.sin(2 * np.pi * h * phase)]
     weights = np.stack(rows, axis=1) * np.array([1.0] + [2.0] * 2 * HARMONICS) / steps
     out = []
-    for own, at in zip(curve, strike, strict=True):
-        seen = np.interp(phase, [0.0, 0.5, 1.0], [0.0, at, 1.0])
-        out.append(np.interp(seen, np.append(phase, 1.0), np.append(own, own[0])) @ weights)
+    for values, landing in zip(curve, strike, strict=True):
+        warped = np.interp(phase, [0.0, 0.5, 1.0], [0.0, landing, 1.0])
+        out.append(np.interp(warped, np.append(phase, 1.0), np.append(values, values[0])) @ weights)
     return np.mean(out, axis=0)
 
 

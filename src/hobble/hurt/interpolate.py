@@ -31,6 +31,6 @@ def _between(frames: int, when: Array) -> tuple[np.ndarray, Array]:
 
 
 def smoothstep(u: Array) -> Array:
-    """From 0 to 1 with zero slope at both ends."""
+    """A curve that rises from 0 at u = 0 to 1 at u = 1, with zero slope at both ends."""
     u = np.clip(u, 0.0, 1.0)
     return u * u * (3 - 2 * u)

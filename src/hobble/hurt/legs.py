@@ -1,4 +1,4 @@
-"""Sets the height of the hips so that the standing leg has the desired bend, and places the knees."""
+"""Sets the height of the hips so that the standing knee has the desired bend, and places the knees."""
 
 from __future__ import annotations
 
@@ -15,18 +15,18 @@ from hobble.core.smooth import gaussian, smooth_above
 from hobble.hurt.body_parts import SIDES
 from hobble.hurt.interpolate import at_frames, turns_at
 
-# Radians of knee flexion. Below the first the bend is too small to tell where the knee points, above the
-# second it is large enough.
+# Radians of knee flexion. Below the first value the bend is too small to tell where the knee points. Above
+# the second value it is large enough.
 BENT = np.radians([6.0, 18.0])
-STRETCH = (0.985, 0.9985)  # leg lengths: limits of `Leg.longest`
+STRETCH = (0.985, 0.9985)  # leg lengths: least and greatest value of `Leg.longest`
 
 
 @dataclass(frozen=True)
 class Leg:
-    """A leg of the source, over F frames.
+    """A leg of the healthy clip, over F frames.
 
-    reach: (F,) cm from hip to ankle. thigh, shank: (F, 4) rotations, and hinge: (F, 3) axis of the knee, in
-    the coordinates of the pelvis. upper, lower: lengths of thigh and shank, cm.
+    reach: (F,) cm from hip to ankle. thigh, shank: (F, 4) rotations relative to the pelvis. hinge: (F, 3)
+    axis of the knee, also relative to the pelvis. upper, lower: lengths of thigh and shank, cm.
     """
 
     reach: Array = field(repr=False)
@@ -44,7 +44,7 @@ class Leg:
 
 
 def read_leg(clip: Clip, side: int) -> Leg:
-    """The source's leg. While it is nearly straight, the knee points in its usual direction on the thigh."""
+    """Measure a leg. While it is nearly straight, its knee points as in the frames in which it is bent."""
     skeleton = clip.skeleton
     hip, knee, heel = (skeleton.role(f"{SIDES[side]}_{r}") for r in ("hip", "knee", "heel"))
     at = clip.positions
@@ -58,10 +58,10 @@ def read_leg(clip: Clip, side: int) -> Leg:
     bend = knee_flexion(reach, upper, lower)
     sure = np.clip((bend - BENT[0]) / (BENT[1] - BENT[0]), 0.0, 1.0)[:, None]
     thigh = clip.global_rotations[:, hip]
-    own = quat.rotate(quat.inv(thigh), out / np.maximum(size, 1e-9))
-    usual = np.sum(own * sure, axis=0) if sure.sum() > 5 else _forward(clip, side, thigh)
+    in_thigh = quat.rotate(quat.inv(thigh), out / np.maximum(size, 1e-9))
+    usual = np.sum(in_thigh * sure, axis=0) if sure.sum() > 5 else _forward(clip, side, thigh)
     usual = usual / max(float(np.linalg.norm(usual)), 1e-9)
-    points = quat.rotate(thigh, own * sure + usual * (1 - sure))
+    points = quat.rotate(thigh, in_thigh * sure + usual * (1 - sure))
     pelvis = quat.inv(clip.global_rotations[:, skeleton.role("hips")])
     return Leg(
         reach,
@@ -86,7 +86,7 @@ def knee_flexion(reach: Array, upper: float, lower: float) -> Array:
 
 
 def reach_of(flexion: Array, upper: float, lower: float) -> Array:
-    """The inverse of `knee_flexion`."""
+    """(...) distance from hip to ankle at a knee flexion: the inverse of `knee_flexion`."""
     return np.sqrt(upper**2 + lower**2 + 2 * upper * lower * np.cos(flexion))
 
 
@@ -100,9 +100,10 @@ def hips_height(
 ) -> Array:
     """(N,) heights of the root.
 
-    root: (N, 3) positions before the change. For each leg: hips: (N, 3) position of the hip joint relative to
-    the root. ankles: (N, 3). reaches: (N,) desired distance from hip to ankle while the leg stands, cm.
-    stands: (N,) from 0 (swings) to 1 (stands). longest: `Leg.longest`.
+    root: (N, 3) positions before the change. The lists hold an entry for each leg. hips: (N, 3) position of
+    the hip joint relative to the root. ankles: (N, 3) positions in the world. reaches: (N,) desired distance
+    from hip to ankle while the leg stands, cm. stands: (N,) from 0 (swings) to 1 (stands). longest:
+    `Leg.longest`.
     """
     needed = np.zeros(len(root))
     weight = np.full(len(root), 1e-9)
@@ -127,25 +128,25 @@ def place_leg(
     """World rotations (N, 4) of thigh and shank that put the ankle in its place.
 
     when: (N,) source frames from which the direction of the knee is taken. pelvis: (N, 4) world rotations.
-    hip, ankle: (N, 3) in the world.
+    hip, ankle: (N, 3) positions in the world.
     """
     bones = [skeleton.offsets[skeleton.role(f"{SIDES[side]}_{r}")] for r in ("knee", "heel")]
-    thigh, shank = (quat.mul(pelvis, turns_at(own, when)) for own in (leg.thigh, leg.shank))
+    thigh, shank = (quat.mul(pelvis, turns_at(rotations, when)) for rotations in (leg.thigh, leg.shank))
     hinge = quat.rotate(pelvis, at_frames(leg.hinge, when))
     knee, end = two_bone_knee(hip, ankle, np.cross(ankle - hip, hinge), leg.upper, leg.lower)
     return _turned(thigh, hinge, bones[0], knee - hip), _turned(shank, hinge, bones[1], end - knee)
 
 
 def _turned(world: Array, hinge: Array, bone: Array, along: Array) -> Array:
-    """World rotations (N, 4), turned so that the bone (`bone` at rest) points along `along`.
+    """World rotations (N, 4), turned so that the bone points along `along`.
 
-    The knee keeps its axis `hinge`.
+    hinge: (N, 3) axis of the knee, which is kept. bone: (3,) vector of the bone at rest. along: (N, 3).
     """
-    turn = _frame(along, hinge) @ np.swapaxes(_frame(quat.rotate(world, bone), hinge), -1, -2)
+    turn = _bone_axes(along, hinge) @ np.swapaxes(_bone_axes(quat.rotate(world, bone), hinge), -1, -2)
     return quat.mul(quat.from_matrix(turn), world)
 
 
-def _frame(along: Array, hinge: Array) -> Array:
+def _bone_axes(along: Array, hinge: Array) -> Array:
     """(N, 3, 3) unit vectors as columns: the hinge made orthogonal to the bone, the bone, and across both."""
     y = along / np.linalg.norm(along, axis=-1, keepdims=True)
     x = hinge - y * np.sum(hinge * y, axis=-1, keepdims=True)

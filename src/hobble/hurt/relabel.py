@@ -12,9 +12,10 @@ from hobble.labels.phase import dropped_frames, find_cycles, phase_of_footsteps
 
 
 def relabel(labels: Labels, timing: Timing, zero: str, margins: str) -> Labels:
-    """Contacts, footsteps, phase and gait at the new frames. A limping walk still has the gait "walk".
+    """The labels at the new frames. A limping walk still has the gait "walk".
 
-    zero: the foot that lands at phase 0. margins: which cycles are kept, as in `hobble.labels.phase`.
+    zero: the foot that lands at phase 0. margins: which cycles are kept, a key of MARGINS in
+    `hobble.labels.phase`.
     """
     frames = len(timing)
     last = len(labels) - 1

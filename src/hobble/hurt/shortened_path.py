@@ -12,14 +12,15 @@ from hobble.core.smooth import gaussian
 from hobble.hurt.effects import Effects
 from hobble.hurt.healthy_clip import HealthyClip
 
-SLOPE = 0.3  # seconds: sigma of the Gaussian that smooths the heights of the ground under the feet
+SLOPE_SECONDS = 0.3  # sigma of the Gaussian that smooths the heights of the ground under the feet
 
 
 @dataclass(frozen=True)
 class ShortenedPath:
-    """Old and new horizontal path (F, 2) and height of the ground (F,) at each source frame, cm.
+    """The path of the body before and after it is shortened, at each of F source frames, cm.
 
-    Flat ground stays at 0. On other ground, heights shrink like the path, so that slopes keep their angle.
+    old, new: (F, 2) horizontal path. old_ground, new_ground: (F,) height of the ground. Flat ground stays at
+    0. On other ground, heights shrink like the path, so that slopes keep their angle.
     """
 
     old: Array = field(repr=False)
@@ -28,7 +29,7 @@ class ShortenedPath:
     new_ground: Array = field(repr=False)
 
     def moved(self, point: Array, when: float) -> Array:
-        """(3,) where a point (3,) of source frame `when` is after the path has moved."""
+        """Where a point (3,) of source frame `when` is after the path has changed, (3,)."""
         first = min(int(when), len(self.old) - 1)
         near = slice(first, first + 2)  # reading all frames for each footprint would take long
         moved = self.new[near] - self.old[near]
@@ -37,7 +38,7 @@ class ShortenedPath:
 
 
 def shorten(source: HealthyClip, effects: Effects, slower: Array, ground: Array | None) -> ShortenedPath:
-    """The path of a body with the speed of `effects`.
+    """The path of a body that has the speed of `effects`.
 
     slower: (F,) factor of the stride time. ground: (F,) height of the ground below the body; None if flat.
     """
@@ -57,9 +58,11 @@ def ground_below(source: HealthyClip, heights: list[list[tuple[float, float]]]) 
     heights: (middle frame, height) of each foot's stances. Heights are used relative to the foot's median, so
     that legs of different length make no waves.
     """
-    points = sorted((when, y - float(np.median([h for _, h in own]))) for own in heights for when, y in own)
+    points = sorted(
+        (when, y - float(np.median([h for _, h in of_foot]))) for of_foot in heights for when, y in of_foot
+    )
     line = np.interp(np.arange(len(source)), [p[0] for p in points], [p[1] for p in points])
-    return gaussian(line, SLOPE * source.clip.fps)
+    return gaussian(line, SLOPE_SECONDS * source.clip.fps)
 
 
 def _shrunk(values: Array, share: Array) -> Array:

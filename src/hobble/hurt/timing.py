@@ -12,10 +12,11 @@ from hobble.hurt.body_parts import LEFT, RIGHT
 from hobble.hurt.effects import Effects
 from hobble.hurt.healthy_clip import HealthyClip
 
-LEAST_SHARE = 0.57  # the time between two events of a leg shrinks at most to this share
-JOG_STRIDE = 0.15  # a jog gets only this share of a longer stride time, because flight cannot last longer
-JOG_SHIFT = 0.6  # a jog gets only this share of the shifts of landings, because its stances are short
-MOST_SHIFT = 0.3  # cycles: shifts come close to this, but do not exceed it
+# The times from landing to leaving and from leaving to landing shrink at most to this share.
+LEAST_SHARE = 0.57
+JOG_STRIDE = 0.15  # a jog gets only this share of a change of stride time: flight cannot last longer
+JOG_SHIFT = 0.6  # a jog gets only this share of the shifts of landing and leaving: its stances are short
+MOST_SHIFT = 0.3  # cycles: shifts of landing and leaving stay below this
 
 
 @dataclass(frozen=True)
@@ -36,28 +37,28 @@ class Timing:
 
     def new_frames(self, when: Array, leg: int | None = None) -> Array:
         """The new frames (with fractions) that show source frames `when`, for the body or a leg."""
-        looked = self.body if leg is None else self.legs[:, leg]
-        return np.interp(when, looked, np.arange(len(looked)))
+        shown = self.body if leg is None else self.legs[:, leg]
+        return np.interp(when, shown, np.arange(len(shown)))
 
 
 def retime(source: HealthyClip, effects: Effects) -> Timing:
     """Slow the cadence, and shift each foot's landing and leaving within the cycle."""
     stride = 1 + effects.body["stride"] * (1 - (1 - JOG_STRIDE) * source.jog)
     begins = np.concatenate([[0.0], np.cumsum((stride[1:] + stride[:-1]) / 2)])
-    unit = source.cycle * stride
+    new_cycle = source.cycle * stride
     new = np.arange(int(begins[-1] + 1e-6) + 1, dtype=float)
     legs = []
     landings: list[tuple[float, float]] = []
     shares = 1 - (1 - JOG_SHIFT) * source.jog
     for side in (LEFT, RIGHT):
-        land = _limited(effects.sided["land"][:, side]) * shares * unit
-        off = _limited(effects.sided["off"][:, side]) * shares * unit
+        land = _limited(effects.sided["land"][:, side]) * shares * new_cycle
+        off = _limited(effects.sided["off"][:, side]) * shares * new_cycle
         events = []
         for stance in source.stances[side]:
             events += [(stance.land, land), (stance.off, off)]
-        own = [(at, float(np.interp(at, np.arange(len(source)), shift))) for at, shift in events[1:-1]]
-        landings += own[1::2]
-        legs.append(_source_frames(own, begins, new))
+        shifted = [(at, float(np.interp(at, np.arange(len(source)), shift))) for at, shift in events[1:-1]]
+        landings += shifted[1::2]
+        legs.append(_source_frames(shifted, begins, new))
     return Timing(_source_frames(sorted(landings), begins, new), np.stack(legs, axis=1), begins, stride)
 
 

@@ -15,33 +15,34 @@ from hobble.hurt.healthy_clip import HealthyClip
 from hobble.hurt.impairment_profiles import HARMONICS
 
 X, Y, Z = np.eye(3)
-PELVIS = 0.35  # the pelvis tilts by this share of the trunk's lean
+PELVIS_LEAN = 0.35  # the pelvis tilts forward by this share of the trunk's lean
 PELVIS_CALM = 0.7  # the pelvis loses this share of the movement that a stiff back loses
-MEAN = 0.5  # seconds: sigma of the Gaussian that gives a joint's mean posture
-LOOK = {"neck": 0.5, "head": 0.85}  # share of the trunk's lean that neck and head undo, to look ahead
-STILL = 0.93  # a held arm loses up to this share of its movement
+POSTURE_SECONDS = 0.5  # sigma of the Gaussian that gives a joint's mean posture
+LOOK_AHEAD = 0.85  # share of the trunk's lean that the head undoes, to look ahead
+ARM_STILL = 0.93  # a held arm loses up to this share of its movement
 # An arm is held with (strength of the injury) ** HOLD_POWER, so a mildly hurt arm swings nearly as far as a
-# healthy one. With 1, a network's character holds its arms too still at 5.
+# healthy one. With 1, a network's character holds its arms too still at severity 5.
 HOLD_POWER = 1.6
 # How a hurt left arm is held: directions of upper arm and forearm (forward, left, up), relative to the
-# heading. `fore`, for a hurt forearm, lies across the belly: the mean of the jog with a hurt forearm by Ferre
-# et al. (Injured_Jog_LLA). `upper`, for a hurt upper arm, is closer to the body, with the forearm ahead.
-# `carry`, for a hurt hand, only carries the forearm in front of the body.
+# heading. For a hurt forearm (`fore`), the forearm lies across the belly, in the mean posture of the clip
+# Injured_Jog_LLA by Ferre et al., a jog with a hurt forearm. For a hurt upper arm (`upper`), the arm is
+# closer to the body, with the forearm ahead. For a hurt hand (`carry`), the forearm is only carried in front
+# of the body.
 HELD_ARMS = {
     "upper": ((0.10, 0.16, -0.98), (0.80, -0.58, 0.10)),
     "fore": ((0.28, 0.17, -0.85), (0.26, -0.86, -0.41)),
     "carry": ((0.10, 0.14, -0.98), (0.92, -0.25, 0.30)),
 }
-HAND = 0.75  # strength of `carry` for a hurt hand
+CARRY_STRENGTH = 0.75  # factor on the strength with which the arm of a hurt hand is held
 
 
 def change_body(source: HealthyClip, effects: Effects) -> Array:
-    """The changed world rotations (F, J, 4) of the source's frames. The legs do not change here."""
+    """The changed world rotations (F, J, 4) of the source's frames. The legs only turn with the pelvis."""
     skeleton = source.clip.skeleton
     local = _stiffened(source, effects)
     world = _world(skeleton, local)
     pelvis, chest, head = _turns(source, effects)
-    position_in_trunk = _shares(skeleton)
+    position_in_trunk = _heights_in_trunk(skeleton)
     for j in range(len(skeleton.joints)):
         where, share = position_in_trunk[j]
         if where == "pelvis":
@@ -55,6 +56,7 @@ def change_body(source: HealthyClip, effects: Effects) -> Array:
 
 
 def _world(skeleton: Skeleton, local: Array) -> Array:
+    """World rotations (F, J, 4) of local rotations (F, J, 4)."""
     world = np.empty_like(local)
     for j, parent in enumerate(skeleton.parents):
         world[:, j] = local[:, j] if parent < 0 else quat.mul(world[:, parent], local[:, j])
@@ -74,7 +76,7 @@ def _stiffened(source: HealthyClip, effects: Effects) -> Array:
         ratios.append((arm[1:], effects.ratio("arm")[:, side]))  # all of the arm but the hand
     for joints, ratio in ratios:
         for j in joints:
-            mean = quat.normalize(gaussian(quat.continuous(local[:, j]), MEAN * source.clip.fps))
+            mean = quat.normalize(gaussian(quat.continuous(local[:, j]), POSTURE_SECONDS * source.clip.fps))
             local[:, j] = quat.slerp(mean, local[:, j], ratio)
     return local
 
@@ -85,10 +87,12 @@ def _between(skeleton: Skeleton, role: str, above: str) -> list[int]:
     return path[: path.index(skeleton.role(above))]
 
 
-def _shares(skeleton: Skeleton) -> list[tuple[str, float]]:
-    """For each joint how far it is from the pelvis to the chest, ("pelvis", 0 to 1), or on to the head.
+def _heights_in_trunk(skeleton: Skeleton) -> list[tuple[str, float]]:
+    """How far up the trunk each joint is.
 
-    ("head", 0 to 1) is the way from the chest to the head. Limbs have the value of the joint they hang from.
+    ("pelvis", share): at this share of the way from the pelvis to the chest. ("head", share): at this share
+    of the way from the chest to the head. The joints of a limb have the value of the joint that the limb
+    hangs from.
     """
     out: list[tuple[str, float]] = [("pelvis", 0.0)] * len(skeleton.joints)
     back = _between(skeleton, "chest", "hips")[::-1]
@@ -114,9 +118,9 @@ def _turns(source: HealthyClip, effects: Effects) -> tuple[Array, Array, Array]:
     forward = forward + effects.body["forward"]
     left = left + side[:, LEFT] - side[:, RIGHT]
     left_up = left_up + hike[:, LEFT] - hike[:, RIGHT]
-    pelvis = _lean(source, turn, left_up, PELVIS * forward)
+    pelvis = _lean(source, turn, left_up, PELVIS_LEAN * forward)
     chest = _lean(source, shoulders, -left, forward)
-    calm = 1 - LOOK["head"]
+    calm = 1 - LOOK_AHEAD
     head = _lean(source, calm * shoulders, -calm * left, calm * forward + effects.body["nod"])
     return pelvis, chest, head
 
@@ -129,29 +133,28 @@ def _lean(source: HealthyClip, turn: Array, roll: Array, forward: Array) -> Arra
     yaw, roll_, pitch = (
         quat.from_axis_angle(axis, np.radians(angle)) for axis, angle in ((Y, turn), (Z, roll), (X, forward))
     )
-    own = quat.mul(yaw, quat.mul(roll_, pitch))
-    return quat.mul(source.heading, quat.mul(own, quat.inv(source.heading)))
+    turned = quat.mul(yaw, quat.mul(roll_, pitch))
+    return quat.mul(source.heading, quat.mul(turned, quat.inv(source.heading)))
 
 
 def _hold_arm(source: HealthyClip, effects: Effects, world: Array, side: int) -> None:
     """Hold a hurt arm with a bent elbow, against the body or in front of the chest. Changes `world`."""
     skeleton = source.clip.skeleton
     weights = {name: np.clip(effects.sided[name][:, side], 0.0, 1.0) ** HOLD_POWER for name in HELD_ARMS}
-    weights["carry"] = HAND * weights["carry"]
-    held = STILL * np.max(list(weights.values()), axis=0)
+    weights["carry"] = CARRY_STRENGTH * weights["carry"]
+    held = ARM_STILL * np.max(list(weights.values()), axis=0)
     if not held.any():
         return
     total = np.sum(list(weights.values()), axis=0)
-    weights["carry"] = np.where(
-        total > 1e-9, weights["carry"], 1.0
-    )  # frames without a held arm need a direction, too
+    # Frames without a held arm need a direction, too.
+    weights["carry"] = np.where(total > 1e-9, weights["carry"], 1.0)
     total = np.maximum(total, 1e-9) + (total <= 1e-9)
     sign = np.array([1.0 if side == LEFT else -1.0, 1.0, 1.0])
     shoulder, elbow, wrist = (skeleton.role(f"{SIDES[side]}_{r}") for r in ("shoulder", "elbow", "wrist"))
     for bone, (joint, end) in enumerate(((shoulder, elbow), (elbow, wrist))):
         goal = np.zeros((len(source), 3))
-        for name, dirs in HELD_ARMS.items():
-            ahead, out, up = dirs[bone]
+        for name, directions in HELD_ARMS.items():
+            ahead, out, up = directions[bone]
             goal += (weights[name] / total)[:, None] * np.array([out, up, ahead]) * sign
         toward = quat.rotate(source.heading, goal)
         bone_now = skeleton.offsets[end]

@@ -25,7 +25,8 @@ def hurt_version(
 ) -> tuple[HurtClip, LabelReport]:
     """The version `name` of a healthy clip, and the report of its labels.
 
-    turn: number of the version among all versions of the data set, from 0.
+    report: of the clip's labels. turn: number of the version among all versions of the data set, from 0.
+    ground: "flat", or another kind of ground.
     """
     severity = severities(clip.skeleton, len(clip), clip.fps, options, name, turn)
     flat = ground == "flat"
@@ -39,12 +40,12 @@ def hurt_version(
 
 
 def settled(hurt: HurtClip, severities: Sequence[float], report: LabelReport) -> HurtClip:
-    """The clip without the cycles in which some link's severity is neither 0 nor one of `severities`.
+    """The clip without the cycles in which the severity of a link is neither 0 nor one of `severities`.
 
-    Their footsteps are marked as unused, so that the mirrored clip lacks them, too.
+    Their footsteps are marked as unused, so that the mirrored clip lacks these cycles, too.
     """
-    known = np.array([0.0, *severities])
-    odd = (np.abs(hurt.severity[..., None] - known).min(axis=-1) > SEVERITY_TOLERANCE).any(axis=1)
+    settled_values = np.array([0.0, *severities])
+    odd = (np.abs(hurt.severity[..., None] - settled_values).min(axis=-1) > SEVERITY_TOLERANCE).any(axis=1)
     footsteps = hurt.labels.footsteps.copy()
     for line, following in itertools.pairwise(footsteps):
         if np.isfinite(line[0]) and np.isfinite(following[0]):

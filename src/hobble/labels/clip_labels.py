@@ -40,8 +40,8 @@ class Labels:
 class LabelReport:
     """Where the labels of a clip come from, and warnings.
 
-    phase_source, gait_source: "file" or "automatic". phase_zero, margins: as in the section `labels`.
-    cycles_dropped: number of cycles that are not used.
+    clip: its name. phase_source, gait_source: "file" or "automatic". phase_zero, margins: the options of the
+    section `labels` with these names. cycles_dropped: number of cycles that are not used.
     """
 
     clip: str
@@ -54,7 +54,7 @@ class LabelReport:
 
     @classmethod
     def from_dict(cls, data: Mapping[str, Any]) -> LabelReport:
-        """Read the JSON beside the labels. Keys that are computed again are ignored."""
+        """Read the report from the JSON beside the labels. The other keys of this JSON are ignored."""
         values = {f.name: data[f.name] for f in fields(cls)}
         return cls(**{**values, "warnings": tuple(values["warnings"])})
 

@@ -1,8 +1,8 @@
 """Finds when each foot lands, from the motion alone: a landing is the end of a swing.
 
-A foot is down while its heel or its toe is slower than a limit. The limit depends on unit speeds of heel and
-toe (see the options) and on the swings of the foot. So it suits a slow shuffle, a jog in which the feet never
-quite rest, and a dragged leg.
+A foot is down while its heel or its toe is slower than a limit. The limit depends on the options `heel_speed`
+and `toe_speed` and on the swings of the foot. So it suits a slow shuffle, a jog in which the feet never quite
+rest, and a dragged leg.
 """
 
 from __future__ import annotations
@@ -19,18 +19,22 @@ from hobble.labels.clip_labels import CONTACT_ROLES
 from hobble.labels.options import LabelOptions
 
 RIGHT, LEFT = 0, 1
-END_OF_BOUT = (np.nan, -1)
+END_OF_BOUT = (np.nan, -1)  # stands between the landings (frame, foot) of two bouts of walking
 
-# These were set on the hand-made labels of the original release and on generated walks with exact landings.
-SLOWEST_REST = 0.35  # unit speeds: a foot slower than this always rests
-REST_OF_SWING = 0.12  # share of the speed of the slower adjacent swing: a foot slower than this rests, too
-DIP_OF_SWING = 0.35  # share of the lower of two peaks: a dip that is at most this fast separates two swings
-LEAST_PATH = 6.0  # cm: if the toe moves less than this, it is no swing
-SAME_SWING = 12  # frames: two swings with a rest of at most this between them are one
-LESSER_SWING = 0.4  # share of the longer of two successive swings of a foot: a shorter one is no step
+# These limits were set on the hand-made labels of Holden et al. (2017) and on generated walks with exact
+# landings. REST_SPEED is in units of the options `heel_speed` and `toe_speed`. Frames are at 60 Hz.
+REST_SPEED = 0.35  # a foot slower than this always rests
+# A foot also rests if its speed is below this share of the lower of two peaks: those of the swings before
+# and after the rest.
+REST_OF_SWING = 0.12
+# A dip in the speed separates two swings if it is at most this share of the lower of their peaks.
+DIP_OF_SWING = 0.35
+LEAST_PATH = 6.0  # cm: a swing in which the toe moves less than this is dropped
+SAME_SWING = 12  # frames: a rest of at most this length does not separate two swings of a foot
+LESSER_SWING = 0.4  # of two successive swings of a foot, one shorter than this share of the other is no step
 LONGEST_REST = 60  # frames: a longer rest of both feet ends a bout of walking
-SETTLING_CM = 8.0  # see `landings`
-LAST_FRAMES = 2  # a swing that ends in the last frames may not have landed
+SETTLING_CM = 8.0  # cm that the toe moves between first contact and landing, see `landings`
+LAST_FRAMES = 2  # a foot whose swing ends in this many last frames of the clip may not have landed
 
 
 @dataclass(frozen=True)
@@ -65,7 +69,7 @@ def find_swings(clip: Clip, options: LabelOptions) -> list[Swing]:
     """The swings of both feet, in the order of their ends.
 
     options: `heel_speed` and `toe_speed` are the unit speeds. A foot that never rests between two swings is
-    down while its speed is at most `valley_factor` times its lowest.
+    down while its speed is at most `valley_factor` times its lowest speed between these swings.
     """
     speed, relative = foot_speeds(clip), relative_speeds(clip, options)
     swings = []
@@ -78,19 +82,23 @@ def find_swings(clip: Clip, options: LabelOptions) -> list[Swing]:
 
 
 def relative_speeds(clip: Clip, options: LabelOptions) -> Array:
-    """(F, 2) speed of the left and the right foot: the lower one of heel and toe, each in its unit speed."""
+    """(F, 2) speed of the left and the right foot: that of its heel or of its toe, whichever is lower.
+
+    The units are the options `heel_speed` and `toe_speed`.
+    """
     speed = foot_speeds(clip)
-    units = 2 * np.array([options.heel_speed, options.toe_speed] * 2)
+    units = 2 * np.array([options.heel_speed, options.toe_speed] * 2)  # cm a frame at 60 Hz
     relative = (speed / units).reshape(-1, 2, 2).min(axis=2)
     return np.stack([median_of_three(side) for side in relative.T], axis=1)
 
 
 def landings(swings: list[Swing], frames: int, shortest_step: float) -> list[tuple[float, int]]:
-    """Alternating landings (frame, foot). END_OF_BOUT separates bouts of walking.
+    """Landings (frame, foot) in the order of the swings. END_OF_BOUT separates bouts of walking.
 
-    shortest_step: a landing at most so many frames (at 120 Hz) after one of the other foot is left out. A
-    landing is the frame of first contact, plus the time that the toe needs for SETTLING_CM at its top speed.
-    So it is later after a slow swing, as in hand-made labels: people mark when the weight comes down.
+    The frame of a landing is that of first contact, plus the time in which the toe would move SETTLING_CM at
+    the top speed of the swing. So the landing is later after a slow swing, as in hand-made labels: people
+    mark when the weight comes down. frames: length of the clip. shortest_step: a landing at most this many
+    frames (at 120 Hz) after a landing of the other foot is left out.
     """
     out: list[tuple[float, int]] = []
     resting_since = -1
@@ -108,9 +116,9 @@ def landings(swings: list[Swing], frames: int, shortest_step: float) -> list[tup
 
 
 def _swing_frames(relative: Array, valley_factor: float) -> np.ndarray:
-    """(n, 2) first frame up, and first frame down again, of each swing of a foot.
+    """(n, 2) first frame in the air, and first frame down again, of each swing of a foot.
 
-    relative: (F,) a column of `relative_speeds`.
+    relative: (F,) speed of the foot, a column of `relative_speeds`.
     """
     peaks = swing_peaks(relative)
     up = relative >= _rest_limit(relative, peaks, valley_factor)
@@ -120,12 +128,15 @@ def _swing_frames(relative: Array, valley_factor: float) -> np.ndarray:
 
 
 def swing_peaks(relative: Array) -> np.ndarray:
-    """The fastest frame of each swing: peaks that are separated by a clear dip."""
+    """The fastest frame of each swing of a foot: peaks of its speed, with a clear dip between any two.
+
+    relative: (F,) speed of the foot, a column of `relative_speeds`.
+    """
     kept: list[int] = []
-    for peak in _local_highs(relative, 2 * SLOWEST_REST):
+    for peak in _local_highs(relative, 2 * REST_SPEED):
         while kept:
             lower = min(relative[kept[-1]], relative[peak])
-            if relative[kept[-1] : peak + 1].min() <= max(SLOWEST_REST, DIP_OF_SWING * lower):
+            if relative[kept[-1] : peak + 1].min() <= max(REST_SPEED, DIP_OF_SWING * lower):
                 kept.append(peak)
                 break
             if relative[kept[-1]] >= relative[peak]:
@@ -137,7 +148,7 @@ def swing_peaks(relative: Array) -> np.ndarray:
 
 
 def _local_highs(values: Array, least: float) -> np.ndarray:
-    """Frames of local highs of at least `least` in `values` (F,). For a plateau it is its middle."""
+    """Frames of the local highs in `values` (F,) of at least `least`; for a plateau, its middle frame."""
     steps = np.diff(np.concatenate([[0.0], values, [0.0]]))
     moves = np.flatnonzero(steps)
     tops = np.flatnonzero((steps[moves[:-1]] > 0) & (steps[moves[1:]] < 0))
@@ -146,25 +157,26 @@ def _local_highs(values: Array, least: float) -> np.ndarray:
 
 
 def _rest_limit(relative: Array, peaks: np.ndarray, valley_factor: float) -> Array:
-    """(F,) the relative speed below which the foot is down; it depends on the slower adjacent swing.
+    """(F,) speed below which the foot is down, in the units of `relative`.
 
-    peaks: as of `swing_peaks`.
+    Between two swings it depends on the peak of the slower swing. relative: (F,) speed of the foot. peaks:
+    frames of the peaks, from `swing_peaks`.
     """
     frames = len(relative)
-    limit = np.full(frames, SLOWEST_REST)
+    limit = np.full(frames, REST_SPEED)
     for a, b in itertools.pairwise([0, *peaks, frames]):
         if b <= a:
             continue
         peak = min((relative[p] for p in (a, b) if p in peaks), default=0.0)
         slowest = relative[a:b].min()
-        limit[a:b] = max(SLOWEST_REST, REST_OF_SWING * peak)
+        limit[a:b] = max(REST_SPEED, REST_OF_SWING * peak)
         if slowest > limit[a] and peak:
             limit[a:b] = min(valley_factor * slowest, 0.6 * peak)
     return limit
 
 
 def _one_swing_a_step(swings: list[Swing]) -> list[Swing]:
-    """Join swings of a foot that are separated by a short touch, and drop small moves between steps."""
+    """Join swings of a foot that are separated by a short rest, and drop small moves between steps."""
     out: list[Swing] = []
     for swing in swings:
         last = out[-1] if out else None

@@ -14,9 +14,9 @@ from hobble.labels.clip_labels import GAITS
 STAND, WALK, JOG, CROUCH = range(4)
 GRAVITY = 981.0 / 3600.0  # cm per frame squared, at 60 frames per second
 
-STANDING_SPEED = 0.0019  # leg lengths a frame; a slower figure stands
-# A figure crouches if its head and its hips are both below these heights. The unit of each height is the
-# length of the bones between that joint and the ground.
+STANDING_SPEED = 0.0019  # leg lengths a frame; a person slower than this stands
+# A person crouches if head and hips are both below these heights. The unit of each height is the length of
+# the bones between that joint and the ground.
 CROUCHED_HEAD = 0.8
 CROUCHED_HIPS = 0.85
 
@@ -28,28 +28,28 @@ JOG_FLIGHT = 9.0  # share of the time without a foot down
 JOG_DOUBLE_SUPPORT = -9.0  # share of the time with both feet down
 JOG_BOUNCE = 12.5  # vertical acceleration of the hips, g
 MOST_BOUNCE = 0.5  # g: a larger acceleration counts as this, because happy walks bounce
-JOG_FROUDE = 6.0  # Froude number minus FASTEST_WALK, from 0 to 1
+JOG_FROUDE = 6.0  # Froude number minus FASTEST_WALK, limited to 0..1
 FASTEST_WALK = 0.5  # Froude number of the fastest walk that people keep up for long
 JOG_CONSTANT = -3.2
-# A jog has a flight phase or no double support. So a figure walks, however much it bounces, if both feet are
-# down for at least this share of the time, and flight and spring are below these limits.
+# A jog has a flight phase or no double support. So a person walks, however much they bounce, if double
+# support is at least LEAST_DOUBLE_SUPPORT, flight at most NO_FLIGHT, and spring below CLEAR_SPRING.
 LEAST_DOUBLE_SUPPORT = 0.1
 NO_FLIGHT = 0.01
 CLEAR_SPRING = 0.5
-# Some people hop a little in a slow, happy walk. So a figure whose Froude number, flight and spring are all
-# below these limits walks, too: it is slow, and its hips rise over the standing foot. In the data set
-# `styles`, the mean flight of each happy walk is .06 or less, that of the slowest run is .16. With a limit of
-# .25 for the spring, slow jogs of Holden et al. (2017) would count as walks.
-SLOW, SOME_FLIGHT, SOME_SPRING = 0.35, 0.1, 0.2
-WALK_ODDS = -1.0  # the log odds of jogging are at most this for a figure that walks by one of these rules
+# Some people hop a little in a slow, happy walk. So a person also walks if they are slow (SLOW_FROUDE), there
+# is little flight (SOME_FLIGHT), and the hips do not clearly sink over the standing foot (SOME_SPRING). In
+# the data set `styles` (walks in many moods), the mean flight of each happy walk is .06 or less, that of the
+# slowest run is .16. If SOME_SPRING were .25, slow jogs of Holden et al. (2017) would count as walks.
+SLOW_FROUDE, SOME_FLIGHT, SOME_SPRING = 0.35, 0.1, 0.2
+WALK_ODDS = -1.0  # where one of these two rules finds a walk, the log odds of jogging are at most this
 CERTAIN_ODDS = 2.0  # log odds that count as full evidence
 DATA_SET_ODDS = 1.0  # log odds added if the data set says that a clip is mainly a jog; subtracted for a walk
 SWITCH_COST = 18.0  # a change of gait costs as much as this many frames of full evidence
-FADE_FRAMES = 31  # length of the fade from one gait to the next
-LONGEST_START = 180  # frames: a doubtful walk from standing to a jog counts as jog if it is at most this long
+FADE_FRAMES = 31  # frames: length of the fade from one gait to the next
+LONGEST_START = 180  # frames: a doubtful walk from standing to jogging counts as jog if at most this long
 CLEARLY_WALKING = -4.0  # such a walk is doubtful if the median log odds of its second half are above this
-# Frames. Any other walk between standing and jogging is split if it is at most this long: the half next to
-# standing counts as standing, the half next to jogging as jogging.
+# Frames. Any other walk between standing and jogging is split if it is at most this long: the half beside
+# the standing counts as standing, the half beside the jog as jogging.
 LONGEST_SHORT_WALK = 75
 
 
@@ -70,7 +70,7 @@ def automatic_gait(clip: Clip, down: np.ndarray, dominant: str | None) -> Array:
 
     down: (F, 4) contacts by `contacts.stance`. dominant: the clip's main gait, or None. It decides between
     walk and jog if both are about equally likely. Jumps and bumps are not recognised: if `dominant` is one of
-    them, all frames get it, except those in which the figure stands.
+    them, all frames get it, except those in which the person stands.
     """
     odds = jog_odds(clip, down) + {"jog": DATA_SET_ODDS, "walk": -DATA_SET_ODDS}.get(dominant or "", 0.0)
     gait = _likeliest_path(_evidence(clip, odds), SWITCH_COST)
@@ -82,7 +82,7 @@ def automatic_gait(clip: Clip, down: np.ndarray, dominant: str | None) -> Array:
 
 
 def jog_odds(clip: Clip, down: np.ndarray) -> Array:
-    """(F,) log odds that a moving figure jogs rather than walks. down: (F, 4) contacts."""
+    """(F,) log odds that a person in motion jogs rather than walks. down: (F, 4) contacts."""
     left, right = down[:, :2].any(axis=1), down[:, 2:].any(axis=1)
     flight = gaussian((~left & ~right).astype(float), 20.0)
     double_support = gaussian((left & right).astype(float), 20.0)
@@ -98,7 +98,7 @@ def jog_odds(clip: Clip, down: np.ndarray) -> Array:
         + JOG_CONSTANT
     )
     walks = (double_support >= LEAST_DOUBLE_SUPPORT) & (flight <= NO_FLIGHT) & (spring < CLEAR_SPRING)
-    slow_walk = (froude < SLOW) & (flight <= SOME_FLIGHT) & (spring < SOME_SPRING)
+    slow_walk = (froude < SLOW_FROUDE) & (flight <= SOME_FLIGHT) & (spring < SOME_SPRING)
     return np.where(walks | slow_walk, np.minimum(odds, WALK_ODDS), odds)
 
 
@@ -133,8 +133,8 @@ def _bounce(clip: Clip) -> Array:
 def _spring(clip: Clip) -> Array:
     """(F,) correlation of the hips' height with the distance between the heel joints, over about a cycle.
 
-    A walking leg is an inverted pendulum: the hips are highest over the standing foot, as the other foot
-    passes it. A jogging leg is a spring: the hips are lowest there (Cavagna et al. 1977).
+    A walking leg is an inverted pendulum: the hips are highest over the standing foot, while the other
+    foot swings past it. A jogging leg is a spring: the hips are lowest there (Cavagna et al. 1977).
     """
     skeleton, positions = clip.skeleton, clip.positions
     height = gaussian(positions[:, skeleton.role("hips"), 1], 1.5)
@@ -164,7 +164,7 @@ def _relative_heights(clip: Clip) -> tuple[Array, Array]:
 
 
 def _likeliest_path(evidence: Array, switch: float) -> Array:
-    """(F,) the sequence of gaits with the most evidence, minus `switch` for each change (Viterbi).
+    """(F,) the sequence of gaits with the highest sum of evidence, less `switch` for each change (Viterbi).
 
     evidence: (F, G) of G gaits.
     """
@@ -172,11 +172,11 @@ def _likeliest_path(evidence: Array, switch: float) -> Array:
     if not frames:
         return np.zeros(0, int)
     best, came_from = evidence[0].copy(), np.zeros((frames, gaits), int)
-    own = np.arange(gaits)
+    unchanged = np.arange(gaits)
     for i in range(1, frames):
         top = int(np.argmax(best))
         stay = best >= best[top] - switch
-        came_from[i] = np.where(stay, own, top)
+        came_from[i] = np.where(stay, unchanged, top)
         best = np.where(stay, best, best[top] - switch) + evidence[i]
     path = np.empty(frames, int)
     path[-1] = np.argmax(best)

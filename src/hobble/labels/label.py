@@ -1,4 +1,4 @@
-"""Combines the labels of a clip: contacts, and phase and gait from files or from the motion."""
+"""Labels a clip: finds its contacts from the motion, and its phase and gait from files or from the motion."""
 
 from __future__ import annotations
 
@@ -41,15 +41,15 @@ def label_clip(
 ) -> tuple[Labels, LabelReport]:
     """Label a clip.
 
-    files: hand-made files beside its source. `.phase` has priority over `_footsteps.txt`, `.gait` over
-    `_gait.txt`. motion: the report of the motion stage; `source_fps`, `source_frames`, `source_start` and
-    `loops` are read. gait: the clip's main gait, if known. ground: "flat", or another kind of ground.
-    options: the section `labels` of the data set. Raises InputError for an invalid file.
+    files: hand-made files beside the clip's BVH file. `.phase` has priority over `_footsteps.txt`, `.gait`
+    over `_gait.txt`. motion: the report of the motion stage, of which `source_fps`, `source_frames`,
+    `source_start` and `loops` are read. gait: the clip's main gait, if known. ground: "flat", or another kind
+    of ground. options: the section `labels` of the data set. Raises InputError for an invalid file.
     """
     given = _by_kind(files) if options.files else {}
     warnings: list[str] = []
     if given and motion.get("loops", 1) > 1:
-        warnings.append(_left_out(given))
+        warnings.append(_not_used(given))
         given = {}
     time = SourceTime(motion["source_frames"], motion["source_fps"], motion.get("source_start", 0))
     swings = find_swings(clip, options)
@@ -82,9 +82,9 @@ def label_clip(
     return labels, report
 
 
-def _left_out(given: Mapping[str, Path]) -> str:
+def _not_used(given: Mapping[str, Path]) -> str:
     names = ", ".join(path.name for path in given.values())
-    return f"{names} left out: the frames counted there are those of one cycle, and the clip repeats it"
+    return f"{names} not used: their frame numbers are those of one cycle, but the clip repeats this cycle"
 
 
 def _no_cycle(margins: str) -> str:
@@ -95,7 +95,8 @@ def _no_cycle(margins: str) -> str:
 def mirror_labels(labels: Labels, report: LabelReport, clip: Clip) -> tuple[Labels, LabelReport]:
     """Labels of the mirrored clip: left and right contacts are swapped, and the phase is half a cycle later.
 
-    clip: the mirrored clip. Its cycles begin where the other foot landed before.
+    labels, report: of the clip that is mirrored. clip: the mirrored clip. Its cycles begin where the other
+    foot lands in the clip that is mirrored.
     """
     footsteps = mirrored_footsteps(labels.footsteps)
     cycles, dropped = find_cycles(footsteps, len(labels), report.phase_zero, report.margins)
@@ -112,7 +113,7 @@ def mirror_labels(labels: Labels, report: LabelReport, clip: Clip) -> tuple[Labe
 
 
 def write_report(path: str | Path, report: LabelReport, labels: Labels, clip: Clip) -> None:
-    """Write the JSON beside the labels: seconds of each gait and the data of the label picture."""
+    """Write the JSON beside the labels: the report, seconds of each gait and data of the label picture."""
     main = np.argmax(labels.gait, axis=1)
     seconds = {name: float(np.sum(main == i) / clip.fps) for i, name in enumerate(GAITS)}
     write_json(
@@ -127,6 +128,7 @@ def write_report(path: str | Path, report: LabelReport, labels: Labels, clip: Cl
 
 
 def _by_kind(files: Iterable[str | Path]) -> dict[str, Path]:
+    """Kind of a label file (phase, gait, footsteps, gait_keys) -> file."""
     suffixes = {
         ".phase": "phase",
         ".gait": "gait",
@@ -144,14 +146,14 @@ def _by_kind(files: Iterable[str | Path]) -> dict[str, Path]:
 def _phase(
     clip: Clip, given: Mapping[str, Path], time: SourceTime, swings: list[Swing], shortest_step: int
 ) -> tuple[Array, np.ndarray, Array]:
-    """Phase (F,), 0 as the right foot lands; bool (F,), where it is known; and footsteps (N, 3)."""
+    """Phase (F,), 0 as the right foot lands; bool (F,), whether it is known; and footsteps (N, 3)."""
     frames = len(clip)
     if "footsteps" in given:
         footsteps = label_files.read_footsteps(given["footsteps"], time)
     if "phase" in given:
         phase = label_files.read_phase(given["phase"], time, frames)
-        found, known = footsteps_of_phase(phase)
-        return phase, known, footsteps if "footsteps" in given else found
+        from_phase, known = footsteps_of_phase(phase)
+        return phase, known, footsteps if "footsteps" in given else from_phase
     if "footsteps" not in given:
         footsteps = rows_of_landings(landings(swings, frames, shortest_step))
     phase, known = phase_of_footsteps(footsteps, frames)

@@ -30,17 +30,18 @@ MARGINS = {"extend": 1, "drop": 60}
 def phase_of_footsteps(footsteps: Array, frames: int) -> tuple[Array, np.ndarray]:
     """Phase (frames,) in 0..1, 0 as the right foot lands, and (frames,) bool, whether it is known.
 
-    It is known and linear between the landings of a bout of walking. Elsewhere it advances at IDLE_RATE;
-    between two bouts this rate is adjusted, so that the phase has the right value at the next landing.
+    The phase is known and linear between the landings of a bout of walking. Elsewhere it advances at
+    IDLE_RATE; between two bouts this rate is adjusted, so that the phase has the right value at the next
+    landing.
     """
     when, value, joined = _landings(footsteps)
     frame = np.arange(frames)
     if not len(when):
         return (frame * IDLE_RATE) % 1.0, np.zeros(frames, bool)
-    level = _climbing(when, value, joined)
-    phase = np.interp(frame, when, level)
-    phase = np.where(frame < when[0], level[0] - (when[0] - frame) * IDLE_RATE, phase)
-    phase = np.where(frame > when[-1], level[-1] + (frame - when[-1]) * IDLE_RATE, phase)
+    unwrapped = _unwrapped(when, value, joined)
+    phase = np.interp(frame, when, unwrapped)
+    phase = np.where(frame < when[0], unwrapped[0] - (when[0] - frame) * IDLE_RATE, phase)
+    phase = np.where(frame > when[-1], unwrapped[-1] + (frame - when[-1]) * IDLE_RATE, phase)
     after = np.searchsorted(when, frame, side="right") - 1
     known = (after >= 0) & (frame <= when[-1])
     gap = np.append(~joined, True)[after]
@@ -70,18 +71,18 @@ def footsteps_of_phase(phase: Array) -> tuple[Array, np.ndarray]:
     events: list[tuple[float, int]] = []
     for first, last in zip(edges[::2], edges[1::2], strict=True):
         known[first : last + 1] = True
-        level = phase[first] + np.concatenate([[0.0], np.cumsum(step[first:last])])
-        halves = np.arange(np.ceil(2 * level[0] - 1e-6), np.floor(2 * level[-1] + 1e-6) + 1)
-        at = np.interp(halves / 2, level, np.arange(first, last + 1))
+        unwrapped = phase[first] + np.concatenate([[0.0], np.cumsum(step[first:last])])
+        halves = np.arange(np.ceil(2 * unwrapped[0] - 1e-6), np.floor(2 * unwrapped[-1] + 1e-6) + 1)
+        at = np.interp(halves / 2, unwrapped, np.arange(first, last + 1))
         events += [(float(frame), int(half) % 2) for frame, half in zip(at, halves, strict=True)]
         events.append((np.nan, -1))
     return rows_of_landings(events), known
 
 
 def rows_of_landings(events: list[tuple[float, int]]) -> Array:
-    """Footsteps (N, 3) of landings (frame, foot) in order of time. Foot 0 is right, 1 left, -1 ends a bout.
+    """Footsteps (N, 3) of landings (frame, foot) in order of time. Foot 0 is right, 1 left.
 
-    The same foot twice in a row also ends a bout.
+    A bout of walking ends at an event with the foot -1, and between two successive landings of the same foot.
     """
     rows: list[list[float]] = []
     last = -1
@@ -103,20 +104,21 @@ def rows_of_landings(events: list[tuple[float, int]]) -> Array:
 
 
 def find_cycles(footsteps: Array, frames: int, zero: str, margins: str) -> tuple[np.ndarray, int]:
-    """First and last frame (C, 2) of each cycle between landings of the foot `zero`, and the number left out.
+    """First and last frame (C, 2) of each cycle that is used, and the number of cycles left out.
 
-    A marked row leaves out its cycle and the one before, as in Holden et al. (2017). A cycle that is too near
-    an end of the clip is left out, too. With `margins` "drop", as in Holden et al. (2017), the clip must have
-    60 frames before the cycle and 61 after it. With "extend", one before and two after are enough.
+    A cycle is the time between two landings of the foot `zero`. A marked row leaves out its cycle and the one
+    before, as in Holden et al. (2017). A cycle that is too near an end of the clip is left out, too. With
+    `margins` "drop", the clip must have 60 frames before the cycle and 61 after it, as in Holden et al.
+    (2017). With "extend", one before and two after are enough.
     """
     margin = MARGINS[margins]
-    own = 0 if zero == "right" else 1
+    column = 0 if zero == "right" else 1
     kept, dropped = [], 0
     for row, following in itertools.pairwise(footsteps):
         between = row[1] if zero == "right" else following[0]
-        if not row[own] < between < following[own]:
+        if not row[column] < between < following[column]:
             continue
-        first, last = whole_frame(row[own]), whole_frame(following[own])
+        first, last = whole_frame(row[column]), whole_frame(following[column])
         if row[2] or following[2] or first < margin or frames - last <= margin + 1:
             dropped += 1
         else:
@@ -127,8 +129,8 @@ def find_cycles(footsteps: Array, frames: int, zero: str, margins: str) -> tuple
 def mirrored_footsteps(footsteps: Array) -> Array:
     """The footsteps (M, 3) of the mirrored clip, with left and right exchanged.
 
-    A row of the mirrored clip starts with a right landing, which is a left landing of the original clip. The
-    new row takes the mark of the original row with that landing.
+    A row of the mirrored clip starts with a right landing, which is a left landing of the clip before
+    mirroring. The new row takes its mark from the old row with that left landing.
     """
     landings: list[tuple[float, int]] = []
     marks: list[float] = []
@@ -147,9 +149,9 @@ def mirrored_footsteps(footsteps: Array) -> Array:
 
 
 def _landings(footsteps: Array) -> tuple[Array, Array, np.ndarray]:
-    """Frame (n,) and phase (n,), 0 or .5, of each of the n landings.
+    """Frame (n,) and phase (n,), 0 or .5, of each of the n landings, and which of them are joined.
 
-    Also bool (n - 1,), whether a landing and the next one are in the same bout of walking.
+    That is bool (n - 1,): whether a landing and the next one are in the same bout of walking.
     """
     when: list[float] = []
     value: list[float] = []
@@ -168,17 +170,17 @@ def _landings(footsteps: Array) -> tuple[Array, Array, np.ndarray]:
     return np.array(when, float), np.array(value, float), np.array(joined, bool)
 
 
-def _climbing(when: Array, value: Array, joined: np.ndarray) -> Array:
-    """(n,) phase of each landing, not wrapped to 0..1.
+def _unwrapped(when: Array, value: Array, joined: np.ndarray) -> Array:
+    """(n,) phase of each landing, not wrapped to 0..1: it only rises.
 
     It rises by half a cycle in each step of a bout, and by about IDLE_RATE per frame between two bouts.
     """
-    level = [value[0]]
+    unwrapped = [value[0]]
     for i, together in enumerate(joined):
         if together:
-            level.append(level[-1] + 0.5)
+            unwrapped.append(unwrapped[-1] + 0.5)
             continue
-        least = (value[i + 1] - level[-1]) % 1.0
+        least = (value[i + 1] - unwrapped[-1]) % 1.0
         spare = (when[i + 1] - when[i]) * IDLE_RATE - least
-        level.append(level[-1] + least + max(0, round(spare)))
-    return np.array(level)
+        unwrapped.append(unwrapped[-1] + least + max(0, round(spare)))
+    return np.array(unwrapped)

@@ -1,6 +1,6 @@
 """Reads hand-made label files beside clips: `.phase`, `.gait`, `_footsteps.txt`, `_gait.txt`.
 
-Their frames count from 1 in the clip file's own rate. Errors name the file and the line.
+Frames in them are counted from 1 at the frame rate of the clip's BVH file. Errors name the file and the line.
 """
 
 from __future__ import annotations
@@ -17,16 +17,16 @@ from hobble.core.quat import Array
 from hobble.core.untrusted import read_text
 from hobble.labels.clip_labels import GAITS
 
-FILE_GAITS = ("stand", "walk", "jog", "run", "crouch", "jump", "crawl", "unknown")
-TO_GAIT = {"run": "jog", "crawl": "crouch", "unknown": "bump"}
+FILE_GAITS = ("stand", "walk", "jog", "run", "crouch", "jump", "crawl", "unknown")  # columns of `.gait`
+TO_GAIT = {"run": "jog", "crawl": "crouch", "unknown": "bump"}  # gait that only files have -> gait of GAITS
 
 
 @dataclass(frozen=True)
 class SourceTime:
     """How frames of the clip's source file relate to frames of the clip.
 
-    frames: number of frames of the source file. fps: its rate. first: the frame of the source file, from 0,
-    that is frame 0 of the clip.
+    frames: number of frames of the source file. fps: its frame rate. first: the frame of the source file,
+    counted from 0, that is frame 0 of the clip.
     """
 
     frames: int
@@ -48,15 +48,18 @@ class SourceTime:
 
 
 def whole_frame(frame: float) -> int:
-    """The first whole frame at or after `frame`: a // 2 for frame a (from 1) of a 120 Hz file."""
+    """The first whole frame at or after `frame`.
+
+    So frame a of a 120 Hz file, counted from 1, becomes frame a // 2 of the clip, counted from 0.
+    """
     return math.ceil(frame - 1e-6)
 
 
 def read_phase(path: Path, time: SourceTime, frames: int) -> Array:
     """(frames,) phase at 60 Hz from a file with one value for each source frame.
 
-    Between two values it is interpolated the shorter way round. Raises InputError for a value that is not a
-    number in 0..1, or for a wrong number of rows.
+    Between two values the phase is interpolated the shorter way round. Raises InputError for a value that is
+    not a number in 0..1, or for a wrong number of rows.
     """
     rows = _matrix(path, time, 1)[:, 0]
     before, after, share = _between(rows, time, frames)
@@ -72,41 +75,43 @@ def read_gait(path: Path, time: SourceTime, frames: int) -> Array:
 
 
 def read_footsteps(path: Path, time: SourceTime) -> Array:
-    """(N, 3) footsteps (see `hobble.labels.phase`) from a file with lines `right left [*]`.
+    """(N, 3) footsteps (see `hobble.labels.phase`) from a file with lines `right left` or `right left *`.
 
-    The last line may hold only `right`. Then it counts as marked with `*`, because the original does not use
-    the cycle that ends there. Its landing still determines the phase before it. Raises InputError, which
-    names the line, if frames are not numbers, do not rise, or are past the clip's end.
+    `right` and `left` are the frames in which the feet land; `*` marks a row. The last line may hold only
+    `right`. Then it counts as marked with `*`, because the code of Holden et al. does not use the cycle that
+    ends there. The phase before this landing is known all the same. Raises InputError, which names the line,
+    if frames are not numbers, do not rise, or are past the clip's end.
     """
     steps: list[tuple[float, float, float]] = []
-    last, ended = 0.0, False
+    last, short_line = 0.0, 0  # the line that holds one frame; 0: none yet
     for number, words in _lines(path):
-        if ended:
-            raise InputError(path, "only the last line may hold one frame instead of two", line=number - 1)
+        if short_line:
+            raise InputError(path, "only the last line may hold one frame instead of two", line=short_line)
         dropped = words[-1] == "*"
         landings = [_number(path, number, w) for w in (words[:-1] if dropped else words)]
         if not 1 <= len(landings) <= 2:
             raise InputError(path, "a line holds `right left` or `right left *`", line=number)
-        ended = len(landings) == 1
+        if len(landings) == 1:
+            short_line = number
         for landing in landings:
             if landing <= last:
                 raise InputError(path, f"frame {landing:g} does not come after {last:g}", line=number)
             if landing > time.frames + 1:
                 raise InputError(
-                    path, f"frame {landing:g} lies past the clip's last, {time.frames}", line=number
+                    path, f"frame {landing:g} lies past the clip's last frame, {time.frames}", line=number
                 )
             last = landing
         right, left = (time.to_clip(x) for x in (*landings, math.nan)[:2])
-        steps.append((right, left, float(dropped or ended)))
+        steps.append((right, left, float(dropped or short_line > 0)))
     return np.array(steps, float).reshape(-1, 3)
 
 
 def read_gait_keys(path: Path, time: SourceTime, frames: int) -> Array:
-    """(frames, 6) gait shares from a file with lines `frame gait` (keys).
+    """(frames, 6) gait shares from a file with keys: lines `frame gait`.
 
-    Between two keys with different gaits the shares fade linearly. A fade ends one frame before its second
-    key, as in the original's `.gait` files. Raises InputError, which names the line, if a frame is not a
-    number or does not rise, or for an unknown gait.
+    Between two keys with different gaits the shares fade linearly. A fade ends one frame before the second
+    key, as in the `.gait` files of Holden et al. Raises InputError, which names the line, if frames are not
+    numbers or do not rise, or for an unknown gait.
     """
     names = (*FILE_GAITS, "bump")
     keys: list[tuple[float, int]] = []
@@ -121,7 +126,9 @@ def read_gait_keys(path: Path, time: SourceTime, frames: int) -> Array:
         if keys and frame <= keys[-1][0]:
             raise InputError(path, f"frame {frame:g} does not come after {keys[-1][0]:g}", line=number)
         if frame > time.frames + 1:
-            raise InputError(path, f"frame {frame:g} lies past the clip's last, {time.frames}", line=number)
+            raise InputError(
+                path, f"frame {frame:g} lies past the clip's last frame, {time.frames}", line=number
+            )
         keys.append((frame, GAITS.index(TO_GAIT.get(words[1], words[1]))))
     if not keys:
         raise InputError(path, "holds no keys", fix="Write lines of `frame gait`, or remove the file.")
@@ -173,7 +180,7 @@ def _matrix(path: Path, time: SourceTime, columns: int) -> Array:
 
 
 def _between(rows: Array, time: SourceTime, frames: int) -> tuple[Array, Array, Array]:
-    """For each frame of the clip the rows before and after it, and its position between these (0..1)."""
+    """For each frame of the clip the rows before and after it, and its position between the two (0..1)."""
     at = np.clip(time.at_clip_frames(frames), 0, len(rows) - 1)
     nearest = np.round(at)
     at = np.where(np.abs(at - nearest) < 1e-6, nearest, at)
@@ -182,7 +189,7 @@ def _between(rows: Array, time: SourceTime, frames: int) -> tuple[Array, Array, 
 
 
 def _six(eight: Array) -> Array:
-    """The columns of FILE_GAITS added up to those of GAITS."""
+    """(n, 6) shares of GAITS, added up from (n, 8) shares of FILE_GAITS."""
     out = np.zeros((len(eight), len(GAITS)))
     for column, name in enumerate(FILE_GAITS):
         out[:, GAITS.index(TO_GAIT.get(name, name))] += eight[:, column]

@@ -1,6 +1,7 @@
 """Writes automatic labels as files that people can correct: `_footsteps.txt`, `_gait.txt`, `.phase`.
 
-Frames count from 1 in the rate of the clip's own file. `hobble.labels.read_files` reads them.
+Frames are counted from 1 at the frame rate of the clip's BVH file. `hobble.labels.read_files` reads the
+label files.
 """
 
 from __future__ import annotations
@@ -14,7 +15,7 @@ from hobble.core.files import write_text
 from hobble.labels.clip_labels import GAITS, Labels
 from hobble.labels.read_files import SourceTime
 
-HALF_FADE = 15  # frames at 60 Hz on each side of a change of gait in which the labels fade
+HALF_FADE = 15  # a change of gait is faded over this many frames (at 60 Hz) before it and after it
 
 
 def write_label_files(footsteps: Path, gait: Path, phase: Path, labels: Labels, time: SourceTime) -> None:
@@ -27,8 +28,8 @@ def write_label_files(footsteps: Path, gait: Path, phase: Path, labels: Labels, 
 def footsteps_text(labels: Labels, time: SourceTime) -> str:
     """Lines `right left`: the frames in which the feet land.
 
-    A `*` marks a line that is not used for cycles: one that is marked in the labels, or the last one of a
-    bout of walking, because the format has no other way to end a bout.
+    A `*` marks a line that is not used for cycles. It is written where the row of footsteps is marked in the
+    labels, and in the last line of a bout of walking, because the format has no other way to end a bout.
     """
     lines = []
     rows = labels.footsteps
@@ -43,7 +44,7 @@ def footsteps_text(labels: Labels, time: SourceTime) -> str:
 
 
 def gait_text(labels: Labels, time: SourceTime) -> str:
-    """Lines `frame gait`, two at each change. The labels fade between them."""
+    """Lines `frame gait`, two at each change of gait: from the first to the second, the gait fades."""
     gaits = labels.gait.argmax(axis=1).tolist()
     changes = [i for i in range(1, len(gaits)) if gaits[i] != gaits[i - 1]]
     keys: list[tuple[int, int]] = [(0, gaits[0])]
@@ -68,5 +69,5 @@ def phase_text(labels: Labels, time: SourceTime) -> str:
 
 
 def _source_frame(frame: float, time: SourceTime) -> int:
-    """The source file's frame, from 1, nearest to a frame of the clip."""
+    """The frame of the source file, counted from 1, that is nearest to a frame of the clip."""
     return min(max(round(frame * time.ratio + time.first) + 1, 1), time.frames)

@@ -18,7 +18,7 @@ from hobble.rows.summary import load_summary
 
 @dataclass(frozen=True)
 class ClipPart:
-    """Rows of a clip: all of them, or those of `excerpt`. weight: how many rows each row stands for."""
+    """Rows of a clip: all of them, or those of `excerpt`. Each row stands for `weight` rows."""
 
     clip: str
     path: Path
@@ -26,7 +26,7 @@ class ClipPart:
     excerpt: Excerpt | None = None
 
     def load(self, before: int = 0, after: int = 0) -> LoadedPart:
-        """Read the rows, and up to `before` and `after` rows of the same clip around them."""
+        """Read the rows, with up to `before` rows of the clip before an excerpt and `after` behind it."""
         if self.excerpt is None:
             rows = load_clip_rows(self.path)
             return LoadedPart(rows, 0, len(rows))
@@ -37,7 +37,7 @@ class ClipPart:
 
 @dataclass(frozen=True)
 class LoadedPart:
-    """Rows read from a clip's file. The chosen ones are rows[first:stop]; the others lie around them."""
+    """Rows read from a clip's file. Those to measure are rows[first:stop]; the others lie around them."""
 
     rows: ClipRows = field(repr=False)
     first: int
@@ -45,24 +45,27 @@ class LoadedPart:
 
     @property
     def frames(self) -> list[int]:
-        """The frames of the first and the last chosen row. There must be at least one chosen row."""
+        """The frames of the first and the last row to measure, of which there must be at least one."""
         return [int(self.rows.frame[at]) for at in (self.first, self.stop - 1)]
 
 
 def clip_parts(clips: Mapping[str, str | Path], sample: Sample | None) -> Iterator[ClipPart]:
-    """What to measure, sorted by clip and place. clips: name -> file of rows. sample: None for all clips."""
+    """The parts to measure, sorted by clip and row.
+
+    clips: name -> file of rows. sample: the excerpts to measure; None for all clips.
+    """
     if sample is None:
         for name in sorted(clips):
             yield ClipPart(name, Path(clips[name]))
     else:
-        for one, weight in sample.weights.items():
-            yield ClipPart(one.clip, Path(clips[one.clip]), weight, one)
+        for excerpt, weight in sample.weights.items():
+            yield ClipPart(excerpt.clip, Path(clips[excerpt.clip]), weight, excerpt)
 
 
 def captured_motion(clips: Mapping[str, str | Path], sample: Sample | None) -> Iterator[Captured]:
     """The unbroken stretches of all clips, or of a sample's excerpts. They are loaded one after another."""
-    for one in clip_parts(clips, sample):
-        yield from captured(one.load().rows)
+    for part in clip_parts(clips, sample):
+        yield from captured(part.load().rows)
 
 
 def sample_of(inputs: MeasureInputs, options: SampleOptions) -> Sample | None:
@@ -76,7 +79,10 @@ def with_sample(result: Json, sample: Sample | None) -> Json:
 
 
 def captured_sampled(found: Mapping[str, Any]) -> str:
-    """A sentence which says that only a sample of the captured motion was read; empty if all of it was."""
+    """A sentence on which part of the captured motion was read; empty if all of it was.
+
+    found: a measurement's JSON.
+    """
     words = sampled_words(found)
     return f" Only a part of the clips was read: {words}." if words else ""
 

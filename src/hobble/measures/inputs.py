@@ -15,18 +15,18 @@ from hobble.core.untrusted import read_yaml
 from hobble.runtime.options import Runtime
 
 Json = Mapping[str, Any]  # what a JSON file holds
-Row = Mapping[str, object]  # of a CSV table: column -> number, text or None
+Row = Mapping[str, object]  # a row of a CSV table: column -> number, text or None
 
 
 @dataclass(frozen=True)
 class MeasureInputs:
-    """The inputs of a measurement of one configuration: only those listed in its `Measure.inputs`.
+    """The inputs of a measurement of one configuration. It gets only those that its `Measure` asks for.
 
-    clips: clip -> its file of rows. summaries: their `hobble.rows.summary` files. splits: clip ->
-    "train" or "held_out". people: clip -> the person who walks in it; each clip without a known person counts
-    as a person of its own. runtime: the values of the keys in `Measure.runtime`; the other keys have
-    defaults. pieces: name of a piece -> its JSON file, if the pieces ran as separate jobs. files: name ->
-    file of each other input, such as the JSON of another measurement.
+    clips: clip -> its file of rows. summaries: a `hobble.rows.summary` file for each clip. splits: clip ->
+    "train" or "held_out". people: clip -> the person who walks in it; a clip whose person is not known
+    counts, with its mirror and its hurt versions, as one more person. runtime: the values of the keys in
+    `Measure.runtime`; the other keys have defaults. pieces: name of a piece -> its JSON file, if the pieces
+    ran as separate jobs. files: name -> file of each other input, such as the JSON of another measurement.
     """
 
     configuration: str
@@ -41,7 +41,7 @@ class MeasureInputs:
     def file(self, name: str) -> Path:
         """The file of the input `name`. Raises HobbleError if it is not among the measurement's `inputs`."""
         if name not in self.files:
-            raise HobbleError(f"a measurement reads {name!r}, which is not among its `inputs`")
+            raise HobbleError(f"a measurement reads {name!r}: list it in the `inputs` of its `Measure`")
         return self.files[name]
 
     @property
@@ -56,7 +56,7 @@ class MeasureInputs:
 
     @property
     def published(self) -> Json:
-        """The published figures."""
+        """The published results with which ours are compared."""
         return yaml.safe_load(self.file("published").read_text(encoding="utf-8"))
 
     def measured_pieces(self) -> dict[str, Json]:
@@ -70,7 +70,7 @@ class MeasureInputs:
 
 @dataclass(frozen=True)
 class Outcome:
-    """The output of a measurement: `result` becomes <measure>.json, each of `tables` <measure>/<table>.csv.
+    """The output of a measurement. `result` becomes <measure>.json, each of `tables` <measure>/<table>.csv.
 
     says: a line for the log.
     """

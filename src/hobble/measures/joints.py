@@ -10,8 +10,8 @@ from hobble.core.section import Section
 
 
 class Joints(Section):
-    """An option of all measurements of joint positions."""
+    """The option `joints`, which all measurements of joint positions have."""
 
     joints: Literal["all", "equivalent"] = Field(
-        "all", description="`equivalent`: only the joints that the 31-joint skeleton has too"
+        "all", description="`equivalent`: only the joints that the skeleton holden31 has too"
     )

@@ -12,7 +12,7 @@ from hobble.measures.measure import Measure
 
 
 def of_channels() -> Iterator[Measure]:
-    """The MEASURES of each channel that has a module `measures`."""
+    """The measurements of each channel that has a module `measures`."""
     for name in channels.NAMES:
         module = f"hobble.channels.{name}.measures"
         if importlib.util.find_spec(module) is not None:
@@ -34,5 +34,5 @@ def measure(name: str) -> Measure:
 
 
 def modules(part: str) -> list[str]:
-    """Full names of the modules `part` of all measurements that have one."""
+    """Full name of the module `part`, such as `page`, of each measurement that has it."""
     return [one.module(part) for one in MEASURES if one.has(part)]

@@ -9,9 +9,10 @@ SPLITS: tuple[Split, Split] = ("train", "held_out")
 
 
 class SampleSize(TypedDict):
-    """The size of a sample. excerpts, clips: how many are in the sample; strata: how many it is drawn from.
+    """The size of a sample of excerpts of clips, drawn by `hobble.measures.stratified_sample`.
 
-    of_excerpts, of: how many excerpts and clips there are in all.
+    excerpts: number of excerpts in the sample. of_excerpts: number of excerpts in all. clips: number of clips
+    with an excerpt in the sample. of: number of clips in all. strata: number of strata.
     """
 
     excerpts: int

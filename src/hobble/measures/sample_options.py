@@ -1,4 +1,4 @@
-"""The option that limits a measurement to a sample of the clips' frames: `measures.stratified_sample`."""
+"""The option that limits a measurement to a sample of excerpts (`hobble.measures.stratified_sample`)."""
 
 from __future__ import annotations
 
@@ -8,10 +8,11 @@ from hobble.core.section import Section
 
 
 class SampleOptions(Section):
-    """An option of all measurements of clips."""
+    """The option of all measurements of clips."""
 
     sample_frames: int = Field(
         500_000,
         gt=0,
-        description="most frames to measure; a larger data set is sampled by gait, speed, channel and split",
+        description="if the clips have more frames, a sample of about this many frames is measured, drawn by "
+        "gait, speed, channel and split",
     )

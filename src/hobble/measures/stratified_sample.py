@@ -2,13 +2,13 @@
 
 The sample consists of excerpts of clips (`hobble.rows.excerpts`), so that no long clip is measured as a
 whole. The excerpts are put into strata by split, gait, speed (the slow, middle and fast third of a gait) and
-channel. Each stratum gets a share of the sample in proportion to its rows. Each split gets half of the
-measured rows, because there are few held-out clips. The excerpts drawn from a stratum represent all of its
-rows (Cochran, Sampling Techniques, 1977, chapters 5 and 6: stratified sampling, ratio estimates).
+channel. Each split gets half of the measured rows, because there are few held-out clips. Within a split, each
+stratum gets a share in proportion to its rows. The excerpts drawn from a stratum represent all of its rows
+(Cochran, Sampling Techniques, 1977, chapters 5 and 6: stratified sampling, ratio estimates).
 
 Each excerpt is drawn on its own, whichever clip it is from. So the confidence interval holds although
-excerpts of one clip resemble each other. It says how far the mean of the sample may be from the mean over all
-rows of these clips. It does not say how much other clips would differ.
+excerpts of one clip resemble each other. The interval says how far the mean of the sample may be from the
+mean over all rows of these clips. It does not say how much other clips would differ.
 """
 
 from __future__ import annotations
@@ -25,14 +25,17 @@ from hobble.measures.results import SampleSize
 from hobble.rows.excerpts import Excerpt, ExcerptKind
 from hobble.rows.summary import RowsSummary
 
-LEAST = 2  # fewest excerpts drawn from a stratum, because the variance needs two
+LEAST = 2  # at least this many excerpts are drawn from a stratum, because its variance needs two
 SPEEDS = 3  # ranges of speed into which each gait is divided
 STANDARD_ERRORS = 1.96  # half the width of a 95 % confidence interval, in standard errors
 
 
 @dataclass(frozen=True)
 class Stratum:
-    """Similar excerpts. count: how many. rows: rows of all of them. drawn: the excerpts in the sample."""
+    """Similar excerpts.
+
+    count: number of excerpts. rows: number of rows in all of them. drawn: the excerpts in the sample.
+    """
 
     split: str
     count: int
@@ -54,7 +57,7 @@ class Sample:
 
     @property
     def weights(self) -> dict[Excerpt, float]:
-        """Excerpt in the sample -> number of rows that each of its rows represents, by clip and place."""
+        """Excerpt in the sample -> number of rows that each row represents. Sorted by clip and row."""
         return dict(sorted((one, stratum.weight) for stratum in self.strata for one in stratum.drawn))
 
     @property
@@ -100,9 +103,9 @@ def _variance(stratum: Stratum, values: Mapping[Excerpt, float]) -> float:
 
 
 def draw_sample(summaries: Iterable[RowsSummary], splits: Mapping[str, str], frames: int) -> Sample | None:
-    """A sample of about `frames` rows; None if all clips together have no more.
+    """A sample of about `frames` rows; None if all clips together do not have more rows.
 
-    The same clips give the same sample, and one more clip changes it only a little.
+    splits: clip -> split. The same clips give the same sample, and one more clip changes it only a little.
     """
     clips = [one for one in summaries if one.rows]
     if sum(one.rows for one in clips) <= frames:
@@ -115,8 +118,8 @@ def draw_sample(summaries: Iterable[RowsSummary], splits: Mapping[str, str], fra
     for members in _strata(every, splits).values():
         split = splits[members[0].clip]
         rows = sum(one.rows for one in members)
-        wanted = frames * _share(of_split, split, frames) * rows / of_split[split]
-        strata.append(Stratum(split, len(members), rows, _first(members, wanted)))
+        rows_to_draw = frames * _share(of_split, split, frames) * rows / of_split[split]
+        strata.append(Stratum(split, len(members), rows, _drawn(members, rows_to_draw)))
     return Sample(tuple(strata), len(clips))
 
 
@@ -145,21 +148,21 @@ def _strata(
 
 
 def shuffle_key(name: str) -> bytes:
-    """A key for sorting names. The order looks random but is always the same; a new name only joins in."""
+    """A key for sorting names. The order looks random, but a new name does not reorder the others."""
     return hashlib.sha256(name.encode()).digest()
 
 
-def _first(members: Sequence[Excerpt], rows: float) -> tuple[Excerpt, ...]:
-    """A random choice of `LEAST` excerpts of a stratum, and more until they have `rows` rows."""
+def _drawn(members: Sequence[Excerpt], rows: float) -> tuple[Excerpt, ...]:
+    """Excerpts drawn at random from a stratum: at least LEAST, and as many as it takes to get `rows` rows."""
     out: list[Excerpt] = []
-    found = 0
-    for one in sorted(members, key=_random_place):
-        if len(out) >= LEAST and found >= rows:
+    rows_drawn = 0
+    for one in sorted(members, key=_random_order):
+        if len(out) >= LEAST and rows_drawn >= rows:
             break
         out.append(one)
-        found += one.rows
+        rows_drawn += one.rows
     return tuple(out)
 
 
-def _random_place(one: Excerpt) -> bytes:
+def _random_order(one: Excerpt) -> bytes:
     return shuffle_key(one.clip if one.whole else f"{one.clip} {one.first}")

@@ -1,7 +1,7 @@
 """The kinds of network, one folder each; this folder holds what they share.
 
-Every subfolder with an `__init__.py` is a kind. So there is no list to edit for a new kind, and the
-fingerprints of existing rules do not change.
+Every subfolder with an `__init__.py` is a kind. So a new kind needs no entry in a list, and because no
+existing file changes, Snakemake does not repeat existing jobs.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 
 # The values of `network.kind` in a configuration.
 MODELS = tuple(sorted(path.parent.name for path in Path(__file__).parent.glob("*/__init__.py")))
-DEFAULT = "pfnn"
+DEFAULT = "pfnn"  # the kind if a configuration or a network's file names none
 
 
 def model(kind: str) -> Model:
@@ -27,8 +27,8 @@ def model(kind: str) -> Model:
 
 
 def network_options(section: Mapping[str, Any]) -> Options:
-    """The options of a configuration's section `network`, in the type of its kind.
+    """The options of a configuration's section `network`, in the class of options of its kind.
 
-    It is not called `options`, because that is a module of this package.
+    The function is not called `options`, because a module of this package has this name.
     """
     return model(section.get("kind", DEFAULT)).options().model_validate(section)

@@ -18,13 +18,14 @@ from hobble.core.quat import Array
 from hobble.core.skeleton import Skeleton
 
 MOST_LAYERS = 16
-MOST_NUMBERS = 1 << 26  # in one array, 256 MB as float32; the largest array of a known network has 3 million
+# At most this many numbers in an array: 256 MB as float32. The largest array of known networks has 3 million.
+MOST_NUMBERS = 1 << 26
 LARGEST_WEIGHT = 1e6  # trained weights are below 10
 LARGEST_MEAN = 1e9
-LARGEST_STD = 1e20  # the std of a joint that is left out of the input is multiplied by 1e11
-MOST_NAMES = 4096
-LONGEST_NAME = 200
-FARTHEST = 1e5  # centimetres from a joint to its parent
+LARGEST_STD = 1e20  # to leave a joint out of the input, its std is multiplied by 1e11
+MOST_NAMES = 4096  # in one list
+LONGEST_NAME = 200  # characters
+FARTHEST = 1e5  # cm; largest coordinate of a joint relative to its parent
 NEEDED_ROLES = ("hips", *(f"{s}_{p}" for s in ("left", "right") for p in ("hip", "knee", "heel", "toe")))
 STATISTICS = {"Xmean": "x_mean", "Xstd": "x_std", "Ymean": "y_mean", "Ystd": "y_std"}
 DIVERGED = "The training diverged, or the file is damaged."
@@ -44,18 +45,21 @@ def numbers(
     if array.size > MOST_NUMBERS:
         raise InputError(path, f"{name} holds {array.size} numbers; at most {MOST_NUMBERS} are allowed")
     # No copy: for an array of bytes a float64 copy would be eight times as large.
-    beyond = max(float(array.max()), -float(array.min()))
-    if not np.isfinite(beyond):
-        raise InputError(path, f"{name} holds weights that are not finite numbers", fix=DIVERGED)
-    if beyond > largest:
+    extreme = max(float(array.max()), -float(array.min()))
+    if not np.isfinite(extreme):
+        raise InputError(path, f"{name} holds numbers that are not finite", fix=DIVERGED)
+    if extreme > largest:
         raise InputError(
-            path, f"{name} holds {beyond:.3g}, which is above the limit of {largest:g}", fix=DIVERGED
+            path, f"{name} holds {extreme:.3g}, which is above the limit of {largest:g}", fix=DIVERGED
         )
     return np.ascontiguousarray(array, np.float32)
 
 
 def layers(path: str | Path, arrays: Mapping[str, Any], *prefixes: str) -> int:
-    """The number of layers, counted by the first prefix (W0, W1, ...). Every layer needs every prefix."""
+    """The number of layers: how many arrays have the first prefix (W0, W1, ...).
+
+    Raises InputError unless each layer has an array for every prefix.
+    """
     found = {name for name in arrays if re.fullmatch(rf"{prefixes[0]}\d{{1,4}}", name)}
     if not found:
         raise InputError(path, f"not a network: no {prefixes[0]}0")
@@ -73,7 +77,8 @@ def stacked(
     """Weights (..., out, in) and biases (..., out) of consecutive layers, checked to fit one another.
 
     names: prefixes of weights and biases, ("W", "b") for W0, b0, W1, ... axes: number of axes of the weights;
-    all but the last two have to be equal in all layers. inputs: of the first layer. outputs: of the last one.
+    the lengths of all but the last two axes have to be equal in all layers. inputs: number of inputs of the
+    first layer. outputs: number of outputs of the last layer.
     """
     count = layers(path, arrays, *names)
     weights = tuple(numbers(path, arrays, f"{names[0]}{i}", axes) for i in range(count))
@@ -90,7 +95,7 @@ def stacked(
 
 
 def statistics(path: str | Path, arrays: Mapping[str, Any]) -> dict[str, Array]:
-    """x_mean, x_std (X,), y_mean, y_std (Y,)."""
+    """x_mean, x_std (X,), y_mean, y_std (Y,): the numbers that standardise X and Y."""
     out = {}
     for name, key in STATISTICS.items():
         is_std = key.endswith("std")
@@ -161,7 +166,7 @@ def skeleton(path: str | Path, value: Any) -> Skeleton:
 
 
 def _named_joints(path: str | Path, data: Mapping[str, Any], joints: set[str]) -> None:
-    """Check that roles, links, end sites and unseen joints name existing joints."""
+    """Check that roles, links, end sites and unseen joints name joints of the skeleton, `joints`."""
     roles = mapping(path, "its skeleton's roles", data.get("roles"))
     if missing := [role for role in NEEDED_ROLES if role not in roles]:
         raise InputError(path, f"its skeleton has no joint for {', '.join(missing)}")
@@ -182,7 +187,7 @@ def _one_of(name: Any, joints: set[str]) -> bool:
 
 
 def _three_numbers(path: str | Path, what: str, value: Any) -> None:
-    """Check that `value` is three finite numbers, in centimetres."""
+    """Check that `value` is three finite numbers, in centimetres, none beyond FARTHEST."""
     if not isinstance(value, list | tuple) or len(value) != 3:
         raise InputError(path, f"{what} is {_short(value)}, not three numbers")
     for number in value:

@@ -14,10 +14,13 @@ from hobble.models.trainable import ALL_ROWS
 
 
 class FusedBase:
-    """First base class of a kind's fused step. The second is its plain step, such as `PfnnStep`.
+    """First base class of the fused training step of a kind of network.
 
-    The plain step sets three fields. network: the network in training. keep: the share of units that dropout
-    keeps. widths: the number of inputs of each layer, in the order of the masks.
+    The second base class is the kind's training step in PyTorch, such as `PfnnStep`. It sets three fields.
+    network: the network in training. keep: the share of units that dropout keeps. widths: the number of
+    inputs of each layer, in the order of the masks.
+
+    counter: state of the random numbers for the masks. buffers: (name, width) -> memory for `buffer`.
     """
 
     network: Any
@@ -34,7 +37,10 @@ class FusedBase:
         self.counter = np.uint64(seed)
 
     def masks(self, rows: int, own: slice = ALL_ROWS) -> list[Tensor]:
-        """Like `masks` of the plain step, with other random numbers. The next call overwrites the masks."""
+        """Draw the dropout masks of a batch of `rows` rows, and return those of the rows `own`.
+
+        The random numbers differ from those of the step in PyTorch. The next call overwrites the masks.
+        """
         first, stop, _ = own.indices(rows)
         masks = []
         for number, width in enumerate(self.widths):
@@ -45,11 +51,14 @@ class FusedBase:
         return masks
 
     def multiplied(self, name: str, a: Tensor, b: Tensor) -> Tensor:
-        """Like `multiplied` of the plain step. The result is in memory that the next step uses again."""
+        """a @ b.T. name: of this product; the next call with the same name may overwrite the result."""
         return product(a, b, self.buffer(name, len(a), len(b), a.dtype))
 
     def buffer(self, name: str, rows: int, width: int, dtype: torch.dtype | None = None) -> Tensor:
-        """(rows, width) of uninitialised memory. The same name and width give the same memory."""
+        """A tensor (rows, width) of uninitialised memory, by default of the network's dtype.
+
+        Calls with the same name and width get the same memory, unless a call asks for more rows than before.
+        """
         key = (name, width)
         if key not in self.buffers or len(self.buffers[key]) < rows:
             self.buffers[key] = torch.empty(rows, width, dtype=dtype or self.network.flat.dtype)

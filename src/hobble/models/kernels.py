@@ -1,4 +1,4 @@
-"""Compiled loops shared by the fast steps and the optimiser, and their number of threads."""
+"""Compiled loops shared by the fast training steps and the optimiser, and their number of threads."""
 
 from __future__ import annotations
 
@@ -11,12 +11,16 @@ from torch import Tensor
 
 from hobble.core.compiled import njit
 
-NUMBERS_PER_THREAD = 100_000  # about 20 microseconds of work
+NUMBERS_PER_THREAD = 100_000  # a thread gets at least this many numbers, about 20 microseconds of work
+# The state of the random number generator splitmix64 grows by this for each number.
 SPLITMIX_STEP = np.uint64(0x9E3779B97F4A7C15)
 
 
 def use_threads(values: int) -> None:
-    """Set how many threads the next compiled loop over `values` numbers uses: waking threads takes time."""
+    """Set how many threads the next compiled loop over `values` numbers uses.
+
+    A short loop uses fewer threads than PyTorch, because waking threads takes time.
+    """
     threads = min(torch.get_num_threads(), numba.config.NUMBA_NUM_THREADS)  # type: ignore[attr-defined]
     numba.set_num_threads(max(1, min(threads, values // NUMBERS_PER_THREAD)))
 
@@ -36,13 +40,16 @@ def to_bfloat16(value: Any) -> Any:
 
 @njit(inline="always")
 def to_float32(half: Any) -> Any:
-    """The float32 of bfloat16 bits."""
+    """The float32 of a bfloat16. half: its bits."""
     return np.uint32(np.uint32(half) << np.uint32(16)).view(np.float32)
 
 
 @njit(parallel=True, error_model="numpy")
 def draw(mask: Any, counter: Any, keep: Any) -> None:
-    """Fill a dropout mask (rows, width) with 0 or 1 / keep, by splitmix64 (Steele et al. 2014)."""
+    """Fill a dropout mask (rows, width) with random 0 or 1 / keep, by splitmix64 (Steele et al. 2014).
+
+    counter: state of the generator before the first number. keep: probability that an entry is 1 / keep.
+    """
     rows, width = mask.shape
     scale = mask.dtype.type(1 / keep)
     bound = np.uint64(keep * 2.0**32)
@@ -55,5 +62,5 @@ def draw(mask: Any, counter: Any, keep: Any) -> None:
 
 
 def counter_after(counter: np.uint64, numbers: int) -> np.uint64:
-    """The counter of `draw` after it has drawn `numbers` numbers."""
+    """The counter with which the next `draw` continues, after `numbers` numbers were drawn."""
     return np.uint64((int(counter) + numbers * int(SPLITMIX_STEP)) % 2**64)

@@ -1,4 +1,4 @@
-// Layers with K sets of weights each. The outputs of the sets are blended by shares. An ELU follows each layer but the last.
+// Layers with K sets of weights each. In each layer, the outputs of the sets are blended by shares. An ELU follows each layer but the last.
 // 16-bit weights are packed by `packed_rows`, with a factor for each row. 8-bit weights are packed by
 // `hobble.report.rounded_weights`, with a factor for each group of columns.
 import { bytes } from "../report/web/numbers.js";
@@ -29,7 +29,7 @@ const product = (w, from, x, n) => {
   return p + q + s + t;
 };
 
-// One set of weights after another, so that they are read from memory in their order.
+// The outputs of one layer, computed from one set of weights after another, so that memory is read in order.
 const applied = ({ points, rows, columns, w, b, out }, shares, x, last) => {
   out.fill(0);
   for (let k = 0; k < points; k++) {
@@ -40,7 +40,7 @@ const applied = ({ points, rows, columns, w, b, out }, shares, x, last) => {
   return out;
 };
 
-// Returns (x, shares) => outputs, in an array that the next call overwrites. Without shares there is one set of weights.
+// Returns (x, shares) => outputs, in an array that the next call overwrites. Layers with one set of weights need no shares.
 export const createLayers = (packed) => {
   const layers = packed.map(unpacked);
   return (x, shares) => layers.reduce((h, one, i) => applied(one, shares, h, i === layers.length - 1), x);

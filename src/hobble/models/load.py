@@ -20,22 +20,22 @@ from hobble.models.network import TERRAIN_SIDE, Network
 from hobble.models.training_facts import TrainingFacts
 from hobble.rows.layout import GAITS, RowLayout
 
-MOST_META = 1 << 22  # characters in `meta`
-WIDEST = 1e4  # cm from the path to the points at its sides where the ground is looked up
-LARGEST_Y = 1e9  # in the prediction for the mean input; a working network predicts values below 1000
+MOST_META = 1 << 22  # `meta` has at most this many characters
+WIDEST = 1e4  # cm; largest `terrain_side`, the distance from the path to the ground points at its sides
+LARGEST_Y = 1e9  # largest prediction for the mean input; a working network predicts values below 1000
 
 
 def read_skeleton(path: str | Path) -> Skeleton:
-    """The skeleton of a file of config/skeletons. Raises InputError if it is not a valid skeleton."""
+    """The skeleton in a file of config/skeletons. Raises InputError if it is not valid."""
     data = checks.mapping(path, "a skeleton", read_yaml(path))
     keys = {key: value for key, value in data.items() if key != "maps"}
     return checks.skeleton(path, {"name": Path(path).stem, **keys})
 
 
 def load_network(path: str | Path, skeleton: Skeleton | str | Path | None = None) -> Network:
-    """Read weights.npz, its folder, or a folder of the original release's .bin files.
+    """Read weights.npz, its folder, or a folder with the .bin files that Holden et al. (2017) released.
 
-    skeleton: a Skeleton or a file of config/skeletons, for files without one (the original release's).
+    skeleton: a Skeleton or a file of config/skeletons, for a network without one, such as theirs.
     Raises InputError if something is missing, damaged, not finite, out of range or of the wrong shape.
     """
     path = Path(path)
@@ -50,7 +50,8 @@ def load_network(path: str | Path, skeleton: Skeleton | str | Path | None = None
         raise InputError(
             path,
             "not a network: it holds neither weights.npz nor Xmean.bin, W0_000.bin, ...",
-            fix="Train one (snakemake results/<configuration>/network/weights.npz), or pass its folder.",
+            fix="Train one (snakemake results/<configuration>/network/weights.npz), "
+            "or pass the folder of a trained network.",
         )
     return network_from_arrays(path, load_npz(path), skeleton)
 
@@ -105,16 +106,16 @@ def _meta(path: str | Path, arrays: Mapping[str, Any]) -> dict[str, Any]:
 def _layout(
     path: str | Path, meta: Mapping[str, Any], x_size: int, y_size: int, skeleton: Skeleton | None
 ) -> RowLayout:
-    """The file's layout of columns. Their number has to match the arrays."""
+    """The layout of the columns of X and Y. Raises InputError if it does not have `x_size` and `y_size`."""
     if "layout" not in meta:
         layout = _guess_layout(x_size, y_size, skeleton)
     else:
         given = checks.mapping(path, "layout", meta["layout"])
-        known = {"joints": (1, y_size), "window": (1, x_size), "step": (1, x_size)}
-        if not set(known) <= set(given):
+        ranges = {"joints": (1, y_size), "window": (1, x_size), "step": (1, x_size)}
+        if not set(ranges) <= set(given):
             keys = ", ".join(map(ascii, given))[:80]
-            raise InputError(path, f"layout has the keys {keys}, not {', '.join(known)} and channels")
-        for key, (least, most) in known.items():
+            raise InputError(path, f"layout has the keys {keys}, not {', '.join(ranges)} and channels")
+        for key, (least, most) in ranges.items():
             checks.whole(path, f"layout.{key}", given[key], least, most)
         if given["window"] % given["step"]:
             raise InputError(
@@ -141,27 +142,28 @@ def _guess_layout(x_size: int, y_size: int, skeleton: Skeleton | None) -> RowLay
     Columns of X that are left over become the first channel that has as many columns.
     """
     joints = max(1, (y_size - RowLayout(0).y_size) // 9)
-    left = x_size - RowLayout(joints).x_size
-    if left <= 0:
+    left_over = x_size - RowLayout(joints).x_size
+    if left_over <= 0:
         return RowLayout(joints)
     fitting = (
-        one.name for one in all_channels() if skeleton is not None and len(one.columns(skeleton)) == left
+        one.name for one in all_channels() if skeleton is not None and len(one.columns(skeleton)) == left_over
     )
-    return RowLayout(joints, channels=((next(fitting, NAMES[0]), left),))
+    return RowLayout(joints, channels=((next(fitting, NAMES[0]), left_over),))
 
 
 def _gaits(path: str | Path, meta: Mapping[str, Any]) -> tuple[str, ...]:
     gaits = checks.names(path, "gaits", meta.get("gaits", GAITS))
     if sorted(gaits) != sorted(GAITS):
-        raise InputError(path, f"gaits are not {', '.join(GAITS)} in any order")
+        raise InputError(path, f"gaits must be {', '.join(GAITS)}, in any order")
     return gaits
 
 
 def _labels(
     path: str | Path, name: str, meta: Mapping[str, Any], layout: RowLayout, skeleton: Skeleton | None
 ) -> tuple[str, ...]:
-    """The labels of a channel, from the file or else the skeleton. Raises InputError if they do not fit."""
+    """A channel's labels, from the file or else from the skeleton. Raises InputError if they do not fit."""
     stated = checks.mapping(path, "channels", meta.get("channels", {})).get(name)
+    # Older files have the labels under other keys.
     given = stated or next((meta[key] for key in channel(name).old_keys if meta.get(key)), None)
     if given is None and skeleton is not None:
         given = channel(name).columns(skeleton)

@@ -1,4 +1,4 @@
-"""The interface of a kind of network, as training and loading use it."""
+"""The interface of a kind of network, for training and loading."""
 
 from __future__ import annotations
 
@@ -40,11 +40,11 @@ class FinishedNetwork(Protocol):
 class Model(ABC):
     """One kind of network. `MODEL` in its folder is a `Trained` or a `Built`.
 
-    Methods import pydantic, PyTorch and numba only when they need them. So a game needs no PyTorch, and
-    checking a configuration needs neither PyTorch nor numba.
+    Its methods import pydantic, PyTorch and numba only when they need them. So a game that runs a network
+    needs no PyTorch, and checking a configuration needs neither PyTorch nor numba.
     """
 
-    modes: ClassVar[tuple[str, ...]] = ("exact",)  # those of its networks, see `Network.modes`
+    modes: ClassVar[tuple[str, ...]] = ("exact",)  # the modes of its networks, see `Network.modes`
 
     @abstractmethod
     def options(self) -> type[Options]:
@@ -52,19 +52,19 @@ class Model(ABC):
 
     @abstractmethod
     def read(self, path: str | Path, arrays: Mapping[str, Any], common: Mapping[str, Any]) -> Network:
-        """The network of a file's arrays, as `Trainable.arrays` wrote them.
+        """The network of a file. arrays: as `FinishedNetwork.arrays` returned them.
 
-        common: the fields of `hobble.models.network.Network`, already checked. Raises InputError, with
-        `path`, for arrays that cannot run. Use `hobble.models.checks`.
+        path: the file, for error messages. common: the fields of `hobble.models.network.Network`, already
+        checked. Raises InputError for arrays that cannot run; `hobble.models.checks` has functions for this.
         """
 
     def read_folder(self, folder: Path) -> Mapping[str, np.ndarray] | None:
-        """The arrays of a folder in another program's format, or None if it is not of this kind."""
+        """The arrays of a folder in another program's format; None if it holds no network of this kind."""
         return None
 
 
 class Trained(Model):
-    """A kind that is trained in passes over the shuffled rows of a database."""
+    """A kind of network that is trained in passes over the shuffled rows of a database."""
 
     @abstractmethod
     def parameters(self, options: Any, inputs: int, outputs: int) -> int:
@@ -74,19 +74,19 @@ class Trained(Model):
     def trainable(self, options: Any, layout: RowLayout, skeleton: Skeleton, seed: int) -> Trainable:
         """A new, untrained network on the CPU. The same seed gives the same network.
 
-        layout: its columns, with the joints of `skeleton`.
+        layout: the columns of X and Y, with the joints of `skeleton`.
         """
 
 
 class Built(Model):
-    """A kind without training: it is built from the rows of the training clips in their order."""
+    """A kind of network without training, built from the rows of the training clips, frame after frame."""
 
     @abstractmethod
     def build(
         self, options: Any, clips: Sequence[str | Path], layout: RowLayout, skeleton: Skeleton
     ) -> FinishedNetwork:
-        """Build it from the files of rows `clips` (`hobble.rows.clip_rows`).
+        """Build a network.
 
-        layout: of the database, which may have fewer channels than the files. Raises InputError if a file
-        does not fit the layout.
+        clips: the files with the clips' rows (`hobble.rows.clip_rows`). layout: of the database, which may
+        have fewer channels than these files. Raises InputError if a file does not fit the layout.
         """

@@ -23,22 +23,24 @@ from hobble.rows.layout import GAITS, RowLayout
 TERRAIN_SIDE = 25.0
 STORAGES = ("float32", "int16")  # types in which a predictor can keep its weights
 
-Export = Callable[[Path, str], str]
+Export = Callable[[Path, str], str]  # see `Network.exports`
 
 
 class Predictor(Protocol):
     """A network prepared for fast evaluation, called in every frame.
 
-    It may keep buffers between calls, so each group of characters that is evaluated together needs its own.
-    It keeps no state of a character. If `Network.memory` is above 0, the caller keeps that state: an array
-    (C, Network.memory) float64 for C characters, zero before a character's first frame. `evaluate` and
-    `predict` then take it as one more argument `memory`, which the signatures below leave out, and change it
-    in place. X are inputs and Y outputs; in shapes, X and Y are the numbers of their columns.
+    It may keep buffers between calls, so each group of characters that is evaluated together needs its
+    own predictor. It keeps no state of a character. If `Network.memory` is above 0, the caller keeps this
+    state: an array (C, Network.memory) float64 for C characters, zero before a character's first frame.
+    `evaluate` and `predict` then take it as one more argument `memory`, which the signatures below leave out,
+    and change it in place.
+
+    X are inputs and Y outputs; in shapes, X and Y are the numbers of their columns.
     """
 
     @property
     def network(self) -> Network:
-        """The network it was made from."""
+        """The network that the predictor evaluates."""
 
     def standardise(self, x: Array, z: Array) -> None:
         """Write the standardised inputs x into z, both (C, X) float32."""
@@ -122,13 +124,13 @@ class Network(ABC):
         """How many numbers one prediction reads: the weights and biases of one phase."""
 
     def stored(self, mode: str) -> int:
-        """How many numbers it keeps in memory to run in a mode, one of `modes`."""
+        """How many numbers the network keeps in memory to run in a mode, one of `modes`."""
         return self.parameters
 
     @property
     @abstractmethod
     def described(self) -> str:
-        """What it is, to be put after "A" in a sentence."""
+        """What the network is, in words to be put after "A" in a sentence."""
 
     @abstractmethod
     def predict(self, x: Array, phase: Array) -> Array:
@@ -144,11 +146,10 @@ class Network(ABC):
 
     @abstractmethod
     def page(self, inputs: NDArray[np.int64], outputs: NDArray[np.int64]) -> dict[str, Any]:
-        """The JSON with which the report's page evaluates the network in a browser (`network.js`).
+        """The JSON with which the report's page evaluates the network in a browser.
 
-        It predicts the columns `outputs` of Y from the columns `inputs` of X.
-
-        The weights of the other inputs are left out.
+        `network.js` in the kind's folder reads it. It predicts the columns `outputs` of Y from the columns
+        `inputs` of X. The weights of other columns are left out.
         """
 
     @property

@@ -1,8 +1,8 @@
 """Write and check a network as one ONNX file, with standardisation inside the graph.
 
 The inputs are `x` (batch, X) and `phase` (batch,) in cycles, the output is `y` (batch, Y): float32, raw
-units, any batch size. Networks that ignore the phase have this input too, so that all files are called in the
-same way. Only this module needs the onnx packages: pip install "hobble[onnx]".
+units, any batch size. Networks that ignore the phase have this second input, too, so that all files are
+called in the same way. Only this module needs the onnx packages: pip install "hobble[onnx]".
 """
 
 from __future__ import annotations
@@ -19,12 +19,16 @@ from hobble.core.files import atomic_path
 from hobble.models.network import Network, inverse
 
 OPSET = 15
-TOLERANCE = 1e-4  # largest difference from the runtime, in units of Y; relative for values above 1
-CHECKED_ROWS = 64
+# Largest allowed difference from Hobble's runtime, in units of Y; relative for values above 1.
+TOLERANCE = 1e-4
+CHECKED_ROWS = 64  # random rows of X, with which a file is checked
 
 
 class Graph:
-    """Collects nodes and constants and gives each a unique name."""
+    """Collects nodes and constants and gives each a unique name.
+
+    helper, numpy_helper: modules of onnx.
+    """
 
     def __init__(self, helper: Any, numpy_helper: Any) -> None:
         self.helper, self.numpy_helper = helper, numpy_helper
@@ -45,7 +49,7 @@ class Graph:
         return output
 
 
-Body = Callable[[Graph, str], str]
+Body = Callable[[Graph, str], str]  # adds the nodes of a network; see `export`
 
 
 def export(path: str | Path, network: Network, mode: str, body: Body) -> None:
@@ -70,10 +74,10 @@ def export(path: str | Path, network: Network, mode: str, body: Body) -> None:
         ("phase", []),
         ("y", [len(network.y_mean)]),
     )
-    ends = [
+    inputs_and_output = [
         helper.make_tensor_value_info(name, TensorProto.FLOAT, ["batch", *sizes]) for name, sizes in columns
     ]
-    graph = helper.make_graph(g.nodes, "hobble", ends[:2], ends[2:], g.constants)
+    graph = helper.make_graph(g.nodes, "hobble", inputs_and_output[:2], inputs_and_output[2:], g.constants)
     opset = helper.make_opsetid("", OPSET)
     model = helper.make_model(
         graph,
@@ -109,19 +113,19 @@ def check(path: str | Path, network: Network, mode: str) -> float:
     expected = network.predictor(mode, "float32").predict(x, phase.astype(float))
     difference = float((np.abs(y - expected) / np.maximum(1.0, np.abs(expected))).max())
     if not difference <= TOLERANCE:
-        raise InputError(path, f"onnxruntime and the runtime differ by {difference:.2g}")
+        raise InputError(path, f"onnxruntime and Hobble's runtime differ by {difference:.2g}")
     return difference
 
 
 def write(path: str | Path, network: Network, mode: str, body: Body) -> float:
-    """`export` to a temporary file, `check` it, then give it its name. Returns the largest difference."""
+    """`export` to a temporary file, `check` it, then rename it to `path`. Returns what `check` does."""
     with atomic_path(path) as temporary:
         export(temporary, network, mode, body)
         return check(temporary, network, mode)
 
 
 def _metadata(network: Network, mode: str) -> dict[str, Any]:
-    """The metadata: what a reader needs to use the columns."""
+    """The metadata: what a program that reads the file needs to use the columns."""
     keys = ("configuration", "contacts", "limits", "units")
     return {
         "mode": mode,

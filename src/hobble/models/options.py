@@ -1,4 +1,4 @@
-"""The part of a configuration's `network` section that all kinds share."""
+"""The part of a configuration's `network` section that all kinds of network share."""
 
 from __future__ import annotations
 
@@ -17,5 +17,5 @@ class Options(Section):
 
     @property
     def why_asymmetric(self) -> str:
-        """Why such a network cannot be trained with `training.symmetric`; empty if it can."""
+        """Why a network with these options cannot be trained with `training.symmetric`; empty if it can."""
         return f"a network of kind {self.kind} cannot treat left and right alike"

@@ -1,4 +1,4 @@
-"""Packs arrays as text for the page: little-endian bytes in base64, weights as 16-bit integers."""
+"""Packs arrays as text for the report's page: little-endian bytes in base64, weights as 16-bit integers."""
 
 from __future__ import annotations
 

@@ -1,9 +1,9 @@
 """A short trial of several ways to compute the same thing, and a file that stores which one was the fastest.
 
-The results of the ways differ in their last bits. So the first choice is used in every later run on the same
-kind of machine. The file is in the user's cache folder, one for each kind of processor, version of PyTorch
-and setting of the libraries. If there is no such folder, or it cannot be written, a default is used without a
-trial.
+The results of the ways differ in their last bits. So that results do not change, the way chosen in the first
+trial is used in every later run on the same kind of machine. The user's cache folder has one such file for
+each kind of processor, version of PyTorch and setting of the libraries. If the folder is missing or cannot be
+written to, a default is used without a trial.
 """
 
 from __future__ import annotations
@@ -28,46 +28,53 @@ from hobble.core.processors import processor
 
 # Environment variables that limit which instructions the libraries use, and so change speed and rounding.
 SETTINGS = ("ATEN_CPU_CAPABILITY", "ONEDNN_MAX_CPU_ISA", "MKL_ENABLE_INSTRUCTIONS", "MKL_CBWR")
-SECONDS = 0.1  # length of a trial of one product
-CALLS_OF_A_WAY = 5, 50  # fewest and most calls of each way in a trial
-GIVE_UP_ABOVE = 1.5  # a way this many times slower than another after two turns gets no more turns
-REPLACES_BELOW = 0.97  # a way replaces one listed before it only if it takes less than this share of its time
+# A trial calls each way once in each turn. It has at least LEAST_TURNS and at most MOST_TURNS turns, and
+# between these numbers it ends as soon as TRIAL_SECONDS are over.
+LEAST_TURNS, MOST_TURNS = 5, 50
+TRIAL_SECONDS = 0.1
+GIVE_UP_ABOVE = 1.5  # after two turns, a way this many times slower than the fastest is not called again
+# The ways are compared in their order: a later way replaces the one chosen so far only if it takes less than
+# this share of that one's time.
+REPLACES_BELOW = 0.97
 
 log = logging.getLogger("hobble")
 
 
-def kept_choice(name: str, trial: Callable[[], str], ways: Collection[str], without: str) -> str:
-    """The way that the file names for the product `name`. If it names none, run `trial` and store its choice.
+def kept_choice(name: str, trial: Callable[[], str], ways: Collection[str], default: str) -> str:
+    """The way that the file stores under `name`. If there is none, run `trial` and store its choice.
 
-    ways: the allowed names. without: the way to take if the choice cannot be stored. Processes that ask at
-    the same time wait for the trial of the first one.
+    name: what is computed, such as a product and its shape. trial: returns the name of a way. ways: the
+    allowed names of ways. default: the way to take if the choice cannot be stored. If several processes ask
+    at the same time, one of them runs the trial and the others wait for its choice.
     """
     try:
         path = choices_file()
-        found = _read(path).get(name)
-        if isinstance(found, str) and found in ways:
-            return found
+        way = _read(path).get(name)
+        if isinstance(way, str) and way in ways:
+            return way
         with _locked(path.with_suffix(".lock")):
             choices = _read(path)
-            found = choices.get(name)
-            if not isinstance(found, str) or found not in ways:
-                found = trial()
-                write_json(path, {"machine": machine(), "ways": {**choices, name: found}})
-            return found
+            way = choices.get(name)
+            if not isinstance(way, str) or way not in ways:
+                way = trial()
+                write_json(path, {"machine": machine(), "ways": {**choices, name: way}})
+            return way
     except (HobbleError, OSError, RuntimeError) as error:
         _warn_once(str(error))
-        return without
+        return default
 
 
 def fastest(ways: Mapping[str, Callable[[], object]], clock: Callable[[], float] = perf_counter) -> str:
-    """The name of the way with the shortest call. The ways take turns, because other programs come and go.
+    """The name of the way with the shortest call.
 
-    clock: returns seconds. With one thread, use the time of that thread: other work does not add to it.
+    ways: name -> function to call. They take turns, so that the work of other programs slows down all of them
+    alike. clock: returns seconds. For ways that use one thread, give the processor time of that thread: the
+    work of other programs does not add to it.
     """
     best = dict.fromkeys(ways, float("inf"))
     begun = perf_counter()
-    for turn in range(CALLS_OF_A_WAY[1]):
-        if turn >= CALLS_OF_A_WAY[0] and perf_counter() - begun > SECONDS:
+    for turn in range(MOST_TURNS):
+        if turn >= LEAST_TURNS and perf_counter() - begun > TRIAL_SECONDS:
             break
         least = min(best.values())
         for name, call in ways.items():
@@ -89,14 +96,14 @@ def machine() -> dict[str, str]:
 
 
 def choices_file() -> Path:
-    """The file of this kind of machine. Raises RuntimeError if the user has no home."""
+    """The path of the file for this kind of machine. Raises RuntimeError if the user has no home."""
     folder = os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache"
     digest = hashlib.sha256(json.dumps(machine(), sort_keys=True).encode()).hexdigest()[:12]
     return Path(folder) / "hobble" / f"products-{digest}.json"
 
 
 def _read(path: Path) -> dict[str, Any]:
-    """The choices in the file; none if it is missing or damaged, so that they are made again."""
+    """The choices in the file; none if it is missing or damaged, so that new trials are run."""
     try:
         ways = read_json(path)["ways"]
         return ways if isinstance(ways, dict) else {}

@@ -13,24 +13,24 @@ from hobble.models import product_trial
 
 Way = Callable[[Tensor, Tensor, Tensor], Tensor]
 
-# A trial of the ways is worth its time from this number of multiplications and additions on. A smaller
-# product takes some 50 microseconds in any of them.
+# Least number of multiplications and additions in a product for which a trial of WAYS is worth its time. A
+# smaller product takes some 50 microseconds, whichever way is used.
 WORTH_A_TRIAL = 8_000_000
-TYPES = (torch.float32, torch.bfloat16)
+TYPES = (torch.float32, torch.bfloat16)  # products in other types have no trial
 
 
 def product(a: Tensor, b: Tensor, out: Tensor | None = None) -> Tensor:
     """a @ b.T for a (m, n) and b (k, n).
 
-    out: (m, k) memory that the result may use, so that none has to be allocated. On a CPU the way is chosen
-    by a trial, once for each machine and shape, because the ways round differently
+    out: (m, k) memory that the result may use, so that none has to be allocated. On a CPU a trial chooses one
+    of WAYS. Its choice is kept for each machine and shape, because the ways round differently
     (`hobble.models.product_trial`).
     """
     m, n, k = *a.shape, len(b)
     if a.device.type != "cpu" or a.dtype not in TYPES or 2 * m * n * k < WORTH_A_TRIAL:
         return _plain(a, b, out)
-    shape = (m, n, k), (_by_rows(a), _by_rows(b)), a.dtype, torch.get_num_threads()
-    return WAYS[_chosen(*shape)](a, b, torch.empty(m, k, dtype=a.dtype) if out is None else out)
+    way = WAYS[_chosen((m, n, k), (_by_rows(a), _by_rows(b)), a.dtype, torch.get_num_threads())]
+    return way(a, b, torch.empty(m, k, dtype=a.dtype) if out is None else out)
 
 
 def _plain(a: Tensor, b: Tensor, out: Tensor | None) -> Tensor:
@@ -39,15 +39,16 @@ def _plain(a: Tensor, b: Tensor, out: Tensor | None) -> Tensor:
 
 
 def _turned(a: Tensor, b: Tensor, out: Tensor) -> Tensor:
-    """The transpose of b @ a.T, by PyTorch's default library. It is faster for few rows."""
+    """The transpose of b @ a.T, by PyTorch's default library. It is faster if a has few rows."""
     return out.copy_(torch.mm(b, a.T).T)
 
 
 def _linear(a: Tensor, b: Tensor, out: Tensor) -> Tensor:
-    """The product by oneDNN. MKL has no 512-bit kernels for processors of other makers than Intel."""
+    """The product by oneDNN, which has 512-bit kernels for all processors. MKL has them only for Intel's."""
     return torch.ops.mkldnn._linear_pointwise(a, b, None, "none", [], "")
 
 
+# Name -> function that computes a @ b.T for a, b and the memory `out`.
 WAYS: dict[str, Way] = {"plain": _plain, "turned": _turned}
 if torch.backends.mkldnn.is_available() and hasattr(torch.ops.mkldnn, "_linear_pointwise"):
     WAYS["linear"] = _linear
@@ -55,11 +56,13 @@ if torch.backends.mkldnn.is_available() and hasattr(torch.ops.mkldnn, "_linear_p
 
 @cache
 def _chosen(shape: tuple[int, int, int], by_rows: tuple[bool, bool], dtype: torch.dtype, threads: int) -> str:
-    """The name of the way for a product. Batches of nearly the same size share a choice.
+    """The name of the fastest way for a product, from a trial now or earlier.
 
-    shape: (m, n, k). by_rows: whether a and b are stored row by row, or else column by column.
+    The batch size is rounded up to a power of 2, so that similar batches share a choice. shape: (m, n, k).
+    by_rows: for a and for b, whether it is stored row by row; if not, column by column.
     """
-    # The rows of a batch are the rows of a, or, for the gradient of weights, its columns.
+    # The batch size is m, the number of rows of `a`. Only for the gradient of weights it is n, the number of
+    # columns of `a`, and this `a` is stored column by column.
     sizes = list(shape)
     batch = 0 if by_rows[0] else 1
     sizes[batch] = 1 << (sizes[batch] - 1).bit_length()
@@ -73,8 +76,8 @@ def _chosen(shape: tuple[int, int, int], by_rows: tuple[bool, bool], dtype: torc
         clock = thread_time if threads == 1 else perf_counter
         return product_trial.fastest({name: partial(way, a, b, out) for name, way in WAYS.items()}, clock)
 
-    without = "linear" if dtype == torch.float32 and "linear" in WAYS else "plain"
-    return product_trial.kept_choice(name, trial, WAYS, without)
+    default = "linear" if dtype == torch.float32 and "linear" in WAYS else "plain"
+    return product_trial.kept_choice(name, trial, WAYS, default)
 
 
 def _by_rows(a: Tensor) -> bool:
@@ -82,7 +85,7 @@ def _by_rows(a: Tensor) -> bool:
 
 
 def _filled(rows: int, columns: int, by_rows: bool, dtype: torch.dtype) -> Tensor:
-    """(rows, columns) filled with one number, so that no random numbers are drawn."""
+    """A (rows, columns) matrix of equal numbers, so that no random numbers are drawn."""
     shape = (rows, columns) if by_rows else (columns, rows)
     values = torch.full(shape, 0.01, dtype=dtype)
     return values if by_rows else values.T

@@ -1,9 +1,10 @@
-"""Layers prepared to run on a CPU: K sets of weights each, whose outputs are blended by given shares.
+"""Layers prepared to run on a CPU. Each has K sets of weights, whose outputs are blended by given shares.
 
-sum_k c_k (W_k x + b_k) equals the output of blended weights, because a layer is linear before its activation,
-but no blended matrix is written to memory. For one character, reading weights from memory limits the speed. A
-crowd reads each set of weights once for all characters that use it. A character's prediction has the same
-bits alone and in any crowd, because its sums always have the same order (`hobble.models.tiles`).
+The blended outputs sum_k c_k (W_k x + b_k), with shares c_k, equal the output of blended weights, because a
+layer is linear before its activation. So no blended matrix has to be written to memory. For one character,
+the speed is limited by reading weights from memory. In a crowd, each set of weights is read once for all
+characters that use it. A character's prediction has the same bits alone and in any crowd, because its sums
+always have the same order (`hobble.models.tiles`).
 """
 
 from __future__ import annotations
@@ -18,22 +19,23 @@ from hobble.core.quat import Array
 from hobble.models.network import STORAGES, Network, inverse
 from hobble.models.tiles import WIDTH, aligned, in_panels, multiply, panels_of
 
-# Columns of `Stack.plan`, which has a row for each layer: numbers of inputs and outputs, and the indices
-# where weights, factors and biases begin. Everything is in a few flat arrays, because each array that is
-# passed to a compiled function costs 0.3 microseconds.
+# Columns of `Stack.plan`, which has a row for each layer: numbers of inputs and outputs, the index in
+# `Stack.weights` where the layer's weights begin, and the indices in `Stack.numbers` where its factors and
+# its biases begin. There are so few arrays because each one costs 0.3 microseconds when it is passed to a
+# compiled function.
 INPUTS, OUTPUTS, WEIGHTS, FACTORS, BIASES = range(5)
 
 
 class Stack:
     """Layers of weights (K, out, in) and biases (K, out), an ELU between them, packed for `blend_layers`.
 
-    mean, std: (Y,) statistics to bring the last layer's outputs to raw units, by default 0 and 1. storage:
-    "float32", or "int16" with a factor for each row, which halves the memory traffic. Raises ValueError for
-    another storage.
+    storage: type of the stored weights: "float32", or "int16" with a factor for each row, to halve the memory
+    traffic. mean, std: (Y,) statistics to bring the last layer's outputs to raw units, by default 0 and 1.
+    Raises ValueError for another storage.
 
-    weights: flat array of all weights in panels (`hobble.models.tiles`), set by set. numbers: flat float32
-    array of mean and std, then for each layer the factors of the rows and the biases of each set. plan: see
-    INPUTS to BIASES.
+    Its fields: `sets` is K. `weights` is a flat array of all weights in panels (`hobble.models.tiles`), layer
+    by layer and set by set. `numbers` is a flat float32 array of mean and std, then for each layer the
+    factors of all rows and the biases of all sets. `plan`: see INPUTS to BIASES.
     """
 
     def __init__(
@@ -77,11 +79,11 @@ class StackPredictor:
         standardise(x, self._x_mean, self._x_inverse, z)
 
     def evaluate(self, z: Array, phase: Array, out: Array) -> None:
-        """Write Y (C, Y) float32 of standardised inputs z (C, X) at phases (C,) in cycles into `out`."""
+        """Write Y (C, Y) float32 for standardised inputs z (C, X) at phases (C,), 0 to 1, into `out`."""
         raise NotImplementedError
 
     def predict(self, x: Array, phase: Array, out: Array | None = None) -> Array:
-        """Y (C, Y) float32 of X (C, X) float32 at phases (C,) in cycles."""
+        """Y (C, Y) float32 of X (C, X) float32 at phases (C,), 0 to 1: `standardise`, then `evaluate`."""
         z = np.empty_like(x)
         self.standardise(x, z)
         if out is None:
@@ -111,9 +113,9 @@ def standardise(x: Any, mean: Any, factor: Any, z: Any) -> None:
             z[c, i] = (x[c, i] - mean[i]) * factor[i]
 
 
-# Only functions called from Python are cached on disk, and their callees are inlined. If callees were cached,
-# too, the compiler could optimise across calls the first time but not after loading from the cache, and the
-# rounding would change.
+# Only functions called from Python are cached on disk; the functions that they call are inlined. If the
+# inner functions had caches of their own, the compiler could optimise across the calls in the first run, but
+# not after loading these functions from the cache. Then the rounding would change.
 @njit(forceinline=True, cache=False)
 def blend_layers(weights: Any, numbers: Any, plan: Any, shares: Any, z: Any, out: Any) -> None:
     """Run the layers and write their outputs, in raw units, into out (C, Y).
@@ -125,8 +127,10 @@ def blend_layers(weights: Any, numbers: Any, plan: Any, shares: Any, z: Any, out
     widest = 0
     for layer in range(layers):
         widest = max(widest, plan[layer, INPUTS], -(-plan[layer, OUTPUTS] // WIDTH) * WIDTH)
+    # h, y: inputs and blended outputs of a layer. members_h, sums: inputs and outputs of one set of weights,
+    # for the characters that use it (`members`). slots: where the sums of each of them begin.
     room = np.empty((4, count * widest), np.float32)
-    h, y, some, sums = room[0], room[1], room[2], room[3]
+    h, y, members_h, sums = room[0], room[1], room[2], room[3]
     members, slots = np.empty(count, np.int64), np.empty(count, np.int64)
     for c in range(count):
         _copy(z[c], z.shape[1], h[c * z.shape[1] :])
@@ -143,10 +147,11 @@ def blend_layers(weights: Any, numbers: Any, plan: Any, shares: Any, z: Any, out
             if rows == 0:
                 continue
             for m in range(rows if rows < count else 0):
-                _copy(h[members[m] * inputs :], inputs, some[m * inputs :])
+                _copy(h[members[m] * inputs :], inputs, members_h[m * inputs :])
             sums[: rows * padded] = np.float32(0)
             start = plan[layer, WEIGHTS] + k * padded * inputs
-            multiply(weights, start, padded // WIDTH, inputs, h if rows == count else some, rows, sums, slots)
+            x = h if rows == count else members_h
+            multiply(weights, start, padded // WIDTH, inputs, x, rows, sums, slots)
             factors = numbers[plan[layer, FACTORS] + k * outputs :]
             biases = numbers[plan[layer, BIASES] + k * outputs :]
             for m in range(rows):

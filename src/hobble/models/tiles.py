@@ -23,9 +23,10 @@ from hobble.core.compiled import njit
 from hobble.core.quat import Array
 
 WIDTH = 16  # outputs in a panel: two registers with AVX2, one with AVX-512
-DEPTH = 256  # most inputs at a time, so that their part of a panel stays in the L1 cache
+DEPTH = 256  # at most this many inputs at a time, so that their weights in a panel stay in the L1 cache
 ALIGNMENT = 64  # bytes of a cache line
-AHEAD = 48  # number of inputs by which the weights are fetched ahead from memory, if there is one row
+# With one row of inputs, weights are fetched from memory this many inputs before they are needed.
+AHEAD = 48
 
 
 def panels_of(outputs: int) -> int:
@@ -53,8 +54,9 @@ def in_panels(weights: Array) -> Array:
 def _write_tile(builder, shape, weights_from, inputs_from, sums_at):  # type: ignore[no-untyped-def]
     """Write the loop of `_tile` in LLVM IR, with vectors of WIDTH numbers on every processor.
 
-    This keeps the sums in registers, which compilers do not achieve from plain loops. shape: numbers of rows
-    and panels. weights_from, inputs_from, sums_at: the tuples of `_tile` as values, arrays as pointers.
+    Written this way, the sums stay in registers. From plain loops compilers do not achieve this. shape:
+    numbers of rows and panels. weights_from, inputs_from, sums_at: see `_typed_tile`; here arrays are
+    pointers.
     """
     (rows, panels), (weights, first, step) = shape, weights_from
     (x, x_at, x_step, depth), (y, y_at) = inputs_from, sums_at
@@ -82,8 +84,8 @@ def _write_tile(builder, shape, weights_from, inputs_from, sums_at):  # type: ig
         _fetch_ahead(builder, weights, of_panel, step, k, depth)
     after = []
     for r in range(rows):
-        one = _spread(builder, builder.load(builder.gep(x, [builder.add(of_row[r], k)])), vector)
-        after += [builder.call(fused, [one, w[q], sums[r * panels + q]]) for q in range(panels)]
+        x_k = _spread(builder, builder.load(builder.gep(x, [builder.add(of_row[r], k)])), vector)
+        after += [builder.call(fused, [x_k, w[q], sums[r * panels + q]]) for q in range(panels)]
     following = builder.add(k, index(1))
     for phi, old, new in zip([k, *sums], [index(0), *before], [following, *after], strict=True):
         phi.add_incoming(old, begin)
@@ -111,12 +113,13 @@ def _fetch_ahead(builder, weights, of_panel, step, k, depth):  # type: ignore[no
     distance = builder.add(builder.mul(later, index(WIDTH)), further)
     for start in of_panel:
         place = builder.gep(weights, [builder.add(start, distance)])
-        builder.call(fetch, [builder.bitcast(place, cell), flag(0), flag(3), flag(1)])  # read, keep, data
+        # 0: to read; 3: keep in all caches; 1: data, not code.
+        builder.call(fetch, [builder.bitcast(place, cell), flag(0), flag(3), flag(1)])
 
 
 def _vector_at(builder, array, place):  # type: ignore[no-untyped-def]
-    kind = ir.VectorType(array.type.pointee, WIDTH)
-    return builder.bitcast(builder.gep(array, [place]), kind.as_pointer())
+    vector = ir.VectorType(array.type.pointee, WIDTH)
+    return builder.bitcast(builder.gep(array, [place]), vector.as_pointer())
 
 
 def _weights_at(builder, weights, place, vector):  # type: ignore[no-untyped-def]
@@ -126,19 +129,21 @@ def _weights_at(builder, weights, place, vector):  # type: ignore[no-untyped-def
     return builder.sitofp(builder.sext(stored, ir.VectorType(ir.IntType(32), WIDTH)), vector)
 
 
-def _spread(builder, one, vector):  # type: ignore[no-untyped-def]
-    """A vector with the same number in all places."""
+def _spread(builder, number, vector):  # type: ignore[no-untyped-def]
+    """A vector with `number` in all places."""
     nothing, lane = ir.Constant(vector, ir.Undefined), ir.IntType(32)
-    first = builder.insert_element(nothing, one, lane(0))
+    first = builder.insert_element(nothing, number, lane(0))
     return builder.shuffle_vector(first, nothing, ir.Constant(ir.VectorType(lane, WIDTH), [0] * WIDTH))
 
 
 def _typed_tile(typing, rows, panels, weights_from, inputs_from, sums_at):  # type: ignore[no-untyped-def]
-    """Add the products of some inputs with `panels` panels of weights to `rows` rows of sums.
+    """The signature and the code of the compiled function `_tile`.
+
+    It adds the products of some inputs with `panels` panels of weights to `rows` rows of sums.
 
     rows, panels: compile-time constants. The other arguments are tuples of flat arrays and indices:
-    weights_from: the weights; index of the first panel's weights for these inputs; distance to those of the
-    next panel. inputs_from: the inputs; index of the first row's inputs; distance to those of the next row;
+    weights_from: the weights; index of the first panel's weights for these inputs; distance from one panel to
+    the next. inputs_from: the inputs; index of the first row's inputs; distance from one row to the next;
     number of inputs in each row. sums_at: the sums; (rows,) index of each row's sums for the first panel.
     """
     if not (isinstance(rows, types.IntegerLiteral) and isinstance(panels, types.IntegerLiteral)):
@@ -178,7 +183,7 @@ def _has_32_registers() -> bool:
 # one row the processor waits for memory anyway.
 PANELS_FOR_1_ROW = 4
 PANELS_FOR_3_ROWS, PANELS_FOR_6_ROWS = (4, 4) if _has_32_registers() else (2, 1)
-ROWS = 6
+ROWS = 6  # a tile has at most this many rows
 
 
 @njit(forceinline=True, cache=False)
@@ -187,8 +192,8 @@ def multiply(
 ) -> None:
     """Add W x to rows of y. All arrays are flat.
 
-    weights: from index `start` on (panels, inputs, WIDTH). x: (rows, inputs). y: panels * WIDTH sums of each
-    row, from its index in y_at (rows,) on.
+    weights: the matrix W as (panels, inputs, WIDTH), which begins at index `start`. x: (rows, inputs). y:
+    each row's panels * WIDTH sums. y_at: (rows,) index in y where a row's sums begin.
     """
     at = np.empty(ROWS, np.int64)
     tiles = -(-rows // ROWS)
@@ -202,8 +207,7 @@ def multiply(
         while panel < panels:
             together = wide if panel + wide <= panels else 1
             first = start + (panel * inputs + k) * WIDTH
-            # These weights stay in the L1 cache for all rows. Tiles get about the same number of rows, since
-            # a tile with fewer rows takes as long as a full one.
+            # These weights stay in the L1 cache for all rows. Tiles get about the same number of rows.
             for n in range(tiles):
                 row = rows * n // tiles
                 count = rows * (n + 1) // tiles - row

@@ -22,9 +22,9 @@ ALL_ROWS = slice(None)
 class TrainingStep(Protocol):
     """Computes the gradient of the mean squared error on one batch.
 
-    gradients: of the last call, one for each layer, in the order of the layer's parameters. error: (B, Y) of
-    the last call, prediction minus y. generator: random numbers for dropout on CUDA. input_mask: index of the
-    mask of the network's inputs among `masks`.
+    gradients: those of the last call, one for each layer, in the order of the layer's parameters. error: (B,
+    Y) prediction minus y in the last call. generator: random numbers for dropout on CUDA. input_mask: which
+    item of the list of dropout masks is for the network's inputs.
     """
 
     gradients: list[Tensor]
@@ -33,7 +33,10 @@ class TrainingStep(Protocol):
     input_mask: int
 
     def __call__(self, x: Tensor, y: Tensor, p: Tensor, masks: list[Tensor]) -> Tensor:
-        """Compute `gradients` for x (B, X), y (B, Y), p (B,). Returns the mean squared error, a scalar."""
+        """Compute `gradients` for x (B, X), y (B, Y) and phases p (B,). Returns the mean squared error.
+
+        masks: the dropout masks of this batch, from the method `masks`.
+        """
 
     def masks(self, rows: int, own: slice = ALL_ROWS) -> list[Tensor]:
         """Draw the dropout masks of a batch of `rows` rows, and return those of the rows `own`.
@@ -47,14 +50,15 @@ class TrainingStep(Protocol):
 
 @dataclass(frozen=True)
 class Trainable(ABC):
-    """All parameters in one buffer `flat`, layer by layer.
+    """A network in training. Its parameters are in one buffer `flat`, layer by layer.
 
-    A layer is (out, K, in + 1): K sets of weights that the network blends, with the bias as the last column.
-    So one loop of the optimiser serves all architectures, and a layer is one matrix product with its inputs,
-    which are extended by a 1 and multiplied by each of the K shares.
+    A layer is (out, K, in + 1): K sets of weights, with the bias as the last column. The network blends the
+    sets, each with a share. So one loop of the optimiser serves all architectures. A layer is one matrix
+    product: its parameters as (out, K (in + 1)), times its inputs, which are extended by a 1 and repeated K
+    times, each time multiplied by the share of a set.
     """
 
-    kind: ClassVar[str] = ""  # its folder in hobble.models
+    kind: ClassVar[str] = ""  # name of the kind of network, and of its folder in hobble.models
 
     flat: Tensor
 
@@ -79,16 +83,19 @@ class Trainable(ABC):
 
     @abstractmethod
     def step(self, dropout: float, half: bool) -> TrainingStep:
-        """The fastest step on this device. half: round the factors of the matrix products to bfloat16."""
+        """The fastest step on the device of `flat`.
+
+        dropout: share of units dropped. half: round the factors of the matrix products to bfloat16.
+        """
 
     @abstractmethod
     def arrays(self) -> dict[str, np.ndarray]:
-        """The arrays of its file; `Model.read` builds the network from them."""
+        """The arrays of its file, from which `hobble.models.model.Model.read` builds the network."""
 
     @property
     @abstractmethod
     def about(self) -> dict[str, Any]:
-        """Its entries in the file's meta, as JSON. The entry `network` is its formula in one line."""
+        """Its entries in the metadata of its file. The entry `network` is its formula in one line."""
 
     @property
     @abstractmethod
@@ -96,7 +103,7 @@ class Trainable(ABC):
         """Its shape in a few words. A training resumes only with a network of the same shape."""
 
     def mirrors(self, inputs: ColumnMirror, outputs: ColumnMirror) -> list[LayerMirror]:
-        """How each layer changes with the mirrors of standardised X and Y.
+        """How each layer changes if standardised X and Y are mirrored by `inputs` and `outputs`.
 
         Raises TypeError for kinds that cannot be trained with `training.symmetric`.
         """
@@ -118,7 +125,11 @@ class Trainable(ABC):
 
 
 def uniform_start(layers: Sequence[Tensor], generator: np.random.Generator) -> None:
-    """Fill layers: weights within +-sqrt(6 / (in * out)), biases 0 (Holden et al. 2017, as released)."""
+    """Fill the weights of layers, uniform within +-sqrt(6 / (in * out)).
+
+    The code that Holden et al. (2017) released starts in the same way. The biases are not changed; in a new
+    buffer they are 0.
+    """
     for layer in layers:
         out, k, size = layer.shape
         bound = (6.0 / ((size - 1) * out)) ** 0.5

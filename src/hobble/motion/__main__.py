@@ -17,11 +17,11 @@ from hobble.motion.options import ClipMotion
 from hobble.motion.read import read_bvh
 from hobble.motion.retarget_picture import picture_of_file
 
-SKELETONS = Path("config/skeletons")
+SKELETONS = Path("config/skeletons")  # the folder of the skeleton files
 
 
 def rig(file: Path) -> str:
-    """A draft of a rig file for a BVH file. It has the roles that were found, and `?` for the others."""
+    """A draft of a skeleton file for the rig of a BVH file. Roles without a joint have `?`."""
     bvh = read_bvh(file)
     skeleton = rig_of(bvh)
     try:
@@ -39,7 +39,7 @@ def main() -> int:
     parser = argparse.ArgumentParser(prog="python -m hobble.motion", description=__doc__)
     commands = parser.add_subparsers(dest="command", required=True)
     for_rig = commands.add_parser(
-        "rig", help="write a draft of a rig file: which joint of a BVH file is which"
+        "rig", help="write a draft of a skeleton file, which says which joint of a BVH file is which"
     )
     for_rig.add_argument("file", type=Path, help="a BVH file")
     for_rig.add_argument("--to", type=Path, help="the file to write (default: print it)")
@@ -59,13 +59,13 @@ def main() -> int:
         "--handedness",
         choices=["auto", "right", "left"],
         default="auto",
-        help="handedness of the files' coordinates, as motion.handedness of a data set",
+        help="handedness of the files' coordinates, like the setting motion.handedness of a data set",
     )
     for_look.add_argument(
         "--picture",
         type=Path,
         metavar="SVG",
-        help="for one file: picture of its motion before and after retargeting, the worst joint in red",
+        help="for one file: draw its motion before and after retargeting, the joint that differs most in red",
     )
     given = parser.parse_args()
     try:
@@ -79,7 +79,7 @@ def main() -> int:
             write_text(given.picture, picture_of_file(given.folder, target, given.skeletons, options))
         seen = look(given.folder, target, given.skeletons, options)
         print(table(seen))
-        return int(any(one.refused for one in seen.clips))
+        return int(any(clip.refused for clip in seen.clips))
     except HobbleError as error:
         print(error, file=sys.stderr)
         return 1

@@ -1,7 +1,11 @@
-"""Adds joints that a rig lacks: balls of the feet, and bends of the spine at hips and chest.
+"""Adds joints that a rig lacks: balls of the feet, and second joints at hips and chest to bend the spine.
 
-Hips and chest are turned by the limbs that they carry, and the spine by its bones. A rig on which one joint
-does both gets a second joint at the same place, so that the target's spine can follow the bones.
+In many rigs one joint at the hips carries both legs and spine, and one at the chest both arms and neck. Such
+a joint is taken to be turned as its limbs are, but the bone above it may point in another direction. So a
+second joint is added at the same place. It follows the bone, and the target's spine can then follow it.
+
+The frame of a joint (not a moment of the clip) is a rotation (4,), the same at all times: from the axes of a
+figure that stands facing +Z with its arms out sideways to the joint's own axes.
 """
 
 from __future__ import annotations
@@ -16,16 +20,18 @@ from hobble.core.clip import Clip
 from hobble.core.quat import Array
 from hobble.motion.body import SIDES, Body
 
-# Offset from an ankle to the ball that is added below it, as a share of the length of thigh and shank, along
-# the axes of a foot that stands and points to +Z. OUTWARD: radians by which feet point outward. Means over
-# seven subjects of CMU, with standard deviations of .006 (height), .010 (length) and 2 degrees.
+# BALL: offset from an ankle to the ball that is added below it, as a share of the length of thigh and shank,
+# along the axes of a foot that stands and points to +Z. OUTWARD: radians by which feet point outward. Both
+# are means over seven subjects of the CMU database. The standard deviations are .006 (height) and .010
+# (length) for BALL, and 2 degrees for OUTWARD.
 BALL, OUTWARD = np.array([0.0, -0.034, 0.136]), np.radians(5.0)
 
 
 def with_balls(clip: Clip, body: Body, frames: dict[int, Array]) -> tuple[Clip, Body]:
     """The clip and the body with a ball on every foot. Missing balls are put where people have them.
 
-    frames: joint -> (4,) frame, as `BodySample` defines it. Those of the new joints are added to it.
+    frames: joint -> (4,) frame. This argument is changed: the frames of the new joints are added, and the
+    frames of the ankles above them are turned outward.
     """
     without = [side for side in SIDES if body.legs[side][3] is None]
     legs, offsets = dict(body.legs), []
@@ -48,7 +54,7 @@ def with_balls(clip: Clip, body: Body, frames: dict[int, Array]) -> tuple[Clip, 
 @dataclass(frozen=True)
 class Bend:
     """The bone above hips or chest. end: the joint where it ends. bone: (3,) its mean vector, in the
-    coordinates of the joint where it begins. frame: (4,) its frame, as `BodySample` defines it.
+    coordinates of the joint where it begins. frame: (4,) the frame of a joint that follows the bone.
     """
 
     end: int
@@ -59,11 +65,11 @@ class Bend:
 def with_split_joints(
     clip: Clip, body: Body, frames: dict[int, Array], bends: Mapping[int, Bend]
 ) -> tuple[Clip, Body]:
-    """The clip and the body with further joints at the places of hips and chest.
+    """The clip and the body with second joints at the places of hips and chest.
 
-    frames: joint -> (4,) frame, as `BodySample` defines it. Those of the new joints are added to it. bends:
-    hips or chest, or both -> the bone above that joint, which the new joint follows. If the bone's end moves
-    relative to the joint, the new joint turns with it.
+    frames: joint -> (4,) frame. This argument is changed: the frames of the new joints are added. bends:
+    joint (hips, chest or both) -> the bone above it, which the new joint follows. The new joint turns only if
+    the bone's end moves relative to the old joint.
     """
     trunk, neck = body.trunk, body.neck
     turns = [_turns(clip, joint, bend) for joint, bend in bends.items()]
@@ -78,7 +84,10 @@ def with_split_joints(
 
 
 def _turns(clip: Clip, joint: int, bend: Bend) -> Array:
-    """(F, 4) rotations of a bone relative to the joint where it begins; none where the bone has no length."""
+    """(F, 4) rotations of a bone relative to the joint where it begins, from its mean direction.
+
+    The rotation is zero at times at which the bone is shorter than half of its mean.
+    """
     if clip.translations is None:
         return _still(clip)
     bones = quat.rotate(
@@ -98,7 +107,8 @@ def _with_joints(
 ) -> Clip:
     """The clip with a new joint below each of `parents`, at an offset (3,) from it.
 
-    word: end of their names. turns: (F, 4) rotations of each relative to its parent; none by default.
+    word: last word of the new joints' names. turns: for each, its rotations (F, 4) relative to its parent; by
+    default it does not turn.
     """
     if not parents:
         return clip

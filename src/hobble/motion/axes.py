@@ -14,11 +14,12 @@ from hobble.core.clip import Clip
 from hobble.core.quat import Array
 from hobble.core.skeleton import Skeleton, rest_positions
 
-# Factors of a position (3,) and of a quaternion (4,) that negate the x axis.
+# Factors that negate x: FLIP of a position (3,), and MIRROR of a rotation (a quaternion, (4,)).
 FLIP = np.array([-1.0, 1.0, 1.0])
 MIRROR = np.array([1.0, 1.0, -1.0, -1.0])
 CLIMB = 20.0  # cm: a body climbs if its lowest joint rises by more than this during the clip
-UPRIGHT = np.cos(np.radians(20.0))  # a rest pose that is off its nearest axes by less counts as along them
+# A rest pose whose axes are all within 20 degrees of coordinate axes counts as exactly along these.
+UPRIGHT = np.cos(np.radians(20.0))
 DIRECTIONS = {  # name of an axis, such as "-X" -> (3,) unit vector
     sign + axis: np.eye(3)["XYZ".index(axis)] * (1 if sign == "+" else -1) for sign in "+-" for axis in "XYZ"
 }
@@ -26,7 +27,7 @@ DIRECTIONS = {  # name of an axis, such as "-X" -> (3,) unit vector
 
 @dataclass(frozen=True)
 class RigAxes:
-    """The axes of a file, found or given.
+    """The axes of a file's coordinates, found or given.
 
     up: the axis that points up, such as "+Y". handedness: "right" or "left". facing: the axis along which the
     rest pose faces, or "oblique" if it faces along none.
@@ -45,10 +46,10 @@ def nearest_axis(direction: Array) -> tuple[str, float]:
 
 
 def body_axes(skeleton: Skeleton, positions: Array) -> tuple[Array, Array, Array]:
-    """Unit vectors (..., 3): from right to left, from hips to head, and forward as the feet point, or as the
-    knees do on a rig without toes.
+    """Unit vectors (..., 3): from right to left, from hips to head, and forward.
 
-    positions: (..., J, 3) of the joints.
+    Forward is where the feet point or, on a rig without toes, the knees. positions: (..., J, 3) of the
+    joints.
     """
     at = {role: positions[..., skeleton.role(role), :] for role in skeleton.roles}
     left = at["left_hip"] - at["right_hip"] + at["left_shoulder"] - at["right_shoulder"]
@@ -74,10 +75,7 @@ def _unit(v: Array) -> Array:
 
 
 def rest_frame(skeleton: Skeleton) -> Array:
-    """(4,) rotation from left = X, up = Y, forward = Z to the body's own axes in the rest pose.
-
-    A rest pose whose axes are all within 20 degrees of coordinate axes counts as exactly along those.
-    """
+    """(4,) rotation from the axes left = X, up = Y, forward = Z to the body's own axes in the rest pose."""
     left, up, _ = body_axes(skeleton, rest_positions(skeleton))
     up = _unit(up - left * (up @ left))
     axes = np.stack([left, up, np.cross(left, up)], axis=1)
@@ -92,7 +90,8 @@ class UprightClip:
     """A clip with right-handed coordinates and Y up.
 
     axes: those of the file. If motion and rest pose disagree on what is up, a sentence says so: in `notes` if
-    the motion decides it, and in `unsure` if it stays in doubt. The other list is then empty.
+    the figure crawls or moves far over the ground, which decides it, and else in `unsure`. At least one of
+    the two lists is empty.
     """
 
     clip: Clip
@@ -104,13 +103,13 @@ class UprightClip:
 def straighten(clip: Clip, up: str, handedness: str, standing: bool = True) -> UprightClip:
     """The clip with right-handed coordinates and Y up.
 
-    A rest pose that faces along an axis is turned to +Z. One that faces obliquely is left as it is. up:
-    "auto", "Y" or "Z". handedness: "auto", "right" or "left". standing: whether a person can stand in the
-    rest pose; if not, it does not show what is up.
+    A rest pose that faces along an axis is turned to +Z. One that faces obliquely is left as it is.
 
-    With "auto" the axes come from the motion. Up is from the feet over the hips to the head, unless the
-    figure crawls: then the rest pose decides. Raises ValueError if the figure crawls and nobody can stand in
-    the rest pose.
+    up: "auto", "Y" or "Z". handedness: "auto", "right" or "left". With "auto" the axes come from the motion.
+    Up is then from the feet over the hips to the head, unless the figure crawls: then up is where the rest
+    pose has it. standing: whether a person can stand in the rest pose; if not, it does not show what is up.
+
+    Raises ValueError if the figure crawls and nobody can stand in the rest pose.
     """
     name, notes, unsure = _up_of(clip, standing) if up == "auto" else (f"+{up}", [], [])
     if handedness == "auto":
@@ -134,7 +133,10 @@ def _up_of(clip: Clip, standing: bool) -> tuple[str, list[str], list[str]]:
     )
     crawls = _crawls(clip, body)
     if not standing and crawls:
-        raise ValueError(f"the body moves along itself ({body}), and nobody could stand in its zero pose")
+        why = (
+            f"the body moves along {body}, from its feet to its head, and nobody could stand in its zero pose"
+        )
+        raise ValueError(why)
     if body == rest or not standing:
         return body, [], []
     up, why = (rest, "the body crawls") if crawls else (body, "the body moves that way up")
@@ -157,10 +159,10 @@ def _along_body(skeleton: Skeleton, positions: Array) -> Array:
 
 
 def _crawls(clip: Clip, axis: str) -> bool:
-    """Whether the body moves along `axis`, the one from its feet to its head, more than sideways to it.
+    """Whether the body moves at least about as far along `axis`, from its feet to its head, as across it.
 
-    For an upright figure that would mean climbing, and an upright figure climbs less far than it moves over
-    the ground. A jump does not count, since the lowest joint comes down again.
+    An upright figure that did this would be climbing, but upright figures climb less far than they move over
+    the ground. A jump does not count, because the lowest joint comes down again.
     """
     along = clip.positions @ DIRECTIONS[axis]
     early, late = np.percentile(along.min(axis=1), [25, 75])
@@ -169,7 +171,7 @@ def _crawls(clip: Clip, axis: str) -> bool:
 
 
 def _travels(clip: Clip, axis: str) -> bool:
-    """Whether the figure moves further over the ground than it is tall, if `axis` is the one that is up."""
+    """Whether the figure moves further over the ground than it is tall, if `axis` points up."""
     along, level = DIRECTIONS[axis], 1 - np.abs(DIRECTIONS[axis])
     tall = float(np.median(np.ptp(clip.positions @ along, axis=1)))
     return bool(np.linalg.norm(np.ptp(clip.root * level, axis=0)) > tall)

@@ -1,8 +1,8 @@
 """Finds which way is down from how a body balances on its feet.
 
-While one foot stands, gravity and inertia act along the line from that foot to the centre of mass (the zero
-moment point; Vukobratovic and Borovac 2004). So the accelerations and the standing feet of a few steps show
-the direction of gravity, however the body leans and the ground slopes.
+While only one foot stands, the sum of gravity and inertia acts along the line from the zero moment point,
+under this foot, to the centre of mass (Vukobratovic and Borovac 2004). So the accelerations and the standing
+feet of a few steps show the direction of gravity, however the body leans and the ground slopes.
 """
 
 from __future__ import annotations
@@ -20,11 +20,12 @@ from hobble.motion.rig import leg_length
 from hobble.motion.root import facing
 
 GRAVITY = 981.0  # cm / s2
-# Shares of the body's mass, and where the centres of mass of the body's segments are (de Leva 1996): that of
-# the trunk between the hips (0) and the shoulders (1), that of the head at its joint.
+# TRUNK, HEAD: shares of the body's mass (de Leva 1996). TRUNK_CENTRE: where the trunk's centre of mass is,
+# between the hips (0) and the shoulders (1). The head's centre of mass is at its joint.
 TRUNK, TRUNK_CENTRE = 0.4346, 0.55
 HEAD = 0.0694
-# Segments on each side: share of the mass, the joints at both ends, and where between them the centre is.
+# Segments on each side: share of the body's mass, the joints at both ends, and where the segment's centre of
+# mass is, between the first joint (0) and the second (1).
 SEGMENTS = (
     (0.0271, "shoulder", "elbow", 0.577),
     (0.0162, "elbow", "wrist", 0.457),
@@ -34,25 +35,28 @@ SEGMENTS = (
     (0.0137, "heel", "toe", 0.5),
 )
 SMOOTH = 0.04  # seconds: positions are smoothed by a Gaussian of this width before accelerations are taken
-# Leg lengths a second. The ball of a standing foot is slower. Ball and heel of a swinging foot are faster.
-SLOW = 0.4
-UPRIGHT = 0.6  # leg lengths: the hips of a figure that does not sit or kneel are further above the ankle
-SHORTEST = 0.06  # least number of seconds that the figure stands on each foot alone
-# The point between ankle (0) and ball (1) at which the ground's force acts, at three speeds forward (divided
-# by the square root of gravity times leg length). Means over 172 clips of CMU, styles, patients, Ferre et al.
-# and the original release.
+# Leg lengths a second: the ball of a standing foot is slower than this; ball and heel of a swinging foot are
+# faster.
+SLOW_FOOT = 0.4
+UPRIGHT = 0.6  # leg lengths: unless a figure sits or kneels, its hips are further above the ankle than this
+SHORTEST = 0.06  # seconds: with less time on either foot alone, no direction is found
+# PRESSED: the point between ankle (0) and ball (1) at which the ground's force acts, if the figure moves
+# forward at SPEEDS (divided by the square root of gravity times leg length). Means over 172 clips of the data
+# sets `cmu`, `styles` and `patients`, of Ferre et al. and of Holden et al. (2017).
 SPEEDS, PRESSED = (-0.1, 0.0, 0.1), (0.45, 0.25, 1.0)
-# In those clips, runners seem to balance further forward than they do: by LEAN degrees at the speeds RUNS.
+# In these clips, runners seem to balance further forward than they really do: by LEAN degrees at the speeds
+# RUNS (divided like SPEEDS).
 RUNS, LEAN = (0.5, 0.9), (0.0, 3.5)
 
 
 @dataclass(frozen=True)
 class Balance:
-    """The direction against gravity, by how the body balances.
+    """The direction against gravity, found from how the body balances.
 
-    up: (2,) its x and z for y = 1. In 172 clips the error is 1 degree to the side and 1.9 forward (standard
-    deviations), and twice that in short clips. left: (2,) x and z of the mean direction to the body's left.
-    seconds: how long the figure stood on one foot alone, for the foot with less of that.
+    up: (2,) x and z of this direction for y = 1. In 172 clips the error is 1 degree to the side and 1.9
+    degrees forward (standard deviations); in short clips it is twice as large. left: (2,) x and z of the mean
+    direction to the body's left. seconds: how long the figure stood on the left foot alone or on the right
+    foot alone, whichever is shorter.
     """
 
     up: Array
@@ -61,16 +65,16 @@ class Balance:
 
     @property
     def aside(self) -> float:
-        """Degrees by which the direction against gravity differs from Y to the body's left."""
+        """Degrees by which the direction against gravity leans from Y towards the body's left."""
         return float(np.degrees(np.arcsin(np.clip(self.up @ self.left, -1.0, 1.0))))
 
 
 class _Moving(NamedTuple):
     """What the balance of a body depends on, in F frames.
 
-    at: role -> (F, 3) positions, cm. ahead: (F, 3) unit vectors in which the body faces. speed: (F,) forward,
-    divided by the square root of gravity times leg length. centre: (F, 3) centre of mass, cm. push: (F, 3)
-    its acceleration, divided by gravity plus the vertical acceleration.
+    at: role -> (F, 3) positions, cm. ahead: (F, 3) unit vectors along which the body faces. speed: (F,)
+    forward speed, divided by the square root of gravity times leg length. centre: (F, 3) centre of mass, cm.
+    push: (F, 3) acceleration of this centre, divided by the sum of gravity and vertical acceleration.
     """
 
     at: dict[str, Array]
@@ -93,7 +97,7 @@ def balance(clip: Clip) -> Balance | None:
     forward = np.sum(velocity * ahead, axis=-1) / np.sqrt(GRAVITY * leg)
     moving = _Moving(at, ahead, forward, centre, pull / (GRAVITY + pull[:, 1:2]))
     slow = {
-        f"{side}_{part}": _speed(at[f"{side}_{part}"], reach) * fps < SLOW * leg
+        f"{side}_{part}": _speed(at[f"{side}_{part}"], reach) * fps < SLOW_FOOT * leg
         for side in SIDES
         for part in ("toe", "heel")
     }
@@ -125,12 +129,12 @@ def centre_of_mass(at: dict[str, Array]) -> Array:
 
 
 def _up(moving: _Moving, side: str) -> Array:
-    """(F, 2) x and z of the direction against gravity for y = 1, right while this foot stands alone."""
+    """(F, 2) x and z of the direction against gravity for y = 1. Only valid while this foot stands alone."""
     heel, bone = moving.at[f"{side}_heel"], moving.at[f"{side}_toe"] - moving.at[f"{side}_heel"]
     pressed = np.interp(moving.speed, SPEEDS, PRESSED)[:, None]
     level = np.linalg.norm(bone * [1, 0, 1], axis=-1, keepdims=True)
-    # Along where the body faces, the force acts at the share `pressed` of the way from ankle to ball.
-    # Sideways it acts at the share `middle`.
+    # Of the way from ankle to ball, the force acts at the share `pressed` in the direction in which the body
+    # faces, and at the share `middle` sideways.
     middle = 0.6
     foot = heel + middle * bone + (pressed - middle) * level * moving.ahead
     arm = moving.centre - foot

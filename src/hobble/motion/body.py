@@ -13,22 +13,22 @@ from hobble.motion.fingers import pointing_fingers
 from hobble.motion.tree import common, path
 
 SIDES = ("left", "right")
-TRUNK = ("hips", "spine", "chest", "neck", "head")  # roles of its joints, from below
-# A joint may follow a source joint that lies higher in the trunk (or neck) than itself by up to this share of
-# its length.
+TRUNK = ("hips", "spine", "chest", "neck", "head")  # roles of the joints from the hips to the head
+# A joint may follow a source joint that lies higher in the trunk, by up to this share of the trunk's length.
+# The same holds for the neck.
 REACH = 0.2
 
 
 @dataclass(frozen=True)
 class Body:
-    """Joints of a rig, by index, parents first.
+    """The joints of a rig that are parts of a body, by index. Each tuple lists parents first.
 
     hips: the joint that carries both thighs. trunk: from the first joint above the hips to the chest, which
     carries both arms; empty if the hips carry the arms. neck: the joints between chest and head. arms: side
     -> clavicle (or None), shoulder, elbow and wrist. legs: side -> hip, knee, heel (the ankle) and toe (the
     ball of the foot, or None). fingers: side -> joint at the base of a finger, if a hand has one.
-    arms_on_neck: whether the arms hang from the first joint of the neck, as in rigs of 3ds Max, and it
-    lies below the shoulders. Then the bone from the chest to that joint belongs to the trunk.
+    arms_on_neck: whether the arms hang from the first joint of the neck, as in rigs of 3ds Max, and this
+    joint lies below the shoulders. Then the bone from the chest to that joint belongs to the trunk.
     """
 
     hips: int
@@ -46,8 +46,8 @@ class Body:
         return self.trunk[-1] if self.trunk else self.hips
 
     @property
-    def top_bones(self) -> int:
-        """Number of the bones of the trunk, from the hips to where the neck begins."""
+    def trunk_bones(self) -> int:
+        """Number of bones from the hips to where the neck begins."""
         return len(self.trunk) + int(self.arms_on_neck)
 
     @property
@@ -125,10 +125,10 @@ def body_by_roles(skeleton: Skeleton) -> Body:
 def pairs(source: Skeleton, source_body: Body, target: Skeleton, target_body: Body) -> dict[str, str]:
     """For each joint of the target, the name of the source joint that it follows.
 
-    source_body: the body on `source`. target_body: the body on `target`. Limbs, hips and head follow the same
-    parts. Inside the trunk each joint follows the highest source joint that is not above it by more than a
-    fifth of the trunk (so it is in the neck), and the chest follows the chest. Joints without a counterpart
-    are left out.
+    source_body: the body on `source`. target_body: the body on `target`. The hips, the chest, the head and
+    each joint of a limb follow the same part of the source's body. Each other joint of the trunk follows the
+    highest source joint that is not above it by more than a fifth of the trunk. The joints of the neck are
+    matched in the same way. Joints without a counterpart are left out.
     """
     out: dict[int, int] = {target_body.hips: source_body.hips, target_body.head: source_body.head}
     target_trunk = (target_body.hips, *target_body.trunk)
@@ -152,6 +152,7 @@ def pairs(source: Skeleton, source_body: Body, target: Skeleton, target_body: Bo
 def _joints_along(
     target: Skeleton, target_chain: Sequence[int], source: Skeleton, source_chain: Sequence[int]
 ) -> dict[int, int]:
+    """`pairs` for a chain of joints in the trunk or the neck, by index. The first joint is left out."""
     target_shares, source_shares = _shares(target, target_chain), _shares(source, source_chain)
     out = {target_chain[-1]: source_chain[-1]}
     for joint, share in zip(target_chain[1:-1], target_shares[1:-1], strict=True):

@@ -1,4 +1,4 @@
-"""Finds the body in a file, or refuses the file if its parts are in doubt."""
+"""Finds the body in a BVH file, or refuses the file if the parts of the body are in doubt."""
 
 from __future__ import annotations
 
@@ -21,8 +21,9 @@ from hobble.motion.retarget import LIMB_BONES
 from hobble.motion.rig import RigMatch
 
 Limb = TypeVar("Limb")
+# The bones of the limbs: roles of their two ends.
 BONES = [(f"{side}_{start}", f"{side}_{end}") for side in SIDES for start, end in LIMB_BONES.items()]
-STRETCH = 0.06  # share of a bone's length by which it may change; in 172 real clips it is 0
+STRETCH = 0.06  # share of its length by which a bone may change; in 172 real clips the change is 0
 
 
 def body_in_file(
@@ -31,8 +32,8 @@ def body_in_file(
     """The body of a file's rig.
 
     rig: the file's joints. raw: its motion, in any unit and axes. known: the skeleton file that describes the
-    rig, if there is one. Raises InputError if the parts are in doubt (with a draft of a rig file), if there
-    are two figures, or if nothing tells left from right.
+    rig, if there is one. Raises InputError if the parts are in doubt (the message then contains a draft of a
+    skeleton file), if there are two figures, or if nothing tells left from right.
     """
     if known is not None:
         _check_bones(file, raw, known)
@@ -46,7 +47,7 @@ def body_in_file(
     if not found.sided and options.handedness == "auto":
         raise InputError(
             file.path,
-            "its joint names do not say left and right, and its mirror image would move as well",
+            "its joint names do not say left and right, and its mirror image would also move like a person",
             fix="Set motion.handedness in the data set: right, the standard of BVH files, or left, if the "
             "program that wrote the file has left-handed coordinates.",
         )
@@ -57,7 +58,7 @@ def body_in_file(
 
 
 def _check_bones(file: Bvh, raw: Clip, known: RigMatch) -> None:
-    """Raise InputError if a limb's bone changes its length, because then a role has a wrong joint."""
+    """Raise InputError if a bone of a limb changes its length: then a role has a wrong joint."""
     for start, end in BONES:
         if start in known.roles and end in known.roles:
             a, b = (raw.positions[:, raw.skeleton.index(known.roles[role])] for role in (start, end))

@@ -16,8 +16,8 @@ from hobble.motion.orient import pointed_along, robust_mean, unit
 from hobble.motion.spine import SHORT
 from hobble.motion.target_build import TargetBuild
 
-LEFT = np.array([1.0, 0.0, 0.0])
-FLEXED = 0.05  # a knee or elbow whose bend has a larger mean sine shows about which axis it bends
+LEFT = np.array([1.0, 0.0, 0.0])  # the left of a figure that faces +Z
+FLEXED = 0.05  # a knee or elbow shows the axis of its bend if the mean sine of the bend is larger than this
 
 
 class BodySample:
@@ -27,10 +27,12 @@ class BodySample:
     of a figure that stands facing +Z with its arms out sideways to the joint's own axes. The joint's rotation
     in the world times its frame is how far the body part has turned from that stance.
 
-    positions: (S, J, 3) cm, kept as `at`. rotations: (S, J, 4) in the world, kept as `turned`. speeds: (S, J)
-    cm a second. rest: (J, 3) positions in the zero pose. ends: side -> (3,) position of the end site below
-    the ankle, or None. target: the build of the figure to which the motion will go. seconds: length of the
-    clip.
+    body: which joint is which part. positions: (S, J, 3) cm, kept as `at`. rotations: (S, J, 4) in the world,
+    kept as `turned`. speeds: (S, J) cm a second. rest: (J, 3) positions in the zero pose. ends: side -> (3,)
+    offset from the ankle to its end site, or None. target: the build of the skeleton to which the clip will
+    be retargeted. seconds: length of the clip.
+
+    hips_left, chest_left: (S, 3) unit vectors from the right hip and shoulder to the left ones.
     """
 
     def __init__(
@@ -49,15 +51,15 @@ class BodySample:
         self.hips_left = self.line(body.legs["right"][0], body.legs["left"][0])
         self.chest_left = self.line(body.arms["right"][1], body.arms["left"][1])
 
-    def part(self, frames: NDArray[np.bool_]) -> BodySample:
-        """The sample with some of its frames alone. frames: (S,)."""
+    def part(self, moments: NDArray[np.bool_]) -> BodySample:
+        """The sample with only some of its moments. moments: (S,), whether to keep each."""
         out = copy(self)
-        out.at, out.turned, out.speeds = self.at[frames], self.turned[frames], self.speeds[frames]
-        out.hips_left, out.chest_left = self.hips_left[frames], self.chest_left[frames]
+        out.at, out.turned, out.speeds = self.at[moments], self.turned[moments], self.speeds[moments]
+        out.hips_left, out.chest_left = self.hips_left[moments], self.chest_left[moments]
         return out
 
     def in_zero_pose(self) -> BodySample:
-        """The zero pose as a sample of one frame."""
+        """The zero pose as a sample of one moment."""
         out = self.part(np.arange(len(self.at)) == 0)
         out.at, out.turned = self.rest[None], np.broadcast_to(quat.IDENTITY, out.turned.shape)
         body = self.body
@@ -70,7 +72,7 @@ class BodySample:
         return unit(self.at[:, end] - self.at[:, start])
 
     def local(self, joint: int, vectors: Array) -> Array:
-        """(3,) robust mean of vectors (S, 3) in the world, after a change to the joint's own axes."""
+        """(3,) robust mean, along the joint's own axes, of `vectors` (S, 3) along the axes of the world."""
         own = quat.rotate(quat.inv(self.turned[:, joint]), vectors)
         return robust_mean(own)
 
@@ -86,7 +88,7 @@ class BodySample:
     def first_long(self, joint: int, following: Sequence[int], least: float = SHORT) -> tuple[Array, int]:
         """(3,) `bone` from a joint to the first of `following` that is over `least` cm away, and that joint.
 
-        If all are nearer, the last of them.
+        If all are nearer, the last of them is taken.
         """
         bones = [(self.bone(joint, end), end) for end in following]
         return next((found for found in bones if np.linalg.norm(found[0]) > least), bones[-1])
@@ -103,10 +105,11 @@ class BodySample:
         return quat.rotate(self.turned[:, start], np.broadcast_to(unit(own), axis.shape))
 
     def hand(self, side: str, straight: Array, sign: float) -> Array:
-        """(4,) the frame of a hand: `straight`, but pointing where its finger is.
+        """(4,) the frame of a hand: `straight`, turned so that the hand points to its finger.
 
-        straight: (4,) the frame of the hand if it is in line with its forearm, returned for a hand without a
-        finger. sign: 1 for the left hand, whose arm points to +X in the stance, -1 for the right.
+        straight: (4,) the frame of the hand if it is in line with its forearm. It is returned unchanged for a
+        hand without a finger. sign: 1 for the left hand, whose arm points to +X in the stance, -1 for the
+        right.
         """
         if side not in self.body.fingers:
             return straight

@@ -1,4 +1,4 @@
-"""Checks the content of a skeleton file, so that a mistake in a rig written by hand is found in its line."""
+"""Checks the content of a skeleton file. These are written by hand, so the line of a mistake is named."""
 
 from __future__ import annotations
 
@@ -17,24 +17,28 @@ from hobble.motion.body import SIDES, TRUNK
 from hobble.motion.names import side_of
 from hobble.motion.tree import above, common, path
 
-FARTHEST = 1e5  # cm from a joint to its parent
+FARTHEST = 1e5  # cm: each component of a joint's offset from its parent is at most this large
 ARM, LEG = ("shoulder", "elbow", "wrist"), ("hip", "knee", "heel", "toe")
 LIMBS = [tuple(f"{side}_{part}" for part in limb) for side in SIDES for limb in (ARM, LEG)]
 ROLES = (*TRUNK, *(role for limb in LIMBS for role in limb))
+# Roles that a file may leave out.
 OPTIONAL = ("spine", "chest", "neck", "left_toe", "right_toe")
 ORDER = "The order is hips, spine, chest, neck, head; shoulder, elbow, wrist; hip, knee, heel, toe."
-APART = 0.25  # leg lengths: the legs hang from a joint that is nearer to the hips than this
-ALIKE = ("spine", "chest")  # a trunk of one joint has both roles
+APART = 0.25  # leg lengths: the joint from which the legs hang may be at most this far from the hips
+ALIKE = ("spine", "chest")  # if the trunk has only one joint, this joint has both roles
 
 
 class RigFile:
-    """A skeleton file that is being checked. text: its lines, in which the place of a mistake is found."""
+    """A skeleton file that is being checked.
+
+    data: its content as plain data. text: its content as it is written, to find the line of a mistake.
+    """
 
     def __init__(self, path: Path, data: Any, text: str) -> None:
         self.path, self.data, self.text = path, data, text
 
     def refuse(self, problem: str, section: str = "", name: str = "", fix: str | None = None) -> NoReturn:
-        """Raise InputError. section, name: the section and the key in it in whose line the mistake is."""
+        """Raise InputError. section, name: the mistake is in the line of key `name` of this section."""
         raise InputError(self.path, printable(problem, 400), line=self._line(section, name), fix=fix)
 
     def _line(self, section: str, name: str) -> int | None:
@@ -50,14 +54,15 @@ class RigFile:
 
 
 def check_rig_file(where: Path, data: Any, text: str) -> None:
-    """Raise InputError, with the line if it is known, if a skeleton file is wrong.
+    """Raise InputError if a skeleton file is wrong. The error names the line of the mistake if it is found.
 
-    data: the content of the file as plain data. text: the same as it is written.
+    data: the content of the file as plain data. text: the content as it is written.
 
-    Joints need a parent above them and an offset of three numbers. Roles must be known ones, each of another
-    joint, in the order from the trunk outward, on the side that the joint's name says. Hips, head, and on
-    both sides shoulder, elbow, wrist, hip, knee and heel are required, and either both toes or none. Legs
-    must hang from the hips, and arms from the chest or the neck.
+    Each joint but the first needs a parent that is listed above it, and each needs an offset of three
+    numbers. Only the roles in ROLES are allowed, and no two may have the same joint (except spine and chest).
+    Their joints must be in order from the trunk outward, and on the side that their names say. Hips, head,
+    and on both sides shoulder, elbow, wrist, hip, knee and heel are required, and either both toes or none.
+    Legs must hang from the hips, and arms from the chest or the neck.
     """
     file = RigFile(where, data, text)
     for key in ("joints", "roles"):
@@ -99,7 +104,7 @@ def _three_numbers(offset: Any) -> bool:
 
 
 def _check_roles(file: RigFile, roles: Mapping[Any, Any], parents: Mapping[str, int]) -> None:
-    """Check that the roles are known, complete, and each of another joint."""
+    """Check that the roles are known and complete, and that no two have the same joint."""
     owner: dict[str, str] = {}
     for role, joint in roles.items():
         if role not in ROLES:

@@ -11,13 +11,13 @@ from hobble.core.errors import InputError
 from hobble.core.quat import Array
 from hobble.motion.read import Bvh
 
-# Frames a second. Where two fit a file equally well, the first is taken.
+# Frames a second. Of two rates that fit a file equally well, the one that is listed first is taken.
 STANDARD_RATES = (120, 60, 30, 24, 25, 50, 100, 90, 48, 72, 144, 180, 200, 240, 250, 300, 15, 20, 12, 10)
 
-# A file whose angles are all below 2 pi is in radians if one of them changes by more than this. In degrees
-# that would be too little for a movement.
+# A file whose angles are all below 2 pi is in radians if one of them changes by more than this. If they were
+# degrees, they would be too small for a body that moves.
 RADIANS = 0.5
-BLOCK = 4096  # frames at a time, to keep intermediate arrays small
+BLOCK = 4096  # frames that are converted at a time, to keep intermediate arrays small
 
 
 @dataclass(frozen=True)
@@ -25,9 +25,9 @@ class Decoded:
     """F frames of J joints, in the file's unit.
 
     rotations: (F, J, 4) local. root: (F, 3) positions of the root. offsets: (J, 3) from the parents.
-    translations: (F, J, 3) positions relative to the parents if any joint but the root moves there, else
-    None. repairs: sentences on how the position channels of other joints than the root were read. notes:
-    sentences on what needs no repair.
+    translations: (F, J, 3) positions relative to the parents, or None if no joint but the root moves
+    relative to its parent. repairs: sentences on how the position channels of joints other than the root were
+    read. notes: sentences on oddities that need no repair.
     """
 
     rotations: Array = field(repr=False)
@@ -39,7 +39,9 @@ class Decoded:
 
 
 def frame_rate(frame_time: float, text: str) -> float:
-    """Frames a second of a frame time: the standard rate that it can be a rounded value of, if there is one.
+    """Frames a second for a file's frame time.
+
+    If the frame time can be the rounded frame time of a standard rate, that rate is returned.
 
     frame_time: seconds. text: the same number as the file writes it, which shows to how many digits it was
     rounded.
@@ -80,10 +82,10 @@ def check_angles(bvh: Bvh) -> None:
 def decode(bvh: Bvh, still: float) -> Decoded:
     """Rotations and positions of a BVH file.
 
-    A position channel replaces that component of the joint's OFFSET, as all current programs write it. Only
-    if the position channels of a joint below the root are about zero although its OFFSET is not, their values
-    are added to the OFFSET. still: a joint whose position stays this close to its offset (in the file's unit)
-    does not move relative to its parent.
+    A position channel replaces its component of the joint's OFFSET, as all current programs intend. If the
+    position channels of a joint below the root are about zero although its OFFSET is not, their values are
+    added to the OFFSET instead. still: a joint whose position stays this close to its offset (in the file's
+    unit) does not move relative to its parent.
     """
     frames, joints = len(bvh), len(bvh.names)
     rotations = np.broadcast_to(quat.IDENTITY, (frames, joints, 4)).copy()
@@ -150,8 +152,8 @@ def _judge_channels(
     """Judges which position channels carry motion, which only repeat an offset, and which contradict it.
 
     Returns the fields `offsets`, `translations` and `repairs` of `Decoded`. local: (F, J, 3) positions
-    relative to the parents; where channels must be added to the OFFSETs, that is done in it. given: (J, 3)
-    bool, which of its components come from channels.
+    relative to the parents; where channels must be added to the OFFSETs, this array is changed. given: (J, 3)
+    bool, which components of the positions come from channels.
     """
     joints = np.flatnonzero(given.any(axis=1)).tolist()
     middle = np.median(local, axis=0)
@@ -191,12 +193,14 @@ def _judge_channels(
 
 
 def _increments(offsets: Array, middle: Array, given: Array, still: float) -> list[int]:
-    """Joints whose channels are about zero although their offsets are not, so they must be added to the
-    offsets.
+    """Joints whose position channels are about zero although their offsets are not.
+
+    The channels of such a joint must be added to its offset: if they replaced it, the bone would be far
+    shorter than its OFFSET. About zero is at most a tenth of the offset, but at least `still` and at most 10
+    times `still`.
 
     middle: (J, 3) the median over the frames of the positions relative to the parents. given: (J, 3) bool,
-    which of its components come from channels. About zero is at most a tenth of the offset: no bone is that
-    much shorter than its OFFSET.
+    which components of the positions come from channels.
     """
     apart = np.linalg.norm(middle * given, axis=1)
     length = np.linalg.norm(offsets * given, axis=1)

@@ -1,6 +1,6 @@
 """Finds broken frames, and cuts them off, bridges them or smooths them.
 
-A joint of a living body changes its velocity little between frames. A larger jump is an error of the file: a
+A joint of a living body changes its velocity little between frames. A large change is an error of the file: a
 rest pose or zeros as first or last frame, a teleport, a jump at the seam of a loop, a single wrong frame.
 In sentences for users the first frame is frame 1, but in the code it is frame 0.
 """
@@ -16,21 +16,24 @@ from hobble.core import quat
 from hobble.core.clip import Clip
 from hobble.core.quat import Array
 
-# A jump is a step that differs from the neighbouring steps by more than JUMP cm, plus JUMP_AT_30 at 30 Hz,
-# where velocities change more between frames. At f Hz it is JUMP + JUMP_AT_30 * (30 / f)^2.
+# A step is the way of a joint from one frame to the next. At f Hz it is a jump if it differs from the
+# neighbouring steps by more than JUMP + JUMP_AT_30 * (30 / f)^2 cm. At low frame rates, velocities change
+# more between frames.
 JUMP = 12.0
 JUMP_AT_30 = 30.0
-# A single frame is wrong if a joint is further than GLITCH cm from the mean of the frames before and after,
-# plus GLITCH_AT_30 at 30 Hz. At f Hz it is GLITCH + GLITCH_AT_30 * (30 / f)^2.
+# At f Hz a single frame is wrong if a joint is further than GLITCH + GLITCH_AT_30 * (30 / f)^2 cm from the
+# mean of its positions in the frames before and after.
 GLITCH = 6.5
 GLITCH_AT_30 = 8.0
-TELEPORT = 30.0  # cm: where the root jumps further, the clip is cut instead of smoothed
+TELEPORT = 30.0  # cm: where the root jumps further than this, the clip is cut instead of smoothed
 HEAD, TAIL = 0.5, 1.0  # seconds: shorter pieces before the first and after the last jump are cut off
 BRIDGE = 0.25  # seconds: shorter pieces between two jumps are bridged
 BLEND = 0.1  # seconds on each side over which a jump of the pose is smoothed
-FLIP = np.radians(60.0)  # a joint that turns by more from one frame to the next has flipped
-BLOCK = 4096  # frames at a time
-NO_POSE = 0.75  # in a frame without a pose, at least this share of the joints has no rotation
+# A joint that turns by more than this from one frame to the next spins faster than a living joint can. Above
+# 120 Hz the limit is lower, in proportion to the time between frames.
+FLIP = np.radians(60.0)
+BLOCK = 4096  # frames that are searched at a time
+NO_POSE = 0.75  # in frames without a pose, more than this share of the joints has no rotation
 
 
 @dataclass(frozen=True)
@@ -49,8 +52,8 @@ class Repaired:
 class Jump:
     """A jump between frame `after` and the next.
 
-    size: by how many cm the step of the worst joint differs from the usual one. joint: its name. root_size:
-    the same difference for the root, cm.
+    size: by how many cm the step of the worst joint differs from its neighbouring steps. joint: name of
+    this joint. root_size: the difference for the root, cm.
     """
 
     after: int
@@ -73,11 +76,11 @@ def repair(clip: Clip) -> Repaired:
         sentences.append(
             f"Frame {frame + 1} is off by {size:.0f} cm at {joint}; the middle of its neighbours replaces it."
         )
-    left, bridges = _short_pieces(draft, find_jumps(draft))
-    if not left and not bridges:
+    unpaired, bridges = _pairs_of_jumps(draft, find_jumps(draft))
+    if not unpaired and not bridges:
         return Repaired(draft, 0, sentences)
-    first, last = _without_edges(len(clip), clip.fps, left)
-    teleports = [jump.after for jump in left if jump.root_size > TELEPORT and first <= jump.after < last]
+    first, last = _without_edges(len(clip), clip.fps, unpaired)
+    teleports = [jump.after for jump in unpaired if jump.root_size > TELEPORT and first <= jump.after < last]
     edges = [first - 1, *teleports, last]
     first, last = max(((a + 1, b) for a, b in pairwise(edges)), key=lambda part: part[1] - part[0])
     mended = _copy(draft)
@@ -85,27 +88,28 @@ def repair(clip: Clip) -> Repaired:
         _interpolate(mended, start, end)
         if first <= start <= end <= last:
             sentences.append(f"{jump}; {_frames(start, end)} were bridged by interpolation.")
-    for jump in left:
+    for jump in unpaired:
         if first <= jump.after < last:
             _smooth(mended, jump.after)
             sentences.append(f"{jump}; the motion was blended over {BLEND:g} s to each side.")
     if first > 0:
-        sentences.append(_cut_sentence(clip, 0, first - 1, left, first - 1))
+        sentences.append(_cut_sentence(clip, 0, first - 1, unpaired, first - 1))
     if last < len(clip) - 1:
-        sentences.append(_cut_sentence(clip, last + 1, len(clip) - 1, left, last))
+        sentences.append(_cut_sentence(clip, last + 1, len(clip) - 1, unpaired, last))
     return Repaired(_cut(mended, first, last), first, sentences)
 
 
 def find_jumps(clip: Clip) -> list[Jump]:
-    """The jumps of a clip: steps from a frame to the next in which a joint moves quite unlike in the three
-    steps before and the three after.
+    """The jumps of a clip.
+
+    In a jump, the step of a joint is far from the median of seven steps: three before, this one, three after.
     """
     if len(clip) < 3:
         return []
     limit = JUMP + JUMP_AT_30 * (30.0 / clip.fps) ** 2
     jumps = []
     for first in range(0, len(clip) - 1, BLOCK):
-        # Three more transitions on each side, so that medians at the edge of a block are right.
+        # Three more steps on each side, so that medians at the edge of a block are right.
         start = max(0, first - 3)
         step = np.diff(clip.positions[start : first + BLOCK + 4], axis=0)
         off = np.linalg.norm(step - _running_median(step, 3), axis=-1)
@@ -129,7 +133,7 @@ def _running_median(values: Array, reach: int) -> Array:
 
 
 def _find_glitches(clip: Clip) -> list[tuple[int, float, str]]:
-    """Single wrong frames: frame, distance in cm from the mean of its neighbours, and the joint most off."""
+    """Each single wrong frame: its index, by how many cm the worst joint is off, and this joint's name."""
     if len(clip) < 5:
         return []
     limit = GLITCH + GLITCH_AT_30 * (30.0 / clip.fps) ** 2
@@ -168,9 +172,9 @@ def flips(clip: Clip, first: int) -> list[str]:
 
 
 def _without_edges(frames: int, fps: float, jumps: list[Jump]) -> tuple[int, int]:
-    """First and last frame that are left without the short pieces at both ends that a jump separates.
+    """First and last frame that remain when short pieces between an end of the clip and a jump are cut off.
 
-    frames: how many the clip has.
+    frames: number of the clip's frames.
     """
     first, last = 0, frames - 1
     head = [j.after for j in jumps if j.after + 1 <= HEAD * fps and 2 * (j.after + 1) <= frames]
@@ -191,13 +195,13 @@ def _cut_sentence(clip: Clip, start: int, end: int, jumps: list[Jump], after: in
     return f"{_frames(start, end).capitalize()}{what} cut off: {jump}."
 
 
-def _short_pieces(clip: Clip, jumps: list[Jump]) -> tuple[list[Jump], list[tuple[int, int, Jump]]]:
+def _pairs_of_jumps(clip: Clip, jumps: list[Jump]) -> tuple[list[Jump], list[tuple[int, int, Jump]]]:
     """Find pairs of jumps with a few broken frames between them.
 
     Two jumps are a pair if the motion after the second continues the motion before the first. Returns the
     jumps that are in no pair, and for each pair the first and the last broken frame and its first jump.
     """
-    left: list[Jump] = []
+    unpaired: list[Jump] = []
     bridges = []
     step = np.linalg.norm(np.diff(clip.positions, axis=0), axis=-1).max(axis=1)
     usual = float(np.median(step)) if len(step) else 0.0
@@ -210,13 +214,13 @@ def _short_pieces(clip: Clip, jumps: list[Jump]) -> tuple[list[Jump], list[tuple
                 bridges.append((a + 1, b, jumps[i]))
                 i += 2
                 continue
-        left.append(jumps[i])
+        unpaired.append(jumps[i])
         i += 1
-    return left, bridges
+    return unpaired, bridges
 
 
 def _copy(clip: Clip) -> Clip:
-    """A copy whose arrays may be changed until its `positions` are asked for: those are computed once."""
+    """A copy. Its arrays may be changed until its `positions` are first read: these are computed once."""
     moved = clip.translations
     return replace(
         clip,
@@ -240,9 +244,9 @@ def _interpolate(draft: Clip, start: int, end: int) -> None:
 def _smooth(draft: Clip, after: int) -> None:
     """Smooth the jump between frame `after` and the next.
 
-    Half of the difference is added to the frames before and half is subtracted from the frames after, less
-    and less over BLEND seconds. What the root jumps over the ground is subtracted from all later frames, so
-    that its path has no gap.
+    Half of the difference is added to the frames before and half is subtracted from the frames after; both
+    fade out over BLEND seconds. How far the root jumps over the ground is subtracted from all later frames,
+    so that the root's path has no gap.
     """
     a, b = after, after + 1
     reach = max(2, round(BLEND * draft.fps))

@@ -7,7 +7,7 @@ from pathlib import Path
 
 from hobble.core.errors import InputError
 
-MOST = 3.0  # cm (two standard deviations): a clip whose height is more uncertain is refused
+MOST_HEIGHT_ERROR = 3.0  # cm (two standard deviations): a clip whose height is more uncertain is refused
 
 
 class Doubt(Exception):
@@ -28,13 +28,13 @@ class TwoFigures(Doubt):
 def check_height(path: Path, error: float, notes: Sequence[str], accept: bool) -> None:
     """Raise InputError if the height of a figure is too uncertain.
 
-    error: cm (two standard deviations). notes: what is uncertain, in sentences. accept: take the
-    clip anyway.
+    error: of the height, cm (two standard deviations). notes: what is uncertain, in sentences. accept: take
+    the clip anyway.
     """
-    if error > MOST and not accept:
+    if error > MOST_HEIGHT_ERROR and not accept:
         raise InputError(
             path,
             " ".join(notes),
-            fix="Use a clip in which both feet stand flat or whose zero pose stands, or accept this with "
-            "motion.accept_doubt: true.",
+            fix="Use a clip in which both feet stand flat, or one in whose zero pose a person could stand. "
+            "To use this clip anyway, set motion.accept_doubt: true.",
         )

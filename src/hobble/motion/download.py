@@ -1,4 +1,4 @@
-"""Downloads a clip and checks it. If the server fails, it tries again and resumes where it stopped."""
+"""Downloads a clip and checks it. A download that fails is tried again and resumes where it stopped."""
 
 from __future__ import annotations
 
@@ -24,12 +24,12 @@ from hobble.motion.read import MOST_BYTES
 
 log = logging.getLogger("hobble.download")
 
-ATTEMPTS = 5
+ATTEMPTS = 5  # at most
 PAUSE = 1.0  # seconds before the second attempt; doubled before each further one
 TIMEOUT = 30.0  # seconds without data
 DEADLINE = 600.0  # seconds for all attempts; the workflow's rule asks a cluster for as much time
-BLOCK = 1 << 16
-LENGTH = re.compile(r"\d{1,18}")
+BLOCK = 1 << 16  # bytes that are read at a time
+LENGTH = re.compile(r"\d{1,18}")  # a valid header Content-Length
 RETRY_STATUS = {408, 425, 429, *range(500, 600)}  # HTTP statuses after which a retry may work
 
 
@@ -46,7 +46,7 @@ class _TooLate(Exception):
 
 
 class _OtherFile(_Failed):
-    """The file has the wrong checksum. If it arrives twice, the server has another file."""
+    """The file has the wrong checksum. If it arrives twice, the server really has another file."""
 
 
 def download_clip(
@@ -62,22 +62,24 @@ def download_clip(
     most: int = MOST_BYTES,
     sleep: Callable[[float], object] = time.sleep,
 ) -> int:
-    """Download `url` to `path`. Returns its number of bytes. `path` is written only if the checksum is right.
+    """Download `url` to `path`. Returns the number of bytes.
 
-    sha256: checksum of the file. A file also passes if it does so after \\r\\n at the ends of lines is
-    changed to \\n, since version control may add the \\r. folder: where users can put the file themselves,
-    for the message. Until they are complete, the data are in a hidden file beside `path`, from which this or
-    a later call resumes.
+    `path` is written only if the checksum is right. Until the data are complete, they are in a hidden file
+    beside `path`, from which this or a later call resumes.
 
-    attempts: how many are made. pause: seconds before the second attempt. timeout: seconds without data after
-    which an attempt fails. deadline: seconds for all attempts. most: bytes; a larger file is not kept. sleep:
-    waits for so many seconds.
+    sha256: checksum of the file. It may also be the checksum after \\r\\n at the ends of lines is changed to
+    \\n, because version control may add the \\r. folder: where users can put the file themselves, for the
+    message.
+
+    attempts: how many are made at most. pause: seconds before the second attempt. timeout: seconds without
+    data after which an attempt fails. deadline: seconds for all attempts. most: bytes; a larger file is not
+    kept. sleep: function that waits for a number of seconds.
 
     Raises InputError with advice if no attempt succeeds.
     """
     path = Path(path)
     part = path.with_name(f".{path.name}.part")
-    others: set[str] = set()
+    wrong_files: set[str] = set()
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
         with _at_most(deadline):
@@ -88,10 +90,10 @@ def download_clip(
                     return _keep(part, path)
                 except _Failed as failure:
                     last = failure
-                if attempt + 1 == attempts or not last.again or str(last) in others:
+                if attempt + 1 == attempts or not last.again or str(last) in wrong_files:
                     break
                 if isinstance(last, _OtherFile):
-                    others.add(str(last))
+                    wrong_files.add(str(last))
                 log.info("%s: %s; trying again", url, last)
                 sleep(pause * 2**attempt)
     except _TooLate:
@@ -121,7 +123,7 @@ def _at_most(seconds: float) -> Iterator[None]:
 
 
 def _keep(part: Path, path: Path) -> int:
-    """Rename the complete file. Returns its number of bytes."""
+    """Rename the complete file `part` to `path`. Returns its number of bytes."""
     with open(part, "rb") as file:
         os.fsync(file.fileno())
         size = os.fstat(file.fileno()).st_size
@@ -140,7 +142,7 @@ def _refusal(url: str, path: Path, folder: str, reason: str, attempts: int) -> H
 
 
 def _fetch(url: str, part: Path, timeout: float, most: int) -> None:
-    """Download the rest of the file `part`, or all of it if the server cannot send a part."""
+    """Download what is missing in the file `part`, or everything if the server cannot resume."""
     have = part.stat().st_size if part.is_file() else 0
     headers = {"User-Agent": "hobble", "Accept-Encoding": "identity"}
     if have:
@@ -155,7 +157,7 @@ def _fetch(url: str, part: Path, timeout: float, most: int) -> None:
                 _copy(answer, file, have if goes_on else 0, timeout, most)
     except urllib.error.HTTPError as error:
         error.close()
-        if error.code == 416 and have:  # no data after these: the file is complete, or another one
+        if error.code == 416 and have:  # `part` is complete already, or too long
             return
         raise _Failed(
             f"the server says {error.code} {printable(error.reason)}", error.code in RETRY_STATUS
@@ -176,7 +178,8 @@ def _starts_at(content_range: str | None, byte: int) -> bool:
 def _copy(answer: http.client.HTTPResponse, file: BinaryIO, have: int, timeout: float, most: int) -> None:
     """Write the answer's body.
 
-    Raises _Failed if it is shorter than announced or larger than `most`, which is not kept.
+    Raises _Failed if the file is shorter than announced, or larger than `most` bytes. A file that is too
+    large is deleted. have: number of bytes that the file already has.
     """
     length = answer.headers.get("Content-Length") or ""
     announced = int(length) if LENGTH.fullmatch(length) else None
@@ -208,7 +211,7 @@ def _block(answer: http.client.HTTPResponse, timeout: float) -> bytes:
 
 
 def _check(part: Path, sha256: str) -> None:
-    """Delete the file and raise _OtherFile if its checksum is not the one that the manifest gives."""
+    """Delete the file and raise _OtherFile if its checksum is not `sha256`, which is from the manifest."""
     data = part.read_bytes()
     found = hashlib.sha256(data).hexdigest()
     if sha256.lower() in (found, hashlib.sha256(data.replace(b"\r\n", b"\n")).hexdigest()):

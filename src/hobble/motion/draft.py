@@ -1,4 +1,7 @@
-"""Writes a draft of a rig file, with roles of joints as far as they are known, for users to correct."""
+"""Writes a draft of a rig's skeleton file, for users to correct.
+
+The file tells which joint has which role. The draft contains the roles that are known.
+"""
 
 from __future__ import annotations
 
@@ -11,34 +14,42 @@ from hobble.motion.doubt import Doubt
 from hobble.motion.names import limb_parts, part_of, side_of
 from hobble.motion.read import Bvh
 
+# Roles in a skeleton file. Those of limbs begin with the side, as in left_knee. A rig may lack OPTIONAL
+# roles.
 LIMBS = ("shoulder", "elbow", "wrist", "hip", "knee", "heel", "toe")
 ROLES = ("hips", "spine", "chest", "neck", "head", *(f"{side}_{part}" for side in SIDES for part in LIMBS))
 OPTIONAL = ("spine", "chest", "neck", "left_toe", "right_toe")
-MOST_SHOWN = 80  # joints in a message; enough for usual rigs with all fingers
+MOST_SHOWN = 80  # at most this many joints are shown in a message: enough for usual rigs with all fingers
 
 
 def refusal(file: Bvh, rig: Skeleton, doubt: Doubt) -> InputError:
-    """The error for a rig in doubt. It contains a draft to correct, or the start of a long one."""
+    """The error for a rig whose parts of the body are in doubt.
+
+    It shows a draft of the skeleton file, or only the beginning of a long draft. rig: the joints of the file.
+    """
     roles = guessed(rig) | {role: rig.joints[j] for role, j in doubt.certain_roles.items()}
-    text, name, more = draft(rig, roles), file.path.name, len(rig.joints) - MOST_SHOWN
-    if more > 0:
-        shown = "\n".join(text.rstrip("\n").split("\n")[:-more])
-        text = f"{shown}\n  ... ({more} more; python -m hobble.motion rig {name} writes all)\n"
+    text, name, hidden = draft(rig, roles), file.path.name, len(rig.joints) - MOST_SHOWN
+    if hidden > 0:
+        shown = "\n".join(text.rstrip("\n").split("\n")[:-hidden])
+        text = f"{shown}\n  ... ({hidden} more; python -m hobble.motion rig {name} writes all)\n"
         fix = (
             f"Write a draft with `python -m hobble.motion rig {name} --to config/skeletons/<name>.yaml`, put "
             "the right joints into it, and run again. It begins:"
         )
     else:
         fix = (
-            "Put the right joints into this draft, save it as config/skeletons/<name>.yaml, and run again "
-            f"(`python -m hobble.motion rig {name}` writes it):"
+            f"Put the right joints into this draft (`python -m hobble.motion rig {name}` prints it, too), "
+            "save it as config/skeletons/<name>.yaml, and run again:"
         )
     problem = f"the parts of this rig are in doubt: {doubt}"
     return InputError(file.path, problem, fix=f"{fix}\n\n{text}")
 
 
 def draft(rig: Skeleton, roles: Mapping[str, str]) -> str:
-    """A rig file in YAML: the rig's joints and their roles. roles: role -> joint; others get `?` as joint."""
+    """The text of the skeleton file (YAML): the rig's joints and their roles.
+
+    roles: role -> joint. Other roles are left out if they are optional, and get `?` as joint if not.
+    """
     lines = ["# Role: joint. Fill in each ?. Leave out roles that the rig does not have.", "roles:"]
     for role in ROLES:
         if role in roles:

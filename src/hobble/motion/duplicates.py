@@ -1,4 +1,4 @@
-"""Finds duplicate clips: the same file, or the same motion by another name or heading or mirrored."""
+"""Finds duplicate clips: the same file, or the same motion with another name or heading, or mirrored."""
 
 from __future__ import annotations
 
@@ -14,12 +14,13 @@ from hobble.core.files import load_npz, save_npz
 from hobble.core.quat import Array
 from hobble.motion.root import facing
 
-# cm: clips whose joints are nearer to each other on average are the same motion. The mirrored clips of the
-# original release are 1.2 and 1.3 cm from their mirrors, and two walks or runs of a person at least 2.6 cm.
-NEAR = 1.7
-LONGER = 0.02  # the same motion may be longer in one clip than in another by this share
+# cm: two clips show the same motion if their joints are on average less than this apart. In the release of
+# Holden et al. (2017), two mirrored clips are 1.2 and 1.3 cm from the mirror images of their originals. Two
+# walks or runs of one person are at least 2.6 cm apart.
+SAME_MOTION = 1.7
+LONGER = 0.02  # of two clips with the same motion, one may be longer than the other by this share
 POSES = 12  # number of poses of each clip that are compared
-FLIP = np.array([-1.0, 1.0, 1.0])
+FLIP = np.array([-1.0, 1.0, 1.0])  # times a position: the position mirrored in the plane x = 0
 
 
 @dataclass(frozen=True)
@@ -27,9 +28,9 @@ class ClipDigest:
     """The data by which clips are compared.
 
     sha256: checksum of the file. seconds: length of the clip. poses: (12, J, 3) cm, the positions of the
-    joints at times spread evenly over the clip, relative to the ground below the hips in that pose and to
-    where the first pose faces. mirrored: `poses` with left and right exchanged, or None if the rig cannot be
-    mirrored.
+    joints at times spread evenly over the clip, relative to the ground below the hips of the same pose. The
+    axes are turned so that the first pose faces +Z. mirrored: `poses` with left and right exchanged, or None
+    if the rig cannot be mirrored.
     """
 
     name: str
@@ -40,7 +41,7 @@ class ClipDigest:
 
 
 def digest(clip: Clip, sha256: str) -> ClipDigest:
-    """The data by which a clip is compared with others."""
+    """The data by which a clip is compared with others. sha256: checksum of its file."""
     at = np.linspace(0, len(clip) - 1, POSES).round().astype(int)
     moved = None if clip.translations is None else clip.translations[at]
     few = replace(clip, rotations=clip.rotations[at], root=clip.root[at], translations=moved)
@@ -99,8 +100,8 @@ def _why_equal(a: ClipDigest, b: ClipDigest) -> str:
         return "the same file"
     if a.poses.shape != b.poses.shape:
         return ""
-    if np.linalg.norm(a.poses - b.poses, axis=-1).mean() < NEAR:
+    if np.linalg.norm(a.poses - b.poses, axis=-1).mean() < SAME_MOTION:
         return "the same motion"
-    if a.mirrored is not None and np.linalg.norm(a.mirrored - b.poses, axis=-1).mean() < NEAR:
+    if a.mirrored is not None and np.linalg.norm(a.mirrored - b.poses, axis=-1).mean() < SAME_MOTION:
         return "mirrors of each other"
     return ""

@@ -1,4 +1,4 @@
-"""Loads a file's motion in centimetres, right-handed, with Y up, on a rig whose rest pose stands."""
+"""Loads the motion of a BVH file: in centimetres, right-handed, Y up, on a rig with a standing rest pose."""
 
 from __future__ import annotations
 
@@ -35,20 +35,21 @@ from hobble.motion.rig import (
 from hobble.motion.standing import why_not_standing
 from hobble.motion.upright_rest import upright
 
-STILL = 0.1  # cm: a joint whose position stays nearer to its offset than this does not move in its parent
-FOUND = "found"  # name in reports of a rig without a skeleton file
+STILL = 0.1  # cm: a joint that stays this close to its offset counts as fixed to its parent
+FOUND = "found"  # in reports: the name of a rig that has no skeleton file
 
 
 @dataclass(frozen=True)
 class FileMotion:
     """A file's motion at its own frame rate, on its own rig or on the joints of its body.
 
-    match: what the rig is known as, and which of its joints the target's joints follow. unit, unit_name: cm
-    per unit of the file, and the unit in words. axes: those of the file. first_frame: the file's frame (from
-    0) at which the clip begins. repairs, notes: sentences on what was repaired, and on what else users should
-    know. stance: where the rest pose comes from, in words. moving: whether joints of the body below the hips
-    move relative to their parents. straightened: whether the rig is not the file's own, but one made of the
-    joints of its body with a standing rest pose. unsure: sentences on what is uncertain about the rest pose.
+    match: which known skeleton the rig is, if any, and which of its joints the target's joints follow. unit,
+    unit_name: cm per unit of the file, and the unit in words. axes: which of the file's axes points up, and
+    so on. first_frame: the file's frame (from 0) at which the clip begins. repairs, notes: sentences on what
+    was repaired, and on what else users should know. stance: where the rest pose comes from, in words.
+    moving: whether any joint of the body except the hips moves relative to its parent. straightened: whether
+    the clip is not on the file's rig, but on one with only the joints of the body and a standing rest pose.
+    unsure: sentences on what is uncertain about the rest pose.
     """
 
     clip: Clip
@@ -68,7 +69,8 @@ class FileMotion:
 def load_source(file: Bvh, target: TargetSkeleton, maps: str | Path, options: ClipMotion) -> FileMotion:
     """A file's motion, checked and, if allowed, repaired.
 
-    target: the rig to which the motion will go. maps: the folder of the skeleton files.
+    target: the skeleton to which the motion will go. maps: the folder of the skeleton files. options: the
+    data set's options for this clip.
 
     A rig with a skeleton file and the rest pose given there counts as that skeleton. On other rigs the parts
     of the body and a standing rest pose are found. Raises InputError if the parts cannot be found, or for
@@ -86,7 +88,7 @@ def load_source(file: Bvh, target: TargetSkeleton, maps: str | Path, options: Cl
 def _on_known_rig(
     file: Bvh, hips: int, match: RigMatch, repairs: list[str], options: ClipMotion
 ) -> FileMotion:
-    """The motion of a file whose rig has a skeleton file."""
+    """The motion of a file whose rig has a skeleton file. hips: index of the joint. match: to that file."""
     rig = replace(rig_of(below_hips(file, hips)), roles=match.roles)
     unit, unit_name = _unit(file.path, leg_length(rig), options.unit)
     decoded = decode_below(file, hips, STILL / unit)
@@ -115,7 +117,11 @@ def _on_known_rig(
 def _on_unknown_rig(
     file: Bvh, target: TargetSkeleton, known: RigMatch | None, repairs: list[str], options: ClipMotion
 ) -> FileMotion:
-    """The motion of a file on any other rig. Its parts and a standing rest pose are found."""
+    """The motion of a file whose rig has no skeleton file, or another rest pose than the one given there.
+
+    The parts of the body and a standing rest pose are found. known: the match to a skeleton file with the
+    same joint names, if there is one. It tells the parts of the body.
+    """
     rig = rig_of(file)
     decoded = _decoded(file)
     raw = Clip(file.path.stem, rig, 1.0, decoded.rotations, decoded.root, decoded.translations)
@@ -136,20 +142,20 @@ def _on_unknown_rig(
         straight = straighten(clip, options.up, options.handedness, standing)
     except ValueError as error:
         raise InputError(
-            file.path, f"what is up is in doubt: {error}", fix="Set motion.up in the data set to Y or Z."
+            file.path, f"the up axis is in doubt: {error}", fix="Set motion.up in the data set to Y or Z."
         ) from None
     axes = straight.axes if standing else replace(straight.axes, facing="+Z")
-    theirs = body_by_roles(target.skeleton)
-    # A rig with the target's own names follows it name by name, and any other rig part by part.
+    target_body = body_by_roles(target.skeleton)
+    # A rig with the target's own joint names is matched with the target by names, and any other by parts.
     named = known.sources if known is not None and known.rig == target.skeleton.name else {}
-    wanted = [rig.index(joint) for joint in named.values()]
-    standing_clip = upright(straight.clip, body, target.skeleton, wanted)
+    named_joints = [rig.index(joint) for joint in named.values()]
+    standing_clip = upright(straight.clip, body, target.skeleton, named_joints)
     check_height(file.path, standing_clip.height_error, standing_clip.notes, options.accept_doubt)
     match = RigMatch(
         known.rig if known else FOUND,
         standing_clip.clip.skeleton.roles,
         False,
-        named or pairs(standing_clip.clip.skeleton, standing_clip.body, target.skeleton, theirs),
+        named or pairs(standing_clip.clip.skeleton, standing_clip.body, target.skeleton, target_body),
     )
     notes = decoded.notes + straight.notes + ([] if known else notes_on_names(found, options.handedness))
     source = FileMotion(
@@ -194,8 +200,8 @@ def raw_clip(file: Bvh) -> Clip:
 
 
 def _decoded(file: Bvh) -> Decoded:
-    reach = float(np.linalg.norm(file.offsets[1:], axis=-1).max(initial=0.0))
-    return decode(file, 1e-3 * reach)
+    longest = float(np.linalg.norm(file.offsets[1:], axis=-1).max(initial=0.0))
+    return decode(file, 1e-3 * longest)
 
 
 def rig_of(file: Bvh) -> Skeleton:
@@ -224,14 +230,14 @@ def _frame_count(file: Bvh, defects: str) -> list[str]:
 
 
 def _leg(clip: Clip, body: Body) -> float:
-    """Length of thigh and shank together, mean of both sides."""
+    """Length of thigh and shank together: mean of both sides, median over the frames."""
     bones = [pair for leg in body.legs.values() for pair in pairwise(leg[:3])]
     apart = [np.linalg.norm(clip.positions[:, b] - clip.positions[:, a], axis=-1) for a, b in bones]
     return float(np.median(sum(apart)) / 2)
 
 
 def _moving(decoded: Decoded, body: Body, unit: float) -> bool:
-    """Whether any joint of the body except its hips moves in its parent."""
+    """Whether any joint of the body except its hips moves relative to its parent."""
     if decoded.translations is None:
         return False
     parts = [j for limbs in (body.arms, body.legs) for limb in limbs.values() for j in limb if j is not None]

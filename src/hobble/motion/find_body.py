@@ -1,9 +1,9 @@
 """Finds the legs, arms, trunk and head of an unknown rig, from structure, motion and names.
 
-A limb is one of two chains with bones of equal lengths that start at one joint and bend in the middle. The
-legs point away from the joint that carries the arms, and they are the longer pair. Names show which side is
-left. Where they do not, it follows from where the body's head is and where its feet and knees point, if
-coordinates are right-handed.
+Limbs come in pairs: two chains that start at the same joint, are equally long bone by bone, and bend in the
+middle. The legs point away from the joint that carries the arms, and they are the longer pair. Names show
+which side is left. Where they do not, the side follows from the place of the head and from where feet and
+knees point, but only in right-handed coordinates.
 """
 
 from __future__ import annotations
@@ -42,13 +42,13 @@ def find_body(names: Sequence[str], parents: Sequence[int], positions: Array) ->
     if len(pairs) < 2:
         raise Doubt("its joints do not contain two equal legs and two equal arms")
     legs, arms = find_limbs(rig, pairs)
-    leg = [joints_of(rig, legs, "leg", k) for k in (0, 1)]
-    arm = [joints_of(rig, arms, "arm", k) for k in (0, 1)]
+    leg_joints = [joints_of(rig, legs, "leg", k) for k in (0, 1)]
+    arm_joints = [joints_of(rig, arms, "arm", k) for k in (0, 1)]
     head, neck = find_head(rig, legs, arms)
-    left_leg_index, sided = left_leg(rig, legs, leg, head)
-    left_arm_index = left_arm(rig, leg, left_leg_index, arm, arms)
-    hips = common(parents, [leg[0][0], leg[1][0]])
-    hips = parents[hips] if hips in (leg[0][0], leg[1][0]) else hips
+    left_leg_index, sided = left_leg(rig, legs, leg_joints, head)
+    left_arm_index = left_arm(rig, leg_joints, left_leg_index, arm_joints, arms)
+    hips = common(parents, [leg_joints[0][0], leg_joints[1][0]])
+    hips = parents[hips] if hips in (leg_joints[0][0], leg_joints[1][0]) else hips
     trunk = [j for j in path(parents, hips, arms.hub) if j != hips and (j not in above(parents, hips))]
     if len(trunk) > 1 and part_of(names[trunk[-1]]) == "neck" and head != trunk[-1]:
         neck = (trunk.pop(), *neck)  # in rigs of 3ds Max the neck carries the arms
@@ -59,8 +59,8 @@ def find_body(names: Sequence[str], parents: Sequence[int], positions: Array) ->
         tuple(trunk),
         neck,
         head,
-        {s: (clavicle(rig, arms, k, arm[k][0]), *arm[k]) for s, k in arm_of_side.items()},
-        {s: (*leg[k], toe(rig, legs, k, leg[k][2])) for s, k in leg_of_side.items()},
+        {s: (clavicle(rig, arms, k, arm_joints[k][0]), *arm_joints[k]) for s, k in arm_of_side.items()},
+        {s: (*leg_joints[k], toe(rig, legs, k, leg_joints[k][2])) for s, k in leg_of_side.items()},
     )
     if other := _second(names, parents, positions, hips):
         raise TwoFigures(f"it holds two figures, {names[hips]} and {names[other]}")
@@ -68,7 +68,7 @@ def find_body(names: Sequence[str], parents: Sequence[int], positions: Array) ->
 
 
 def _second(names: Sequence[str], parents: Sequence[int], positions: Array, hips: int) -> int | None:
-    """The top joint of another figure beside the one with the given hips, or None."""
+    """The top joint of a second figure in the file, or None. hips: those of the first figure."""
     chain = above(parents, hips)
     for top in range(len(parents)):
         if parents[top] not in chain[1:] or top in chain:

@@ -12,15 +12,18 @@ from hobble.motion.tree import above, path
 
 
 def find_head(rig: MovingRig, legs: LimbPair, arms: LimbPair) -> tuple[int, tuple[int, ...]]:
-    """The head, and the joints of the neck: those between the joint that carries the arms and the head."""
+    """The head, and the joints of the neck: those between the joint that carries the arms and the head.
+
+    Raises Doubt if no joint above the arms can be the head.
+    """
     limbs = set(sum(legs.chains, ())) | set(sum(arms.chains, ()))
     named = [
         j for j, n in enumerate(rig.names) if part_of(n) == "head" and not is_end(n) and side_of(n) is None
     ]
     named = [j for j in named if arms.hub in above(rig.parents, j) and not limbs & set(above(rig.parents, j))]
     spine = path(rig.parents, legs.hub, arms.hub)
-    first = min(named, key=lambda j: len(above(rig.parents, j)), default=None)
-    head = _highest(rig, legs, arms, limbs) if first is None else first
+    named_head = min(named, key=lambda j: len(above(rig.parents, j)), default=None)
+    head = _highest(rig, legs, arms, limbs) if named_head is None else named_head
     way = path(rig.parents, arms.hub, head)[1:-1]
     return head, tuple(j for j in way if j not in spine)
 
@@ -37,18 +40,19 @@ def _highest(rig: MovingRig, legs: LimbPair, arms: LimbPair, limbs: set[int]) ->
         # How far a joint lies beyond the shoulders, along the trunk.
         return float(np.mean(np.sum((rig.at[:, j] - base) * trunk, axis=-1)))
 
-    below = [j for j in range(len(rig.names)) if arms.hub in above(rig.parents, j)[1:]]
-    below = [j for j in below if not limbs & set(above(rig.parents, j))]
+    candidates = [j for j in range(len(rig.names)) if arms.hub in above(rig.parents, j)[1:]]
+    candidates = [j for j in candidates if not limbs & set(above(rig.parents, j))]
     # Hair, ears and wings come in pairs, a left and a right one. There is only one head.
     pairs = [set(sum(pair.chains, ())) for pair in rig.pairs()]
     twins = set().union(*(pair for pair in pairs if not pair & limbs))
-    single = [j for j in below if not twins & set(above(rig.parents, j)) and not side_of(rig.names[j])]
-    below = single or below
-    if not below:
+    single = [j for j in candidates if not twins & set(above(rig.parents, j)) and not side_of(rig.names[j])]
+    candidates = single or candidates
+    if not candidates:
         raise Doubt("there is no joint for the head above the arms")
-    top = max(below, key=height)
-    chain = [j for j in above(rig.parents, top) if j in below][::-1]
+    top = max(candidates, key=height)
+    chain = [j for j in above(rig.parents, top) if j in candidates][::-1]
     leg = rig.chord(legs.chains[0][0], legs.chains[0][-1])[0]
+    # Joints too far from the shoulders, or hardly away from their parents, only mark the end of the head.
     while len(chain) > 1 and (height(chain[-1]) > 0.42 * leg or rig.lengths[chain[-1]] < 0.01 * rig.size):
         chain.pop()
     return chain[-1]

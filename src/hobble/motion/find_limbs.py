@@ -11,79 +11,89 @@ from hobble.motion.moving_rig import LimbPair, MovingRig
 from hobble.motion.names import is_control, limb_parts, part_of
 from hobble.motion.orient import unit
 
-RIGID = 0.03  # two joints are the ends of one bone if their distance varies by no more than this share
+RIGID = 0.03  # two joints are the ends of one bone if their distance varies by at most this share of it
 RATIOS = {"leg": (0.6, 1.6), "arm": (0.48, 1.6)}  # range of shank / thigh, and of forearm / upper arm
-# Least distance between the two hips as a share of that between the knees, and between the two shoulders as a
-# share of that between the elbows. Knees and elbows may be spread for balance.
+# Least distance of the two hips as a share of the distance of the knees, and of the two shoulders as a share
+# of the distance of the elbows. The shares are small, because knees and elbows may be spread for balance.
 APART = {"leg": 0.2, "arm": 0.4}
 SWING = 10.0  # degrees: a pair of chains whose bend varies by this much or more gets the full score for it
-AWAY = -0.2  # largest mean cosine between the directions of legs and trunk, which point apart
+AWAY = -0.2  # largest mean cosine of the angle between legs and trunk, both seen from the hips
 WORDS = {  # words in the names of joints (`names.part_of`) that suggest a kind of limb
     "leg": {"thigh", "shank", "foot", "ankle", "toe", "leg", "hip"},
     "arm": {"clavicle", "upperarm", "forearm", "hand", "wrist", "finger", "arm", "shoulder"},
 }
-LIMBS = {"leg": ("thigh", "shank", "foot"), "arm": ("upperarm", "forearm", "hand")}  # from the trunk outward
+# Parts of a limb, from the trunk outward. Each is the name of the joint where the part begins.
+LIMBS = {"leg": ("thigh", "shank", "foot"), "arm": ("upperarm", "forearm", "hand")}
 
 
 def find_limbs(rig: MovingRig, pairs: list[LimbPair]) -> tuple[LimbPair, LimbPair]:
-    """The pair of legs and the pair of arms of the likeliest body. pairs: all that can be limbs."""
-    known = {}
+    """The pair of legs and the pair of arms of the likeliest body. pairs: all pairs of chains in the rig.
+
+    Raises Doubt if no two pairs can be legs and arms.
+    """
+    places_of = {}
     for i, pair in enumerate(pairs):
         for kind in ("leg", "arm"):
-            if (middle := segments(rig, pair, kind)) is not None:
-                known[i, kind] = middle
-    found = []
+            if (places := segments(rig, pair, kind)) is not None:
+                places_of[i, kind] = places
+    bodies = []
     for i, legs in enumerate(pairs):
         for k, arms in enumerate(pairs):
-            if legs.hub == arms.hub or (i, "leg") not in known or (k, "arm") not in known:
+            if legs.hub == arms.hub or (i, "leg") not in places_of or (k, "arm") not in places_of:
                 continue
             if set(sum(legs.chains, ())) & set(sum(arms.chains, ())):
                 continue
-            away = _away(rig, legs, known[i, "leg"], arms)
+            away = _away(rig, legs, places_of[i, "leg"], arms)
             if away > AWAY:
                 continue
-            ratio = _length_between(rig, legs, known[i, "leg"]) / _length_between(rig, arms, known[k, "arm"])
+            ratio = _length_between(rig, legs, places_of[i, "leg"]) / _length_between(
+                rig, arms, places_of[k, "arm"]
+            )
             score = np.log(ratio) - away
-            for pair, place, kind in ((legs, known[i, "leg"], "leg"), (arms, known[k, "arm"], "arm")):
-                score += _named(rig, pair, kind) + _swing(rig, pair, place)
-            found.append((score, i, k))
-    if not found:
+            for pair, places, kind in (
+                (legs, places_of[i, "leg"], "leg"),
+                (arms, places_of[k, "arm"], "arm"),
+            ):
+                score += _named(rig, pair, kind) + _swing(rig, pair, places)
+            bodies.append((score, i, k))
+    if not bodies:
         raise Doubt("the motion does not show which chains are legs and which are arms")
-    _, i, k = max(found)
+    _, i, k = max(bodies)
     return pairs[i], pairs[k]
 
 
-def _away(rig: MovingRig, legs: LimbPair, middle: tuple[int, int, int], arms: LimbPair) -> float:
+def _away(rig: MovingRig, legs: LimbPair, places: tuple[int, int, int], arms: LimbPair) -> float:
     """Mean cosine of the angle between legs and trunk, both seen from the hips: -1 for a standing body.
 
-    middle: as `segments` returns it for the legs.
+    places: as `segments` returns them for the legs.
     """
     trunk = rig.at[:, arms.hub] - rig.at[:, legs.hub]
-    feet = sum(rig.at[:, chain[middle[2]]] for chain in legs.chains) / 2 - rig.at[:, legs.hub]
+    feet = sum(rig.at[:, chain[places[2]]] for chain in legs.chains) / 2 - rig.at[:, legs.hub]
     return float(np.mean(np.sum(unit(trunk) * unit(feet), axis=-1)))
 
 
-def _length_between(rig: MovingRig, pair: LimbPair, middle: tuple[int, int, int]) -> float:
-    a, b, c = middle
+def _length_between(rig: MovingRig, pair: LimbPair, places: tuple[int, int, int]) -> float:
+    a, b, c = places
     return (
         rig.chord(pair.chains[0][a], pair.chains[0][b])[0]
         + rig.chord(pair.chains[0][b], pair.chains[0][c])[0]
     )
 
 
-def _swing(rig: MovingRig, pair: LimbPair, middle: tuple[int, int, int]) -> float:
+def _swing(rig: MovingRig, pair: LimbPair, places: tuple[int, int, int]) -> float:
     """Score from 0 to 1 for how much the limbs bend and stretch. Hair, skirts and wings often keep one angle.
 
-    middle: as `segments` returns it.
+    places: as `segments` returns them.
     """
-    turns = [np.ptp(np.percentile(rig.bend(chain, *middle), [3, 97])) for chain in pair.chains]
+    turns = [np.ptp(np.percentile(rig.bend(chain, *places), [3, 97])) for chain in pair.chains]
     return float(np.minimum(np.mean(turns) / SWING, 1.0))
 
 
 def _named(rig: MovingRig, pair: LimbPair, kind: str) -> float:
     """Score from -1 to 1 for how strongly the names of a pair's joints suggest a kind of limb.
 
-    Names of the other kind count against it, and so do those of joints that only control others.
+    Names of the other kind of limb count against it, and so do names of joints that only control others.
+    kind: "leg" or "arm".
     """
     names = [rig.names[j] for chain in pair.chains for j in chain]
     parts = [part_of(name) for name in names]
@@ -93,19 +103,19 @@ def _named(rig: MovingRig, pair: LimbPair, kind: str) -> float:
 
 
 def segments(rig: MovingRig, pair: LimbPair, kind: str) -> tuple[int, int, int] | None:
-    """Indices in both chains of hip, knee and ankle, or of shoulder, elbow and wrist.
+    """Where hip, knee and ankle, or shoulder, elbow and wrist, are in the chains: indices for both chains.
 
-    kind: "leg" or "arm". None if the pair cannot be of this kind. Names decide if they give all three joints
-    and the bones between those have the proportions of a body. Otherwise the two bones are the longest
+    kind: "leg" or "arm". Returns None if the pair cannot be of this kind. Names decide if they give all three
+    joints and the bones between those have the proportions of a body. Otherwise the two bones are the longest
     consecutive ones that keep their lengths and have a bend between them. A bone may consist of several
-    joints in line (twist joints): its length is the distance of the outer two.
+    joints in line (twist joints): its length is the distance of the first and the last.
     """
     chain = pair.chains[0]
     named = [limb_parts([rig.names[j] for j in c]) for c in pair.chains]
     if all(set(LIMBS[kind]) <= set(found) for found in named):
-        one, other = (tuple(found[part] for part in LIMBS[kind]) for found in named)
-        if one == other and one[0] < one[1] < one[2] and _fits(rig, chain, one, kind):
-            return one[0], one[1], one[2]
+        places, across = (tuple(found[part] for part in LIMBS[kind]) for found in named)
+        if places == across and places[0] < places[1] < places[2] and _fits(rig, chain, places, kind):
+            return places[0], places[1], places[2]
     best, where = 0.0, None
     for j in range(1, len(chain) - 1):
         for i in range(j):
@@ -131,7 +141,7 @@ def _fits(rig: MovingRig, chain: Sequence[int], places: Sequence[int], kind: str
 
 
 def _moves(rig: MovingRig, pair: LimbPair, i: int, j: int) -> bool:
-    """Whether the distance between two joints of a chain changes, so that no one bone connects them.
+    """Whether the distance between two joints of a chain changes, so that no single bone connects them.
 
     i, j: their indices in both chains.
     """
@@ -151,7 +161,7 @@ def _apart(rig: MovingRig, pair: LimbPair, i: int, j: int, kind: str) -> bool:
 
 
 def _bends(rig: MovingRig, pair: LimbPair, i: int, j: int, k: int) -> bool:
-    """Whether the limb bends at joint `j` between `i` and `k`, by more than six degrees on either side.
+    """Whether at least one limb of the pair bends at `j`, between `i` and `k`, by more than six degrees.
 
     i, j, k: indices in both chains.
     """
@@ -173,8 +183,8 @@ def joints_of(rig: MovingRig, pair: LimbPair, kind: str, k: int) -> tuple[int, i
 def toe(rig: MovingRig, pair: LimbPair, k: int, heel: int) -> int | None:
     """The ball of a foot, or None if the rig has none.
 
-    It is the joint that is named as toe, or the first one that is clearly away from the ankle. k: the chain
-    of the pair, 0 or 1. heel: the ankle.
+    It is the joint that is named as toe, else the first joint that is clearly away from the ankle. k: which
+    chain of the pair, 0 or 1. heel: the ankle.
     """
     chain = pair.chains[k]
     leg = pair.length
@@ -191,7 +201,7 @@ def toe(rig: MovingRig, pair: LimbPair, k: int, heel: int) -> int | None:
 
 
 def clavicle(rig: MovingRig, pair: LimbPair, k: int, shoulder: int) -> int | None:
-    """The joint between chest and shoulder that moves the shoulder, or None. k: chain of the pair, 0 or 1."""
+    """The joint between chest and shoulder that moves the shoulder, or None. k: which chain, 0 or 1."""
     chain = pair.chains[k]
     before = chain[: chain.index(shoulder)]
     moving = [j for j in before if rig.chord(j, shoulder)[0] > 0.01 * rig.size]

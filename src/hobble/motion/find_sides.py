@@ -15,8 +15,8 @@ from hobble.motion.orient import unit
 def left_leg(rig: MovingRig, pair: LimbPair, leg: list[tuple[int, int, int]], head: int) -> tuple[int, bool]:
     """Which of the two legs (0 or 1) is the left one, and whether names say so.
 
-    leg: hip, knee and ankle of both chains of `pair`. head: the joint of the head. If names do not tell, up
-    (to the head) and forward (by feet and knees) do.
+    leg: hip, knee and ankle of both chains of `pair`. head: the joint of the head. If names do not tell, left
+    follows from the directions up (to the head) and forward (where feet and knees point).
     """
     named = _named_sides(rig, pair)
     if named[0] * named[1] < 0:
@@ -33,16 +33,16 @@ def left_leg(rig: MovingRig, pair: LimbPair, leg: list[tuple[int, int, int]], he
 def _named_sides(rig: MovingRig, pair: LimbPair) -> tuple[int, int]:
     """For each of the two chains, how many more of its joints are named left than right."""
     votes = []
-    for chain, across in (pair.chains, pair.chains[::-1]):
+    for chain, opposite in (pair.chains, pair.chains[::-1]):
         sides = [side_of(rig.names[j]) for j in chain]
         if not any(sides):
-            sides = [side_of_pair(rig.names[a], rig.names[b]) for a, b in zip(chain, across, strict=False)]
+            sides = [side_of_pair(rig.names[a], rig.names[b]) for a, b in zip(chain, opposite, strict=False)]
         votes.append(sides.count("left") - sides.count("right"))
     return votes[0], votes[1]
 
 
 def _ahead(rig: MovingRig, pair: LimbPair, leg: list[tuple[int, int, int]]) -> Array:
-    """(S, 3) unit vectors in which the feet point and, with less weight, the knees."""
+    """(S, 3) unit vectors forward in S sampled frames: where feet and, with less weight, knees point."""
     out = np.zeros((len(rig.at), 3))
     for k, (hip, knee, heel) in enumerate(leg):
         ball = toe(rig, pair, k, heel)
@@ -62,16 +62,16 @@ def left_arm(
     arm: list[tuple[int, int, int]],
     pair: LimbPair,
 ) -> int:
-    """Which of the two arms (0 or 1) is the left one: that on the side of the left leg.
+    """Which of the two arms (0 or 1) is the left one: the one on the side of the left leg.
 
-    leg, arm: three joints of both legs and both arms, from the trunk outward. left: which leg is the left
-    one. pair: the arms.
+    leg: hip, knee and ankle of both legs. left: which leg (0 or 1) is the left one. arm: shoulder, elbow and
+    wrist of both arms. pair: the chains of the arms.
     """
     across = rig.at[:, leg[left][0]] - rig.at[:, leg[1 - left][0]]
     arms = rig.at[:, arm[0][0]] - rig.at[:, arm[1][0]]
     side = float(np.mean(np.sum(unit(across) * unit(arms), axis=-1)))
     named = _named_sides(rig, pair)
-    place = 0 if side > 0 else 1
-    if abs(side) < 0.2 or (named[0] * named[1] < 0 and (named[0] > 0) != (place == 0)):
+    index = 0 if side > 0 else 1
+    if abs(side) < 0.2 or (named[0] * named[1] < 0 and (named[0] > 0) != (index == 0)):
         raise Doubt("its left arm and its left leg are not on the same side")
-    return place
+    return index

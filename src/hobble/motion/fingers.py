@@ -13,15 +13,16 @@ from hobble.motion.names import part_of
 from hobble.motion.tree import above
 
 AWAY = (0.1, 0.7)  # range of the distance from the wrist to the base of a finger, in forearm lengths
-EQUAL = 0.03  # forearm lengths: a finger counts as longest, too, if it is shorter by less than this
+# Forearm lengths. If a finger is shorter than the longest finger by less than this, both are equally long.
+EQUAL = 0.03
 
 
 def pointing_fingers(skeleton: Skeleton, wrists: Mapping[str, int]) -> dict[str, int]:
     """Side -> the base of the hand's longest finger. Sides without a finger are left out.
 
-    A thumb does not count, nor a chain longer than the forearm: that is an object held in the hand. Fingers
-    whose names say that they point where the hand does (`_points`) come before all others. Of several longest
-    fingers, the one in the middle of them is taken.
+    wrists: side -> joint of the wrist. A thumb does not count, nor a chain longer than the forearm: this is
+    an object held in the hand. Fingers whose names say that they point where the hand does (like the index
+    finger) are preferred. If several fingers are about as long as the longest, the middle one is taken.
     """
     lengths = np.linalg.norm(skeleton.offsets, axis=-1)
     fingers = {}
@@ -40,8 +41,8 @@ def pointing_fingers(skeleton: Skeleton, wrists: Mapping[str, int]) -> dict[str,
 def _fingers(skeleton: Skeleton, wrist: int, forearm: float) -> list[tuple[float, int, Array]]:
     """Length, base, and (3,) position of the base relative to the wrist, of each chain that can be a finger.
 
-    If the names say that a finger points where the hand does (`_points`), the returned length is larger by
-    the forearm's. Then no other finger is longer.
+    If the names say that a finger points where the hand does (`_points`), the length of the forearm is added
+    to the finger's, so that all other fingers are shorter.
     """
     found = []
     chains = _chains(skeleton.parents, wrist)
@@ -55,11 +56,11 @@ def _fingers(skeleton: Skeleton, wrist: int, forearm: float) -> list[tuple[float
             continue
         length = float(np.linalg.norm(skeleton.offsets[chain], axis=-1).sum())
         places = np.cumsum(skeleton.offsets[chain], axis=0)
-        ways = np.linalg.norm(places, axis=-1)
-        far = np.flatnonzero((ways > AWAY[0] * forearm) & (ways < AWAY[1] * forearm))
-        named = forearm if _points(names, skeleton.joints[wrist]) else 0.0
+        distances = np.linalg.norm(places, axis=-1)
+        far = np.flatnonzero((distances > AWAY[0] * forearm) & (distances < AWAY[1] * forearm))
+        preference = forearm if _points(names, skeleton.joints[wrist]) else 0.0
         if len(far) and length < forearm:
-            found.append((length + named, chain[far[0]], places[far[0]]))
+            found.append((length + preference, chain[far[0]], places[far[0]]))
     return found
 
 

@@ -11,19 +11,21 @@ from hobble.core.quat import Array
 from hobble.motion.rig import leg_length
 
 SOLE = 3.0  # cm: height of the toe joint of a standing foot above the floor
-OFF = 3.0  # cm: a clip is moved if its floor is further from height 0
-CRAWLS = 15.0  # cm: takes the place of OFF if the figure is not upright, whose toes hardly show the floor
+OFF = 3.0  # cm: a clip is moved if its floor is further than this from height 0
+CRAWLS = 15.0  # cm: used instead of OFF if the figure is not upright, since its toes hardly show the floor
 UPRIGHT = 0.8  # least height of the hips above the toes of an upright figure, in leg lengths
-EVEN = 12.0  # cm between high and low steps on flat ground; running has 9, gentle bumps have 14
+# cm: on flat ground, the heights of high and low steps differ by at most this. In running they differ by 9,
+# on gentle bumps by 14.
+EVEN = 12.0
 SLOW = 0.3  # cm a frame at 60 Hz: a toe that rises or falls faster is in the air
-FEWEST, SHORTEST = 4, 1 / 12  # a floor is found only if a foot stands for so many frames and so many seconds
+FEWEST, SHORTEST = 4, 1 / 12  # least number of frames, and of seconds, in which feet have to show the floor
 
 
 def on_floor(clip: Clip) -> tuple[Clip, list[str], list[str]]:
-    """A clip on flat ground, moved so that its floor is at height 0 if it was more than 3 cm off.
+    """A clip on flat ground, moved to height 0 if its floor was further off than OFF (crawling: CRAWLS).
 
     Also returns two lists. The first holds a sentence if the clip was moved. The second holds one if it was
-    not moved because its feet stand at so many heights that the ground cannot be flat.
+    not moved because its feet stand at heights too different for flat ground.
     """
     toes = [clip.skeleton.role(f"{side}_toe") for side in ("left", "right")]
     lower = clip.positions[:, toes, 1].min(axis=1)

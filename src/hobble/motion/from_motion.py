@@ -17,15 +17,17 @@ from hobble.motion.orient import frame, mean_rotation, unit
 from hobble.motion.spine import SHORT, spine_shares
 
 UP, AHEAD = np.array([0.0, 1.0, 0.0]), np.array([0.0, 0.0, 1.0])
-KINK = 0.06  # leg lengths: a bone above the chest that is shorter is skipped
-AGREE = np.radians(25.0)  # trunk joints that differ by less have the same rest pose
+KINK = 0.06  # leg lengths: a bone above the chest that is shorter than this is skipped
+AGREE = np.radians(25.0)  # two joints of the trunk count as turned alike if their frames differ by less
 
 
 def from_motion(sample: BodySample, trunk: BodySample, zero: Array | None) -> dict[int, Array]:
-    """Joint -> (4,) frame, as `BodySample` defines it, from the directions of the bones in motion.
+    """Joint -> (4,) frame, from the directions of the bones in motion.
 
-    trunk: the poses that show how the trunk is turned (`trunk_sample`). zero: (4,) frame of the chest in the
-    zero pose, which is used if the rig has no neck. None if nobody could stand in that pose.
+    The frame of a joint is the rotation from the axes of a standing figure to the joint's own axes
+    (`BodySample` in `hobble.motion.body_sample` explains it). trunk: the moments that show how the trunk is
+    turned. zero: (4,) frame of the chest in the zero pose, for rigs without a neck; None if nobody could
+    stand in that pose.
     """
     frames = trunk_frames(trunk, zero)
     for side, sign in (("left", 1.0), ("right", -1.0)):
@@ -35,7 +37,7 @@ def from_motion(sample: BodySample, trunk: BodySample, zero: Array | None) -> di
 
 
 def bends(sample: BodySample) -> dict[int, Bend]:
-    """Hips and chest -> the bone above each; left out where that bone has no length."""
+    """Joint (hips, chest) -> the bone above it. A joint whose bone is shorter than SHORT is left out."""
     body, out = sample.body, {}
     above_chest = () if body.arms_on_neck else (*body.neck, body.head)
     for joint, following in ((body.hips, body.trunk), (body.chest, above_chest)):
@@ -46,35 +48,41 @@ def bends(sample: BodySample) -> dict[int, Bend]:
 
 
 def trunk_frames(sample: BodySample, zero: Array | None) -> dict[int, Array]:
-    """`from_motion` for hips, trunk, neck and head alone. sample: the poses that show how they are turned."""
+    """The frames of hips, trunk, neck and head alone.
+
+    sample: the moments that show how these are turned. zero: as for `from_motion`.
+    """
     body, frames = sample.body, dict[int, Array]()
     chain = (body.hips, *body.trunk, *body.neck)
     for joint in chain:
         bone, axis, left = _bone(sample, joint)
         if body.trunk and joint == body.chest and lacks_neck(sample):
             bone, axis = neck_bone(sample, left, zero), sample.target.spine.neck
-        # For hips and chest, left is more reliable than the bone: limbs begin level there, but spines of
-        # captured rigs bend sideways by some degrees.
-        carries = joint in (body.hips, body.chest)
-        frames[joint] = frame(left, LEFT, bone, axis) if carries else frame(bone, axis, left, LEFT)
+        # For hips and chest, the direction to the left is more reliable than the bone: hips and shoulders are
+        # level, but spines of captured rigs bend sideways by some degrees.
+        carries_limbs = joint in (body.hips, body.chest)
+        frames[joint] = frame(left, LEFT, bone, axis) if carries_limbs else frame(bone, axis, left, LEFT)
     frames[body.head] = _head(sample, frames, chain)
     return frames
 
 
 def _bone(sample: BodySample, joint: int) -> tuple[Array, Array, Array]:
-    """The bone above a joint of trunk or neck, its direction in a standing rest pose, and left: (3,) each.
+    """Three vectors (3,): the bone above a joint of trunk or neck, this bone's direction in a standing rest
+    pose, and the direction to the body's left.
 
-    Bone and left are in the joint's coordinates.
+    The bone and the direction to the left are in the joint's coordinates.
     """
     body = sample.body
     trunk = (body.hips, *body.trunk)
     chain = (*trunk, *body.neck, body.head)
     lengths = np.array([sample.length(a, b) for a, b in pairwise(chain)])
-    share = dict(zip(chain, spine_shares(lengths, body.top_bones), strict=True))
+    share = dict(zip(chain, spine_shares(lengths, body.trunk_bones), strict=True))
     following = chain[chain.index(joint) + 1 :]
-    # A rig with many short bones has kinks. One bone of the target follows several of them, up to its end.
+    # A rig with many short bones has kinks. Where one bone of the target is as long as several bones of the
+    # rig, the direction is measured from the beginning of the first of these to the end of the last.
     reach = [j for j in following if share[j] <= sample.target.spine.end(share[joint]) + 1e-6]
-    # The chest is stiff up to the shoulders. A very short bone above it does not show how it is turned.
+    # The chest is stiff up to the shoulders. A very short bone above it does not show how the
+    # chest is turned.
     leg = sample.length(*body.legs["left"][:3])
     least = max(SHORT, KINK * leg) if joint == body.chest else SHORT
     bone, end = sample.first_long(joint, [*reach[-1:], *following], least)
@@ -87,8 +95,9 @@ def _bone(sample: BodySample, joint: int) -> tuple[Array, Array, Array]:
 
 
 def _head(sample: BodySample, frames: dict[int, Array], chain: Sequence[int]) -> Array:
-    """(4,) the rotation of the head: that of the chest if all joints of the trunk have nearly the same one.
+    """(4,) the frame of the head.
 
+    If all joints of trunk and neck have nearly the same frame as the chest, the head gets the chest's frame.
     If not, the head is assumed to look ahead on average.
     """
     chest = frames[sample.body.chest]

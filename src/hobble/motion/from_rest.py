@@ -1,6 +1,6 @@
-"""Derives how the joints of a body are turned from a standing zero pose.
+"""Derives how the joints of a body are turned, from a zero pose in which a person could stand.
 
-For some joints it is more reliable than motion.
+For some joints this pose is more reliable than the motion.
 """
 
 from __future__ import annotations
@@ -22,29 +22,34 @@ from hobble.motion.orient import (
 )
 
 UP = np.array([0.0, 1.0, 0.0])
-# Degrees. If zero pose and motion differ by more for a joint, the motion is used.
+# Degrees. If zero pose and motion differ by more than this for a joint, the motion is used.
 TRUSTED = 30.0
-# A larger difference between the angle of standing feet and that in the zero pose is reported. In the data
-# set `patients` it is at most 9 degrees.
+# Radians. If the angle of standing feet differs from that in the zero pose by more, this is reported. In the
+# data set `patients` the difference is at most 9 degrees.
 UNLIKE_ZERO = np.radians(12.0)
-# cm between the 5th and 95th percentile of the heights of feet that stand flat. With more, the ground is
-# uneven and the angle of the feet shows nothing of the rig. On flat ground it is up to 3, in CMU's walks on
-# uneven ground 9 to 18.
+# cm between the 5th and 95th percentile of the heights of feet that stand flat. Above this, the
+# ground is uneven and the angle of the feet tells nothing about the rig. On flat ground the value is up to 3,
+# in CMU's walks on uneven ground 9 to 18.
 UNEVEN = 6.0
-SHRUG = 12.0  # degrees; a clavicle whose mean angle to the chest is smaller is turned like the chest
-LIMP = 60.0  # degrees; if zero pose and motion differ by less for a hand, the zero pose is used
+SHRUG = 12.0  # degrees: if the mean angle of a clavicle to the chest is smaller, it is turned like the chest
+TRUSTED_HAND = 60.0  # degrees: if zero pose and motion differ by less for a hand, the zero pose is used
 
 
 def from_rest(sample: BodySample) -> dict[int, Array]:
-    """Joint -> (4,) rotation of its axes, from a zero pose in which a person could stand.
+    """Joint -> (4,) frame, from a zero pose in which a person could stand.
 
-    Limbs are turned by the directions of their bones in the zero pose.
+    The frame of a joint is the rotation from the axes of a standing figure to the joint's own axes
+    (`BodySample` in `hobble.motion.body_sample` explains it). Limbs are turned by the directions of their
+    bones in the zero pose.
     """
     body, rest = sample.body, sample.rest
-    across = [rest[side["left"][k]] - rest[side["right"][k]] for side, k in ((body.legs, 0), (body.arms, 1))]
+    across = [
+        rest[limbs["left"][k]] - rest[limbs["right"][k]] for limbs, k in ((body.legs, 0), (body.arms, 1))
+    ]
     left = unit(unit(across[0]) + unit(across[1]))
     middle = [
-        0.5 * (rest[side["left"][k]] + rest[side["right"][k]]) for side, k in ((body.legs, 0), (body.arms, 1))
+        0.5 * (rest[limbs["left"][k]] + rest[limbs["right"][k]])
+        for limbs, k in ((body.legs, 0), (body.arms, 1))
     ]
     upward = rest[body.head] - rest[body.hips]
     whole = snapped_to_axes(
@@ -68,7 +73,7 @@ def from_rest(sample: BodySample) -> dict[int, Array]:
 
 
 def add_rest(frames: dict[int, Array], zero: dict[int, Array], sample: BodySample) -> None:
-    """Replace in `frames` the joints for which the zero pose is more reliable."""
+    """Replace in `frames` the joints for which the zero pose is more reliable. zero: from `from_rest`."""
     body = sample.body
     if degrees_between_rotations(zero[body.head], frames[body.head]) < TRUSTED:
         frames[body.head] = zero[body.head]
@@ -76,7 +81,7 @@ def add_rest(frames: dict[int, Array], zero: dict[int, Array], sample: BodySampl
         clavicle, _, _, wrist = body.arms[side]
         if clavicle is not None and degrees_between_rotations(frames[body.chest], frames[clavicle]) < SHRUG:
             frames[clavicle] = frames[body.chest]
-        if degrees_between_rotations(zero[wrist], frames[wrist]) < LIMP:
+        if degrees_between_rotations(zero[wrist], frames[wrist]) < TRUSTED_HAND:
             frames[wrist] = zero[wrist]
         heel, toe = body.legs[side][2:]
         frames[heel] = _foot(frames[heel], zero[heel], sample, side)
@@ -87,8 +92,8 @@ def add_rest(frames: dict[int, Array], zero: dict[int, Array], sample: BodySampl
 def zero_doubt(sample: BodySample, zero: dict[int, Array]) -> str | None:
     """A sentence if the feet stand at another angle than in the zero pose; None if they agree.
 
-    zero: from `from_rest`. In the zero pose a person may stand on the toes or lean. On uneven ground, where
-    feet stand at any angle, nothing is said.
+    The angles may differ because the figure stands on its toes or leans in the zero pose. On uneven ground,
+    feet stand at any angle, so the result is None. zero: from `from_rest`.
     """
     measured = feet_tilt(sample).measured
     difference, lengths, heights = [], [], []
@@ -111,14 +116,16 @@ def zero_doubt(sample: BodySample, zero: dict[int, Array]) -> str | None:
     if degrees > TRUSTED:
         return f"{sentence}: the motion was believed, so feet may be tilted by some degrees."
     high = np.radians(degrees) * np.mean(lengths)
-    return f"{sentence}: if that pose is no stance, the figure stands {high:.1f} cm too high or low."
+    return f"{sentence}: if they are not flat in that pose, the figure stands {high:.1f} cm too high or low."
 
 
 def _foot(standing: Array, zero: Array, sample: BodySample, side: str) -> Array:
-    """(4,) the rotation of a foot: as it stands, but as steep as in the zero pose if both roughly agree.
+    """(4,) the frame of an ankle or toe joint: `standing`, but as steep as `zero` if both roughly agree.
 
-    It is not taken from the zero pose alone: if the legs are splayed there, the feet are rolled and point
-    outward. It is taken from the zero pose if the foot never stands flat, as some patients' feet.
+    standing: the frame found in motion. zero: the frame in the zero pose. `zero` is returned unchanged if the
+    body is not upright while the foot is flat, or if the foot has no toe joint and both frames roughly agree.
+    In other cases only the steepness is taken from it, because in a zero pose with splayed legs the feet are
+    rolled and point outward.
     """
     if not upright_while_flat(sample, side):
         return zero
@@ -128,9 +135,9 @@ def _foot(standing: Array, zero: Array, sample: BodySample, side: str) -> Array:
     bone = sample.bone(heel, toe)
     if degrees_between_rotations(standing, zero) > TRUSTED + 60:
         return standing
-    wanted, found = (quat.rotate(quat.inv(frame), bone) for frame in (zero, standing))
-    if degrees_between(wanted, found) > TRUSTED:
+    zero_bone, standing_bone = (quat.rotate(quat.inv(frame), bone) for frame in (zero, standing))
+    if degrees_between(zero_bone, standing_bone) > TRUSTED:
         return standing
-    across, level = found[0], float(np.hypot(wanted[0], wanted[2]))
-    wanted = np.array([across, wanted[1], np.sqrt(max(level**2 - across**2, 0.0))])
-    return quat.mul(standing, quat.between(wanted, found))
+    across, level = standing_bone[0], float(np.hypot(zero_bone[0], zero_bone[2]))
+    zero_bone = np.array([across, zero_bone[1], np.sqrt(max(level**2 - across**2, 0.0))])
+    return quat.mul(standing, quat.between(zero_bone, standing_bone))

@@ -25,7 +25,8 @@ def below_hips(file: Bvh, hips: int) -> Bvh:
 def decode_below(file: Bvh, hips: int, still: float) -> Decoded:
     """Rotations and positions of `below_hips`. The motion of the joints above is added to that of the hips.
 
-    still: see `decode`.
+    still: a joint whose position stays this close to its offset (in the file's unit) does not move relative
+    to its parent.
     """
     decoded = decode(below_hips(file, hips), still)
     if not hips:
@@ -38,8 +39,8 @@ def decode_below(file: Bvh, hips: int, still: float) -> Decoded:
     carrier = decode(part(file, above), 0.0)
     place, turn = carrier.root, carrier.rotations[:, 0]
     for i in range(1, len(above)):
-        arm = carrier.offsets[i] if carrier.translations is None else carrier.translations[:, i]
-        place = place + quat.rotate(turn, arm)
+        offset = carrier.offsets[i] if carrier.translations is None else carrier.translations[:, i]
+        place = place + quat.rotate(turn, offset)
         turn = quat.mul(turn, carrier.rotations[:, i])
     rotations = decoded.rotations.copy()
     rotations[:, 0] = quat.mul(turn, rotations[:, 0])
@@ -50,7 +51,7 @@ def decode_below(file: Bvh, hips: int, still: float) -> Decoded:
 
 
 def part(file: Bvh, joints: list[int]) -> Bvh:
-    """The same file with only some of its joints, parents first. The first becomes the root."""
+    """The same file with only some of its joints. joints: parents before children; the first is the root."""
     new = {old: i for i, old in enumerate(joints)}
     starts = np.cumsum([0, *(len(c) for c in file.channels)])
     columns = [column for j in joints for column in range(starts[j], starts[j + 1])]

@@ -1,8 +1,8 @@
 """Summarises a folder of clips before training: one line for each clip, and notes on all of them.
 
 The cadence is how often the ankles pass each other in a minute. The speed is that of the hips. For steps of a
-given length, the cadence is nearly the same for all people. If a clip contradicts this, a note names a frame
-rate of the file that would explain it.
+given length, the cadence is nearly the same for all people. If a clip contradicts this, a warning names
+a frame rate that would explain it.
 """
 
 from __future__ import annotations
@@ -29,27 +29,30 @@ from hobble.motion.tempo import too_fast
 
 SLOWEST, FASTEST = 40.0, 260.0  # steps a minute of people who walk or run
 RATES = (24, 25, 30, 60, 120, 240)  # usual frame rates of files
-# A clip that plays MOST_OFF times too fast or too slow by its accelerations gets a warning. If its cadence is
-# odd, too, AGREES is enough. Of 163 clips of CMU, styles, patients, Ferre et al. and the original release,
-# 6 get a warning with their true rates, 87 % with twice the rate, 88 % with half, and all with a quarter.
-# HIDDEN: in a clip that plays slower than this, noise hides the accelerations.
+# A clip gets a warning if its accelerations show that it plays MOST_OFF times too fast or too slow. If its
+# cadence is odd, too, AGREES times is enough. Of 163 clips of CMU, the data sets `styles` and `patients`,
+# Ferre et al. and the release of Holden et al. (2017), 6 get a warning at their true rates, 87 % at twice the
+# rate, 88 % at half, and all at a quarter. HIDDEN: in a clip that plays at less than this share of its true
+# speed, noise hides the accelerations.
 MOST_OFF, AGREES, HIDDEN = 1.34, 1.3, 0.41
 STILL = 3.0  # cm a second; slower hips count as standing
 STANDING = 0.5  # seconds; a shorter rest does not count as standing
-STRIDE = 0.25  # least distance of the ankles in a step, in leg lengths
-MANY = 5  # a warning of so many clips or more is printed once for all of them
-# Kind of duplicates -> advice. For other kinds, one of them is enough.
-ENOUGH = {"mirrors of each other": "hold both out or neither"}
+# Leg lengths: a step counts if one ankle passes the other, from half of this behind it to half of this ahead.
+LEAST_STEP = 0.25
+MANY = 5  # a warning that at least this many clips get is printed once for all of them
+# What `same_pairs` says of two duplicates -> advice. For all others, the advice is that one is enough.
+ADVICE = {"mirrors of each other": "hold both out or neither"}
 
 
 @dataclass(frozen=True)
 class ClipSummary:
     """The summary of one clip.
 
-    refused: why it cannot be used; empty if it can. fps: of the file. hips: median height of the hips, cm.
-    speed: of the hips, cm a second. steps: how often the ankles pass each other. cadence: steps a minute.
-    stands: seconds in which the figure stands. off: the joint or limb that differs most from the file after
-    retargeting, and by how many degrees; None if the clip was not retargeted. like: for finding duplicates.
+    refused: why it cannot be used; empty if it can. rig: its name in the clip's report. fps: of the file.
+    hips: median height of the hips, cm. speed: of the hips, cm a second. steps: how often the ankles pass
+    each other. cadence: steps a minute. stands: seconds in which the figure stands. off: the joint or limb
+    that differs most from the file after retargeting, and by how many degrees; None if the clip was not
+    retargeted. digest: for finding duplicates.
     """
 
     name: str
@@ -76,9 +79,10 @@ class FolderSummary:
 
 
 def look(folder: Path, skeleton: Path, maps: Path, options: ClipMotion | None = None) -> FolderSummary:
-    """Summarise each clip of a folder, or one file. Raises InputError if there are none.
+    """Summarise each clip of a folder, or one file. Raises InputError if the folder has no clips.
 
-    options: how the files are read, as in a data set.
+    skeleton: file of the target skeleton. maps: the folder of the skeleton files. options: how the files are
+    read, as in a data set.
     """
     files = [folder] if folder.is_file() else [only_file(n, f) for n, f in sorted(find_clips(folder).items())]
     if not files:
@@ -102,15 +106,15 @@ def _summary_of_file(file: Path, skeleton: Path, maps: Path, options: ClipMotion
         clip, report = make_clip(file, skeleton, maps, file.stem, skeleton.stem, options)
     except HobbleError as error:
         return ClipSummary(file.stem, refused=_without_path(str(error).split("\n")[0], file))
-    return seen(clip, report)
+    return summary_of_clip(clip, report)
 
 
 def _without_path(message: str, file: Path) -> str:
-    """A message about a file without its path, because the clip's name stands before it."""
+    """A message about a file, without the path: in the table, the message follows the clip's name."""
     return message.removeprefix(str(file)).lstrip(":, ")
 
 
-def reported(report: Mapping[str, Any]) -> ClipSummary:
+def summary_of_report(report: Mapping[str, Any]) -> ClipSummary:
     """The summary as far as the clip's report (`motion/<clip>.json`) tells it. The clip is not read."""
     return ClipSummary(
         report["clip"],
@@ -122,7 +126,7 @@ def reported(report: Mapping[str, Any]) -> ClipSummary:
     )
 
 
-def seen(clip: Clip, report: Mapping[str, Any]) -> ClipSummary:
+def summary_of_clip(clip: Clip, report: Mapping[str, Any]) -> ClipSummary:
     """The summary of a clip. report: its `motion/<clip>.json`."""
     hips = clip.positions[:, clip.skeleton.role("hips")]
     path = np.linalg.norm(np.diff(hips[:, [0, 2]], axis=0), axis=-1)
@@ -131,9 +135,9 @@ def seen(clip: Clip, report: Mapping[str, Any]) -> ClipSummary:
     speed, cadence = float(path.sum() / seconds), 60.0 * steps / seconds
     stands = stand_seconds(path * clip.fps, clip.fps)
     moving = max(seconds - stands, 1e-9)
-    known = reported(report)
+    summary = summary_of_report(report)
     return replace(
-        known,
+        summary,
         name=clip.name,
         seconds=seconds,
         hips=float(np.median(hips[:, 1])),
@@ -141,7 +145,7 @@ def seen(clip: Clip, report: Mapping[str, Any]) -> ClipSummary:
         steps=steps,
         cadence=cadence,
         stands=stands,
-        warnings=(*rate_warnings(steps, moving, float(path.sum()), clip, report), *known.warnings),
+        warnings=(*rate_warnings(steps, moving, float(path.sum()), clip, report), *summary.warnings),
         digest=digest(clip, report["sha256"]),
     )
 
@@ -162,7 +166,7 @@ def step_count(clip: Clip) -> int:
     ahead = np.cross(left, [0.0, 1.0, 0.0])
     ahead /= np.maximum(np.linalg.norm(ahead, axis=-1, keepdims=True), 1e-9)
     apart = np.sum((p[:, role("left_heel")] - p[:, role("right_heel")]) * ahead, axis=-1)
-    far = 0.5 * STRIDE * leg_length(clip.skeleton)
+    far = 0.5 * LEAST_STEP * leg_length(clip.skeleton)
     sides = np.sign(apart[np.abs(apart) > far])
     return int(np.count_nonzero(sides[1:] != sides[:-1]))
 
@@ -184,37 +188,37 @@ def rate_warnings(steps: int, moving: float, way: float, clip: Clip, report: Map
     if steps < 2:
         return []
     cadence = 60.0 * steps / moving
-    stride = way / steps
+    step_length = way / steps
     leg = leg_length(clip.skeleton)
     # Cadence grows with step length (Grieve and Gear 1966). With steps of .8 leg lengths it is 110 a minute.
-    usual = 110.0 * np.clip(stride / (0.8 * leg), 0.5, 2.2) ** 0.6
+    usual = 110.0 * np.clip(step_length / (0.8 * leg), 0.5, 2.2) ** 0.6
     fps, found = report["source_fps"], too_fast(clip, steps, report["scale"])
     odd = not (SLOWEST <= cadence <= FASTEST and 0.45 < cadence / usual < 2.2)
     likely = found.likely if found and found.likely > HIDDEN else float(cadence / usual)
     rate = _usual_rate(fps / likely, fps)
     if odd and (found is None or (found.least > AGREES if cadence > usual else found.least < 1 / AGREES)):
         return [
-            f"{cadence:.0f} steps a minute of {stride:.0f} cm are impossible; at {rate} fps they would be "
-            f"{cadence * rate / fps:.0f} (source_fps: {rate})"
+            f"{cadence:.0f} steps a minute of {step_length:.0f} cm are impossible; at {rate} fps they "
+            f"would be {cadence * rate / fps:.0f} (source_fps: {rate})"
         ]
     if found is None or 1 / MOST_OFF < found.least < MOST_OFF:
         return []
     strong = f"{likely**2:.{1 if likely > 1 else 2}f}"
     return [
-        f"The body accelerates {strong} times as strongly as people do in steps of {stride:.0f} cm; at "
+        f"The body accelerates {strong} times as strongly as people do in steps of {step_length:.0f} cm; at "
         f"{rate} fps it would fit (source_fps: {rate})"
     ]
 
 
-def _usual_rate(wanted: float, fps: float) -> int:
-    """The usual frame rate nearest to `wanted`, except the file's own, `fps`."""
-    return min((rate for rate in RATES if rate != fps), key=lambda rate: abs(np.log(rate / wanted)))
+def _usual_rate(ideal: float, fps: float) -> int:
+    """The usual frame rate nearest to `ideal`, except the file's own, `fps`."""
+    return min((rate for rate in RATES if rate != fps), key=lambda rate: abs(np.log(rate / ideal)))
 
 
 def same_notes(clips: Sequence[ClipSummary]) -> list[str]:
     """Sentences on duplicates."""
     pairs = same_pairs([clip.digest for clip in clips if clip.digest is not None])
-    return [f"{a} and {b} are {what}: {ENOUGH.get(what, 'one of them is enough')}." for a, b, what in pairs]
+    return [f"{a} and {b} are {what}: {ADVICE.get(what, 'one of them is enough')}." for a, b, what in pairs]
 
 
 def standing_notes(clips: Sequence[ClipSummary]) -> list[str]:

@@ -1,6 +1,7 @@
-"""Makes the page of a data set before training: a line for each clip, with a small walking figure.
+"""Makes an HTML page on a data set before training: a line for each clip, with a small walking figure.
 
-If there are very many clips, only a sample of them is read. The lines of the others show only their reports.
+If there are very many clips, only a sample of them is read. The lines of the others show only what is in
+their reports.
 """
 
 from __future__ import annotations
@@ -15,14 +16,24 @@ import numpy as np
 
 from hobble.core.clip import Clip
 from hobble.core.quat import Array
-from hobble.motion.look import ClipSummary, reported, same_notes, seen, shared_warnings, standing_notes
+from hobble.motion.look import (
+    ClipSummary,
+    same_notes,
+    shared_warnings,
+    standing_notes,
+    summary_of_clip,
+    summary_of_report,
+)
 from hobble.motion.root import facing
 
 FRAMES, SECONDS = 40, 4.0  # frames of the small figure, and their duration, from the middle of the clip
-MOST_READ, MOST_SECONDS = 600, 5 * 3600.0  # most clips that are read, and their length: 10 MB, half a minute
-MOST_NOTES = 40  # most notes on several clips, such as duplicates
-LABELS = ("cycles", "seconds", "warnings")  # what the page shows of the labels
-GOLDEN = 0.6180339887498949
+# At most this many clips are read, and at most so many seconds of clips. They make a page of 10 MB in half a
+# minute.
+MOST_READ, MOST_SECONDS = 600, 5 * 3600.0
+MOST_NOTES = 40  # at most this many notes on several clips, such as duplicates, are shown
+LABELS = ("cycles", "seconds", "warnings")  # keys of a clip's labels that the page shows
+GOLDEN = 0.6180339887498949  # golden ratio - 1; its multiples, modulo 1, are spread evenly
+# Headings of the columns.
 HEAD = (
     "clip",
     "",
@@ -78,13 +89,17 @@ def _side(clip: Clip, joint: int) -> int:
 
 
 def foot_down(contacts: Array) -> float:
-    """The share of frames in which a heel or toe is down. contacts: (F, 4)."""
+    """The share of frames in which a heel or toe is down. contacts: (F, 4), of both heels and toes."""
     return float((np.asarray(contacts) > 0.5).any(axis=1).mean())
 
 
 @dataclass(frozen=True)
 class _ClipLine:
-    """A line of the page. down: from `foot_down`. figure, down: None if the clip was not read."""
+    """A line of the page.
+
+    look: summary of the clip. labels: the LABELS of the clip. figure: from the function `figure`. down: from
+    `foot_down`. figure, down: None if the clip was not read.
+    """
 
     look: ClipSummary
     labels: Mapping[str, Any]
@@ -104,15 +119,18 @@ def look_page(
     read: index of a clip -> the clip and its contacts (F, 4). It is called for the clips of `chosen`, one
     after another.
     """
-    some = chosen(reports, labels)
-    lines = [_ClipLine(reported(report), labelled) for report, labelled in zip(reports, labels, strict=True)]
-    for n in sorted(some):
+    sample = chosen(reports, labels)
+    lines = [
+        _ClipLine(summary_of_report(report), labelled)
+        for report, labelled in zip(reports, labels, strict=True)
+    ]
+    for n in sorted(sample):
         clip, contacts = read(n)
-        lines[n] = _ClipLine(seen(clip, reports[n]), labels[n], figure(clip), foot_down(contacts))
+        lines[n] = _ClipLine(summary_of_clip(clip, reports[n]), labels[n], figure(clip), foot_down(contacts))
     looks, common = shared_warnings([line.look for line in lines])
     lines = [replace(line, look=look) for line, look in zip(lines, looks, strict=True)]
-    whole = len(some) == len(lines)
-    notes = standing_notes(looks) if whole else [_sample_note(len(some))]
+    whole = len(sample) == len(lines)
+    notes = standing_notes(looks) if whole else [_sample_note(len(sample))]
     notes += [*common, *same_notes(looks)]
     if (more := len(notes) - MOST_NOTES) > 0:
         notes[MOST_NOTES:] = [f"And {more} more notes, most of them on duplicates."]
@@ -122,11 +140,11 @@ def look_page(
 def chosen(reports: Sequence[Mapping[str, Any]], labels: Sequence[Mapping[str, Any]]) -> list[int]:
     """Indices of the clips that are read for the page: all of them, or a sample if there are very many.
 
-    Clips with warnings come first. The others are spread evenly over the names. At least one clip is chosen,
-    if there are any.
+    Clips with warnings come first, up to half of MOST_READ. The others are spread evenly over the list. At
+    least one clip is chosen, if there are any.
     """
     warned = [
-        bool(reported(report).warnings or labelled["warnings"])
+        bool(summary_of_report(report).warnings or labelled["warnings"])
         for report, labelled in zip(reports, labels, strict=True)
     ]
     # In this order, the first n numbers are spread evenly for every n.

@@ -22,19 +22,20 @@ UP = np.array([0.0, 1.0, 0.0])
 def loop_clip(clip: Clip, times: int, heading: float | None = None) -> Clip:
     """The clip repeated `times` times. Each repetition adds the displacement and the turn of one cycle.
 
-    heading: direction of the first cycle, degrees from +Z towards +X; by default as in the clip. The last
-    frame may repeat the first or be the one before it. Raises HobbleError for less than four frames.
+    heading: direction of the first cycle, degrees from +Z towards +X; by default as in the clip. The
+    clip may end with a repetition of its first frame, or one frame earlier. Raises HobbleError for less than
+    four frames.
     """
     if len(clip) < 4:
         raise HobbleError(f"{clip.name}: {len(clip)} frames are too few for a cycle that could be repeated")
     cycle = _open(clip)
-    step = _step_between_cycles(cycle)
+    move = _move_between_cycles(cycle)
     top = _top_speed(clip)
     reach = max(2, min(round(BLEND * clip.fps), len(cycle) // 2))
     while True:
-        looped = _repeat(_blended(cycle, step, reach), step, times)
+        looped = _repeat(_blended(cycle, move, reach), move, times)
         if reach >= len(cycle) // 2 or _seam_speed(looped, len(cycle)) <= FASTEST * top:
-            return looped if heading is None else _headed(looped, step, np.radians(heading))
+            return looped if heading is None else _headed(looped, move, np.radians(heading))
         reach = min(2 * reach, len(cycle) // 2)
 
 
@@ -64,7 +65,7 @@ def _yaw(clip: Clip, frame: int) -> float:
     return float(np.arctan2(ahead[0], ahead[2]))
 
 
-def _step_between_cycles(cycle: Clip) -> tuple[float, Array]:
+def _move_between_cycles(cycle: Clip) -> tuple[float, Array]:
     """The movement from one cycle to the next: a turn about Y in radians, then a shift (3,) in cm."""
     turn = (_yaw(cycle, -1) - _yaw(cycle, 0) + np.pi) % (2 * np.pi) - np.pi
     turn = float(turn) if abs(turn) > TURNING else 0.0
@@ -74,16 +75,16 @@ def _step_between_cycles(cycle: Clip) -> tuple[float, Array]:
     return turn, shift * [1, 0, 1]
 
 
-def _blended(cycle: Clip, step: tuple[float, Array], reach: int) -> Clip:
+def _blended(cycle: Clip, move: tuple[float, Array], reach: int) -> Clip:
     """The cycle with ends that fit together: half of their difference is removed at each end.
 
     The change fades over `reach` frames.
     """
-    turn, frames = step[0], len(cycle)
+    turn, frames = move[0], len(cycle)
     first = cycle.rotations[0].copy()
     first[0] = quat.mul(quat.yaw(turn), first[0])
     last = quat.slerp(cycle.rotations[-2], cycle.rotations[-1], np.array(2.0))
-    parts = quat.log(quat.mul(quat.inv(last), first))
+    gaps = quat.log(quat.mul(quat.inv(last), first))
     height = cycle.root[0, 1] - (2 * cycle.root[-1, 1] - cycle.root[-2, 1])
     n = np.arange(frames)
     before, after = np.clip(1 - (frames - n) / reach, 0, 1), np.clip(1 - n / reach, 0, 1)
@@ -92,7 +93,7 @@ def _blended(cycle: Clip, step: tuple[float, Array], reach: int) -> Clip:
     moved = cycle.translations
     return replace(
         cycle,
-        rotations=quat.mul(cycle.rotations, quat.exp(weight[:, None, None] * parts)),
+        rotations=quat.mul(cycle.rotations, quat.exp(weight[:, None, None] * gaps)),
         root=root,
         translations=None if moved is None else moved + weight[:, None, None] * (moved[0] - moved[-1]),
     )
@@ -102,8 +103,8 @@ def _eased(x: Array) -> Array:
     return x * x * (3 - 2 * x)
 
 
-def _repeat(cycle: Clip, step: tuple[float, Array], times: int) -> Clip:
-    turn, shift = step
+def _repeat(cycle: Clip, move: tuple[float, Array], times: int) -> Clip:
+    turn, shift = move
     rotations, roots = [], []
     place = np.zeros(3)
     for k in range(times):
@@ -122,9 +123,9 @@ def _repeat(cycle: Clip, step: tuple[float, Array], times: int) -> Clip:
     )
 
 
-def _headed(clip: Clip, step: tuple[float, Array], heading: float) -> Clip:
+def _headed(clip: Clip, move: tuple[float, Array], heading: float) -> Clip:
     """The clip turned about its start so that a cycle goes in the direction `heading`."""
-    shift = step[1]
+    shift = move[1]
     if np.hypot(shift[0], shift[2]) < 1.0:
         return clip
     return turned(clip, heading - float(np.arctan2(shift[0], shift[2])))

@@ -27,10 +27,10 @@ from hobble.motion.root import facing
 from hobble.motion.tilt import check_tilt
 from hobble.motion.upright_rest import upright
 
-SAME = 1e-3  # cm; offsets that differ less from those of the skeleton count as equal
+SAME = 1e-3  # cm: offsets that differ from the target skeleton's by less count as equal
 
-KEPT = "Movements of joints in their parents were kept."
-DROPPED = "Movements of joints in their parents were dropped, because the bone lengths changed."
+KEPT = "Movements of joints relative to their parents were kept."
+DROPPED = "Movements of joints relative to their parents were dropped, because the bone lengths changed."
 
 
 def make_clip(
@@ -43,8 +43,9 @@ def make_clip(
 ) -> tuple[Clip, dict[str, Any]]:
     """Read a BVH file, check it, and convert it to the skeleton at the frame rate of `options`.
 
-    skeleton: the target's file. maps: the folder of the skeleton files. clip: name of the new clip. options:
-    the `motion` section of the data set, with the values of the clip's entry.
+    skeleton: file of the target skeleton. maps: the folder of the skeleton files. clip: name of the new clip.
+    skeleton_name: name of the target skeleton. options: the `motion` section of the data set, with the values
+    of the clip's entry.
 
     Returns the clip and its report (the content of `motion/<clip>.json`). Raises InputError for a file
     that cannot be read, for an unsuitable skeleton, and for defects that cannot be repaired; with
@@ -56,29 +57,29 @@ def make_clip(
     _check_length(file, source.clip, target.skeleton, options)
     resampled = resample(source.clip, options.fps)
     fitted = fit_skeleton(resampled, source, target.skeleton, options.proportions)
-    if fitted.figures is not None:
-        check(file.path, fitted.figures, source.match.rig)
+    if fitted.difference is not None:
+        check(file.path, fitted.difference, source.match.rig)
     leave = options.defects == "leave"
     check_knees(file.path, fitted.clip, leave or options.handedness != "auto")
     doubtful_pace = check_pace(file.path, fitted.clip, leave)
     check_tilt(file.path, fitted.clip, leave or options.up != "auto")
-    made, repairs, loops = fitted.clip, source.repairs + fitted.repairs, options.loops
+    new_clip, repairs, loops = fitted.clip, source.repairs + fitted.repairs, options.loops
     if loops > 1:
-        made = loop_clip(made, loops, options.heading)
-        frames = len(made) // loops
+        new_clip = loop_clip(new_clip, loops, options.heading)
+        frames = len(new_clip) // loops
         repairs.append(f"The cycle of {frames} frames was repeated {loops} times, with blended seams.")
     if options.facing is not None:
-        made = turned(made, np.radians(options.facing) - first_facing(made))
-    made = replace(made, name=clip)
-    _check_finite(file, made)
+        new_clip = turned(new_clip, np.radians(options.facing) - first_facing(new_clip))
+    new_clip = replace(new_clip, name=clip)
+    _check_finite(file, new_clip)
     extra: dict[str, Any] = {
         "loops": loops,
-        "cycle_frames": len(made) // loops,
+        "cycle_frames": len(new_clip) // loops,
         "scale": fitted.scale,
-        "retarget": fitted.figures,
+        "retarget": fitted.difference,
         "unsure": fitted.unsure + ([doubtful_pace] if doubtful_pace else []),
     }
-    return made, _report(file, source, made) | extra | {"repairs": repairs, "notes": source.notes}
+    return new_clip, _report(file, source, new_clip) | extra | {"repairs": repairs, "notes": source.notes}
 
 
 def _check_length(file: Bvh, clip: Clip, target: Skeleton, options: ClipMotion) -> None:
@@ -135,43 +136,48 @@ def resample(clip: Clip, fps: float) -> Clip:
 class Fitted:
     """A clip on the joints of the target.
 
-    scale: of its path. repairs: sentences on what was changed. figures: its difference from the source
-    (`hobble.motion.check_retarget.compare`), or None if it was not retargeted. unsure: sentences on what is
-    uncertain.
+    scale: length of its path / length of the source's path. repairs: sentences on what was changed.
+    difference: how the clip differs from the source (from `hobble.motion.check_retarget.compare`), or None if
+    it was not retargeted.
+    unsure: sentences on what is uncertain.
     """
 
     clip: Clip
     scale: float
     repairs: list[str]
-    figures: dict[str, Any] | None = None
+    difference: dict[str, Any] | None = None
     unsure: list[str] = field(default_factory=list)
 
 
 def fit_skeleton(clip: Clip, source: FileMotion, target: Skeleton, proportions: str) -> Fitted:
     """The clip's motion on the target skeleton, or on its joints with the clip's own bone lengths.
 
-    clip: that of `source` at the new frame rate. proportions: see `MotionOptions`.
+    clip: that of `source` at the new frame rate. proportions: "skeleton" for the target's bone lengths,
+    "clip" to keep the clip's own where possible.
     """
     match = source.match
     if match.same:
-        own = _reordered(clip, np.array([clip.skeleton.index(name) for name in target.joints]), target)
-        same = np.abs(own.skeleton.offsets - target.offsets).max() <= SAME
+        reordered = _reordered(clip, np.array([clip.skeleton.index(name) for name in target.joints]), target)
+        same = np.abs(reordered.skeleton.offsets - target.offsets).max() <= SAME
         if same or proportions == "clip":
-            own = replace(own, skeleton=target) if same else own
-            return Fitted(own, 1.0, [KEPT] if source.moving else [])
+            reordered = replace(reordered, skeleton=target) if same else reordered
+            return Fitted(reordered, 1.0, [KEPT] if source.moving else [])
     sources, unsure = match.sources, source.unsure
     if not source.straightened:
-        wanted = {clip.skeleton.index(name) for name in sources.values()}
-        standing = upright(clip, body_by_roles(clip.skeleton), target, wanted)
+        followed_joints = {clip.skeleton.index(name) for name in sources.values()}
+        standing = upright(clip, body_by_roles(clip.skeleton), target, followed_joints)
         clip, unsure = standing.clip, unsure + standing.notes
-        sources = {mine: theirs for mine, theirs in sources.items() if theirs in clip.skeleton.joints}
-    how = plan(clip.skeleton, target, sources)
+        sources = {joint: followed for joint, followed in sources.items() if followed in clip.skeleton.joints}
+    retargeting = plan(clip.skeleton, target, sources)
     repairs = [DROPPED] if source.moving else []
     if proportions == "clip":
-        rig = "another" if match.rig == FOUND else match.rig
-        repairs.append(f"Its rig is {rig}, so it got the bone lengths of {target.name}.")
-    made = retarget_clip(clip, how)
-    return Fitted(made, round(how.scale, 6), repairs, compare(clip, made, how.scale), unsure)
+        rig = "unknown" if match.rig == FOUND else match.rig
+        why = f"Its rig is {rig}, so it could not keep its own bone lengths"
+        repairs.append(f"{why}. It got the bone lengths of {target.name}.")
+    new_clip = retarget_clip(clip, retargeting)
+    return Fitted(
+        new_clip, round(retargeting.scale, 6), repairs, compare(clip, new_clip, retargeting.scale), unsure
+    )
 
 
 def _reordered(clip: Clip, order: Array, target: Skeleton) -> Clip:
@@ -181,18 +187,18 @@ def _reordered(clip: Clip, order: Array, target: Skeleton) -> Clip:
     return Clip(clip.name, skeleton, clip.fps, clip.rotations[:, order], clip.root, translations)
 
 
-def _report(file: Bvh, source: FileMotion, made: Clip) -> dict[str, Any]:
+def _report(file: Bvh, source: FileMotion, new_clip: Clip) -> dict[str, Any]:
     return {
-        "clip": made.name,
+        "clip": new_clip.name,
         "source": file.path.name,
         "sha256": file.sha256,
         "bytes": file.bytes,
         "source_frames": len(file),
         "source_start": source.first_frame,
         "source_fps": source.clip.fps,
-        "frames": len(made),
-        "seconds": round(len(made) / made.fps, 3),
-        "facing": round(float(np.degrees(first_facing(made))), 1) + 0.0,
+        "frames": len(new_clip),
+        "seconds": round(len(new_clip) / new_clip.fps, 3),
+        "facing": round(float(np.degrees(first_facing(new_clip))), 1) + 0.0,
         "unit": source.unit,
         "unit_name": source.unit_name,
         "up": source.axes.up,

@@ -12,19 +12,20 @@ from hobble.core.clip import Clip
 from hobble.core.errors import HobbleError
 from hobble.core.skeleton import Skeleton, other_side
 
-FLIP = np.array([-1.0, 1.0, 1.0])
+FLIP = np.array([-1.0, 1.0, 1.0])  # times a position: the position mirrored in the plane x = 0
 
 
 def mirror_skeleton(skeleton: Skeleton) -> Skeleton:
-    """The skeleton with left and right offsets swapped. A symmetric skeleton is returned unchanged.
+    """The skeleton with left and right swapped. A symmetric skeleton is returned unchanged.
 
-    Raises HobbleError if the counterparts of a joint and its parent are not joint and parent.
+    Raises HobbleError if the parents of two counterparts (such as left and right knee) are not counterparts.
     """
     swap = skeleton.mirror_joints
     for j, p in enumerate(skeleton.parents):
         if p >= 0 and skeleton.parents[swap[j]] != swap[p]:
             a, b = skeleton.joints[j], skeleton.joints[swap[j]]
-            raise HobbleError(f"skeleton {skeleton.name} cannot be mirrored: {a} and {b} hang differently")
+            why = f"the parents of {a} and {b} are not each other's counterparts"
+            raise HobbleError(f"skeleton {skeleton.name} cannot be mirrored: {why}")
     ends = {}
     for name in skeleton.end_sites:
         x, y, z = skeleton.end_sites.get(other_side(name), skeleton.end_sites[name])

@@ -13,15 +13,15 @@ from hobble.motion.body import SIDES
 from hobble.motion.names import are_twins, side_of
 from hobble.motion.orient import unit
 
-SAMPLES = 150  # frames of the clip that are looked at
+SAMPLES = 150  # at most this many frames of the clip are looked at
 ALIKE = 0.15  # largest relative difference of length between a bone and its counterpart
-FEWEST = 3  # fewest joints of a limb
-LEAST = 0.1  # least length of a limb, as a share of the size of the body, which includes wings and swords
+FEWEST = 3  # least number of joints of a limb
+LEAST = 0.1  # least length of a limb, as a share of `MovingRig.size`, which includes wings and swords
 
 
 @dataclass(frozen=True)
 class LimbPair:
-    """Two equal chains of joints below joint `hub`, from the trunk outward. length: that of each chain."""
+    """Two equal chains of joints below joint `hub`, from the trunk outward. length: of each chain."""
 
     hub: int
     chains: tuple[tuple[int, ...], tuple[int, ...]]
@@ -39,8 +39,8 @@ class MovingRig:
     @cached_property
     def at(self) -> Array:
         """(S, J, 3) positions in a sample of frames."""
-        every = np.unique(np.linspace(0, len(self.positions) - 1, SAMPLES).round().astype(int))
-        return self.positions[every]
+        sampled = np.unique(np.linspace(0, len(self.positions) - 1, SAMPLES).round().astype(int))
+        return self.positions[sampled]
 
     @cached_property
     def lengths(self) -> Array:
@@ -50,12 +50,12 @@ class MovingRig:
 
     @cached_property
     def size(self) -> float:
-        """The largest extent of the body, in the file's unit."""
+        """The diagonal of the box around all joints, in the file's unit (median over the sample)."""
         return float(np.median(np.linalg.norm(np.ptp(self.at, axis=1), axis=-1)))
 
     @cached_property
     def children(self) -> list[list[int]]:
-        """The joints below each joint."""
+        """The child joints of each joint."""
         out: list[list[int]] = [[] for _ in self.names]
         for j, p in enumerate(self.parents):
             if p >= 0:
@@ -63,7 +63,7 @@ class MovingRig:
         return out
 
     def alike(self, a: int, b: int) -> bool:
-        """Whether two bones, by their names and lengths, can be each other's counterparts."""
+        """Whether the bones that end at joints `a` and `b` can be counterparts, by name and length."""
         sides = {side_of(self.names[a]), side_of(self.names[b])}
         if None not in sides and len(sides) == 1:
             return False

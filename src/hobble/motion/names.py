@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Sequence
 
+# Words for left and right, in several languages.
 LEFT = {
     "left",
     "l",
@@ -22,8 +23,9 @@ LEFT = {
 LEFT |= {"izquierdo", "sinistra", "sinistro", "sx", "hidari", "esq", "esquerda", "izq"}
 RIGHT = {"right", "r", "rgt", "rt", "rght", "rechts", "rechte", "rechter", "rechtes", "droite", "droit"}
 RIGHT |= {"derecha", "derecho", "destra", "destro", "dx", "migi", "dir", "direita", "der"}
-# Longer words first, because "forearm" contains "arm". The meaning of `shoulder`, `arm`, `hip` and `leg`
-# depends on the other joints of the limb: see `limb_parts`.
+# Parts of the body and the words for each. The first match counts, so longer words come first: "forearm"
+# contains "arm". The meaning of `shoulder`, `arm`, `hip` and `leg` depends on the other joints of the limb:
+# see `limb_parts`.
 WORDS = (
     ("twist", ("twist", "roll", "tweak", "helper", "corrective", "muscle")),
     (
@@ -77,7 +79,7 @@ ENDS = ("end", "nub", "site", "tip", "top")  # joints that only mark the end of 
 
 
 def words(name: str) -> list[str]:
-    """The words of a name in lower case, split at capitals, digits and signs.
+    """The words of a name in lower case, split at capitals, digits and signs such as "_".
 
     >>> words("mixamorig:LeftUpLeg"), words("Bip01 L Thigh"), words("DEF-shin.R.001"), words("lShin")
     (['mixamorig', 'left', 'up', 'leg'], ['bip', 'l', 'thigh'], ['def', 'shin', 'r'], ['l', 'shin'])
@@ -86,7 +88,7 @@ def words(name: str) -> list[str]:
 
 
 def side_of(name: str) -> str | None:
-    """ "left", "right" or None.
+    """The side that a name says: "left" or "right", or None if it says neither or both.
 
     >>> side_of("LeftUpLeg"), side_of("thigh.R"), side_of("rForeArm"), side_of("LLeg"), side_of("Spine")
     ('left', 'right', 'right', 'left', None)
@@ -102,9 +104,10 @@ def side_of(name: str) -> str | None:
 
 
 def side_of_pair(name: str, other: str) -> str | None:
-    """The side of a joint, by its own name and that of its counterpart. None if the names do not say.
+    """The side of a joint, by its own name and the name of its counterpart on the other side of the body.
 
-    Two names that differ only in one letter say more together than each alone.
+    None if the names do not say it. Two names that differ only in one letter may say it together, though
+    neither says it alone.
 
     >>> side_of_pair("lfemur", "rfemur"), side_of_pair("toe_r2", "toe_l2"), side_of_pair("armA", "armB")
     ('left', 'right', None)
@@ -139,14 +142,14 @@ def _without_side(name: str) -> list[str]:
 
 
 def part_of(name: str) -> str | None:
-    """The part of the body that a name means: the first of a pair in WORDS, or None.
+    """The part of the body that a name means: the first in WORDS with a word that the name contains, or None.
 
     >>> part_of("LeftForeArm"), part_of("RightShoulder"), part_of("Bip01 R Calf"), part_of("qwertz")
     ('forearm', 'shoulder', 'shank', None)
     """
     text = "".join(w for w in words(name) if w not in LEFT | RIGHT)
-    for part, known in WORDS:
-        if any(word in text for word in known):
+    for part, spellings in WORDS:
+        if any(word in text for word in spellings):
             return part
     return None
 
@@ -157,12 +160,12 @@ def is_end(name: str) -> bool:
 
 
 def is_control(name: str) -> bool:
-    """Whether a name says that the joint is no part of the body but controls one, like foot_ik.L."""
+    """Whether a name says that the joint is not part of the body but moves other joints, like foot_ik.L."""
     return any(w in CONTROLS for w in words(name))
 
 
 def limb_parts(names: Sequence[str]) -> dict[str, int]:
-    """The parts of a limb, by names alone. names: of the joints along the limb, from the trunk outward.
+    """The parts of a limb, by names alone. names: the names of its joints, from the trunk outward.
 
     Returns part -> index in `names`, as far as the names say. The parts are thigh, shank, foot and toe, or
     clavicle, upperarm, forearm and hand.

@@ -1,6 +1,6 @@
 """Finds how far the chest leans on a rig without a joint between chest and head.
 
-On other rigs the neck shows it. On these rigs a neck is assumed that leans as far as people's necks do.
+On other rigs the neck shows it. Here a neck is assumed that leans as far as people's necks do on average.
 """
 
 from __future__ import annotations
@@ -14,8 +14,8 @@ from hobble.motion.orient import unit
 from hobble.motion.spine import SHORT
 
 # Radians by which the first bone of a person's neck leans forward: from the vertical in a standing zero pose
-# (AHEAD), and from the line between chest and head (AHEAD_OF_HEAD). Means, and standard deviations (ERROR),
-# over seven subjects of CMU.
+# (AHEAD), and from the line between chest and head (AHEAD_OF_HEAD). These are means over seven subjects of
+# CMU. Each _ERROR is the standard deviation.
 AHEAD, AHEAD_ERROR = np.radians(5.4), np.radians(2.6)
 AHEAD_OF_HEAD, AHEAD_OF_HEAD_ERROR = np.radians(5.6), np.radians(3.9)
 
@@ -32,8 +32,8 @@ def lacks_neck(sample: BodySample) -> bool:
 def neck_bone(sample: BodySample, left: Array, zero: Array | None) -> Array:
     """(3,) direction of the assumed neck, in the chest's coordinates.
 
-    left: (3,) the body's left in the chest's coordinates. zero: (4,) the rotation of the chest's axes in a
-    standing zero pose, or None.
+    left: (3,) the body's left in the chest's coordinates. zero: (4,) rotation from the axes of a standing
+    figure to those of the chest, from the zero pose, or None if nobody could stand in that pose.
     """
     if zero is not None:
         return quat.rotate(zero, np.array([0.0, np.cos(AHEAD), np.sin(AHEAD)]))
@@ -42,7 +42,7 @@ def neck_bone(sample: BodySample, left: Array, zero: Array | None) -> Array:
 
 
 def lean_doubt(sample: BodySample, zero: bool) -> str | None:
-    """A sentence that the lean of the chest is uncertain, on a rig without a neck; None if it is known.
+    """A warning that the lean of the chest is uncertain if the rig has no neck, else None.
 
     zero: whether a person could stand in the zero pose.
     """
@@ -51,6 +51,6 @@ def lean_doubt(sample: BodySample, zero: bool) -> str | None:
     body, error = sample.body, AHEAD_ERROR if zero else AHEAD_OF_HEAD_ERROR
     arm = float(np.mean([sample.length(body.chest, arm[1]) for arm in body.arms.values()]))
     return (
-        "It has no joint for the neck, so how far the chest leans is uncertain: arms may lie "
+        "The rig has no joint for the neck, so how far the chest leans is uncertain: arms may lie "
         f"{2 * error * arm:.0f} cm too far forward or back."
     )

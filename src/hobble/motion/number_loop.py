@@ -1,4 +1,4 @@
-"""The compiled loop of `hobble.motion.read_numbers`."""
+"""The compiled loop with which `hobble.motion.read_numbers` reads the table of numbers in a BVH file."""
 
 from __future__ import annotations
 
@@ -11,55 +11,57 @@ from hobble.core.compiled import njit
 EXACT = np.uint64(1 << 53)  # a double holds every integer up to this one exactly
 MOST_POWER = 22  # a double holds every power of ten up to this one exactly
 POWERS = np.array([float(f"1e{power}") for power in range(MOST_POWER + 1)])
-MOST_DIGITS = 18  # so many digits fit into an integer of 64 bits
-FARTHEST = 400  # larger exponents are left to Python; no double has them
-NONE, END_OF_LINE, END, OTHER = range(4)
-ZERO, TEN = np.uint8(48), np.uint64(10)
+MOST_DIGITS = 18  # every integer with this many digits fits into 64 bits
+LARGEST_EXPONENT = 400  # no double has a larger exponent; numbers with a larger one are left to Python
+NUMBER, END_OF_LINE, END, OTHER = range(4)  # what can follow blanks
+TEN = np.uint64(10)
+# ASCII codes.
+ZERO = np.uint8(48)
 PLUS, MINUS, POINT, SMALL_E, LARGE_E = 43, 45, 46, 101, 69
 TAB, LINE_FEED, RETURN, SPACE = 9, 10, 13, 32
 
 
 @njit(error_model="numpy")
 def read_lines(data: Any, at: int, table: Any, long: Any) -> tuple[int, int]:
-    """Read lines of data (n,) from `at` on into table (F, width).
+    """Read the lines of data (n,), the bytes of a file, from `at` on into table (F, width).
 
-    Returns the number of lines, or -1 if something is unusual (see `read_numbers`), and how many numbers are
-    too long to be read here. For each of these, its index in the flat table and its begin and end in data are
-    written to long (m, 3).
+    Returns the number of lines, or -1 if something is unusual (as `read_numbers` lists it), and how many
+    numbers are too long to be read here. For each of the long numbers, its index in the flat table and its
+    begin and end in data are written to long (m, 3).
     """
     rows, width = table.shape
-    row, column, found = 0, 0, 0
+    row, column, long_count = 0, 0, 0
     while True:
         at, met = _to_next(data, at)
         if met == OTHER:
-            return -1, found
-        if met != NONE:
+            return -1, long_count
+        if met != NUMBER:
             if column != 0:
                 if column != width:
-                    return -1, found
+                    return -1, long_count
                 row, column = row + 1, 0
             if met == END:
-                return row, found
+                return row, long_count
             continue
         if row == rows or column == width:
-            return -1, found
+            return -1, long_count
         value, end, exact = _number(data, at)
         if end < 0:
-            return -1, found
+            return -1, long_count
         table[row, column] = value
         if not exact:
-            if found == len(long):
-                return -1, found
-            long[found, 0], long[found, 1], long[found, 2] = row * width + column, at, end
-            found += 1
+            if long_count == len(long):
+                return -1, long_count
+            long[long_count, 0], long[long_count, 1], long[long_count, 2] = row * width + column, at, end
+            long_count += 1
         at, column = end, column + 1
 
 
 @njit(inline="always")
 def _to_next(data: Any, at: int) -> tuple[int, int]:
-    """Skip blanks. Returns the next place, and what is there: NONE for a number, END_OF_LINE, END or OTHER.
+    """Skip blanks. Returns the next place, and what is there: NUMBER, END_OF_LINE, END (of data) or OTHER.
 
-    The place after an END_OF_LINE is the start of the next line.
+    For an END_OF_LINE, the place is the start of the next line.
     """
     size = len(data)
     while at < size and (data[at] == SPACE or data[at] == TAB):
@@ -72,12 +74,12 @@ def _to_next(data: Any, at: int) -> tuple[int, int]:
         if at + 1 < size and data[at + 1] == LINE_FEED:
             return at + 2, END_OF_LINE
         return at, OTHER
-    return at, NONE
+    return at, NUMBER
 
 
 @njit(inline="always")
 def _number(data: Any, at: int) -> tuple[float, int, bool]:
-    """The number at `at`, where it ends (-1 if it is none), and whether it is exact."""
+    """The number at `at`, where it ends (-1 if there is no number), and whether it is exact."""
     size = len(data)
     negative = data[at] == MINUS
     if negative or data[at] == PLUS:
@@ -107,14 +109,17 @@ def _number(data: Any, at: int) -> tuple[float, int, bool]:
     exact: Any = digits <= MOST_DIGITS and whole <= EXACT and -MOST_POWER <= power <= MOST_POWER
     value = 0.0
     if exact:
-        of = np.float64(whole)
-        value = of / POWERS[-power] if power < 0 else of * POWERS[power]
+        integer = np.float64(whole)
+        value = integer / POWERS[-power] if power < 0 else integer * POWERS[power]
     return (-value if negative else value), at, exact
 
 
 @njit(inline="always")
 def _exponent(data: Any, at: int) -> tuple[int, int]:
-    """The exponent at `at`, and where it ends (-1 if there is no digit). Above FARTHEST it is not exact."""
+    """The exponent at `at`, and where it ends (-1 if there is no digit).
+
+    Above LARGEST_EXPONENT, the number returned may be too small, but not below that limit.
+    """
     size = len(data)
     negative = at < size and data[at] == MINUS
     if at < size and (negative or data[at] == PLUS):
@@ -122,7 +127,7 @@ def _exponent(data: Any, at: int) -> tuple[int, int]:
     shift: Any = np.int64(0)
     begin = at
     while at < size and np.uint8(data[at] - ZERO) <= 9:
-        if shift < FARTHEST:
+        if shift < LARGEST_EXPONENT:
             shift = 10 * shift + np.int64(np.uint8(data[at] - ZERO))
         at += 1
     return (-shift if negative else shift), (at if at > begin else -1)

@@ -12,7 +12,7 @@ from hobble.core.section import Finite, Ground, MocapPath, Positive, PositiveFlo
 
 
 def _sixty(fps: float) -> float:
-    """Refuse other rates than 60 Hz: windows, speeds, thresholds and the character are based on it."""
+    """Refuse other rates than 60 Hz: windows, speeds, thresholds and the character are based on 60 Hz."""
     if fps != 60.0:
         raise ValueError("clips must have 60 frames a second, whatever the rate of their files")
     return fps
@@ -21,14 +21,16 @@ def _sixty(fps: float) -> float:
 SixtyHz = Annotated[float, AfterValidator(_sixty)]
 
 
-PADDING = re.compile(r"(?:.?[<>^])?\d{0,2}")  # wider names are no file names
+# Format that may follow a name in `url`, such as 0>3 in {subject:0>3}: fill, alignment, and a width of up to
+# 99 characters, because no file name needs more.
+PADDING = re.compile(r"(?:.?[<>^])?\d{0,2}")
 
 
 class Download(Section):
     """Where to download clips that are not in the user's folder."""
 
     url: str = Field(
-        description="address of a clip; {clip} is its name, {subject} the part before the first _"
+        description="address of a clip; {clip} is its name, {subject} the part of its name before the first _"
     )
     checksums: MocapPath = Field(
         description="file of SHA-256 sums, as sha256sum writes them, in the folder of the data set's file"
@@ -37,16 +39,16 @@ class Download(Section):
     @model_validator(mode="after")
     def _url_of_a_clip(self) -> Download:
         try:
-            parts = [part for part in Formatter().parse(self.url) if part[1] is not None]
-            fields = {name for _, name, _, _ in parts}
-            if any(how or not PADDING.fullmatch(spec or "") for _, _, spec, how in parts):
+            braces = [found for found in Formatter().parse(self.url) if found[1] is not None]
+            fields = {name for _, name, _, _ in braces}
+            if any(conversion or not PADDING.fullmatch(spec or "") for _, _, spec, conversion in braces):
                 raise ValueError("only a width of up to 99 may follow a name, as in {subject:0>3}")
-            made = self.url.format(clip="02_01", subject="02")
+            example = self.url.format(clip="02_01", subject="02")
         except (ValueError, LookupError, AttributeError) as error:
             raise ValueError(f"url: {error}") from None
         if not fields <= {"clip", "subject"} or "clip" not in fields:
             raise ValueError("url: must contain {clip}, may contain {subject}, and nothing else in braces")
-        if not re.fullmatch(r"https?://[^/\s]+/\S+", made) or not made.isprintable():
+        if not re.fullmatch(r"https?://[^/\s]+/\S+", example) or not example.isprintable():
             raise ValueError("url: must be an address like https://host/{subject}/{clip}.bvh")
         return self
 
@@ -58,7 +60,9 @@ class MotionOptions(Section):
     """
 
     fps: SixtyHz = Field(60.0, description="frames a second of the clips; must be 60")
-    source_fps: PositiveFloat | None = Field(None, description="overrides the files' Frame Time")
+    source_fps: PositiveFloat | None = Field(
+        None, description="frames a second of the files; overrides their Frame Time"
+    )
     unit: Literal["auto"] | PositiveFloat = Field("auto", description="centimetres per unit of the file")
     up: Literal["auto", "Y", "Z"] = "auto"
     handedness: Literal["auto", "right", "left"] = Field(
@@ -68,7 +72,8 @@ class MotionOptions(Section):
     )
     facing: Finite | None = Field(
         None,
-        description="first facing direction, degrees from +Z towards +X; by default as in the file",
+        description="facing direction in the first frame, degrees from +Z towards +X; by default as in the "
+        "file",
     )
     proportions: Literal["skeleton", "clip"] = Field(
         "skeleton", description="retarget onto the skeleton's bone lengths, or keep each clip's own"
@@ -76,19 +81,22 @@ class MotionOptions(Section):
     defects: Literal["repair", "refuse", "leave"] = Field(
         "repair",
         description="what to do with broken frames and a floor off height 0. `repair` mends and reports "
-        "them, `refuse` ends the run, `leave` takes the clip as it is, like the original code",
+        "them, `refuse` stops with an error, `leave` takes the clip as it is, like the code of Holden et al.",
     )
     accept_doubt: bool = Field(
         False,
-        description="accept a clip even if nothing in its file shows the height of the figure to 3 cm",
+        description="accept a clip even if nothing in its file shows, to within 3 cm, how high the figure "
+        "stands",
     )
-    loops: Positive = Field(1, description="how often a clip of one short cycle is repeated")
+    loops: Positive = Field(1, description="how many times a clip of one short cycle is played in a row")
     heading: Finite | None = Field(
-        None, description="direction of a looped clip, degrees from +Z towards +X; by default as in the file"
+        None,
+        description="direction in which a looped clip walks, degrees from +Z towards +X; by default as in "
+        "the file",
     )
 
 
 class ClipMotion(MotionOptions):
-    """The section for one clip. Values of the clip's entry in the data set override the section."""
+    """The options for one clip: the section `motion`, overridden by the clip's own entry in the data set."""
 
     ground: Ground = Field("flat", description="the clip's ground; a flat floor is moved to height 0")

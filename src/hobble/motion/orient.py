@@ -19,7 +19,7 @@ def degrees_between(a: Array, b: Array) -> float:
 
 
 def frame(first: Array, axis: Array, second: Array, other: Array) -> Array:
-    """(4,) the rotation that turns `axis` to `first`, and `other` as near as possible to `second`."""
+    """The rotation (4,) that turns `axis` to `first`, and then `other` as near to `second` as possible."""
     return quat.from_matrix(_axes(first, second) @ _axes(axis, other).T)
 
 
@@ -31,18 +31,23 @@ def _axes(first: Array, second: Array) -> Array:
     return np.stack([x, y, np.cross(x, y)], axis=1)
 
 
-def snapped_to_axes(frame: Array) -> Array:
-    """The rotation `frame` (4,), or the nearest one that permutes the axes if it is within 20 degrees."""
-    axes = quat.to_matrix(frame)
-    whole = np.round(axes)
-    if np.all(np.abs(whole).sum(axis=0) == 1) and np.sum(axes * whole, axis=0).min() > np.cos(np.radians(20)):
-        return quat.from_matrix(whole)
-    return frame
+def snapped_to_axes(rotation: Array) -> Array:
+    """A rotation (4,), made exact if it almost maps the X, Y and Z axes onto one another.
+
+    "Almost" means that each axis comes to within 20 degrees of an axis (in either direction). Any other
+    rotation is returned unchanged.
+    """
+    axes = quat.to_matrix(rotation)
+    snapped = np.round(axes)
+    near = np.sum(axes * snapped, axis=0).min() > np.cos(np.radians(20))
+    if np.all(np.abs(snapped).sum(axis=0) == 1) and near:
+        return quat.from_matrix(snapped)
+    return rotation
 
 
-def pointed_along(whole: Array, axis: Array, bone: Array) -> Array:
-    """The rotation `whole` (4,), changed as little as possible so that it turns `axis` to the bone."""
-    return quat.mul(quat.between(quat.rotate(whole, axis), bone), whole)
+def pointed_along(rotation: Array, axis: Array, bone: Array) -> Array:
+    """A rotation (4,), changed as little as possible to turn `axis` to the direction of `bone` (3,)."""
+    return quat.mul(quat.between(quat.rotate(rotation, axis), bone), rotation)
 
 
 def robust_mean(vectors: Array) -> Array:

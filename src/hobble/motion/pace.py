@@ -14,33 +14,36 @@ from hobble.core.clip import Clip
 from hobble.core.errors import InputError
 from hobble.motion.rig import leg_length
 
-# Allowed quotients: speed of the hips / speed of the lower foot relative to the hips. In 172 clips of CMU,
-# styles, patients, Ferre et al. and the original release it is .88 to 1.17.
-LEAST, MOST = 0.5, 1.7
-# Percentiles of the foot's speed relative to the hips. The higher ones are of the standing foot.
+# Allowed range of the quotient: speed of the hips / speed of the lower foot relative to the hips. It is .88
+# to 1.17 in 172 clips of CMU, Holden et al. (2017) and Ferre et al., and of the data sets `styles` and
+# `patients` (config/datasets).
+LEAST_QUOTIENT, MOST_QUOTIENT = 0.5, 1.7
+# Percentiles of the lower foot's speed relative to the hips, between which a standing foot's speed lies.
 PERCENTILES = (50.0, 75.0)
 IN_PLACE = 0.15  # with a smaller quotient the figure walks in place
-SLOW = 0.5  # leg lengths a second: slower movements are not compared
-# A foot stands if it is slower than this share of the speed of the hips, both over this many seconds.
+SLOW = 0.5  # leg lengths a second; slower movements of hips and feet are not compared
+# A foot stands if its speed is below STANDS times the speed of the hips. SPAN: seconds over which both speeds
+# are taken.
 STANDS, SPAN = 0.12, 2 / 15
-# The share of frames in which some foot stands while the hips move. Below SELDOM the clip gets a warning,
-# below NEVER it is refused. The share is .29 or more in those 172 clips, and .2 with 1 cm of noise. With
-# rotation channels declared in a wrong order it is .12 or less in 40 of 42 tries, but .25 in a walk straight
-# along an axis.
+# Shares of the frames with moving hips in which some foot stands: below SELDOM the clip gets a warning, below
+# NEVER it is refused. The share is .29 or more in those 172 clips, and .2 if 1 cm of noise is added.
+# With rotation channels declared in a wrong order it is .12 or less in 40 of 42 tries, but .25 in a walk
+# straight along an axis.
 SELDOM, NEVER = 0.27, 0.12
-# Allowed factors by which to scale the path of the hips so that feet stand most often. In those clips the
-# factor is .85 to 1, because feet roll.
+# Allowed range of the factor: if the path of the hips is scaled by it, feet stand most often. It is .85 to
+# 1 in those clips; it is below 1 because feet roll.
 SHORTEST, LONGEST = 0.79, 1.12
-FACTORS = np.exp(np.linspace(np.log(0.4), np.log(2.5), 47))
-FEWEST = 40  # fewest frames in which the hips move
-UPRIGHT = 0.6  # least height of the hips above the lower foot, in leg lengths
+FACTORS = np.exp(np.linspace(np.log(0.4), np.log(2.5), 47))  # the factors that are tried
+FEWEST = 40  # with fewer frames in which the hips move, the share is not computed
+UPRIGHT = 0.6  # leg lengths: least height of an upright figure's hips above its lower foot
 
 
 def pace(clip: Clip) -> float | None:
     """Speed of the hips divided by the speed of the lower foot relative to the hips.
 
-    Any speed of the foot between its PERCENTILES is allowed. The one that brings the quotient nearest
-    to 1 is taken. None if both are slow, or if the figure is not upright.
+    The foot's speed varies over the clip: any value between its PERCENTILES may be that of a standing foot.
+    The value that brings the quotient nearest to 1 is taken. None if hips and foot are slow, or if the figure
+    is not upright.
     """
     role, p = clip.skeleton.role, clip.positions
     if len(p) < 3:
@@ -60,9 +63,10 @@ def pace(clip: Clip) -> float | None:
 
 
 def standing_share(clip: Clip) -> tuple[float, float] | None:
-    """Share of the frames in which some foot stands, and the factor of the hips' path that makes it largest.
+    """(share of the frames in which some foot stands, factor by which the hips' path is scaled).
 
-    None if the hips hardly move.
+    The factor is the one of FACTORS that makes the share largest. Only frames in which the hips move count.
+    None if there are fewer than FEWEST of them.
     """
     role, p = clip.skeleton.role, clip.positions[..., [0, 2]]
     n = max(1, round(SPAN * clip.fps))
@@ -72,10 +76,10 @@ def standing_share(clip: Clip) -> tuple[float, float] | None:
     balls = np.stack([p[:, role(f"{side}_toe")] for side in ("left", "right")]) - hips
     path, feet = hips[n:] - hips[:-n], balls[:, n:] - balls[:, :-n]
     far = np.linalg.norm(path, axis=-1)
-    goes = far * clip.fps / n > SLOW * leg_length(clip.skeleton)
-    if goes.sum() < FEWEST:
+    moves = far * clip.fps / n > SLOW * leg_length(clip.skeleton)
+    if moves.sum() < FEWEST:
         return None
-    path, feet, far = path[goes], feet[:, goes], far[goes]
+    path, feet, far = path[moves], feet[:, moves], far[moves]
     shares = []
     for factor in FACTORS:
         slide = np.linalg.norm(factor * path + feet, axis=-1).min(axis=0)
@@ -87,25 +91,26 @@ def standing_share(clip: Clip) -> tuple[float, float] | None:
 def check_pace(path: Path, clip: Clip, leave: bool) -> str | None:
     """A warning if the figure walks in place or its feet seldom stand; else None.
 
-    leave: accept any pace. Raises InputError if the speeds of feet and hips do not fit, or if no foot stands.
+    leave: accept any pace. Raises InputError if the speeds of feet and hips contradict each other, or if the
+    feet stand almost never.
     """
     if leave:
         return None
-    found = pace(clip)
-    if found is None or LEAST <= found <= MOST:
+    quotient = pace(clip)
+    if quotient is None or LEAST_QUOTIENT <= quotient <= MOST_QUOTIENT:
         return _check_standing(path, clip)
-    if found < IN_PLACE:
+    if quotient < IN_PLACE:
         return (
             "The legs walk and the hips stay in place, so the feet slide. The file has no path of the hips."
         )
-    raise _two_units(path, found)
+    raise _two_units(path, quotient)
 
 
 def _check_standing(path: Path, clip: Clip) -> str | None:
-    found = standing_share(clip)
-    if found is None:
+    standing = standing_share(clip)
+    if standing is None:
         return None
-    share, factor = found
+    share, factor = standing
     if share < NEVER:
         raise InputError(
             path,
@@ -125,8 +130,8 @@ def _check_standing(path: Path, clip: Clip) -> str | None:
     return None
 
 
-def _two_units(path: Path, found: float) -> InputError:
-    times = f"{found:.{2 if found < 10 else 0}f}"
+def _two_units(path: Path, quotient: float) -> InputError:
+    times = f"{quotient:.{2 if quotient < 10 else 0}f}"
     return InputError(
         path,
         f"the hips go {times} times as fast as the feet step, so the root's positions seem to be in another "

@@ -1,7 +1,7 @@
 """Reads BVH files of all kinds. Errors name the line.
 
-It accepts any order of rotations, any channels on any joint, tabs, CRLF, scientific notation, several end
-sites, joint names with spaces or prefixes, and braces anywhere. Other modules interpret the numbers.
+The reader accepts any order of rotations, any channels on any joint, tabs, CRLF, scientific notation, several
+end sites, joint names with spaces or prefixes, and braces anywhere. Other modules interpret the numbers.
 """
 
 from __future__ import annotations
@@ -25,22 +25,23 @@ from hobble.motion.read_numbers import read_numbers
 MOST_BYTES = 1 << 30
 MOST_HEADER = 1 << 24  # bytes before MOTION
 MOST_LINES = 50_000_000  # after MOTION
-LONGEST_LINE = 1 << 22  # bytes; a frame of 4096 joints with six channels of 25 letters has 614,400
+LONGEST_LINE = 1 << 22  # bytes; a frame of 4096 joints with six values of 25 characters has 614,400
 MOST_POSES = 50_000_000  # frames times joints
 
 
 @dataclass(frozen=True)
 class Bvh:
-    """A BVH file, not converted yet.
+    """A BVH file, with its numbers as they are written.
 
-    names, parents: J joints in the file's order, -1 for the root.
+    path: the file. names, parents: name of each of J joints, and index of its parent (-1 for the root), in
+    the file's order.
     offsets: (J, 3) in the file's unit.
-    channels: the channels of each joint in the file's order, such as ("Xposition", ..., "Zrotation", ...).
-    values: (F, C) of F frames and C channels, in degrees and file units.
-    frame_time: seconds. frame_time_text: the same, as it is written in the file.
+    channels: for each joint the names of its channels in the file's order, such as ("Xposition", ...).
+    values: (F, C) of F frames and C channels, in degrees and the file's unit.
+    frame_time: seconds from frame to frame. frame_time_text: the same, as it is written in the file.
     end_sites: joint -> offsets of its end sites.
     declared: the number of frames that the file declares. F may differ by one (see `read_bvh`).
-    sha256, bytes: of the file as it was read.
+    sha256, bytes: hash and size of the file.
     """
 
     path: Path
@@ -63,10 +64,9 @@ class Bvh:
 def read_bvh(path: str | Path) -> Bvh:
     """Read a BVH file.
 
-    A file with one frame more or less than it declares is accepted (compare `len` with `declared`). Raises
-    InputError, with the line if there is one, for a file that is missing, empty, binary, truncated or
-    malformed, that has NaN or infinity or a wrong number of values or frames, or that declares more than it
-    can hold.
+    A file may have one frame more or less than it declares. Raises InputError, with the line if there is one,
+    for a file that is missing, empty, binary, truncated or malformed, that has NaN or infinity or a wrong
+    number of values or frames, or that declares more frames than it can hold.
     """
     path = Path(path)
     raw = read_bytes(path, MOST_BYTES)
@@ -96,7 +96,7 @@ _MOTION = re.compile(rb"^[ \t\r}]*MOTION(?![^\s])", re.MULTILINE | re.IGNORECASE
 
 
 def _motion_at(path: Path, data: bytes) -> int:
-    """The index where the MOTION section begins: the first line with only that word."""
+    """The index of the first word MOTION at the start of a line, after blanks or closing braces if any."""
     found = _MOTION.search(data)
     if not found:
         lines = data.count(b"\n") + 1
@@ -137,8 +137,8 @@ def _motion(path: Path, data: bytes, at: int, header: Header) -> Bvh:
     if declared * len(header.names) > MOST_POSES:
         raise InputError(
             path,
-            f"declares {declared} frames of {len(header.names)} joints: more than {MOST_POSES} poses of a "
-            "joint",
+            f"declares {declared} frames of {len(header.names)} joints: more than {MOST_POSES} joint "
+            "poses (frames times joints)",
             line=line_frames,
             fix="Cut it into shorter clips.",
         )
@@ -159,7 +159,7 @@ def _motion(path: Path, data: bytes, at: int, header: Header) -> Bvh:
 
 
 def _declaration(path: Path, head: list[bytes], key: bytes, line: int) -> tuple[str, int, int]:
-    """The text after `key` in the lines `head`, the number of its line, and the bytes up to the line's end.
+    """The text after `key` in the lines `head`, the number of its line, and where in `head` that line ends.
 
     line: number of the first line of `head`.
     """
@@ -174,9 +174,9 @@ def _declaration(path: Path, head: list[bytes], key: bytes, line: int) -> tuple[
 
 
 def _values(path: Path, data: bytes, at: int, width: int, declared: int, first_line: int) -> Array:
-    """The table (F, width) of the text from `at` on, with one line for each frame.
+    """The table (F, width) of the numbers in `data` from `at` on.
 
-    If the lines are not like this, a slower reader reads them or finds the error.
+    If a line does not hold exactly one frame, a slower reader reads the table or finds the error.
     """
     text = io.BytesIO(data)  # shares the bytes; a slice would copy them
     text.seek(at)
@@ -187,9 +187,9 @@ def _values(path: Path, data: bytes, at: int, width: int, declared: int, first_l
     try:
         table = np.loadtxt(text, dtype=float, comments=None, ndmin=2) if quick is None else quick
     except ValueError:
-        table = _explained(path, data[at:], width, first_line)
+        table = _read_or_explain(path, data[at:], width, first_line)
     if table.shape[1] != width:
-        table = _explained(path, data[at:], width, first_line)
+        table = _read_or_explain(path, data[at:], width, first_line)
     bad = ~np.isfinite(table).all(axis=1)
     if bad.any():
         frame = int(np.argmax(bad))
@@ -202,7 +202,7 @@ def _values(path: Path, data: bytes, at: int, width: int, declared: int, first_l
 
 
 def _check_lines(path: Path, data: bytes, at: int, first_line: int) -> None:
-    """Raise InputError if a line is too long or there are too many, before splitting them takes memory."""
+    """Raise InputError if a line is too long or there are too many lines, before splitting takes memory."""
     for start in range(at, len(data) - LONGEST_LINE, LONGEST_LINE):
         if data.find(b"\n", start, start + LONGEST_LINE) < 0:
             line = first_line + data.count(b"\n", at, start)
@@ -212,8 +212,8 @@ def _check_lines(path: Path, data: bytes, at: int, first_line: int) -> None:
         raise InputError(path, f"more than {MOST_LINES} lines after MOTION", fix="Cut it into shorter clips.")
 
 
-def _explained(path: Path, body: bytes, width: int, first_line: int) -> Array:
-    """Reads frames that run over several lines. Anything else raises InputError, which names the line."""
+def _read_or_explain(path: Path, body: bytes, width: int, first_line: int) -> Array:
+    """Read frames that are split over several lines. Anything else raises InputError with the line."""
     counts = np.fromiter((len(raw.split()) for raw in io.BytesIO(body)), np.int32)
     used, total = np.flatnonzero(counts), int(counts.sum(dtype=np.int64))
     if total % width or not total or not (counts[used] < width).all():

@@ -10,9 +10,9 @@ import numpy as np
 
 from hobble.core.errors import InputError
 
-# Limits. The largest known rig has 191 joints.
+# Limits. The largest rig that we know has 191 joints.
 MOST_JOINTS = 4096
-LONGEST_NAME = 200
+LONGEST_NAME = 200  # letters
 CHANNELS = tuple(f"{axis}{kind}" for kind in ("position", "rotation") for axis in "XYZ")
 EXPORT = "Export the clip again."
 
@@ -29,7 +29,12 @@ class Header:
 
 
 class _Hierarchy:
-    """Reads the header's lines in one pass. Open joints are kept on a stack, so a hierarchy may be deep."""
+    """Reads the header's lines in one pass. A stack instead of recursion allows deep hierarchies.
+
+    line: number of the current line. open: the joints whose braces are open, -1 for an end site. pending: the
+    joint (or -1) that still needs its opening brace. end_placed: whether the last end site has its OFFSET.
+    seen: name of each joint -> number of its line.
+    """
 
     def __init__(self, path: Path) -> None:
         self.path = path
@@ -139,7 +144,7 @@ class _Hierarchy:
 
 
 def read_header(path: Path, data: bytes) -> Header:
-    """The joints of a file. data: the text before MOTION. Raises InputError with the line of an error."""
+    """The joints of a file. data: the bytes before MOTION. Raises InputError with the line of the error."""
     try:
         text = data.decode("utf-8")
     except UnicodeDecodeError:

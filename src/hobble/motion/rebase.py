@@ -14,16 +14,16 @@ from hobble.motion.body import SIDES, Body
 from hobble.motion.body_sample import LEFT
 from hobble.motion.tree import above
 
-MOVES = 0.1  # cm; a joint whose offset changes by more moves in its parent
+MOVES = 0.1  # cm; if the offset of a joint changes by more than this, the clip stores offsets for each frame
 
 
 def rebased(
-    clip: Clip, body: Body, joints: list[int], frames: dict[int, Array], roles: Mapping[str, str]
+    clip: Clip, body: Body, joints: list[int], axes: dict[int, Array], roles: Mapping[str, str]
 ) -> tuple[Clip, Body]:
-    """The clip with only these joints and a new rest pose, and the body with new indices.
+    """The clip with only `joints` and a new rest pose, and the body with the new indices of its joints.
 
-    frames: joint -> (4,) the rotation of its axes in the new rest pose. roles: role -> joint, of the new
-    skeleton.
+    axes: joint -> (4,) rotation of its axes in the new rest pose. roles: role -> name of its joint, for the
+    new skeleton.
     """
     skeleton = clip.skeleton
     joints = [
@@ -32,8 +32,7 @@ def rebased(
     ]
     new = {old: i for i, old in enumerate(joints)}
     parents = [-1, *(new[_carrier(skeleton.parents, body, old, new)] for old in joints[1:])]
-    own = np.stack([frames[j] for j in joints])
-    turned = quat.mul(clip.global_rotations[:, joints], own)
+    turned = quat.mul(clip.global_rotations[:, joints], np.stack([axes[j] for j in joints]))
     for side, finger in body.fingers.items():
         wrist = body.arms[side][3]
         out = quat.rotate(turned[:, new[wrist]], LEFT if side == "left" else -LEFT)
@@ -41,15 +40,16 @@ def rebased(
         hand = np.where(np.linalg.norm(hand, axis=-1, keepdims=True) > 1e-6, hand, out)
         turned[:, new[wrist]] = quat.mul(quat.between(out, hand), turned[:, new[wrist]])
     places = clip.positions[:, joints]
-    arms = quat.rotate(quat.inv(turned[:, parents]), places - places[:, parents])
-    arms[:, 0] = 0.0
-    offsets = np.median(arms, axis=0)
-    moving = np.abs(arms - offsets).max() > MOVES
-    moved = body.renumbered(new)
+    from_parent = quat.rotate(quat.inv(turned[:, parents]), places - places[:, parents])
+    from_parent[:, 0] = 0.0
+    offsets = np.median(from_parent, axis=0)
+    moving = np.abs(from_parent - offsets).max() > MOVES
     names = tuple(skeleton.joints[j] for j in joints)
-    made = Skeleton(skeleton.name, names, tuple(parents), offsets, roles=roles)
-    rotations = quat.continuous(local_rotations(made, turned))
-    return Clip(clip.name, made, clip.fps, rotations, places[:, 0], arms if moving else None), moved
+    rebased_skeleton = Skeleton(skeleton.name, names, tuple(parents), offsets, roles=roles)
+    rotations = quat.continuous(local_rotations(rebased_skeleton, turned))
+    translations = from_parent if moving else None
+    rebased_clip = Clip(clip.name, rebased_skeleton, clip.fps, rotations, places[:, 0], translations)
+    return rebased_clip, body.renumbered(new)
 
 
 def _depth(skeleton: Skeleton, body: Body, joint: int) -> int:
@@ -61,7 +61,10 @@ def _depth(skeleton: Skeleton, body: Body, joint: int) -> int:
 
 
 def _carrier(parents: Sequence[int], body: Body, joint: int, among: Collection[int]) -> int:
-    """The joint that `joint` hangs from: the body part before it, or the nearest of `among` above it."""
+    """The joint that `joint` hangs from: the one before it in its trunk or limb.
+
+    For a joint that is in neither, it is the nearest of `among` above the joint, or else the hips.
+    """
     chain = (body.hips, *body.trunk, *body.neck, body.head)
     if joint in chain:
         return chain[chain.index(joint) - 1]

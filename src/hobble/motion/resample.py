@@ -26,7 +26,10 @@ def _between(times: Array) -> tuple[Array, Array, Array]:
 
 
 def sample_rotations(rotations: Array, times: Array) -> Array:
-    """Rotations (N, J, 4) of (F, J, 4) at times in frames. At a whole frame they are exactly that frame's."""
+    """Rotations (N, J, 4) at `times` (N,), in frames, between the rotations (F, J, 4) of whole frames.
+
+    At a whole frame they are exactly the rotations of that frame.
+    """
     first, second, share = _between(times)
     if not share.any():
         return quat.continuous(rotations[first])
@@ -36,7 +39,7 @@ def sample_rotations(rotations: Array, times: Array) -> Array:
 
 
 def sample_positions(positions: Array, times: Array) -> Array:
-    """Positions (N, ..., 3) of (F, ..., 3) at times in frames."""
+    """Positions (N, ..., 3) at `times` (N,), in frames, between the positions (F, ..., 3) of whole frames."""
     first, second, share = _between(times)
     share = share.reshape(-1, *(1,) * (positions.ndim - 1))
     return positions[first] * (1 - share) + positions[second] * share

@@ -2,10 +2,10 @@
 
 World rotations are transferred relative to the rest poses. Limbs get the directions of the source's limbs.
 Trunk, head and feet turn as far from their rest pose as in the source, so that a flat foot stays flat
-whatever the height of its ankle. The path is scaled by the leg length. Two-bone inverse kinematics puts the
-balls of the feet at the scaled positions of the source's, so that feet that do not slide in the source do not
-slide in the result. Joints that follow no joint of the source (fingers, face, roll joints) keep their rest
-pose relative to the joint above.
+whatever the height of its ankle. The path is scaled by leg length of the target / leg length of the source.
+Two-bone inverse kinematics puts the balls of the feet where they are in the scaled source, so that feet that
+do not slide in the source do not slide in the result. Joints that follow no joint of the source (fingers,
+face, roll joints) keep their rest pose relative to the joint above.
 """
 
 from __future__ import annotations
@@ -28,27 +28,30 @@ from hobble.motion.rig import leg_length, missing_bone
 
 # Bones of limbs: role of the joint -> role of the bone's other end.
 LIMB_BONES = {"shoulder": "elbow", "elbow": "wrist", "hip": "knee", "knee": "heel"}
-# Distance from hip to ankle, as a share of the leg's length. If that of the source is NEARLY_STRAIGHT or
-# more, the hips come down so that the target's leg is no straighter. If it is BENT or less, they do not.
-# Between the two, the rule sets in gradually.
+# Distance from hip to ankle, as a share of the leg's length. If the share in the source is NEARLY_STRAIGHT or
+# more, the hips come down so that the target's leg is no straighter than the source's. If the share is BENT
+# or less, the hips do not come down. Between BENT and NEARLY_STRAIGHT, this rule sets in gradually.
 BENT, NEARLY_STRAIGHT = 0.88, 0.95
-SMOOTH = 0.08  # seconds on each side over which the hips come down
-MOST_DROP = 6.0  # cm; the hips come down by at most this
-STRAIGHT = 0.5  # cm; for a knee nearer to the line from hip to ankle, the direction is partly assumed forward
+SMOOTH = 0.08  # seconds before and after a frame over which the drop of its hips is smoothed
+MOST_DROP = 6.0  # cm by which the hips come down at most
+# cm: a knee nearer than this to the line from hip to ankle hardly shows which way it bends, so its direction
+# is mixed with forward.
+STRAIGHT = 0.5
 
 
 @dataclass(frozen=True)
 class Retarget:
-    """How `target` follows `source`. Made once by `plan` and applied to any pose.
+    """How the skeleton `target` follows the skeleton `source`. Made once by `plan`, applied to any pose.
 
-    joints: (M,) target joints that follow a joint of the source, parents first. follows: (M,) the joints that
-    they follow. turns: (M, 4); the world rotation of a target joint is that of the source joint times this.
-    drivers: (J,) for each target joint the nearest of `joints` above it, or itself if it is one of them.
-    driver_offsets: (J, 3) cm, position of a joint in its driver's coordinates; for one of `joints`, in those
-    of its parent's driver. levels: the `joints` below the hips, in groups in the order in which they are
-    placed. forward: (3,) the direction that the target's rest pose faces. pelvis: (3,) cm, from the target's
-    hips to the middle between its legs. scale: leg length of the target / leg length of the source. lift: cm
-    by which the target's ankles are higher above the balls of the feet than the source's ankles, scaled.
+    joints: (M,) target joints that follow a joint of the source, parents first. follows: (M,) the source
+    joints that they follow. turns: (M, 4); the world rotation of a target joint is the world rotation of its
+    source joint times its turn. drivers: (J,) for each target joint the nearest of `joints` above it, or the
+    joint itself if it is one of them. driver_offsets: (J, 3) cm, position of each joint in the coordinates of
+    its driver, or of its parent's driver if the joint is its own driver. levels: the `joints` below the hips,
+    in groups in the order in which they are placed. forward: (3,) the direction that the target's rest pose
+    faces. pelvis: (3,) cm, from the target's hips to the middle between its two hip joints. scale: leg length
+    of the target / leg length of the source. lift: cm by which the target's ankles are higher above the balls
+    of its feet than the ankles of the scaled source.
     """
 
     source: Skeleton = field(repr=False)
@@ -68,10 +71,10 @@ class Retarget:
 def plan(source: Skeleton, target: Skeleton, sources: Mapping[str, str]) -> Retarget:
     """Plan how `target` follows `source`. sources: joint of the target -> joint of the source.
 
-    Both need the roles hips and head, and on both sides shoulder, hip, knee, heel and toe. Raises HobbleError
-    if the target's hips or legs follow nothing, or if a bone of a leg has no length.
+    Both skeletons need the roles hips and head, and on both sides shoulder, hip, knee, heel and toe. Raises
+    HobbleError if the target's hips or legs follow nothing, or if a bone of a leg has no length.
     """
-    pairs = sorted((target.index(mine), source.index(theirs)) for mine, theirs in sources.items())
+    pairs = sorted((target.index(follower), source.index(leader)) for follower, leader in sources.items())
     joints, follows = (np.array(side) for side in zip(*pairs, strict=True))
     for role in ("hips", *(f"{s}_{part}" for s in SIDES for part in ("hip", "knee", "heel"))):
         if target.role(role) not in joints:
@@ -102,14 +105,14 @@ def plan(source: Skeleton, target: Skeleton, sources: Mapping[str, str]) -> Reta
         forward=quat.rotate(rest_frame(target), np.array([0.0, 0.0, 1.0])),
         pelvis=middle - rest[target.role("hips")],
         scale=scale,
-        lift=_ankle(target, to_target) - scale * _ankle(source, quat.inv(from_source)),
+        lift=_ankle_height(target, to_target) - scale * _ankle_height(source, quat.inv(from_source)),
     )
 
 
 def _limb_bones(
     source: Skeleton, target: Skeleton, from_source: Array, to_target: Array
 ) -> dict[tuple[int, int], Array]:
-    """(target joint, source joint) of each limb bone -> its entry of `turns`, which makes bones parallel."""
+    """(target joint, source joint) of each limb bone -> its turn (4,), which makes the two bones parallel."""
     a, b = rest_positions(target), rest_positions(source)
     out = {}
     for side in SIDES:
@@ -117,15 +120,19 @@ def _limb_bones(
             roles = f"{side}_{start}", f"{side}_{end}"
             if not all(role in s.roles for role in roles for s in (source, target)):
                 continue
-            mine, theirs = target.role(roles[0]), source.role(roles[0])
-            bone = quat.rotate(to_target, a[target.role(roles[1])] - a[mine])
-            wanted = quat.rotate(quat.inv(from_source), b[source.role(roles[1])] - b[theirs])
-            out[mine, theirs] = quat.mul(from_source, quat.mul(quat.between(bone, wanted), to_target))
+            follower, leader = target.role(roles[0]), source.role(roles[0])
+            bone = quat.rotate(to_target, a[target.role(roles[1])] - a[follower])
+            source_bone = quat.rotate(quat.inv(from_source), b[source.role(roles[1])] - b[leader])
+            turn = quat.between(bone, source_bone)
+            out[follower, leader] = quat.mul(from_source, quat.mul(turn, to_target))
     return out
 
 
-def _ankle(skeleton: Skeleton, to_upright: Array) -> float:
-    """Height of the ankles above the balls of the feet in the rest pose, in the skeleton's unit."""
+def _ankle_height(skeleton: Skeleton, to_upright: Array) -> float:
+    """Height of the ankles above the balls of the feet in the rest pose, in the skeleton's unit.
+
+    to_upright: (4,) rotation that makes the rest pose stand along Y and face +Z.
+    """
     p = quat.rotate(to_upright, rest_positions(skeleton))[:, 1]
     return float(np.mean([p[skeleton.role(f"{s}_heel")] - p[skeleton.role(f"{s}_toe")] for s in SIDES]))
 
@@ -165,9 +172,10 @@ def retarget_clip(clip: Clip, how: Retarget) -> Clip:
 
 
 def retarget_pose(how: Retarget, positions: Array, rotations: Array) -> tuple[Array, Array]:
-    """Poses on the target, such as the pose of a network in each frame of a game.
+    """Transfer poses to the target, such as the pose of a network in each frame of a game.
 
-    positions (..., J, 3) and rotations (..., J, 4) in the world. Returns those of the target's joints.
+    positions: (..., J, 3) and rotations: (..., J, 4) of the source's joints in the world. Returns positions
+    and rotations of the target's joints in the world.
     """
     return _posed(how, positions, _carried(how, rotations))
 
@@ -182,7 +190,9 @@ def _carried(how: Retarget, rotations: Array) -> Array:
 def _posed(how: Retarget, source: Array, rotations: Array, fps: float | None = None) -> tuple[Array, Array]:
     """World positions and rotations of the target's joints, with the feet at the source's scaled positions.
 
-    fps: frame rate of successive frames, in which the hips come down smoothly. None for single poses.
+    source: (..., J, 3) world positions of the source's joints. rotations: (..., J, 4) as from `_carried`;
+    they are changed in place. fps: frame rate of successive frames, in which the hips come down smoothly, or
+    None for single poses.
     """
     hips = _hips(how, source, rotations)
     legs = [_Leg(how, source, rotations, hips, side) for side in SIDES]
@@ -209,7 +219,7 @@ def _posed(how: Retarget, source: Array, rotations: Array, fps: float | None = N
 def _hips(how: Retarget, source: Array, rotations: Array) -> Array:
     """Position of the hips that puts the middle between the legs at the source's scaled position.
 
-    The place of the hips joint in the pelvis differs between skeletons, but legs and feet must fit.
+    The legs and feet must fit; where the hips joint lies in the pelvis differs between skeletons.
     """
     middle = 0.5 * sum(source[..., how.source.role(f"{side}_hip"), :] for side in SIDES)
     arm = quat.rotate(rotations[..., how.target.role("hips"), :], how.pelvis)
@@ -217,7 +227,7 @@ def _hips(how: Retarget, source: Array, rotations: Array) -> Array:
 
 
 def _smoothed(drop: Array, fps: float) -> Array:
-    """A smooth curve (F,) above `drop`: its running maximum, averaged."""
+    """A smooth curve (F,) that is nowhere below `drop`: a moving average of the running maximum of `drop`."""
     reach = max(1, round(SMOOTH * fps))
     padded = np.pad(drop, 2 * reach, mode="edge")
     highest = np.lib.stride_tricks.sliding_window_view(padded, 2 * reach + 1).max(axis=-1)
@@ -228,7 +238,10 @@ def _smoothed(drop: Array, fps: float) -> Array:
 class _Leg:
     """A leg of the target, from its hip to the position that the foot must reach.
 
-    rotations: (..., J, 4) of the target's joints. `bend` changes those of thigh and shank.
+    source: (..., J, 3) positions of the source's joints. rotations: (..., J, 4) of the target's joints; the
+    method `bend` changes the rotations of thigh and shank. hips: (..., 3) position of the target's hips.
+    Attributes start and ankle: where the leg begins and where its ankle must be. stretch: distance from hip
+    to ankle in the source, as a share of the leg's length.
     """
 
     def __init__(self, how: Retarget, source: Array, rotations: Array, hips: Array, side: str) -> None:
@@ -248,7 +261,7 @@ class _Leg:
         self.stretch = np.linalg.norm(c - a, axis=-1) / length
 
     def drop(self) -> Array:
-        """(...) cm that the hips must come down so that the leg is no straighter than the source's."""
+        """(...) cm by which the hips must come down for the leg to be no straighter than the source's."""
         reach = self.stretch * (np.linalg.norm(self.thigh) + np.linalg.norm(self.shank))
         way = self.start - self.ankle
         level = np.minimum(way[..., 0] ** 2 + way[..., 2] ** 2, reach**2)
@@ -267,7 +280,11 @@ class _Leg:
 
 
 def _knee_direction(hip: Array, knee: Array, thigh: Array, shank: Array, ahead: Array) -> Array:
-    """The direction of the knee from the line between hip and ankle; forward if the leg is straight."""
+    """(..., 3) direction in which the knee is off the line from hip to ankle; forward for a straight leg.
+
+    hip, knee: (..., 4) rotations of these joints. thigh, shank: (3,) bones below them. ahead: (3,) forward in
+    the rest pose.
+    """
     along = quat.rotate(hip, thigh)
     line = along + quat.rotate(knee, shank)
     line = line / np.linalg.norm(line, axis=-1, keepdims=True)

@@ -22,40 +22,44 @@ from hobble.motion.read import read_bvh
 from hobble.motion.rig import load_skeleton
 from hobble.motion.root import facing
 
+# Roles of the joints along a leg and along an arm.
 LIMBS = (("hips", "hip", "knee", "heel", "toe"), ("chest", "shoulder", "elbow", "wrist"))
-POSES = 6
-WIDE, HIGH, EDGE = 150, 260, 46  # pixels of one figure, and of the captions
-COLOURS = {"left": "#2b6cb0", "right": "#8a8a8a", "": "#333333"}
-WRONG = "#d62828"
+POSES = 6  # poses of the clip in each row of the picture
+WIDE, HIGH, EDGE = 150, 260, 46  # pixels: width and height of one figure, and the margin for captions
+COLOURS = {"left": "#2b6cb0", "right": "#8a8a8a", "": "#333333"}  # of each side, and of trunk and head
+WRONG = "#d62828"  # colour of the part that differs most
 
 
 def picture_of_file(bvh: Path, skeleton: Path, maps: Path, options: ClipMotion) -> str:
-    """The SVG for a BVH file, also if its result is refused because it differs from its source.
+    """The picture (SVG) of a BVH file's motion and of the result of retargeting.
 
-    skeleton: the file of the skeleton to put it on. maps: the folder of the skeleton files. Raises InputError
-    for a file that cannot be read or has this skeleton's bones already.
+    It is drawn even if the workflow refuses the result because it differs too much from the source.
+
+    skeleton: the file of the skeleton that gets the motion. maps: the folder with all skeleton
+    files, whose joint maps are used to recognise the source. Raises
+    InputError for a BVH file that cannot be read or has this skeleton's bones already.
     """
     target = load_skeleton(skeleton, skeleton.stem)
     source = load_source(read_bvh(bvh), target, maps, options)
     before = resample(source.clip, options.fps)
     before = replace(before, skeleton=replace(before.skeleton, roles=source.match.roles))
     fitted = fit_skeleton(before, source, target.skeleton, options.proportions)
-    if fitted.figures is None:
+    if fitted.difference is None:
         raise InputError(bvh, f"already has the bones of {target.skeleton.name}, so nothing is compared")
-    return retarget_picture(before, fitted.clip, *worst(fitted.figures))
+    return retarget_picture(before, fitted.clip, *worst(fitted.difference))
 
 
-def retarget_picture(source: Clip, made: Clip, part: str, degrees: float) -> str:
-    """An SVG: four rows of POSES figures each, the source from the side, the result, and both from the front.
+def retarget_picture(source: Clip, result: Clip, part: str, degrees: float) -> str:
+    """An SVG of four rows of POSES figures: source and result from the side, then both from the front.
 
-    source, made: clips with roles, at the same times. part: the joint or limb that differs most, such as
+    source, result: clips with roles, at the same times. part: the joint or limb that differs most, such as
     "left knee"; it is drawn in red. degrees: by how much it differs on average.
     """
-    frames = np.linspace(0, min(len(source), len(made)) - 1, POSES).round().astype(int)
+    frames = np.linspace(0, min(len(source), len(result)) - 1, POSES).round().astype(int)
     rows = [
         (f"{name}, from the {view}", _figures(clip, frames, part, view))
         for view in ("side", "front")
-        for name, clip in (("source", source), ("result", made))
+        for name, clip in (("source", source), ("result", result))
     ]
     width, height = POSES * WIDE + 2 * EDGE, len(rows) * HIGH + 2 * EDGE
     text = f"{source.name}: the {part} is {degrees:.0f} degrees off its source on average (red)"
@@ -73,14 +77,14 @@ def retarget_picture(source: Clip, made: Clip, part: str, degrees: float) -> str
         ]
     captions = [
         f'<text x="{EDGE + WIDE * (k + 0.5):g}" y="{height - 14}" text-anchor="middle">'
-        f"{frame / made.fps:.2f} s</text>"
+        f"{frame / result.fps:.2f} s</text>"
         for k, frame in enumerate(frames)
     ]
     return "\n".join([*out, *captions, "</svg>\n"])
 
 
 def _figures(clip: Clip, frames: Array, part: str, view: str) -> list[str]:
-    """The lines of each figure. Its lowest point is at y = 0, and its hips are at x = 0."""
+    """The SVG elements of each figure. A figure's lowest point is at y = 0, and its hips are at x = 0."""
     at = {role: clip.positions[frames, clip.skeleton.role(role)] for role in clip.skeleton.roles}
     ahead = facing(clip.skeleton, clip.positions[frames], 0.0)
     across = np.cross([0.0, 1.0, 0.0], ahead)
@@ -102,17 +106,17 @@ def _figures(clip: Clip, frames: Array, part: str, view: str) -> list[str]:
 
 
 def _bones(places: Mapping[str, Array], part: str) -> list[tuple[str, str, str, bool]]:
-    """(start, end, side, whether it is the wrong part) of each bone between roles that exist."""
+    """(start, end, side, whether it belongs to `part`) of each bone, by roles. Trunk and head: side ""."""
     side, _, name = part.partition(" ")
     roles = ANGLES.get(name) or BONES.get(name) or ()
     wrong = set(pairwise(role if role == "head" else f"{side}_{role}" for role in roles))
     chains: list[tuple[str, tuple[str, ...]]] = [("", TRUNK)]
-    for own in SIDES:
+    for limb_side in SIDES:
         for first, *rest in LIMBS:
-            chains.append((own, (first, *(f"{own}_{role}" for role in rest))))
+            chains.append((limb_side, (first, *(f"{limb_side}_{role}" for role in rest))))
     return [
-        (a, b, own, (a, b) in wrong)
-        for own, chain in chains
+        (a, b, bone_side, (a, b) in wrong)
+        for bone_side, chain in chains
         for a, b in pairwise(role for role in chain if role in places)
     ]
 

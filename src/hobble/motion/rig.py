@@ -1,4 +1,7 @@
-"""Finds which known skeleton the rig (the skeleton of a file) is, how it maps to the target, and its unit."""
+"""Identifies the rig of a BVH file, maps it to the target skeleton, and finds its unit.
+
+A rig is the skeleton in a BVH file. A known skeleton is one that has a file in `config/skeletons`.
+"""
 
 from __future__ import annotations
 
@@ -21,20 +24,24 @@ from hobble.motion.tree import path
 
 # Centimetres per unit of the file. The unit of CMU files is an inch / 0.45.
 UNITS = {"cm": 1.0, "inch": 2.54, "m": 100.0, "mm": 0.1, "CMU": 5.6444, "foot": 30.48}
-LEG = 80.0  # cm: length of thigh and shank of an average adult
-KNOWN = 0.75  # a skeleton is a clip's rig if it has at least this share of the joint names
-# A joint's name in a skeleton file.
+LEG = 80.0  # cm: length of thigh plus shank of an average adult
+KNOWN = 0.75  # a known skeleton is a clip's rig if it has at least this share of the clip's joint names
+# Finds the names of joints (and other keys) in the text of a skeleton file.
 NAME = re.compile(r"^ +['\"]?([^\s'\":{}][^'\":{}]*)['\"]?\s*:", re.MULTILINE)
-# Two rest poses count as equal if bones differ by at most this many degrees, by the role at the bone's end.
+# Role at the end of a bone -> degrees. Two rest poses count as equal if no bone differs by more than this.
 LIKE = {"elbow": 20.0, "wrist": 25.0, "knee": 35.0, "heel": 35.0, "toe": 35.0}
-LEG_RANGE = (35.0, 125.0)  # cm: from small children to giants
+LEG_RANGE = (35.0, 125.0)  # cm: length of thigh plus shank, from small children to giants
+# Roles that every rig must have.
 LIMBS = ("shoulder", "hip", "knee", "heel", "toe")
 MANDATORY = ("hips", "head", *(f"{side}_{part}" for side in ("left", "right") for part in LIMBS))
 
 
 @dataclass(frozen=True)
 class TargetSkeleton:
-    """A skeleton as in its file, with its maps to other skeletons."""
+    """A known skeleton, read from its file, with its maps to other skeletons.
+
+    maps: name of the other skeleton -> {joint of this one: joint of the other}.
+    """
 
     skeleton: Skeleton
     maps: Mapping[str, Mapping[str, str]]
@@ -44,9 +51,10 @@ class TargetSkeleton:
 class RigMatch:
     """Which known skeleton a clip's rig is, and how it maps to the target.
 
-    rig: name of the skeleton file. roles: role -> the clip's joint. same: whether the clip's rig is the
-    target itself. sources: the target's joint -> the clip's joint that it follows. alike: whether the rest
-    pose of the clip equals that of the skeleton file.
+    rig: name of the known skeleton, or "found" if the joints' roles were found without one. roles: role ->
+    the clip's joint. same: whether the clip has the target's own joints and an equal rest pose. sources: the
+    target's joint -> the clip's joint that it follows. alike: whether the clip's rest pose equals that of the
+    known skeleton.
     """
 
     rig: str
@@ -57,7 +65,7 @@ class RigMatch:
 
 
 def load_skeleton(path: str | Path, name: str | None = None) -> TargetSkeleton:
-    """Read a skeleton file (`config/skeletons/<name>.yaml`). It is validated when the workflow starts."""
+    """Read a skeleton file (`config/skeletons/<name>.yaml`). Raises InputError if it is missing or wrong."""
     if not Path(path).is_file():
         raise InputError(path, "no such skeleton file")
     state = Path(path).stat()
@@ -81,10 +89,10 @@ def _loaded(path: Path, name: str, changed: int, size: int) -> TargetSkeleton:
 
 
 def nearest(names: Collection[str], target: TargetSkeleton, folder: str | Path) -> TargetSkeleton:
-    """The skeleton file in `folder` that has most of the names; the target if no file has more than it.
+    """The skeleton in `folder` that has the most of these joint names; the target if none has more.
 
-    A file whose text cannot contain more of the names is not parsed, because parsing YAML takes longer than
-    reading most clips.
+    A file whose text shows that it cannot have more of them is not parsed, because parsing YAML takes longer
+    than reading most clips.
     """
     best, found = len(set(names) & set(target.skeleton.joints)), target
     for file in sorted(Path(folder).glob("*.yaml")):
@@ -98,15 +106,16 @@ def nearest(names: Collection[str], target: TargetSkeleton, folder: str | Path) 
 
 
 def clean_names(names: Sequence[str]) -> tuple[str, ...]:
-    """Joint names without a prefix like "mixamorig:", unless they become ambiguous without it."""
+    """Joint names without a prefix like "mixamorig:"; unchanged if two names would become equal."""
     short = tuple(name.rpartition(":")[2].strip() for name in names)
     return short if len(set(short)) == len(short) and all(short) else tuple(names)
 
 
 def find_hips(names: Sequence[str], target: TargetSkeleton, folder: str | Path) -> int:
-    """Index of a clip's hips, by the known skeleton that has most of its names; else that of the root.
+    """Index of a clip's hips. This is needed because some programs export a joint above the hips.
 
-    It is needed because some programs export a joint above the hips. folder: that of the skeleton files.
+    The name of the hips is taken from the known skeleton that has the most of the clip's joint names. If the
+    clip has no joint of this name, its root counts as the hips. folder: the folder of the skeleton files.
     """
     if names[0] == target.skeleton.roles["hips"]:
         return 0
@@ -117,42 +126,42 @@ def find_hips(names: Sequence[str], target: TargetSkeleton, folder: str | Path) 
 def match_rig(rig: Skeleton, target: TargetSkeleton, folder: str | Path) -> RigMatch | None:
     """Find which known skeleton a clip's rig is, and how it maps to the target.
 
-    rig: the clip's joints. folder: the folder of the skeleton files, for their maps. Returns None if no
-    skeleton file has the rig's names. If no map leads to the target, the match has roles but no sources.
+    rig: the clip's skeleton. folder: the folder of the skeleton files. Returns None if no skeleton file has
+    the rig's joint names. If no map leads to the target, the match has roles but no sources.
     """
     if not _differences(rig, target.skeleton):
         roles = target.skeleton.roles
         alike = rest_alike(replace(rig, roles=roles), target.skeleton)
-        same = {name: name for name in target.skeleton.joints}
-        return RigMatch(target.skeleton.name, roles, alike, same, alike)
+        itself = {name: name for name in target.skeleton.joints}
+        return RigMatch(target.skeleton.name, roles, same=alike, sources=itself, alike=alike)
     known = nearest(rig.joints, target, folder)
-    if _share(rig, known.skeleton) < KNOWN or _unfit(rig, known.skeleton):
+    if _share_of_names(rig, known.skeleton) < KNOWN or _unfit(rig, known.skeleton):
         return None
     roles = _roles(rig, known.skeleton)
     if _trunk(rig, roles) != _trunk(known.skeleton, known.skeleton.roles):
         # With fewer or more joints in the spine, names like Neck may mean other joints than in the file.
-        return RigMatch(known.skeleton.name, roles, False, {}, False)
+        return RigMatch(known.skeleton.name, roles, same=False, sources={}, alike=False)
     sources = {a: b for a, b in joint_pairs(known, target).items() if b in rig.joints}
     alike = rest_alike(replace(rig, roles=roles), known.skeleton)
-    return RigMatch(known.skeleton.name, roles, False, sources, alike)
+    return RigMatch(known.skeleton.name, roles, same=False, sources=sources, alike=alike)
 
 
 def rest_alike(rig: Skeleton, known: Skeleton) -> bool:
     """Whether the bones of two rest poses have equal directions. Turned or mirrored bodies count as equal.
 
-    A rig without toes never counts as equal, because its balls of the feet have to be added.
+    A rig without toe joints (the balls of the feet) never counts as equal, because they have to be added.
     """
     if "left_toe" not in rig.roles:
         return False
-    mine, theirs = (_bones(skeleton) for skeleton in (rig, known))
-    for bone, wanted in theirs.items():
-        if bone in mine and mine[bone] @ wanted < np.cos(np.radians(LIKE[bone[1].partition("_")[2]])):
+    of_rig, of_known = (_bones(skeleton) for skeleton in (rig, known))
+    for bone, direction in of_known.items():
+        if bone in of_rig and of_rig[bone] @ direction < np.cos(np.radians(LIKE[bone[1].partition("_")[2]])):
             return False
     return True
 
 
 def _bones(skeleton: Skeleton) -> dict[tuple[str, str], Array]:
-    """(role, role) -> direction of the bone between, as components to the body's left, up and forward."""
+    """(role, role) -> unit direction (3,) of the bone between them: to the body's left, up and forward."""
     at = rest_positions(skeleton)
     place = {role: at[skeleton.role(role)] for role in skeleton.roles}
     left = place["left_hip"] - place["right_hip"] + place["left_shoulder"] - place["right_shoulder"]
@@ -173,22 +182,22 @@ def _bones(skeleton: Skeleton) -> dict[tuple[str, str], Array]:
     return out
 
 
-def _share(rig: Skeleton, known: Skeleton) -> float:
-    """Share of the clip's joints, 0 to 1, that have names of a known skeleton."""
+def _share_of_names(rig: Skeleton, known: Skeleton) -> float:
+    """Share of the clip's joints, 0 to 1, whose names also occur in a known skeleton."""
     return len(set(rig.joints) & set(known.joints)) / len(rig.joints)
 
 
 def _differences(rig: Skeleton, target: Skeleton) -> list[str]:
     """How the rig differs from the target, in words. Empty if names and hierarchy agree."""
-    mine, wanted = _parent_names(rig), _parent_names(target)
-    found = [f"joint {name} is missing" for name in wanted if name not in mine]
-    found += [f"joint {name} is not in the skeleton" for name in mine if name not in wanted]
-    found += [
-        f"joint {name} hangs from {mine[name]}, not from {parent}"
-        for name, parent in wanted.items()
-        if name in mine and mine[name] != parent
+    in_rig, in_target = _parent_names(rig), _parent_names(target)
+    differences = [f"joint {name} is missing" for name in in_target if name not in in_rig]
+    differences += [f"joint {name} is not in the skeleton" for name in in_rig if name not in in_target]
+    differences += [
+        f"joint {name} hangs from {in_rig[name]}, not from {parent}"
+        for name, parent in in_target.items()
+        if name in in_rig and in_rig[name] != parent
     ]
-    return found
+    return differences
 
 
 def _parent_names(skeleton: Skeleton) -> dict[str, str | None]:
@@ -207,21 +216,23 @@ def _trunk(skeleton: Skeleton, roles: Mapping[str, str]) -> list[str]:
 
 
 def _unfit(rig: Skeleton, known: Skeleton) -> list[str]:
-    """Why a rig cannot be treated as a known one, in words; empty if it can.
+    """Why a rig cannot be treated as a known skeleton, in words; empty if it can.
 
-    It may lack fingers or eyes, but no mandatory role. It may have unknown joints.
+    The rig may lack fingers or eyes, but no mandatory role. It may have unknown joints.
     """
     roles = _roles(rig, known)
     needed = [role for role in MANDATORY if role in known.roles]
-    found = [f"joint {known.roles[role]} ({role}) is missing" for role in needed if role not in roles]
-    mine, wanted = _nearest(rig, known), _nearest(known, rig)
-    return found + [
-        f"joint {n} hangs from {mine[n]}, not from {p}" for n, p in wanted.items() if mine[n] != p
+    missing = [f"joint {known.roles[role]} ({role}) is missing" for role in needed if role not in roles]
+    in_rig, in_known = _common_parents(rig, known), _common_parents(known, rig)
+    return missing + [
+        f"joint {name} hangs from {in_rig[name]}, not from {parent}"
+        for name, parent in in_known.items()
+        if in_rig[name] != parent
     ]
 
 
-def _nearest(skeleton: Skeleton, other: Skeleton) -> dict[str, str | None]:
-    """For each joint of both skeletons the nearest joint above it that is in both."""
+def _common_parents(skeleton: Skeleton, other: Skeleton) -> dict[str, str | None]:
+    """For each joint that is in both skeletons, the nearest joint above it in `skeleton` that is in both."""
     above: dict[str, str | None] = {}
     for name, p in zip(skeleton.joints, skeleton.parents, strict=True):
         up = None if p < 0 else skeleton.joints[p]
@@ -230,14 +241,14 @@ def _nearest(skeleton: Skeleton, other: Skeleton) -> dict[str, str | None]:
 
 
 def joint_pairs(source: TargetSkeleton, target: TargetSkeleton) -> dict[str, str]:
-    """Target joint -> source joint, by the map of either to the other, or of both to a third skeleton."""
-    mine, theirs = source.skeleton.name, target.skeleton.name
-    if mine == theirs:
+    """Target joint -> source joint, by a map of one skeleton to the other, or by maps of both to a third."""
+    source_name, target_name = source.skeleton.name, target.skeleton.name
+    if source_name == target_name:
         return {name: name for name in target.skeleton.joints}
-    if mine in target.maps:
-        return dict(target.maps[mine])
-    if theirs in source.maps:
-        return _reverse(source.maps[theirs])
+    if source_name in target.maps:
+        return dict(target.maps[source_name])
+    if target_name in source.maps:
+        return _reverse(source.maps[target_name])
     for hub in source.maps:
         if hub in target.maps:
             to_source = _reverse(source.maps[hub])
@@ -246,7 +257,7 @@ def joint_pairs(source: TargetSkeleton, target: TargetSkeleton) -> dict[str, str
 
 
 def _reverse(pairs: Mapping[str, str]) -> dict[str, str]:
-    """Invert a map. If several joints map to one, the first in the file counts."""
+    """Invert a map. If several joints map to the same joint, the first of them in the file counts."""
     out: dict[str, str] = {}
     for a, b in pairs.items():
         out.setdefault(b, a)
@@ -271,9 +282,9 @@ def missing_bone(skeleton: Skeleton) -> str | None:
 
 
 def unit_of(leg: float) -> tuple[float, str] | None:
-    """(centimetres per unit, name of the unit) in which a leg of length `leg` is nearest to an adult's.
+    """The unit in which a leg of length `leg` is nearest to an adult's: (centimetres per unit, name).
 
-    None if no unit gives a length within LEG_RANGE.
+    None if no unit gives a leg within LEG_RANGE.
     """
     if leg <= 0:
         return None

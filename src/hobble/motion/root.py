@@ -25,9 +25,9 @@ class RootFrames:
     """The root of each of F frames.
 
     position: (F, 2) x and z of the hips, cm, not smoothed. direction: (F, 3) unit facing direction,
-    horizontal, smoothed. rotation: (F, 4) world to root: the turn about Y that takes `direction` to +Z. turn:
-    (F - 1,) radians from each frame to the next, with the sign of the network's output: it is the turn of
-    the world seen from the root, so the runtime applies its negative.
+    horizontal, smoothed. rotation: (F, 4) world to root: the rotation about Y that takes `direction` to +Z.
+    turn: (F - 1,) radians by which the world turns, seen from the root, from each frame to the next. The root
+    itself turns by the negative. The network's output has the sign of `turn`.
     """
 
     position: Array = field(repr=False)
@@ -53,7 +53,7 @@ def facing(skeleton: Skeleton, positions: Array, sigma: float) -> Array:
     """Facing direction (F, 3), unit and horizontal, of joint positions (F, J, 3).
 
     It is the cross product of `across_body` and up, smoothed over time by a Gaussian of `sigma` frames and
-    normalised again. Past its ends, the clip counts as standing still.
+    normalised again. The smoothing continues the clip past its ends with the first and last frame.
     """
     forward = np.cross(across_body(skeleton, positions), [0.0, 1.0, 0.0])
     if sigma > 0:
@@ -62,7 +62,7 @@ def facing(skeleton: Skeleton, positions: Array, sigma: float) -> Array:
 
 
 def root_frames(clip: Clip, sigma: float) -> RootFrames:
-    """Root position, facing and rotation of every frame. sigma: in frames of the clip (20 at 60 Hz)."""
+    """The root of every frame of a clip. sigma: of `facing`, in frames of the clip (20 at 60 Hz)."""
     direction = facing(clip.skeleton, clip.positions, sigma)
     rotation = quat.yaw(-np.arctan2(direction[:, 0], direction[:, 2]))
     change = quat.rotate(quat.mul(rotation[1:], quat.inv(rotation[:-1])), np.array([0.0, 0.0, 1.0]))
@@ -72,11 +72,11 @@ def root_frames(clip: Clip, sigma: float) -> RootFrames:
 
 
 def continued(root: RootFrames, frames: int) -> RootFrames:
-    """The root, continued for `frames` frames before the first frame and after the last.
+    """The root, continued by `frames` frames at each end of the clip.
 
-    It continues straight, with the smoothed facing direction at that end of the clip and the median velocity
-    of the nearest STEADY frames. Frame i of the clip is frame i + `frames` of the result. On walks of the CMU
-    database, the position half a second ahead is off by 11 cm.
+    It goes straight on, with the smoothed facing direction at that end and the median velocity of the nearest
+    STEADY frames. Frame i of the clip is frame i + `frames` of the result. On walks of the CMU database, a
+    path that is continued in this way for half a second ends 11 cm off the captured path.
     """
     steps = np.diff(root.position, axis=0) if len(root) > 1 else np.zeros((1, 2))
     n = np.arange(1, frames + 1)[:, None]

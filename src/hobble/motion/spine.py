@@ -29,25 +29,29 @@ class Spine:
 
     @classmethod
     def of(cls, skeleton: Skeleton, body: Body) -> Spine:
-        """The spine of a skeleton with a standing rest pose. Converted motion gets the same directions."""
+        """The spine of a skeleton with a standing rest pose. body: its joints.
+
+        When a rig gets a new rest pose, the bones of its trunk and neck get the directions of this spine.
+        """
         rest = quat.rotate(quat.inv(rest_frame(skeleton)), rest_positions(skeleton))
         chain = (body.hips, *body.trunk, *body.neck, body.head)
         places = rest[list(chain)]
         lengths = np.linalg.norm(np.diff(places, axis=0), axis=-1)
         long = [0, *(k for k, length in enumerate(lengths, 1) if length > SHORT)]
-        return cls(spine_shares(lengths, body.top_bones)[long], places[long])
+        return cls(spine_shares(lengths, body.trunk_bones)[long], places[long])
 
     def direction(self, start: float, end: float) -> Array:
         """(3,) direction of a bone between two positions along the body, `start` and `end` (see `shares`).
 
-        A rig with fewer joints has longer bones. Each of them replaces several bones of this spine.
+        The bone is of another rig. If that rig has fewer joints, one of its bones may span several bones of
+        this spine.
         """
         chest, first = int(np.searchsorted(self.shares, 1.0 - 1e-6)), self._bone(start)
         last = min(self._below(end), chest if end <= 1 else len(self.shares) - 1)
         return unit(self.points[max(last, first + 1)] - self.points[first])
 
     def end(self, start: float) -> float:
-        """Where along the body the bone ends that follows a joint at `start`."""
+        """Position along the body at which the bone from `start` ends in this spine."""
         return float(self.shares[self._bone(start) + 1])
 
     @property
@@ -62,12 +66,12 @@ class Spine:
         return bool(((self.shares > 1.0 + 1e-6) & (self.shares < 2.0 - 1e-6)).any())
 
     def _bone(self, start: float) -> int:
-        """The point at which the bone begins that follows a joint at `start`."""
+        """Index of the point at which the bone from position `start` along the body begins."""
         chest = int(np.searchsorted(self.shares, 1.0 - 1e-6))
         return max(min(self._below(start), chest - 1 if start < 1 else len(self.shares) - 2), 0)
 
     def _below(self, share: float) -> int:
-        """Index of the highest point that is at most REACH above a position along the body."""
+        """Index of the highest point that is at most REACH above the position `share` along the body."""
         return int(np.searchsorted(self.shares, share + REACH, side="right")) - 1
 
 
@@ -75,7 +79,7 @@ def spine_shares(lengths: Array, trunk: int) -> Array:
     """(N,) position of each joint along the body, where hips are at 0, chest at 1 and head at 2.
 
     lengths: (N-1,) of the bones from the hips through trunk and neck to the head. trunk: number of bones of
-    the trunk; at the end of the last one is the chest.
+    the trunk, the last of which ends at the chest.
     """
     way = np.concatenate([[0.0], np.cumsum(lengths)])
     below, above = way[: trunk + 1], way[trunk:] - way[trunk]

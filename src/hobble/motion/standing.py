@@ -11,8 +11,8 @@ from hobble.motion.body import SIDES, Body
 from hobble.motion.orient import degrees_between, unit
 from hobble.motion.spine import SHORT
 
-# Largest angles of a standing person, degrees: legs from straight down, trunk and head from straight up, feet
-# from straight ahead.
+# Largest angles of a standing person, in degrees. Straight up is from the hips to the shoulders. Legs: from
+# straight down; trunk and head: from straight up; feet: from straight ahead.
 LEG, TRUNK, HEAD, FOOT = 40.0, 40.0, 50.0, 50.0
 
 
@@ -38,10 +38,10 @@ def why_not_standing(body: Body, rest: Array) -> str | None:
             return f"the {side} leg does not point down"
         if toe is not None:
             foot = rest[toe] - rest[heel]
-            level = foot - up * (foot @ up)
-            facing.append(level @ ahead)
-            if abs(degrees_between(level, ahead) - 90) < 90 - FOOT or np.linalg.norm(
-                level
+            flat = foot - up * (foot @ up)
+            facing.append(flat @ ahead)
+            if abs(degrees_between(flat, ahead) - 90) < 90 - FOOT or np.linalg.norm(
+                flat
             ) < 0.4 * np.linalg.norm(foot):
                 return f"the {side} foot does not point forward"
     if facing and min(facing) < 0 < max(facing):

@@ -1,4 +1,4 @@
-"""The build of the figure to which a motion will go: its spine, how its feet stand, and its limbs."""
+"""The build of the skeleton to which a motion will be retargeted: spine, slope of the feet, limbs."""
 
 from __future__ import annotations
 
@@ -14,7 +14,8 @@ from hobble.motion.axes import rest_frame
 from hobble.motion.body import SIDES, Body
 from hobble.motion.spine import Spine
 
-# A rig whose bones have the target's lengths, up to one factor and this share, is the target's own figure.
+# A rig has the target's proportions if rig / target is the same for the lengths of all limb bones, to within
+# this share.
 SAME = 0.01
 
 
@@ -23,7 +24,7 @@ class TargetBuild:
     """The build of a skeleton with a standing rest pose.
 
     spine: the shape of its trunk in that pose. tilt: radians by which the bones from ankle to ball point
-    down. limbs: (B,) lengths of `limb_bones`, cm.
+    below the horizontal, mean of both feet. limbs: (B,) lengths of `limb_bones`, cm.
     """
 
     spine: Spine
@@ -40,15 +41,15 @@ class TargetBuild:
         return cls(Spine.of(skeleton, body), tilt, limbs)
 
     def is_built_like(self, limbs: Array) -> bool:
-        """Whether a rig has the target's proportions. limbs: lengths of its `limb_bones`, in any unit."""
+        """Whether a rig has these proportions. limbs: lengths of the rig's `limb_bones`, in any unit."""
         if len(limbs) != len(self.limbs):
             return False
-        share = np.maximum(limbs, 1e-9) / self.limbs
-        return bool(share.max() < (1 + SAME) * share.min())
+        quotients = np.maximum(limbs, 1e-9) / self.limbs
+        return bool(quotients.max() < (1 + SAME) * quotients.min())
 
 
 def limb_bones(body: Body) -> list[tuple[int, int]]:
-    """The bones of legs, feet and arms as pairs of joints. A foot without a ball is left out."""
+    """The bones of legs, feet and arms as pairs of joints. A foot without a joint at its ball is left out."""
     bones: list[tuple[int, int]] = []
     for side in SIDES:
         for limb in (body.legs[side], body.arms[side][1:]):

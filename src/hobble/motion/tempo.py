@@ -21,29 +21,33 @@ from hobble.motion.rig import leg_length
 from hobble.motion.root import facing
 
 FEWEST = 3  # steps; with fewer, nothing is estimated
-BRIEFEST = 4  # frames a step; with fewer, a step shows no accelerations
-MOVES = 0.25  # share of a brisk speed of the clip: slower frames belong to no step
+BRIEFEST = 4  # frames; shorter steps show no accelerations
+# Share of the 80th percentile of the speed of the hips. Frames in which the hips are slower belong to no
+# step.
+MOVES = 0.25
 ALONE = 0.3  # a foot stands alone if its ball is slower than this share of the speed of the other ball
-# Correlation of the height of the hips with the distance between the ankles. If it is higher, the figure
-# runs: its hips are lowest over the standing foot (Cavagna et al. 1977).
+# Correlation of the height of the hips with the distance between the ankles. Above it the figure runs: in a
+# run, the hips are lowest when they pass over the standing foot (Cavagna et al. 1977).
 RUNS = 0.1
-# Binary logarithms of accelerations, in g, as a + b s + c s^2, where s is the binary logarithm of the length
-# of a step in leg lengths. Robust fits to 161 clips of CMU, styles, patients, Ferre et al. and the original
-# release.
+# The usual values of the fields of `Accelerations`: LEVEL for `level` in walks and runs, WALK and RUN for the
+# other fields. The binary logarithm of a value is a + b s + c s^2, where s is the binary logarithm of the
+# length of a step in leg lengths. The coefficients (a, b, c) are robust fits to 161 clips of CMU, Holden et
+# al. (2017) and Ferre et al., and of the data sets `styles` and `patients` (config/datasets).
 LEVEL = (-2.77, 0.83, 0.23)
 WALK = {"pendulum": (-1.43, -0.72, -0.2), "vertical": (-2.59, 1.59, 0.59)}
 RUN = {"pendulum": (-0.35, -0.35, -0.25), "falling": (-0.02, 0.21, -0.3)}
-STEPS = (0.3, 2.0)  # leg lengths; the fits hold for steps of this length
+STEPS = (0.3, 2.0)  # leg lengths: shortest and longest step for which the fits hold
 
 
 @dataclass(frozen=True)
 class Accelerations:
     """The accelerations of a body's centre of mass, and what they depend on.
 
-    level, vertical: root mean squares, in g. falling: the strongest downward one (98th percentile), in g.
-    pendulum: how much the forward acceleration grows, in g, as the centre of mass moves forward over the
-    standing foot by as much as it is above it; 1 for a pendulum on a point. step: length of a step in leg
-    lengths. runs: whether the figure runs.
+    level, vertical: root mean squares of the horizontal and of the vertical acceleration, in g. falling: the
+    strongest downward acceleration (98th percentile), in g. pendulum: slope of the forward acceleration, in
+    g, against the forward lean (how far the centre of mass is ahead of the standing foot, divided by its
+    height above this foot); 1 for a pendulum on a point. step: length of a step in leg lengths. runs: whether
+    the figure runs.
     """
 
     level: float
@@ -56,8 +60,10 @@ class Accelerations:
 
 @dataclass(frozen=True)
 class TooFast:
-    """How many times too fast a clip plays. least: the estimate nearest to 1; 1 if the estimates disagree on
-    whether it is too fast or too slow. likely: the median of the estimates.
+    """How many times too fast a clip plays, from three estimates.
+
+    least: the estimate nearest to 1, or 1 if some estimates are above 1 and others below. likely: the median
+    of the estimates.
     """
 
     least: float
@@ -65,31 +71,35 @@ class TooFast:
 
 
 def too_fast(clip: Clip, steps: int, scale: float = 1.0) -> TooFast | None:
-    """How many times too fast a clip plays, by each of three accelerations. None if they cannot be measured.
+    """How many times too fast a clip plays. None if its accelerations cannot be measured.
 
-    steps: how many the clip has. scale: size of the clip's figure / size of the captured one.
+    steps: the number of steps in the clip. scale: size of the clip's figure / size of the captured person.
     """
-    found = accelerations(clip, steps, GRAVITY * scale)
-    if found is None:
+    measured = accelerations(clip, steps, GRAVITY * scale)
+    if measured is None:
         return None
-    s = float(np.log2(np.clip(found.step, *STEPS)))
-    usual = {"level": LEVEL, **(RUN if found.runs else WALK)}
+    s = float(np.log2(np.clip(measured.step, *STEPS)))
+    usual = {"level": LEVEL, **(RUN if measured.runs else WALK)}
     estimates = []
     for name, (a, b, c) in usual.items():
-        measured = np.log2(max(getattr(found, name), 0.02))
-        estimates.append(0.5 * (measured - (a + b * s + c * s * s)))
+        # Half the logarithm, because accelerations grow with the square of the speed.
+        value = np.log2(max(getattr(measured, name), 0.02))
+        estimates.append(0.5 * (value - (a + b * s + c * s * s)))
     low, likely, high = sorted(estimates)
     return TooFast(float(2.0 ** (low if low > 0 else min(high, 0.0))), float(2.0**likely))
 
 
 def accelerations(clip: Clip, steps: int, gravity: float = GRAVITY) -> Accelerations | None:
-    """Measure a clip of so many steps. None if the steps are too few or too short. gravity: g in cm / s2."""
+    """Measure the accelerations in a clip. None if its steps are too few or too short.
+
+    steps: the number of steps in the clip. gravity: g in cm / s2.
+    """
     at = {role: clip.positions[:, clip.skeleton.role(role)] for role in clip.skeleton.roles}
     if steps < FEWEST or len(clip) < FEWEST * BRIEFEST:
         return None
     speed = np.linalg.norm(np.gradient(gaussian(at["hips"][:, [0, 2]], 2.0), axis=0), axis=-1)
     moves = speed > MOVES * np.percentile(speed, 80)
-    frames = moves.sum() / steps  # of a step
+    frames = moves.sum() / steps  # frames in a step
     if frames < BRIEFEST:
         return None
     centre = gaussian(centre_of_mass(at), frames / 12)
@@ -118,35 +128,42 @@ def _pendulum(
     inner: NDArray[np.bool_],
     reach: int,
 ) -> float:
-    """The slope of the forward acceleration against the forward lean over the foot that stands alone.
+    """The slope of forward acceleration against forward lean, while one foot stands alone.
 
-    pull: (F, 3) accelerations in g. inner: (F,) the frames to use. reach: frames before and after over which
-    speeds are measured.
+    at: role -> (F, 3) positions. centre: (F, 3) centre of mass. pull: (F, 3) accelerations of `centre` in g.
+    ahead: (F, 3) facing directions. inner: (F,) bool, the frames to use. reach: speeds are measured from
+    this many frames before a frame to this many after it.
     """
-    balls = [_way(at[f"{side}_toe"], reach) for side in SIDES]
+    balls = [_distance_moved(at[f"{side}_toe"], reach) for side in SIDES]
     leans, pulls = [np.zeros(1)], [np.zeros(1)]
     for k, side in enumerate(SIDES):
         alone = inner & (balls[k] < ALONE * balls[1 - k])
         if alone.any():
             arm = centre - (0.4 * at[f"{side}_heel"] + 0.6 * at[f"{side}_toe"])
             lean = np.sum(arm / np.maximum(arm[:, 1:2], 1.0) * ahead, axis=-1)[alone]
-            own = np.sum(pull * ahead, axis=-1)[alone]
+            forward = np.sum(pull * ahead, axis=-1)[alone]
             leans.append(lean - lean.mean())
-            pulls.append(own - own.mean())
-    lean, own = np.concatenate(leans), np.concatenate(pulls)
-    return float(lean @ own / max(float(lean @ lean), 1e-9))
+            pulls.append(forward - forward.mean())
+    lean, forward = np.concatenate(leans), np.concatenate(pulls)
+    return float(lean @ forward / max(float(lean @ lean), 1e-9))
 
 
-def _way(place: Array, reach: int) -> Array:
-    """(F,) distance between where a point (F, 3) is `reach` frames before and after; 0 at the ends."""
-    out = np.zeros(len(place))
-    if len(place) > 2 * reach:
-        out[reach:-reach] = np.linalg.norm(place[2 * reach :] - place[: -2 * reach], axis=-1)
+def _distance_moved(point: Array, reach: int) -> Array:
+    """(F,) distance that a point (F, 3) moves from `reach` frames before a frame to `reach` frames after it.
+
+    It is 0 in the first and last `reach` frames.
+    """
+    out = np.zeros(len(point))
+    if len(point) > 2 * reach:
+        out[reach:-reach] = np.linalg.norm(point[2 * reach :] - point[: -2 * reach], axis=-1)
     return out
 
 
 def _spring(at: dict[str, Array], frames: float, inner: NDArray[np.bool_]) -> float:
-    """Correlation of the height of the hips with the distance between the ankles. frames: of a step."""
+    """Correlation of the height of the hips with the distance between the ankles.
+
+    at: role -> (F, 3) positions. frames: number of frames in a step. inner: (F,) bool, the frames to use.
+    """
     height = gaussian(at["hips"][:, 1], frames / 16)
     apart = np.linalg.norm((at["left_heel"] - at["right_heel"])[:, [0, 2]], axis=-1)
     height, apart = (values - gaussian(values, frames / 2) for values in (height, apart))

@@ -1,7 +1,7 @@
 """Chooses the poses that show how the pelvis is turned against the spine.
 
-Upright poses show it, because the spine is about straight in them. In a bow or a squat the spine bends, and
-if it were taken for straight, the pelvis would come out tilted.
+Upright poses show it, because the spine is about straight in them. In a bow or a squat the spine bends. If it
+were taken for straight, the pelvis would come out tilted.
 """
 
 from __future__ import annotations
@@ -13,18 +13,19 @@ from hobble.motion.body import SIDES
 from hobble.motion.body_sample import BodySample
 from hobble.motion.orient import unit
 
-STRETCHED = 0.8  # in one leg of an upright figure, hip and ankle are this share of its length apart, or more
-LEANS = 25.0  # degrees: the trunk of an upright figure leans less
-STOOPS = 40.0  # degrees: a figure whose trunk leans more stoops; a sprinter's straight trunk leans up to 35
-# Share of the frames that must be upright. The most upright frames of this share set a limit: the frames that
-# lean at most SPREAD degrees more are the sample.
-FEWEST = 0.05
+# In at least one leg of an upright figure, hip and ankle are this share of the leg's length apart, or more.
+STRETCHED = 0.8
+LEANS = 25.0  # degrees: the trunk of an upright figure leans less than this
+# Degrees: a figure stoops if its trunk leans more than this. The straight trunk of a sprinter leans up to 35.
+STOOPS = 40.0
+FEWEST = 0.05  # least share of the frames that must be upright
+# Degrees: the sample is all frames that lean less than this plus the 5 % quantile (FEWEST) of the lean.
 SPREAD = 15.0
-OFF = 3.0  # cm: mean error of where hips and head are, in clips of bows and squats
+OFF = 3.0  # cm: mean error of the positions of hips and head in clips of bows and squats
 
 
 def trunk_sample(sample: BodySample, zero: bool) -> BodySample:
-    """The upright frames of a sample. If there are too few: the zero pose if it stands, else all.
+    """The upright frames of a sample. If there are too few: its zero pose if `zero`, else all its frames.
 
     zero: whether a person could stand in the zero pose.
     """
@@ -35,7 +36,7 @@ def trunk_sample(sample: BodySample, zero: bool) -> BodySample:
 
 
 def stoop_doubt(sample: BodySample, zero: bool) -> str | None:
-    """A sentence if the figure always stoops or squats and nobody could stand in its zero pose, else None.
+    """A warning if the figure always stoops or squats and nobody could stand in its zero pose, else None.
 
     zero: whether a person could stand in the zero pose.
     """

@@ -1,4 +1,4 @@
-"""Gives a rig's motion an upright rest pose. Joints stay in the same places.
+"""Gives a rig's motion an upright rest pose, without changing the positions of joints.
 
 The meaning of a joint's rotations depends on the zero pose, in which all of them are zero. If a person could
 stand in the zero pose, it is the rest pose. If not (all bones along one axis, or a heap of twisted bones),
@@ -32,15 +32,17 @@ from hobble.motion.target_build import TargetBuild
 from hobble.motion.tree import above
 from hobble.motion.trunk_sample import stoop_doubt, trunk_sample
 
-SAMPLES = 400  # frames of the clip that are looked at
+SAMPLES = 400  # at most this many frames of the clip are looked at
 
 
 @dataclass(frozen=True)
 class UprightMotion:
-    """A clip with a standing rest pose that faces +Z with the arms out. Its joints are those of the body.
+    """A clip with a standing rest pose that faces +Z with the arms out.
 
-    body: the parts by their new indices. rest: where the rest pose comes from, in words. notes: sentences on
-    what is uncertain. height_error: by how many cm the figure may stand too high or low.
+    It has the joints of the body and any further joints that were to be kept.
+
+    body: which joint is which part of the body. rest: where the rest pose comes from, in words. notes:
+    sentences on what is uncertain. height_error: by how many cm the figure may stand too high or low.
     """
 
     clip: Clip = field(repr=False)
@@ -51,26 +53,26 @@ class UprightMotion:
 
 
 def upright(clip: Clip, body: Body, target: Skeleton, others: Collection[int] = ()) -> UprightMotion:
-    """The motion of a body on a rig that stands in its rest pose.
+    """The same motion on a rig that stands upright in its rest pose.
 
-    clip: centimetres, right-handed, Y up. target: the skeleton to which it will be retargeted. others:
-    further joints to keep, turned like the body part that they are on.
+    clip: in centimetres, right-handed, Y up. body: its joints. target: the skeleton to which the clip will be
+    retargeted. others: further joints to keep; they are turned like the body part that they are on.
 
     Only the directions of the bones decide how trunk, limbs and feet are turned, so that the same motion
     gives the same result on any rig. A standing zero pose adds what no bone shows: how head, clavicles and
     hands are turned.
     """
     body = replace(body, arms_on_neck=_arms_on_neck(clip, body))
-    every = np.unique(np.linspace(0, len(clip) - 1, SAMPLES).round().astype(int))
+    sampled = np.unique(np.linspace(0, len(clip) - 1, SAMPLES).round().astype(int))
     ends = {
         side: clip.skeleton.end_sites.get(clip.skeleton.joints[leg[2]]) for side, leg in body.legs.items()
     }
-    speeds = _speeds(clip)[every]
+    speeds = _speeds(clip)[sampled]
     rest = rest_positions(clip.skeleton)
     sample = BodySample(
         body,
-        clip.positions[every],
-        clip.global_rotations[every],
+        clip.positions[sampled],
+        clip.global_rotations[sampled],
         speeds,
         rest,
         ends,
@@ -82,24 +84,24 @@ def upright(clip: Clip, body: Body, target: Skeleton, others: Collection[int] = 
     if zero and _twisted(sample, zero):
         problem, zero = "the trunk is twisted", None
     trunk = trunk_sample(sample, zero is not None)
-    frames = from_motion(sample, trunk, zero[body.chest] if zero else None)
+    axes = from_motion(sample, trunk, zero[body.chest] if zero else None)
     unsure = [lean_doubt(sample, zero is not None), stoop_doubt(sample, zero is not None)]
     if zero:
-        add_rest(frames, zero, sample)
+        add_rest(axes, zero, sample)
         unsure.append(zero_doubt(sample, zero))
     source = "its zero pose" if problem is None else f"its motion, because in its zero pose {problem}"
     unsure.append(doubt(sample, problem is None))
-    kept = _kept(clip, sample, others, frames)
-    clip, body = with_balls(clip, body, frames)
+    kept = _kept(clip, sample, others, axes)
+    clip, body = with_balls(clip, body, axes)
     roles = body.roles(clip.skeleton.joints)
-    clip, body = with_split_joints(clip, body, frames, bends(trunk))
-    made = rebased(clip, body, [*body.joints, *kept], frames, roles)
+    clip, body = with_split_joints(clip, body, axes, bends(trunk))
+    clip, body = rebased(clip, body, [*body.joints, *kept], axes, roles)
     notes = [note for note in unsure if note]
-    return UprightMotion(*made, source, notes, height_error(sample, problem is None))
+    return UprightMotion(clip, body, source, notes, height_error(sample, problem is None))
 
 
 def _arms_on_neck(clip: Clip, body: Body) -> bool:
-    """Whether the arms hang from the first joint of the neck, and it lies below the shoulders."""
+    """Whether the arms hang from the first joint of the neck, and this joint lies below the shoulders."""
     shoulders = [arm[1] for arm in body.arms.values()]
     parents, p = clip.skeleton.parents, clip.positions
     if not body.neck or any(body.neck[0] not in above(parents, joint) for joint in shoulders):
@@ -111,11 +113,11 @@ def _arms_on_neck(clip: Clip, body: Body) -> bool:
 def _twisted(sample: BodySample, zero: dict[int, Array]) -> bool:
     """Whether the trunk's bones are turned about themselves in a zero pose that looks like a stance.
 
-    zero: frames of `from_rest`.
+    zero: joint -> (4,) rotation of its axes, if the zero pose is taken as the rest pose.
     """
-    shown = trunk_frames(trunk_sample(sample, False), zero[sample.body.chest])
+    in_motion = trunk_frames(trunk_sample(sample, False), zero[sample.body.chest])
     joints = (sample.body.hips, *sample.body.trunk)
-    lefts = [[quat.rotate(frames[j], LEFT) for frames in (zero, shown)] for j in joints]
+    lefts = [[quat.rotate(axes[j], LEFT) for axes in (zero, in_motion)] for j in joints]
     return max(degrees_between(*pair) for pair in lefts) > TRUSTED
 
 
@@ -126,8 +128,8 @@ def _speeds(clip: Clip) -> Array:
     return np.linalg.norm(np.gradient(clip.positions, axis=0), axis=-1) * clip.fps
 
 
-def _kept(clip: Clip, sample: BodySample, others: Collection[int], frames: dict[int, Array]) -> list[int]:
-    """Those of `others` that can be kept. Their rotations in the rest pose are added to `frames`.
+def _kept(clip: Clip, sample: BodySample, others: Collection[int], axes: dict[int, Array]) -> list[int]:
+    """Those of `others` that can be kept. The rotations of their axes in the rest pose are added to `axes`.
 
     Each joint gets the mean rotation of the body part that it is on. The base of a finger points along the
     finger.
@@ -138,12 +140,12 @@ def _kept(clip: Clip, sample: BodySample, others: Collection[int], frames: dict[
         carrier = next((j for j in above(parents, joint)[1:] if j in body.joints), None)
         if carrier is None:
             continue
-        part = quat.mul(sample.turned[:, carrier], frames[carrier])
-        frames[joint] = mean_rotation(quat.mul(quat.inv(sample.turned[:, joint]), part))
+        part = quat.mul(sample.turned[:, carrier], axes[carrier])
+        axes[joint] = mean_rotation(quat.mul(quat.inv(sample.turned[:, joint]), part))
         for side, sign in (("left", 1.0), ("right", -1.0)):
             tips = [j for j in others if joint in above(parents, j)[1:]]
             bones = [bone for j in tips if np.linalg.norm(bone := sample.bone(joint, j)) > SHORT]
             if carrier == body.arms[side][3] and bones:
-                frames[joint] = pointed_along(frames[joint], sign * LEFT, bones[0])
+                axes[joint] = pointed_along(axes[joint], sign * LEFT, bones[0])
         out.append(joint)
     return out

@@ -1,1 +1,1 @@
-"""One HTML file that a person opens, reads and plays with."""
+"""The report of a configuration: one HTML file to read and to play with."""

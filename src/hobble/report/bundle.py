@@ -44,8 +44,8 @@ def install(folder: str | Path) -> None:
 def bundle(modules: str | Path, target: str | Path, sources: str | Path = WEB) -> None:
     """Bundle sources/index.js and everything it imports into one script.
 
-    modules: the node_modules folder from `install`. Needs no internet. The same input gives the same bytes.
-    Raises HobbleError with file and line if a script has an error.
+    modules: the folder node_modules that `install` fills. target: the file to write. Needs no internet. The
+    same input gives the same bytes. Raises HobbleError with file and line if a script has an error.
     """
     with tempfile.TemporaryDirectory() as folder:
         networks = Path(folder, "networks.js")
@@ -54,7 +54,10 @@ def bundle(modules: str | Path, target: str | Path, sources: str | Path = WEB) -
 
 
 def bundle_module(modules: str | Path, target: str | Path) -> None:
-    """Bundle only the code of the character, as an ES module without imports; else see `bundle`."""
+    """Bundle only the code of the character, as an ES module without imports.
+
+    Arguments and errors are those of `bundle`.
+    """
     with tempfile.TemporaryDirectory() as folder:
         networks = Path(folder, "networks.js")
         networks.write_text(networks_module(), encoding="utf-8")
@@ -62,7 +65,7 @@ def bundle_module(modules: str | Path, target: str | Path) -> None:
 
 
 def networks_module() -> str:
-    """Source of the page's module "networks": kind of network -> `createNetwork` of its network.js."""
+    """Source of the page's module "networks": for each kind of network, `createNetwork` of its network.js."""
     imports = [
         f"import {{ createNetwork as {kind} }} from {json.dumps(str(MODELS_FOLDER / kind / 'network.js'))};"
         for kind in MODELS
@@ -71,6 +74,7 @@ def networks_module() -> str:
 
 
 def _bundle(modules: Path, target: str | Path, entry: Path, networks: Path, form: str) -> None:
+    """Bundle `entry`. networks: file with the source of the module "networks". form: esbuild's format."""
     done = node(
         [
             str(modules / "esbuild" / "bin" / "esbuild"),
@@ -82,7 +86,7 @@ def _bundle(modules: Path, target: str | Path, entry: Path, networks: Path, form
             "--target=es2022",
             "--charset=utf8",
             "--legal-comments=eof",
-            "--loader:.min.js=text",  # plotly.js, which charts.js runs when it draws the first chart
+            "--loader:.min.js=text",  # plotly.js as text, which charts.js runs when it draws the first chart
             "--log-level=error",
         ],
         return_completed_process=True,

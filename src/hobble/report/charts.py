@@ -1,4 +1,4 @@
-"""Charts as plotly specifications. Colours are names of the page's CSS colours, such as "@accent"."""
+"""Charts as plotly specifications. Colours are names of CSS colours of the page, such as "@accent"."""
 
 from __future__ import annotations
 
@@ -14,8 +14,9 @@ Trace = dict[str, Any]
 class Chart:
     """A chart, with a caption that says how to read it.
 
-    traces: plotly traces. options: option -> its traces, instead of `traces`; a menu with the label `choose`
-    selects an option. option_layouts: option -> changes of the layout. height: pixels.
+    name: its id in the page. traces, layout: as plotly takes them. height: pixels. A chart that shows one of
+    several options has no `traces`, but `options`: option -> its traces; a menu with the label `choose`
+    selects the option. option_layouts: option -> changes of the layout.
     """
 
     name: str
@@ -29,7 +30,7 @@ class Chart:
     option_layouts: Mapping[str, Mapping[str, Any]] = field(repr=False, default_factory=dict)
 
     def spec(self) -> dict[str, Any]:
-        """The data for the page's script."""
+        """The chart's data for the page's script."""
         traces = list(self.traces) or list(next(iter(self.options.values()), ()))
         return {
             "name": self.name,
@@ -44,7 +45,10 @@ class Chart:
 
 @dataclass(frozen=True)
 class ChartGroup:
-    """Small charts that share a title and a caption, and a menu of their options if `choose` is not empty."""
+    """Small charts that share a title and a caption.
+
+    name: its id in the page. choose: label of a menu that selects the option of all charts; "" for no menu.
+    """
 
     name: str
     title: str
@@ -66,29 +70,35 @@ def _escaped(value: Any) -> Any:
 
 
 def axis(title: str, **more: Any) -> dict[str, Any]:
-    """An axis with a title."""
+    """A plotly axis with a title. more: further settings of the axis."""
     return {"title": {"text": title}, **more}
 
 
 def log_axis(title: str, values: Iterable[float | None]) -> dict[str, Any]:
-    """A logarithmic axis with ticks at 1, 2 and 5 times the powers of ten, as plain numbers."""
-    found = [v for v in values if v is not None and v > 0]
-    if not found:
+    """A logarithmic axis with ticks at 1, 2 and 5 times the powers of ten, as plain numbers.
+
+    values: the values that the chart shows.
+    """
+    positive = [v for v in values if v is not None and v > 0]
+    if not positive:
         return axis(title, type="log")
-    decades = range(math.floor(math.log10(min(found))) - 1, math.ceil(math.log10(max(found))) + 1)
+    decades = range(math.floor(math.log10(min(positive))) - 1, math.ceil(math.log10(max(positive))) + 1)
     ticks = [float(f"{digit}e{decade}") for decade in decades for digit in (1, 2, 5)]
     return axis(title, type="log", tickvals=ticks, ticktext=[f"{tick:g}" for tick in ticks])
 
 
 def line(name: str, x: Sequence, y: Sequence, colour: str, **more: Any) -> Trace:
-    """A line. `dash` and `width` set its stroke; `more` goes to the trace."""
+    """The trace of a line. more: `dash` and `width` of the stroke; anything else is set in the trace."""
     stroke = {"color": colour, "width": more.pop("width", 2), "dash": more.pop("dash", "solid")}
     mode = more.pop("mode", "lines")
     return {"type": "scatter", "mode": mode, "name": name, "x": list(x), "y": list(y), "line": stroke, **more}
 
 
 def mark(value: float, text: str, vertical: bool = True, colour: str = "@soft") -> tuple[dict, dict]:
-    """A dotted line across the plot at `value`, and a text at its end, as plotly's (shape, annotation)."""
+    """A dotted line across the plot at `value`, with a text at its end: plotly's shape and annotation.
+
+    vertical: `value` is on the x axis, else on the y axis.
+    """
     across = {"type": "line", "line": {"color": colour, "width": 1, "dash": "dot"}}
     note = {"text": text, "showarrow": False, "font": {"size": 11, "color": colour}}
     if vertical:

@@ -17,8 +17,8 @@ from hobble.report.rounded_weights import has_weights, rounded
 from hobble.report.templates import FOLDER, specs, style, template, trusted
 
 LARGEST_PAGE = 19_850_000  # bytes; the page must stay under 20 MB
-RESERVED = 60_000  # bytes of the page for text, style and tables
-NAME = "compare"
+RESERVED = 60_000  # bytes that are kept free for the page's text, style and tables
+NAME = "compare"  # the page's name
 
 
 def render_compared(
@@ -29,10 +29,12 @@ def render_compared(
 ) -> str:
     """The comparison as one HTML document.
 
-    compared: compare.json. playables: configuration -> data from `playable.playable`. If they do not all fit
-    into the page, their weights get 8 bits, and those that still do not fit are left out. bundle: the
-    scripts, from `bundle.bundle`. errors: configuration -> centimetres from `rounded_weights.rounding_error`.
+    compared: the content of compare.json. playables: configuration -> data of its character, from `playable`
+    in `hobble.report.playable`. If these characters do not all fit into the page, their weights are rounded
+    to 8 bits. Characters that still do not fit are left out. bundle: the page's scripts in one. errors:
+    configuration -> mean distance in cm by which rounding the weights moves a predicted joint.
     """
+    errors = errors or {}
     sections: dict[str, dict[str, Any]] = {
         "overview": {
             "verdicts": measure_sections.compared_verdicts(compared),
@@ -47,9 +49,9 @@ def render_compared(
     bodies = {spec["body"]: packed_body(skeleton_of(spec)) for spec in (playables or {}).values()}
     used = len(bundle.encode()) + len(embedded(charts).encode()) + len(embedded(bodies).encode())
     kept, left_out = fitting(playables or {}, LARGEST_PAGE - RESERVED - used)
-    small: list[str] = []
+    rounded_names: list[str] = []
     if left_out:
-        small = [name for name, spec in (playables or {}).items() if has_weights(spec)]
+        rounded_names = [name for name, spec in (playables or {}).items() if has_weights(spec)]
         smaller = {name: rounded(spec) for name, spec in (playables or {}).items()}
         kept, left_out = fitting(smaller, LARGEST_PAGE - RESERVED - used)
     bodies = {spec["body"]: bodies[spec["body"]] for spec in kept.values()}
@@ -63,7 +65,7 @@ def render_compared(
         embedded={name: embedded(part) for name, part in data.items()},
         playable=list(kept),
         left_out=left_out,
-        rounding=[(name, (errors or {})[name]) for name in small if name in kept and name in (errors or {})],
+        rounding=[(name, errors[name]) for name in rounded_names if name in kept and name in errors],
         hurts=any(body_channel(spec) for spec in kept.values()),
         style=style(),
         bundle=trusted("the bundle", bundle),

@@ -10,11 +10,12 @@ from hobble.report.comparison_charts import Compared, colours, dots
 from hobble.report.cost_section import log_range
 from hobble.report.formats import duration, size
 
+# Key of a configuration's training history -> title of the horizontal axis.
 X_AXES = {"pass": "passes", "seconds": "seconds of training", "samples": "samples seen"}
 
 
 def training_curves(compared: Compared) -> Chart | None:
-    """Training and held-out error of all configurations, over passes, seconds and samples."""
+    """Training and held-out error of all configurations, by passes, seconds or samples."""
     options: dict[str, list[Trace]] = {}
     values: list[float | None] = []
     for key, label in X_AXES.items():
@@ -65,13 +66,14 @@ def stage_dots(compared: Compared) -> list[Chart]:
             "xaxis": axis(label, type="log", tickformat="~s", dtick=1, range=log_range(values)),
             "yaxis": {"automargin": True, "categoryorder": "array", "categoryarray": order},
         }
-        caption = "Configurations with the same data set share its stages, which then run only once."
+        caption = "The stages that prepare a data set run only once for all configurations that use it."
         charts.append(Chart(f"compare-{key}", title, caption, traces, layout, 110 + 32 * len(order)))
     return charts
 
 
 def _passes(entry: Mapping[str, Any]) -> list[float]:
-    """For each section of training, the number of passes at its end."""
+    """How many passes were done at the end of each section of training. A section is a part of a pass."""
     sections = [s for s in entry.get("section", ()) if s is not None]
-    most = max(sections, default=1)
-    return [p - 1 + s / most for p, s in zip(entry.get("pass", ()), entry.get("section", ()), strict=True)]
+    per_pass = max(sections, default=1)
+    passes = zip(entry.get("pass", ()), entry.get("section", ()), strict=True)
+    return [pass_number - 1 + section / per_pass for pass_number, section in passes]

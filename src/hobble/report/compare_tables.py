@@ -14,12 +14,12 @@ from hobble.report.tables import Column, Table
 MEASURES = {
     "patches": "patches: pieces of ground cut from height maps (ours: all files of the terrain stage)",
     "database": "database, on disk",
-    "weights of 50 phases": "weights of 50 phases, as the original stores them",
+    "weights of 50 phases": "weights of 50 phases, as the code of Holden et al. stores them",
 }
 
 
-# Columns of the table of pairs. "sd of means" is the standard deviation of the means of a split's clips, or
-# of a phase mode's laps.
+# Columns of the table of pairs of configurations: (key in compare.json, heading). "sd of means" is the
+# standard deviation of the means of clips, or, for frame times, of the means of laps on the test track.
 PAIR = (
     ("mean_a", "mean, one"),
     ("sd_a", "sd of frames, one"),
@@ -33,20 +33,20 @@ PAIR = (
 
 
 def configuration_table(compared: Compared) -> Table:
-    """A row per configuration: its settings, and the key results of the measurements."""
+    """A row for each configuration: its settings and the main results of its measurements."""
     entries = {entry["configuration"]: entry for entry in compared["configurations"]}
 
-    def of(key: str) -> dict[str, Any]:
+    def by_name(key: str) -> dict[str, Any]:
         return {name: entry[key] for name, entry in entries.items()}
 
-    names = {name: ", ".join(channels) or "none" for name, channels in of("channels").items()}
+    channel_names = {name: ", ".join(channels) or "none" for name, channels in by_name("channels").items()}
     columns = [
         *compared_columns(compared),
-        OverviewColumn(50, Column("channels"), names),
-        OverviewColumn(60, Column("data set"), of("dataset")),
-        OverviewColumn(80, Column.count("layers"), of("hidden_layers")),
-        OverviewColumn(90, Column.count("units"), of("units")),
-        OverviewColumn(100, Column.number("passes"), of("passes")),
+        OverviewColumn(50, Column("channels"), channel_names),
+        OverviewColumn(60, Column("data set"), by_name("dataset")),
+        OverviewColumn(80, Column.count("layers"), by_name("hidden_layers")),
+        OverviewColumn(90, Column.count("units"), by_name("units")),
+        OverviewColumn(100, Column.number("passes"), by_name("passes")),
     ]
     columns.sort(key=lambda column: column.at)
     rows = [[name, *(column.values.get(name) for column in columns)] for name in entries]
@@ -55,15 +55,16 @@ def configuration_table(compared: Compared) -> Table:
 
 
 def difference_table(compared: Compared) -> Table | None:
-    """Errors and frame times of every pair, and their difference by eq. 3.2 of Segerstedt.
+    """Errors and frame times of every pair, and their difference by eq. 3.2 of Segerstedt (2021).
 
-    The difference is divided by the deviation of frames in one column, and by that of means in another.
+    The equation divides by standard deviations. One column has the result with those of frames, another with
+    those of means.
     """
-    found = [("error", r) for r in compared["difference"]]
-    found += [("mean ms a frame", r) for r in compared["milliseconds"].get("difference", ())]
+    pairs = [("error", r) for r in compared["difference"]]
+    pairs += [("mean ms a frame", r) for r in compared["milliseconds"].get("difference", ())]
     rows = [
         [r["a"], r["b"], f"{what}, {r['over'].replace('_', ' ')}", *(r.get(key) for key, _ in PAIR)]
-        for what, r in found
+        for what, r in pairs
     ]
     if not rows:
         return None
@@ -75,12 +76,12 @@ def difference_table(compared: Compared) -> Table | None:
 def published_table(compared: Compared) -> Table:
     """The published results next to ours."""
     sources = compared["published"]["sources"]
-    shows = {"bytes": size, "s": duration}
+    formats = {"bytes": size, "s": duration}
     rows = []
-    found = (*compared["against_published"], *compared["milliseconds"]["against_published"])
-    for row in sorted(found, key=lambda row: row["ours"] is None):
-        show = shows.get(row["unit"], lambda value: number(value, 3))
-        unit = f" {row['unit']}" if row["unit"] and row["unit"] not in shows else ""
+    published = (*compared["against_published"], *compared["milliseconds"]["against_published"])
+    for row in sorted(published, key=lambda row: row["ours"] is None):
+        show = formats.get(row["unit"], lambda value: number(value, 3))
+        unit = f" {row['unit']}" if row["unit"] and row["unit"] not in formats else ""
         texts = ["" if row[k] is None else f"{show(float(row[k]))}{unit}" for k in ("published", "ours")]
         measure = MEASURES.get(row["measure"], row["measure"])
         measure += ", mean" if row["unit"] == "ms" and not measure.startswith("standard") else ""

@@ -1,4 +1,4 @@
-"""What the charts of the comparison page share: names, colours, dots."""
+"""What the charts of the comparison page have in common: names, colours and dots of configurations."""
 
 from __future__ import annotations
 
@@ -7,7 +7,8 @@ from typing import Any
 
 from hobble.report.charts import Trace
 
-Compared = Mapping[str, Any]
+Compared = Mapping[str, Any]  # the content of compare.json
+# The page's CSS colours for the configurations.
 PALETTE = ("@accent", "@g2", "@g3", "@g4", "@g5", "@g0", "@g1", "@predicted")
 SPLITS = {"held_out": "held-out clips", "train": "training clips"}
 
@@ -18,7 +19,7 @@ def names(compared: Compared) -> list[str]:
 
 
 def colours(compared: Compared) -> dict[str, str]:
-    """A colour for each configuration, the same in every chart."""
+    """Configuration -> its colour in all charts."""
     return {name: PALETTE[i % len(PALETTE)] for i, name in enumerate(names(compared))}
 
 

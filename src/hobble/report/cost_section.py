@@ -13,7 +13,7 @@ from hobble.report.tables import Column, Table
 
 
 def stage_charts(material: ReportMaterial) -> list[Chart]:
-    """Seconds and bytes of each stage, side by side."""
+    """Two charts: the seconds and the bytes of each stage."""
     stages = list(material.pipeline.get("stages") or ())[::-1]
     names = [stage["stage"] for stage in stages]
     charts = []
@@ -48,15 +48,19 @@ def stage_charts(material: ReportMaterial) -> list[Chart]:
 
 
 def log_range(values: Sequence[float]) -> list[float]:
-    """Range of a logarithmic axis: whole decades around the positive values, with room for text."""
-    some = [math.log10(value) for value in values if value > 0] or [0.0, 1.0]
-    return [math.floor(min(some)), max(some) + 0.4 * (max(some) - math.floor(min(some)) + 1)]
+    """Range of a logarithmic axis, as exponents of ten, with room for text beyond the largest value.
+
+    It begins with the whole decade below the smallest positive value.
+    """
+    powers = [math.log10(value) for value in values if value > 0] or [0.0, 1.0]
+    return [math.floor(min(powers)), max(powers) + 0.4 * (max(powers) - math.floor(min(powers)) + 1)]
 
 
 def stage_table(material: ReportMaterial) -> Table:
-    """A row for each stage, with the published values of this configuration if there are any."""
-    rows_of = [row for row in material.published["stages"] if row["configuration"] == material.name]
-    theirs = {row["stage"]: row for row in rows_of}
+    """A row for each stage, with published times and sizes if there are any for this configuration."""
+    published = {
+        row["stage"]: row for row in material.published["stages"] if row["configuration"] == material.name
+    }
     columns = [
         Column("stage"),
         Column.count("jobs"),
@@ -66,7 +70,7 @@ def stage_table(material: ReportMaterial) -> Table:
         Column.count("files"),
         Column("size", lambda v: size(float(v)), "n"),
     ]
-    if theirs:
+    if published:
         columns.append(Column("published time", lambda v: duration(float(v)), "n"))
         columns.append(Column("published size", lambda v: size(float(v)), "n"))
     rows = [
@@ -78,7 +82,11 @@ def stage_table(material: ReportMaterial) -> Table:
             stage.get("max_rss_mb"),
             stage.get("files"),
             stage.get("bytes"),
-            *((theirs.get(stage["stage"], {}).get(key) for key in ("seconds", "bytes")) if theirs else ()),
+            *(
+                (published.get(stage["stage"], {}).get(key) for key in ("seconds", "bytes"))
+                if published
+                else ()
+            ),
         ]
         for stage in material.pipeline.get("stages") or ()
     ]

@@ -1,4 +1,4 @@
-"""How many seconds of data there are at each speed, turn and channel value, counted over rows of clips."""
+"""How many seconds of data there are at each speed, turning speed and channel value."""
 
 from __future__ import annotations
 
@@ -16,25 +16,29 @@ from hobble.report.charts import Chart, Trace, axis
 from hobble.rows.clip_rows import row_count
 from hobble.rows.excerpts import Excerpt, excerpts, load_excerpt
 
-FPS = 60.0
-SPEEDS = np.arange(0, 6.01, 0.2)  # metres a second
-TURNS = np.arange(-220, 221, 20.0)  # degrees a second, positive to the left
-LEVELS = np.arange(1, 11)  # tenths of the highest value of a channel
-MOST = 600  # excerpts of clips whose frames are counted
+FPS = 60.0  # of the clips' rows
+SPEEDS = np.arange(0, 6.01, 0.2)  # edges of the bins, metres a second
+TURNS = np.arange(-220, 221, 20.0)  # edges of the bins, degrees a second, positive to the left
+TENTHS = np.arange(1, 11)  # middles of the bins of channel values, in tenths of the highest value
+MOST_EXCERPTS = 600  # the frames of at most this many excerpts of clips are counted
+# Split, its name on the page, the colour of its bars.
 SPLITS = (("train", "training", "@muted"), ("held_out", "held out", "@accent"))
 
 
 def seconds_of_data(
     paths: Sequence[str | Path], splits: Mapping[str, str], of: int | None = None
 ) -> dict[str, Any]:
-    """Seconds of data in the files `database/clips/<clip>.npz`. Each frame counts once.
+    """Seconds of data in the files `database/clips/<clip>.npz`. A frame with several rows counts once.
 
-    of: the number of all clips, if `paths` are a random choice of them; the seconds are then an estimate for
-    all clips. The result has `turns`: split -> seconds in each bin of TURNS; `both`: (turns, speeds), seconds
-    in each bin of turn and speed; `channels`: channel -> column -> seconds at each tenth of the highest
-    value; `estimate`: a sentence which says what was read, empty if everything was.
+    splits: clip -> "train" or "held_out". of: the number of all clips, if `paths` are a random choice of
+    them; the seconds are then an estimate for all clips.
+
+    The result has `turns`: split -> seconds in each bin of TURNS; `both`: (turns, speeds), seconds in each
+    bin of turn and speed; `channels`: channel -> column -> seconds in each bin of TENTHS; `estimate`: a
+    sentence that says which part of the data was read, empty if all was read.
     """
     chosen, share = _chosen(paths)
+    # Each frame that is read stands for this many seconds of data.
     each = max(of or 0, len(paths)) / max(len(paths), 1) / share / FPS
     turns = {split: np.zeros(len(TURNS) - 1) for split, *_ in SPLITS}
     both = np.zeros((len(TURNS) - 1, len(SPEEDS) - 1))
@@ -44,19 +48,18 @@ def seconds_of_data(
         once = np.unique(rows.frame, return_index=True)[1]
         y, layout = np.asarray(rows.y[once], float), rows.layout
         speed = np.linalg.norm(y[:, layout.y_root_velocity], axis=1) * FPS / 100
-        turn = (
-            np.degrees(-y[:, layout.y_turn][:, 0]) * FPS
-        )  # the column is the turn of the world relative to the root
+        # The column has the opposite sign: it is the turn of the world relative to the root.
+        turn = np.degrees(-y[:, layout.y_turn][:, 0]) * FPS
         speed, turn = (np.clip(v, e[0], e[-1] - 1e-6) for v, e in ((speed, SPEEDS), (turn, TURNS)))
         turns[splits.get(rows.clip, "train")] += np.histogram(turn, TURNS)[0] * each
         both += np.histogram2d(turn, speed, (TURNS, SPEEDS))[0] * each
         skeleton = Skeleton.from_dict(rows.skeleton)
         for name, table in rows.channels.items():
-            one, seconds = channel(name), channels.setdefault(name, {})
-            for column, values in zip(one.columns(skeleton), table[once].T, strict=True):
+            definition, seconds = channel(name), channels.setdefault(name, {})
+            for column, values in zip(definition.columns(skeleton), table[once].T, strict=True):
                 if values.any():
-                    found = np.histogram(10 * values / one.highest, np.arange(0.5, 11))[0] * each
-                    seconds[column] = seconds.get(column, 0) + found
+                    counts = np.histogram(10 * values / definition.highest, np.arange(0.5, 11))[0]
+                    seconds[column] = seconds.get(column, 0) + counts * each
     part = [f"{len(paths):,} of {of:,} clips"] if of and of > len(paths) else []
     part += [f"{100 * share:.0f} % of their frames"] if share < 1 else []
     estimate = f" Estimated from {' and '.join(part)}." if part else ""
@@ -64,26 +67,27 @@ def seconds_of_data(
 
 
 def _chosen(paths: Sequence[str | Path]) -> tuple[list[tuple[str | Path, Excerpt]], float]:
-    """The excerpts to read: all, or MOST drawn at random. Also returns their share of all rows."""
-    every = [(path, one) for path in paths for one in excerpts(Path(path).stem, row_count(path))]
-    some = sorted(every, key=lambda pair: shuffle_key(f"{pair[1].clip} {pair[1].first}"))[:MOST]
-    rows = sum(one.rows for _, one in every)
-    return (every, 1.0) if len(every) <= MOST else (some, sum(one.rows for _, one in some) / rows)
+    """The excerpts to read: all, or MOST_EXCERPTS drawn at random. Also returns their share of all rows."""
+    every = [(path, excerpt) for path in paths for excerpt in excerpts(Path(path).stem, row_count(path))]
+    if len(every) <= MOST_EXCERPTS:
+        return every, 1.0
+    drawn = sorted(every, key=lambda pair: shuffle_key(f"{pair[1].clip} {pair[1].first}"))[:MOST_EXCERPTS]
+    return drawn, sum(excerpt.rows for _, excerpt in drawn) / sum(excerpt.rows for _, excerpt in every)
 
 
-def turn_chart(found: Mapping[str, Any]) -> Chart | None:
-    """Seconds at each turning speed."""
+def turn_chart(counted: Mapping[str, Any]) -> Chart | None:
+    """Seconds at each turning speed. counted: from `seconds_of_data`."""
     traces: list[Trace] = [
         {
             "type": "bar",
             "name": label,
             "x": _middles(TURNS),
-            "y": np.round(found["turns"][split], 3).tolist(),
+            "y": np.round(counted["turns"][split], 3).tolist(),
             "marker": {"color": colour},
             "hovertemplate": "%{x}°/s: %{y:.1f} s<extra></extra>",
         }
         for split, label, colour in SPLITS
-        if found["turns"][split].any()
+        if counted["turns"][split].any()
     ]
     if not traces:
         return None
@@ -94,12 +98,12 @@ def turn_chart(found: Mapping[str, Any]) -> Chart | None:
         "yaxis": axis("seconds", rangemode="tozero"),
     }
     caption = "Seconds of data at each turning speed. With mirrored clips, left and right are alike."
-    return Chart("turns", "Turning speed", caption + found["estimate"], traces, layout, 300)
+    return Chart("turns", "Turning speed", caption + counted["estimate"], traces, layout, 300)
 
 
-def both_chart(found: Mapping[str, Any]) -> Chart | None:
-    """Seconds at each combination of speed and turn."""
-    both = found["both"]
+def both_chart(counted: Mapping[str, Any]) -> Chart | None:
+    """Seconds at each combination of speed and turn. counted: from `seconds_of_data`."""
+    both = counted["both"]
     if not both.any():
         return None
     last = int(np.flatnonzero(both.any(axis=0)).max()) + 1
@@ -118,17 +122,17 @@ def both_chart(found: Mapping[str, Any]) -> Chart | None:
     caption = (
         "Seconds of data at each combination of speed and turn. The network was not trained on empty cells."
     )
-    return Chart("speed-turn", "Speed and turn combined", caption + found["estimate"], [trace], layout, 300)
+    return Chart("speed-turn", "Speed and turn combined", caption + counted["estimate"], [trace], layout, 300)
 
 
-def channel_charts(found: Mapping[str, Any], shown_name: Callable[[str], str] = str) -> list[Chart]:
+def channel_charts(counted: Mapping[str, Any], shown_name: Callable[[str], str] = str) -> list[Chart]:
     """A chart for each channel that has a value above 0 in any clip: seconds at each value of each column.
 
-    shown_name: column -> its name on the page.
+    counted: from `seconds_of_data`. shown_name: column -> its name on the page.
     """
     return [
-        _channel_chart(name, seconds, found["estimate"], shown_name)
-        for name, seconds in found["channels"].items()
+        _channel_chart(name, seconds, counted["estimate"], shown_name)
+        for name, seconds in counted["channels"].items()
         if seconds
     ]
 
@@ -136,11 +140,11 @@ def channel_charts(found: Mapping[str, Any], shown_name: Callable[[str], str] = 
 def _channel_chart(
     name: str, seconds: Mapping[str, Array], estimate: str, shown_name: Callable[[str], str]
 ) -> Chart:
-    one, columns = channel(name), list(seconds)[::-1]
-    tenth = one.highest / 10
+    definition, columns = channel(name), list(seconds)[::-1]
+    tenth = definition.highest / 10
     trace = {
         "type": "heatmap",
-        "x": np.round(LEVELS * tenth, 6).tolist(),
+        "x": np.round(TENTHS * tenth, 6).tolist(),
         "y": [shown_name(column) for column in columns],
         "z": [[round(float(v), 3) or None for v in seconds[column]] for column in columns],
         "colorscale": [[0, "@hurt-low"], [1, "@hurt-high"]],
@@ -149,12 +153,12 @@ def _channel_chart(
         "colorbar": {"title": {"text": "s"}, "thickness": 10, "outlinewidth": 0},
         "hovertemplate": "%{y} at %{x}: %{z:.1f} s<extra></extra>",
     }
-    across = axis(one.value, dtick=tenth, range=[0.4 * tenth, 10.6 * tenth])
+    across = axis(definition.value, dtick=tenth, range=[0.4 * tenth, 10.6 * tenth])
     caption = (
-        f"Each cell has the seconds of data at one {one.value}, including mirrored clips. The network was "
-        "not trained on empty cells and has to interpolate there."
+        f"Each cell has the seconds of data at one {definition.value}, including mirrored clips. The network "
+        "was not trained on empty cells and has to interpolate there."
     )
-    title, height = f"{one.title}: amount of data", 120 + 24 * len(columns)
+    title, height = f"{definition.title}: amount of data", 120 + 24 * len(columns)
     layout = {"xaxis": across, "yaxis": {"automargin": True}}
     return Chart(f"{name}-coverage", title, caption + estimate, [trace], layout, height)
 

@@ -8,16 +8,17 @@ from typing import Any
 import numpy as np
 
 from hobble.channels.shown import shown_names
-from hobble.motion.check_retarget import MOST, worst
+from hobble.motion.check_retarget import MOST as MOST_DIFFERENCE
+from hobble.motion.check_retarget import worst
 from hobble.report.charts import Chart, Trace, axis
 from hobble.report.formats import size
 from hobble.report.gather import ReportMaterial
 from hobble.report.tables import Column, Table
 
 GAIT_COLOURS = {"stand": "@g0", "walk": "@g1", "jog": "@g2", "crouch": "@g3", "jump": "@g4", "bump": "@g5"}
-MOST_BARS = 200  # clips with a bar of their own, at most
-MOST_REMARKS = 500  # rows of the table of repairs and warnings, at most
-MOST_NAMED = 30  # if there are more bars than this, none has a name under it
+MOST_BARS = 200  # the chart of retargeted clips has at most this many bars
+MOST_REMARKS = 500  # the table of repairs and warnings has at most this many rows
+MOST_NAMED = 30  # if the chart of retargeted clips has more bars than this, none has a name under it
 SPLIT_NAMES = {"train": "training", "held_out": "held out"}
 
 
@@ -87,38 +88,41 @@ def speed_chart(material: ReportMaterial) -> Chart | None:
 
 
 def retarget_chart(material: ReportMaterial) -> Chart | None:
-    """A bar for each retargeted clip: the joint or limb that differs most from the file, in degrees."""
-    known = {report["clip"] for report in material.motion}
-    found = []
+    """A bar for each retargeted clip: the joint or limb that differs most from the clip's file, in degrees.
+
+    A mirrored clip has no bar if the clip that it mirrors is there.
+    """
+    names = {report["clip"] for report in material.motion}
+    bars = []
     for report in material.motion:
-        clip, figures = report["clip"], report.get("retarget")
-        if figures and not (clip.endswith("_mirror") and clip.removesuffix("_mirror") in known):
-            found.append((*worst(figures), clip))
-    if not found:
+        clip, differences = report["clip"], report.get("retarget")
+        if differences and not (clip.endswith("_mirror") and clip.removesuffix("_mirror") in names):
+            bars.append((*worst(differences), clip))
+    if not bars:
         return None
-    found.sort(key=lambda bar: -bar[1])
-    every, found = len(found), found[:MOST_BARS]
+    bars.sort(key=lambda bar: -bar[1])
+    total, bars = len(bars), bars[:MOST_BARS]
     trace: Trace = {
         "type": "bar",
-        "x": [clip for _, _, clip in found],
-        "y": [degrees for _, degrees, _ in found],
-        "text": [joint for joint, _, _ in found],
+        "x": [clip for _, _, clip in bars],
+        "y": [degrees for _, degrees, _ in bars],
+        "text": [joint for joint, _, _ in bars],
         "textposition": "none",
         "marker": {"color": "@muted"},
         "hovertemplate": "%{x}: %{text} differs by %{y:.1f} degrees<extra></extra>",
     }
     layout = {
         "showlegend": False,
-        "xaxis": {"type": "category", "showticklabels": len(found) <= MOST_NAMED},
+        "xaxis": {"type": "category", "showticklabels": len(bars) <= MOST_NAMED},
         "yaxis": axis("difference, degrees", rangemode="tozero"),
     }
     caption = (
         "These clips were retargeted to the skeleton of the data set. Each bar is the joint or limb that "
         "differs most from the file, in degrees averaged over the clip. Clips with more than "
-        f"{MOST:.0f} degrees are refused."
+        f"{MOST_DIFFERENCE:.0f} degrees are refused."
     )
-    if every > len(found):
-        caption += f" Shown are the {len(found)} of {every:,} clips that differ most."
+    if total > len(bars):
+        caption += f" Shown are the {len(bars)} of {total:,} clips that differ most."
     return Chart(
         "retarget", "Difference between retargeted clips and their files", caption, [trace], layout, 220
     )
@@ -158,19 +162,20 @@ def clip_table(material: ReportMaterial, clips: frozenset[str]) -> Table:
                 report.get("sha256"),
             ]
         )
-    every = len(material.motion)
+    total = len(material.motion)
     which = (
-        f"All {every} clips"
-        if len(rows) == every
-        else f"{len(rows)} of {every:,} clips (more would make the page slow)"
+        f"All {total} clips"
+        if len(rows) == total
+        else f"{len(rows)} of {total:,} clips (more would make the page slow)"
     )
     return Table(f"{material.name}-clips", columns, rows, f"{which}, with checksums")
 
 
 def remarks_table(material: ReportMaterial) -> Table | None:
-    """Every repair, doubt and warning.
+    """A row for each repair, doubt and warning.
 
-    If there are more than MOST_REMARKS, one row for each kind, with the number of its clips and one example.
+    If there are more than MOST_REMARKS, a row for each kind (messages that differ only in numbers), with the
+    number of its clips and one example.
     """
     rows = []
     for stage, reports, key in (
@@ -194,7 +199,7 @@ def remarks_table(material: ReportMaterial) -> Table | None:
 
 
 def _by_kind(rows: list[list[str]]) -> list[list[Any]]:
-    """One row for all remarks whose sentences differ only in numbers, most frequent first.
+    """A row for each kind of remark, most frequent first. Sentences of a kind differ only in numbers.
 
     A row has the number of clips, the stage, the first clip, and the first clip's sentence.
     """
@@ -202,27 +207,28 @@ def _by_kind(rows: list[list[str]]) -> list[list[Any]]:
     for row in rows:
         kinds.setdefault((row[1], re.sub(r"[0-9][0-9.,:/-]*", "0", row[2])), []).append(row)
     many = sorted(kinds.values(), key=len, reverse=True)[:MOST_REMARKS]
-    return [[len({row[0] for row in same}), same[0][1], same[0][0], same[0][2]] for same in many]
+    return [[len({row[0] for row in kind}), kind[0][1], kind[0][0], kind[0][2]] for kind in many]
 
 
 def strips(material: ReportMaterial, clips: frozenset[str]) -> list[dict[str, Any]]:
-    """Data for the strips, one chart over time for each clip: label curves and channel values.
+    """Data for the strips. A strip is a chart of one clip over time: label curves and channel values.
 
-    Clips that are not in `clips`, mirrors, and clips without label curves are left out.
+    Left out are clips that are not in `clips`, clips without label curves, and mirrored clips if the clip
+    that they mirror is there.
     """
     of_clip: dict[str, dict[str, Any]] = {}
     for report in material.channels:
         channel_highest = report.get("highest", 10.0)
-        found = {label: (value, channel_highest) for label, value in report["values"].items()}
-        of_clip.setdefault(report["clip"], {}).update(found)
+        values = {label: (value, channel_highest) for label, value in report["values"].items()}
+        of_clip.setdefault(report["clip"], {}).update(values)
     shown_name = shown_names(material.network["skeleton"])
     lengths = {report["clip"]: report.get("seconds") for report in material.motion}
-    known = {report["clip"] for report in material.labels}
+    labelled = {report["clip"] for report in material.labels}
     out = []
     for report in material.labels:
         curves, clip = report.get("curves"), report["clip"]
-        mirrors = clip.endswith("_mirror") and clip.removesuffix("_mirror") in known
-        if clip not in clips or mirrors or not curves or not curves.get("seconds"):
+        mirrored = clip.endswith("_mirror") and clip.removesuffix("_mirror") in labelled
+        if clip not in clips or mirrored or not curves or not curves.get("seconds"):
             continue
         length = lengths.get(clip) or curves["seconds"][-1]
         channel_values = [

@@ -14,20 +14,21 @@ from hobble.report.formats import duration, number, size
 from hobble.report.gather import ReportMaterial
 from hobble.report.summary import Hint, KeyFigure, placed
 
-TURNING = 40.0  # degrees a second; slower turning is the sway of a straight walk
-LITTLE_TURNING = 0.01  # share of the time with turns; with less the page warns
+TURNING = 40.0  # degrees a second: slower turning is not counted, because it is the sway of a straight walk
+LITTLE_TURNING = 0.01  # if turning takes less than this share of the time, the page warns
+# Kinds of hints, in the order of the page.
 ORDER = ("warn", "note", "good", "fact")
 
 
 def _recipe(material: ReportMaterial) -> Mapping[str, Any]:
-    """The training section of the configuration; empty if it is not known."""
+    """The options of training in the configuration; empty if they are not known."""
     return (material.resolved.get("configuration") or {}).get("training") or {}
 
 
 def lead(material: ReportMaterial) -> str:
     """A sentence or two on the network and its training data."""
     clips = [report["clip"] for report in material.motion]
-    kept = sum(material.split(clip) == "held_out" for clip in clips)
+    held_out = sum(material.split(clip) == "held_out" for clip in clips)
     frames = sum(report.get("frames", 0) for report in material.motion)
     passes = _recipe(material).get("passes")
     network = material.network
@@ -37,8 +38,8 @@ def lead(material: ReportMaterial) -> str:
         else f"A character driven by {network['described']}, built"
     )
     text += f" for {passes:g} passes" if passes and network["sizes"] else ""
-    text += f" on {len(clips) - kept} clips of the data set {material.dataset}"
-    text += f", and tested on {kept} held-out clips" if kept else ""
+    text += f" on {len(clips) - held_out} clips of the data set {material.dataset}"
+    text += f", and tested on {held_out} held-out clips" if held_out else ""
     return f"{text}. All clips together have {frames:,} frames at 60\u00a0Hz."
 
 
@@ -47,12 +48,12 @@ def key_figures(material: ReportMaterial) -> list[KeyFigure]:
     figures = measure_sections.figures(material)
     seconds = sum(report.get("seconds", 0) for report in material.motion)
     if seconds:
-        kept = sum(material.split(report["clip"]) == "held_out" for report in material.motion)
-        note = f"{len(material.motion)} clips, {kept} of them held out"
+        held_out = sum(material.split(report["clip"]) == "held_out" for report in material.motion)
+        note = f"{len(material.motion)} clips, {held_out} of them held out"
         value, _, unit = duration(seconds).partition(" ")
         figures.append(KeyFigure("Motion data", value, unit, note, 30))
     network = material.network
-    # For a PFNN they are counted for one of its control points, for other kinds of network all are counted.
+    # Of a PFNN, these are the parameters of one control point; of other kinds of network, all parameters.
     which = " at each control point" if "control points" in network["described"] else ""
     note = f"parameters{which}; layers of {'–'.join(map(str, network['sizes']))}"
     note = f"{note if network['sizes'] else 'numbers in its tables'}; {size(network['bytes'])} on disk"
@@ -74,9 +75,10 @@ def hints(material: ReportMaterial, turns: Mapping[str, Array] | None = None) ->
 
     turns: split -> seconds in each bin of `coverage.TURNS`, if they were counted.
     """
+    # The first argument of `placed` sorts hints of the same kind: see `at` in `hobble.report.summary.Hint`.
     found = [
         *measure_sections.hints(material),
-        *placed(10, _coverage(material)),  # first, because training cannot make up for missing data
+        *placed(10, _coverage(material)),  # before training, which cannot make up for missing data
         *placed(10, _turning(turns or {})),
         *placed(11, _repairs(material)),
         *placed(20, _curve(material)),
@@ -88,12 +90,12 @@ def hints(material: ReportMaterial, turns: Mapping[str, Array] | None = None) ->
 def _curve(material: ReportMaterial) -> Iterator[Hint]:
     history = material.history
     curve = zip(history.get("pass", ()), history.get("held_out_mse", ()), strict=False)
-    known = [(p, v) for p, v in curve if p is not None and v is not None]
-    if len(known) < 8:
+    measured = [(p, v) for p, v in curve if p is not None and v is not None]
+    if len(measured) < 8:
         return
-    passes, losses = zip(*known, strict=True)
-    # The error of one section is noisy, so compare means over passes.
-    means = {p: np.mean([v for q, v in known if q == p]) for p in passes}
+    passes, losses = zip(*measured, strict=True)
+    # The error is measured several times in a pass. One value is noisy, so compare means over passes.
+    means = {p: np.mean([v for q, v in measured if q == p]) for p in passes}
     best = min(means, key=lambda p: means[p])
     if means[passes[-1]] > 1.05 * means[best]:
         yield Hint(
@@ -106,7 +108,7 @@ def _curve(material: ReportMaterial) -> Iterator[Hint]:
     before, after = np.mean(losses[-2 * quarter : -quarter]), np.mean(losses[-quarter:])
     fall = 1 - after / before
     if _recipe(material).get("schedule", "constant") != "constant":
-        return  # the error falls with the learning rate, which has reached its end
+        return  # the error fell because the learning rate did, so it says nothing about more passes
     if fall > 0.03:
         yield Hint(
             "note",
@@ -162,7 +164,7 @@ def _repairs(material: ReportMaterial) -> Iterator[Hint]:
         yield Hint(
             "note",
             f"{len(repaired)} clips were repaired, and {len(warned)} have warnings.",
-            "Look at them: the network also learns the errors in a clip. They are listed under Data.",
+            "They are listed under Data. Look at them, because the network also learns the errors in a clip.",
         )
 
 

@@ -1,4 +1,4 @@
-"""Reads everything that the page shows from the artefacts."""
+"""Reads the artefacts from which the report of a configuration is made."""
 
 from __future__ import annotations
 
@@ -15,6 +15,7 @@ from hobble.measures.inputs import Json
 from hobble.models.load import load_network
 
 PUBLISHED = Path(__file__).parents[1] / "evaluation" / "published.yaml"
+# Columns of the history that are not the error of one block of the output Y.
 GENERAL_COLUMNS = ("pass", "section", "samples", "seconds", "train_mse", "held_out_mse")
 
 
@@ -22,11 +23,13 @@ GENERAL_COLUMNS = ("pass", "section", "samples", "seconds", "train_mse", "held_o
 class ReportMaterial:
     """The results of one configuration.
 
-    splits: clip -> "train" or "held_out". resolved: the configuration with all defaults. measured:
-    measurement -> its JSON. pipeline: pipeline.json. history: column -> values, one for each section of
-    training, None for an empty cell. network: see `describe_network`. motion, labels: reports of the clips,
-    in the same order. channels: reports of their channels. terrain, rows: paths of the clips' terrain fits
-    and rows. published: published.yaml.
+    name: of the configuration. dataset: name of the data set. title: heading of the page, if it is not the
+    name. splits: clip -> "train" or "held_out". resolved: the configuration with all defaults. measured:
+    measurement -> its JSON. pipeline: content of pipeline.json. history: column -> values, one for each
+    section (part of a pass) of training, None for an empty cell. network: from `describe_network`. motion,
+    labels: for each clip, the report on its motion and the one on its labels, in the same order. channels:
+    reports on the channels of clips. terrain, rows: paths of the clips' terrain fits and rows. published:
+    content of published.yaml.
     """
 
     name: str
@@ -46,7 +49,7 @@ class ReportMaterial:
     published: Mapping[str, Any] = field(repr=False)
 
     def split(self, clip: str) -> str:
-        """ "train" or "held_out"."""
+        """The split of a clip, "train" or "held_out"."""
         return self.splits.get(clip, "train")
 
     def found(self, measure: str) -> Json:
@@ -60,7 +63,7 @@ class ReportMaterial:
 
     @property
     def blocks(self) -> list[str]:
-        """Columns of the history that hold the held-out error of one block of Y."""
+        """Columns of the history that hold the held-out error of one block of the output Y."""
         return [name for name in self.history if name not in GENERAL_COLUMNS]
 
 
@@ -81,7 +84,10 @@ def gather(
     terrain: Iterable[str] = (),
     rows: Iterable[str] = (),
 ) -> ReportMaterial:
-    """Read the files of a report. Raises InputError with the name of a file that cannot be read."""
+    """Read the files of a report. All arguments after `splits` are paths.
+
+    Raises InputError with the name of a file that cannot be read.
+    """
     return ReportMaterial(
         name=name,
         dataset=dataset,

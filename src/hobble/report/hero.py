@@ -5,43 +5,45 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping
 from typing import Any
 
-OPENING = 7  # tenths of the highest value: easy to see, but not the maximum
+OPENING = 7  # value when the page opens, in tenths of the highest: easy to see, but not the maximum
 
 
 def opening(playable: Mapping[str, Any], measured: Iterable[Mapping[str, Any]]) -> dict[str, Any]:
     """The slider that is set when the page opens, and its value.
 
-    measured: the JSON of the measurements. In the result, `part` is the label of a slider: the one that makes
-    the walk limp most according to `measured`; if no limps were measured, the one that changes the pose most;
-    if that was not measured either, the first one. It is None if no channel has sliders. `value`: what the
-    dial is set to, in tenths of the highest value.
+    playable: from `hobble.report.playable`. measured: the JSON of the measurements.
+
+    In the result, `part` is the label of the slider that makes the walk limp most according to `measured`; if
+    no limps were measured, of the slider that changes the pose most; if poses were not measured either, of
+    the first slider. It is None if no channel has sliders. `value` is the slider's value, in tenths of the
+    highest.
     """
-    one = first_shown(playable)
-    if one is None:
+    channel = first_shown(playable)
+    if channel is None:
         return {"part": None, "value": 0}
-    parts = {one["columns"][i]: label for label, i in one["sliders"].items()}
-    seen: dict[str, tuple[float, float]] = {}
-    for found in measured:
-        for key, size in (("responses", _pose_change), ("sizes", _limp)):
-            for row in found.get(key) or ():
-                if row.get("gait") == "walk" and row["link"] in parts:
-                    seen[row["link"]] = max(seen.get(row["link"], (0.0, 0.0)), size(row))
-    best = max(seen, key=lambda column: seen[column]) if seen else next(iter(parts))
-    return {"part": parts[best], "value": OPENING}
+    labels = {channel["columns"][i]: label for label, i in channel["sliders"].items()}
+    ranks: dict[str, tuple[float, float]] = {}
+    for results in measured:
+        for table, rank in (("responses", _pose_change), ("sizes", _limp)):
+            for row in results.get(table) or ():
+                if row.get("gait") == "walk" and row["link"] in labels:
+                    ranks[row["link"]] = max(ranks.get(row["link"], (0.0, 0.0)), rank(row))
+    best = max(ranks, key=lambda column: ranks[column]) if ranks else next(iter(labels))
+    return {"part": labels[best], "value": OPENING}
 
 
 def _pose_change(row: Mapping[str, Any]) -> tuple[float, float]:
-    """A rank by how far severity 10 moves the joints, cm. It is below every rank by limp (`_limp`).
+    """A rank by how far severity 10 moves the joints, cm. It is below every rank that `_limp` gives.
 
-    A bent back changes the pose most, but a visitor looks for a limp.
+    The limp comes first because a bent back changes the pose most, but a visitor looks for a limp.
     """
     return 0.0, row.get("from_healthy_cm") or 0.0
 
 
 def _limp(row: Mapping[str, Any]) -> tuple[float, float]:
     """A rank by how uneven the walk is: the changes of stance, step and knee of the hurt leg, added up."""
-    shares = [row.get(name) for name in ("step_hurt", "knee_hurt")]
-    return abs(row.get("stance") or 0.0) + sum(abs(1 - share) for share in shares if share is not None), 0.0
+    ratios = [row.get(name) for name in ("step_hurt", "knee_hurt")]
+    return abs(row.get("stance") or 0.0) + sum(abs(1 - ratio) for ratio in ratios if ratio is not None), 0.0
 
 
 def body_channel(playable: Mapping[str, Any]) -> Mapping[str, Any] | None:

@@ -14,7 +14,7 @@ about the configuration. Its `comparison_page.py` may have
   page,
 - `verdicts(compared) -> Iterable[Verdict]`: sentences on which configuration is best, for the summary,
 
-where `compared` is compare.json.
+where `compared` is the content of compare.json.
 """
 
 from __future__ import annotations
@@ -50,7 +50,7 @@ def sections(material: ReportMaterial) -> list[PageSection]:
 
 
 def figures(material: ReportMaterial) -> list[KeyFigure]:
-    """Figures for the top of the report."""
+    """Key figures for the top of the report."""
     return [f for name, show in _each("page", "figures") for f in show(material.found(name), material)]
 
 
@@ -76,7 +76,7 @@ def compared_columns(compared: Json) -> list[OverviewColumn]:
 
 
 def _each(part: str, function: str) -> Iterator[tuple[str, Callable[..., Any]]]:
-    """(measurement, function) for each measurement whose module `part` has that function."""
-    for one in MEASURES:
-        if (found := getattr(one.part(part), function, None)) is not None:
-            yield one.name, found
+    """(name of a measurement, function) for each measurement that has this function in its module `part`."""
+    for measure in MEASURES:
+        if (found := getattr(measure.part(part), function, None)) is not None:
+            yield measure.name, found

@@ -1,4 +1,7 @@
-"""The figures at the top of the page. They already walk when it opens, so it has nothing to compute first."""
+"""The characters at the top of the page, which already walk when it opens.
+
+Their first steps are computed here, so that the page does not have to compute them before it shows them.
+"""
 
 from __future__ import annotations
 
@@ -14,9 +17,9 @@ from hobble.report.hero import first_shown, opening
 from hobble.report.straight_walk import walk_straight
 from hobble.runtime.options import Runtime
 
-FRAMES = 120  # of walking before the page opens: two seconds, enough to reach the speed and to begin to limp
+FRAMES = 120  # frames of walking before the page opens: two seconds, enough to get up to speed and to limp
 
-# Fields of `hobble.runtime.character.Character` that are flat lists in the page, with names in camel case.
+# Fields of `hobble.runtime.character.Character` that are flat lists in the page, under names in camel case.
 FLAT = (
     "gait",
     "ground",
@@ -38,18 +41,20 @@ NESTED = (
 def opening_walk(
     network: Network, runtime: Runtime, playable: Mapping[str, Any], measured: Iterable[Mapping[str, Any]]
 ) -> dict[str, Any]:
-    """The result of `hero.opening`, with the states of one or two figures under `walked`.
+    """The slider that is set when the page opens, and the states of the characters under `walked`.
 
-    The figures have walked straight on for FRAMES frames on flat ground. The first one has the value of the
-    slider. The second one has no value; it is there only if there is a slider. Names and units are those of
-    state.js.
+    playable, measured: the arguments of `hobble.report.hero.opening`, which chooses the slider.
+
+    The characters have walked straight on for FRAMES frames on flat ground. If there is a slider, there are
+    two: one with its value, then one without any value. Otherwise there is only the one without. Names and
+    units of a state are those of state.js.
     """
-    found, one = opening(playable, measured), first_shown(playable)
-    if one is None:
-        return found | {"walked": [_state(network, runtime, {})]}
-    column = one["columns"][one["sliders"][found["part"]]]
-    hurt = {one["name"]: {column: found["value"] / 10 * one["highest"]}}
-    return found | {"walked": [_state(network, runtime, channels) for channels in (hurt, {})]}
+    chosen, channel = opening(playable, measured), first_shown(playable)
+    if channel is None:
+        return chosen | {"walked": [_state(network, runtime, {})]}
+    column = channel["columns"][channel["sliders"][chosen["part"]]]
+    hurt = {channel["name"]: {column: chosen["value"] / 10 * channel["highest"]}}
+    return chosen | {"walked": [_state(network, runtime, channels) for channels in (hurt, {})]}
 
 
 def _state(network: Network, runtime: Runtime, channels: Mapping[str, Mapping[str, float]]) -> dict[str, Any]:

@@ -6,6 +6,6 @@ from hobble.core.section import Section
 
 
 class ReportOptions(Section):
-    """The page."""
+    """The report page. title: its heading, in place of the default one."""
 
     title: str | None = None

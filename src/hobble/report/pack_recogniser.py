@@ -1,7 +1,7 @@
 """Packs the recogniser of limps for the page.
 
-It consists of the statistics of people's limps, and of the character's healthy walk, with which its limps are
-compared.
+The page gets statistics of people's limps, and a profile of the character's healthy walk, with which the
+recogniser compares the character's present walk.
 """
 
 from __future__ import annotations
@@ -26,11 +26,11 @@ from hobble.runtime.options import Runtime
 
 FPS = 60
 WARM_UP, MEASURED = 3 * FPS, 8 * FPS  # frames to get up to speed, and frames that are measured
-ROLES = ("hip", "knee", "heel", "toe", "shoulder")  # roles that both sides must have
+ROLES = ("hip", "knee", "heel", "toe", "shoulder")  # joint roles that the skeleton must have on both sides
 
 
 def playable_with_recogniser(network: Network, runtime: Runtime) -> dict[str, Any]:
-    """The data of `playable`, and under `recogniser` what the page needs to recognise a limp.
+    """The data of `hobble.report.playable`, and under `recogniser` what the page needs to recognise a limp.
 
     There is no `recogniser` if the network has no channel for parts of the body, if its skeleton lacks one of
     ROLES, or if the healthy character walks no complete gait cycle.
@@ -57,19 +57,20 @@ def healthy_walk(network: Network, skeleton: Skeleton, runtime: Runtime) -> Prof
     return profile(walk) if len(walk) else None
 
 
-def learnt(known: Grader | None = None) -> dict[str, Any]:
-    """The statistics that `hobble.gait.limp_grade` learnt from walks with D features each.
+def learnt(statistics: Grader | None = None) -> dict[str, Any]:
+    """Packs what `hobble.gait.limp_grade` learnt from people's walks with D features each.
 
-    `features`: their names. `strengths`: the strengths of limps that are tried. `healthySpread`: (D, D)
-    covariance of healthy walks. `kinds`: for each label and side its `words` for the page, the `mean` (D,) at
-    strength 1, and the covariance `spread` (D, D). Arrays are float64 in base64.
+    In the result, `features`: names of the features. `strengths`: the strengths of a limp that are tried.
+    `healthySpread`: (D, D) covariance of healthy walks. `kinds`: for each kind of limp (a label and a side),
+    its `words` for the page, the `mean` (D,) at strength 1, and the covariance `spread` (D, D). Arrays are
+    float64 in base64.
     """
-    known = known or grader()
+    statistics = statistics or grader()
     normal = people().normal()
     return {
         "features": list(features(normal, normal)),
         "strengths": STRENGTHS.tolist(),
-        "healthySpread": packed(known.healthy),
+        "healthySpread": packed(statistics.healthy),
         "kinds": [
             {
                 "label": label,
@@ -78,13 +79,13 @@ def learnt(known: Grader | None = None) -> dict[str, Any]:
                 "mean": packed(mean),
                 "spread": packed(spread),
             }
-            for (label, side), (mean, spread) in known.kinds.items()
+            for (label, side), (mean, spread) in statistics.kinds.items()
         ],
     }
 
 
 def words(label: str, side: str) -> str:
-    """The words for the page, such as "left thigh, shank or foot" or "back, leaning forward"."""
+    """A kind of limp in words, such as "left thigh, shank or foot" or "back, leaning forward"."""
     parts = PARTS[label]
     named = parts[0] if len(parts) == 1 else f"{', '.join(parts[:-1])} or {parts[-1]}"
     return f"{named}, leaning {side}" if label == LEANING else f"{side} {named}"

@@ -9,7 +9,7 @@ import yaml
 
 from hobble.channels.shown import shown_names
 from hobble.core.skeleton import Skeleton
-from hobble.figure.mesh import key
+from hobble.figure.mesh import key as mesh_key
 from hobble.figure.pack import packed_body
 from hobble.report import (
     cost_section,
@@ -39,18 +39,18 @@ def render(
 ) -> str:
     """The report as one HTML document.
 
-    scenes: from `scenes.scenes`; playable: from `playable.playable`; captured_and_predicted: from
-    `captured_and_predicted.comparisons`. A part without data is left out. bundle: the page's scripts, from
-    `bundle.bundle`. hero: from `opening_walk.opening_walk`; without it the figures at the top start from a
-    standing pose.
+    The arguments come from other modules of hobble.report: scenes from `scenes.scenes`; playable from
+    `playable.playable`; captured_and_predicted from `captured_and_predicted.comparisons`; bundle, the page's
+    scripts, from `bundle.bundle`; hero from `opening_walk.opening_walk`. A section without data is left out.
+    Without `hero`, the characters at the top of the page begin in the network's start frame.
 
     The template escapes every value. Data for the scripts is JSON without any "<".
     """
     clips = shown_clips.shown(material)
     terrain = shown_clips.files_of(material.terrain, clips)
-    some = shown_clips.sampled(material.rows)
-    found = coverage.seconds_of_data(some, material.splits, of=len(material.rows))
-    sections, measured = _sections(material, found, clips, terrain), measure_sections.sections(material)
+    row_files = shown_clips.sampled(material.rows)
+    counted = coverage.seconds_of_data(row_files, material.splits, of=len(material.rows))
+    sections, measured = _sections(material, counted, clips, terrain), measure_sections.sections(material)
     scenes, playable = dict(scenes or {}), playable or {}
     captured_and_predicted = captured_and_predicted or {}
     strips = data_section.strips(material, clips)
@@ -71,7 +71,7 @@ def render(
         material=material,
         measured=measured,
         figures=findings.key_figures(material),
-        hints=findings.hints(material, found["turns"]),
+        hints=findings.hints(material, counted["turns"]),
         embedded={name: embedded(part) for name, part in data.items()},
         scene_names=[scene["name"] for scene in scenes.get("scenarios", ())],
         playable=playables,
@@ -87,15 +87,15 @@ def render(
 
 
 def _bodies(material: ReportMaterial) -> dict[str, Any]:
-    """The body to draw, by the key of its skeleton; {} if the network has no skeleton."""
+    """Key of the body (`mesh_key`) -> the body to draw; {} if the network has no skeleton."""
     if not material.network["skeleton"]:
         return {}
     figure = Skeleton.from_dict({"name": "", **material.network["skeleton"]})
-    return {key(figure): packed_body(figure)}
+    return {mesh_key(figure): packed_body(figure)}
 
 
 def _top(material: ReportMaterial, playable: Mapping[str, Any]) -> dict[str, Any]:
-    """Title and text above the first section, and the channel that the figure there shows."""
+    """Title and text above the first section, and the channel that the character there shows."""
     return {
         "name": material.name,
         "title": material.title or material.name,
@@ -108,7 +108,7 @@ def _top(material: ReportMaterial, playable: Mapping[str, Any]) -> dict[str, Any
 
 
 def _origin(material: ReportMaterial) -> dict[str, Any]:
-    """The configuration, and the versions and the machine that the page is from."""
+    """The configuration, and the commit, the machine and the versions with which the page was made."""
     resolved = plain(dict(material.resolved))
     return {
         "configuration": yaml.safe_dump(resolved, sort_keys=False, allow_unicode=True),
@@ -117,11 +117,11 @@ def _origin(material: ReportMaterial) -> dict[str, Any]:
 
 
 def _sections(
-    material: ReportMaterial, found: Mapping[str, Any], clips: frozenset[str], terrain: list[str]
+    material: ReportMaterial, counted: Mapping[str, Any], clips: frozenset[str], terrain: list[str]
 ) -> dict[str, dict[str, Any]]:
     """Section -> name -> chart or table, None if there is nothing to show.
 
-    found: from `coverage.seconds_of_data`. clips: names of the clips that are shown one by one. terrain:
+    counted: from `coverage.seconds_of_data`. clips: names of the clips that are shown one by one. terrain:
     files of their terrain fits.
     """
     costs, data, training = cost_section, data_section, training_section
@@ -139,9 +139,9 @@ def _sections(
         "data": {
             "gaits": data.gait_chart(material),
             "speeds": data.speed_chart(material),
-            "turns": coverage.turn_chart(found),
-            "both": coverage.both_chart(found),
-            "channels": coverage.channel_charts(found, shown_names(material.network["skeleton"])),
+            "turns": coverage.turn_chart(counted),
+            "both": coverage.both_chart(counted),
+            "channels": coverage.channel_charts(counted, shown_names(material.network["skeleton"])),
             "retarget": data.retarget_chart(material),
             "clips": data.clip_table(material, clips),
             "remarks": data.remarks_table(material),

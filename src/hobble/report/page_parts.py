@@ -1,4 +1,4 @@
-"""The parts of a section of a page: charts, tables, text and figures."""
+"""The parts of a section of a page: charts, tables, text and key figures."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from hobble.report.tables import Table
 
 @dataclass(frozen=True)
 class Paragraph:
-    """A paragraph. Only text from the code may be Markup; everything else is escaped."""
+    """A paragraph. Only text that stands in the source code may be Markup; all other text is escaped."""
 
     text: str | Markup
 
@@ -35,12 +35,13 @@ class ChartPair:
 
 @dataclass(frozen=True)
 class TemplatePart:
-    """A template in the report's folder, for parts that a script of the page draws."""
+    """A part that a script of the page draws. template: file name of its HTML in this folder."""
 
     template: str
 
 
 Content = Chart | ChartGroup | Table | Paragraph | KeyFigures | ChartPair | TemplatePart
+# type of content -> its kind, for the template of the page
 KINDS: dict[type, str] = {
     Chart: "chart",
     ChartGroup: "family",
@@ -54,10 +55,10 @@ KINDS: dict[type, str] = {
 
 @dataclass(frozen=True)
 class SectionPart:
-    """One part of a section. at: its place, from 0 (top) to 100 (end).
+    """One part of a section. at: its place in the section, from 0 (top) to 100 (end).
 
-    content: None if there is nothing to show. tall: whether it is a chart with a row for each clip. open:
-    whether a table is shown unfolded. short: whether a table needs no scroll bar.
+    content: None if there is nothing to show. tall: whether the content is a chart with a row for each clip.
+    open: whether a table is shown unfolded. short: whether a table needs no scroll bar.
     """
 
     at: int
@@ -76,8 +77,9 @@ class SectionPart:
 class PageSection:
     """A section of a page. Sections with the same `name` are joined into one (`joined`).
 
-    title: the heading; only one of the joined sections needs it. at: the place; sections are sorted by it.
-    nav: a shorter title for the list of contents. long: whether printing may break the section between pages.
+    title: the heading; only one of the joined sections needs it. at: the place in the page; sections are
+    sorted by it. nav: a shorter title for the list of contents. long: whether printing may break the section
+    between pages.
     """
 
     name: str
@@ -89,17 +91,18 @@ class PageSection:
 
 
 def joined(sections: Iterable[PageSection]) -> list[PageSection]:
-    """Sections in order. Sections of the same name become one with all their parts; empty ones are left out.
+    """The sections of a page, in order. Sections of the same name become one; empty ones are left out.
 
-    Title and place come from the first section that has a title.
+    A joined section has the parts of all its sections. All its other fields are those of the first section
+    that has a title.
     """
     by_name: dict[str, list[PageSection]] = {}
     for section in sections:
         by_name.setdefault(section.name, []).append(section)
     out = []
-    for name, some in by_name.items():
-        parts = sorted((p for s in some for p in s.parts if _shows(p.content)), key=lambda part: part.at)
-        owner = next((s for s in some if s.title), some[0])
+    for name, same_name in by_name.items():
+        parts = sorted((p for s in same_name for p in s.parts if _shows(p.content)), key=lambda part: part.at)
+        owner = next((s for s in same_name if s.title), same_name[0])
         title = owner.title or name.replace("_", " ").capitalize()
         if parts:
             out.append(replace(owner, parts=parts, title=title, nav=owner.nav or title))

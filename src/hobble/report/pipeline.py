@@ -21,17 +21,20 @@ def summarise(configuration: str, stages: Mapping[str, Mapping[str, Iterable[str
     """The content of `pipeline.json`.
 
     stages: in the order of the pipeline, stage -> {"benchmarks": tsv files or folders of them, "files":
-    artefacts or folders of them}. Stages of a data set also have "made": folders with the records of finished
-    clips, each named after its rule; and "batches": names of benchmarks, and only these count for such rules.
+    artefacts or folders of them}. Stages of a data set make their clips in batches. They also have "made":
+    folders with records of finished clips, each folder named after the rule that made the clips; and
+    "batches": the names of the benchmarks of all present batches. For a rule in "made", other benchmarks do
+    not count: they are left from batches that have changed since, for example because a clip was added.
 
     A missing file is listed under `missing` and is no error: a stage may have been copied from another
-    machine without its benchmarks. The time of training comes from its history. The time of clips comes from
-    their records if it is longer there, because Snakemake measures only the last of several calls.
+    machine without its benchmarks. If a job was stopped and called again, its Snakemake benchmark has only
+    the last call. So the time of training is taken from the history, and the time of a rule in "made" from
+    the records, if it is longer there.
 
     The result has `stages` (for each stage: jobs, seconds, `longest` job in seconds, max_rss_mb, cpu_seconds,
-    files, bytes, and the same for each rule), `total_seconds`, `total_bytes`, `database` (see
-    `hobble.database.sizes`; None without a database), `missing`, `machine`, `versions`. Raises InputError for
-    a malformed benchmark or history.
+    files, bytes; and `rules`, the same without files and bytes for each rule), `total_seconds`,
+    `total_bytes`, `database` (see `hobble.database.sizes`; None without a database), `missing`, `machine`,
+    `versions`. Raises InputError for a malformed benchmark or history.
     """
     missing: list[str] = []
     entries: list[StageTotal] = []
@@ -69,7 +72,7 @@ def summarise(configuration: str, stages: Mapping[str, Mapping[str, Iterable[str
 
 
 def read_benchmark(path: str | Path) -> list[dict[str, float]]:
-    """The rows of a Snakemake benchmark file, without the values that it could not measure ("-", "NA").
+    """The rows of a Snakemake benchmark file. Values that were not measured ("-", "NA") are left out.
 
     Raises InputError if the file is not a benchmark.
     """
@@ -114,14 +117,14 @@ def _jobs(
 
 
 def _add_earlier_calls(rows: list[dict[str, float]], seconds: float) -> None:
-    """Scale the times of a rule's jobs so that they add up to the seconds that all its clips took.
+    """Scale the times of a rule's jobs so that they add up to `seconds`, the time that all its clips took.
 
     The measured time of the jobs is shorter if earlier calls had already made some of the clips.
     """
-    last = sum(row.get("s", 0.0) for row in rows)
-    if seconds > last > 0:
+    measured = sum(row.get("s", 0.0) for row in rows)
+    if seconds > measured > 0:
         for row in rows:
-            row["s"] = row.get("s", 0.0) * seconds / last
+            row["s"] = row.get("s", 0.0) * seconds / measured
 
 
 def _sizes(paths: Iterable[str], missing: list[str]) -> list[int]:
@@ -148,7 +151,7 @@ def _trained(paths: Iterable[str]) -> float:
 
 
 def _database(paths: Iterable[str]) -> Sizes | None:
-    """The sizes of the database among the artefacts of its stage."""
+    """The sizes of the database, if it is among the artefacts in `paths`."""
     for path in map(Path, paths):
         if (path / MANIFEST).is_file():
             return sizes(Manifest.load(path))

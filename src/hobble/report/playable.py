@@ -11,7 +11,8 @@ from numpy.typing import NDArray
 from hobble.channels import channel
 from hobble.channels.shown import shown, words
 from hobble.core.skeleton import Skeleton
-from hobble.figure.mesh import body, key
+from hobble.figure.mesh import body
+from hobble.figure.mesh import key as mesh_key
 from hobble.models.network import Network, inverse
 from hobble.models.packing import packed
 from hobble.rows.layout import RowLayout
@@ -29,38 +30,38 @@ from hobble.runtime.bounds import Bounds
 from hobble.runtime.character import start
 from hobble.runtime.options import Runtime
 
-NO_EFFECT = 1e-7  # an input with a smaller scale has no effect
+NO_EFFECT = 1e-7  # an input whose scale (1 / standard deviation) is smaller than this has no effect
 
 
 def playable(network: Network, runtime: Runtime) -> dict[str, Any]:
     """The data of the page's JavaScript runtime; {} if the network has no skeleton.
 
-    It leaves out inputs without effect (hidden joints) and the rotations of joints that move no part of the
-    drawn body, such as fingers. In the page these joints keep their rest pose relative to their parent.
+    Inputs without effect are left out, and so are the rotations of joints that move no part of the drawn
+    body, such as fingers. In the page such a joint keeps its rest pose relative to its parent.
     """
     skeleton = network.skeleton
     if skeleton is None:
         return {}
     layout = network.layout
     turning = turning_joints(skeleton)
-    rows, scale = _rows(layout, turning), inverse(network.x_std)
-    read = np.flatnonzero(scale > NO_EFFECT)
+    outputs, scale = _used_outputs(layout, turning), inverse(network.x_std)
+    inputs = np.flatnonzero(scale > NO_EFFECT)
     legs = feet.leg_joints(skeleton)
     sole = feet.sole_heights(network, legs).tolist()
     carried = feet.carried(skeleton, legs)
     return {
-        "network": {"kind": network.kind, **network.page(read, rows)},
+        "network": {"kind": network.kind, **network.page(inputs, outputs)},
         "recordedPoses": network.recorded_poses,
-        "inputColumns": read.tolist(),
-        "xMean": packed(network.x_mean[read].astype(np.float32)),
-        "xScale": packed(scale[read].astype(np.float32)),
-        "yMean": packed(network.y_mean[rows].astype(np.float32)),
-        "yStd": packed(network.y_std[rows].astype(np.float32)),
+        "inputColumns": inputs.tolist(),
+        "xMean": packed(network.x_mean[inputs].astype(np.float32)),
+        "xScale": packed(scale[inputs].astype(np.float32)),
+        "yMean": packed(network.y_mean[outputs].astype(np.float32)),
+        "yStd": packed(network.y_std[outputs].astype(np.float32)),
         "turning": turning,
         "joints": layout.joints,
         "names": list(skeleton.joints),
         "parents": list(skeleton.parents),
-        "bounds": _bounds(network, rows),
+        "bounds": _bounds(network, outputs),
         "start": _start(network),
         "offsets": np.round(skeleton.offsets, 4).tolist(),
         "roles": dict(skeleton.roles),
@@ -75,7 +76,7 @@ def playable(network: Network, runtime: Runtime) -> dict[str, Any]:
         "carried": [np.flatnonzero(row).tolist() for row in carried],
         "toes": [np.flatnonzero(row == feet.TOES).tolist() for row in carried],
         "sole": sole,
-        "body": key(skeleton),
+        "body": mesh_key(skeleton),
         "footLocking": runtime.foot_locking,
         "steering": runtime.steering,
         "constants": {**_constants(), "side": network.terrain_side},
@@ -86,38 +87,39 @@ def shown_channels(network: Network, runtime: Runtime) -> list[dict[str, Any]]:
     """The data of each channel for the page. Columns are given as indices.
 
     `first`: index of the channel's first column among the columns of all channels. `rate`: largest change of
-    a value in one frame. `scale`: the divisor of values.
+    a value in one frame. `scale`: values are divided by it before the network gets them. How a channel is
+    shown, such as `spoken`, `sliders` and `says`, comes from `hobble.channels.shown`.
     """
     skeleton, out, first = network.skeleton, [], 0
     assert skeleton is not None
     for name, columns in network.channels.items():
-        one, wording, at = channel(name), words(name), list(columns).index
+        definition, wording, index = channel(name), words(name), list(columns).index
         speed_limits = network.limits.get(name)
-        face = shown(name, skeleton, columns, network.trained(name))
+        display = shown(name, skeleton, columns, network.trained(name))
         presets = [
-            {"name": preset, "values": [[at(column), value] for column, value in values.items()]}
-            for preset, values in face.presets.items()
+            {"name": preset, "values": [[index(column), value] for column, value in values.items()]}
+            for preset, values in display.presets.items()
         ]
         out.append(
             {
                 "name": name,
-                "title": one.title,
+                "title": definition.title,
                 "key": wording.key or name,
                 "first": first,
                 "columns": list(columns),
                 "trained": list(network.trained(name)),
-                "spoken": list(face.spoken),
-                "sliders": {label: at(column) for label, column in face.sliders.items()},
+                "spoken": list(display.spoken),
+                "sliders": {label: index(column) for label, column in display.sliders.items()},
                 "presets": presets,
-                "regions": [list(some) for some in face.regions],
-                "highest": one.highest,
+                "regions": [list(indices) for indices in display.regions],
+                "highest": definition.highest,
                 "sliderStep": wording.step,
                 "rest": wording.rest,
                 "never": wording.never,
                 "headline": wording.headline,
                 "says": wording.says,
                 "on": wording.on,
-                "rate": runtime.rates.get(name, one.rate) / 60,
+                "rate": runtime.rates.get(name, definition.rate) / 60,
                 "scale": runtime.scales.get(name, 1.0),
                 "limits": speed_limits.to_dict() if runtime.limits and speed_limits is not None else None,
             }
@@ -136,7 +138,7 @@ def turning_joints(skeleton: Skeleton) -> list[int]:
     return sorted(found)
 
 
-def _rows(layout: RowLayout, turning: Sequence[int]) -> NDArray[np.int64]:
+def _used_outputs(layout: RowLayout, turning: Sequence[int]) -> NDArray[np.int64]:
     """Indices of the outputs that the page uses: all but rotations, and the rotations of `turning` joints."""
     start = layout.y_joint_rotation.start
     turns = start + 3 * np.asarray(turning)[:, None] + np.arange(3)
@@ -149,14 +151,14 @@ def skeleton_of(spec: Mapping[str, Any]) -> Skeleton:
     return Skeleton("", joints, parents, np.array(spec["offsets"]), spec["roles"])
 
 
-def _bounds(network: Network, rows: NDArray[np.int64]) -> dict[str, Any]:
-    """The bounds of inputs and of the outputs `rows`, from `hobble.runtime.bounds`."""
-    found = Bounds.of(network)
-    low, high = found.y_low[rows], found.y_high[rows]
-    arrays = {"xLow": found.x_low, "xHigh": found.x_high, "yLow": low, "yHigh": high}
+def _bounds(network: Network, outputs: NDArray[np.int64]) -> dict[str, Any]:
+    """The bounds of all inputs and of the outputs with these indices, from `hobble.runtime.bounds`."""
+    bounds = Bounds.of(network)
+    low, high = bounds.y_low[outputs], bounds.y_high[outputs]
+    arrays = {"xLow": bounds.x_low, "xHigh": bounds.x_high, "yLow": low, "yHigh": high}
     return {name: packed(a.astype(np.float32)) for name, a in arrays.items()} | {
-        "fastest": found.fastest,
-        "hips": list(found.hips),
+        "fastest": bounds.fastest,
+        "hips": list(bounds.hips),
     }
 
 

@@ -1,4 +1,4 @@
-"""Citations of published figures."""
+"""Citations of published numbers."""
 
 from __future__ import annotations
 
@@ -7,7 +7,9 @@ from typing import Any
 
 
 def cited(row: Mapping[str, Any], sources: Mapping[str, str]) -> str:
-    """Source and table of a published figure, and another value that the same publication gives, if any.
+    """Source and table of a published number, and the other value if its publication gives two.
+
+    row: an entry of `hobble/evaluation/published.yaml`. sources: key of a source -> its authors and year.
 
     >>> cited({"source": "a", "table": "5.2", "other_figure": "3 in Appendix A"}, {"a": "Author (2021)"})
     'Author (2021), Table 5.2 (but 3 in Appendix A)'

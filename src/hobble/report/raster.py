@@ -1,4 +1,4 @@
-"""Renders the body that the page draws, without a browser, with light, ground and shadow."""
+"""Draws the body of the page's character without a browser, with light, ground and shadow."""
 
 from __future__ import annotations
 
@@ -15,20 +15,22 @@ from hobble.figure.mesh import Mesh
 from hobble.report.triangles import averaged, fill, grid, normals, shade
 
 SUPERSAMPLING = 2  # rendered pixels per picture pixel, in each direction
+# Colours: red, green and blue from 0 to 1. PAPER: background. LINE: grid on the ground. BODY: parts of the
+# body with value 0. HURT_LOW: parts with value 0.5. HURT_HIGH: parts with value 1.
 PAPER = np.array([0.953, 0.945, 0.925])
 GROUND = np.array([0.905, 0.888, 0.850])
 LINE = np.array([0.60, 0.61, 0.62])
 BODY = np.array([0.70, 0.735, 0.765])
 HURT_LOW, HURT_HIGH = np.array([0.914, 0.725, 0.286]), np.array([0.761, 0.220, 0.169])
 GRID = 50.0  # cm between the lines on the ground
-REACH = 700.0  # cm from the target over which the ground fades into the background
+FADE = 700.0  # cm over which the ground fades into the background; this begins FADE / 4 from the target
 
 
 @dataclass(frozen=True)
 class Camera:
     """A camera that looks at `target` from `distance` (cm).
 
-    yaw, pitch: radians. size: pixels of each side.
+    yaw, pitch: radians. size: pixels on each side of the square picture.
     """
 
     target: Array
@@ -52,7 +54,7 @@ class Camera:
         return self.target - self.distance * self.axes[2]
 
     def project(self, points: Array, scale: int = 1) -> Array:
-        """(V, 3): pixels x, y and depth in cm of world points (V, 3)."""
+        """Pixel x, pixel y and depth in cm, (V, 3), of world points (V, 3). scale: enlarges the picture."""
         across, up, deep = ((points - self.eye) @ self.axes.T).T
         deep = np.maximum(deep, 1.0)
         half, zoom = scale * self.size / 2, scale * self.size * 1.75
@@ -69,23 +71,25 @@ class BodyRenderer:
     def draw(
         self, places: Array, turns: Array, camera: Camera, values: Array | None = None
     ) -> NDArray[np.uint8]:
-        """An RGB picture (size, size, 3). places (B, 3), cm, and turns (B, 4) of the bones.
+        """An RGB picture (size, size, 3).
 
-        values: (columns,) from 0 to 1, drawn as colours."""
+        places, turns: positions (B, 3), cm, and rotations (B, 4) of the bones. values: (columns,) from 0 to
+        1, drawn as colours.
+        """
         corners = self._body.posed(places, turns)
-        key = np.array([0.55 * np.sin(camera.yaw - 0.85), 0.78, 0.55 * np.cos(camera.yaw - 0.85)])
-        key /= np.linalg.norm(key)
-        rim = np.array([0.9 * np.sin(camera.yaw + 2.5), 0.35, 0.9 * np.cos(camera.yaw + 2.5)])
+        key_light = np.array([0.55 * np.sin(camera.yaw - 0.85), 0.78, 0.55 * np.cos(camera.yaw - 0.85)])
+        key_light /= np.linalg.norm(key_light)
+        rim_light = np.array([0.9 * np.sin(camera.yaw + 2.5), 0.35, 0.9 * np.cos(camera.yaw + 2.5)])
         fine = camera.size * SUPERSAMPLING
         cover = np.zeros((camera.size, camera.size), np.float32)
-        fill(camera.project(corners - key * (corners[:, 1:2] / key[1])), self._faces, cover)
+        fill(camera.project(corners - key_light * (corners[:, 1:2] / key_light[1])), self._faces, cover)
         background = _ground(camera)
         background *= 1 - 0.42 * gaussian_filter(cover, camera.size / 130)[..., None]
         facing = normals(corners, self._faces)
         tone = (
             (0.50 + 0.10 * facing[:, 1]) * (0.55 + 0.45 * self._body.shade)
-            + 0.58 * np.maximum(facing @ key, 0)
-            + 0.16 * np.maximum(facing @ rim, 0) ** 2
+            + 0.58 * np.maximum(facing @ key_light, 0)
+            + 0.16 * np.maximum(facing @ rim_light, 0) ** 2
         )
         colours = self._colours(values) * tone[:, None]
         picture, depth = np.zeros((fine, fine, 3), np.float32), np.full((fine, fine), np.inf, np.float32)
@@ -93,7 +97,7 @@ class BodyRenderer:
         return averaged(picture, depth, background, SUPERSAMPLING)
 
     def _colours(self, values: Array | None) -> Array:
-        """RGB of every corner: grey for value 0, then amber, then red for value 1."""
+        """RGB of every corner: from grey for value 0 over amber to red for value 1."""
         if values is None:
             return np.broadcast_to(BODY, self._body.corners.shape)
         bones = np.tile(BODY, (len(self._body.bones), 1))
@@ -106,11 +110,14 @@ class BodyRenderer:
 
 
 @functools.lru_cache(maxsize=4)
-def _sheet(yaw: float, pitch: float, distance: float, size: int, height: float) -> tuple[Array, Array, Array]:
+def _ground_in_pixels(
+    yaw: float, pitch: float, distance: float, size: int, height: float
+) -> tuple[Array, Array, Array]:
     """What each pixel (size, size) shows of the ground.
 
-    Returns the point of the ground, (size, size, 2), relative to the point under the target, cm; the share of
-    ground colour over background; and half the width of a grid line, cm. height: of the target, cm.
+    The arguments are those of `Camera`, with the height of its target, cm. Returns the point of the ground,
+    (size, size, 2), relative to the point under the target, cm; the share of the ground's colour, the rest
+    being background; and half the width of a grid line, cm.
     """
     camera = Camera(np.array([0.0, height, 0.0]), yaw, pitch, distance, size)
     pixel = np.arange(size) + 0.5 - size / 2
@@ -118,12 +125,12 @@ def _sheet(yaw: float, pitch: float, distance: float, size: int, height: float) 
     rays = np.stack([x, y, np.full_like(x, size * 1.75)], axis=-1) @ camera.axes
     far = camera.eye[1] / np.maximum(-rays[..., 1], 1e-6)
     place = camera.eye[[0, 2]] + rays[..., [0, 2]] * far[..., None]
-    seen = np.clip(1.25 - np.linalg.norm(place, axis=-1) / REACH, 0, 1)
+    seen = np.clip(1.25 - np.linalg.norm(place, axis=-1) / FADE, 0, 1)
     return place, np.where(rays[..., 1] < -1e-6, seen, 0.0), 0.35 + 96 * np.maximum(far / size, 1e-5)
 
 
 def _ground(camera: Camera) -> Array:
     """RGB (size, size, 3) of the ground at height 0 with its grid, fading into the background far away."""
     x, height, z = (float(v) for v in camera.target)
-    sheet = _sheet(camera.yaw, camera.pitch, camera.distance, camera.size, height)
-    return grid(*sheet, x, z, GRID, np.array([PAPER, GROUND, LINE]))
+    pixels = _ground_in_pixels(camera.yaw, camera.pitch, camera.distance, camera.size, height)
+    return grid(*pixels, x, z, GRID, np.array([PAPER, GROUND, LINE]))

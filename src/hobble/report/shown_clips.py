@@ -8,22 +8,22 @@ from pathlib import Path
 from hobble.measures.stratified_sample import shuffle_key
 from hobble.report.gather import ReportMaterial
 
-MOST = 150  # most clips with curves of their labels, a row of the table, and views of their ground
-MOST_SAMPLED = 600  # most clips whose rows are counted frame by frame
+MOST_SHOWN = 150  # at most this many clips have label curves, a row in the table and views of their ground
+MOST_COUNTED = 600  # the seconds of data are counted frame by frame in at most this many clips
 
 
-def shown(material: ReportMaterial, most: int = MOST) -> frozenset[str]:
-    """Names of at most `most` clips, or of all clips if there are no more.
+def shown(material: ReportMaterial, most: int = MOST_SHOWN) -> frozenset[str]:
+    """Names of the clips that are shown: all of them, or `most` if there are more.
 
     The clips are put into kinds by split, by main gait, and by whether a channel has a value in them. The
     kinds take turns to give one clip each, in a random order that depends only on the names.
     """
-    changed = {report["clip"] for report in material.channels if report.get("values")}
+    with_values = {report["clip"] for report in material.channels if report.get("values")}
     kinds: dict[tuple[str, str, bool], list[str]] = {}
     for report in material.labels:
         clip, seconds = report["clip"], report.get("seconds") or {}
         gait = max(seconds, key=lambda name: seconds[name], default="")
-        kinds.setdefault((material.split(clip), gait, clip in changed), []).append(clip)
+        kinds.setdefault((material.split(clip), gait, clip in with_values), []).append(clip)
     if sum(map(len, kinds.values())) <= most:
         return frozenset(name for names in kinds.values() for name in names)
     turns = [
@@ -32,7 +32,7 @@ def shown(material: ReportMaterial, most: int = MOST) -> frozenset[str]:
     return frozenset(name for *_, name in sorted(turns)[:most])
 
 
-def sampled(paths: Sequence[str], most: int = MOST_SAMPLED) -> list[str]:
+def sampled(paths: Sequence[str], most: int = MOST_COUNTED) -> list[str]:
     """At most `most` of the clips' files, drawn at random with the same probability for each clip."""
     if len(paths) <= most:
         return list(paths)
@@ -41,5 +41,5 @@ def sampled(paths: Sequence[str], most: int = MOST_SAMPLED) -> list[str]:
 
 
 def files_of(paths: Iterable[str], names: frozenset[str]) -> list[str]:
-    """The files of these clips."""
+    """Those of the clips' files that belong to the clips `names`."""
     return [path for path in paths if Path(path).stem in names]

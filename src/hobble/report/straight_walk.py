@@ -1,4 +1,4 @@
-"""Generates a walk straight on over flat ground, the same one for all pictures and measures of the page."""
+"""Generates a walk straight on over flat ground, the same one for all pictures and numbers of a page."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from hobble.models.network import Network
 from hobble.runtime.animation import Pose, ProceduralAnimation
 from hobble.runtime.options import Runtime
 
-AHEAD = (0.0, 2.5)  # target velocity, cm a frame; the same as for walking in the page's section Play
+AHEAD = (0.0, 2.5)  # target velocity, cm a frame: the same as for walking in the page's section Play
 
 
 def walk_straight(
@@ -16,7 +16,7 @@ def walk_straight(
 ) -> Iterator[tuple[ProceduralAnimation, Pose]]:
     """The character and its pose after each frame, at 60 Hz.
 
-    channels: name of a channel to the values of its columns, as `ProceduralAnimation.next_pose` takes them.
+    channels: channel -> column -> value; columns that are not given have 0.
     """
     animation = ProceduralAnimation(network, **dict(runtime))
     for _ in range(frames):

@@ -22,9 +22,9 @@ class Hint:
     """Advice that follows from the numbers.
 
     kind: "warn", a problem; "note", something to improve; "good", something fine; "fact", information. head:
-    the first words, in bold. text: the rest. at: its place; hints of a kind are sorted by it in the order of
-    the pipeline, because earlier problems cause later ones: data below 20, training 20, network 30, motion of
-    the character 40, channels 50, speed 60.
+    the first words, in bold. text: the rest. at: its place among hints of the same kind, in the order of the
+    pipeline, because earlier problems cause later ones: data below 20, training 20, network 30, motion of the
+    character 40, channels 50, speed 60, cost of the pipeline 90.
     """
 
     kind: str

@@ -11,7 +11,11 @@ from hobble.report.formats import number
 
 @dataclass(frozen=True)
 class Column:
-    """A column. label: its heading. show: value -> text. kind: its CSS class; "n" is sorted as numbers."""
+    """A column.
+
+    label: its heading. show: gives the text for a value. kind: its CSS class; a column of the class "n" is
+    sorted by number.
+    """
 
     label: str
     show: Callable[[Any], str] = str
@@ -30,7 +34,7 @@ class Column:
 
 @dataclass(frozen=True)
 class Table:
-    """A table. Its CSV file is called <name>.csv."""
+    """A table. Its CSV file is called <name>.csv. title: the line that unfolds it."""
 
     name: str
     columns: Sequence[Column]

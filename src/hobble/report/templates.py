@@ -1,4 +1,4 @@
-"""What all pages share: templates that escape, style, scripts, specifications of charts."""
+"""What all pages share: templates that escape values, style, scripts, specifications of charts."""
 
 from __future__ import annotations
 
@@ -55,7 +55,7 @@ def questionnaire_script() -> Markup:
 
 
 def trusted(name: str, text: str) -> Markup:
-    """Our own CSS or script. Raises ValueError if it contains the end tag of its element."""
+    """Our own CSS or script, marked as safe. Raises ValueError if it contains the end tag of its element."""
     if "</script" in text.lower() or "</style" in text.lower():
         raise ValueError(f"{name} contains </script or </style, which would end its element")
     return Markup(text)

@@ -15,18 +15,18 @@ from hobble.core.quat import Array
 from hobble.report.charts import Chart, Trace, axis, line
 from hobble.report.tables import Column, Table
 
-MOST_CLIPS = 10  # clips whose ground profile is drawn
-LONGEST = 900  # frames of a clip that are drawn
-STRIDE = 3  # frames between two points of a profile
+MOST_CLIPS = 10  # at most this many clips have their ground profile drawn
+MOST_ROWS = 900  # a profile shows at most this many rows (frames of gait cycles) of its clip
+FRAME_STEP = 3  # a profile has a point for every third frame
 
 
 @dataclass(frozen=True)
 class ShownFits:
     """The terrain fits of one clip with C gait cycles and 10 fits of each cycle.
 
-    foot_error: (C, 10, 2) mean and largest distance of a standing foot from its ground, cm. error: (C, 10)
-    fitting error, cm². frame: (S,) frames of the profile. profile: (S, K) height of the ground under the
-    root, for K fits, cm.
+    foot_error: (C, 10, 2) mean and largest distance of a foot in contact from the fitted ground, cm. error:
+    (C, 10) fitting error, cm². frame: (S,) frames of the profile. profile: (S, K) height of the ground under
+    the root in the first K fits of each frame, cm. K: the number of fits of the frame with the fewest.
     """
 
     clip: str
@@ -45,14 +45,15 @@ def read_fits(path: str | Path) -> ShownFits:
     """Read `terrain/clips/<clip>.npz`. Raises InputError if an array is missing or lengths disagree."""
     try:
         file = ArrayParts(path)
-        fits, frame = file.whole("fits"), file.rows("frame", 0, LONGEST)
-        least = int(fits.min()) if len(fits) else 1
-        first = (np.cumsum(fits) - fits)[:LONGEST:STRIDE]
-        heights = file.rows("heights", 0, int(first[-1]) + least if len(fits) else 0)
+        fits, frame = file.whole("fits"), file.rows("frame", 0, MOST_ROWS)
+        fewest = int(fits.min()) if len(fits) else 1
+        first = (np.cumsum(fits) - fits)[:MOST_ROWS:FRAME_STEP]  # row of each frame's first fit in `heights`
+        heights = file.rows("heights", 0, int(first[-1]) + fewest if len(fits) else 0)
+        # Columns: samples of the path on the left, in the centre, on the right. The present is in the middle.
         present = heights.shape[1] // 3 + heights.shape[1] // 6
-        profile = heights[:, present][first[:, None] + np.arange(least)] if len(fits) else np.zeros((0, 1))
+        profile = heights[:, present][first[:, None] + np.arange(fewest)] if len(fits) else np.zeros((0, 1))
         errors = file.whole("foot_error"), file.whole("error")
-        return ShownFits(Path(path).stem, *errors, frame[::STRIDE], profile)
+        return ShownFits(Path(path).stem, *errors, frame[::FRAME_STEP], profile)
     except (ValueError, IndexError) as error:
         raise InputError(
             path, f"not the terrain of a clip ({error})", fix="Delete the file; the workflow makes it again."
@@ -60,20 +61,20 @@ def read_fits(path: str | Path) -> ShownFits:
 
 
 def section(paths: Iterable[str | Path]) -> dict[str, Any]:
-    """Charts and a table of the fits."""
-    found = [fit for fit in map(read_fits, paths) if not fit.flat and len(fit.profile)]
-    if not found:
+    """Charts and a table of the fits. paths: files of terrain fits."""
+    fits_of_clips = [fit for fit in map(read_fits, paths) if not fit.flat and len(fit.profile)]
+    if not fits_of_clips:
         return {"charts": [], "table": None}
-    return {"charts": [profiles(found), distances(found)], "table": fit_table(found)}
+    return {"charts": [profiles(fits_of_clips), distances(fits_of_clips)], "table": fit_table(fits_of_clips)}
 
 
-def profiles(found: list[ShownFits]) -> Chart:
+def profiles(fits_of_clips: list[ShownFits]) -> Chart:
     """Height of the ground under the root along each clip, for all its fits."""
     options: dict[str, list[Trace]] = {}
-    for fit in found[:MOST_CLIPS]:
+    for fit in fits_of_clips[:MOST_CLIPS]:
         x = np.round(fit.frame / 60, 2)
         # No line between cycles that are not consecutive.
-        gaps = np.flatnonzero(np.diff(fit.frame) > STRIDE) + 1
+        gaps = np.flatnonzero(np.diff(fit.frame) > FRAME_STEP) + 1
         count = fit.profile.shape[1]
         traces = []
         for k in range(count - 1, -1, -1):
@@ -101,7 +102,7 @@ def profiles(found: list[ShownFits]) -> Chart:
     )
 
 
-def distances(found: list[ShownFits]) -> Chart:
+def distances(fits_of_clips: list[ShownFits]) -> Chart:
     """Distance of feet in contact from the fitted ground, for each clip."""
     traces: list[Trace] = [
         {
@@ -113,7 +114,7 @@ def distances(found: list[ShownFits]) -> Chart:
             "line": {"color": "@accent", "width": 1.4},
             "fillcolor": "@accent-wash",
         }
-        for fit in found[::-1]
+        for fit in fits_of_clips[::-1]
     ]
     return Chart(
         "terrain-feet",
@@ -127,12 +128,12 @@ def distances(found: list[ShownFits]) -> Chart:
             "yaxis": {"type": "category", "automargin": True},
             "showlegend": False,
         },
-        height=max(260, 110 + 26 * len(found)),
+        height=max(260, 110 + 26 * len(fits_of_clips)),
     )
 
 
-def fit_table(found: list[ShownFits]) -> Table:
-    """A row for each clip that is not on flat ground."""
+def fit_table(fits_of_clips: list[ShownFits]) -> Table:
+    """A row for each clip."""
     columns = [
         Column("clip"),
         Column.count("cycles"),
@@ -150,6 +151,6 @@ def fit_table(found: list[ShownFits]) -> Table:
             float(fit.foot_error[:, :, 0].mean()),
             float(fit.foot_error[:, :, 1].max()),
         ]
-        for fit in found
+        for fit in fits_of_clips
     ]
     return Table("terrain", columns, rows)

@@ -10,18 +10,19 @@ from hobble.report.formats import number
 from hobble.report.gather import ReportMaterial
 from hobble.report.tables import Column, Table
 
-# Names of the parts of the output whose own names do not say that they belong to the path.
+# Block of the output -> its name on the page, if the block's name does not say that it belongs to the path.
 PATH_PARTS = {"position": "path position", "direction": "path direction"}
 
 
 def passes_axis(material: ReportMaterial) -> list[float]:
-    """For each section of training, the passes done at its end: section 10 of 10 in pass 1 ends at 1.0."""
+    """The passes done at the end of each section (part of a pass): section 10 of 10 in pass 1 ends at 1.0."""
     passes, sections = material.history.get("pass", []), material.history.get("section", [])
-    most = max((s for s in sections if s is not None), default=1) or 1
+    last = max((s for s in sections if s is not None), default=1) or 1
+    # Passes and sections may be numbered from 1 or from 0.
     first = min((p for p in passes if p is not None), default=1)
     start = 1 if first >= 1 else 0
     low = min((s for s in sections if s is not None), default=1)
-    per_pass = most if low >= 1 else most + 1
+    per_pass = last if low >= 1 else last + 1
     ends = [(s if low >= 1 else s + 1) / per_pass for s in sections if s is not None]
     return [p - start + end for p, end in zip(passes, ends, strict=False) if p is not None]
 
@@ -53,7 +54,7 @@ def learning_curve(material: ReportMaterial) -> Chart:
 
 
 def block_curves(material: ReportMaterial) -> ChartGroup | None:
-    """The held-out error of each block of Y: small charts with the same scale, largest error first."""
+    """The held-out error of each block of the output: small charts with one scale, largest error first."""
     x, history = passes_axis(material), material.history
     whole = [v for v in history.get("held_out_mse", ()) if v is not None]
     blocks = {
@@ -90,7 +91,7 @@ def _column_in_words(name: str) -> str:
 
 
 def part_in_words(name: str) -> str:
-    """A part of the output in words, such as "joint velocity" or "path position"."""
+    """A block of the output in words, such as "joint velocity" or "path position"."""
     return PATH_PARTS.get(name, name.replace("_", " "))
 
 
@@ -102,11 +103,11 @@ def _log_span(values: Sequence[float | None]) -> list[float]:
 
 
 def history_table(material: ReportMaterial) -> Table:
-    """Every section of training, as in history.csv."""
+    """A row for each section (part of a pass) of training, as in history.csv."""
     names = list(material.history)
-    whole = ("pass", "section", "samples")
+    counts = ("pass", "section", "samples")
     columns = [
-        Column.count(name) if name in whole else Column.number(_column_in_words(name), 4) for name in names
+        Column.count(name) if name in counts else Column.number(_column_in_words(name), 4) for name in names
     ]
     rows = list(zip(*material.history.values(), strict=False))
     return Table(f"{material.name}-history", columns, rows, "Every section (part of a pass) of training")

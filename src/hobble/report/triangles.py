@@ -1,6 +1,6 @@
-"""Compiled functions for `raster`: they draw triangles and the grid of the ground, and finish the picture.
+"""Compiled functions for `hobble.report.raster`: they draw triangles and the ground, and finish the picture.
 
-They release Python's lock, so that several films can be drawn at once.
+They release Python's global lock (GIL), so that several films can be drawn at once.
 """
 
 from __future__ import annotations
@@ -15,7 +15,10 @@ from hobble.core.quat import Array
 
 @njit(nogil=True)
 def normals(corners: Array, faces: Any) -> Array:  # pragma: no cover
-    """Unit normals (V, 3) of corners (V, 3): means over their triangles (T, 3), weighted by area."""
+    """Unit normals (V, 3) of corners (V, 3). faces: (T, 3) corners of each triangle.
+
+    A corner's normal is the mean over its triangles, weighted by area.
+    """
     out = np.zeros_like(corners)
     for f in range(len(faces)):
         i, j, k = faces[f]
@@ -39,8 +42,9 @@ def grid(
 ) -> Array:  # pragma: no cover
     """RGB (H, W, 3) of a ground with lines every `cell` cm.
 
-    place: (H, W, 2) points of the ground relative to (x, z), cm. seen: (H, W), share of ground over
-    background. wide: (H, W), half the width of a line, cm. colours: (3, 3), of background, ground and lines.
+    place: (H, W, 2) points of the ground relative to (x, z), cm. seen: (H, W), share of the ground's
+    colour, the rest being background. wide: (H, W), half the width of a line, cm. colours: (3, 3),
+    of background, ground and lines.
     """
     out = np.empty((*seen.shape, 3))
     for i in range(seen.shape[0]):
@@ -64,7 +68,7 @@ def _range(a: float, b: float, c: float, size: int) -> tuple[int, int]:  # pragm
 def _weights(
     a: Array, b: Array, c: Array, x: int, y: int, area: float
 ) -> tuple[float, float]:  # pragma: no cover
-    """Barycentric weights of corners a and b at pixel (x, y). area: twice that of the triangle, with sign."""
+    """Barycentric weights of corners a and b at pixel (x, y). area: twice the signed area."""
     u = ((b[0] - x) * (c[1] - y) - (b[1] - y) * (c[0] - x)) / area
     v = ((c[0] - x) * (a[1] - y) - (c[1] - y) * (a[0] - x)) / area
     return u, v
@@ -74,7 +78,7 @@ def _weights(
 def shade(
     points: Array, colours: Array, faces: Any, picture: Array, depth: Array
 ) -> None:  # pragma: no cover
-    """Draw triangles `faces` (T, 3) into `picture` (H, W, 3), with a buffer `depth` (H, W).
+    """Draw triangles `faces` (T, 3) into `picture` (H, W, 3), with a depth buffer `depth` (H, W).
 
     points: (V, 3) corners, x and y in pixels, and depth. colours: (V, 3) of the corners.
     """
@@ -138,7 +142,7 @@ def averaged(picture: Array, depth: Array, background: Array, scale: int) -> Any
                         red += picture[y, x, 0]
                         green += picture[y, x, 1]
                         blue += picture[y, x, 2]
-            for k, own in enumerate((red, green, blue)):
-                value = own / count + (1 - drawn / count) * background[i, j, k]
+            for k, total in enumerate((red, green, blue)):
+                value = total / count + (1 - drawn / count) * background[i, j, k]
                 out[i, j, k] = np.uint8(min(max(np.round(255 * value), 0.0), 255.0))
     return out

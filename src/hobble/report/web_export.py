@@ -1,4 +1,4 @@
-"""Exports the character for other web pages: an ES module, its network, and an example page."""
+"""Exports the character for use in any web page: an ES module, its network, and an example page."""
 
 from __future__ import annotations
 
@@ -13,13 +13,13 @@ from hobble.report.bundle import WEB, bundle_module
 from hobble.report.playable import playable
 from hobble.runtime.options import Runtime
 
-THREE = ("three.module.js", "three.core.js")  # files of three.js, for the example page
+THREE_FILES = ("three.module.js", "three.core.js")  # files of three.js that the example page loads
 
 
 def export_web(folder: str | Path, network: Network, runtime: Runtime, modules: str | Path) -> None:
     """Write hobble.js, hobble.d.ts, character.json, and an example index.html with three.js into a folder.
 
-    modules: the node_modules folder from `bundle.install`. Raises HobbleError for a network without a
+    modules: the node_modules folder with three.js and the bundler. Raises HobbleError for a network without a
     skeleton.
     """
     if network.skeleton is None:
@@ -30,7 +30,7 @@ def export_web(folder: str | Path, network: Network, runtime: Runtime, modules: 
     write_json(folder / "character.json", {"spec": spec, "body": packed_body(network.skeleton)})
     bundle_module(modules, folder / "hobble.js")
     copies = {WEB / "hobble.d.ts": "hobble.d.ts", WEB / "example.html": "index.html"}
-    copies |= {Path(modules, "three", "build", name): name for name in THREE}
+    copies |= {Path(modules, "three", "build", name): name for name in THREE_FILES}
     for source, name in copies.items():
         with atomic_path(folder / name) as temporary:
             shutil.copyfile(source, temporary)

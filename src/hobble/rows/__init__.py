@@ -1,1 +1,1 @@
-"""Rows of X, Y and P: their layout, the rows of a clip, and how a row is composed."""
+"""Rows of training data: input X, output Y and phase P of the network, for one frame of a clip."""

@@ -1,6 +1,7 @@
 """Rows for one clip: input X, output Y and phase P of the network, for each frame of the clip's cycles.
 
-Columns and root frames are those of the pipeline that Holden, Komura, Saito (2017) released.
+The columns, and the coordinate system that moves with the root, are those of the pipeline that Holden,
+Komura, Saito (2017) released.
 """
 
 from __future__ import annotations
@@ -19,6 +20,8 @@ from hobble.rows.layout import RowLayout
 
 Arrays = Mapping[str, np.ndarray]
 
+MAKE_AGAIN = "Make the clip's labels, channels and terrain again."
+
 
 def clip_rows(
     name: str,
@@ -31,14 +34,16 @@ def clip_rows(
     step: int,
     facing_sigma: float,
 ) -> ClipRows:
-    """The rows of a clip's locomotion cycles, one cycle after another. See `ClipRows` for their form.
+    """The rows of a clip's locomotion cycles, one cycle after another.
 
-    labels, terrain: arrays of these stages (`Labels`, `ClipFits`). channels: name -> values (F, columns).
+    name: of the clip. labels, terrain: the arrays that the stages of these names saved for the clip.
+    channels: name -> values (F, columns).
     window: frames of the trajectory before and after the row's frame. step: frames between two samples of the
-    trajectory. facing_sigma: sigma of the Gaussian that smooths the facing direction, frames. Past the ends
-    of the clip the root moves on (`continued`), and the gait of the first or the last frame is repeated.
-    Raises InputError if the files do not belong together, or if the clip has no frame before or after a
-    cycle.
+    trajectory. facing_sigma: sigma of the Gaussian that smooths the facing direction, frames.
+    Past the ends of the clip the root moves straight on, and the gait of the first or the last frame is
+    repeated.
+    Raises InputError if labels, channels or terrain do not fit the clip, or if the clip has no frame before
+    or after a cycle.
     """
     skeleton = clip.skeleton
     columns = tuple((name, values.shape[1]) for name, values in channels.items())
@@ -76,15 +81,16 @@ def _columns(
     pose: tuple[Array, Array, Array],
     hips: int,
 ) -> tuple[list[Array], list[Array]]:
-    """The parts of X (without the ground) and of Y in the rows of the frames `frame` (R,), in their order.
+    """The blocks of X (without terrain and channels) and of Y, in column order, for R rows.
 
-    path: the root that moves on past the ends of the clip, and the places (R,) of the frames on it. pose: of
-    all frames, in the root frame, see `local_pose`.
+    frame: (R,) the clip's frame of each row. path: the root with more frames before and after the clip, and
+    the index (R,) in it of each row's frame. root: the root in the clip alone. pose: joint positions,
+    velocities and rotations in root coordinates, in all frames but the last. hips: index of this joint.
     """
-    going, here = path
+    longer_root, here = path
     position, velocity, rotation = pose
     x = [
-        *trajectory(going, here, here, layout.offsets),
+        *trajectory(longer_root, here, here, layout.offsets),
         gait_columns(labels["gait"], frame, layout.offsets),
         position[frame - 1],
         velocity[frame - 1],
@@ -94,7 +100,7 @@ def _columns(
         root.turn[frame],
         phase_change(labels["phase"])[frame],
         labels["contacts"][frame],
-        *trajectory(going, here + 1, here + 1, layout.offsets[layout.future :]),
+        *trajectory(longer_root, here + 1, here + 1, layout.offsets[layout.future :]),
         position[frame],
         velocity[frame],
         rotation[frame],
@@ -105,7 +111,8 @@ def _columns(
 def cycle_frames(cycles: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Frame (R,) and cycle number (R,) of each row. cycles: (C, 2) first and last frame of each cycle.
 
-    Both ends belong to a cycle. So the frame in which one cycle ends and the next begins has two rows.
+    The first and the last frame both belong to the cycle. So a frame in which one cycle ends and the next
+    begins has two rows.
 
     >>> cycle_frames(np.array([[60, 62], [62, 63]]))
     (array([60, 61, 62, 62, 63]), array([0, 0, 0, 1, 1]))
@@ -126,15 +133,16 @@ def cycle_phase(phase: Array, cycles: np.ndarray) -> Array:
 
 
 def phase_change(phase: Array) -> Array:
-    """(F - 1,) change of phase (F,) from each frame to the next, plus 1 where a new cycle begins."""
+    """(F - 1,) change of `phase` (F,) from each frame to the next. Where the phase restarts, 1 is added."""
     change = np.diff(phase.astype(float))
     return np.where(change < 0, change + 1, change)
 
 
 def trajectory(root: RootFrames, frame: np.ndarray, seen_from: np.ndarray, offsets: range) -> list[Array]:
-    """Root positions and directions at `frame` + offsets, in the root coordinates of `seen_from`.
+    """Positions and facing directions of the root, sampled at `offsets` from each of R frames.
 
-    frame, seen_from: (R,) frame numbers. Returns four arrays (R, samples): position x and z (cm), direction x
+    frame: (R,) numbers of these frames. seen_from: (R,) for each of them, the number of the frame in whose
+    root coordinates the result is given. Returns four arrays (R, samples): position x and z (cm), direction x
     and z.
     """
     at = frame[:, None] + np.array(offsets)
@@ -146,9 +154,10 @@ def trajectory(root: RootFrames, frame: np.ndarray, seen_from: np.ndarray, offse
 
 
 def gait_columns(gait: Array, frame: np.ndarray, offsets: range) -> Array:
-    """(R, gaits, samples) share of each gait at `frame` + offsets.
+    """(R, gaits, samples) share of each gait, at each of `offsets` from each frame.
 
-    frame: (R,) frame numbers. gait: (F, gaits); its first and last frame are repeated past the ends.
+    gait: (F, gaits) shares in the clip; past its ends, the first and the last are repeated. frame: (R,)
+    numbers of the frames.
     """
     at = np.clip(frame[:, None] + np.array(offsets), 0, len(gait) - 1)
     return np.swapaxes(gait[at], 1, 2)
@@ -170,20 +179,21 @@ def _check(
     frame: np.ndarray,
 ) -> None:
     where = name
-    lengths = {"labels": len(labels["phase"]), **{name: len(values) for name, values in channels.items()}}
+    lengths = {"labels": len(labels["phase"])}
+    lengths |= {f"values of {name}": len(values) for name, values in channels.items()}
     for what, length in lengths.items():
         if length != len(clip):
-            raise InputError(where, f"{what} have {length} frames, the clip has {len(clip)}")
+            raise InputError(where, f"{what} have {length} frames, the clip has {len(clip)}", fix=MAKE_AGAIN)
     for channel_name, values in channels.items():
         columns = len(channel(channel_name).columns(clip.skeleton))
         if values.shape[1] != columns:
             problem = f"{channel_name} has {values.shape[1]} columns where the skeleton needs {columns}"
-            raise InputError(where, problem)
+            raise InputError(where, problem, fix=MAKE_AGAIN)
     if not np.array_equal(terrain["frame"], frame):
         raise InputError(
             where,
             "terrain was fitted to other cycles than those of the labels",
-            fix="Make both again from the same clip.",
+            fix=MAKE_AGAIN,
         )
     if len(frame) and (frame.min() < 1 or frame.max() + 2 > len(clip)):
         outside = int(frame.min() if frame.min() < 1 else frame.max())

@@ -1,6 +1,7 @@
-"""The rows of one clip: a row for each frame of its cycles. A row has several fits of the terrain.
+"""The rows of one clip: a row for each frame of its cycles.
 
-What depends only on the frame is stored once for each row, what depends on the fit once for each fit.
+Each row has several terrain fits: ground heights that suit the motion. What depends only on the frame is
+stored once for each row, what depends on the fit once for each fit.
 """
 
 from __future__ import annotations
@@ -20,22 +21,23 @@ from hobble.core.quat import Array
 from hobble.rows.compose import body_columns, compose, frame_inputs
 from hobble.rows.layout import RowLayout
 
-CHANNEL_PREFIX = "channel_"  # of the names of channel arrays in a file
+CHANNEL_PREFIX = "channel_"  # names of channel arrays in a file begin with it
 DELETE_IT = "Delete it; the next run makes it again."
 
 
 @dataclass(frozen=True)
 class ClipRows:
-    """R rows of a clip with S terrain fits in all.
+    """R rows of a clip. Together they have S terrain fits.
 
-    layout: the columns of rows with every channel of the data set. skeleton: see `Skeleton.to_dict`.
-    x: (R, columns of X without terrain and channels). y: (R, columns of Y). Joint heights in both are above
-    the world's zero. p: (R,) phase. channels: name -> (R, columns of the channel).
+    clip: its name. layout: the columns of X and Y with every channel of the data set.
+    skeleton: see `Skeleton.to_dict`.
+    x: (R, columns of X without terrain and channels). y: (R, columns of Y). Joint heights in both are
+    measured from height 0 of the world. p: (R,) phase. channels: name -> (R, columns of the channel).
     frame: (R,) int, frame of the clip. cycle: (R,) int, number of the cycle.
-    fits: (R,) number of terrain fits of each row; S is their sum. heights: (S, 3 * samples) ground heights
-    minus `mean`, cm. mean: (S,) mean height of the centre samples, cm; it has to be subtracted from the joint
-    heights. Fits are in the order of the rows.
-    visits: how often a row is used in a pass over the data, however many fits it has.
+    fits: (R,) number of terrain fits of each row; their sum is S. heights: (S, 3 * samples) ground heights
+    minus `mean`, cm. mean: (S,) mean height of the ground on the path, cm; it has to be subtracted from the
+    joint heights. `heights` and `mean` are in the order of the rows.
+    visits: how often a pass over the data uses each row, however many fits the row has.
     """
 
     clip: str
@@ -100,18 +102,19 @@ class ClipRows:
                 )
         if rows and np.min(self.fits) < 1:
             frame = int(self.frame[np.argmin(self.fits)])
-            raise InputError(where, "a row has no terrain fit", frame=frame)
+            raise InputError(where, "a row has no terrain fit", frame=frame, fix=DELETE_IT)
         for name in ("x", "y", "p", *self.channels):
             finite = np.isfinite(self.p if name == "p" else tables[name])
             bad = ~(finite if finite.ndim == 1 else finite.all(axis=1))
             if bad.any():
-                raise InputError(where, f"{name} is not a number", frame=int(self.frame[np.argmax(bad)]))
+                frame = int(self.frame[np.argmax(bad)])
+                raise InputError(where, f"{name} is not a number", frame=frame, fix=DELETE_IT)
         if not (np.isfinite(self.heights).all() and np.isfinite(self.mean).all()):
-            raise InputError(where, "terrain heights are not numbers")
+            raise InputError(where, "terrain heights are not numbers", fix=DELETE_IT)
 
 
 class Pairs(NamedTuple):
-    """n pairs of a row and one of its terrain fits. The original's rows are such pairs.
+    """n pairs of a row and one of its terrain fits. A row in the data of Holden et al. (2017) is such a pair.
 
     x: (n, X) float32. y: (n, Y) float32. p: (n,) phase. row: (n,) index of the row. weight: (n,) 1 divided by
     the row's number of fits, so that every row has the same weight.
@@ -188,7 +191,7 @@ def outline(source: ClipRows | str | Path) -> Outline:
 def load_clip_rows(path: str | Path, part: tuple[int, int] | None = None) -> ClipRows:
     """Read what `save_clip_rows` wrote. Raises InputError if the file is damaged or inconsistent.
 
-    part: the first row to read and the one after the last; None for all rows. The file's checksums are
+    part: the first row to read and the first one not to read; None for all rows. The file's checksums are
     checked only if all rows are read.
     """
     data: dict[str, Any] = load_npz(path) if part is None else _part(ArrayParts(path), *part)

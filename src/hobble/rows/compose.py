@@ -1,6 +1,7 @@
-"""Composes rows of X from the columns of a frame, the channels, and the heights of one terrain fit.
+"""Composes rows of X from the body's columns, the channels, and the ground heights of one terrain fit.
 
-It works for numpy arrays and PyTorch tensors, raw or standardised. `n` is the number of rows.
+`compose` and `lower_joints` take numpy arrays or PyTorch tensors, raw or standardised. n is the number of
+rows.
 """
 
 from __future__ import annotations
@@ -14,7 +15,7 @@ import numpy as np
 from hobble.core.quat import Array
 from hobble.rows.layout import RowLayout
 
-TERRAIN = "terrain"
+TERRAIN = "terrain"  # name of the block of ground heights in X
 
 
 def body_columns(layout: RowLayout) -> int:
@@ -33,7 +34,7 @@ def x_columns(layout: RowLayout) -> int:
 
 
 def fit_columns(layout: RowLayout) -> int:
-    """Number of columns of `fits` in a database: ground heights, then their mean (the lift)."""
+    """Number of values that a database stores for a terrain fit: ground heights, and the mean on the path."""
     return 3 * layout.samples + 1
 
 
@@ -70,25 +71,26 @@ def compose(
     layout: RowLayout,
     frames: Any,
     ground: Any,
-    lift: Any,
+    mean_height: Any,
     x: Any,
     y: Any,
     x_std: Any = None,
     y_std: Any = None,
 ) -> None:
-    """Fill x (n, X), and subtract the mean ground height from the joint heights of x and y (n, Y), in place.
+    """Fill x (n, X) in place, then subtract `mean_height` from the joint heights of x and of y (n, Y).
 
-    frames: (n, x_columns) columns without terrain. ground: (n, 3 * samples) ground heights. Both are in the
-    units of x. lift: (n, 1) mean ground height in cm, or None to subtract nothing. x_std (X,), y_std (Y,):
-    standard deviations by which standardised rows were divided; None for raw rows.
+    frames: (n, x_columns) columns without terrain. ground: (n, 3 * samples) ground heights. If x is
+    to be standardised, pass both standardised. mean_height: (n, 1) of the ground, in cm, or None to subtract
+    nothing. x_std (X,), y_std (Y,): standard deviations by which standardised rows were divided; None for raw
+    rows.
     """
     terrain = layout.x_terrain
     x[:, : terrain.start] = frames[:, : terrain.start]
     x[:, terrain.stop :] = frames[:, terrain.start :]
     x[:, terrain] = ground
-    if lift is not None:
-        lower_joints(x, layout.x_joint_position, lift, x_std)
-        lower_joints(y, layout.y_joint_position, lift, y_std)
+    if mean_height is not None:
+        lower_joints(x, layout.x_joint_position, mean_height, x_std)
+        lower_joints(y, layout.y_joint_position, mean_height, y_std)
 
 
 def lower_joints(values: Any, joints: slice, by: Any, std: Any = None) -> None:

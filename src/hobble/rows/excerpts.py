@@ -1,6 +1,6 @@
 """Excerpts of clips. A sample of a large data set consists of excerpts, so that no long clip is read whole.
 
-A clip is cut into excerpts of equal length, of at most LONGEST rows. A shorter clip is one excerpt.
+A clip is cut into as few excerpts as possible, of about equal length. A short clip is one excerpt.
 """
 
 from __future__ import annotations
@@ -17,11 +17,17 @@ from hobble.rows.clip_rows import DELETE_IT, ClipRows, load_clip_rows
 from hobble.rows.compose import body_layout
 from hobble.rows.layout import GAITS
 
-LONGEST = 1200  # rows, 20 seconds: an excerpt has several steps, and an hour has many excerpts
+# An excerpt has at most this many rows. 1200 rows are 20 seconds: enough for several steps, and short enough
+# for an hour of walking to give many excerpts.
+LONGEST = 1200
 
 
 class Excerpt(NamedTuple):
-    """Rows of a clip. first: index of the first. rows: how many. clip_rows: how many the whole clip has."""
+    """Consecutive rows of a clip.
+
+    clip: its name. first: index of the first row. rows: number of rows. clip_rows: number of rows of the
+    whole clip.
+    """
 
     clip: str
     first: int
@@ -53,9 +59,11 @@ class ExcerptKind:
 
 
 def excerpts(clip: str, rows: int, longest: int = LONGEST) -> list[Excerpt]:
-    """The excerpts of a clip of `rows` rows. Their lengths differ by at most one row.
+    """The excerpts of a clip of `rows` rows, with at most `longest` rows each.
 
-    >>> [(one.first, one.rows) for one in excerpts("walk", 2500)]
+    Their lengths differ by at most one row.
+
+    >>> [(excerpt.first, excerpt.rows) for excerpt in excerpts("walk", 2500)]
     [(0, 833), (833, 833), (1666, 834)]
     >>> excerpts("empty", 0)
     []
@@ -66,7 +74,7 @@ def excerpts(clip: str, rows: int, longest: int = LONGEST) -> list[Excerpt]:
 
 
 def excerpt_kind(rows: ClipRows, first: int, stop: int) -> ExcerptKind:
-    """What is in the rows from `first` up to `stop`, which is not included; at least one row."""
+    """What is in the rows from `first` up to `stop`, which is not included. `stop` is above `first`."""
     layout, part = rows.layout, slice(first, stop)
     channels = tuple(name for name, values in rows.channels.items() if np.any(values[part] != 0))
     shares = rows.x[part, body_layout(layout).x_gait].reshape(stop - first, len(GAITS), layout.samples)
@@ -75,16 +83,16 @@ def excerpt_kind(rows: ClipRows, first: int, stop: int) -> ExcerptKind:
     return ExcerptKind(gait, float(speed), channels)
 
 
-def load_excerpt(path: str | Path, one: Excerpt, before: int = 0, after: int = 0) -> ClipRows:
-    """The rows of an excerpt, and up to `before` and `after` rows of the same clip around it.
+def load_excerpt(path: str | Path, excerpt: Excerpt, before: int = 0, after: int = 0) -> ClipRows:
+    """The rows of an excerpt, with up to `before` rows of the clip before it and `after` rows after it.
 
     Only these rows are read from the file. Raises InputError if the file is damaged, or if the clip does not
-    have `one.clip_rows` rows.
+    have `excerpt.clip_rows` rows.
     """
-    first, stop = max(0, one.first - before), min(one.clip_rows, one.stop + after)
-    rows = load_clip_rows(path, None if stop - first == one.clip_rows else (first, stop))
+    first, stop = max(0, excerpt.first - before), min(excerpt.clip_rows, excerpt.stop + after)
+    rows = load_clip_rows(path, None if stop - first == excerpt.clip_rows else (first, stop))
     if len(rows) != stop - first:
         raise InputError(
-            path, f"does not have as many rows as its summary says ({one.clip_rows})", fix=DELETE_IT
+            path, f"does not have as many rows as its summary says ({excerpt.clip_rows})", fix=DELETE_IT
         )
     return rows

@@ -1,4 +1,4 @@
-"""The columns of a row by name. They depend on the skeleton, the window and the channels."""
+"""The columns of X and Y by name. They depend on the skeleton, the window and the channels."""
 
 from __future__ import annotations
 
@@ -11,8 +11,8 @@ from hobble.channels import channel_of_old_key
 
 GAITS = ("stand", "walk", "jog", "crouch", "jump", "bump")
 CONTACTS = ("left_heel", "left_toe", "right_heel", "right_toe")
-SIDES = ("left", "centre", "right")
-# The blocks of X that every network has, in the original's order.
+SIDES = ("left", "centre", "right")  # of the path, where X has ground heights
+# The blocks of X that every network has, in the order of Holden et al. (2017).
 BODY = ("position", "direction", "gait", "joint_position", "joint_velocity", "terrain")
 
 
@@ -21,13 +21,13 @@ class RowLayout:
     """The columns of X (inputs) and Y (outputs) of the network. Each block of columns is a slice.
 
     joints: number of joints. window: frames of the trajectory before and after the present frame. step:
-    frames between two samples of it. channels: (name, number of columns) of each channel. order: names of the
-    blocks of X in column order; empty for BODY, then the channels. Raises ValueError if `order` is not
-    exactly these blocks.
+    frames between two samples of the trajectory. channels: (name, number of columns) of each channel. order:
+    names of all blocks of X in column order. If it is empty, the blocks of BODY come first, then the
+    channels. Raises ValueError if a given `order` does not have each of these blocks once.
 
-    With 31 joints, window 60 and step 10, X has 342 columns (372 with a channel of 30) and Y has 311. Joint
-    blocks hold x, y, z of joint 0, then of joint 1, and so on. Trajectory blocks hold x of every sample, then
-    z of every sample.
+    With 31 joints, window 60 and step 10, X has 342 columns and Y has 311. With a channel of 30 columns, X
+    has 372. Joint blocks hold x, y, z of joint 0, then of joint 1, and so on. Trajectory blocks hold x of
+    every sample, then z of every sample.
     """
 
     joints: int
@@ -42,23 +42,23 @@ class RowLayout:
 
     @classmethod
     def from_dict(cls, data: Mapping[str, Any]) -> RowLayout:
-        """The inverse of `to_dict`. In old files the columns of a channel are under an old key."""
-        known = {key: data[key] for key in ("joints", "window", "step") if key in data}
+        """The inverse of `to_dict`. Old files have a channel's size under one of its `old_keys`."""
+        numbers = {key: data[key] for key in ("joints", "window", "step") if key in data}
         channels = dict(data.get("channels", {}))
         for key in set(data) - {"joints", "window", "step", "channels", "order"}:
             if data[key]:
                 channels[channel_of_old_key(key)] = data[key]
         pairs = tuple((str(name), int(columns)) for name, columns in channels.items())
-        return cls(**known, channels=pairs, order=tuple(data.get("order", ())))
+        return cls(**numbers, channels=pairs, order=tuple(data.get("order", ())))
 
     def to_dict(self) -> dict[str, Any]:
         """Plain data for `from_dict`."""
-        own = {"order": list(self.order)} if self.order else {}
+        order = {"order": list(self.order)} if self.order else {}
         sizes = {"joints": self.joints, "window": self.window, "step": self.step}
-        return {**sizes, "channels": [list(pair) for pair in self.channels], **own}
+        return {**sizes, "channels": [list(pair) for pair in self.channels], **order}
 
     def with_channels(self, names: Iterable[str]) -> RowLayout:
-        """The layout with only the channels `names`, in that order. Raises KeyError if it lacks one."""
+        """The layout with only the channels `names`, in that order. Raises KeyError for one that it lacks."""
         size = dict(self.channels)
         kept = tuple((name, size[name]) for name in names)
         order = tuple(name for name in self.order if name in BODY or name in dict(kept))
@@ -90,11 +90,11 @@ class RowLayout:
             )
         )
         sizes |= dict(self.channels)
-        found, start = {}, 0
+        blocks, start = {}, 0
         for name in self.order or sizes:
-            found[name] = slice(start, start + sizes[name])
+            blocks[name] = slice(start, start + sizes[name])
             start += sizes[name]
-        return found
+        return blocks
 
     @property
     def x_position(self) -> slice:
@@ -123,7 +123,7 @@ class RowLayout:
 
     @property
     def x_terrain(self) -> slice:
-        """Ground heights left (+X) of the path, on it and right of it, minus the mean of those on it, cm."""
+        """Ground heights left (+x) of the path, on it and right of it, cm above the mean on the path."""
         return self._x["terrain"]
 
     def x_channel(self, name: str) -> slice:

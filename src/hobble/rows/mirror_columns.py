@@ -12,8 +12,8 @@ from hobble.core.quat import Array
 from hobble.core.skeleton import Skeleton
 from hobble.rows.layout import CONTACTS, SIDES, RowLayout
 
-POINT = (-1, 1, 1)  # signs of x, y, z of a point or a velocity
-ROTATION = (1, -1, -1)  # signs of x, y, z of axis times angle; a mirror also reverses every turn
+POINT = (-1, 1, 1)  # signs that mirror x, y, z of a point or a velocity
+ROTATION = (1, -1, -1)  # the same for axis times angle of a rotation; a mirror also reverses every turn
 
 
 @dataclass(frozen=True)
@@ -33,16 +33,17 @@ class ColumnMirror:
         return values[..., self.source] * self.sign + self.shift
 
     def standardised(self, mean: Array, std: Array) -> ColumnMirror:
-        """The mirror of standardised rows (v - mean) / std. `shift` makes up for means that differ.
+        """The mirror of standardised rows, that is (raw - mean) / std.
 
-        Raises HobbleError if a column and its mirror are divided by different numbers.
+        `shift` makes up for the different means of a column and its mirror. Raises HobbleError
+        if a column and its mirror are divided by different numbers.
         """
         mean, std = mean.astype(float), std.astype(float)
         if len(odd := np.flatnonzero(std != std[self.source])):
             a, b = odd[0], self.source[odd[0]]
             raise HobbleError(
                 f"training.symmetric: columns {a} and {b} of the rows mirror each other, but their standard "
-                f"deviations are {std[a]:.6g} and {std[b]:.6g}. Does the data set say `mirror: true`?"
+                f"deviations are {std[a]:.6g} and {std[b]:.6g}. Use a data set with `mirror: true`."
             )
         return ColumnMirror(self.source, self.sign, (mean[self.source] * self.sign - mean) / std)
 
@@ -50,32 +51,32 @@ class ColumnMirror:
 def mirror_of_x(layout: RowLayout, skeleton: Skeleton) -> ColumnMirror:
     """The mirror of the inputs, in raw units. The phase is not a column; the caller moves it by half a cycle.
 
-    Raises HobbleError if the joints or links of the skeleton do not pair left and right.
+    Raises HobbleError if the joints or links of the skeleton do not form pairs of left and right.
     """
-    mirror = _Columns(layout.x_size, skeleton)
-    mirror.trajectory(layout.x_position)
-    mirror.trajectory(layout.x_direction)
-    mirror.joints(layout.x_joint_position, POINT)
-    mirror.joints(layout.x_joint_velocity, POINT)
-    mirror.swap(layout.x_terrain, np.arange(len(SIDES))[::-1])
+    collected = _Columns(layout.x_size, skeleton)
+    collected.trajectory(layout.x_position)
+    collected.trajectory(layout.x_direction)
+    collected.joints(layout.x_joint_position, POINT)
+    collected.joints(layout.x_joint_velocity, POINT)
+    collected.swap(layout.x_terrain, np.arange(len(SIDES))[::-1])
     for name, columns in layout.channels:
         swapped = channel(name).mirror(np.arange(columns, dtype=float)[None], skeleton)[0]
-        mirror.swap(layout.x_channel(name), swapped.astype(int))
-    return mirror.made()
+        collected.swap(layout.x_channel(name), swapped.astype(int))
+    return collected.mirror()
 
 
 def mirror_of_y(layout: RowLayout, skeleton: Skeleton) -> ColumnMirror:
     """The mirror of the outputs, in raw units. Raises HobbleError as `mirror_of_x` does."""
-    mirror = _Columns(layout.y_size, skeleton)
-    mirror.trajectory(layout.y_root_velocity)
-    mirror.trajectory(layout.y_position)
-    mirror.trajectory(layout.y_direction)
-    mirror.sign[layout.y_turn] = -1
-    mirror.swap(layout.y_contacts, np.array([CONTACTS.index(_other(name)) for name in CONTACTS]))
-    mirror.joints(layout.y_joint_position, POINT)
-    mirror.joints(layout.y_joint_velocity, POINT)
-    mirror.joints(layout.y_joint_rotation, ROTATION)
-    return mirror.made()
+    collected = _Columns(layout.y_size, skeleton)
+    collected.trajectory(layout.y_root_velocity)
+    collected.trajectory(layout.y_position)
+    collected.trajectory(layout.y_direction)
+    collected.sign[layout.y_turn] = -1
+    collected.swap(layout.y_contacts, np.array([CONTACTS.index(_other(name)) for name in CONTACTS]))
+    collected.joints(layout.y_joint_position, POINT)
+    collected.joints(layout.y_joint_velocity, POINT)
+    collected.joints(layout.y_joint_rotation, ROTATION)
+    return collected.mirror()
 
 
 def _other(contact: str) -> str:
@@ -95,14 +96,15 @@ class _Columns:
         self.sign[block.start : (block.start + block.stop) // 2] = -1
 
     def joints(self, block: slice, signs: tuple[int, int, int]) -> None:
-        """Set a block of x, y, z of every joint: left and right joints swap, and the numbers get `signs`."""
+        """Set a block of x, y, z of every joint: left and right joints swap, signs multiply x, y, z."""
         self.swap(block, self.swapped)
         self.sign[block] = np.tile(signs, len(self.swapped))
 
     def swap(self, block: slice, order: np.ndarray) -> None:
-        """Set a block of parts of equal length: the mirrored part i is part order[i]."""
+        """Set a block that consists of equally long parts: part i of the mirrored block is part order[i]."""
         columns = np.arange(block.start, block.stop).reshape(len(order), -1)
         self.source[block] = columns[order].ravel()
 
-    def made(self) -> ColumnMirror:
+    def mirror(self) -> ColumnMirror:
+        """The mirror of all columns, after the blocks were set."""
         return ColumnMirror(self.source, self.sign, np.zeros(len(self.source)))

@@ -17,7 +17,8 @@ from hobble.rows.excerpts import Excerpt, ExcerptKind, excerpt_kind, excerpts
 class RowsSummary:
     """A summary of a clip's rows.
 
-    rows: number of rows. kinds: what is in each excerpt, in the order of `hobble.rows.excerpts.excerpts`.
+    clip: its name. rows: number of rows. kinds: what is in each excerpt, in the order of
+    `hobble.rows.excerpts.excerpts`.
     """
 
     clip: str
@@ -38,18 +39,20 @@ def summary_of_rows(rows: ClipRows) -> RowsSummary:
     )
 
 
-def save_summary(path: str | Path, found: RowsSummary) -> None:
+def save_summary(path: str | Path, summary: RowsSummary) -> None:
     """Write a summary as JSON."""
-    write_json(Path(path), asdict(found))
+    write_json(Path(path), asdict(summary))
 
 
 def load_summary(path: str | Path) -> RowsSummary:
     """Read a summary. Raises InputError if the file holds something else."""
     values: Mapping[str, Any] = read_json(Path(path))
     try:
-        kinds = tuple(ExcerptKind(**{**one, "channels": tuple(one["channels"])}) for one in values["kinds"])
-        found = RowsSummary(str(values["clip"]), int(values["rows"]), kinds)
-        found.excerpts  # noqa: B018 - fails unless each has its entry
+        kinds = tuple(
+            ExcerptKind(**{**kind, "channels": tuple(kind["channels"])}) for kind in values["kinds"]
+        )
+        summary = RowsSummary(str(values["clip"]), int(values["rows"]), kinds)
+        summary.excerpts  # noqa: B018 - ValueError unless there is a kind for each excerpt
     except (KeyError, TypeError, ValueError) as error:
         raise InputError(path, f"not the summary of a clip ({error})", fix=DELETE_IT) from error
-    return found
+    return summary

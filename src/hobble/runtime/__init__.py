@@ -14,7 +14,7 @@ __all__ = ["Pose", "ProceduralAnimation"]
 def __getattr__(name: str) -> Any:
     """Import the public names on first use.
 
-    Snakemake reads the options of this package for every job and should not wait for numpy and numba.
+    Every job of Snakemake imports the options in this package, and should not wait for numpy and numba.
     """
     if name in __all__:
         return getattr(importlib.import_module("hobble.runtime.animation"), name)

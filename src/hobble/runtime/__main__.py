@@ -42,7 +42,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         "--mode",
         choices=get_args(PhaseMode),
         default="cubic",
-        help="how the weights of a phase are found; cubic is exact",
+        help="how the network's weights are interpolated over the phase; cubic is exact",
     )
     parser.add_argument("--skeleton", help="a file of config/skeletons, if the network has no skeleton")
     options = parser.parse_args(arguments)

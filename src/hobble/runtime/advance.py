@@ -1,7 +1,7 @@
 """Moves a trajectory on by one frame: root and future path follow the network's prediction.
 
-All functions are in one file, because numba renews cached code only when its own file changes, not when that
-of a function it calls does.
+The compiled functions are in one file, because numba compiles a cached function again only if its own file
+changes, not if the file of a function that it calls changes.
 """
 
 from __future__ import annotations
@@ -18,21 +18,23 @@ from hobble.runtime.trajectory import STILL, Trajectory
 
 phase_change, moving_share = register_jitable(rule.phase_change), register_jitable(rule.moving)
 
-# With `Network.recorded_poses`: largest change of the root's movement at right angles to the target, as a
-# share of the movement.
+# If the predicted poses are recorded frames (motion matching), the root's movement is changed toward the
+# target velocity. Across the target, the change is at most this share of the movement's length.
 PULL = 0.2
-# Largest change along the target, as a share of PULL. With more, the character takes corners faster and
-# wider.
+# Along the target, the change is at most PULL * PULL_AHEAD of the movement's length. With more, the character
+# takes corners faster and wider.
 PULL_AHEAD = 0.5
-BACKWARD_LOSS = 0.5  # share of movement against the target that is removed; removing all would drag the feet
+# With other networks, this share of the movement against the target is removed. Removing all of it would drag
+# the feet.
+BACKWARD_LOSS = 0.5
 
 
 @njit
 def _pull(share: float, target_x: float, target_z: float, x: float, z: float) -> tuple[float, float]:
-    """What to add to a movement (x, z) so that it comes nearer to the target.
+    """What to add to a movement (x, z) so that it comes nearer to the target movement.
 
-    It changes the movement across the target by at most `share` times the movement's length, and along the
-    target by at most PULL_AHEAD of that. If both shared one limit, a clip that is too slow would use it up,
+    Across the target, at most `share` times the movement's length is added; along the target, at most
+    PULL_AHEAD times as much. If the two directions shared one limit, a clip that is too slow would use it up,
     and the character would drift off its path.
     """
     most = share * np.sqrt(x * x + z * z)
@@ -50,7 +52,10 @@ def _pull(share: float, target_x: float, target_z: float, x: float, z: float) ->
 def _without_backward(
     loss: float, target_x: float, target_z: float, x: float, z: float
 ) -> tuple[float, float]:
-    """The movement (x, z) without the share `loss` of what goes against the target; of all of it if STILL."""
+    """The movement (x, z) without the share `loss` of its component against the target.
+
+    If the target is slower than STILL, the share `loss` of the whole movement is removed.
+    """
     speed = target_x * target_x + target_z * target_z
     if speed < STILL * STILL:
         return (1.0 - loss) * x, (1.0 - loss) * z
@@ -66,11 +71,13 @@ def advance(
 
     y: (C, Y) prediction. at: first columns in y of root velocity, turn, phase change, position and direction,
     then the number of future samples and the frames between two samples. target: (C, 2) velocity.
-    recorded_poses: see `Network.recorded_poses`. If false, the movement is scaled by (1 - stand)^.25.
-    loss: share of the movement against the target that is removed; if the target is to stand, that share of
-    all movement. The original runtime removes nothing.
-    pull: largest change of the movement toward the target, as a share of the movement. It is needed because
-    clips have only some directions and speeds (after the adjustment of Holden et al. 2020).
+    loss: share of the movement against the target that is removed; 0 in the runtime of Holden et al. (2017).
+    recorded_poses: whether the predicted poses are recorded frames. If not, movement and turn are scaled by
+    (1 - stand)^.25, where stand is the present share of the gait "stand".
+    pull: largest change of the movement across the target, as a share of its length; 0 for no change. It is
+    needed for recorded frames, because clips have only some directions and speeds. The idea is the adjustment
+    of Holden et al. (2020).
+    path, phase (C,): changed in place.
     The predicted turn is that of the world seen from the root, so the root turns by its negative.
     """
     position, direction, gait = path

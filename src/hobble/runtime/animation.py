@@ -27,7 +27,7 @@ from hobble.runtime.limits import SpeedLimiter
 from hobble.runtime.trajectory import target_facing
 from hobble.runtime.waypoints import Follower, Waypoint
 
-FARTHEST = 1e7  # cm from the origin, 100 km; farther away, positions are too imprecise for a step
+FARTHEST = 1e7  # cm, 100 km: largest start coordinate; farther from the origin, floats are imprecise
 
 
 @dataclass(frozen=True)
@@ -110,22 +110,24 @@ class ProceduralAnimation:
     def load(
         cls, path: str | Path, *, skeleton: Skeleton | str | Path | None = None, **options: Any
     ) -> ProceduralAnimation:
-        """Load weights.npz, its folder, or a folder of the original release's .bin files.
+        """Load weights.npz, its folder, or a folder with the .bin files of Holden et al. (2017).
 
         skeleton: a Skeleton or a file of config/skeletons, for a network file that has none.
-        mode: how the phase gets its weights: "constant", "linear" or "cubic".
-        storage: how weights are stored in memory, "float32" or "int16"; the default depends on the kind.
+        mode: how the weights are interpolated over the phase: "constant", "linear" or "cubic".
+        storage: how weights are stored in memory, "float32" or "int16"; the default depends on the kind of
+            network.
         characters: how many.
         waypoints: the track to follow when `next_pose` gets no velocity.
         rates: channel -> largest change of its values per second; default: the channel's own rate.
-        scales: channel -> divisor of its values.
+        scales: channel -> number by which its values are divided for the network.
         foot_locking: hold feet in contact where they landed.
-        steering: gain of the correction when the target velocity is not reached; 0: none, as in the original.
+        steering: gain of the correction when the target velocity is not reached; 0: none, as in the
+            runtime of Holden et al. (2017).
         limits: limit the target speed to what the injured body can do.
         axes: the caller's axes and unit. position, facing: see `reset`.
 
-        Raises InputError for a file that is not a usable network, ValueError for an option out of range,
-        UnknownName for a gait that the network does not have.
+        Raises InputError for a file that is not a usable network, ValueError for an option out of range, and
+        UnknownName for a waypoint's gait that the network does not have.
         """
         network = load_network(path, skeleton)
         if network.skeleton is None:
@@ -134,7 +136,7 @@ class ProceduralAnimation:
         return cls(network, **options)
 
     def reset(self, position: Any = None, facing: Any = None) -> None:
-        """Restart healthy at `position` (3,) or (C, 3), facing the direction `facing` (3,) or (C, 3).
+        """Restart the characters, healthy, at `position` and facing `facing`, each (3,) or (C, 3).
 
         By default they start at the origin facing forward, or at the start of the waypoints.
         """
@@ -156,7 +158,7 @@ class ProceduralAnimation:
         self._control(start(self.network, count, np.array(places, float), yaws))
 
     def copies(self, of: np.ndarray) -> ProceduralAnimation:
-        """A new animation whose character i continues from this one's character of[i]. of: (C',) indices.
+        """A new animation whose character i continues from character of[i] of this one. of: (C',) indices.
 
         The two animations share no state. Raises ValueError if the characters follow waypoints.
         """
@@ -190,21 +192,22 @@ class ProceduralAnimation:
 
     @property
     def predicted_rotations(self) -> Array:
-        """(C, J, 4) world rotations that the network predicted for the last frame, before any limit.
+        """(C, J, 4) world rotations that the network predicted for the last frame.
 
-        In Hobble's axes: Y up, Z forward.
+        Here it is not yet limited how far a joint turns in a frame. In Hobble's axes: Y up, Z forward.
         """
         return world_rotations(*self.predicted_turns)
 
     @property
     def predicted_turns(self) -> tuple[Array, Array]:
-        """The arguments of `world_rotations` in the last frame, (C, J, 3) and (C,), as copies.
+        """Rotations (C, J, 3) predicted for the last frame, relative to the root, and the root's yaw (C,).
 
-        Collect them and convert many frames at once: that is faster than `predicted_rotations`.
+        Both are copies. Collect those of many frames and pass them to `world_rotations` at once: this is
+        faster than `predicted_rotations`.
         """
-        made = self._controller
-        turns = made.y[:, self.network.layout.y_joint_rotation].reshape(self.characters, -1, 3)
-        return turns.copy(), made.yaw.copy()
+        controller = self._controller
+        turns = controller.y[:, self.network.layout.y_joint_rotation].reshape(self.characters, -1, 3)
+        return turns.copy(), controller.yaw.copy()
 
     def next_pose(
         self,
@@ -218,15 +221,17 @@ class ProceduralAnimation:
         """Advance by one 60 Hz frame and return the pose.
 
         target_velocity: (2,) on the ground, (3,), or (C, 2 or 3): distance per frame, in your unit. None
-        follows the waypoints; without waypoints the character stands. facing: direction to look in, same
-        shapes, any length. None or zero: the direction of movement. gait: a name ("walk"), one name for each
-        character, shares (6,) or (C, 6), or None to choose by speed. Below 0.1 cm a frame the character
-        stands, whatever the gait. terrain: None for flat ground at 0; a function of two ground coordinates
-        (arrays) that returns heights; a `ground.Heightmap`; or a 2D array around the origin. All in your axes
-        and unit. Pass the same object every frame. channels: keywords named after channels, such as
-        injury={"LeftUpLeg-LeftLeg": 7}. The value is a mapping from label (column of the channel) to value or
-        (C,) values, or an array (L,) or (C, L) of all L labels. Labels that are not named go back to 0. None,
-        or no keyword, leaves the channel unchanged.
+            follows the waypoints; without waypoints the character stands.
+        facing: direction to look in, same shapes, any length. None or zero: the direction of movement.
+        gait: a name ("walk"), one name for each character, shares (6,) or (C, 6), or None to choose by speed.
+            Below 0.1 cm a frame the character stands, whatever the gait.
+        terrain: None for flat ground at 0; a function of two ground coordinates (arrays) that returns
+            heights; a `ground.Heightmap`; or a 2D array of heights around the origin. Coordinates and heights
+            are in your axes and unit. Pass the same object every frame.
+        channels: keywords named after channels, such as injury={"LeftUpLeg-LeftLeg": 7}. The value is a
+            mapping from label (column of the channel) to value or (C,) values, or an array (L,) or (C, L) of
+            all L labels. Labels that are not named go back to 0. None, or no keyword, leaves the channel
+            unchanged.
 
         Raises UnknownName (a KeyError) for a label or gait that the network does not have; TypeError for a
         keyword that is no channel; ValueError for a channel that the network has no input for, for values out
@@ -245,14 +250,14 @@ class ProceduralAnimation:
             for name, given in channels.items()
             if given is not None
         ]
-        made = self._controller
-        before = None if self._terrain[1] is None else Snapshot(self.state, made.root, made.yaw)
+        controller = self._controller
+        before = None if self._terrain[1] is None else Snapshot(self.state, controller.root, controller.yaw)
         try:
             for columns, values in targets:
                 self.state.channel_targets[:, columns] = values
             if self._limited:
                 self._limiter.hold(self.state.channel_values, velocity, shares)
-            made.frame((velocity, direction, strafe, shares), self._terrain[1])
+            controller.frame((velocity, direction, strafe, shares), self._terrain[1])
         except BaseException:
             if before is not None:  # on flat ground nothing in a frame can fail
                 before.restore()
@@ -260,21 +265,24 @@ class ProceduralAnimation:
         return self._pose()
 
     def _target(self, velocity: Any, facing: Any, gait: Any) -> tuple[Array, Array, Any]:
-        """Target velocity and facing (C, 2), zero to look where the character goes, and the caller's gait."""
+        """Target velocity (C, 2), facing (C, 2) and gait, from the caller or the waypoints.
+
+        A facing of zero means: look where the character goes.
+        """
         ahead = self._nowhere if facing is None else self._targets.facing(facing)
         if velocity is not None:
             return self._targets.velocity(velocity), ahead, gait
         if self.follower is None:
             return np.zeros((self.characters, 2)), ahead, gait
         middle = self.network.layout.window
-        target, heading = self.follower.lead(self.state.position[:, middle])
+        target, waypoints = self.follower.lead(self.state.position[:, middle])
         ahead = target
-        if any(waypoint.facing is not None for waypoint in heading):
+        if any(waypoint.facing is not None for waypoint in waypoints):
             ahead = target.copy()
-            for c, waypoint in enumerate(heading):
+            for c, waypoint in enumerate(waypoints):
                 if waypoint.facing is not None:
                     ahead[c] = waypoint.facing
-        return target, ahead, [w.gait for w in heading] if gait is None else gait
+        return target, ahead, [waypoint.gait for waypoint in waypoints] if gait is None else gait
 
     def _pose(self) -> Pose:
         c, state = self._controller, self.state
@@ -301,5 +309,9 @@ class ProceduralAnimation:
 
 
 def world_rotations(turns: Array, yaw: Array) -> Array:
-    """(..., J, 4) world rotations from rotation vectors (..., J, 3) relative to a root that faces `yaw`."""
+    """(..., J, 4) world rotations of joints.
+
+    turns: (..., J, 3) axis times half the angle, relative to the root. yaw: (...) radians, where the root
+    faces.
+    """
     return quat.mul(quat.yaw(yaw)[..., None, :], quat.exp(turns.astype(float)))

@@ -17,19 +17,19 @@ from hobble.core.quat import Array
 from hobble.models.network import Network
 
 MARGIN_SHARE = 0.25  # margin on each side, as a share of a column's range in training
-# Bounds of the outputs if the file has no ranges: mean +- (deviations * std + margin).
+# If the network's file has no ranges, the bounds of the outputs are mean +- (deviations * std + margin).
 DEFAULT_DEVIATIONS = 15.0
-DEFAULT_MARGIN = 50.0  # cm
+DEFAULT_MARGIN = 50.0  # in the unit of each column: cm for positions
 SPEED_MARGIN = 1.5  # largest joint speed, as a multiple of the fastest joint in training
 LARGEST_SOUND = 1e8  # larger numbers are treated as not finite; no value of a working character is as large
 
 
 @dataclass(frozen=True)
 class Bounds:
-    """The allowed ranges: x_low, x_high (X,) and y_low, y_high (Y,), float32, raw units.
+    """The allowed ranges: x_low, x_high (X,) and y_low, y_high (Y,), float32, in the units of the rows.
 
-    fastest: largest joint movement, cm a frame. hips: lowest and highest hips in training, cm above the
-    ground; unbounded if the network's file has no ranges.
+    fastest: largest joint movement, cm a frame. hips: lowest and highest height of the hips in training,
+    cm above the ground; unbounded if the network's file has no ranges.
     """
 
     x_low: Array = field(repr=False)
@@ -53,9 +53,9 @@ class Bounds:
         x_low, x_high = facts.x_low - x_more, facts.x_high + x_more
         for name, _ in layout.channels:
             x_low[layout.x_channel(name)], x_high[layout.x_channel(name)] = -LARGEST_SOUND, LARGEST_SOUND
-        y_low, on = facts.y_low - y_more, layout.y_phase_change
+        y_low, change = facts.y_low - y_more, layout.y_phase_change
         # The phase may run backwards only as fast as it did in training.
-        y_low[on] = np.maximum(y_low[on], np.minimum(facts.y_low[on], 0.0))
+        y_low[change] = np.maximum(y_low[change], np.minimum(facts.y_low[change], 0.0))
         assert network.skeleton is not None
         height = layout.y_joint_position.start + 3 * network.skeleton.role("hips") + 1
         hips = float(facts.y_low[height]), float(facts.y_high[height])
@@ -66,8 +66,8 @@ class Bounds:
 def clip_rows(rows: Any, low: Any, high: Any, unsound: Any) -> bool:
     """Clip rows (C, N) in place to low and high (N,).
 
-    Numbers that are not finite or too large become the middle of their range; `unsound` (C,) marks their
-    rows. Returns whether any row is marked.
+    Numbers that are not finite or too large become the middle of their column's range, and `unsound` (C,)
+    marks their rows. Returns whether any row is marked.
     """
     any_unsound = False
     for c in range(rows.shape[0]):

@@ -1,4 +1,4 @@
-"""Conversion between the caller's axes and unit and Hobble's: right-handed, Y up, +Z forward, cm."""
+"""Converts from Hobble's axes and unit (right-handed, Y up, +Z forward, cm) to the caller's, and back."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ import numpy as np
 
 from hobble.core.quat import Array
 
-# Rows: the caller's x, y, z, as combinations of Hobble's axes (left, up, forward).
+# (handedness, up axis) of the caller -> matrix from Hobble's left, up, forward to the caller's x, y, z.
 MATRICES = {
     ("right", "Y"): ((1, 0, 0), (0, 1, 0), (0, 0, 1)),
     # Unity: x to the right, z forward.
@@ -19,7 +19,7 @@ MATRICES = {
     # Unreal: x forward, y to the right.
     ("left", "Z"): ((0, 0, 1), (-1, 0, 0), (0, 1, 0)),
 }
-UNITS = {"cm": 1.0, "m": 0.01}
+UNITS = {"cm": 1.0, "m": 0.01}  # unit of the caller -> how many of it are one centimetre
 
 
 @dataclass(frozen=True)
@@ -49,7 +49,7 @@ class Axes:
 
     @property
     def scale(self) -> float:
-        """One centimetre in the caller's unit."""
+        """Length of one centimetre in the caller's unit."""
         return UNITS[self.unit]
 
     def directions_out(self, v: Array) -> Array:

@@ -1,4 +1,4 @@
-"""Targets given by the caller, checked and converted: velocity, facing and gait of each character."""
+"""Checks and converts the targets that the caller gives: velocity, facing and gait of each character."""
 
 from __future__ import annotations
 
@@ -19,7 +19,10 @@ TURN_IN_PLACE = np.radians(20)  # a standing character steps around if it has to
 
 
 class CallerTargets:
-    """Converts the targets of C characters. gaits: names of the network's gaits. axes: the caller's."""
+    """Converts the targets of C characters.
+
+    gaits: names of the network's gaits. axes: the caller's. characters: C.
+    """
 
     def __init__(self, gaits: Sequence[str], axes: Axes, characters: int) -> None:
         self.axes, self.characters = axes, characters
@@ -27,7 +30,10 @@ class CallerTargets:
         self._shares = np.zeros((characters, len(gaits)))
 
     def velocity(self, velocity: Any) -> Array:
-        """Target velocities (C, 2), cm a frame. Raises ValueError above FASTEST and for wrong shapes."""
+        """Target velocities (C, 2), cm a frame.
+
+        Raises ValueError for a speed above FASTEST, and where `on_the_ground` does.
+        """
         target = self.on_the_ground("target_velocity", velocity, self.axes.points_in)
         if (fastest := np.hypot(target[:, 0], target[:, 1]).max()) > FASTEST:
             raise ValueError(
@@ -37,11 +43,15 @@ class CallerTargets:
         return target
 
     def facing(self, facing: Any) -> Array:
-        """Directions (C, 2) to look in, of any length. Raises ValueError for wrong shapes."""
+        """Directions (C, 2) to look in, of any length. Raises ValueError where `on_the_ground` does."""
         return self.on_the_ground("facing", facing, self.axes.directions_in)
 
     def on_the_ground(self, what: str, vector: Any, convert: Any) -> Array:
-        """The caller's vectors as Hobble's x, z (C, 2). Two components are taken as ground coordinates."""
+        """The caller's vectors as Hobble's x, z (C, 2). A vector of two components has no height.
+
+        what: name of the vector for messages. convert: function from the caller's axes to Hobble's. Raises
+        ValueError for a wrong shape or a number that is not finite.
+        """
         v = np.asarray(vector, float)
         if (
             v.shape[-1:] not in ((2,), (3,))
@@ -66,14 +76,15 @@ class CallerTargets:
         """Shares (C, G) of the gaits, from the caller's gait. The next call overwrites them.
 
         velocity: (C, 2) target, cm a frame. direction: (C, 2) target facing; heading: (C, 2) facing now.
-        gait: see `ProceduralAnimation.next_pose`.
+        gait: a
+        name, a name for each character, shares (G,) or (C, G), or None to choose by speed.
         """
         shares = self._shares
         speed = np.hypot(velocity[:, 0], velocity[:, 1])
         given = np.asarray(gait)
         if given.dtype.kind in "biuf":
-            known = (given >= 0) & (given <= 1)
-            if given.shape not in (shares.shape, shares.shape[1:]) or not known.all():
+            valid = (given >= 0) & (given <= 1)
+            if given.shape not in (shares.shape, shares.shape[1:]) or not valid.all():
                 raise ValueError(
                     f"gait shares have to be {shares.shape[1:]} or {shares.shape} numbers from 0 to 1, not "
                     f"{given.tolist()}; order: {', '.join(self._gaits)}"
@@ -97,7 +108,7 @@ class CallerTargets:
         return shares
 
     def check_gait(self, name: Any) -> None:
-        """Raises UnknownName if the network does not have this gait."""
+        """Raise UnknownName if the network does not have this gait."""
         if name not in self._gaits:
             raise UnknownName("no gait", name, self._gaits)
 

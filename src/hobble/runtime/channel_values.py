@@ -14,7 +14,7 @@ from hobble.models.network import Network
 
 
 class UnknownName(KeyError):
-    """The network does not have this label or gait. The message lists the nearest names."""
+    """The network does not have this label or gait. The message lists similar names, or else all."""
 
     def __init__(self, what: str, name: object, known: Iterable[str]) -> None:
         names = list(known)
@@ -27,7 +27,11 @@ class UnknownName(KeyError):
 
 
 class ChannelValues:
-    """The channels of a network. columns: channel -> its columns in the state. scales: channel -> divisor."""
+    """Converts values for the channels of a network.
+
+    labels: channel -> label -> number of its column in the channel. columns: channel -> its columns in the
+    state. scales: channel -> number by which its values are divided for the network.
+    """
 
     def __init__(self, network: Network, scales: Mapping[str, float]) -> None:
         self.labels = {
@@ -48,15 +52,15 @@ class ChannelValues:
         """
         if name not in NAMES:
             raise TypeError(f"next_pose() got an unexpected keyword argument {name!r}")
-        one, labels = channel(name), self.labels.get(name, {})
+        definition, labels = channel(name), self.labels.get(name, {})
         values = np.zeros((characters, len(labels)))
         if isinstance(given, Mapping):
             for label, value in given.items():
-                self._name(name, label)
+                self._check_label(name, label)
                 if np.shape(value) not in ((), (1,), (characters,)):
                     shape = np.shape(value)
                     raise ValueError(
-                        f"{label} has to be one {one.value} or {characters}, not of shape {shape}"
+                        f"{label} has to be one {definition.value} or {characters}, not of shape {shape}"
                     )
                 values[:, labels[label]] = value
         else:
@@ -68,16 +72,16 @@ class ChannelValues:
                     f"{name} has to have shape {values.shape[1:]} or {values.shape}, not {array.shape}"
                 )
             values[:] = array
-        wrong = ~((values >= 0) & (values <= one.highest))
+        wrong = ~((values >= 0) & (values <= definition.highest))
         if wrong.any():
             c, k = np.argwhere(wrong)[0]
             raise ValueError(
-                f"the {one.value} of {list(labels)[k]} is {values[c, k]:g}, but has to be from 0 to "
-                f"{one.highest:g}"
+                f"the {definition.value} of {list(labels)[k]} is {values[c, k]:g}, but has to be from 0 to "
+                f"{definition.highest:g}"
             )
         return self.columns.get(name, slice(0, 0)), values / self.scales.get(name, 1.0)
 
-    def _name(self, name: str, label: str) -> None:
+    def _check_label(self, name: str, label: str) -> None:
         labels = self.labels.get(name, {})
         if not labels:
             raise ValueError(f"{label} cannot be set: {_no_input(name)}")

@@ -17,15 +17,18 @@ SHOWN = ("knee", "heel", "toe")  # the joints of `leg_shown`
 class Character:
     """The state of C characters, changed in place by the controller. World axes, cm, velocities per frame.
 
-    position, direction: (C, T, 2) trajectory; gait: (C, T, 6) shares; T frames, see `trajectory.Trajectory`.
-    ground: (C, samples, 3) heights at left, path, right; root_height: (C,) mean of the heights on the path.
-    joint_position, joint_velocity: (C, J, 3); joint_rotation: (C, J, 4) world: the pose as predicted, before
-    feet are placed.
+    position, direction: (C, T, 2) x and z of the trajectory; gait: (C, T, 6) shares; T frames, of which frame
+    T/2 is the present one.
+    ground: (C, samples, 3) heights left of, on and right of the path; root_height: (C,) mean height on it.
+    joint_position, joint_velocity: (C, J, 3); joint_rotation: (C, J, 4) world: the predicted pose, with
+    limited turns of the joints, before feet are placed.
     phase: (C,). channel_values, channel_targets: (C, K) present and target values of all channels' columns.
-    smoothed_velocity, smoothed_direction: (C, 2); strafe: (C,); correction: (C, 2): see
-    `trajectory.follow_target`.
-    foot_lock (C, 2), foot_hold (C, 2, 2), foot_step (C, 2), foot_missed (C, 2): see `foot_lock`.
-    foot_lift (C, 2), foot_added (C, 2, 2, 4), leg_shown (C, 2, 3, 3), body_lift (C,): see `feet`.
+    smoothed_velocity, smoothed_direction: (C, 2); strafe: (C,); correction: (C, 2): the smoothed target, see
+    `Smoothed` in `hobble.runtime.trajectory`.
+    foot_lock (C, 2), foot_hold (C, 2, 2), foot_step (C, 2), foot_missed (C, 2): see `Hold` in
+    `hobble.runtime.foot_lock`.
+    foot_lift (C, 2), foot_added (C, 2, 2, 4), leg_shown (C, 2, 3, 3), body_lift (C,): see `Feet` in
+    `hobble.runtime.feet`.
     placed: (C,) whether the joints have been lifted to the ground at the start.
     memory: (C, M) the network's own state of the character, see `Network.memory`.
     """
@@ -57,12 +60,12 @@ class Character:
     memory: Array
 
     def copies(self, of: np.ndarray) -> Character:
-        """A new state whose character i is a copy of this one's character of[i]. of: (C',) indices."""
+        """A new state whose character i is a copy of character of[i] of this one. of: (C',) indices."""
         return Character(**{field.name: getattr(self, field.name)[of] for field in fields(self)})
 
 
 class Snapshot:
-    """A copy of the state (and of other arrays), to restore it if the frame fails."""
+    """A copy of the state and of the arrays `more`, to restore all of them if a frame fails."""
 
     def __init__(self, state: Character, *more: Array) -> None:
         arrays = (*(getattr(state, field.name) for field in fields(state)), *more)
@@ -77,18 +80,18 @@ class Snapshot:
 def start(network: Network, characters: int, position: Array, yaw: Array) -> Character:
     """C healthy characters at ground positions (C, 2), facing `yaw` (C,) in radians.
 
-    They start in the start frame of the network's file, a standing one if the clips have any. If the file has
-    no start frame, they start in the network's mean pose.
+    They start in the start frame of the network's file, a standing pose unless the training clips hardly have
+    any. If the file has no start frame, they start in the network's mean pose.
     """
     layout, facts = network.layout, network.training_facts
     count = characters
     columns = sum(columns for _, columns in layout.channels)
     now = network.y_mean.astype(float) if facts is None else facts.start_y.astype(float)
-    path, heading, gait = _past(network)
+    path, heading, gait = _start_path(network)
     sin, cos = np.sin(yaw)[:, None], np.cos(yaw)[:, None]
     joints = now[layout.y_joint_position].reshape(-1, 3)
-    placed = _turned(joints, sin, cos)
-    placed[..., ::2] += position[:, None]
+    in_world = _turned(joints, sin, cos)
+    in_world[..., ::2] += position[:, None]
     assert network.skeleton is not None
     legs = [[network.skeleton.role(f"{side}_{part}") for part in SHOWN] for side in ("left", "right")]
     moving = np.zeros_like(joints) if facts is None else now[layout.y_joint_velocity].reshape(-1, 3)
@@ -100,7 +103,7 @@ def start(network: Network, characters: int, position: Array, yaw: Array) -> Cha
         gait=np.repeat(gait[None], count, axis=0),
         ground=np.zeros((count, layout.samples, 3)),
         root_height=np.zeros(count),
-        joint_position=np.ascontiguousarray(placed),
+        joint_position=np.ascontiguousarray(in_world),
         joint_velocity=np.ascontiguousarray(_turned(moving, sin, cos)),
         joint_rotation=quat.mul(quat.yaw(yaw)[:, None], quat.exp(turns)),
         phase=np.full(count, 0.0 if facts is None else facts.start_phase),
@@ -116,15 +119,15 @@ def start(network: Network, characters: int, position: Array, yaw: Array) -> Cha
         foot_missed=np.zeros((count, 2)),
         foot_lift=np.zeros((count, 2)),
         foot_added=np.tile([1.0, 0.0, 0.0, 0.0], (count, 2, 2, 1)),
-        leg_shown=placed[:, legs].copy(),
+        leg_shown=in_world[:, legs].copy(),
         body_lift=np.zeros(count),
         placed=np.zeros(count, bool),
         memory=np.zeros((count, network.memory)),
     )
 
 
-def _past(network: Network) -> tuple[Array, Array, Array]:
-    """Path (T, 2), facing (T, 2) and gait (T, 6) of the start frame, relative to its root.
+def _start_path(network: Network) -> tuple[Array, Array, Array]:
+    """Path (T, 2), facing (T, 2) and gait (T, 6) around the start frame, relative to its root.
 
     If the file has no start frame, the character stands still.
     """

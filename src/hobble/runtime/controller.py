@@ -30,8 +30,8 @@ STEPS = ("prepare", "input", "insert", "predict", "output", "update")
 FPS = 60
 HIGHEST = 1e7  # cm, 100 km: largest height of the ground above or below 0; larger heights are imprecise
 
-# Parts of the state that are checked to be finite. The others are checked in the call or made anew each
-# frame.
+# In each frame the runtime checks that these arrays of the state are finite. The others are checked when the
+# caller gives them, or made anew in each frame.
 CHECKED = (
     *("position", "direction", "gait", "joint_position", "joint_velocity", "joint_rotation", "phase"),
     *(
@@ -51,7 +51,7 @@ Ground = Callable[[Array, Array], Array]
 
 
 class ControllerOptions(TypedDict):
-    """The keywords of a `Controller`."""
+    """The keywords of a `Controller`, which its docstring describes."""
 
     rates: Mapping[str, float]
     foot_locking: bool
@@ -63,7 +63,8 @@ class Controller:
     """Runs the characters of one network. `seconds` (6,) holds the time of each of STEPS in the last frame.
 
     rates: channel -> largest change of its values per second; foot_locking: hold feet in contact where they
-    landed; steering: see `trajectory.follow_target`; side: cm from the path to the side heights.
+    landed; steering: gain of the correction when the target velocity is not reached, 0 for none; side: cm
+    from the path to the points at its sides where the ground is looked up.
     """
 
     def __init__(
@@ -113,18 +114,19 @@ class Controller:
             self.bounds.fastest,
         )
         self._hips = network.skeleton.role("hips")
+        # The joints under which the ground is looked up (heels, toes, hips), and the heights found.
         self._standing = np.append(legs[:, 2:].reshape(-1), self._hips)
         self._under = np.zeros((count, len(self._standing)))
         self._warned = False
         self._group(character)
 
     def take_pose(self, other: Controller, of: np.ndarray) -> None:
-        """Character i gets the pose in which `other` drew its character of[i]. of: (C,) indices."""
+        """Copy the pose of character i from character of[i] of the controller `other`. of: (C,) indices."""
         for name in ("root", "yaw", "pose_position", "pose_rotation"):
             getattr(self, name)[:] = getattr(other, name)[of]
 
     def _group(self, c: Character) -> None:
-        """Group the arrays for the compiled functions. They only change in place, so this is done once."""
+        """Group the arrays for the compiled functions: once, because the arrays only change in place."""
         self._path = (c.position, c.direction, c.gait)
         self._smoothed = (c.smoothed_velocity, c.smoothed_direction, c.strafe, c.correction)
         self._channels = (c.channel_values, c.channel_targets, self._channel_steps)
@@ -138,12 +140,12 @@ class Controller:
         self._checked = tuple(getattr(c, name).reshape(len(c.phase), -1) for name in CHECKED)
 
     def frame(self, target: trajectory.Target, ground: Ground | None) -> None:
-        """Run one frame. ground returns heights (N,) at x, z (N,)."""
+        """Run one frame. ground: function from x, z (N,) to heights (N,), cm; None: flat at 0."""
         clock = perf_counter
         t0 = clock()
         c = self.character
         if find_unsound(self._checked, self._unsound):
-            self._restore("the state")
+            self._restore()
         self._prepare(target, ground)
         t1 = clock()
         self._input()
@@ -153,7 +155,7 @@ class Controller:
         t3 = clock()
         self.predictor.evaluate(self.z, c.phase, self.y, *self._memory)
         if clip_rows(self.y, self.bounds.y_low, self.bounds.y_high, self._unsound):
-            self._warn("the network's prediction")
+            self._warn("the network's prediction", "such numbers are replaced by the middle of their range")
         t4 = clock()
         self._output(ground)
         t5 = clock()
@@ -161,20 +163,19 @@ class Controller:
         t6 = clock()
         self.seconds[:] = (t1 - t0, t2 - t1, t3 - t2, t4 - t3, t5 - t4, t6 - t5)
 
-    def _restore(self, what: str) -> None:
+    def _restore(self) -> None:
         """Restart the characters marked in `_unsound` where they are, with the same channel targets."""
-        self._warn(what)
-        some = np.flatnonzero(self._unsound)
-        fresh = start(self.predictor.network, len(some), self.root[some][:, ::2], self.yaw[some])
-        for part in fields(fresh):
-            if part.name != "channel_targets":
-                getattr(self.character, part.name)[some] = getattr(fresh, part.name)
+        self._warn("the state", "they restart where they were, in the start pose")
+        marked = np.flatnonzero(self._unsound)
+        fresh = start(self.predictor.network, len(marked), self.root[marked][:, ::2], self.yaw[marked])
+        for field in fields(fresh):
+            if field.name != "channel_targets":
+                getattr(self.character, field.name)[marked] = getattr(fresh, field.name)
 
-    def _warn(self, what: str) -> None:
+    def _warn(self, what: str, remedy: str) -> None:
         if not self._warned:
             warnings.warn(
-                f"{what} was not finite for {int(self._unsound.sum())} characters; they restart from a pose "
-                "of the clips, where they were",
+                f"{what} was not finite for {int(self._unsound.sum())} characters; {remedy}",
                 RuntimeWarning,
                 stacklevel=4,
             )
@@ -189,8 +190,8 @@ class Controller:
         if ground is None:
             c.ground.fill(0.0)
         else:
-            level = self._points.reshape(-1, 2)
-            c.ground[:] = _heights(ground, level[:, 0], level[:, 1]).reshape(c.ground.shape)
+            points = self._points.reshape(-1, 2)
+            c.ground[:] = _heights(ground, points[:, 0], points[:, 1]).reshape(c.ground.shape)
         trajectory.stand_on(c.ground, c.root_height)
         if not c.placed.all():  # at the start the ground may have any height
             new = ~c.placed

@@ -21,8 +21,9 @@ FPS = 60.0
 def motion_clip(name: str, skeleton: Skeleton, positions: Array, rotations: Array) -> Clip:
     """A clip of world positions (F, J, 3) in cm and world rotations (F, J, 4), in Hobble's axes.
 
-    A clip has the root's position and the rotations of all joints. Predicted rotations and positions differ
-    by some millimetres, which would show as sliding feet. So the legs are bent, see `jointed`.
+    A clip stores the rotations of all joints, but only the root's position. Predicted rotations do not quite
+    lead to the predicted positions. Feet that are off by some millimetres would seem to slide, so the legs
+    are bent until the toes are where they were predicted.
     """
     world, _ = jointed(skeleton, positions, rotations)
     local = quat.continuous(local_rotations(skeleton, world))
@@ -58,9 +59,10 @@ def _reach(world: Array, positions: Array, leg: Array, target: Array) -> None:
 
 
 def fitted_skeleton(skeleton: Skeleton, positions: Array, rotations: Array) -> Skeleton:
-    """The skeleton with a motion's bones: the mean offset of each joint in its parent's coordinates.
+    """The skeleton with other bones: each joint's offset is its mean offset from its parent in a motion.
 
-    For networks that were trained on a body other than `skeleton`.
+    positions (F, J, 3) and rotations (F, J, 4) of the motion are in the world. For networks that were trained
+    on a body other than `skeleton`.
     """
     offsets = np.zeros((len(skeleton.joints), 3))
     for j, p in enumerate(skeleton.parents):

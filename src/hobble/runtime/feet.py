@@ -12,34 +12,36 @@ from hobble.models.network import Network
 from hobble.runtime.foot_lock import Hold, hold_foot, note_missed, step_rise
 from hobble.runtime.leg_reach import MOST_ADDED, LastFrame, bend, hold_back, turn, turned
 
+# Foot lift and body lift: cm by which foot placement raises a foot, or the whole body.
 HEIGHT_MIX = 0.5  # share of the remaining foot lift that is applied each frame
 # Largest change of the foot lift, cm a frame. It is needed because a network may predict contact while the
 # foot is at knee height.
 FASTEST_LIFT = 8.0
-# A held foot behind the hips may stretch its leg to this share of full length, or as far as the network
-# stretches it. If it has to stretch more, the heel rises. Without this rule, holding a foot 5 cm behind the
-# network's foot straightens a knee that is bent by 26 degrees, and a leg that should be stiff bends and
-# stretches.
+# A held foot behind the hip may stretch the leg to this share of the leg's full length, or as far as the
+# network stretches it. Instead of stretching further, the leg raises its heel. Without this rule, holding a
+# foot 5 cm behind the network's foot straightens a knee that is bent by 26 degrees, and a leg that should
+# stay stiff bends and stretches.
 STRETCH = 0.99
-# STRETCH holds in full if the toe is at least this many cm behind the hip. A foot ahead of the hip stays
-# flat.
+# The rule of STRETCH applies in full if the toe is at least this many cm behind the hip. A foot ahead of the
+# hip stays flat.
 BEHIND = 10.0
 BODY_MIX = 0.15  # share of the remaining body lift that is applied each frame
 BODY_FREE = 3.0  # cm that standing feet may be off the ground before the body is raised or lowered
 BODY_MIN_CONTACT = 0.3  # if the contacts of both feet sum to less, the feet do not decide the body's height
 FLOATING = 3.0  # cm that a standing foot may be above SOLE, because skeletons differ
 SOLE = (5.0, 4.0)  # height of heel and toe joint above the ground in a standing foot, cm
-FOOT, TOES = 1, 2  # the joints of a foot, see `carried`
+FOOT, TOES = 1, 2  # which part of a foot a joint belongs to; 0: neither
 
 
 # Groups of arrays for compiled functions, which unpack them into names.
 #
 # joints (2, 4), see `leg_joints`; carried (2, J), see `carried`; sole (2,), see `sole_heights`; ahead (3,),
-# see `knees_ahead`; fastest: largest movement of a joint by foot placement, cm a frame.
+# see `knees_ahead`; fastest: a drawn joint of a leg may move at most this many cm in a frame.
 Legs = tuple[Any, Any, Any, Any, float]
 # The state of the feet between frames: the hold of each foot; lift (C, 2), smoothed rise of the foot, cm;
-# added (C, 2, 2, 4), see `bend`; shown (C, 2, 3, 3), knee, heel and toe as they were drawn. The heights in
-# `shown` are above root_height (C,) + body_lift (C,), because the whole body may rise in a frame.
+# added (C, 2, 2, 4), rotations added to thigh and shank; shown (C, 2, 3, 3), knee, heel and toe as they were
+# drawn. The heights in `shown` are above root_height (C,) + body_lift (C,), because the whole body may rise
+# in a frame.
 Feet = tuple[Hold, Any, Any, Any, Any, Any]
 
 
@@ -50,10 +52,10 @@ def leg_joints(skeleton: Skeleton) -> np.ndarray:
 
 
 def sole_heights(network: Network, legs: np.ndarray) -> np.ndarray:
-    """(2,) heel and toe height below which a foot is in the ground, cm: SOLE, or less on a lower foot.
+    """(2,) heel and toe height below which a foot is in the ground, cm: SOLE, or less for a smaller foot.
 
-    The network's mean pose gives the mean heights of heel and toe. Feet are in the air half of the time, so
-    60% of these means is below any standing foot.
+    The network's mean pose gives the mean heights of heel and toe. They are above those of a standing
+    foot, because feet are in the air half of the time. 60% of them is below any standing foot.
     """
     layout = network.layout
     height = network.y_mean[layout.y_joint_position].reshape(-1, 3)[:, 1]
@@ -61,7 +63,7 @@ def sole_heights(network: Network, legs: np.ndarray) -> np.ndarray:
 
 
 def knees_ahead(skeleton: Skeleton) -> np.ndarray:
-    """(3,) the direction in which the figure of the rest pose looks, to which straight knees bend."""
+    """(3,) the direction in which the body looks in the rest pose. Straight knees bend in this direction."""
     rest, legs = rest_positions(skeleton), leg_joints(skeleton)
     left, down = rest[legs[0, 0]] - rest[legs[1, 0]], (rest[legs[:, 2]] - rest[legs[:, 0]]).sum(axis=0)
     ahead = np.cross(down, left)
@@ -70,9 +72,9 @@ def knees_ahead(skeleton: Skeleton) -> np.ndarray:
 
 @njit
 def raise_heel(position: Any, hip: int, knee: int, heel: int, toe: int, shift: Any, by: Any) -> None:
-    """Raise the heel of a foot that `shift` (3,) moves back, so that the leg stretches to STRETCH at most.
+    """Raise the heel of a foot that moves back by `shift` (3,), so that the leg stretches to STRETCH at most.
 
-    The foot turns about its toe, by MOST_ADDED at most. That rotation is written to `by` (4,), and the heel's
+    The foot turns about its toe, by MOST_ADDED at most. This rotation is written to `by` (4,), and the heel's
     movement is added to `shift`. A foot ahead of the hip stays flat.
     """
     by[0], by[1], by[2], by[3] = 1.0, 0.0, 0.0, 0.0
@@ -112,7 +114,8 @@ def carry_foot(
 ) -> None:
     """Move a foot along with its heel, which was at `was` (x, y, z).
 
-    below: (J,) which joints belong to it, see `carried`. by: (4,) the turn of the foot; its toes do not turn.
+    below: (J,) which joints belong to the foot, see `carried`. by: (4,) rotation of the foot. The toes
+    keep their rotation.
     """
     x, y, z = was
     tx, ty, tz = turned(by, position[toe, 0] - x, position[toe, 1] - y, position[toe, 2] - z)
@@ -135,9 +138,10 @@ def carry_foot(
 
 @njit
 def hold_toes_back(position: Any, below: Any, toe: int, last: LastFrame) -> None:
-    """`hold_back` for the toe and the joints below it.
+    """Limit how far the toe moves in a frame, and move the joints below it along.
 
-    A foot that turns may move its toe faster than its heel. below: (J,), see `carried`.
+    It is needed because a foot that turns may move its toe faster than its heel. below: (J,) which joints
+    belong to the toe, see `carried`. last: the leg in the last frame.
     """
     shown, base, fastest = last
     x, y, z = position[toe, 0], position[toe, 1], position[toe, 2]
@@ -173,25 +177,25 @@ def carry_body(
     """Raise or lower whole bodies, positions (C, J, 3), so that they stand on the ground under them.
 
     The network stands on the mean ground height along two seconds of path. On a hill a few metres long this
-    height is 30 cm off, and a network trained on gentler hills does not correct it: legs fold, or hang in the
-    air. So the standing feet decide the height of the body, and the hips stay in the range of heights above
-    the ground that they had in training.
+    height is 30 cm off the ground under the feet, and a network trained on gentler hills does not correct it:
+    legs fold, or hang in the air. So the standing feet decide the height of the body, and the hips stay in
+    the range of heights above the ground that they had in training.
 
     contacts: see `place_feet`. ground: (C, 5) heights under the feet as in `place_feet`, then under the hips.
-    hips: the joint. hips_range: lowest and highest, cm above the ground. lift: (C,) cm by which the body is
-    raised, kept between frames.
+    hips: the joint. hips_range: lowest and highest height of this joint, cm above the ground. lift: (C,) cm
+    by which the body is raised, kept between frames.
     """
     joints, _, sole, _, _ = legs
     for c in range(position.shape[0]):
-        wanted, weight = 0.0, 0.0
+        rises, weight = 0.0, 0.0
         for f in range(2):
             under = ground[c, 2 * f], ground[c, 2 * f + 1]
             rise = sole_depth(position[c], joints[f, 2], joints[f, 3], under[0], under[1], sole)
             stands = min(max(contacts[c, 2 * f], contacts[c, 2 * f + 1], 0.0), 1.0)
-            wanted += stands * (max(rise - BODY_FREE, 0.0) + min(rise + BODY_FREE, 0.0))
+            rises += stands * (max(rise - BODY_FREE, 0.0) + min(rise + BODY_FREE, 0.0))
             weight += stands
         if weight > BODY_MIN_CONTACT:
-            lift[c] += BODY_MIX * (wanted / weight - lift[c])
+            lift[c] += BODY_MIX * (rises / weight - lift[c])
         above = position[c, hips, 1] - ground[c, 4]
         lift[c] = min(max(lift[c], hips_range[0] - above), hips_range[1] - above)
         for j in range(position.shape[1]):
@@ -204,8 +208,8 @@ def place_feet(
 ) -> None:
     """Hold feet in contact and keep feet out of the ground. Changes the pose and the state of the feet.
 
-    contacts: (C, 4) of left heel, left toe, right heel, right toe; 0 is written for a foot that steps, see
-    `foot_lock`. ground: (C, 4 or more) heights under them. locking: whether feet are held at all.
+    contacts: (C, 4) of left heel, left toe, right heel, right toe; 0 is written for a foot that the runtime
+    makes step. ground: (C, 4 or more) heights under them. locking: whether feet are held at all.
     position: (C, J, 3); rotation: (C, J, 4) of the pose.
     """
     joints, below, sole, ahead, fastest = legs
@@ -248,7 +252,7 @@ def place_feet(
 
 
 def carried(skeleton: Skeleton, legs: np.ndarray) -> np.ndarray:
-    """(2, J) joints that move with a foot: TOES from the toe on, FOOT for others below the heel, else 0."""
+    """(2, J) for each foot: TOES for its toe and the joints below, FOOT for others below its heel, else 0."""
     out = np.zeros((2, len(skeleton.joints)), np.int8)
     for f in range(2):
         for j, p in enumerate(skeleton.parents):

@@ -1,9 +1,9 @@
 """Decides where a foot is held: from its landing until the network lifts it, or until it has to step.
 
 A network often predicts contact while it moves the foot: for a few frames at the end of a stance, and for
-seconds when it glides. A held foot then falls behind the network's foot. It cannot be held for ever, and
-if it is let go while it stands, it drags over the ground. So the runtime makes it step: the foot is lifted,
-swings to the network's foot and lands there.
+seconds when it glides. A held foot then falls behind the network's foot, which is the foot where the network
+predicts it. A foot cannot be held for ever, and if it is let go while it stands, it drags over the ground.
+So the runtime makes it step: the foot is lifted, swings to the network's foot and lands there.
 """
 
 from __future__ import annotations
@@ -14,22 +14,24 @@ import numpy as np
 
 from hobble.core.compiled import njit
 
-# A foot is held from this predicted contact on. With .8 as in the original, a foot slides 4.8 cm a step
-# before it is held and after it is released.
+# A foot is held from this predicted contact on. With .8, as in the runtime of Holden et al. (2017), a foot
+# slides 4.8 cm a step before it is held and after it is released.
 LOCK_AT = 0.5
-# Share of the hold that is released each frame after contact. With .075 the foot drags behind the swing, and
-# the knee bends by 46 degrees instead of the network's 53.
+# After contact, this much of the hold (0 to 1) is released in each frame. With .075 the foot drags behind the
+# swing, and the knee bends by 46 degrees instead of the network's 53.
 RELEASE = 0.2
-TOO_FAR = 20.0  # cm; a held foot that is further than this from the network's foot steps
-MISSED = 1.0  # cm; a held foot steps if its leg cannot keep it within this distance of its place
-# The same while the other foot is in the air: wait for it, so that the character does not hop.
+TOO_FAR = 20.0  # cm; a held foot steps when the network's foot is this far away from it
+MISSED = 1.0  # cm; a held foot steps if its leg cannot keep it within this distance of where it is held
+# TOO_FAR and MISSED while the other foot is not held. They are larger, so that this foot waits for the other
+# one to land, and the character does not hop.
 TOO_FAR_ALONE, MISSED_ALONE = 30.0, 4.0
 STEP_FRAMES = 10  # length of a step in frames, a sixth of a second
 STEP_HEIGHT = 5.0  # cm by which the sole is off the ground in the middle of a step
 
-# The state of the holds between frames, for C characters: lock (C, 2), share of the hold; hold (C, 2, 2),
-# x and z where the toe landed; step (C, 2), share of a step that is done, 0 if the foot does not step;
-# missed (C, 2), cm between the hold and where the toe was shown.
+# The state of the holds between frames, for C characters: lock (C, 2), from 1, the toe stays where it landed,
+# to 0, the toe is where the network predicts it; hold (C, 2, 2), x and z where the toe landed; step (C, 2),
+# share of a step that is done, 0 if the foot does not step; missed (C, 2), cm between the hold and where the
+# toe was shown.
 Hold = tuple[Any, Any, Any, Any]
 
 
@@ -42,15 +44,16 @@ def hold_foot(
     locking: bool,
     shown: Any,
     fastest: float,
-    of: Hold,
+    state: Hold,
 ) -> Any:
     """Advance the hold of foot `f` of character `c`. Returns how far (x, z) to move the network's toe, cm.
 
     toe: x and z of the network's toe. contact: of the toe, predicted. locking: whether feet are held at all.
-    shown: (3,) where the toe was drawn in the last frame. fastest: cm that it may move in this frame. The
-    network's toe never moves faster, so a foot that is behind catches up.
+    shown: (3,) where the toe was drawn in the last frame. fastest: cm that the drawn toe may move in this
+    frame. The network's toe never moves faster, so a foot that is behind catches up.
+    state: changed in place.
     """
-    lock, hold, step, missed = of
+    lock, hold, step, missed = state
     x, z = toe
     away_x, away_z = hold[c, f, 0] - x, hold[c, f, 1] - z
     if not locking:
@@ -58,7 +61,7 @@ def hold_foot(
         return 0.0, 0.0
     far = np.sqrt(away_x * away_x + away_z * away_z)
     if lock[c, f] < 1.0 and far > TOO_FAR_ALONE:
-        # While the foot is in the air, the network's foot may move by a metre. Then this foot follows it.
+        # While the foot is in the air, the network's foot may move by a metre. The hold then follows it.
         away_x, away_z = away_x * TOO_FAR_ALONE / far, away_z * TOO_FAR_ALONE / far
         hold[c, f, 0], hold[c, f, 1] = x + away_x, z + away_z
     if step[c, f] > 0.0:
@@ -102,9 +105,9 @@ def step_rise(done: float, above: float) -> float:
 
 
 @njit
-def note_missed(c: int, f: int, x: float, z: float, of: Hold) -> None:
+def note_missed(c: int, f: int, x: float, z: float, state: Hold) -> None:
     """Store in `missed` how far the toe of a held foot, drawn at x, z, is from where it is held, cm."""
-    lock, hold, _, missed = of
+    lock, hold, _, missed = state
     missed[c, f] = 0.0
     if lock[c, f] == 1.0:
         missed[c, f] = np.sqrt((hold[c, f, 0] - x) ** 2 + (hold[c, f, 1] - z) ** 2)

@@ -22,13 +22,14 @@ FPS = 30.0  # poses a second in the file; viewers interpolate between them
 def export_glb(path: str | Path, network: Network, scenarios: str | Path) -> None:
     """Write the body of a network's skeleton, with one animation for each scenario.
 
-    scenarios: runtime/scenarios.npz. Raises HobbleError for a network without a skeleton.
+    scenarios: the file runtime/scenarios.npz of a configuration. Raises HobbleError for a network without a
+    skeleton.
     """
     if network.skeleton is None:
         raise HobbleError("this network has no skeleton, so there is no body to write")
     data = load_npz(scenarios)
     skeleton = network.skeleton
-    if "skeleton" not in network.meta:
+    if "skeleton" not in network.meta:  # a file of config/skeletons, whose bones may differ
         first = str(data["names"][0])
         skeleton = fitted_skeleton(skeleton, *_motion(data, first, skeleton))
     write_glb(path, skeleton, _motions(data, skeleton))
@@ -36,17 +37,17 @@ def export_glb(path: str | Path, network: Network, scenarios: str | Path) -> Non
 
 def _motion(data: Mapping[str, Array], name: str, skeleton: Skeleton) -> tuple[Array, Array]:
     """World positions (F, J, 3) and rotations (F, J, 4), thinned to FPS."""
-    stride = max(1, round(float(data["fps"]) / FPS))
-    positions = np.asarray(data[f"{name}/positions"], float)[::stride]
+    frame_step = max(1, round(float(data["fps"]) / FPS))
+    positions = np.asarray(data[f"{name}/positions"], float)[::frame_step]
     rotations = data.get(f"{name}/rotations")
     if rotations is None:
         return positions, fitted_rotations(skeleton, positions)
-    return positions, np.asarray(rotations, float)[::stride]
+    return positions, np.asarray(rotations, float)[::frame_step]
 
 
 def _motions(data: Mapping[str, Array], skeleton: Skeleton) -> Iterator[BodyMotion]:
-    stride = max(1, round(float(data["fps"]) / FPS))
+    frame_step = max(1, round(float(data["fps"]) / FPS))
     for name in map(str, data["names"]):
-        world, places = jointed(skeleton, *_motion(data, name, skeleton))
+        world, positions = jointed(skeleton, *_motion(data, name, skeleton))
         local = local_rotations(skeleton, world)
-        yield BodyMotion(name, places[:, 0], local, float(data["fps"]) / stride)
+        yield BodyMotion(name, positions[:, 0], local, float(data["fps"]) / frame_step)

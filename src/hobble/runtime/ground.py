@@ -12,7 +12,7 @@ from hobble.core.compiled import njit
 from hobble.core.quat import Array
 from hobble.runtime.caller_axes import Axes
 
-CELL = 3.937007874  # cm, the cell size of the heightmaps of Holden et al. 2017
+CELL = 3.937007874  # cm, the cell size of the heightmaps of Holden et al. (2017)
 
 
 @dataclass(frozen=True)
@@ -61,11 +61,11 @@ def as_ground(terrain: Any, axes: Axes) -> Callable[[Array, Array], Array] | Non
     if isinstance(terrain, Heightmap) and terrain.cell is None:
         terrain = replace(terrain, cell=CELL * axes.scale)
     up = "XYZ".index(axes.up)
-    level = [k for k in range(3) if k != up]
+    ground_axes = [k for k in range(3) if k != up]
 
     def converted(x: Array, z: Array) -> Array:
         points = axes.points_out(np.stack([x, np.zeros_like(x), z], axis=-1))
-        first, second = np.ascontiguousarray(points[:, level].T)
+        first, second = np.ascontiguousarray(points[:, ground_axes].T)
         return np.asarray(terrain(first, second)) / axes.scale
 
     return converted

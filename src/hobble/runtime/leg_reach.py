@@ -1,4 +1,4 @@
-"""Moves the heel of a pose by bending its leg (two-bone IK). The turns of thigh and shank are limited."""
+"""Moves the heel of a pose by bending its leg (two-bone IK), with limited turns of thigh and shank."""
 
 from __future__ import annotations
 
@@ -12,15 +12,15 @@ from hobble.core.compiled import njit
 # in a frame, radians. One frame in 2,000 needs more; then the foot arrives some frames later. Without the
 # limit, legs snapped by up to 148 degrees.
 MOST_ADDED = float(np.radians(28))
-# Least distance, in cm, by which a knee is ahead of the line between hip and heel. In all captured clips it
-# is 1.6 or more. A predicted knee may cross that line, because positions are predicted joint by joint. If the
-# leg kept bending to the side of the predicted knee, it would then flip from front to back.
+# Least distance, in cm, by which foot placement puts a knee ahead of the line between hip and heel. In all
+# captured clips this distance is 1.6 or more. A predicted knee may cross that line, because positions are
+# predicted joint by joint. If the leg then bent to the side of the predicted knee, it would bend backwards.
 KNEE_AHEAD = 3.0
 
 # Vectors below are written out by component: array expressions take seconds to compile and allocate memory.
 
-# Where the joints of a leg were drawn in the last frame: shown (2 or more, 3) from the knee on, with heights
-# above `base`; base, cm; fastest, cm that each may move in this frame.
+# (shown, base, fastest). shown: (2 or more, 3) positions of a leg's joints in the last frame, from the knee
+# on, as drawn, with heights above `base`. base: a height, cm. fastest: cm that each joint may move.
 LastFrame = tuple[Any, float, float]
 
 
@@ -57,7 +57,7 @@ def approach(rotation: Any, w: float, x: float, y: float, z: float) -> bool:
 
 @njit
 def turned(by: Any, x: float, y: float, z: float) -> tuple[float, float, float]:
-    """The vector turned by the rotation `by` (4,)."""
+    """The vector x, y, z turned by the rotation `by` (4,)."""
     w, a, b, c = by[0], by[1], by[2], by[3]
     p, q, r = 2 * (b * z - c * y), 2 * (c * x - a * z), 2 * (a * y - b * x)
     return x + w * p + b * r - c * q, y + w * q + c * p - a * r, z + w * r + a * q - b * p
@@ -81,8 +81,9 @@ def reach(
     """Move the heel of a pose, positions (J, 3), by `shift` (3,), by bending the knee.
 
     ahead: the direction in which a straight knee bends. Bone lengths stay. The knee keeps bending to the same
-    side, but is at least KNEE_AHEAD forward. If the target is out of reach, the leg stretches to 99.9% (law
-    of cosines, as `hobble.core.ik.two_bone_knee`). A pose that already fulfils all this is not changed.
+    side, but is at least KNEE_AHEAD ahead of the line between hip and heel. If the target is out of reach,
+    the leg stretches to 99.9% of its length. The knee's angle follows from the law of cosines, as in
+    `hobble.core.ik.two_bone_knee`. A pose that already fulfils all this is not changed.
     """
     sx, sy, sz = shift[0], shift[1], shift[2]
     hx, hy, hz = position[hip, 0], position[hip, 1], position[hip, 2]
@@ -108,7 +109,7 @@ def reach(
     if more == 0.0 and abs(sx) + abs(sy) + abs(sz) < 1e-9:
         return
     ox, oy, oz = ox + more * fx / size, oy + more * fy / size, oz + more * fz / size
-    # Turn the old bend direction with the leg. A direction from the new leg alone may bend the knee
+    # Turn the old bend direction with the leg. A direction computed from the new leg alone may bend the knee
     # backwards.
     factor = (ox * wx + oy * wy + oz * wz) / max(1 + ax * wx + ay * wy + az * wz, 1e-6)
     ox, oy, oz = ox - factor * (ax + wx), oy - factor * (ay + wy), oz - factor * (az + wz)
@@ -153,8 +154,8 @@ def bend(
 
     leg: (4,) hip, knee, heel and toe. ahead: (3,) the direction in which a straight knee bends in the rest
     pose. added: (2, 4) rotations added to the network's thigh and shank in the last frame; updated to this
-    frame's. last: knee and heel in the last frame. They move a limited way in a frame, so the heel may need
-    more than one to reach its target.
+    frame's. last: knee and heel in the last frame. In a frame both move by a limited distance, so the heel
+    may need several frames to reach its target.
     """
     shown, base, fastest = last
     hip, knee, heel = leg[0], leg[1], leg[2]

@@ -1,4 +1,4 @@
-"""Limit the target speed and gait to what a body with these injuries can do."""
+"""Limits the target speed and gait of each character to what its hurt or sad body can do."""
 
 from __future__ import annotations
 
@@ -10,13 +10,18 @@ from hobble.channels.speed_limits import together
 from hobble.core.quat import Array
 from hobble.models.network import Network
 
-JOG_FROM = 5.0  # cm a frame: half way between walking at 2.5 and jogging at 7.5
-LAME_BELOW = 4.5  # cm a frame: a lame body, which cannot jog at this speed, walks instead
-HURRY_FACTOR = 1.25  # if the target is a jog, a lame body may walk this many times as fast as its limit
+# cm a frame: if the caller names no gait, a target of at least this speed is a jog. It is half way between
+# walking at 2.5 and jogging at 7.5.
+JOG_FROM = 5.0
+LAME_BELOW = 4.5  # cm a frame: a body whose limit for a jog is lower is lame, and walks instead
+HURRY_FACTOR = 1.25  # if the target is a jog, a lame body walks up to this many times its walking limit
 
 
 class SpeedLimiter:
-    """Limits the targets of C characters. columns: channel -> its columns among the channel values."""
+    """Limits the targets of C characters (`characters`) by the limits of each channel of the network.
+
+    columns: channel -> its columns among the channel values.
+    """
 
     def __init__(self, network: Network, columns: Mapping[str, slice], characters: int) -> None:
         self._tables = [(columns[name], limits) for name, limits in network.limits.items()]
@@ -25,10 +30,10 @@ class SpeedLimiter:
         self._values: Array | None = None
 
     def hold(self, values: Array, velocity: Array, shares: Array) -> None:
-        """Shorten velocities (C, 2) to the limits of bodies with channel values `values` (C, K).
+        """Limit target velocities (C, 2) and shares of the gaits (C, G), in place.
 
-        shares: (C, G) of the gaits. velocity and shares are changed in place. A body whose jog would be
-        slower than LAME_BELOW gets a hurried walk instead.
+        values: (C, K) channel values. A body that cannot jog as fast as LAME_BELOW gets a hurried walk
+        instead.
         """
         if not self._tables:
             return
@@ -45,8 +50,8 @@ class SpeedLimiter:
         shares[lame, jog] = 0.0
         going = shares.copy()
         going[:, self._gaits["stand"]] = 0.0
-        whole = going.sum(axis=1)
+        total = going.sum(axis=1)
         limit = (going * np.where(going > 0, self._allowed, 0.0)).sum(axis=1)
-        most = np.where(whole > 0, hurry * limit / np.maximum(whole, 1e-9), np.inf)
+        highest = np.where(total > 0, hurry * limit / np.maximum(total, 1e-9), np.inf)
         speed = np.hypot(velocity[:, 0], velocity[:, 1])
-        velocity *= np.minimum(1.0, most / np.maximum(speed, 1e-9))[:, None]
+        velocity *= np.minimum(1.0, highest / np.maximum(speed, 1e-9))[:, None]

@@ -1,4 +1,4 @@
-"""The rows X and Y of the network: a character's state as inputs, and outputs as its next pose.
+"""Writes a character's state into the network's input row X, and turns its output row Y into the next pose.
 
 The first axis of every array is the C characters.
 """
@@ -15,17 +15,19 @@ from hobble.core.compiled import njit
 from hobble.runtime.trajectory import Trajectory
 
 joint_place = register_jitable(rule.joint_place)
-# Radians a frame (1500 degrees a second). No joint of a walking or running person turns as fast, but a
-# predicted joint can: if clips have rotations half a turn apart, as in hands, their mean may be any rotation.
-# A new target may also change the next pose at once.
+# Largest turn of a joint, radians a frame (1500 degrees a second). No joint of a walking or running person
+# turns as fast, but a predicted joint can. If the rotations of a joint in the clips are half a turn apart, as
+# in hands, the network predicts their mean, which may be any rotation. A new target may also change the
+# predicted pose at once.
 FASTEST_TURN = np.radians(25)
-# Largest rise or fall of the body with the mean height of the path, cm a frame. When a new target turns the
-# path around on a hill, that height may change by 20 cm at once, while the ground under the feet stays.
+# Largest rise or fall of the body, cm a frame, because the mean ground height along the path changes. When a
+# new target turns the path around on a hill, this mean may change by 20 cm at once, although the ground under
+# the feet stays the same.
 MOST_CLIMB = 5.0
 
 # Groups of arrays for compiled functions, which unpack them into names.
 #
-# The pose that the network predicted last: position, velocity (C, J, 3); rotation (C, J, 4), world.
+# The pose that the network predicted last: position, velocity (C, J, 3); rotation (C, J, 4), in the world.
 Joints = tuple[Any, Any, Any]
 # The copy of the pose that the caller gets: root (C, 3), yaw (C,), position (C, J, 3), rotation (C, J, 4).
 Drawn = tuple[Any, Any, Any, Any]
@@ -42,10 +44,12 @@ def write_inputs(
     step: int,
     x: Any,
 ) -> None:
-    """Write the state into the network's input rows x (C, X), in raw units.
+    """Write the state into the network's input rows x (C, X), not standardised.
 
-    ground: (C, samples, 3) heights. height: (C,) mean ground height along the path. columns: the first column
-    of each block of BODY, and the column of each of channel_values (C, K). step: frames between two samples.
+    ground: (C, samples, 3) ground heights to the left of the path, on it and to its right. height: (C,) mean
+    ground height along the path. channel_values: (C, K). columns: two arrays of columns of x. The first has
+    the first column of each block of `hobble.rows.layout.BODY`, the second the column of each channel value.
+    step: frames between two samples.
     """
     position, direction, gait = path
     joints, velocities, _ = pose
@@ -94,10 +98,12 @@ def take_outputs(
 ) -> None:
     """Turn the prediction y (C, Y) into the world poses `pose` and `drawn`.
 
-    first: first column of the joints. heights: (C,) mean ground height along the path, and (C,) lift of the
-    body, see `feet.carry_body`. A new joint position is the mean of two: the predicted position, and the old
-    position plus the predicted velocity. In a frame no joint moves by more than `fastest` cm, apart from the
-    change of the ground's height, and no joint turns by more than FASTEST_TURN.
+    first: first column of the joints in y. heights: (C,) mean ground height along the path, and (C,) cm by
+    which the body is raised above the predicted pose, changed so that the body climbs by at most MOST_CLIMB.
+    fastest: largest movement of a joint, cm a frame, apart from the change of the ground's height.
+
+    A new joint position is the mean of two: the predicted position, and the old position plus the predicted
+    velocity. No joint turns by more than FASTEST_TURN.
     """
     position, direction, _ = path
     joints, velocities, rotations = pose
@@ -133,9 +139,10 @@ def take_outputs(
 def _move_joint(
     place: Any, velocity: Any, x: float, y: float, z: float, climbed: float, fastest: float
 ) -> None:
-    """Move a joint from `place` (3,) towards x, y, z, where the network predicts it, by `fastest` at most.
+    """Move the joint position `place` (3,) toward the predicted position x, y, z, by at most `fastest` cm.
 
-    velocity: (3,) predicted. climbed: change of the ground's height, which does not count.
+    velocity: (3,) predicted. climbed: change of the ground's height, cm, which does not count toward
+    `fastest`.
     """
     sx = joint_place(place[0] + velocity[0], x) - place[0]
     sy = joint_place(place[1] + velocity[1], y) - place[1]
@@ -150,10 +157,10 @@ def _move_joint(
 
 @njit
 def _turn_joint(rotation: Any, x: float, y: float, z: float, half_cos: float, half_sin: float) -> None:
-    """Turn a joint from `rotation` (4,) to the predicted one, by FASTEST_TURN at most.
+    """Turn the world rotation `rotation` (4,) of a joint to the predicted one, by at most FASTEST_TURN.
 
-    x, y, z: the predicted axis times half the angle, relative to the root. half_cos, half_sin: of half the
-    root's yaw.
+    x, y, z: the predicted axis times half the angle, relative to the root. half_cos, half_sin: cosine and
+    sine of half the root's yaw.
     """
     half = np.sqrt(x * x + y * y + z * z)
     scale = np.sin(half) / half if half > 1e-8 else 1.0

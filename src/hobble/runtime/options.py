@@ -10,19 +10,23 @@ from hobble.core.section import PhaseMode, PositiveFloat, Section
 
 
 class Runtime(Section):
-    """The character."""
+    """Options of the character at run time."""
 
     mode: PhaseMode = Field(
         "cubic",
-        description="how a phase gets its weights: cubic is exact, linear has 10 tables, constant 50",
+        description="how the network's weights follow from the phase: cubic is exact, linear blends weights "
+        "stored at 10 phases, constant takes those of one of 50 phases",
     )
     rates: dict[str, PositiveFloat] = Field(
-        {}, description="channel: largest change of its values per second; default: the channel's own rate"
+        {},
+        description="for each channel, the largest change of its values per second; default: the channel's "
+        "own rate",
     )
-    scales: dict[str, PositiveFloat] = Field({}, description="channel: divisor of its values")
-    foot_locking: bool = True
-    limits: bool = Field(True, description="limit the target speed to what the injured body can do")
+    scales: dict[str, PositiveFloat] = Field({}, description="for each channel, the divisor of its values")
+    foot_locking: bool = Field(True, description="hold feet in contact where they landed")
+    limits: bool = Field(True, description="limit the target speed to what the hurt or sad body can do")
     steering: Annotated[float, Field(ge=0)] = Field(
         2.0,
-        description="gain of the correction of a velocity that is not reached; 0 is the original runtime",
+        description="gain with which the target velocity is corrected while the character does not reach it; "
+        "0: no correction, as in the runtime of Holden et al. (2017)",
     )

@@ -25,8 +25,9 @@ Target = tuple[Array, Array | None, str]  # velocity, facing, gait
 class Scenario:
     """A script of `frames` frames.
 
-    target: frame -> velocity (2,) in cm a frame, facing (2,) or None, and gait. swept: channel and column
-    whose value rises from 0 to its highest during the walk, or None.
+    target: frame -> velocity (2,) in cm a frame, facing (2,) or None to look where the character goes, and
+    gait. swept: the channel, and its column whose value rises from 0 to the highest during the script; None:
+    all values are 0.
     """
 
     name: str
@@ -37,8 +38,13 @@ class Scenario:
 
 @dataclass(frozen=True)
 class Track:
-    """The motion of a scenario: positions (F, J, 3), rotations (F, J, 4), contacts (F, 4), phase (F,),
-    target (F, 2) velocity, root (F, 3), gait (F,) names, swept_values (F,) of the swept column."""
+    """The motion of a scenario with F frames.
+
+    positions: (F, J, 3) world, cm. rotations: (F, J, 4) world. contacts: (F, 4) from 0 to 1, of left heel,
+    left toe, right heel and right toe. phase: (F,) cycles. target: (F, 2) target velocity, cm a frame. root:
+    (F, 3) cm, on the ground. gait: (F,) names of the target gait. swept_values: (F,) of the swept column, 0
+    if there is none.
+    """
 
     scenario: Scenario
     positions: Array
@@ -51,37 +57,38 @@ class Track:
     swept_values: Array
 
 
-def _velocity(speed: float, degrees: float = 0.0) -> Array:
-    return speed * np.array([np.sin(np.radians(degrees)), np.cos(np.radians(degrees))])
+def _vector(length: float, degrees: float = 0.0) -> Array:
+    """(2,) x and z of a velocity or facing. degrees: from +Z toward +X (left)."""
+    return length * np.array([np.sin(np.radians(degrees)), np.cos(np.radians(degrees))])
 
 
 def scenarios(network: Network) -> list[Scenario]:
-    """The scenarios of a network, with one more walk for each column that its channels sweep."""
-    facing = _velocity(1.0)
+    """The seven scenarios for every network, and a walk for each value that `swept` lists."""
+    facing = _vector(1.0)
     out = [
-        Scenario("walk", 900, lambda f: (_velocity(2.5, max(0, f - 300) * 0.5), None, "walk")),
-        Scenario("jog", 900, lambda f: (_velocity(7.0, max(0, f - 300) * 0.5), None, "jog")),
-        Scenario("crouch", 600, lambda f: (_velocity(2.0), None, "crouch")),
-        Scenario("strafe", 600, lambda f: (_velocity(2.5, 90 if f % 300 < 150 else -90), facing, "walk")),
-        Scenario("backward", 480, lambda f: (_velocity(2.0, 180), facing, "walk")),
-        Scenario("stop_and_go", 720, lambda f: (_velocity(2.5 if f % 240 < 150 else 0.0), None, "walk")),
-        Scenario("turn_in_place", 600, lambda f: (_velocity(0.0), _velocity(1.0, 90 * (f // 120)), "walk")),
+        Scenario("walk", 900, lambda f: (_vector(2.5, max(0, f - 300) * 0.5), None, "walk")),
+        Scenario("jog", 900, lambda f: (_vector(7.0, max(0, f - 300) * 0.5), None, "jog")),
+        Scenario("crouch", 600, lambda f: (_vector(2.0), None, "crouch")),
+        Scenario("strafe", 600, lambda f: (_vector(2.5, 90 if f % 300 < 150 else -90), facing, "walk")),
+        Scenario("backward", 480, lambda f: (_vector(2.0, 180), facing, "walk")),
+        Scenario("stop_and_go", 720, lambda f: (_vector(2.5 if f % 240 < 150 else 0.0), None, "walk")),
+        Scenario("turn_in_place", 600, lambda f: (_vector(0.0), _vector(1.0, 90 * (f // 120)), "walk")),
     ]
-    taken = {one.name for one in out}
+    taken = {scenario.name for scenario in out}
     for name, column in swept(network).items():
-        free = name if name not in taken else "_".join((column[0], name))
-        out.append(Scenario(free, 720, lambda f: (_velocity(2.5), None, "walk"), column))
+        unused_name = name if name not in taken else "_".join((column[0], name))
+        out.append(Scenario(unused_name, 720, lambda f: (_vector(2.5), None, "walk"), column))
     return out
 
 
 def swept(network: Network) -> dict[str, tuple[str, str]]:
-    """The scenarios with a swept value: name -> channel and column. Empty for a network without channels."""
+    """The scenarios with a swept value: name -> channel and column. Empty without channels or skeleton."""
     if network.skeleton is None:
         return {}
     return {
-        name: (one, column)
-        for one, columns in network.channels.items()
-        for name, column in sweeps(one, network.skeleton, columns, network.trained(one)).items()
+        name: (group, column)
+        for group, columns in network.channels.items()
+        for name, column in sweeps(group, network.skeleton, columns, network.trained(group)).items()
     }
 
 
@@ -117,16 +124,15 @@ def write_motions(network: Network, bvh: str | Path, options: Runtime) -> Iterat
     assert network.skeleton is not None
     for scenario in scenarios(network):
         track = run_scenario(network, scenario, options)
-        own = "skeleton" in network.meta
-        body = (
-            network.skeleton if own else fitted_skeleton(network.skeleton, track.positions, track.rotations)
-        )
+        body = network.skeleton
+        if "skeleton" not in network.meta:  # trained on a body other than this skeleton
+            body = fitted_skeleton(body, track.positions, track.rotations)
         export_bvh(Path(bvh) / f"{scenario.name}.bvh", scenario.name, body, track.positions, track.rotations)
         yield track
 
 
 def generate(network: Network, npz: str | Path, bvh: str | Path, options: Runtime) -> None:
-    """Run every scenario; write all to the file `npz` and each as a BVH file into the folder `bvh`.
+    """Run every scenario; write all of them to the file `npz`, and each to a BVH file in the folder `bvh`.
 
     npz: names (N,), joints (J,), parents (J,), fps; for each scenario <name>: <name>/positions (F, J, 3)
     float32 cm, <name>/rotations (F, J, 4) world, w first, <name>/contacts (F, 4), <name>/phase (F,),

@@ -2,7 +2,7 @@
 
 A trajectory has one entry per frame, half of them past and half future. The first axis of every array is the
 C characters. Angles are yaw: 0 faces +Z, and they grow toward +X (left). The formulas are those of the
-runtime of Holden et al. 2017.
+runtime of Holden et al. (2017).
 """
 
 from __future__ import annotations
@@ -17,11 +17,14 @@ from hobble.core.compiled import njit
 # starts of a walk in training stands for seconds before it walks.
 STEERING_LIMIT = 2.0
 TARGET_MIX = 0.9  # share of the remaining difference to the target that is applied each frame
-GAIT_MIX = 0.1  # the same for the gait
-CORRECTION_RATE = 0.01  # integral gain a frame: a steady error is corrected within a second or two
-CORRECTION_WITHIN = 0.8  # share of the target; with a larger error the character is still turning or starting
-MOST_CORRECTION = 1.0  # largest integral correction, as a share of the target
-# Largest turn to ask the network for. With a larger one the character may turn the other way.
+GAIT_MIX = 0.1  # the same for the shares of the gaits
+# Integral gain of the velocity error, a frame: a steady error is corrected within a second or two.
+CORRECTION_RATE = 0.01
+# Largest velocity error that is integrated, as a share of the target speed. While the error is larger, the
+# character is still turning or starting.
+CORRECTION_WITHIN = 0.8
+MOST_CORRECTION = 1.0  # largest integral correction, as a share of the target velocity
+# Largest turn to ask the network for, radians. If asked for more, the character may turn the other way.
 FURTHEST_TURN = np.radians(137)
 STRAFE_FROM = np.radians(45)  # from this angle between facing and velocity on, the strafe share is 1
 STILL = 0.1  # cm a frame: a slower target means standing
@@ -30,8 +33,8 @@ STILL = 0.1  # cm a frame: a slower target means standing
 # Groups of arrays for compiled functions, which unpack them into names. They are plain tuples, because
 # passing a named tuple costs a microsecond.
 #
-# position, direction (C, T, 2): world x and z. gait (C, T, 6): shares. T is 120: 60 frames of the
-# past and 60 from the present on (entry T/2 is the present), unless the rows were made with another window.
+# position, direction (C, T, 2): world x and z. gait (C, T, 6): shares. By default T is 120: 60 frames of the
+# past, then the present (entry T/2) and the 59 frames after it.
 Trajectory = tuple[Any, Any, Any]
 # What the caller wants: velocity, direction (C, 2); strafe (C,) share; gait (C, 6) shares.
 Target = tuple[Any, Any, Any, Any]
@@ -52,8 +55,9 @@ def wrap(angle: float) -> float:
 def target_facing(velocity: Any, ahead: Any, direction: Any, strafe: Any, look: Any) -> None:
     """Write the share of strafing into `strafe` (C,) and the target facing into `look` (C, 2).
 
-    velocity: (C, 2) the target. ahead: (C, 2) direction to look in. If it is zero, the character looks where
-    it goes, or keeps `direction` (C, 2) if it stands.
+    velocity: (C, 2) target velocity. ahead: (C, 2) direction in which the caller wants the character to look;
+    zero if it is to look where it goes. direction: (C, 2) smoothed facing, which such a character keeps while
+    it stands.
     """
     for c in range(velocity.shape[0]):
         x, z = velocity[c, 0], velocity[c, 1]
@@ -70,10 +74,10 @@ def target_facing(velocity: Any, ahead: Any, direction: Any, strafe: Any, look: 
 
 @njit
 def follow_target(target: Target, steering: float, smoothed: Smoothed, path: Trajectory) -> None:
-    """Move `smoothed` toward the caller's target, and the gait of the present frame slowly toward its target.
+    """Move `smoothed` toward the caller's target, and the gait of the present frame toward the target gait.
 
-    `_ask_velocity` and `_ask_turn` correct the target; with `steering` 0 there is no correction, as in the
-    original runtime.
+    `_ask_velocity` and `_ask_turn` correct the target. With `steering` 0 there is no correction, as in the
+    runtime of Holden et al. (2017).
     """
     target_velocity, target_direction, target_strafe, target_gait = target
     velocity, direction, strafe, correction = smoothed
@@ -99,12 +103,12 @@ def follow_target(target: Target, steering: float, smoothed: Smoothed, path: Tra
 
 @njit
 def _ask_velocity(steering: float, x: float, z: float, position: Any, correction: Any) -> tuple[float, float]:
-    """The velocity to ask the network for, so that the character reaches (x, z).
+    """The velocity to ask the network for, so that the character reaches the velocity (x, z).
 
     A network tends to keep its past velocity. So `steering` times the error is added to the target, at most
     STEERING_LIMIT times the target. The error is the target minus the mean velocity over the later half of
     the past. A steady error, such as weaker strafing to one side, is integrated in `correction` (2,): along
-    the target, and to its left, as shares of the target.
+    the target velocity, and to its left, as shares of the target speed. position: (T, 2) of the trajectory.
     """
     middle = position.shape[0] // 2
     span = middle // 2
@@ -207,8 +211,8 @@ def prepare(
 ) -> None:
     """`follow_target`, `blend_future` and `sample_points` in one call.
 
-    Also moves the channel values toward their targets. All are in this file because numba renews cached code
-    only when its own file changes, not when a callee's does.
+    Also moves the channel values toward their targets. All are in this file because numba compiles a cached
+    function again only if its own file changes, not if the file of a callee changes.
     """
     follow_target(target, steering, smoothed, path)
     blend_future(smoothed, path)

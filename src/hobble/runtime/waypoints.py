@@ -1,4 +1,4 @@
-"""Leads characters around a closed track of waypoints, each with speed, gait and facing."""
+"""Target velocities that lead characters around a closed track of waypoints."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from hobble.core.quat import Array
 class Waypoint:
     """A ground position x, z in cm, with the gait and speed (cm a frame) on the way to it.
 
-    facing: world direction (x, z) to look in on the way (strafing); None looks ahead.
+    facing: world direction (x, z) to look in on the way (strafing); None: look toward the waypoint.
     """
 
     position: tuple[float, float]
@@ -25,7 +25,7 @@ class Waypoint:
     facing: tuple[float, float] | None = None
 
 
-# The track of Segerstedt 2021, positions given there in metres.
+# The track of Segerstedt (2021), who gives the positions in metres.
 TRACK = (
     Waypoint((-3000.0, 4000.0), "walk", 2.5),
     Waypoint((-5000.0, 0.0), "walk", 2.5, (-0.5, -0.5)),
@@ -38,11 +38,12 @@ ARRIVED = 100.0  # cm: a waypoint counts as reached within this distance
 
 
 class Follower:
-    """Leads C characters around a closed track, each at its own waypoint.
+    """Makes C characters (`characters`) follow a closed track, each at its own pace.
 
-    Every character starts at the last waypoint and goes toward waypoint 0. `reached` (C,) counts the
-    waypoints reached; `off_path` (C,) is the present distance in cm from the line between the last waypoint
-    and the next.
+    Every character starts at the track's last waypoint and goes toward waypoint 0. arrived: distance, in cm,
+    within which a waypoint counts as reached. places: (W, 2) positions of the waypoints. `reached` (C,)
+    counts the waypoints that each character has reached. `off_path` (C,) is its distance in cm from the line
+    between the waypoint that it reached last and the next one.
     """
 
     def __init__(
@@ -58,12 +59,15 @@ class Follower:
 
     @property
     def start(self) -> tuple[Array, float]:
-        """Start of a lap, (2,) cm, and the yaw toward waypoint 0."""
+        """Start of a lap, (2,) cm, and the yaw from there toward waypoint 0, radians."""
         way = self.places[0] - self.places[-1]
         return self.places[-1].copy(), float(np.arctan2(way[0], way[1]))
 
     def lead(self, position: Array) -> tuple[Array, list[Waypoint]]:
-        """Velocities (C, 2) toward the next waypoints, and the waypoints. position: (C, 2) on the ground."""
+        """The velocity of each character (C, 2) toward its next waypoint, and these C waypoints.
+
+        position: (C, 2) x and z, cm.
+        """
         velocity = np.empty((len(position), 2))
         _lead(self.places, self._speeds, self.arrived, position, self.reached, self.off_path, velocity)
         return velocity, [self.track[n % len(self.track)] for n in self.reached.tolist()]
@@ -81,6 +85,7 @@ def _distance_to_line(p: Any, a: Any, b: Any) -> float:
 def _lead(
     places: Any, speeds: Any, arrived: float, position: Any, reached: Any, off_path: Any, velocity: Any
 ) -> None:
+    """Write the velocities of `Follower.lead`, and update `reached` and `off_path`."""
     count = len(places)
     for c in range(position.shape[0]):
         n = reached[c] % count

@@ -1,1 +1,1 @@
-"""Makes synthetic clips: motion of a procedural walker, written like the files in a user's folder."""
+"""Makes synthetic clips: motion of a procedural walker, written like the clips in a user's folder."""

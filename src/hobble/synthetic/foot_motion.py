@@ -17,13 +17,15 @@ from hobble.synthetic.style import Style
 
 X_AXIS = np.array([1.0, 0.0, 0.0])
 HEEL = np.array([0.0, -4.2, -3.0])  # cm from the ankle joint to the heel, approximately
-READY = 0.95  # share of the swing by which the foot has reached the pitch of its landing
-# Exponents of the time in a swing, which runs from 0 to 1. Because they are below 1, the foot is highest in
-# the first half (KICK), and covers most of its way in the first half (EARLY).
+READY = 0.95  # after this share of the swing, the foot has the pitch with which it lands
+# Exponents of the time in a swing, which runs from 0 to 1. Because they are below 1, the foot is highest
+# before the middle of the swing (KICK), and in the middle it has more than half of its way behind it (EARLY).
 KICK, EARLY = 0.68, 0.81
-FOLLOW = 0.45  # share of its pitch rate that the foot keeps as it leaves
+FOLLOW = 0.45  # the swing begins with this share of the pitch rate at the end of the stance
 LANDING_SPEED = 0.36  # speed of the foot as it lands, as a share of its mean speed in the swing
-RISE, SETTLE = 0.36, 0.3  # shares of the swing in which the foot rises to its clearance and comes down again
+# Where the ground is in the way, the foot rises over it in the first RISE of the swing, and comes down in the
+# last SETTLE (shares of the swing).
+RISE, SETTLE = 0.36, 0.3
 SOLE_HEIGHT = 2.0  # cm: heel, toe joint and toe tip count as this high above the sole
 
 
@@ -40,10 +42,10 @@ class FootPoses:
 
 
 def move_foot(steps: list[PlannedStance], style: Style, side: int, ground: Ground) -> FootPoses:
-    """The path of one foot through its stances.
+    """The path of one foot through its stances, `steps`.
 
-    Frames before the first landing, and from the last landing on, are not set: there positions are 0 and
-    rotations the identity.
+    side: LEFT or RIGHT of `hobble.synthetic.style`. Frames before the first landing, and from the last
+    landing on, are not set: there positions are 0 and rotations the identity.
     """
     frames = len(style.duty)
     turns = np.tile(quat.IDENTITY, (frames, 1))

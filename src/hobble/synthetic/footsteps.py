@@ -18,17 +18,19 @@ FOOT = np.array([0.0, -4.5, 13.5])  # cm from the ankle joint to the toe joint i
 STAY = (7.0, np.radians(12.0))  # cm and radians: a standing figure takes no step that is smaller than both
 APART = 8.0  # cm: least sideways distance between the ankles
 STILL = 12.0  # cm/s: a slower figure stands
-# Points along the foot that must be on one step of stairs, cm from the ankle, with room in front of the toes.
+# Points along the foot, cm from the ankle, that must all be on the same step of stairs. The last ones are in
+# front of the toes, to leave room.
 SOLE = np.array([-11.0, -5.0, 0.0, 6.0, 13.5, 20.5, 27.0, 32.0, 37.0])
 SHIFTS = sorted(np.arange(-20.0, 21.0, 2.0), key=abs)  # cm by which a foot may be moved away from an edge
 
 
 @dataclass(frozen=True)
 class PlannedStance:
-    """A foot on the ground from frame `land` to frame `leave` (of the padded path, with fractions).
+    """A foot on the ground from frame `land` to frame `leave`.
 
+    Both are frames of the planned path, which is longer than the clip at both ends, and may have fractions.
     ankle: (3,) position of the ankle while the foot is flat, cm. turn: (4,) world rotation of the flat foot.
-    swings: whether the foot swung to this place; if not, it stood there before.
+    swings: whether the foot swung to this place. If not, it already stood there.
     """
 
     land: float
@@ -39,29 +41,32 @@ class PlannedStance:
 
 
 def phase_curve(style: Style, fps: float, start: float) -> Array:
-    """(F,) phase in cycles, not wrapped. The right foot lands at whole numbers."""
+    """(F,) phase in cycles, not wrapped, from about `start`. The right foot lands at whole numbers."""
     return start + np.cumsum(style.frequency) / fps
 
 
 def landings(phase: Array, side: int) -> Array:
-    """Frames (with fractions) in which a foot lands."""
-    own = phase - (0.5 if side == LEFT else 0.0)
-    whole = np.arange(np.ceil(own[0]), np.floor(own[-1]) + 1)
-    return np.interp(whole, own, np.arange(len(own), dtype=float))
+    """Frames (with fractions) in which the foot `side` lands, from the unwrapped phase (F,)."""
+    foot_phase = phase - (0.5 if side == LEFT else 0.0)  # the foot lands at whole numbers
+    whole = np.arange(np.ceil(foot_phase[0]), np.floor(foot_phase[-1]) + 1)
+    return np.interp(whole, foot_phase, np.arange(len(foot_phase), dtype=float))
 
 
 def stances(
     path: PlannedPath, style: Style, phase: Array, ground: Ground, rng: np.random.Generator
 ) -> tuple[list[PlannedStance], list[PlannedStance]]:
-    """All stances of the left and of the right foot along the path, in the order of their landings."""
+    """All stances of the left and of the right foot along the path, in the order of their landings.
+
+    phase: (F,) from `phase_curve`. rng: for small random shifts of the feet.
+    """
     frames, speed = np.arange(len(path), dtype=float), path.speed
     leaving = [phase - style.duty[:, side] for side in (LEFT, RIGHT)]
     events = [(land, side) for side in (LEFT, RIGHT) for land in landings(phase, side)[:-1]]
     out: tuple[list[PlannedStance], list[PlannedStance]] = ([], [])
     for land, side in sorted(events):
         here = value_at(phase, land)
-        # How long a foot stands depends on the speed as it leaves. So it leaves sooner if the walker has
-        # become faster.
+        # The duty (share of the cycle on the ground) is taken as the foot leaves, not as it lands. A walker
+        # who has become faster in between lifts the foot sooner.
         leave = np.interp(here, leaving[side], frames)
         middle = np.interp((here + value_at(phase, leave)) / 2, phase, frames)
         before, other = (out[s][-1] if out[s] else None for s in (side, 1 - side))
@@ -83,9 +88,10 @@ def _footprint(
     other: PlannedStance | None,
     rng: np.random.Generator,
 ) -> tuple[Array, Array]:
-    """The place of a foot: near the body's place in mid-stance, but never across the other foot.
+    """The place of a foot: near the body's place in mid-stance, but never crossed over the other foot.
 
-    Returns the ankle's position (3,) and the foot's world rotation (4,). middle: frame of mid-stance.
+    Returns the ankle's position (3,) and the foot's world rotation (4,). middle: frame of mid-stance. other:
+    the last stance of the other foot.
     """
 
     def value(curve: Array) -> float:
@@ -107,7 +113,10 @@ def _footprint(
 
 
 def _planted(ground: Ground, place: Array, yaw: float) -> tuple[Array, Array]:
-    """Put a flat foot on the ground, all of it on one step of stairs: ankle position and world rotation."""
+    """Ankle position (3,) and world rotation (4,) of a flat foot near `place` (x, z), cm.
+
+    If possible, the whole foot is on one step of stairs. yaw: direction of the foot, radians.
+    """
     ahead = np.array([np.sin(yaw), np.cos(yaw)])
 
     def heights(along: Array) -> Array:

@@ -31,8 +31,8 @@ SHORTEST = 60  # frames at 60 Hz: least length of a clip, so that a foot lands i
 class GeneratedWalk:
     """A generated clip and its labels. Frames count from 0 at the clip's rate.
 
-    right, left: frames in which a foot lands. gait: (frame, label), as in `gait_keys`. ground: the heights
-    that the clip was planned for.
+    right, left: frames in which each foot lands. gait: (frame, label); labels fade linearly from one of these
+    frames to the next. ground: the heights for which the clip was planned.
     """
 
     clip: Clip
@@ -45,9 +45,10 @@ class GeneratedWalk:
 def generate(
     clip: str, skeleton: Skeleton, frames: int, recipe: str | None, fps: float, seed: int
 ) -> GeneratedWalk:
-    """Walk a recipe for as long as `frames` frames at 60 Hz. The clip has rate `fps`.
+    """Generate a walk from a recipe. Equal arguments give equal motion.
 
-    recipe: a key of RECIPES; None: "walk-straight". Equal arguments give equal motion.
+    clip: name of the clip. frames: its length, in frames at 60 Hz. recipe: a key of
+    `hobble.synthetic.recipes.RECIPES`; None: "walk-straight". fps: frame rate of the clip.
 
     Raises HobbleError for an unknown recipe.
     """
@@ -60,7 +61,10 @@ def generate(
 def walk(
     clip: str, skeleton: Skeleton, segments: list[Segment], total: int, ground: str, fps: float, seed: int
 ) -> GeneratedWalk:
-    """Walk a plan (`segments`) for `total` frames at `fps`. ground: a kind of ground of `make_ground`."""
+    """Generate a walk of `total` frames at `fps` from a plan, `segments`.
+
+    ground: kind of ground: "flat", "slopes", "steps" or "uneven".
+    """
     path = walk_path(segments, total, fps)
     style = healthy_style(path)
     phase = phase_curve(style, fps, generator(seed, clip, "phase").random())
@@ -76,6 +80,7 @@ def walk(
 
 
 def _frames(at: np.ndarray, first: int, total: int) -> list[int]:
+    """The frames `at` of the planned path as whole frames of the clip, without those outside the clip."""
     frames = np.ceil(at).astype(int) - first
     return [int(f) for f in frames if 0 <= f < total]
 
@@ -91,15 +96,17 @@ def write_clip(
     footsteps: str | pathlib.Path,
     gait: str | pathlib.Path,
 ) -> None:
-    """Generate a clip and write its files like a user's. skeleton: as `Skeleton.to_dict`.
+    """Generate a clip and write it as BVH and label files.
 
-    options: the section `synthetic`. Raises HobbleError for an impossible plan, and for too few frames.
+    skeleton: from `Skeleton.to_dict`. frames: length of the clip at 60 Hz. options: the section
+    `synthetic` of the data set. bvh, footsteps, gait: paths of the three files. Raises HobbleError for an
+    unknown recipe or too few frames.
     """
     if frames < SHORTEST:
         enough = math.ceil(options.frames * SHORTEST / max(frames, 1))
         raise HobbleError(
             f"clip {clip}: {frames} frames at 60 Hz are too short for a step. "
-            f"Set synthetic.frames to {enough} or more, or give the clip a larger share."
+            f"Set synthetic.frames to {enough} or more, or give the clip a larger `share`."
         )
     rig = Skeleton.from_dict(skeleton)
     walk = generate(clip, rig, frames, recipe, options.fps, options.seed)

@@ -11,7 +11,7 @@ import numpy as np
 def footsteps_text(right: Sequence[int], left: Sequence[int]) -> str:
     """Lines `right left`: the frame in which the right foot lands, then the next landing of the left foot.
 
-    Frames count from 0 in the arguments, from 1 in the file.
+    right, left: frames in which each foot lands. Frames count from 0 in the arguments, from 1 in the file.
     """
     lines = []
     lefts = np.asarray(left)
@@ -23,5 +23,5 @@ def footsteps_text(right: Sequence[int], left: Sequence[int]) -> str:
 
 
 def gait_text(keys: Sequence[tuple[int, str]]) -> str:
-    """Lines `frame label`. Frames count from 0 in the argument, from 1 in the file."""
+    """Lines `frame label`. keys: (frame, label). Frames count from 0 in the argument, from 1 in the file."""
     return "".join(f"{frame + 1} {label}\n" for frame, label in keys)

@@ -1,4 +1,4 @@
-"""The ground for which a walk is planned: flat, slopes, steps or uneven. Heights depend on x and z."""
+"""The ground for which a walk is planned: flat, slopes, steps (stairs) or uneven."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ Ground = Callable[[Array, Array], Array]  # x, z in cm -> heights in cm
 
 
 def make_ground(kind: str, rng: np.random.Generator) -> Ground:
-    """The ground of one clip. kind: "flat", "slopes", "steps" or "uneven". Slopes and steps are along Z."""
+    """The ground of one clip. kind: "flat", "slopes", "steps" or "uneven". Slopes and steps run along Z."""
     return {"flat": lambda _: flat, "slopes": _slopes, "steps": _steps, "uneven": _uneven}[kind](rng)
 
 
@@ -22,7 +22,7 @@ def flat(x: Array, z: Array) -> Array:
 
 
 def _slopes(rng: np.random.Generator) -> Ground:
-    """Long hills, up to about 12 degrees steep along the path and less across it."""
+    """Long hills, up to about 12 degrees steep along Z and less steep along X."""
     return _waves(rng, lengths=(480, 640, 900), steepness=(0.07, 0.07, 0.07), across=0.35)
 
 
@@ -39,22 +39,26 @@ def _uneven(rng: np.random.Generator) -> Ground:
 def _waves(
     rng: np.random.Generator, lengths: tuple[float, ...], steepness: tuple[float, ...], across: float
 ) -> Ground:
+    """Sum of sine waves. lengths: wavelengths, cm. steepness: greatest slope of each wave.
+
+    across: greatest angle between the Z axis and the direction of a wave, radians.
+    """
     angles = rng.uniform(-across, across, len(lengths))
-    numbers = 2 * np.pi / (np.array(lengths) * rng.uniform(0.9, 1.1, len(lengths)))
+    wave_numbers = 2 * np.pi / (np.array(lengths) * rng.uniform(0.9, 1.1, len(lengths)))
     starts = rng.uniform(0, 2 * np.pi, len(lengths))
-    heights = np.array(steepness) / numbers
+    heights = np.array(steepness) / wave_numbers
 
     def ground(x: Array, z: Array) -> Array:
         along = np.multiply.outer(np.asarray(x), np.sin(angles)) + np.multiply.outer(
             np.asarray(z), np.cos(angles)
         )
-        return np.sin(along * numbers + starts) @ heights
+        return np.sin(along * wave_numbers + starts) @ heights
 
     return ground
 
 
 def _steps(rng: np.random.Generator) -> Ground:
-    """Steps up and down along Z, 7 to 16 cm high and 62 to 130 cm deep, in flights of up to four."""
+    """Stairs up and down along Z: flights of up to four steps, each 7 to 16 cm high and 62 to 130 cm deep."""
     count = 400
     edges = np.cumsum(rng.uniform(62, 130, count))
     edges -= edges[count // 2]

@@ -1,4 +1,4 @@
-"""Turns segments into curves over time: where the body is, where it faces, and its gait."""
+"""Turns the segments of a plan into curves over time: the body's position, facing, velocity and gait."""
 
 from __future__ import annotations
 
@@ -19,11 +19,11 @@ BLEND = 0.30  # seconds: sigma of the Gaussian that blends segments; a change ta
 class PlannedPath:
     """A path of F frames at `fps`.
 
-    The clip is frames `first` to F - `first`. The padding is there so that steps can begin and end outside
-    it.
+    The clip is frames `first` to F - `first` - 1. The frames before and after it are padding: steps at the
+    ends of the clip begin or end there.
 
-    position: (F, 2) x and z in cm. facing: (F,) radians, positive to the left. velocity: (F, 2) cm/s to the
-    left and forward, relative to facing. gait: (F, 4) shares of GAITS.
+    position: (F, 2) x and z in cm. facing: (F,) radians from +Z, positive to the left. velocity: (F, 2) cm/s
+    to the left and forward, relative to the facing. gait: (F, 4) shares of GAITS.
     """
 
     fps: float
@@ -38,23 +38,23 @@ class PlannedPath:
 
     @property
     def speed(self) -> Array:
-        """(F,) cm/s."""
+        """(F,) speed over the ground, cm/s."""
         return np.linalg.norm(self.velocity, axis=1)
 
 
 def walk_path(segments: Sequence[Segment], frames: int, fps: float) -> PlannedPath:
-    """The path of a plan (`segments`) for a clip of `frames` frames, with padding."""
+    """The path of a plan (`segments`) for a clip of `frames` frames, with padding at both ends."""
     first = margin(fps)
     total = frames + 2 * first
     which = _segment_of_frame(segments, frames, fps)
     which = np.pad(which, (first, total - first - len(which)), mode="edge")
     heading = np.radians([s.heading for s in segments])
     speed = np.array([s.speed for s in segments])
-    wanted = np.stack([speed * np.sin(heading), speed * np.cos(heading)], axis=1)[which]
+    target = np.stack([speed * np.sin(heading), speed * np.cos(heading)], axis=1)[which]
     turning = np.array([np.radians(s.turn) / s.seconds for s in segments])[which]
     gait = np.eye(len(GAITS))[[GAITS.index(s.gait) for s in segments]][which]
     sigma = BLEND * fps
-    velocity = gaussian_filter1d(wanted, sigma, axis=0, mode="nearest")
+    velocity = gaussian_filter1d(target, sigma, axis=0, mode="nearest")
     turning = gaussian_filter1d(turning, sigma * 0.8, mode="nearest")
     facing = np.cumsum(turning) / fps
     facing -= facing[first]
@@ -79,15 +79,16 @@ def margin(fps: float) -> int:
 
 
 def _segment_of_frame(segments: Sequence[Segment], frames: int, fps: float) -> np.ndarray:
+    """(frames,) index of the segment of each frame."""
     ends = np.cumsum([s.seconds for s in segments])
     which = np.searchsorted(ends, np.arange(frames) / fps, side="right")
     return np.minimum(which, len(segments) - 1)
 
 
 def gait_keys(segments: Sequence[Segment], frames: int, fps: float) -> list[tuple[int, str]]:
-    """The gait labels as keys (frame, label), frames from 0. Labels fade linearly between two keys.
+    """The gait labels as keys (frame, label). Frames count from 0. Labels fade linearly between two keys.
 
-    A fade lasts as long as the change of the motion.
+    A fade lasts as long as the motion takes to change.
     """
     which = _segment_of_frame(segments, frames, fps)
     labels = [segments[i].gait for i in which]

@@ -1,4 +1,4 @@
-"""Rotations of all joints from feet, path and style."""
+"""The position of the hips and the rotations of all joints, from the feet, the path and the style."""
 
 from __future__ import annotations
 
@@ -17,10 +17,8 @@ from hobble.synthetic.style import LEFT, RIGHT, SIGN, Style
 
 X, Y, Z = np.eye(3)
 TWIST = 12.0  # degrees by which an upper arm is turned inward about its axis
-STRETCH = {
-    True: 0.9975,
-    False: 0.98,
-}  # longest distance from hip to ankle, leg lengths. True: on flat ground, False: on other ground
+# The keys say whether the ground is flat.
+STRETCH = {True: 0.9975, False: 0.98}  # longest distance from hip to ankle, as a share of the leg's length
 SMOOTH = {True: 0.03, False: 0.06}  # seconds over which the hips come down so that the legs reach the ground
 
 
@@ -37,7 +35,10 @@ def pose(
     ground: Ground,
     rng: np.random.Generator,
 ) -> tuple[Array, Array]:
-    """Local rotations (F, J, 4) and hip positions (F, 3) of every frame of the padded path."""
+    """Local rotations (F, J, 4) and hip positions (F, 3) of every frame of the path.
+
+    phase: (F,) in cycles. feet: motion of the left and of the right foot.
+    """
     noise = _noise(rng, len(path), path.fps, 6)
     yaw = quat.yaw(path.facing)
     hips, chest = _pelvis(style, phase, yaw, noise), _chest(style, phase, yaw, noise)
@@ -58,6 +59,7 @@ def _noise(rng: np.random.Generator, frames: int, fps: float, count: int) -> Arr
 
 
 def _wave(phase: Array, peak: Array | float, times: int = 1) -> Array:
+    """(F,) cosine with `times` periods in a cycle; it is 1 at the phase `peak`."""
     return np.cos(2 * np.pi * times * (phase - peak))
 
 
@@ -94,9 +96,9 @@ def _root(
     sway = sway + 0.3 * noise[:, 3]
     x = path.position[:, 0] + sway * np.cos(path.facing)
     z = path.position[:, 1] - sway * np.sin(path.facing)
-    level = gaussian_filter1d(ground(x, z), 0.16 * path.fps, mode="nearest")
+    ground_height = gaussian_filter1d(ground(x, z), 0.16 * path.fps, mode="nearest")
     middle = (_centre(style, RIGHT) + _centre(style, LEFT) - 0.5) / 2
-    height = level + style.height + style.bob * _wave(phase, middle, 2) + 0.2 * noise[:, 4]
+    height = ground_height + style.height + style.bob * _wave(phase, middle, 2) + 0.2 * noise[:, 4]
     root = np.stack([x, height, z], axis=1)
     excess = np.zeros(len(path))
     for side, name in ((LEFT, "Left"), (RIGHT, "Right")):
@@ -110,17 +112,20 @@ def _root(
 def _too_high(
     skeleton: Skeleton, root: Array, hips: Array, foot: FootPoses, side: str, stretch: float
 ) -> Array:
-    """(F,) cm by which the hip joint is too high for a distance of `stretch` leg lengths to the ankle."""
+    """(F,) cm by which the hip joint must come down to be at most `stretch` leg lengths from the ankle.
+
+    root, hips: positions and rotations of the pelvis. side: "Left" or "Right".
+    """
     joint = root + quat.rotate(hips, skeleton.offsets[skeleton.index(f"{side}UpLeg")])
     upper, lower = leg_lengths(skeleton, side)
     away = joint - foot.ankle
-    level = np.minimum(away[:, 0] ** 2 + away[:, 2] ** 2, (0.9 * (upper + lower)) ** 2)
-    highest = np.sqrt((stretch * (upper + lower)) ** 2 - level)
+    horizontal = np.minimum(away[:, 0] ** 2 + away[:, 2] ** 2, (0.9 * (upper + lower)) ** 2)
+    highest = np.sqrt((stretch * (upper + lower)) ** 2 - horizontal)
     return np.maximum(away[:, 1] - highest, 0.0)
 
 
 def leg_lengths(skeleton: Skeleton, side: str) -> tuple[float, float]:
-    """Lengths of thigh and shank of "Left" or "Right"."""
+    """Lengths of thigh and shank, cm. side: "Left" or "Right"."""
     bones = (skeleton.offsets[skeleton.index(f"{side}{bone}")] for bone in ("Leg", "Foot"))
     upper, lower = (float(np.linalg.norm(bone)) for bone in bones)
     return upper, lower
@@ -142,7 +147,7 @@ def _trunk(
 
 
 def _leg(skeleton: Skeleton, world: Array, root: Array, foot: FootPoses, side: int) -> None:
-    """Set a leg by inverse kinematics. The knee points between the directions of pelvis and foot."""
+    """Set a leg by inverse kinematics. The knee points midway between the facings of pelvis and foot."""
     name = ("Left", "Right")[side]
     hips = world[:, 0]
     hip = root + quat.rotate(hips, skeleton.offsets[skeleton.index(f"{name}UpLeg")])
@@ -169,7 +174,7 @@ def _bone(up: Array, side_axis: Array) -> Array:
 
 
 def _arm(skeleton: Skeleton, world: Array, path: PlannedPath, style: Style, phase: Array, side: int) -> None:
-    """An arm hangs, swings opposite to the leg of its side, and bends more as it moves forward."""
+    """Set an arm. It hangs, swings opposite to the leg of its side, and bends more as it swings forward."""
     name, sign = ("Left", "Right")[side], SIGN[side]
     chest = world[:, skeleton.index("Spine1")]
     upright = quat.slerp(quat.yaw(path.facing), chest, np.full(len(path), 0.55))

@@ -16,9 +16,9 @@ STAND, WALK, JOG, CROUCH = "stand", "walk", "jog", "crouch"
 class Segment:
     """One segment of a plan.
 
-    speed: cm/s. heading: degrees from the facing direction to the direction of travel, positive to the left.
-    turn: degrees by which the facing direction turns in the segment, positive to the left. seconds: its
-    length.
+    speed: cm/s. turn: degrees by which the facing direction turns in the segment, positive to the left.
+    seconds: length of the segment. heading: degrees from the facing direction to the direction of travel,
+    positive to the left.
     """
 
     gait: str
@@ -44,6 +44,7 @@ def _stand(seconds: float = 2.0) -> Segment:
     return Segment(STAND, seconds=seconds)
 
 
+# Arguments of each segment: speed, turn, seconds, heading.
 RECIPES: dict[str, tuple[Segment, ...]] = {
     "walk-straight": (_walk(130, 0, 4), _walk(150, 8, 3), _walk(105, -8, 3), _walk(130, 0, 3)),
     "walk": (
@@ -80,17 +81,21 @@ RECIPES: dict[str, tuple[Segment, ...]] = {
     "steps": (_walk(85, 0, 4), _walk(70, 12, 3), _walk(100, -12, 3), _stand(1.8)),
     "uneven": (_walk(115, 0, 3), _walk(95, 70, 3), _walk(125, -70, 3), _walk(70, 0, 2.5)),
 }
-GROUND = {"slopes": "slopes", "steps": "steps", "uneven": "uneven"}  # all other recipes are on flat ground
+# recipe -> kind of ground; all other recipes are on flat ground
+GROUND = {"slopes": "slopes", "steps": "steps", "uneven": "uneven"}
 
 
 def plan(recipe: str, frames: float, fps: float, seed: int, clip: str) -> list[Segment]:
     """The segments of a clip of `frames` frames, each varied at random (the same in every run).
 
-    The recipe is repeated as often as fits best, with its times stretched or shortened, to three quarters at
-    least. Every other repetition is mirrored. Raises HobbleError for an unknown recipe.
+    The recipe is repeated as often as fits best. Its segments are stretched to fill the clip, or shortened,
+    but not to less than three quarters of their length. Every other repetition is mirrored. Raises
+    HobbleError for an unknown recipe.
     """
     if recipe not in RECIPES:
-        raise HobbleError(f"clip {clip}: there is no recipe {recipe!r}. There are: {', '.join(RECIPES)}.")
+        raise HobbleError(
+            f"clip {clip}: there is no recipe {recipe!r}. Name one of these: {', '.join(RECIPES)}."
+        )
     rng = generator(seed, clip, "plan")
     segments = RECIPES[recipe]
     side = 1.0 if rng.random() < 0.5 else -1.0

@@ -1,7 +1,8 @@
 """The style of each gait as functions of speed: timing, feet, pelvis, trunk and arms.
 
-Reference values are those of level gait in healthy adults (Perry & Burnfield, Gait Analysis; Winter, The
-Biomechanics and Motor Control of Human Gait; Novacheck 1998 for running), for walking at 1.3 m/s.
+The values for walking at 1.3 m/s and for running are those of healthy adults on level ground: Perry &
+Burnfield, Gait Analysis; Winter, The Biomechanics and Motor Control of Human Gait; for running, Novacheck
+(1998).
 """
 
 from __future__ import annotations
@@ -15,7 +16,7 @@ from hobble.synthetic.planned_path import GAITS, PlannedPath
 
 LEFT, RIGHT = 0, 1
 
-REFERENCE_SPEED = (0.0, 1.3, 2.8, 0.8)  # m/s, of the gaits in GAITS
+REFERENCE_SPEED = (0.0, 1.3, 2.8, 0.8)  # m/s, for each gait of GAITS
 # name -> for each gait (value at the gait's reference speed, change per m/s). Degrees, centimetres, shares.
 TABLE: dict[str, tuple[tuple[float, float], ...]] = {
     "duty": ((0.64, 0), (0.604, -0.06), (0.365, -0.05), (0.64, -0.06)),  # share of the cycle on the ground
@@ -23,32 +24,31 @@ TABLE: dict[str, tuple[tuple[float, float], ...]] = {
     "off_pitch": ((-15, 0), (-53, -13), (-49, -1), (-58, -8)),  # pitch of the foot as it leaves
     "rest_pitch": ((0, 0), (0, 0), (0, 0), (-24, 0)),  # pitch of the foot while it stands
     "flat": ((0.15, 0), (0.14, 0), (0.30, 0), (0.15, 0)),  # share of stance until the toe is down
-    "heel_off": ((0.6, 0), (0.32, -0.03), (0.30, 0), (0.48, 0)),  # share of stance when the heel leaves
+    # share of stance until the heel leaves the ground
+    "heel_off": ((0.6, 0), (0.32, -0.03), (0.30, 0), (0.48, 0)),
     "roll": ((2.8, 0), (3.2, 0), (2.6, 0), (1.9, 0)),  # power of the heel's rise: slow at first, then fast
-    "lift": (
-        (2, 0),
-        (0.3, 1),
-        (3, 3),
-        (4, 0),
-    ),  # height of the swinging foot above the line from where it leaves to where it lands
-    "clearance": ((1, 0), (2.5, 0), (3, 0), (2, 0)),  # least height of the swinging sole
+    # height of the swinging foot above the line from where it leaves to where it lands
+    "lift": ((2, 0), (0.3, 1), (3, 3), (4, 0)),
+    "clearance": ((1, 0), (2.5, 0), (3, 0), (2, 0)),  # least height of the swinging sole above the ground
     "behind": ((4, 0), (9.9, 5.5), (7.5, 3), (10, 5)),  # distance of an ankle behind the body in mid-stance
-    "width": ((9.5, 0), (5.5, 0), (3.5, 0), (9.5, 0)),  # distance of an ankle from the path
-    "toe_out": ((8, 0), (6, 0), (3, 0), (10, 0)),
+    "width": ((9.5, 0), (5.5, 0), (3.5, 0), (9.5, 0)),  # distance of an ankle from the path, sideways
+    "toe_out": ((8, 0), (6, 0), (3, 0), (10, 0)),  # turn of the foot, outward
     "height": ((94.6, 0), (94.8, -1.0), (94.5, -0.8), (65, 0)),  # height of the hips above the ground
-    "bob": ((0, 0), (1.3, 1.2), (-2.0, 0.3), (0.8, 0)),  # of the hips, + highest in mid-stance, - lowest
-    "sway": ((1.6, 0), (2.2, -0.8), (0.8, 0), (2.5, 0)),
-    "pelvis_yaw": ((0.3, 0), (9, 2), (6, 1), (5, 0)),
-    "pelvis_list": ((1.0, 0), (6, 1), (4, 0), (3, 0)),
-    "pelvis_tilt": ((3, 0), (7, 1), (6, 1), (34, 0)),
+    # amplitude of the hips' height; positive if they are highest in mid-stance, negative if lowest
+    "bob": ((0, 0), (1.3, 1.2), (-2.0, 0.3), (0.8, 0)),
+    "sway": ((1.6, 0), (2.2, -0.8), (0.8, 0), (2.5, 0)),  # amplitude of the hips, sideways
+    "pelvis_yaw": ((0.3, 0), (9, 2), (6, 1), (5, 0)),  # amplitude
+    "pelvis_list": ((1.0, 0), (6, 1), (4, 0), (3, 0)),  # amplitude
+    "pelvis_tilt": ((3, 0), (7, 1), (6, 1), (34, 0)),  # mean, + forward
     "lean": ((1, 0), (3, 2), (10, 2), (79, 0)),  # lean of the trunk, forward
-    "chest_yaw": ((0.3, 0), (4, 2), (9, 2), (4, 0)),
-    "arm_swing": ((0.8, 0), (17, 12), (27, 4), (9, 0)),
+    "chest_yaw": ((0.3, 0), (4, 2), (9, 2), (4, 0)),  # amplitude
+    "arm_swing": ((0.8, 0), (17, 12), (27, 4), (9, 0)),  # amplitude
     "arm_mean": ((1, 0), (-1, 0), (-8, 0), (14, 0)),  # + forward
-    "elbow": ((14, 0), (22, 8), (82, 2), (48, 0)),
-    "elbow_swing": ((0.5, 0), (9, 5), (11, 0), (5, 0)),
-    "abduction": ((9, 0), (9, 0), (13, 0), (14, 0)),
+    "elbow": ((14, 0), (22, 8), (82, 2), (48, 0)),  # mean flexion
+    "elbow_swing": ((0.5, 0), (9, 5), (11, 0), (5, 0)),  # amplitude
+    "abduction": ((9, 0), (9, 0), (13, 0), (14, 0)),  # of the upper arms
 }
+# The names in TABLE whose curves have a value for each side.
 SIDED: tuple[str, ...] = (
     "duty",
     "land_pitch",
@@ -60,8 +60,8 @@ SIDED: tuple[str, ...] = (
     "arm_swing",
 )
 SIDED += ("arm_mean", "elbow", "elbow_swing", "abduction")
-SPIN = 0.6  # relative rise of the cadence of a figure that turns in place by a radian a second or more
-SIGN = (1.0, -1.0)  # +X is the figure's left
+SPIN = 0.6  # a figure that turns in place by a radian a second or more raises its cadence by this share
+SIGN = (1.0, -1.0)  # sign of X on the left and on the right side: +X is the figure's left
 
 
 @dataclass(frozen=True)
@@ -105,7 +105,7 @@ class Style:
 
 
 def healthy_style(path: PlannedPath) -> Style:
-    """The healthy style along a path: each gait's values at the current speed, mixed by gait share."""
+    """The healthy style along a path: values of the gaits at the current speed, mixed by their shares."""
     speed = path.speed / 100
     values = {}
     for name, row in TABLE.items():
@@ -131,7 +131,10 @@ def _frequencies(speed: Array) -> Array:
 
 
 def _directed(style: Style, path: PlannedPath) -> Style:
-    """The style for steps backward and sideways: toe first, little roll, wider, quicker, less arm swing."""
+    """The style, changed where the figure walks backward or sideways.
+
+    Then the toe lands first, and steps are wider and quicker, with little roll and arm swing.
+    """
     speed = np.maximum(path.speed, 1e-6)
     moving = np.clip(path.speed / 30, 0, 1)
     ahead = np.where(moving > 0, path.velocity[:, 1] / speed, 1.0) * moving + (1 - moving)
@@ -144,7 +147,8 @@ def _directed(style: Style, path: PlannedPath) -> Style:
     return style.changed(
         land_pitch=style.land_pitch * forward - 16 * back - 8 * side,
         off_pitch=style.off_pitch * forward + 8 * back - 16 * side,
-        # The feet do not cross: the distance between them varies around this width by half a stride.
+        # In steps to the side, the distance between the feet varies by half a stride. The extra width keeps
+        # them from crossing.
         width=style.width + 0.25 * stride / (1 + 0.6 * sideways) * sideways,
         behind=4 + (style.behind - 4) * ahead,
         lift=style.lift + 3 * (back + side),

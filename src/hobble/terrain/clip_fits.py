@@ -1,4 +1,8 @@
-"""The terrain of one clip: for each fit of a cycle, the ground heights at the samples of the trajectory."""
+"""Fits the ground under each gait cycle of a clip, and looks up its heights along the trajectory.
+
+A fit is a patch of ground that suits the footsteps of a cycle, corrected to meet the feet. A cycle gets
+several fits, or one if its ground is flat.
+"""
 
 from __future__ import annotations
 
@@ -30,13 +34,13 @@ class ClipFits:
     """The terrain fits of a clip with C cycles and R rows. A row is a frame of a cycle.
 
     frame, cycle, fits: (R,) the row's frame, its cycle, and how many fits it has. heights: (sum of fits, 36)
-    cm in the clip's world, for 12 samples to the left, in the centre and to the right; the fits of a row are
-    consecutive.
-    patch, error: (C, 10) index of the patch of each fit, and its error; -1 and 0 on flat ground.
+    cm in the clip's world, for 12 samples to the left of the path, then on it, then to its right; the fits of
+    a row are consecutive.
+    patch, error: (C, 10) index of each fit's patch, and the fit's error, cm²; -1 and 0 on flat ground.
     foot_error: (C, 10, 2) mean and largest distance of a foot in contact from the ground, cm.
     foot_below: (C, 10) how far the lowest foot, in contact or not, is below the ground, cm; at least 0.
     heel_height, toe_height: height of these joints above their soles, cm.
-    pictures: of some cycles, for the report.
+    pictures: of the fits of some cycles, for the report.
     """
 
     frame: np.ndarray = field(repr=False)
@@ -63,7 +67,7 @@ def clip_fits(
     """Fit the ground under every cycle of a clip.
 
     labels: `contacts` (F, 4) and `cycles` (C, 2). ground: "flat", "rocky", "jumpy" or "beam".
-    Raises InputError if the labels do not belong to the clip.
+    Raises InputError if the labels do not belong to the clip, or if there are fewer patches than fits.
     """
     cycles, contacts = np.asarray(labels["cycles"], int), np.asarray(labels["contacts"], bool)
     window = sampling.window
@@ -103,15 +107,15 @@ def clip_fits(
 
 
 def _warn_if_off_ground(name: str, fits: ClipFits, deepest: float | None) -> None:
-    """Log a warning if feet are more than `deepest` cm from the ground.
+    """Log a warning if the ground does not meet the feet within `deepest` cm.
 
-    These are feet in contact (on average), or any foot that is below the ground.
+    That is, if feet in contact are on average further than this from it, or any foot is further below it.
     """
     if deepest is None or not len(fits.patch):
         return
     mean, below = float(fits.foot_error[..., 0].mean()), float(fits.foot_below.max())
     if max(mean, below) > 1.001 * deepest:
-        text = "%s: feet in contact are %.2f cm from the ground on average; the lowest is %.2f cm below it"
+        text = "%s: on average, feet in contact are %.2f cm from the ground; the lowest foot is %.2f cm below"
         log.warning(text, name, mean, below)
 
 
@@ -120,9 +124,9 @@ def _standing_feet(
 ) -> Feet:
     """The soles of a clip, and which of them stand on the ground.
 
-    On flat ground a joint in contact does not count if it is more than `held_up` above the other joint of its
-    foot and that is in contact, too. If a cycle has no contact at all, the lowest 5 % of its sole positions
-    count.
+    On flat ground, a joint in contact does not count if the other joint of its foot is in contact, too, and
+    more than `options.held_up` cm lower. If no joint is in contact in a cycle and its window, the lowest 5 %
+    of the sole positions count. window: frames before and after a cycle.
     """
     counted = np.zeros(len(clip), bool)
     for start, end in cycles:
@@ -158,7 +162,7 @@ def _fitted_frames(start: int, end: int, window: int, frames: int) -> slice:
 def _fit_ground(
     feet: Feet, around: slice, samples: Array, patches: Patches, kind: str, options: Fitting
 ) -> Ground:
-    """The fits of one cycle. around: the frames of `_fitted_frames`."""
+    """The fits of one cycle. around: the frames to fit to. samples: (3, F, 2) as from `sample_points`."""
     soles, contacts = feet.soles[around], feet.contacts[around]
     smoothing, deepest = options.smoothing, options.deepest
     if kind == "flat":
@@ -187,14 +191,14 @@ def _fit_ground(
 
 
 def _fit_statistics(fitted: Sequence[tuple[Ground, Array, Mask]], fits: int) -> dict[str, Any]:
-    """Patch and errors of each fit of each cycle, for `ClipFits`. A single fit is repeated `fits` times."""
+    """The fields patch to foot_below of `ClipFits`. The only fit of a flat cycle is repeated `fits` times."""
     patch, error = np.zeros((len(fitted), fits), np.int32), np.zeros((len(fitted), fits), np.float32)
     foot_error, foot_below = np.zeros((*error.shape, 2), np.float32), np.zeros_like(error)
     for c, (ground, soles, contacts) in enumerate(fitted):
         above = ground.above(soles)
-        apart = np.abs(above[:, contacts])
+        distance = np.abs(above[:, contacts])
         patch[c], error[c] = ground.chosen, ground.error
-        foot_error[c] = np.stack([apart.mean(axis=1), apart.max(axis=1)], axis=-1)
+        foot_error[c] = np.stack([distance.mean(axis=1), distance.max(axis=1)], axis=-1)
         foot_below[c] = np.maximum(above.max(axis=(1, 2)), 0)
     return {"patch": patch, "error": error, "foot_error": foot_error, "foot_below": foot_below}
 
@@ -206,10 +210,12 @@ def sample_points(root: RootFrames, side: float) -> Array:
 
 
 def heights_under(ground: Ground, samples: Array, start: int, end: int, offsets: np.ndarray) -> Array:
-    """Heights (rows of the cycle * fits, 3 * samples), cm. Each point of the path is looked up only once.
+    """Ground heights (rows * fits, 3 * len(offsets)), cm, for the rows of one cycle.
 
-    samples: from `sample_points`. start, end: first and last frame of the cycle, as indices into `samples`.
-    offsets: frames of the samples of a row, relative to its frame.
+    Rows share points of the path, and each point is looked up only once.
+
+    samples: (3, F, 2) from `sample_points`. start, end: first and last frame of the cycle, as indices into
+    axis 1 of `samples`. offsets: frames of the points of a row, relative to the row's frame.
     """
     first, last = start + offsets[0], end + offsets[-1]
     points = samples[:, first : last + 1]
@@ -219,6 +225,7 @@ def heights_under(ground: Ground, samples: Array, start: int, end: int, offsets:
 
 
 def _rows(cycles: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """The frame (R,) and the number of the cycle (R,) of each row."""
     frames = [np.arange(start, end + 1) for start, end in cycles]
     numbers = [np.full(len(f), c) for c, f in enumerate(frames)]
     nothing = np.zeros(0, int)

@@ -1,8 +1,8 @@
 """Corrects the chosen patch so that the ground meets the feet.
 
-First, as in the original, a surface of radial basis functions is fitted to the distances that are left
-between feet in contact and the ground (the residual), and is added to the ground. Then the ground is lowered
-around feet that are still below it.
+First, as in Holden et al. (2017), a surface of radial basis functions is fitted to the residual, which is the
+distances that are left between feet in contact and the ground. This surface is added to the ground. Then the
+ground is lowered around feet that are still below it.
 """
 
 from __future__ import annotations
@@ -15,12 +15,14 @@ from hobble.core.quat import Array
 from hobble.terrain.soles import Mask
 
 WALL_STEEPNESS = 2.0  # least steepness of the walls of a pit, cm per cm
-MAX_REFITS = 8  # a surface that leaves too much residual is fitted again with a quarter of the smoothing
+# A surface that leaves too much residual is fitted again, each time with a quarter of the smoothing, at most
+# this many times.
+MAX_REFITS = 8
 
 
 @dataclass(frozen=True)
 class Stances:
-    """Contacts of feet, gathered into N points. A foot that stands for several frames is one point.
+    """Positions of soles, gathered into N points, for example one for each contact of a foot joint.
 
     place: (N, 2) x and z, cm. height: (N,) of the sole, cm. count: (N,) number of frames, used as a weight.
     """
@@ -31,9 +33,10 @@ class Stances:
 
 
 def gather_stances(soles: Array, contacts: Mask, longest: int) -> Stances:
-    """Average the sole of each joint over each run of frames in contact.
+    """Average the sole of each joint over consecutive frames in contact.
 
-    soles: (T, 4, 3). contacts: (T, 4) bool. longest: most frames of one point; longer runs are cut.
+    soles: (T, 4, 3). contacts: (T, 4) bool. longest: at most this many frames become one point;
+    longer contacts are cut into several.
     """
     frame, joint = np.nonzero(contacts)
     order = np.lexsort((frame, joint))
@@ -41,8 +44,8 @@ def gather_stances(soles: Array, contacts: Mask, longest: int) -> Stances:
     new = np.ones(len(frame), bool)
     new[1:] = (np.diff(frame) != 1) | (np.diff(joint) != 0)
     first = np.flatnonzero(new)
-    run = np.cumsum(new) - 1
-    within = np.arange(len(frame)) - first[run]
+    contact = np.cumsum(new) - 1
+    within = np.arange(len(frame)) - first[contact]
     piece = np.cumsum(new | (within % longest == 0)) - 1
     count = np.bincount(piece)
     points = soles[frame, joint]
@@ -61,7 +64,7 @@ def join_points(a: Stances, b: Stances) -> Stances:
 
 @dataclass(frozen=True)
 class Surface:
-    """A surface of radial basis functions phi(r) = r / spread around N places.
+    """A surface of radial basis functions phi(r) = r / spread around N places, r being the distance.
 
     places: (N, 2) x and z, cm. weights: (N,). spread: mean distance between the places, cm.
     """
@@ -84,9 +87,10 @@ def fit_surfaces(
 
     A point with count m has smoothing / m on the diagonal of the system, and the weight m in the mean
     distance. This gives exactly the surface of m points at one place.
-    most: if the mean distance that a surface leaves at the points exceeds this (cm), it is fitted again with
-    less smoothing. An example is feet that stand half a metre beside a beam. standing: number of points, from
-    the first, over which this mean is taken; None: all.
+
+    most: largest mean distance, cm, that a surface may leave to the points; None: no limit. A surface that
+    leaves more is fitted again with less smoothing. This happens, for example, if feet stand half a metre
+    beside a beam. standing: the mean is taken over this many points, from the first on; None: all.
     """
     apart = distances(points.place, points.place)
     spread = float(points.count @ apart @ points.count / points.count.sum() ** 2)
@@ -118,7 +122,7 @@ class Pits:
     steepness: Array = field(repr=False)
 
     def of(self, ground: Array, points: Array) -> Array:
-        """(M,) the heights `ground` (M,) at points (M, 2), lowered to the cones where they are above them."""
+        """The heights `ground` (M,) at points (M, 2), lowered to the cones where the ground is above them."""
         from hobble.terrain.kernels import lowest_cone
 
         if not len(self.places):
@@ -128,9 +132,10 @@ class Pits:
 
 
 def dig_pits(soles: Array, standing: Stances, depth: float) -> Pits:
-    """Pits in which soles (N, 3) are `depth` cm below the ground.
+    """Pits that lower the ground until soles (N, 3) are only `depth` cm below it.
 
-    Their walls are so steep that they do not lower the ground under other standing feet, such as on a step.
+    The walls of a pit are so steep that the ground under standing feet nearby is not lowered, for example on
+    the next step of stairs.
     """
     places, heights = soles[:, [0, 2]], soles[:, 1] + depth
     apart = np.maximum(distances(places, standing.place), 1e-3)

@@ -21,10 +21,12 @@ from hobble.terrain.correction import (
 from hobble.terrain.patches import Patches
 from hobble.terrain.soles import Mask
 
-STANCE_FRAMES = 8  # most frames of a stance that are averaged to one point
-COVERED_FRAMES = 4  # most frames of a foot below the ground that are averaged to one point
-BEAM_SIDE_CM = (35.0, 50.0)  # distances from the path at which there must be no ground next to a beam
-PATH_CLEARANCE_CM = 25.0  # points next to the path that are closer than this to any part of it are left out
+STANCE_FRAMES = 8  # at most this many frames of a stance are averaged to one point
+COVERED_FRAMES = 4  # at most this many frames of a foot below the ground are averaged to one point
+# This far to the sides of a path on a beam, the ground must be far below the beam.
+BEAM_SIDE_CM = (35.0, 50.0)
+# Points beside the path are left out if another part of the path is closer than this.
+PATH_CLEARANCE_CM = 25.0
 
 
 @dataclass(frozen=True)
@@ -33,8 +35,8 @@ class Ground:
 
     patches: all patches; None for flat ground. chosen, error: (K,) indices of the fitted patches and their
     errors, best first. centre: (2,) x and z of the middle of the patches, cm. level: (K,) height that is
-    added to each patch, cm. surfaces: for each fit, the surface that is added to meet the feet. pits: for
-    each fit, the pits in it.
+    added to each patch, cm. surfaces: for each fit, the surface that is added so that the ground meets
+    the feet. pits: for each fit, the pits in the ground. Both may be empty.
     """
 
     patches: Patches | None = field(repr=False)
@@ -77,9 +79,9 @@ def fit_cycle(
     """Fit the ground under one cycle and its window.
 
     soles: (T, 4, 3) of heels and toes in T frames, cm. contacts: (T, 4) bool, at least one true. path: (T, 2)
-    x and z of the root. sides: (T, 2) unit vectors to its left. kind: "rocky", "jumpy" or "beam"; "jumpy" and
-    "beam" add terms to the error. fits: their number. smoothing: see `fit_surfaces`. deepest: how far a foot
-    may be below the ground, cm; None: no limit.
+    x and z of the root. sides: (T, 2) unit vectors to the left of the path. kind: "rocky", "jumpy" or "beam";
+    "jumpy" and "beam" add terms to the error. fits: number of fits. smoothing: regularisation of the surfaces
+    that are added. deepest: how far a foot may be below the ground, cm; None: no limit.
     """
     from hobble.terrain.search import (  # here, because it loads compiled code, which flat clips do not need
         FootPoints,
@@ -103,20 +105,21 @@ def flat_ground(
 ) -> Ground:
     """Flat ground, with one fit.
 
-    level: "zero", or "feet" for the mean height of the soles in contact, as in the original. The original
-    has no velocity in the last frame, so the contacts of the frame before it are used there.
+    soles, contacts, smoothing, deepest: see `fit_cycle`. level: "zero", or "feet" for the mean height of the
+    soles in contact, as in Holden et al. (2017). They compute contacts from velocities, of which the last
+    frame has none. As there, the last frame gets the contacts of the frame before.
 
     correct: whether to correct the ground. If the feet in contact are more than `deepest` cm from it on
-    average (an uneven floor or capture), a surface is added. Otherwise pits are dug under feet more than
-    `deepest` below it.
+    average (an uneven floor or capture), a surface is added. Otherwise pits are dug under feet that are more
+    than `deepest` below the ground.
     """
     heights = soles[..., 1]
-    original = np.concatenate([contacts[:-1], contacts[-2:-1]])
-    zero = heights[original if original.any() else contacts].mean() if level == "feet" else 0.0
-    plain = Ground(None, np.array([-1]), np.zeros(1), np.zeros(2), np.array([zero]))
+    by_velocity = np.concatenate([contacts[:-1], contacts[-2:-1]])
+    flat = heights[by_velocity if by_velocity.any() else contacts].mean() if level == "feet" else 0.0
+    plain = Ground(None, np.array([-1]), np.zeros(1), np.zeros(2), np.array([flat]))
     if deepest is None or not correct:
         return plain
-    if np.abs(heights[contacts] - zero).mean() > deepest:
+    if np.abs(heights[contacts] - flat).mean() > deepest:
         return meet_feet(plain, soles, contacts, smoothing, deepest)
     return replace(plain, pits=_pits(plain, soles, gather_stances(soles, contacts, STANCE_FRAMES), deepest))
 
@@ -124,9 +127,9 @@ def flat_ground(
 def meet_feet(plain: Ground, soles: Array, contacts: Mask, smoothing: float, deepest: float | None) -> Ground:
     """Correct the ground so that it meets the feet in contact.
 
-    A smooth surface is fitted to the residual at the contacts. It leaves at most deepest / 2 on average. If
-    feet are then more than deepest / 2 below the ground, they are added to the points and the surface is
-    fitted again. Feet that are still more than `deepest` below the ground get pits.
+    A smooth surface is fitted to the residual at the contacts, so that at most deepest / 2 is left on
+    average. If feet are then more than deepest / 2 below the ground, they are added to the points and the
+    surface is fitted again. Feet that are still more than `deepest` below the ground get pits.
     """
     standing = gather_stances(soles, contacts, STANCE_FRAMES)
     residual = standing.height - plain.at(standing.place)
@@ -137,15 +140,18 @@ def meet_feet(plain: Ground, soles: Array, contacts: Mask, smoothing: float, dee
     surfaces = [
         _refitted(plain, k, standing, gather_stances(soles, c & ~contacts, COVERED_FRAMES), smoothing, most)
         if c.any()
-        else same
-        for k, (c, same) in enumerate(zip(ground.above(soles) > deepest / 2, ground.surfaces, strict=True))
+        else surface
+        for k, (c, surface) in enumerate(zip(ground.above(soles) > deepest / 2, ground.surfaces, strict=True))
     ]
     ground = replace(plain, surfaces=surfaces)
     return replace(ground, pits=_pits(ground, soles, standing, deepest))
 
 
 def _pits(ground: Ground, soles: Array, standing: Stances, deepest: float) -> list[Pits]:
-    """For each fit, pits for feet that are more than `deepest` below it; then they are deepest / 2 below."""
+    """For each fit, the pits for feet that are more than `deepest` below the ground.
+
+    A pit lowers the ground so far that these feet are only deepest / 2 below it.
+    """
     return [dig_pits(soles[covered], standing, deepest / 2) for covered in ground.above(soles) > deepest]
 
 
@@ -159,9 +165,9 @@ def _refitted(
 
 
 def beam_side_points(patches: Patches, path: Array, sides: Array, centre: Array) -> Array:
-    """(N, 4) points next to the path, where there is no ground next to a beam.
+    """(N, 4) points beside a path on a beam, at which the ground has to be far below the beam.
 
-    Columns: u and v of the point, then of its point on the path, in cells from the middle of the patch.
+    Columns: u and v of the point, then u and v of the path beside it, in cells from the middle of the patch.
     """
     off = np.concatenate([path + sign * d * sides for d in BEAM_SIDE_CM for sign in (1, -1)])
     on = np.tile(path, (2 * len(BEAM_SIDE_CM), 1))

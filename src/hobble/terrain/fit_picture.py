@@ -11,18 +11,18 @@ from hobble.core.quat import Array
 from hobble.terrain.cycle_ground import Ground
 from hobble.terrain.soles import Feet, Mask
 
-GRID_POINTS = 24
-MARGIN_CM = 60.0  # of the grid around the feet
-MOST = 2
+GRID_POINTS = 24  # points of the ground's grid along x and along z
+MARGIN_CM = 60.0  # the grid reaches this far beyond the feet
 
 
 @dataclass(frozen=True)
 class FitPicture:
     """The best fit of one cycle, in centimetres in the clip's world.
 
-    x, z: (G,) coordinates of the grid. ground: (G, G) heights at x[i], z[j]. soles: (T, 4, 3) and contacts:
-    (T, 4) in the T frames of the cycle and its window. pose: (3, J, 3) joint positions after a quarter, half
-    and three quarters of the frames. parents: (J,) parent of each joint.
+    cycle: its number in the clip. x, z: (G,) coordinates of the grid. ground: (G, G) heights at x[i], z[j].
+    soles, contacts: (T, 4, 3) and (T, 4), in the T frames of the cycle and its window. pose: (3, J, 3)
+    joint positions after a quarter, half and three quarters of the frames. parents: (J,) parent of each
+    joint.
     """
 
     cycle: int
@@ -41,7 +41,7 @@ def picture_cycles(cycles: int) -> set[int]:
 
 
 def picture_of(clip: Clip, cycle: int, ground: Ground, feet: Feet, around: slice) -> FitPicture:
-    """The picture of the best fit of a cycle. around: the frames that the ground was fitted to."""
+    """The picture of the best fit of a cycle. around: the frames that it was fitted to."""
     soles = feet.soles[around]
     low, high = (
         soles[..., [0, 2]].min(axis=(0, 1)) - MARGIN_CM,

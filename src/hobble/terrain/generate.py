@@ -12,17 +12,20 @@ import numpy as np
 
 from hobble.core.quat import Array
 
-CELLS = 400
+CELLS = 400  # rows, and also columns, of a map
 
 
 def generate(kind: str, seed: int, cell: float) -> Array:
-    """(400, 400) heights of one kind of ground, cm. cell: width of a cell, cm. Equal seeds, equal ground."""
+    """(400, 400) heights of one kind of ground, cm. Equal arguments give equal ground.
+
+    kind: a key of KINDS. cell: width of a cell, cm.
+    """
     rng = np.random.default_rng([zlib.crc32(kind.encode()), seed])
     return KINDS[kind](rng, cell)
 
 
 def fractal(rng: np.random.Generator, cell: float) -> Array:
-    """Noise with an amplitude of 1 / frequency², like rough soil; waves longer than 8 m get no larger."""
+    """Noise like rough soil: its amplitude is 1 / frequency², but constant for waves longer than 8 m."""
     frequency = np.hypot(np.fft.fftfreq(CELLS, cell)[:, None], np.fft.rfftfreq(CELLS, cell))
     amplitude = 1 / np.maximum(frequency, 1 / 800) ** 2
     amplitude[0, 0] = 0
@@ -42,7 +45,7 @@ def hills(rng: np.random.Generator, cell: float) -> Array:
 
 
 def stairs(rng: np.random.Generator, cell: float) -> Array:
-    """Lanes side by side. In each, a flight of 3 to 5 steps goes up or down, the next one back, and so on."""
+    """Lanes side by side. In each lane, a flight of 3 to 5 steps goes up or down, and the next one back."""
     heights = np.zeros((CELLS, CELLS))
     along = np.arange(CELLS) * cell
     lane = 0
@@ -67,7 +70,7 @@ def stairs(rng: np.random.Generator, cell: float) -> Array:
 
 
 def slope(rng: np.random.Generator, cell: float) -> Array:
-    """Ramps of 2 to 12 degrees. They change every 1 to 4 m and are tilted sideways by up to 5 degrees."""
+    """Ramps of 2 to 12 degrees, 1 to 4 m long. The whole map is tilted sideways by up to 5 degrees."""
     along = np.arange(CELLS) * cell
     knots, levels = [0.0], [0.0]
     while knots[-1] < along[-1]:

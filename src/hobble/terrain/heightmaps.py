@@ -16,11 +16,12 @@ from hobble.core.untrusted import printable, read_text
 from hobble.terrain import options
 from hobble.terrain.generate import generate
 
-MAX_CELLS = 1 << 26  # cells of a map: 8192 x 8192, 512 MB, 322 x 322 m with cells of 3.9 cm
-MAX_TEXT_BYTES = 1 << 28  # size of a map as text
-MAX_LINE_LETTERS = 1 << 20  # length of a line of a map as text
-MAX_HEIGHT = 1e7  # cm (100 km); the runtime has the same limit
+MAX_CELLS = 1 << 26  # largest number of cells of a map: 8192 x 8192, 512 MB, 322 x 322 m with cells of 3.9 cm
+MAX_TEXT_BYTES = 1 << 28  # size of the largest text file that is read
+MAX_LINE_LETTERS = 1 << 20  # letters in the longest line of such a file
+MAX_HEIGHT = 1e7  # largest height, cm (100 km); the runtime has the same limit
 
+# First words of the lines in the header of an ESRI grid.
 ESRI_HEADER = {
     "ncols",
     "nrows",
@@ -57,13 +58,13 @@ def heightmaps(
     height_scale: factor that converts the heights in files to cm. An entry may have its own `cell` and
     `height_scale`. Raises InputError for a file that cannot be used.
     """
-    given = iter(files)
+    paths = iter(files)
     out = []
     for entry in entries:
         width = entry.cell or cell
         scale = entry.height_scale
         if entry.kind == "file":
-            path = next(given)
+            path = next(paths)
             heights = read_heights(path) * (scale or height_scale)
             if (highest := float(np.nanmax(np.abs(heights)))) > MAX_HEIGHT:
                 raise InputError(
@@ -84,9 +85,9 @@ def heightmaps(
 def elevation(cell: float) -> Array:
     """Heights (rows, columns), cm, of a real landscape in matplotlib's sample data, reduced in size.
 
-    One cell of 3 arc seconds is 92.6 m north to south and 74.3 m east to west at 36.6 degrees north. The
-    columns are resampled so that cells are square. Then lengths and heights are scaled by the same factor so
-    that a cell is `cell` cm wide. Slopes reach 36 degrees.
+    A cell of the data is 3 arc seconds wide: 92.6 m north to south, and 74.3 m east to west at 36.6 degrees
+    north. The columns are resampled so that cells are square. Then lengths and heights are scaled by the same
+    factor, so that a cell is `cell` cm wide. Slopes reach 36 degrees.
     """
     import matplotlib
 
@@ -95,8 +96,8 @@ def elevation(cell: float) -> Array:
     latitude = (float(data["ymin"]) + float(data["ymax"])) / 2
     narrow = np.cos(np.radians(latitude))
     columns = np.arange(metres.shape[1])
-    wanted = np.arange(0, metres.shape[1] - 1, 1 / narrow)
-    square = np.stack([np.interp(wanted, columns, row) for row in metres])
+    at = np.arange(0, metres.shape[1] - 1, 1 / narrow)
+    square = np.stack([np.interp(at, columns, row) for row in metres])
     north_south = 1852.0 / 60 * 3
     return (square - square.mean()) * cell / north_south
 
@@ -153,8 +154,8 @@ def _text(path: Path) -> Array:
             raise InputError(path, f"more than {MAX_CELLS} heights", line=number)
     if not rows:
         raise InputError(path, "holds no heights")
-    heights, nothing = np.array(rows), header.get("nodata_value")
-    return heights if nothing is None else np.where(heights == nothing, np.nan, heights)
+    heights, no_data = np.array(rows), header.get("nodata_value")
+    return heights if no_data is None else np.where(heights == no_data, np.nan, heights)
 
 
 def _npz(path: Path) -> Array:
@@ -179,8 +180,8 @@ def _image(path: Path) -> Array:
                 raise InputError(path, f"{image.width} x {image.height} cells, more than {MAX_CELLS}")
             grey = image if image.mode in ("L", "I", "F", "I;16", "I;16B", "1") else image.convert("L")
             heights = np.asarray(grey, float)
-            nothing = getattr(image, "tag_v2", {}).get(GDAL_NODATA)
-            return heights if nothing is None else np.where(heights == float(nothing), np.nan, heights)
+            no_data = getattr(image, "tag_v2", {}).get(GDAL_NODATA)
+            return heights if no_data is None else np.where(heights == float(no_data), np.nan, heights)
     except InputError:
         raise
     except Exception as error:  # Pillow's decoders raise many kinds of error for a damaged file

@@ -3,14 +3,14 @@
 A patch is a view of a heightmap. Its cell (u, v) is counted from the middle of the patch along the world's x
 and z. The affine map A (2, 3) of the patch gives its place in the heightmap: row, column = A (u, v, 1).
 
-Functions that other modules call have these arguments. heights: all heightmaps, one after another, in one
-float32 array. starts, shapes: where each map begins, and its rows and columns. which, affine: map and A of
-each patch. All arguments are plain arrays, so one compiled version serves all data sets. Helpers get the
-heights of one map, its rows and columns, and `a`, the two rows of A.
+The functions `view_...` and `search_views` have these arguments. heights: all heightmaps, one after another,
+in one float32 array. starts, shapes: where each map begins, and its rows and columns. which, affine: map and
+A of each patch. All arguments are plain arrays, so one compiled version serves all data sets. Functions that
+these call get the heights of one map, its rows and columns, and `a`, the two rows of A.
 
 Everything is in one file because numba renews its cache only if the file of the called function changes. Only
-functions that other modules call are cached, and helpers are inlined in them. Separately compiled helpers
-would round sums in another order when they come from the cache.
+functions that other modules call are cached, and the others are inlined in them. If those were compiled
+separately, versions from the cache could add up sums in another order, and so round them differently.
 """
 
 from __future__ import annotations
@@ -19,10 +19,10 @@ import numpy as np
 
 from hobble.core.compiled import njit
 
-DOWN_WEIGHT = 0.1  # weight of the error at feet in contact
+DOWN_WEIGHT = 0.1  # weight of the feet in contact in the error of a patch
 JUMP_HEIGHT = 5.0  # cm; in jumps the ground should not be further than this below a foot in the air
 BEAM_HEIGHT = 40.0  # cm; next to a beam the ground should be at least this far below it
-FAST = {"reassoc", "contract", "nsz", "nnan"}  # allows vectorised sums; heights are never nan
+FAST = {"reassoc", "contract", "nsz", "nnan"}  # allow vectorised sums; heights are never nan
 ONE = np.uint32(1)
 
 
@@ -69,8 +69,8 @@ def view_heights(heights, starts, shapes, which, affine, mean, points):
 def view_extents(heights, starts, shapes, which, affine, size, highest):
     """Mean height (P,) of P views of `size` x `size` cells, and (P,) whether each stays close to its mean.
 
-    A view passes if all its cells are within `highest` of the mean. First only every eighth row and column is
-    read. If these cells differ by more than 2 * highest, the view is skipped and its mean is 0.
+    A view passes if all its cells are within `highest` cm of the mean. First only every eighth row and column
+    is read. If these cells differ by more than 2 * highest, the view is skipped and its mean is 0.
     """
     mean = np.zeros(len(which), np.float32)
     passes = np.zeros(len(which), np.bool_)
@@ -111,7 +111,10 @@ def view_extents(heights, starts, shapes, which, affine, size, highest):
 
 @njit(fastmath=FAST)
 def distance_sum(x, z, place_x, place_z, weights):
-    """(M,) at each point x, z (M,), the sum of its distances from N places, weighted by `weights` (N,)."""
+    """(M,) at each point x, z (M,), the weighted sum of its distances from N places.
+
+    place_x, place_z, weights: (N,) of the places.
+    """
     out = np.empty(len(x))
     for m in range(len(x)):
         total = 0.0
@@ -124,7 +127,10 @@ def distance_sum(x, z, place_x, place_z, weights):
 
 @njit(fastmath=FAST)
 def lowest_cone(x, z, place_x, place_z, heights, steepness):
-    """(M,) at each point x, z (M,), the height of the lowest of N cones, which rise by `steepness` (N,)."""
+    """(M,) at each point x, z (M,), the height of the lowest of N cones that are open at the top.
+
+    place_x, place_z, heights: (N,) of the tips, cm. steepness: (N,) rise from the tip, cm per cm.
+    """
     out = np.empty(len(x))
     for m in range(len(x)):
         lowest = np.inf
@@ -137,9 +143,10 @@ def lowest_cone(x, z, place_x, place_z, heights, steepness):
 
 @njit(fastmath=FAST, forceinline=True, cache=False)
 def _down_means(heights, rows, columns, a, points):
-    """The first height d of the patch above feet in contact, and the means of d - first and of its square.
+    """The first d, the mean of d - first and the mean of (d - first)², over all feet in contact.
 
-    d - first is a small number, so single precision is enough. points: u, v and height of each foot.
+    d is the height of the patch above a foot. d - first is a small number, so single precision is enough.
+    points: u, v and height of each foot.
     """
     u, v, foot = points
     (ru, rv, r0), (cu, cv, c0) = a
@@ -157,9 +164,10 @@ def _down_means(heights, rows, columns, a, points):
 
 @njit(fastmath=FAST, forceinline=True, cache=False)
 def _up_sum(heights, rows, columns, a, offset, points, jumps):
-    """Sum of squared heights of the ground above feet in the air. For jumps, ground far below counts, too.
+    """Sum of squared heights of the ground above feet in the air.
 
-    offset: mean height of the patch above the feet in contact, which is subtracted.
+    Ground below a foot does not count, except in jumps if it is more than JUMP_HEIGHT below. offset: mean
+    height of the patch above the feet in contact, which is subtracted. points: u, v and height of each foot.
     """
     u, v, foot = points
     (ru, rv, r0), (cu, cv, c0) = a
@@ -176,7 +184,10 @@ def _up_sum(heights, rows, columns, a, offset, points, jumps):
 
 @njit(fastmath=FAST, forceinline=True, cache=False)
 def _beam_side_sum(heights, rows, columns, a, points):
-    """Sum over points beside the path of max(0, height - height of the path + BEAM_HEIGHT) squared."""
+    """Sum, over points beside the path, of max(0, height - height of the path + BEAM_HEIGHT) squared.
+
+    points: u and v of each point, and u and v of the path beside it.
+    """
     u, v, path_u, path_v = points
     (ru, rv, r0), (cu, cv, c0) = a
     squares = np.float32(0)
@@ -193,7 +204,12 @@ def _beam_side_sum(heights, rows, columns, a, points):
 
 @njit(forceinline=True, cache=False)
 def _error(heights, rows, columns, a, tables, jumps, limit):
-    """The error of one patch, or infinity as soon as it is known to exceed `limit`."""
+    """The error of one patch, cm², or infinity as soon as it is known to exceed `limit`.
+
+    tables: four tables, each as a tuple of its columns: feet in contact (u, v, height); the feet in the air
+    that are tried first, and the other feet in the air (the same columns); points beside a beam (u, v, and u,
+    v of the path). jumps: whether the ground must not be far below feet in the air.
+    """
     down, up_first, up_rest, beam_sides = tables
     first, offset, squares = _down_means(heights, rows, columns, a, down)
     error = DOWN_WEIGHT * max(squares - offset * offset, 0.0)
@@ -219,7 +235,7 @@ def _map_to_cells(a):
 
 @njit
 def view_errors(heights, starts, shapes, which, affine, tables, jumps):
-    """The error (P,) of every view. tables: as `_columns` of `hobble.terrain.search` returns them."""
+    """The error (P,) of every patch, cm². tables, jumps: see `_error`."""
     out = np.empty(len(which))
     for p in range(len(which)):
         cells, rows, columns = map_of(heights, starts, shapes, which[p])
@@ -229,7 +245,7 @@ def view_errors(heights, starts, shapes, which, affine, tables, jumps):
 
 @njit
 def search_views(heights, starts, shapes, which, affine, tables, jumps, count):
-    """Indices and errors (count,) of the views with the lowest errors, best first, ties by index."""
+    """Indices and errors (count,) of the patches with the lowest errors, best first; ties go by index."""
     best = np.full(count, -1)
     errors = np.full(count, np.inf)
     for p in range(len(which)):

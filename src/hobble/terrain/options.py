@@ -10,14 +10,16 @@ from hobble.core.section import Finite, MocapPath, Positive, PositiveFloat, Sect
 
 
 class HeightmapOptions(Section):
-    """One source of ground: generated, matplotlib's elevation model of a real landscape, or a file."""
+    """One heightmap: generated, read from a file, or matplotlib's elevation model of a real landscape."""
 
     kind: Literal["fractal", "hills", "stairs", "slope", "boxes", "beams", "elevation", "file"]
     path: MocapPath | None = Field(None, description="for kind: file; relative to the mocap folder")
     seed: int = 0
-    cell: PositiveFloat | None = Field(None, description="width of a cell, cm, instead of terrain.cell")
+    cell: PositiveFloat | None = Field(
+        None, description="width of this map's cells, cm; default: terrain.cell"
+    )
     height_scale: PositiveFloat | None = Field(
-        None, description="factor on the heights; for files it replaces terrain.height_scale"
+        None, description="factor on the heights; for `kind: file` it replaces terrain.height_scale"
     )
 
     @model_validator(mode="after")
@@ -37,11 +39,13 @@ class Drawing(Section):
         )
     )
     patches: Positive = 20_000
-    cell: PositiveFloat = Field(3.937007874, description="width of a cell, cm")
+    cell: PositiveFloat = Field(
+        3.937007874, description="width of a patch's cells, and of a heightmap's unless it has its own, cm"
+    )
     size: Annotated[int, Field(gt=0, le=2048)] = Field(128, description="width of a patch, cells")
     height_scale: PositiveFloat = Field(3.0, description="factor that converts the heights in files to cm")
     highest: PositiveFloat = Field(
-        50.0, description="patches with a height that is further than this from their mean are dropped, cm"
+        50.0, description="a patch is dropped if one of its heights is further than this from their mean, cm"
     )
     seed: int = 1
 
@@ -53,38 +57,45 @@ class Drawing(Section):
 
 
 class Fitting(Section):
-    """How patches are fitted under the cycles of a clip, for the rule `terrain_fits`."""
+    """How patches are fitted under the gait cycles of a clip, for the rule `terrain_fits`."""
 
     fits: Positive = Field(
-        10, description="fits of each cycle; a flat cycle has one, which is used this many times"
+        10,
+        description="fits of each cycle; on flat ground a cycle has only one, which counts this many times",
     )
     smoothing: Annotated[float, Field(ge=0)] = Field(
         0.1, description="regularisation of the radial basis functions"
     )
     heel_height: Literal["auto"] | Finite = Field(
-        "auto", description="height of the heel joint above its sole, cm; `auto`: from the clip; original: 5"
+        "auto",
+        description="height of the heel joint above its sole, cm; `auto`: from the clip; Holden et al.: 5",
     )
     toe_height: Literal["auto"] | Finite = Field(
-        "auto", description="height of the toe joint above its sole, cm; `auto`: from the clip; original: 4"
+        "auto",
+        description="height of the toe joint above its sole, cm; `auto`: from the clip; Holden et al.: 4",
     )
     sole: Finite = Field(
-        4.0, description="what `auto` takes for the toe joint on ground that is not flat, cm"
+        4.0, description="`toe_height: auto` means this height on ground that is not flat, cm"
     )
     deepest: PositiveFloat | None = Field(
-        1.0, description="how far a foot may be below the ground, cm; null: no limit, as in the original"
+        1.0,
+        description="how far a foot may be below the ground, cm; null: no limit, as in Holden et al. (2017)",
     )
     bend_flat: bool = Field(
-        True, description="correct flat ground if feet are more than `deepest` from it; false: keep it level"
+        True,
+        description="correct flat ground that is on average more than `deepest` from the feet in contact, or "
+        "more than `deepest` above a foot; false: keep it level",
     )
     flat_level: Literal["zero", "feet"] = Field(
         "zero",
         description="height of flat ground: zero, or the mean height of the soles in contact in each cycle, "
-        "as in the original",
+        "as in Holden et al. (2017)",
     )
     held_up: PositiveFloat | None = Field(
         2.0,
-        description="on flat ground a heel in contact does not count if it is more than this above its toe, "
-        "which is in contact, too (cm), and the other way round; null: no such rule, as in the original",
+        description="on flat ground, a heel does not count as in contact if the toe of its foot does and is "
+        "more than this lower, cm; likewise for a toe above its heel; null: no such rule, as in Holden "
+        "et al. (2017)",
     )
 
 
@@ -99,7 +110,12 @@ class Terrain(Drawing, Fitting):
 
 
 class HeightSampling(Section):
-    """The keys of the section `database` that decide at which points rows need ground heights."""
+    """The keys of the section `database` that decide at which points rows need ground heights.
+
+    window: frames of the trajectory before and after the present one. step: frames between its samples.
+    facing_sigma: smoothing of the facing direction, frames. terrain_side: cm from the path to the points
+    beside it.
+    """
 
     window: Positive
     step: Positive

@@ -1,8 +1,8 @@
 """Patches of ground: views of a few heightmaps, drawn at random.
 
-A patch does not store its cells. It stores which heightmap it is from, the affine map from its cells to those
-of the heightmap, and its mean height, which is subtracted. 20,000 patches take 1 MB; their cells would take
-600 MB.
+A patch does not store its cells. It stores which heightmap it is from, the affine transform from its cells to
+those of the heightmap, and its mean height, which is subtracted. 20,000 patches take 1 MB; their cells would
+take 600 MB.
 """
 
 from __future__ import annotations
@@ -18,9 +18,9 @@ from hobble.core.files import load_npz, save_npz
 from hobble.core.quat import Array
 from hobble.terrain.heightmaps import TerrainMap
 
-VIEWS_PER_DRAW = 1_000
-HOLE_HEIGHT = 1e9  # cm, so that no view with a hole passes
-FEWEST_PASSING = 1 / 1_000  # share of a map's random views that have to pass
+VIEWS_PER_DRAW = 1_000  # random views of a heightmap that are tried at a time
+HOLE_HEIGHT = 1e9  # height that holes in a map get, cm: views with a hole are then dropped as too high
+FEWEST_PASSING = 1 / 1_000  # drawing from a map fails if a smaller share of its random views can be used
 
 
 @dataclass(frozen=True)
@@ -28,10 +28,10 @@ class Patches:
     """P views of M heightmaps.
 
     heights: all maps one after another, row by row, cm, float32. starts: (M,) index of each map's first cell.
-    shapes: (M, 2) rows and columns. names: (M,) of the maps. which: (P,) map of each view. affine: (P, 2, 3)
-    such that row, column of the map = affine (u, v, 1), where (u, v) is a cell counted from the middle of the
-    patch, u along the world's x and v along z. mean: (P,) height to subtract, cm. cell: width of a patch's
-    cell, cm. size: width of a patch, cells.
+    shapes: (M, 2) rows and columns. names: (M,) names of the maps. which: (P,) index of each view's map.
+    affine: (P, 2, 3) such that row, column of the map = affine (u, v, 1), where (u, v) is a cell counted from
+    the middle of the patch, u along the world's x and v along z. mean: (P,) height to subtract, cm. cell:
+    width of a patch's cell, cm. size: width of a patch, cells.
     """
 
     heights: Array = field(repr=False)
@@ -75,16 +75,16 @@ def draw_patches(
 ) -> Patches:
     """Draw `count` patches of `size` x `size` cells, `cell` cm wide, equally many from each map.
 
-    Each is a view at a random place, flipped at random and turned by up to 90 degrees either way. A view with
-    a height more than `highest` cm from its mean is dropped and drawn again. Raises InputError for a map
-    that is too small, or if fewer than one in a thousand of its views pass.
+    Each patch is a view at a random place, flipped at random and turned by up to 90 degrees either way. A
+    view with a height more than `highest` cm from its mean is dropped, and another one is drawn. Raises
+    InputError for a map that is too small, or if fewer than one in a thousand of its views can be used.
     """
     if not maps:
         raise HobbleError("terrain.heightmaps is empty, so there is nothing to draw patches from.")
-    shares = [count // len(maps) + (i < count % len(maps)) for i in range(len(maps))]
+    counts = [count // len(maps) + (i < count % len(maps)) for i in range(len(maps))]
     drawn = [
-        _draw_from(heightmap, share, cell, size, highest, np.random.default_rng([seed, i]))
-        for i, (heightmap, share) in enumerate(zip(maps, shares, strict=True))
+        _draw_from(heightmap, views, cell, size, highest, np.random.default_rng([seed, i]))
+        for i, (heightmap, views) in enumerate(zip(maps, counts, strict=True))
     ]
     shapes = np.array([m.heights.shape for m in maps], np.int64)
     return Patches(
@@ -92,7 +92,7 @@ def draw_patches(
         starts=_starts(shapes),
         shapes=shapes,
         names=np.array([Path(m.name).name for m in maps]),
-        which=np.repeat(np.arange(len(maps), dtype=np.int32), shares),
+        which=np.repeat(np.arange(len(maps), dtype=np.int32), counts),
         affine=np.concatenate([affine for affine, _ in drawn]),
         mean=np.concatenate([mean for _, mean in drawn]),
         cell=cell,
@@ -101,27 +101,28 @@ def draw_patches(
 
 
 def _draw_from(
-    heightmap: TerrainMap, share: int, cell: float, size: int, highest: float, rng: np.random.Generator
+    heightmap: TerrainMap, count: int, cell: float, size: int, highest: float, rng: np.random.Generator
 ) -> tuple[Array, Array]:
-    """`share` views (share, 2, 3) of one map that pass, and their mean heights (share,)."""
+    """`count` views of one map that can be used, (count, 2, 3), and their mean heights (count,)."""
     from hobble.terrain.kernels import view_extents
 
-    one = _with_holes_marked(heightmap, cell).astype(np.float32)
-    alone = one.ravel(), np.zeros(1, np.int64), np.array([one.shape], np.int64)
+    heights = _with_holes_marked(heightmap, cell).astype(np.float32)
+    only_map = heights.ravel(), np.zeros(1, np.int64), np.array([heights.shape], np.int64)
     affines, means = [np.zeros((0, 2, 3), np.float32)], [np.zeros(0, np.float32)]
     found, drawn = 0, 0
-    while found < share:
+    while found < count:
         affine = _views(rng, heightmap, cell, size)
-        mean, passes = view_extents(*alone, np.zeros(len(affine), np.int32), affine, size, highest)
-        keep = np.flatnonzero(passes)[: share - found]
+        mean, passes = view_extents(*only_map, np.zeros(len(affine), np.int32), affine, size, highest)
+        keep = np.flatnonzero(passes)[: count - found]
         affines.append(affine[keep])
         means.append(mean[keep])
         found += len(keep)
         drawn += VIEWS_PER_DRAW
-        if found < share and found < FEWEST_PASSING * drawn:
+        if found < count and found < FEWEST_PASSING * drawn:
             raise InputError(
                 heightmap.name,
-                f"{found or 'none'} of {drawn} views of {size} cells stay within {highest:g} cm of the mean",
+                f"{found or 'none'} of {drawn} views of {size} cells stay within {highest:g} cm "
+                "of their mean",
                 fix="Lower its height_scale, or leave this heightmap out.",
             )
     return np.concatenate(affines), np.concatenate(means)
@@ -148,7 +149,7 @@ def load_patches(path: str | Path) -> Patches:
 def _with_holes_marked(heightmap: TerrainMap, cell: float) -> Array:
     """The map's heights, with HOLE_HEIGHT in holes (nan) and in the cells around them.
 
-    The cells around a hole get it, too, because the cells of a coarse patch could skip the hole itself.
+    The cells around a hole are marked, too, because the cells of a coarse patch could skip the hole itself.
     """
     holes = np.isnan(heightmap.heights)
     if not holes.any():
@@ -160,6 +161,7 @@ def _with_holes_marked(heightmap: TerrainMap, cell: float) -> Array:
 
 
 def _starts(shapes: np.ndarray) -> np.ndarray:
+    """(M,) index of the first cell of each map. shapes: (M, 2)."""
     sizes = np.prod(shapes, axis=1)
     return np.cumsum(sizes) - sizes
 
@@ -171,13 +173,13 @@ def _views(rng: np.random.Generator, heightmap: TerrainMap, cell: float, size: i
     corners = np.array([[a, b] for a in (-half, size - 1 - half) for b in (-half, size - 1 - half)])
     angle = rng.uniform(-np.pi / 2, np.pi / 2, VIEWS_PER_DRAW)
     flips = rng.choice([-1.0, 1.0], (VIEWS_PER_DRAW, 2))
-    place = rng.uniform(size=(VIEWS_PER_DRAW, 2))
+    place_in_map = rng.uniform(size=(VIEWS_PER_DRAW, 2))
     c, s = np.cos(angle), np.sin(angle)
     turn = scale * np.stack([np.stack([c, -s], -1), np.stack([s, c], -1)], -2) * flips[:, None]
-    reach = np.einsum("nij,kj->nki", turn, corners)
-    low, high = -reach.min(axis=1), np.array(heightmap.heights.shape) - 1 - reach.max(axis=1)
-    fits = np.all(high >= low, axis=1)
-    if not fits.any():
+    from_centre = np.einsum("nij,kj->nki", turn, corners)
+    low, high = -from_centre.min(axis=1), np.array(heightmap.heights.shape) - 1 - from_centre.max(axis=1)
+    has_room = np.all(high >= low, axis=1)
+    if not has_room.any():
         needed = int(np.ceil((size - 1) * scale)) + 1
         rows, columns = heightmap.heights.shape
         raise InputError(
@@ -185,5 +187,5 @@ def _views(rng: np.random.Generator, heightmap: TerrainMap, cell: float, size: i
             f"{rows} x {columns} cells are too few for patches of {needed} x {needed}",
             fix="Use a larger map, a larger `cell` for this map, or a smaller terrain.size.",
         )
-    centre = low + place * (high - low)
-    return np.concatenate([turn, centre[..., None]], axis=-1)[fits].astype(np.float32)
+    centre = low + place_in_map * (high - low)
+    return np.concatenate([turn, centre[..., None]], axis=-1)[has_room].astype(np.float32)

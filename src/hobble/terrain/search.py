@@ -1,7 +1,7 @@
-"""Finds the patches that fit a cycle best. It tries every patch, but gives most up early.
+"""Finds the patches that fit a cycle best. The search tries every patch, but gives most up early.
 
-The error of a patch is a sum of terms that only grow with more points. So a patch can be skipped as soon as
-its partial sum exceeds the largest error of the best patches so far. The result is that of a full search.
+The error of a patch is a sum of terms that are never negative. So a patch can be skipped as soon as its
+partial sum exceeds the largest error of the best patches so far. The result equals that of a full search.
 """
 
 from __future__ import annotations
@@ -14,8 +14,8 @@ from hobble.core.quat import Array
 from hobble.terrain.kernels import search_views, view_errors
 from hobble.terrain.patches import Patches
 
-FIRST_POINTS = 128  # points in the air that are tried first; most patches can be skipped after these
-GOLDEN_RATIO = 0.6180339887498949
+FIRST_POINTS = 128  # feet in the air that are compared first; most patches can be skipped after these
+GOLDEN_RATIO = 0.6180339887498949  # the fractional parts of its multiples are spread evenly over 0..1
 
 
 @dataclass(frozen=True)
@@ -23,9 +23,9 @@ class FootPoints:
     """The points that the ground under a cycle has to fit.
 
     u, v are cells from the middle of the patch, along x and z. down, up: (N, 3) u, v and height of soles in
-    contact (down) and in the air (up), cm above the mean of those in contact. jumps: whether the ground must
-    not be far below feet in the air. beam_sides: (N, 4) u, v of a point next to the path, and u, v of its
-    point on the path; empty unless the ground is a beam.
+    contact (down) and in the air (up). Heights are cm above the mean height of the soles in contact. jumps:
+    whether the clip jumps, so that the ground must not be far below feet in the air. beam_sides: (N, 4) u, v
+    of a point next to the path, and u, v of the path beside it; empty unless the ground is a beam.
     """
 
     down: Array = field(repr=False)
@@ -51,7 +51,7 @@ def patch_errors(patches: Patches, footing: FootPoints) -> Array:
 
 
 def _columns(footing: FootPoints) -> tuple[tuple[Array, ...], ...]:
-    """The columns of four tables: in contact; the first FIRST_POINTS in the air; the rest; next to a beam."""
+    """Columns of four tables: feet in contact; FIRST_POINTS feet in the air; the other feet; beam sides."""
     spread = (np.arange(len(footing.up)) * GOLDEN_RATIO) % 1.0  # so that the first points cover all frames
     order = np.argsort(spread, kind="stable")
     up = footing.up[order]

@@ -42,39 +42,40 @@ def find_soles(
     sole: float,
     deepest: float | None,
 ) -> Feet:
-    """The soles of a clip. A height of "auto" is found from the clip or its skeleton.
+    """The soles of a clip. Joint heights above the sole that are "auto" are computed from clip or skeleton.
 
-    frames: (N,) the frames to look at. On flat ground, which is at height 0, "auto" is the median height of
-    the joints in contact, or up to `deepest` cm less if this keeps all feet within `deepest` below the
-    ground. On other ground the toe joint is `sole` cm above its sole, and the heel joint is as much higher as
-    in the rest pose.
+    contacts: (F, 4). frames: (N,) the frames to look at. flat: whether the ground is flat; it is then at
+    height 0. On flat ground "auto" is the median height of the joints in contact. If a foot would then be
+    more than `deepest` cm below the ground, "auto" is lowered by just enough to avoid this, but only if this
+    takes at most `deepest` cm. On other ground the toe joint is `sole` cm above its sole, and the heel joint
+    is higher than the toe joint by as much as in the rest pose.
     """
     joints = clip.positions[:, [clip.skeleton.role(role) for role in FOOT_ROLES]].copy()
-    found: list[float] = []
-    for wanted, columns in ((heel_height, IS_HEEL), (toe_height, ~IS_HEEL)):
+    above_sole: list[float] = []
+    for setting, columns in ((heel_height, IS_HEEL), (toe_height, ~IS_HEEL)):
         heights, down = joints[frames][:, columns, 1], contacts[frames][:, columns]
-        if wanted != "auto":
-            found.append(float(wanted))
+        if setting != "auto":
+            above_sole.append(float(setting))
         elif flat and down.any():
-            found.append(_flat_height(heights, down, deepest))
+            above_sole.append(_flat_height(heights, down, deepest))
         else:
-            found.append(sole + (heel_above_toe(clip.skeleton) if columns is IS_HEEL else 0.0))
-    joints[..., 1] -= np.where(IS_HEEL, *found)
-    return Feet(joints, contacts, *found)
+            above_sole.append(sole + (heel_above_toe(clip.skeleton) if columns is IS_HEEL else 0.0))
+    joints[..., 1] -= np.where(IS_HEEL, *above_sole)
+    return Feet(joints, contacts, *above_sole)
 
 
 def held_above_other(feet: Feet, least: float) -> Mask:
-    """(F, 4) whether a joint is over `least` cm above the other joint of its foot, which is in contact."""
+    """(F, 4) whether the other joint of the same foot is in contact and more than `least` cm lower."""
     other = [1, 0, 3, 2]
     height = feet.soles[..., 1]
     return (height - height[:, other] > least) & feet.contacts[:, other]
 
 
 def _flat_height(heights: Array, down: Array, deepest: float | None) -> float:
-    """The median height in contact, or up to `deepest` less if then every sole is above -deepest."""
+    """The median height of the joints in contact, or less to keep soles above -deepest; see `find_soles`."""
     median = float(np.median(heights[down]))
-    wanted = float(heights.min()) + (deepest or 0.0)
-    return wanted if deepest is not None and median - deepest <= wanted < median else median
+    highest = float(heights.min()) + (deepest or 0.0)  # with more, the lowest sole is below -deepest
+    return highest if deepest is not None and median - deepest <= highest < median else median
 
 
 def heel_above_toe(skeleton: Skeleton) -> float:

@@ -1,6 +1,7 @@
 """The `training` stage: network weights from a database.
 
-Importing it sets environment variables that PyTorch and numba read at import, if they are not set yet.
+Importing this package sets environment variables that PyTorch and numba read at import, if they are not set
+yet.
 """
 
 import os

@@ -16,8 +16,8 @@ from hobble.training.processes import ALONE, Processes
 
 TRAIN = "train"
 CHECK_EVERY = 2048  # samples between checks of the losses; checking every batch would wait for the GPU
-DIVERGED = 100.0  # a larger error means that training diverged; predicting the mean gives 1
-MOST_NAMED = 8  # clips in a message
+DIVERGED = 100.0  # a larger mean loss of a section means that training diverged; predicting the mean gives 1
+MOST_NAMED = 8  # at most this many clips or rows are named in a message
 
 Piece = tuple[Tensor, Tensor, Tensor, np.ndarray, np.ndarray]  # x, y, p, clip and frame of a `SampleBatch`
 
@@ -40,8 +40,8 @@ class SampleBatch(NamedTuple):
 class TrainingRows:
     """The training rows of a database, as one process reads them. A section is a part of a pass over them.
 
-    processes: those that share a batch. stretches: number of parts of a section from which each batch takes
-    its samples; None: one for each process.
+    processes: the processes that share a batch. stretches: number of parts of a section from which each batch
+    takes its samples; None: one for each process.
     """
 
     def __init__(
@@ -68,27 +68,29 @@ class HostRows(TrainingRows):
     ) -> Iterator[SampleBatch]:
         """Yield this process's part of each batch of a section. size: samples of a batch over all processes.
 
-        section: from 0 to `sections` - 1 in each pass. The last batch may be shorter. It is trained like the
-        others, because a loss is a mean over the batch. So a section uses each of its samples once, leaves
-        none for the next section, and a checkpoint between sections is complete.
+        section: from 0 to `sections` - 1 in each pass. seed: of the order of the rows. The last batch may be
+        shorter. It is used all the same: so a section uses each of its samples once and leaves none for the
+        next section, and a checkpoint between sections is complete.
         """
-        place = (pass_index, section, sections, seed)
+        order_key = (pass_index, section, sections, seed)
         # The order of the rows depends on this window and must be the same for any number of processes. So
         # the window follows from the size of the whole batch, not of this process's part.
         window = self.database.window(TRAIN, self.database.block_rows(size))
         sharing = self.sharing(section, sections, size)
-        read = [self._pieces(place, stretch, window) for stretch in sharing.read()]
+        stretches = [self._pieces(order_key, stretch, window) for stretch in sharing.read()]
         for total, _ in sharing.sizes():
-            # A short last batch fills only its first places, so later stretches may have no samples for it.
-            pieces = [piece for one in read if (piece := next(one, None)) is not None]
+            # The last batch may be so short that some stretches have no samples for it.
+            pieces = [piece for stretch in stretches if (piece := next(stretch, None)) is not None]
             piece = pieces[0] if len(pieces) == 1 else _joined(pieces, self._nothing)
             yield SampleBatch(*piece, total)
 
-    def _pieces(self, place: tuple[int, int, int, int], stretch: SampleRange, window: int) -> Iterator[Piece]:
+    def _pieces(
+        self, order_key: tuple[int, int, int, int], stretch: SampleRange, window: int
+    ) -> Iterator[Piece]:
         """The samples of one stretch, batch by batch."""
         size = stretch.high - stretch.low
         rows = self.database.block_rows(size)
-        for block in self.database.blocks(TRAIN, *place, rows, stretch, window):
+        for block in self.database.blocks(TRAIN, *order_key, rows, stretch, window):
             x, y, p = (torch.from_numpy(array).to(self.device) for array in block[:3])
             for start in range(0, len(p), size):
                 part = slice(start, start + size)
@@ -96,7 +98,7 @@ class HostRows(TrainingRows):
 
     @property
     def _nothing(self) -> Piece:
-        """No rows."""
+        """A piece without rows."""
         layout, none = self.database.layout, np.empty(0, np.int32)
         x, y = (torch.empty(0, size, device=self.device) for size in (layout.x_size, layout.y_size))
         return x, y, x[:, 0], none, none
@@ -111,7 +113,8 @@ class LossWatch:
     """Adds up the losses of a section, and stops the training if it diverges.
 
     where: names the pass and section in messages. clips: names by index. processes: all of them stop
-    together, with the message of the process that has the broken rows.
+    together, with the message of the process that has the broken rows. seen, samples: numbers of samples that
+    were added, and whose losses were checked.
     """
 
     def __init__(self, where: str, clips: tuple[str, ...], processes: Processes = ALONE) -> None:
@@ -133,7 +136,12 @@ class LossWatch:
         self._check()
         mean = self._total / max(self.samples, 1)
         if mean > DIVERGED and self._worst is not None:
-            raise HobbleError(self._message(f"its error is {mean:.3g} on the average", *self._worst[1:]))
+            raise HobbleError(
+                self._message(
+                    f"the mean error of the section is {mean:.3g}, and this batch has the largest",
+                    *self._worst[1:],
+                )
+            )
         return mean
 
     def _check(self) -> None:

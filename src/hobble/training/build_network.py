@@ -1,4 +1,4 @@
-"""Builds a network from the clips without training, such as motion matching."""
+"""Builds a network that needs no training, such as motion matching, from the clips."""
 
 from __future__ import annotations
 
@@ -39,23 +39,24 @@ def run_built(
     checkpoint: Path,
     terrain_side: float,
 ) -> None:
-    """Build a network and write the same three files as a training.
+    """Build a network and write the files that a training would write: weights, history and checkpoint.
 
-    clips: name -> file of its rows in order; all training clips of the database have to be there. The history
-    has one row, since every frame is read once. The checkpoint only names what was built; training cannot
-    resume from it.
+    clips: name -> file with the clip's rows in order; has all training clips of the database. configuration:
+    its name. terrain_side: cm from the path to the points at its sides where rows have ground heights. The
+    history has one row, since every frame is read once. The checkpoint only describes the network; training
+    cannot resume from it.
     """
     began = time.perf_counter()
-    made, frames = build(database, network, clips)
+    built, frames = build(database, network, clips)
     seconds = time.perf_counter() - began
-    log.info("%s, from %d rows in %s", made.described, frames, duration(seconds))
-    facts = {"passes": 1, "samples": frames, "steps": 0, "terrain_side": terrain_side}
-    write_weights(weights, made, database, configuration, facts)
+    log.info("%s, from %d rows in %s", built.described, frames, duration(seconds))
+    about_training = {"passes": 1, "samples": frames, "steps": 0, "terrain_side": terrain_side}
+    write_weights(weights, built, database, configuration, about_training)
     blocks = database.layout.blocks("y")
     errors = HeldOut(database, torch.device("cpu"), 0).every_row(Standardised(load_network(weights)))
     log.info("held out, every row: %.4f", errors[0])
     write_history(history, blocks, [[1, 1, frames, seconds, float("nan"), *errors]])
-    save_npz(checkpoint, network=np.array(made.described), sections=np.array(0))
+    save_npz(checkpoint, network=np.array(built.described), sections=np.array(0))
 
 
 def build(
@@ -71,8 +72,8 @@ def build(
     if missing := [clip["clip"] for clip in used if clip["clip"] not in clips]:
         raise HobbleError(f"the database has rows of {', '.join(missing)}, but their files are missing")
     files = [clips[clip["clip"]] for clip in used]
-    made = kind.build(network, files, database.layout, Skeleton.from_dict(database.skeleton))
-    return made, sum(clip["rows"] for clip in used)
+    built = kind.build(network, files, database.layout, Skeleton.from_dict(database.skeleton))
+    return built, sum(clip["rows"] for clip in used)
 
 
 class Standardised:

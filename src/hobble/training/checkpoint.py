@@ -16,18 +16,18 @@ from hobble.models.trainable import Trainable
 from hobble.training.history import COLUMNS
 from hobble.training.optimiser import Adam
 
-HELD_OUT = COLUMNS.index("held_out_mse")
+HELD_OUT = COLUMNS.index("held_out_mse")  # the place of the held-out error in a row of the history
 
 
 @dataclass
 class State:
     """The state of a training after `sections_done` whole sections, counted from its start.
 
-    adam: the optimiser. recipe: hash of everything that determines the result
-    (`hobble.training.start.run_name`). samples, seconds: used so far. best, best_mse: the flat weights with
-    the lowest held-out error so far, and this error. history: one row of numbers per section: COLUMNS, then
-    the held-out error of each block of Y. There is no state of random generators: the order of the rows and
-    dropout are seeded by pass and section.
+    adam: the optimiser. samples, seconds: used so far. best_mse, best: the lowest held-out error so far, and
+    the weights with this error, laid out like `network.flat`. history: one row of numbers per section:
+    COLUMNS of `hobble.training.history`, then the held-out error of each block of Y. recipe: hash of
+    everything that determines the result (`hobble.training.start.run_name`). There is no state of random
+    generators, because the order of the rows and dropout are seeded by pass and section.
     """
 
     network: Trainable

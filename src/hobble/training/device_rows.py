@@ -18,14 +18,17 @@ from hobble.training.batches import TRAIN, HostRows, SampleBatch, TrainingRows
 from hobble.training.processes import ALONE, Processes
 
 ROWS_AT_ONCE = 4096  # rows composed at a time: that takes few kernel launches and 10 MB
-MEMORY_SHARE = 0.6  # of the device's memory for rows; the rest is for the network and its buffers
+MEMORY_SHARE = 0.6  # share of the device's memory for rows; the network and its buffers need the rest
 
 
 class DeviceRows(TrainingRows):
     """All training rows in the memory of the device. They are uploaded chunk by chunk to save host memory.
 
-    The batches equal those of `HostRows` if the host holds all rows in memory. The host computes only the
+    The batches equal those of a `HostRows` that can hold all rows in memory. The host computes only the
     order of rows and terrain fits, and sends it once a section.
+
+    x, y, fits, phase: tables on the device. On the host, for each row: count, first: number of its terrain
+    fits, and index of the first one; clip, frame: the clip and frame that it is from.
     """
 
     def __init__(
@@ -70,58 +73,64 @@ class DeviceRows(TrainingRows):
     def batches(
         self, pass_index: int, section: int, sections: int, seed: int, size: int
     ) -> Iterator[SampleBatch]:
-        """See `hobble.training.batches.HostRows.batches`."""
+        """Yield this process's part of each batch, see `hobble.training.batches.HostRows.batches`."""
         sharing = self.sharing(section, sections, size)
         rows, fits = self._read(sharing, (pass_index, section, sections, seed))
-        sent, fits_sent = (torch.from_numpy(part).to(self.device) for part in (rows, fits))
-        own = len(sharing.own)
-        step = own * max(1, ROWS_AT_ONCE // own)
+        device_rows, device_fits = (torch.from_numpy(part).to(self.device) for part in (rows, fits))
+        batch_rows = len(sharing.own)  # rows of this process in a batch
+        step = batch_rows * max(1, ROWS_AT_ONCE // batch_rows)
         sizes = sharing.sizes()
         for at in range(0, max(len(rows), 1), step):
-            x, y, p = self._composed(sent[at : at + step], fits_sent[at : at + step])
-            of_host = rows[at : at + step]
-            clip, frame = self.clip[of_host], self.frame[of_host]
-            for start in range(0, len(p), own):
-                part = slice(start, start + own)
+            x, y, p = self._composed(device_rows[at : at + step], device_fits[at : at + step])
+            composed = rows[at : at + step]
+            clip, frame = self.clip[composed], self.frame[composed]
+            for start in range(0, len(p), batch_rows):
+                part = slice(start, start + batch_rows)
                 yield SampleBatch(x[part], y[part], p[part], clip[part], frame[part], next(sizes)[0])
         for total, _ in sizes:  # the last batch is too short to have rows for this process
             yield SampleBatch(x[:0], y[:0], p[:0], clip[:0], frame[:0], total)
 
-    def _read(self, sharing: PassSharing, place: tuple[int, int, int, int]) -> tuple[np.ndarray, np.ndarray]:
-        """Indices of the rows and of the fits that this process reads in a section, batch by batch."""
-        places, batches = [], []
+    def _read(
+        self, sharing: PassSharing, order_key: tuple[int, int, int, int]
+    ) -> tuple[np.ndarray, np.ndarray]:
+        """Indices of the rows and of the fits that this process reads in a section, batch by batch.
+
+        order_key: pass, section, number of sections and seed.
+        """
+        read, batches = [], []
         for stretch in sharing.read():
-            parts = list(self._places(*place, stretch))
-            rows, fits = (np.concatenate(part) for part in zip(*parts, strict=True))
-            some = stretch.kept(0, len(rows))
-            places.append((rows[some], fits[some]))
-            batches.append(np.arange(len(places[-1][0])) // (stretch.high - stretch.low))
-        rows, fits = (np.concatenate(part) for part in zip(*places, strict=True))
+            layers = list(self._of_stretch(*order_key, stretch))
+            rows, fits = (np.concatenate(part) for part in zip(*layers, strict=True))
+            kept = stretch.kept(0, len(rows))
+            read.append((rows[kept], fits[kept]))
+            batches.append(np.arange(len(read[-1][0])) // (stretch.high - stretch.low))
+        rows, fits = (np.concatenate(part) for part in zip(*read, strict=True))
         if len(batches) == 1:
             return rows, fits
-        turn = np.argsort(np.concatenate(batches), kind="stable")
-        return rows[turn], fits[turn]
+        by_batch = np.argsort(np.concatenate(batches), kind="stable")
+        return rows[by_batch], fits[by_batch]
 
-    def _places(
+    def _of_stretch(
         self, pass_index: int, section: int, sections: int, seed: int, stretch: SampleRange
     ) -> Iterator[tuple[np.ndarray, np.ndarray]]:
-        """Rows and fits of a stretch in order, one layer (visit of all rows) at a time.
+        """Yield indices of rows and fits of a stretch in order, one layer (visit of all rows) at a time.
 
         All chunks are one group, that is, their rows are shuffled together.
         """
-        visits, cut = self.database.manifest.visits, (stretch.start, stretch.stop)
-        every, of_each = range(len(self.chunks)), [chunk.rows for chunk in self.chunks]
+        visits, part = self.database.manifest.visits, (stretch.start, stretch.stop)
+        chunks, chunk_rows = range(len(self.chunks)), [chunk.rows for chunk in self.chunks]
         nothing = np.empty(0, np.int64)
-        yield nothing, nothing
-        for layer, start, stop in order.spans(len(self.count), visits, section, sections, cut):
-            place = (seed, pass_index, layer, 0)
+        yield nothing, nothing  # so that even an empty stretch has arrays to join
+        for layer, start, stop in order.spans(len(self.count), visits, section, sections, part):
+            layer_key = (seed, pass_index, layer, 0)
             yield order.rows_and_fits(
-                every, of_each, self.count, self.first, visits, place, slice(start, stop)
+                chunks, chunk_rows, self.count, self.first, visits, layer_key, slice(start, stop)
             )
 
     def _composed(self, rows: Tensor, fits: Tensor) -> tuple[Tensor, Tensor, Tensor]:
-        """x (n, X), y (n, Y) and p (n,), composed on the device."""
+        """x (n, X), y (n, Y) and p (n,), composed on the device. rows, fits: (n,) indices into the tables."""
         layout = self.database.layout
+        # The last column of `fits` is the mean ground height, by which joint heights are lowered.
         ground, y = self.fits[fits].float(), self.y[rows].float()
         x = torch.empty(len(rows), layout.x_size, device=self.device)
         frames, lift = self.x[rows].float(), ground[:, -1:]
@@ -132,15 +141,15 @@ class DeviceRows(TrainingRows):
 def rows_for(
     database: Database, device: torch.device, processes: Processes = ALONE, stretches: int | None = None
 ) -> HostRows | DeviceRows:
-    """The training rows on the GPU if they fit, else composed on the host."""
+    """The training rows: on the GPU if its memory is large enough, else composed on the host."""
     on_device = device.type == "cuda" and fits_on(device, database.manifest)
     return (DeviceRows if on_device else HostRows)(database, device, processes, stretches)
 
 
 def fits_on(device: torch.device, manifest: Manifest) -> bool:
-    """Whether the training rows fit on the GPU beside the training itself.
+    """Whether the GPU has memory for the training rows and for the training itself.
 
-    Uses the total memory, not the free memory: the rows have another order on the GPU than on the host, and a
+    Uses the total memory, not the free memory: the rows have another order on the GPU than on the host, so a
     resumed run must make the same choice as before.
     """
     needed = sum(chunk.bytes for chunk in manifest.chunks[TRAIN])

@@ -7,14 +7,15 @@ import math
 import torch
 from torch import Tensor
 
-# The fractional parts of the multiples of these irrational numbers are spread evenly over 0..1.
+# The number of a row is the fractional part of: place in the batch * STEP_OF_PLACE + number of the batch *
+# STEP_OF_BATCH. As the steps are irrational, these fractional parts are spread evenly over 0..1.
 STEP_OF_PLACE, STEP_OF_BATCH = (math.sqrt(5) - 1) / 2, math.sqrt(2) - 1
 
 
 class EvenSpread:
-    """A number for each place of a batch, spread evenly over places and over batches.
+    """A number for each row of a batch, spread evenly over the rows and over batches.
 
-    A number depends only on the row's place in the whole batch and on the number of the batch.
+    It depends only on the row's place in the whole batch and on how many batches came before.
 
     batch: largest number of this process's rows in a batch. first: the place of its first row in the whole
     batch.
@@ -25,5 +26,5 @@ class EvenSpread:
         self.of_places = torch.remainder(places * STEP_OF_PLACE, 1.0)
 
     def numbers(self, rows: int, batches: int) -> Tensor:
-        """(rows,) float64 between 0 and 1, for the first `rows` rows of the batch with number `batches`."""
+        """(rows,) float64 from 0 to 1, for the first `rows` rows of this process, after `batches` batches."""
         return torch.remainder(self.of_places[:rows] + batches * STEP_OF_BATCH, 1.0)

@@ -27,17 +27,17 @@ class Predicts(Protocol):
 
 
 class HeldOut:
-    """A sample of the held-out clips' rows, kept in memory, each with one of its terrain fits.
+    """Measures a network on a sample of the held-out clips' rows, each with one of its terrain fits.
 
-    section: number of training samples in a section. The sample has a tenth as many rows, but 2,000 to
-    20,000, so measuring it after each section takes a few percent of the training time. `every_row` measures
-    all rows without keeping them in memory.
+    section_samples: number of training samples in a section. The held-out sample has a tenth as many rows,
+    but at least 2,000 and at most 20,000, so measuring it after each section takes a few percent of the
+    training time. It is kept in memory. `every_row` measures all rows without keeping them in memory.
     """
 
-    def __init__(self, database: Database, device: torch.device, section: int) -> None:
+    def __init__(self, database: Database, device: torch.device, section_samples: int) -> None:
         self.database, self.device = database, device
         self.blocks = database.layout.blocks("y")
-        rows = min(20_000, max(2_000, section // 10))
+        rows = min(20_000, max(2_000, section_samples // 10))
         self.sample: list[tuple[Tensor, ...]] = []
         for batch in self._stream():
             self.sample.append(tuple(part[:rows] for part in batch))
@@ -67,7 +67,7 @@ class HeldOut:
         return [float(mean.mean()), *(float(mean[columns].mean()) for columns in self.blocks.values())]
 
     def _stream(self) -> Iterator[tuple[Tensor, ...]]:
-        """Yield every row once, in random order. A pass uses each row several times; this takes the first."""
+        """Yield every row once, with one of its terrain fits and in random order, in blocks x, y, p."""
         visits = self.database.manifest.visits
         for block in self.database.blocks(SPLIT, 0, 0, visits, 0, ROWS_AT_ONCE):
             yield tuple(torch.from_numpy(array).to(self.device) for array in block[:3])

@@ -11,10 +11,11 @@ COLUMNS = ("pass", "section", "samples", "seconds", "train_mse", "held_out_mse")
 
 
 def columns(blocks: Iterable[str]) -> list[str]:
-    """Names of the columns. Samples and seconds are totals from the start; passes and sections begin at 1.
+    """Names of the columns of history.csv. blocks: names of the blocks of Y.
 
-    train_mse is the mean over the section's batches, with dropout. The held-out errors are measured at the
-    end of the section, without dropout. All are mean squared errors of the standardised output.
+    Samples and seconds are totals from the start; passes and sections begin at 1. train_mse is the mean over
+    the section's batches, with dropout. The held-out errors are measured at the end of the section, without
+    dropout. All are mean squared errors of the standardised output.
     """
     return [*COLUMNS, *(f"held_out_{name}" for name in blocks)]
 
@@ -33,7 +34,7 @@ def _cell(column: int, value: float) -> str:
 
 
 def duration(seconds: float) -> str:
-    """A time in words.
+    """A duration as text.
 
     >>> duration(42.4), duration(754), duration(7512)
     ('42 s', '12 min 34 s', '2 h 05 min')

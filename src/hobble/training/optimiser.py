@@ -20,7 +20,7 @@ def l1_slopes(network: Trainable, l1: float) -> list[float]:
     """For each layer, the factor of sign(w) that the L1 term adds to the gradient of a weight w.
 
     The term is l1 * (sum over the layers of mean|W|) / (2 * number of layers). The factor 2 is there because
-    the original divides by its number of parameter arrays: three of weights and three of biases.
+    Holden et al. (2017) divide by the number of parameter arrays: three of weights and three of biases.
     """
     layers = network.layers
     return [l1 / (2 * len(layers)) / layer[:, :, :-1].numel() for layer in layers]
@@ -44,9 +44,10 @@ class Adam:
         self.second = torch.zeros_like(network.flat)
 
     def step(self, gradients: list[Tensor], share: float = 1.0) -> None:
-        """Take one step against `gradients`, (out, K (in + 1)) for each layer.
+        """Take one step against `gradients`.
 
-        share: factor of the learning rate.
+        gradients: for each layer (out, K * (in + 1)), where K is the number of sets of weights that the
+        network blends. share: factor of the learning rate.
         """
         self.steps += 1
         if self.network.flat.device.type == "cpu":

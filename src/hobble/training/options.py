@@ -23,11 +23,10 @@ Passes = Annotated[float, Field(gt=0, le=1_000_000), AfterValidator(_int_if_whol
 class Recipe(Section):
     """How a network is trained. A pass visits every (frame, terrain fit) pair once, in `sections` sections.
 
-    The sections of a pass are random parts of the pairs, so a fraction of a pass sees a random part of the
-    data.
+    The order of the pairs is random, so even a few sections of a pass are a random sample of the data.
     """
 
-    passes: Passes = Field(20, description="passes over the data; a fraction ends after some sections")
+    passes: Passes = Field(20, description="passes over the data; with a fraction, the last one ends early")
     sections: Positive = 10
     batch: Positive = Field(32, description="samples of a step, over all processes")
     learning_rate: PositiveFloat = 1e-4
@@ -44,22 +43,24 @@ class Recipe(Section):
         0.01, description="factor of the mean absolute weights in the loss"
     )
     rollout: Positive = Field(
-        1, description="frames over which the network's errors are carried in its input pose; 1: none"
+        1,
+        description="frames of a roll-out, in which the input poses get the errors of earlier predictions, "
+        "as at run time; 1: no roll-outs",
     )
     other_poses: Annotated[float, Field(ge=0, le=1)] = Field(
         0.0,
-        description="share of the samples whose input pose is moved towards that of another clip, for "
-        "channels that say how a whole clip walks",
+        description="share of the samples whose input pose is moved towards or away from the pose of a clip "
+        "with other channel values; for channels that are constant in each clip, such as a style",
     )
     version_poses: Annotated[float, Field(ge=0, le=1)] = Field(
         0.0,
-        description="share of the samples whose input pose is moved along the line to the pose of another "
-        "version (healthy or hurt) of the same clip; only for clips with hurt versions",
+        description="share of the samples whose input pose is moved towards or away from the pose of "
+        "another version (healthy or hurt) of the same clip; only for clips with hurt versions",
     )
     other_paces: Annotated[float, Field(ge=1, le=2)] = Field(
         1.0,
-        description="largest factor by which a sample is played slower or faster, along a smoother path, for "
-        "channels that say how a whole clip walks; 1: none",
+        description="samples are played slower or faster, at most by this factor, and their paths "
+        "are smoothed; for channels that are constant in each clip, such as a style; 1: neither",
     )
     keep_channels: bool = Field(False, description="dropout never drops the inputs of channels")
     symmetric: bool = Field(
@@ -68,17 +69,17 @@ class Recipe(Section):
     )
     phase_weight: PositiveFloat = Field(
         1.0,
-        description="weight of the error of the phase's change, relative to the other outputs. It is one of "
-        "311 numbers, but decides when each foot lands",
+        description="factor of the error in the change of phase, before errors are squared. This change is "
+        "only one of 311 outputs, but decides when each foot lands",
     )
     keep: Literal["last", "best"] = Field(
         "last",
-        description="weights to write: those at the end, as in the original, or those with the lowest "
-        "held-out error after a section",
+        description="weights to write: those at the end, as in Holden et al. (2017), or those with the "
+        "lowest held-out error after a section",
     )
     patience: Positive | None = Field(
         None,
-        description="end the training after this many sections without a lower held-out error; none: only "
+        description="end the training after this many sections without a lower held-out error; null: only "
         "after all passes",
     )
     seed: int = 1
@@ -105,7 +106,7 @@ class Recipe(Section):
         if not math.isclose(self.passes * self.sections, self.all_sections, rel_tol=1e-9):
             raise ValueError(
                 f"`passes` ({self.passes:g}) times `sections` ({self.sections}) must be a whole number: "
-                "training ends after a section"
+                "training can end only after a whole section"
             )
         if self.stretches and self.stretches > self.batch:
             raise ValueError(f"`stretches` ({self.stretches}) is above `batch` ({self.batch})")
@@ -143,7 +144,7 @@ class Machines(Section):
 
 
 class Training(Machines, Recipe):
-    """The original recipe, on one machine."""
+    """The keys of the section. Their defaults are the recipe of Holden et al. (2017), on one machine."""
 
     @model_validator(mode="after")
     def _have_work(self) -> Training:

@@ -26,21 +26,22 @@ class OtherPaces:
     network takes it for somebody else, and the walk changes with the speed. With these rows anybody walks at
     any speed.
 
-    The time t in the window, which has T frames on each side, becomes r t (1 + a t / T). The logarithm of r
-    is spread evenly between those of 1 / factor and factor, and 2 a between -RISE and RISE. Trajectory, gait
-    and ground are interpolated at the new times; past their ends, paths continue straight. Velocities, turn
-    and change of phase are multiplied by r. Then the path moves towards the nearest parabola, by a part of
-    the way between 0 and 1. All these numbers are spread evenly over the places of a batch and over batches.
+    The time t in the window, which has T frames on each side, becomes r t (1 + a t / T). Here log(r) is
+    between -log(factor) and log(factor), and 2 a is between -RISE and RISE. Trajectory, gait and ground are
+    interpolated at the new times. Past the ends of the window, paths continue straight, and the rest keeps
+    its last value. Velocities, turn and change of phase are multiplied by r. Then the path moves towards the
+    nearest parabola, by 0 to 1 times the way. log(r), a and this factor are spread evenly over the places of
+    a batch and over batches.
 
-    factor: 1 changes nothing, not even the path. batch: largest number of this process's rows in a batch.
-    first: the place of its first row in the whole batch.
+    factor: largest r; 1 changes nothing, not even the path. batch: largest number of this process's rows in a
+    batch. first: the place of its first row in the whole batch.
     """
 
     def __init__(
         self, database: Database, factor: float, batch: int, device: torch.device, first: int = 0
     ) -> None:
         layout, statistics = database.layout, database.statistics
-        self.layout, self.most = layout, math.log(factor)
+        self.layout, self.log_factor = layout, math.log(factor)
         self.x_std, self.x_mean, self.y_std, self.y_mean = (
             torch.from_numpy(part).to(device, torch.float32)
             for part in (statistics.x_std, statistics.x_mean, statistics.y_std, statistics.y_mean)
@@ -48,6 +49,7 @@ class OtherPaces:
         blocks = [layout.x_channel(name) for name, _ in layout.channels]
         self.channel_columns = [torch.arange(block.start, block.stop, device=device) for block in blocks]
         time = np.arange(layout.samples) / (layout.samples // 2) - 1.0
+        # Positions need no constant term, because they are 0 in the present frame.
         self.smooth_position, self.smooth_direction = (
             torch.from_numpy(_nearest(np.stack([time**k for k in powers], axis=1))).to(device, torch.float32)
             for powers in ((1, 2), (0, 1, 2))
@@ -63,12 +65,12 @@ class OtherPaces:
 
     def play(self, x: Tensor, y: Tensor) -> None:
         """Change standardised inputs x (B, X) and outputs y (B, Y) in place."""
-        if not self.most or not len(x):
+        if not self.log_factor or not len(x):
             return
         even = torch.remainder(self.spread[:, : len(x)] + self.batches * self.steps, 1.0)
         self.batches += 1
         pace, rise, part = even.to(x.dtype)[:, :, None]
-        pace, rise = torch.exp((2 * pace - 1) * self.most), (2 * rise - 1) * RISE / 2
+        pace, rise = torch.exp((2 * pace - 1) * self.log_factor), (2 * rise - 1) * RISE / 2
         channels = [x[:, columns] for columns in self.channel_columns]
         # Channels are put back below as they were: the deviation of a channel that never varies is so large
         # that multiplying and dividing by it loses the value.
@@ -82,7 +84,10 @@ class OtherPaces:
             x[:, columns] = values
 
     def _play_window(self, x: Tensor, y: Tensor, pace: Tensor, rise: Tensor) -> None:
-        """Trajectory, gait and ground at the new times. Heights stay relative to the path's mean ground."""
+        """Change trajectory, gait and ground to those at the new times.
+
+        Heights stay relative to the mean ground height under the path.
+        """
         layout, n = self.layout, self.layout.samples
         blocks = [(layout.x_position, False), (layout.x_direction, True), (layout.x_gait, True)]
         for block, ends in [*blocks, (layout.x_terrain, True)]:
@@ -96,7 +101,11 @@ class OtherPaces:
         y[:, layout.y_joint_position][:, 1::3] -= mean
 
     def _play_frame(self, x: Tensor, y: Tensor, pace: Tensor) -> None:
-        """Scale what happens in a frame by the pace. The previous pose moves nearer or farther to match."""
+        """Multiply what happens in a frame by the pace.
+
+        The pose in x is that of the previous frame. It moves nearer to the pose in y, or away from it, to
+        match.
+        """
         layout = self.layout
         before, now = x[:, layout.x_joint_position], y[:, layout.y_joint_position]
         before += (1 - pace) * (now - before)
@@ -111,8 +120,8 @@ class OtherPaces:
             (layout.x_position, self.smooth_position),
             (layout.x_direction, self.smooth_direction),
         ):
-            own = x[:, block].unflatten(1, (2, layout.samples))
-            x[:, block] = torch.lerp(own, own @ nearest.T, part[:, :, None]).flatten(1)
+            path = x[:, block].unflatten(1, (2, layout.samples))
+            x[:, block] = torch.lerp(path, path @ nearest.T, part[:, :, None]).flatten(1)
 
 
 def _nearest(powers: Array) -> Array:
@@ -121,10 +130,10 @@ def _nearest(powers: Array) -> Array:
 
 
 def _at(values: Tensor, samples: int, half: int, pace: Tensor, rise: Tensor, ends: bool) -> Tensor:
-    """Interpolate values (B, columns * samples) at the new times. pace, rise: (B, 1).
+    """Interpolate values (B, columns * samples) at the new times. pace, rise: (B, 1) r and a.
 
-    half: samples in half of the window; the values are those of the whole window or of its second half. ends:
-    whether the last value is kept past the ends of the window; else the values continue straight.
+    samples: of the whole window or of its second half. half: samples in half of the window. ends: whether the
+    last value is kept past the ends of the window; else the values continue straight.
     """
     table, middle = values.unflatten(1, (-1, samples)), samples - half
     time = torch.arange(samples, device=values.device) - middle

@@ -9,9 +9,9 @@ from hobble.database.reader import Database
 from hobble.rows.layout import GAITS
 from hobble.training.even_spread import EvenSpread
 
-KEPT = 32  # rows that each place in a batch remembers
+KEPT = 32  # each place in a batch remembers this many last rows
 NEAR = 1 / 16  # largest difference in phase between two poses that are mixed, in cycles
-SAME_GAIT = 0.5  # poses are mixed if no share of a gait differs by this much
+SAME_GAIT = 0.5  # poses are mixed only if the share of each gait differs by less than this
 BEYOND = 0.5  # a pose may also move away from the other one, by up to this part of the distance
 OTHER_VALUE = 1e-3  # a larger difference of a standardised channel value means another value
 
@@ -19,16 +19,18 @@ OTHER_VALUE = 1e-3  # a larger difference of a standardised channel value means 
 class OtherPoses:
     """Moves the pose in some rows of X towards the pose of a row with other channel values. Y is unchanged.
 
-    If channels say how a whole clip walks, the poses of the clip show it, too. Then a network can ignore the
-    channels and continue the walk that it sees, and a character keeps the walk that its pose has drifted to.
-    A network trained on 24 people with three diagnoses or none made the character walk like a group that was
-    not requested. With these rows, only the channels tell which walk Y belongs to.
+    If a channel is constant in a clip, such as a mood, all poses of the clip show its value, too. Then a
+    network can ignore the channel and continue the walk that it sees, and a character keeps the walk that its
+    pose has drifted to. A network trained on 24 people with one of three diagnoses or none made the character
+    walk like another group than the requested one. With these rows, only the channels tell which walk Y
+    belongs to.
 
-    Each place in a batch remembers its own last rows, so several processes give the same rows as one. From
-    the remembered rows with the same gait and other channel values, the one with the nearest phase is taken.
-    The pose moves towards it by a part of the way between -BEYOND and 1, spread evenly over places and
-    batches. If the part is negative, the pose becomes more extreme than any captured one, and the network
-    learns the way back. Without such poses a character that leaned forward leaned more and more.
+    Each place in a batch remembers its own last rows, so several processes give the same rows as one would.
+    Of the remembered rows with the same gait and other channel values, the one with the nearest phase is
+    chosen. The pose moves by -BEYOND to 1 times the way to the pose of the chosen row. These factors are
+    spread evenly over places and batches. With a negative factor, the pose becomes more extreme than any
+    captured one, and the network learns the way back. Without such poses a character that leaned forward
+    leaned more and more.
 
     share: share of the rows that are moved; 0 changes nothing. batch: largest number of this process's rows
     in a batch. first: the place of its first row in the whole batch.
@@ -69,22 +71,22 @@ class OtherPoses:
         if not self.share or not len(x):
             return
         rows, slot = len(x), self.batches % KEPT
-        own, gait, values = x[:, self.pose], x[:, self.gait] * self.gait_std, x[:, self.values]
-        alike = (gait[:, None] - self.gaits[:rows]).abs().amax(dim=2) < SAME_GAIT
-        differ = (values[:, None] - self.channels[:rows]).abs().amax(dim=2) > OTHER_VALUE
-        away = (torch.remainder(p[:, None] - self.phases[:rows] + 0.5, 1.0) - 0.5).abs()
-        away = torch.where(alike & differ & (away < NEAR), away, torch.inf)
-        nearest, chosen = away.min(dim=1)
-        part = torch.where(nearest < NEAR, self._parts(rows).to(x.dtype), 0.0)
+        pose, gait, values = x[:, self.pose], x[:, self.gait] * self.gait_std, x[:, self.values]
+        same_gait = (gait[:, None] - self.gaits[:rows]).abs().amax(dim=2) < SAME_GAIT
+        other_value = (values[:, None] - self.channels[:rows]).abs().amax(dim=2) > OTHER_VALUE
+        apart = (torch.remainder(p[:, None] - self.phases[:rows] + 0.5, 1.0) - 0.5).abs()
+        apart = torch.where(same_gait & other_value & (apart < NEAR), apart, torch.inf)
+        nearest, chosen = apart.min(dim=1)
+        factor = torch.where(nearest < NEAR, self._factors(rows).to(x.dtype), 0.0)
         other = self.poses[self.places[:rows], chosen]
-        x[:, self.pose] = torch.lerp(own, other, part[:, None])
+        x[:, self.pose] = torch.lerp(pose, other, factor[:, None])
         kept = (self.poses, self.gaits, self.channels, self.phases)
-        for table, row in zip(kept, (own, gait, values, p), strict=True):
+        for table, row in zip(kept, (pose, gait, values, p), strict=True):
             table[:rows, slot] = row
         self.batches += 1
 
-    def _parts(self, rows: int) -> Tensor:
-        """(rows,) how far each pose moves: 0, or in `share` of the rows evenly spread from -BEYOND to 1."""
+    def _factors(self, rows: int) -> Tensor:
+        """(rows,) how far each pose moves: in `share` of the rows spread evenly from -BEYOND to 1, else 0."""
         even = self.spread.numbers(rows, self.batches)
-        part = 1 - (1 - even) / self.share
-        return torch.where(part > 0, part * (1 + BEYOND) - BEYOND, 0.0)
+        factor = 1 - (1 - even) / self.share
+        return torch.where(factor > 0, factor * (1 + BEYOND) - BEYOND, 0.0)

@@ -22,12 +22,15 @@ from torch import Tensor
 from hobble.core.errors import HobbleError
 from hobble.database.sharing import PassSharing, own_places
 
-PATIENCE = timedelta(minutes=30)  # wait for the slowest process; a dead process is noticed at once
+PATIENCE = timedelta(minutes=30)  # longest wait for the slowest process; a dead process is noticed at once
 
 
 @dataclass(frozen=True)
 class Processes:
-    """One of `count` processes. rank: its number, from 0. local: its number on its machine, from 0."""
+    """A group of `count` processes, as one of them sees it.
+
+    rank: number of this process, from 0. local: its number among those on the same machine, from 0.
+    """
 
     rank: int = 0
     count: int = 1
@@ -48,7 +51,11 @@ class Processes:
         return own_places(batch, self.rank, self.count)
 
     def sharing(self, total: int, batch: int, stretches: int | None) -> PassSharing:
-        """What this process reads of a section. stretches: None means one for each process."""
+        """What this process reads of a section of `total` samples, in batches of `batch` samples.
+
+        stretches: number of parts of the section from which each batch takes samples; None: one for each
+        process.
+        """
         return PassSharing.of(total, batch, stretches or self.count, self.rank, self.count)
 
     def sum(self, values: Tensor) -> None:
@@ -63,7 +70,7 @@ class Processes:
                 torch.distributed.broadcast(tensor, 0)
 
     def from_first(self, *numbers: int) -> list[int]:
-        """In every process, the numbers that the first process passed."""
+        """The numbers that the first process passed, returned in every process."""
         shared: list[Any] = [numbers]
         if not self.alone:
             torch.distributed.broadcast_object_list(shared, 0)
@@ -75,10 +82,10 @@ class Processes:
             return text
         texts: list[Any] = [None] * self.count
         torch.distributed.all_gather_object(texts, (not certain, text))
-        return str(min(enumerate(texts), key=lambda one: (one[1][0], one[0]))[1][1])
+        return str(min(enumerate(texts), key=lambda item: (item[1][0], item[0]))[1][1])
 
     def check_same(self, flat: Tensor) -> None:
-        """Raise HobbleError if the processes hold different weights."""
+        """Raise HobbleError if the processes hold different weights. flat: those of this process."""
         if self.alone:
             return
         sums: list[Any] = [None] * self.count
@@ -86,7 +93,7 @@ class Processes:
         if len(set(sums)) > 1:
             raise HobbleError(
                 "the processes that train together hold different weights. The last checkpoint is kept. "
-                "They need the same kind of processor, the same PyTorch and the same database."
+                "Give all processes the same kind of processor, the same PyTorch and the same database."
             )
 
 

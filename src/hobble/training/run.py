@@ -40,13 +40,13 @@ def run(
     terrain_side: float = TERRAIN_SIDE,
     clips: Mapping[str, str | Path] | None = None,
 ) -> None:
-    """Train on the database folder and write the three files; see `hobble.training.train.train`.
+    """Train on the database folder, then write the files `weights`, `history` and `checkpoint`.
 
-    The three files are weights, history and checkpoint. The written weights are the last ones, as in the
-    original; with `training.keep: best` they are those with the lowest held-out error. The checkpoint holds
-    both. code: fingerprint of the training's source, see `hobble.training.start.recipe_hash`. terrain_side:
-    cm from the path to the points at its sides where the rows have ground heights. clips: name -> file of its
-    rows in order, needed only for a network that is built, not trained.
+    The written weights are the last ones, as in Holden et al. (2017); with `training.keep: best` they are
+    those with the lowest held-out error. The checkpoint holds both. configuration: its name. network,
+    training, checkpoints, threads, start, code: as in `hobble.training.train.train`. terrain_side: cm from
+    the path to the points at its sides where the rows have ground heights. clips: name -> file with the
+    clip's rows in order, needed only for a network that is built, not trained.
     """
     data = Database.open(database, training.memory_mb).with_phase_weight(training.phase_weight)
     if isinstance(model(network.kind), Built):
@@ -84,14 +84,14 @@ def _write(
     checkpoint: Path,
 ) -> None:
     """Measure the held-out error of the finished network, and write the three files."""
-    checkpoint_arrays = pack(state)  # of the last state, before the best weights replace it
-    facts = _facts(state, training) | {"terrain_side": terrain_side}
+    checkpoint_arrays = pack(state)  # of the last state, before the best weights replace the last ones
+    about_training = _about(state, training) | {"terrain_side": terrain_side}
     if training.keep == "best" and state.best is not None:
         state.network.flat.copy_(state.best)
-        facts["best_section"] = state.sections_done - state.since_best
+        about_training["best_section"] = state.sections_done - state.since_best
         log.info(
             "best weights: section %d of %d, by the held-out error",
-            facts["best_section"],
+            about_training["best_section"],
             state.sections_done,
         )
     blocks = data.layout.blocks("y")
@@ -99,13 +99,13 @@ def _write(
     named = zip(["held out, every row", *blocks], errors, strict=True)
     log.info("%s", ", ".join(f"{name} {error:.4f}" for name, error in named))
     if data.rows("held_out"):
-        facts["held_out_mse"] = errors[0]
-    write_weights(weights, state.network, data, configuration, facts)
+        about_training["held_out_mse"] = errors[0]
+    write_weights(weights, state.network, data, configuration, about_training)
     write_history(history, blocks, state.history)
     save_npz(checkpoint, **checkpoint_arrays)
 
 
-def _facts(state: State, training: Training) -> dict[str, Any]:
+def _about(state: State, training: Training) -> dict[str, Any]:
     """Numbers about a training, for the meta data of its weights."""
     return {
         "passes": passes_of(state.sections_done, training.sections),
@@ -115,7 +115,7 @@ def _facts(state: State, training: Training) -> dict[str, Any]:
 
 
 def passes_of(sections: int, each: int) -> float:
-    """The number of passes in so many sections. each: sections of a pass. A whole number is an integer.
+    """How many passes `sections` sections are; an int if it is whole. each: number of sections of a pass.
 
     >>> passes_of(40, 4), passes_of(1, 4)
     (10, 0.25)

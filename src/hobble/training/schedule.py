@@ -8,10 +8,10 @@ from hobble.training.options import Training
 
 
 def learning_rate_share(training: Training, passes: float) -> float:
-    """The factor of `training.learning_rate` after `passes` passes, which may be a fraction.
+    """The factor of `training.learning_rate` after `passes` passes; `passes` may be a fraction.
 
-    It rises linearly from 0 over `warm_up` passes. `constant` then stays at 1; `cosine` falls to 0 at the end
-    of the last pass (Loshchilov and Hutter 2017, without restarts).
+    The factor rises linearly from 0 over `warm_up` passes. `constant` then stays at 1; `cosine` falls to 0 at
+    the end of the last pass (Loshchilov and Hutter 2017, without restarts).
 
     >>> recipe = Training(schedule="cosine", warm_up=0.5, passes=8)
     >>> [round(learning_rate_share(recipe, passes), 3) for passes in (0, 0.25, 2, 4, 8)]

@@ -29,9 +29,11 @@ from hobble.training.schedule import depends_on_passes
 
 log = logging.getLogger("hobble.training")
 
+# Keys of the section `training` that the recipe hash leaves out.
 NOT_IN_RECIPE_HASH = ("continues", "device", "keep", "patience", *Machines.model_fields)
+# Keys of the section `training` that are arguments of `Adam`.
 ADAM_KEYS = ("learning_rate", "beta1", "beta2", "l1")
-# The arrays that a run takes from its start checkpoint.
+# The arrays of a start checkpoint that determine how a training goes on. They are part of the run's name.
 START_ARRAYS = (
     "weights",
     "first",
@@ -39,7 +41,7 @@ START_ARRAYS = (
     "steps",
     "sections",
 )
-BFLOAT16_FROM_BATCH = 256  # from this batch size on, matrix products take most of the time
+BFLOAT16_FROM_BATCH = 256  # with batches of this size or more, matrix products take most of the time
 
 
 def use_threads(threads: int, batch: int | None = None) -> None:
@@ -53,16 +55,16 @@ def use_threads(threads: int, batch: int | None = None) -> None:
     torch.set_num_threads(threads)
     numba.set_num_threads(threads)
     torch.use_deterministic_algorithms(True)
-    # Deterministic algorithms fill new memory. That costs time and is not needed: none is read before it is
-    # written.
+    # With deterministic algorithms, PyTorch fills new memory. This costs time and is not needed, because no
+    # memory is read before it is written.
     torch.utils.deterministic.fill_uninitialized_memory = False  # type: ignore[attr-defined]
 
 
 def recipe_hash(network: Options, training: Training, database: Database, code: str | None) -> str:
-    """A hash of everything that determines a training, section by section.
+    """A hash of everything that determines the state of a training after each section.
 
     The number of passes counts only if the learning rate depends on it. Machines and processes do not count,
-    since a training can resume with other ones. code: a fingerprint of the training's source, or None.
+    because a training can resume with others. code: a fingerprint of the training's source, or None.
     """
     kept = training.model_dump(mode="json", exclude=set(NOT_IN_RECIPE_HASH))
     if not depends_on_passes(training):
@@ -75,10 +77,10 @@ def recipe_hash(network: Options, training: Training, database: Database, code: 
 
 
 def run_name(recipe: str, start: Arrays | None) -> str:
-    """The name of a run: the recipe hash, combined with the start checkpoint if that has another recipe.
+    """The name of a run: the recipe hash, combined with the start checkpoint if its recipe is another one.
 
-    start: arrays of the start checkpoint. With the same recipe it does not change the name, because the run
-    would reach that state by itself.
+    start: arrays of the start checkpoint. If it has the same recipe, it does not change the name, because the
+    run would reach the same state without it.
     """
     if start is None or str(start.get("recipe")) == recipe:
         return recipe
@@ -99,18 +101,21 @@ def begin(
 ) -> tuple[State, Path]:
     """The state to begin with, and the path of the run's own checkpoint.
 
+    recipe: the recipe hash. checkpoints: folder; the run's own checkpoint is in the subfolder that
+    `run_name` names.
+
     The state comes from the run's own checkpoint, else from `start`, else it is new. If the run's own
     checkpoint has more passes than `training.passes`, it is ignored. Raises InputError for a checkpoint that
     is damaged or has a network of another shape, and for a start that is past `training.passes` or has
     another number of sections. With several processes, the first one reads the checkpoint and sends the state
-    to the others.
+    to the others; for these, the returned path is only `checkpoints`.
     """
-    begun = load_npz(start) if start is not None and processes.first else None
+    start_arrays = load_npz(start) if start is not None and processes.first else None
     state = fresh(database, network, training, processes)
     if not processes.first:
         return _send_state(state, processes), checkpoints
-    state, own = _restored(state, training, recipe, checkpoints, start, begun)
-    return _send_state(state, processes), own
+    state, own_path = _restored(state, training, recipe, checkpoints, start, start_arrays)
+    return _send_state(state, processes), own_path
 
 
 def _send_state(state: State, processes: Processes) -> State:
@@ -127,33 +132,33 @@ def _restored(
     recipe: str,
     checkpoints: Path,
     start: Path | None,
-    begun: Arrays | None,
+    start_arrays: Arrays | None,
 ) -> tuple[State, Path]:
     """Restore `state` from the run's own checkpoint or from the start, if there is one; see `begin`.
 
-    begun: the arrays of the start checkpoint. Returns the state and the path of the run's own checkpoint.
+    Returns the state and the path of the run's own checkpoint.
     """
-    state.recipe = run_name(recipe, begun)
-    own = checkpoints / state.recipe / "checkpoint.npz"
+    state.recipe = run_name(recipe, start_arrays)
+    own_path = checkpoints / state.recipe / "checkpoint.npz"
     goal = training.all_sections
-    if own.exists():
-        data = load_npz(own)
+    if own_path.exists():
+        data = load_npz(own_path)
         if int(data.get("sections", 0)) <= goal:
-            unpack(data, state, own)
-            log.info("resuming from %s, after section %d of %d", own, state.sections_done, goal)
-            return state, own
-        log.warning("%s is past %g passes; starting again", own, training.passes)
-    if start is not None and begun is not None:
-        unpack(begun, state, start)
+            unpack(data, state, own_path)
+            log.info("resuming from %s, after section %d of %d", own_path, state.sections_done, goal)
+            return state, own_path
+        log.warning("%s is past %g passes; starting again", own_path, training.passes)
+    if start is not None and start_arrays is not None:
+        unpack(start_arrays, state, start)
         _check_start(state, training, start)
         if state.recipe != recipe:
             log.warning("%s was made with other settings, data or code; training resumes from it", start)
         log.info("resuming from %s, after section %d of %d", start, state.sections_done, goal)
-    return state, own
+    return state, own_path
 
 
 def _check_start(state: State, training: Training, path: Path) -> None:
-    """Raise InputError if the start has other sections a pass, or more passes, than the training."""
+    """Raise InputError if the start has more passes than the training, or more or fewer sections a pass."""
     sections = int(max(row[1] for row in state.history)) if state.history else training.sections
     if sections != training.sections:
         raise InputError(
@@ -181,7 +186,7 @@ def fresh(database: Database, network: Options, training: Training, processes: P
 
 
 def device(wanted: str, processes: Processes = ALONE) -> torch.device:
-    """The device of `training.device`: auto, cpu or cuda. Each of several processes has its own GPU.
+    """The device to train on. wanted: auto, cpu or cuda. Each of several processes has its own GPU.
 
     Raises HobbleError if cuda is wanted but not available.
     """
@@ -196,8 +201,8 @@ def device(wanted: str, processes: Processes = ALONE) -> torch.device:
 def step_for(network: Trainable, training: Training) -> TrainingStep:
     """The `TrainingStep` for the device, the precision and the batch size.
 
-    Sums are always float32. TF32 rounds the factors of products to 11 bits; it is switched on or off for the
-    whole process.
+    Sums are always float32. TF32, which rounds the factors of products to 11 bits, is switched on or off for
+    the whole process.
     """
     on_cpu = network.flat.device.type == "cpu"
     precision = training.precision

@@ -2,8 +2,8 @@
 
 A data set with `mirror: true` has every clip and its mirror image, so its best network is symmetric. But the
 first weights and the order of the samples are not, and the difference between left and right grows with the
-training. A symmetric network also learns from each sample for both sides: a left thigh from the clips of a
-right one.
+training. A symmetric network also learns from each sample for both sides: how a hurt left thigh moves, from
+clips with a hurt right one.
 """
 
 from __future__ import annotations
@@ -14,14 +14,14 @@ from hobble.models.layer_mirror import LayerSymmetry
 from hobble.models.trainable import Trainable
 from hobble.rows.mirror_columns import mirror_of_x, mirror_of_y
 
-EVERY = 16  # steps; after each step it would take longer and the weights would not be better
+EVERY = 16  # steps between enforcements; one after each step would take longer and not improve the weights
 
 
 class Symmetry:
-    """The symmetry of a network that trains on a database, for options whose `why_asymmetric` is empty.
+    """Keeps a network symmetric while it trains on a database.
 
-    Raises HobbleError if the skeleton has no mirror image, or if the rows are scaled differently on both
-    sides.
+    The property `why_asymmetric` of the network's options must be empty. Raises HobbleError if the skeleton
+    has no mirror image, or if left and right columns are standardised differently.
     """
 
     def __init__(self, network: Trainable, database: Database) -> None:
@@ -37,11 +37,12 @@ class Symmetry:
     def start(self) -> None:
         """Make new weights symmetric.
 
-        A weight becomes the mean of two independent ones, so it is multiplied by sqrt(2): the variance stays.
+        This makes a weight the mean of two independent ones. It is multiplied by sqrt(2) to restore the
+        variance.
         """
         self.enforce()
-        for one in self.layers:
-            one.layer[:, :, :-1].mul_(2**0.5)
+        for symmetry in self.layers:
+            symmetry.layer[:, :, :-1].mul_(2**0.5)
         self.enforce()  # the biases depend on the weights
 
     def after(self, steps: int) -> None:
@@ -51,5 +52,5 @@ class Symmetry:
 
     def enforce(self) -> None:
         """Make the network symmetric."""
-        for one in self.layers:
-            one.enforce()
+        for symmetry in self.layers:
+            symmetry.enforce()

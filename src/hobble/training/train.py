@@ -1,9 +1,9 @@
 """The training loop.
 
-A pass goes once through all training samples. It has `training.sections` sections, and a section has
-batches. Each batch is augmented: its motion is played slower or faster, other poses are mixed in, and errors
-that the network made are added. Then the network takes a step. After each section the training logs, measures
-and saves.
+A pass goes once through all training samples. It has `training.sections` sections, and a section has batches.
+If the options say so, each batch is augmented: its motion is played slower or faster, other poses are mixed
+in, and earlier errors of the network are added. Then the optimiser takes a step. After each section the loop
+logs the errors and saves a checkpoint.
 """
 
 from __future__ import annotations
@@ -50,11 +50,12 @@ def train(
 ) -> State:
     """Train to `training.passes` passes over the database's training clips; returns the final state.
 
-    network, training: the options of a configuration. checkpoints: a folder with one subfolder for each
-    run, named by the hash of everything that determines it; a run resumes from its own checkpoint there.
-    start: a checkpoint to start from if the run has none of its own; it is part of the hash, as is `code`,
-    the hash of the code. processes: those that train together, each of which calls this; the first reads and
-    writes checkpoints and the history.
+    network, training: the options of a configuration. checkpoints: a folder with a subfolder for each run,
+    named by the hash of everything that determines it; a run resumes from its own checkpoint there. start: a
+    checkpoint to start from if the run has none of its own. If it was trained with another recipe (options,
+    data, code), it is part of the hash. code: a fingerprint of the training's source, also part of the hash.
+    processes: the group that trains together. Each process calls this function; the first one reads and
+    writes checkpoints and keeps the history.
 
     The result depends on the arguments and the number of threads, never on interruptions. Raises HobbleError
     if the training error is not finite (the message names the batch, and the last checkpoint stays), if there
@@ -89,6 +90,7 @@ def _run(
     processes: Processes,
     record: TrainingRecorder | None,
 ) -> None:
+    """Train section by section from `state`. record: None except in the first process."""
     sections, seed = training.sections, training.seed
     device, batch_size = state.network.flat.device, training.batch
     step = step_for(state.network, training)
@@ -141,13 +143,13 @@ def _run(
 
 
 def _kept(database: Database, training: Training) -> list[slice]:
-    """The blocks of inputs that dropout keeps."""
+    """The blocks of inputs that dropout never drops."""
     layout = database.layout
     return [layout.x_channel(name) for name, _ in layout.channels] if training.keep_channels else []
 
 
 def section_seed(seed: int, index: int) -> int:
-    """The seed of dropout in a section. index: of the section, counted from the start of the training."""
+    """The seed of dropout in a section. index: number of sections before it, in all passes."""
     return int(np.random.SeedSequence([seed, 1, index]).generate_state(1, np.uint64)[0] >> 1)
 
 

@@ -11,14 +11,16 @@ from hobble.models.trainable import ALL_ROWS, TrainingStep
 from hobble.training.optimiser import Adam
 from hobble.training.processes import ALONE, Processes
 
-CAPTURED_UP_TO = 1024  # rows of a batch; with more, kernel launches cost little compared with the products
-WARM_UP = 3  # runs before the capture, in which libraries choose algorithms and allocate memory
+# Batches of at most this many rows are captured. In larger ones, kernel launches cost little compared with
+# matrix products.
+CAPTURED_UP_TO = 1024
+WARM_UP = 3  # updates before the capture, in which libraries choose algorithms and allocate memory
 
 
 class Update:
-    """Draws the dropout masks of a batch, finds the gradient and takes a step.
+    """Draws the dropout masks of a batch, computes the gradient and takes a step.
 
-    kept: blocks of inputs that dropout never drops, such as channels. A dropped input gets its mean value. If
+    kept: blocks of inputs that dropout never drops, such as channels. A dropped input gets its mean value: if
     channels were dropped, a hurt body would seem less hurt, and the network would rely less on its channels.
     """
 
@@ -46,7 +48,7 @@ class SharedUpdate(Update):
     """The update by several processes. Each has its own rows of the batch, maybe none.
 
     The loss is a mean over the rows of the batch. So each process multiplies its gradient and loss by its
-    share of the rows. Summed over the processes, they are those of the whole batch. Gradient and loss are
+    share of the rows. Then the sums over the processes are gradient and loss of the whole batch. Both are
     sent together.
     """
 

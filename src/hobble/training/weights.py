@@ -22,21 +22,28 @@ UNITS = "centimetres, 60 Hz frames, velocities per frame, right-handed, Y up, +Z
 
 
 def write_weights(
-    path: Path, network: FinishedNetwork, database: Database, configuration: str, facts: Mapping[str, Any]
+    path: Path,
+    network: FinishedNetwork,
+    database: Database,
+    configuration: str,
+    about_training: Mapping[str, Any],
 ) -> None:
-    """Write the network's arrays, `Xmean`, `Xstd`, `Ymean`, `Ystd`, those of `TrainingFacts`, and `meta`.
+    """Write the arrays of the network, of the standardisation and of `TrainingFacts`, and `meta`.
 
-    facts: numbers about the training, which are added to `meta`. Equal networks give equal bytes.
+    about_training: numbers such as its passes and samples, which are added to `meta`. (`TrainingFacts`, in
+    contrast, are arrays about the training rows.) Equal networks give equal bytes.
     """
     s = database.statistics
     arrays = {**network.arrays(), "Xmean": s.x_mean, "Xstd": s.x_std, "Ymean": s.y_mean, "Ystd": s.y_std}
     arrays |= TrainingFacts.of(database.layout, database.each_row(TRAIN), s).arrays()
-    save_npz(path, **arrays, meta=np.array(meta(network, database, configuration, facts)))
+    save_npz(path, **arrays, meta=np.array(meta(network, database, configuration, about_training)))
 
 
-def meta(network: FinishedNetwork, database: Database, configuration: str, facts: Mapping[str, Any]) -> str:
+def meta(
+    network: FinishedNetwork, database: Database, configuration: str, about_training: Mapping[str, Any]
+) -> str:
     """The array `meta` of the file, as JSON: meaning of the columns and origin of the network."""
-    rig = Skeleton.from_dict(database.skeleton)
+    skeleton = Skeleton.from_dict(database.skeleton)
     channels = [channel(name) for name, _ in database.layout.channels]
     return json.dumps(
         {
@@ -46,10 +53,10 @@ def meta(network: FinishedNetwork, database: Database, configuration: str, facts
             "skeleton": database.skeleton,
             "gaits": list(GAITS),
             "contacts": list(CONTACTS),
-            "channels": {one.name: one.columns(rig) for one in channels},
+            "channels": {c.name: c.columns(skeleton) for c in channels},
             "limits": database.manifest.limits,
-            "units": "; ".join([UNITS, *(f"{one.value} 0 to {one.highest:g}" for one in channels)]),
+            "units": "; ".join([UNITS, *(f"{c.value} 0 to {c.highest:g}" for c in channels)]),
             **network.about,
-            **facts,
+            **about_training,
         }
-    )  # keys not sorted: the order of the skeleton's joints is that of the columns
+    )  # keys are not sorted, because the skeleton's joints must keep the order of the columns

@@ -1,6 +1,6 @@
-"""Runs a job that makes one clip after another.
+"""Runs a job that makes the files of one clip after another.
 
-Finished clips of an earlier try are not made again. A bad clip does not stop the others.
+Files that an earlier try finished are not made again. A bad clip does not stop the others.
 """
 
 from __future__ import annotations
@@ -20,16 +20,17 @@ from hobble.workflow.clip_batches import family_of
 from hobble.workflow.job import JobLog, checked, reporting
 from hobble.workflow.kept_files import KeptFiles, fingerprint
 
-# Errors that would also stop every further clip.
+# Disk full, quota used up, disk read-only: errors that would stop every other clip, too.
 DISK_ERRORS = (errno.ENOSPC, errno.EDQUOT, errno.EROFS)
 
 
 @dataclass(frozen=True)
 class JobPiece:
-    """A piece of the work of a job: usually a clip and its mirror.
+    """A piece of a job's work: usually a clip and its mirror.
 
-    name: the clip. params: those of the rule and those of this clip. input: name -> file, or -> list of files
-    if the rule says how many each clip has. output: name -> file.
+    name: the clip's name. params: the params of the rule and of this clip. input: name of each input -> the
+    piece's file, or a list of files for an input in `files_per_clip` (see `pieces`). output: name of each
+    output -> the piece's file.
     """
 
     name: str
@@ -39,19 +40,20 @@ class JobPiece:
 
     @property
     def files(self) -> list[str]:
-        """Every input, in order."""
+        """All input files, ordered by the names of the inputs."""
         found = [
             [files] if isinstance(files, str) else list(files) for _, files in sorted(self.input.items())
         ]
-        return [file for some in found for file in some]
+        return [file for files in found for file in files]
 
 
 def pieces(snakemake: Any) -> list[JobPiece]:
     """The pieces of a job.
 
-    params.per_clip: for each piece its own params, in which `clip` is its name. params.files_per_clip
-    (optional): name of an input -> how many of its files each piece has. Other inputs and outputs have one
-    file for each piece, or one for all pieces. A name without files is left out.
+    params.per_clip: a list with the params of each piece; the param `clip` is the piece's name.
+    params.files_per_clip (optional): name of an input -> list with the number of files of each piece. All
+    other inputs, and all outputs, have one file for each piece, or one for all pieces. An input or output
+    without files is left out.
     """
     special = ("per_clip", "files_per_clip")
     common = {name: value for name, value in snakemake.params.items() if name not in special}
@@ -63,25 +65,25 @@ def pieces(snakemake: Any) -> list[JobPiece]:
     outputs = {name: _distributed(_as_list(files), len(per_clip)) for name, files in snakemake.output.items()}
     return [
         JobPiece(
-            own["clip"],
-            {**common, **own},
+            params["clip"],
+            {**common, **params},
             {name: files[n] for name, files in inputs.items() if files},
             {name: files[n] for name, files in outputs.items() if files},
         )
-        for n, own in enumerate(per_clip)
+        for n, params in enumerate(per_clip)
     ]
 
 
 def make_each(snakemake: Any, make: Callable[[JobPiece, logging.Logger], None]) -> None:
-    """Call `make` for each piece of a job, unless its files are kept from an earlier try and undamaged.
+    """Call `make` for each piece of a job, except where undamaged files are kept from an earlier try.
 
-    If a piece fails, its error is reported and the other pieces are made (not if the disk is full). At the
-    end the process exits with status 1. Snakemake deletes the outputs of such a job; the next try takes the
-    kept files.
+    If a piece fails, its error is reported and the other pieces are still made, unless the disk is full or
+    read-only. At the end of a job with a failed piece, the process exits with status 1, and Snakemake deletes
+    the job's outputs. The next try takes the kept files.
     """
     with reporting(snakemake) as report:
         checksums.forget(snakemake.output)
-        # Rules of other data sets and batches that make the same kind of file have the same family.
+        # A family is the rules that make the same kind of file, of all data sets and batches.
         kept, digests = KeptFiles(family_of(snakemake.rule)), _Digests()
         all_pieces = pieces(snakemake)
         taken = failed = 0
@@ -124,14 +126,14 @@ class _Digests:
     """Names and SHA-256 of files. A file that several pieces need is read only once."""
 
     def __init__(self) -> None:
-        self.known: dict[tuple[str, checksums.Stamp], str] = {}
+        self.computed: dict[tuple[str, checksums.Stamp], str] = {}
 
     def of(self, files: list[str]) -> list[tuple[str, str]]:
         found = []
         for file, stamp in checksums.stamps(files).items():
-            if (file, stamp) not in self.known:
-                self.known[file, stamp] = _sha256(file)
-            found.append((Path(file).name, self.known[file, stamp]))
+            if (file, stamp) not in self.computed:
+                self.computed[file, stamp] = _sha256(file)
+            found.append((Path(file).name, self.computed[file, stamp]))
         return found
 
 
@@ -147,7 +149,10 @@ def _as_list(files: Any) -> list[str]:
 
 
 def _distributed(files: list[str], pieces: int, counts: list[int] | None = None) -> list[Any]:
-    """For each piece its file or, with `counts`, its list of files; [] if there are no files at all."""
+    """For each piece its file or, with `counts`, its list of files; [] if there are no files at all.
+
+    counts: number of files of each piece.
+    """
     if counts is not None:
         assert sum(counts) == len(files), f"{len(files)} files, but files_per_clip adds up to {sum(counts)}"
         starts = [sum(counts[:n]) for n in range(pieces)]

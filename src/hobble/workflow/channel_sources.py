@@ -32,13 +32,15 @@ class ChannelSources:
 
         The file beside the clip is not read if the clip's entry in the data set has a value.
         """
-        one, made = channel(name), self.catalogue.dataset(dataset).synthetic is not None
-        in_entry = self._value(dataset, clip, name) is not None and not made
-        files = self.clips.side_files(dataset, clip, (one.suffix,)) if one.suffix and not in_entry else []
+        suffix, has_value = channel(name).suffix, self._value(dataset, clip, name) is not None
+        files = self.clips.side_files(dataset, clip, (suffix,)) if suffix and not has_value else []
         return [*files, *self._tables(dataset, name)]
 
     def source(self, dataset: str, clip: str, name: str) -> dict[str, Any]:
-        """The fields of the `ClipSource` of a clip and channel `name`, as plain data, without `files`."""
+        """Where channel `name` has the values of a clip from, as plain data.
+
+        Holds the fields of `hobble.channels.channel.ClipSource`, without `files`.
+        """
         return {
             "clip": self.clips.original(clip),
             "entry": self.clips.entry(dataset, clip).model_dump(
@@ -53,10 +55,11 @@ class ChannelSources:
         """Whether all values of channel `name` are 0 in a clip."""
         if self.clips.is_hurt_version(clip) and name == self.clips.hurt_channel:
             return False
-        made = self.catalogue.dataset(dataset).synthetic is not None
-        files = self._tables(dataset, name) if made else self.files(dataset, clip, name)
-        one = channel(name)
-        return one.is_neutral(one.source(self.source(dataset, clip, name), files))
+        # The files of a synthetic clip need not exist yet.
+        synthetic = self.catalogue.dataset(dataset).synthetic is not None
+        files = self._tables(dataset, name) if synthetic else self.files(dataset, clip, name)
+        definition = channel(name)
+        return definition.is_neutral(definition.source(self.source(dataset, clip, name), files))
 
     def check(self, dataset: str) -> None:
         """Check what the data set's clip entries and options say about channels.
@@ -73,16 +76,16 @@ class ChannelSources:
                 )
             for name in self.channels(dataset):
                 fields = self.source(dataset, clip, name) | {"clip": f"data set {dataset}: clips.{clip}"}
-                one = channel(name)
-                one.check(one.source(fields, self._tables(dataset, name)), rig)
+                definition = channel(name)
+                definition.check(definition.source(fields, self._tables(dataset, name)), rig)
 
     def _value(self, dataset: str, clip: str, name: str) -> Any:
         return self.clips.entry(dataset, clip).channels.get(name)
 
     def _tables(self, dataset: str, name: str) -> list[str]:
-        one, section = channel(name), self.catalogue.dataset(dataset).channels.get(name, {})
-        given = one.tables(one.options_of(section))
-        files = [self.clips.mocap / file for file in given]
+        definition, section = channel(name), self.catalogue.dataset(dataset).channels.get(name, {})
+        tables = definition.tables(definition.options_of(section))
+        files = [self.clips.mocap / file for file in tables]
         for file in files:
             if not file.is_file():
                 fix = "Put it there, or name the folder that holds it with --config mocap=FOLDER."
@@ -96,11 +99,11 @@ def database_folder(channels: Sequence[str]) -> str:
 
 
 def channels_of_folder(folder_name: str) -> tuple[str, ...]:
-    """The inverse of `database_folder`. Raises HobbleError for any other name."""
+    """The inverse of `database_folder`. Raises HobbleError for a name that no database can have."""
     names = () if folder_name == NO_CHANNEL else tuple(folder_name.split("+"))
     if any(name not in NAMES for name in names) or list(names) != sorted(set(names), key=NAMES.index):
         raise HobbleError(
-            f"no database is called {folder_name}. It is `{NO_CHANNEL}` or names of channels with + between "
-            f"them, in the order {', '.join(NAMES)}"
+            f"no database is called {folder_name}. A database is called `{NO_CHANNEL}`, or by the names of "
+            f"its channels with + between them, in the order {', '.join(NAMES)}"
         )
     return names

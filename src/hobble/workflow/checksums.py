@@ -17,15 +17,15 @@ from pathlib import Path
 from hobble.core.errors import InputError
 from hobble.core.files import write_text
 
-OWN_CHECKSUM = {".npz"}
-BLOCK_BYTES = 1 << 20
-CLOCK_TICK = 0.02  # seconds; the resolution of file times is finer than this
+OWN_CHECKSUM = {".npz"}  # suffixes of files that contain a checksum
+BLOCK_BYTES = 1 << 20  # bytes of a file that are read at once
+CLOCK_TICK = 0.02  # seconds; writes that are this far apart get different file times
 
 Stamp = tuple[int, int, int]  # modification time, size and inode of a file
 
 
 def record_of(path: Path) -> Path | None:
-    """The checksum file of an artefact. None for files that get none, such as npz or a user's clip."""
+    """The path of a file's checksum file. None for files without one, such as an npz or a user's clip."""
     parts = path.parts
     if "results" not in parts:
         return None
@@ -38,8 +38,8 @@ def record_of(path: Path) -> Path | None:
 
 def forget(paths: Iterable[str]) -> None:
     """Delete the checksums of files that are about to be made again."""
-    for record in filter(None, map(record_of, map(Path, paths))):
-        record.unlink(missing_ok=True)
+    for checksum_file in filter(None, map(record_of, map(Path, paths))):
+        checksum_file.unlink(missing_ok=True)
 
 
 def record(paths: Iterable[str]) -> None:
@@ -57,9 +57,9 @@ def verify(paths: Iterable[str]) -> None:
         if where is None or not where.is_file() or not path.exists():
             continue
         lines = where.read_text(encoding="utf-8", errors="replace").splitlines()
-        known = {name: checksum for checksum, _, name in (line.partition(" ") for line in lines)}
+        recorded = {name: checksum for checksum, _, name in (line.partition(" ") for line in lines)}
         for file in _files(path):
-            if known.get(file.name) != f"{_checksum(file):08x}":
+            if recorded.get(file.name) != f"{_checksum(file):08x}":
                 raise InputError(
                     file,
                     "damaged or changed: it differs from what its job wrote",
@@ -73,14 +73,14 @@ def stamps(paths: Iterable[str]) -> Mapping[str, Stamp]:
     for path in map(str, paths):
         if os.path.isfile(path):
             if 0 <= time.time() - os.stat(path).st_mtime < CLOCK_TICK:
-                time.sleep(CLOCK_TICK)  # otherwise a write right after this could get the same time
-            found = os.stat(path)
-            out[path] = (found.st_mtime_ns, found.st_size, found.st_ino)
+                time.sleep(CLOCK_TICK)  # a write right after this could get the same time
+            status = os.stat(path)
+            out[path] = (status.st_mtime_ns, status.st_size, status.st_ino)
     return out
 
 
 def check_unchanged(before: Mapping[str, Stamp]) -> None:
-    """Raise InputError for a file that was written, replaced or deleted since `before`."""
+    """Raise InputError for a file that was written, replaced or deleted since `stamps` returned `before`."""
     now = stamps(before)
     for path, stamp in before.items():
         if now.get(path) != stamp:

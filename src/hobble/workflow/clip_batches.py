@@ -1,8 +1,8 @@
 """Batches of a data set's clips: each stage has one job for each batch, because a job takes time to start.
 
-Up to LEAST_BATCHES clips have a batch each. More are put into LEAST_BATCHES batches by a hash of their names,
-and the number of batches doubles until they hold at most MOST_CLIPS_OF_A_BATCH clips on average. So a new
-clip changes one batch.
+A data set of up to LEAST_BATCHES clips has a batch for each clip. A larger one has LEAST_BATCHES batches, and
+this number is doubled until a batch holds at most MOST_CLIPS_OF_A_BATCH clips on average. A hash of a clip's
+name decides its batch, so a new clip changes only one batch as long as the number of batches stays the same.
 """
 
 from __future__ import annotations
@@ -16,18 +16,21 @@ from dataclasses import dataclass
 
 from hobble.workflow.clips import DATASETS, MIRROR_SUFFIX, Clips, original
 
-LEAST_BATCHES = 12  # least number of batches of a data set that has more clips than this
-MOST_CLIPS_OF_A_BATCH = 32  # most clips in a batch, on average
-JOB_OPTION = "--target-jobs"  # in the command of a job that Snakemake starts; <rule>:<wildcards> follow
-MARK = "__"  # separates the parts of the name of a batch's rule
+LEAST_BATCHES = 12  # a data set with more clips than this has at least this many batches
+MOST_CLIPS_OF_A_BATCH = 32  # a batch holds at most this many clips on average
+JOB_OPTION = "--target-jobs"  # option of a job that Snakemake starts on another machine
+MARK = "__"  # separates family, data set and number in the name of a batch's rule: motion_clips__cmu__3
 
 
 @dataclass(frozen=True)
 class ClipBatch:
-    """Some clips of a data set that one job makes after another, or the hurt versions of these clips.
+    """Some clips of a data set, or hurt versions of clips, that one job processes one after another.
 
     number: from 0. label: the batch's name in logs, which is the clip's name if every clip has a batch of its
     own. mirrored: whether each clip has a mirror. hurt: whether the clips are hurt versions.
+
+    Arguments of the methods: stage: a stage of the workflow, such as motion. family: the name of a rule
+    without data set and number, such as motion_clips.
     """
 
     dataset: str
@@ -67,7 +70,7 @@ class ClipBatch:
         return self._paths(file, self.names)
 
     def of_originals(self, file: str) -> list[str]:
-        """Path of a file, for the clip from which each hurt version is made."""
+        """Path of a file for the original of each clip, in a batch of hurt versions."""
         return self._paths(file, tuple(map(original, self.clips)))
 
     def _paths(self, file: str, names: Sequence[str]) -> list[str]:
@@ -97,37 +100,37 @@ class Batches:
 
     @functools.cache  # noqa: B019 - one project lives as long as the process
     def of(self, dataset: str) -> tuple[ClipBatch, ...]:
-        """The batches of the clips that a data set lists or that are in its folder."""
+        """The batches of a data set's clips, without hurt versions."""
         listed = list(self.clips.listed(dataset))
         mirrored = self.clips.catalogue.dataset(dataset).mirror
         count = batch_count(len(listed))
         if count == len(listed):
             return tuple(ClipBatch(dataset, n, clip, (clip,), mirrored) for n, clip in enumerate(listed))
-        chosen = defaultdict(list)
+        members = defaultdict(list)
         for clip in listed:
-            chosen[batch_of(clip, count)].append(clip)
+            members[batch_of(clip, count)].append(clip)
         width = len(str(count - 1))
         return tuple(
             ClipBatch(dataset, n, f"{n:0{width}}", tuple(clips), mirrored)
-            for n, clips in sorted(chosen.items())
+            for n, clips in sorted(members.items())
         )
 
     @functools.cache  # noqa: B019
     def hurt_of(self, dataset: str) -> tuple[ClipBatch, ...]:
-        """The batches of hurt versions: one for each batch with clips that have hurt versions."""
+        """The batches of hurt versions: one for each batch that has clips with hurt versions."""
         versions = defaultdict(list)
         for version in self.clips.hurt_versions(dataset):
             versions[original(version)].append(version)
-        found = []
+        batches = []
         for batch in self.of(dataset):
             hurt = tuple(version for clip in batch.clips for version in versions[clip])
             if hurt:
                 label = f"{batch.label}_hurt"
-                found.append(ClipBatch(dataset, batch.number, label, hurt, batch.mirrored, hurt=True))
-        return tuple(found)
+                batches.append(ClipBatch(dataset, batch.number, label, hurt, batch.mirrored, hurt=True))
+        return tuple(batches)
 
     def all_of(self, dataset: str) -> tuple[ClipBatch, ...]:
-        """The batches of clips and those of hurt versions."""
+        """The batches of clips, then the batches of hurt versions."""
         return (*self.of(dataset), *self.hurt_of(dataset))
 
     def needed(
@@ -136,18 +139,21 @@ class Batches:
         datasets: Iterable[str],
         arguments: Sequence[str],
     ) -> list[ClipBatch]:
-        """The batches of these data sets that a run needs.
+        """The batches of these data sets that a run of Snakemake needs.
 
-        of: function data set -> its batches. arguments: of the command line. A job on another machine is a
-        run of one rule, which needs only the batch of this rule.
+        of: function data set -> its batches, such as `self.of`. arguments: the command line. A job on another
+        machine is a run of Snakemake whose command line names the rule. It needs only the batch of this rule.
         """
         rules = rules_of_job(arguments)
-        found = [batch for dataset in datasets for batch in of(dataset)]
-        return [batch for batch in found if not rules or any(batch.rule(family_of(r)) == r for r in rules)]
+        batches = [batch for dataset in datasets for batch in of(dataset)]
+        return [batch for batch in batches if not rules or any(batch.rule(family_of(r)) == r for r in rules)]
 
 
 def rules_of_job(arguments: Sequence[str]) -> list[str]:
-    """The rules of a job that Snakemake starts on another machine, from its command line; else []."""
+    """The rules in the command line of a job that Snakemake starts on another machine; else [].
+
+    In this command line, JOB_OPTION is followed by <rule>:<wildcards>.
+    """
     if JOB_OPTION not in arguments:
         return []
     after = arguments[arguments.index(JOB_OPTION) + 1 :]
@@ -156,7 +162,7 @@ def rules_of_job(arguments: Sequence[str]) -> list[str]:
 
 
 def batch_count(clips: int) -> int:
-    """The number of batches of a data set with so many clips. Up to LEAST_BATCHES clips have a batch each."""
+    """The number of batches of a data set with this number of clips; see the module's docstring."""
     count = min(clips, LEAST_BATCHES)
     while clips > count * MOST_CLIPS_OF_A_BATCH:
         count *= 2
@@ -164,6 +170,6 @@ def batch_count(clips: int) -> int:
 
 
 def batch_of(clip: str, count: int) -> int:
-    """The number of the clip's batch among `count`. It depends on no other clip."""
+    """The number, from 0, of the clip's batch if there are `count` batches. Other clips do not change it."""
     digest = hashlib.sha256(clip.encode(errors="surrogateescape")).digest()
     return int.from_bytes(digest[:8], "big") % count

@@ -29,8 +29,8 @@ from hobble.workflow.sources import joint_names, nearest_rig, read_checksums
 DATASETS = "results/datasets"
 MIRROR_SUFFIX = "_mirror"
 HURT_SUFFIX = re.compile(r"_hurt([1-9])$")  # at the end of the name of a hurt version
-MAX_NOTES = 10  # notes on a folder that are shown
-LABEL_FILES = (".phase", ".gait", "_footsteps.txt", "_gait.txt")
+MAX_NOTES = 10  # at most this many notes are shown for a folder
+LABEL_FILES = (".phase", ".gait", "_footsteps.txt", "_gait.txt")  # suffixes of hand-made label files
 
 
 def original(clip: str) -> str:
@@ -51,12 +51,12 @@ class Clips:
 
         Raises HobbleError if a name is reserved, InputError if there are no clips.
         """
-        own = self.listed(dataset)
-        return {**own, **{version: own[original(version)] for version in self.hurt_versions(dataset)}}
+        entries = self.listed(dataset)
+        return {**entries, **{version: entries[original(version)] for version in self.hurt_versions(dataset)}}
 
     @functools.cache  # noqa: B019
     def listed(self, dataset: str) -> dict[str, ClipEntry]:
-        """Name -> entry of the clips that the data set lists or, if it lists none, that are in its folder."""
+        """Name -> entry of the data set's listed clips or, if it lists none, of those in its folder."""
         listed = self.catalogue.dataset(dataset).clips or dict.fromkeys(self._scanned(dataset))
         if odd := [name for name in listed if name.endswith(MIRROR_SUFFIX)]:
             raise HobbleError(
@@ -74,7 +74,7 @@ class Clips:
 
     @staticmethod
     def original(clip: str) -> str:
-        """The clip that a mirror or a hurt version is made from; see `original`."""
+        """The clip from which a mirror or a hurt version is made; for other clips the clip itself."""
         return original(clip)
 
     @staticmethod
@@ -95,21 +95,22 @@ class Clips:
             if options
             else []
         )
-        many = {clip: self.hurt(dataset, clip).versions for clip in healthy}
+        counts = {clip: self.hurt(dataset, clip).versions for clip in healthy}
         names = [
             f"{clip}_hurt{version + 1}"
-            for version in range(max(many.values(), default=0))
+            for version in range(max(counts.values(), default=0))
             for clip in healthy
-            if version < many[clip]
+            if version < counts[clip]
         ]
-        return {name: turn for turn, name in enumerate(names)}
+        return {name: number for number, name in enumerate(names)}
 
     def hurt(self, dataset: str, clip: str) -> Hurt:
-        """The section `hurt` of a data set, which must have it, as changed by the clip's entry."""
+        """Options of a clip's hurt versions: the data set's section `hurt`, changed by the clip's entry."""
         options, amount = self.catalogue.dataset(dataset).hurt, self.entry(dataset, clip).hurt
         assert options is not None
         if amount is None:
             return options
+        # The entry gives the total length of the versions as a multiple of the clip's.
         versions = math.ceil(amount)
         return options.model_copy(update={"versions": versions, "longest": amount / max(versions, 1)})
 
@@ -124,7 +125,8 @@ class Clips:
     def folder(self, dataset: str) -> Path:
         """The folder of the data set's source files.
 
-        Raises InputError if a user's folder is missing, unless the clips can be downloaded.
+        Raises InputError if a user's folder cannot be read, or if it is missing and its clips cannot be
+        downloaded.
         """
         model = self.catalogue.dataset(dataset)
         if model.synthetic is not None:
@@ -150,10 +152,10 @@ class Clips:
             return str(self.folder(dataset) / f"{clip}.bvh")
         if clip in (files := self._files(dataset)):
             return str(only_file(clip, files[clip]))
-        if clip in (known := self._checksums(dataset)):
+        if clip in (downloads := self._checksums(dataset)):
             return self.downloaded(model.source or dataset, clip)
         path = self.folder(dataset) / f"{clip}.bvh"
-        nor = f", and it is not in the download list {self._manifest(dataset)}" if known else ""
+        nor = f", and it is not in the download list {self._manifest(dataset)}" if downloads else ""
         raise InputError(path, f"no such file, but data set {dataset} lists this clip{nor}")
 
     def downloaded(self, dataset: str, clip: str) -> str:
@@ -161,7 +163,7 @@ class Clips:
         return str(self.base / "data" / "downloaded" / dataset / f"{clip}.bvh")
 
     def download(self, dataset: str, clip: str) -> dict[str, str]:
-        """How to download a clip: its `url`, its `sha256`, and the `folder` in which it is missing."""
+        """How to download a clip: its `url`, its `sha256`, and the user's `folder`, which lacks it."""
         model = self.catalogue.dataset(dataset)
         if model.download is None or clip not in self._checksums(dataset):
             raise HobbleError(f"data set {dataset}: clip {clip} cannot be downloaded")
@@ -173,7 +175,7 @@ class Clips:
 
     @functools.cache  # noqa: B019
     def label_files(self, dataset: str, clip: str) -> list[str]:
-        """Hand-made label files beside the clip."""
+        """The label files beside the clip: hand-made ones, or those of a synthetic clip."""
         if self.catalogue.dataset(dataset).synthetic is not None:
             return self.side_files(dataset, clip, ("_footsteps.txt", "_gait.txt"))
         return self.side_files(dataset, clip, LABEL_FILES) if self._reads_labels(dataset) else []
@@ -183,13 +185,14 @@ class Clips:
 
         Files of synthetic clips need not exist yet, because a rule makes them.
         """
-        made = self.catalogue.dataset(dataset).synthetic is not None
-        if made:
+        synthetic = self.catalogue.dataset(dataset).synthetic is not None
+        if synthetic:
             suffixes = [suffix for suffix in suffixes if suffix in WRITES]
         stem = self.folder(dataset) / clip
-        if not made and clip in (files := self._files(dataset)):
+        if not synthetic and clip in (files := self._files(dataset)):
             stem = files[clip][0].with_suffix("")
-        return [file for file in (f"{stem}{suffix}" for suffix in suffixes) if made or Path(file).is_file()]
+        files_of_clip = (f"{stem}{suffix}" for suffix in suffixes)
+        return [file for file in files_of_clip if synthetic or Path(file).is_file()]
 
     def heightmap_files(self, dataset: str) -> list[str]:
         """Paths of the heightmaps of kind `file`, in the order of the data set."""
@@ -205,7 +208,7 @@ class Clips:
 
     @functools.cache  # noqa: B019
     def rig_files(self, dataset: str, clip: str) -> list[str]:
-        """The skeleton file of the clip's rig, in a list; [] if it is the skeleton of the data set."""
+        """The skeleton file of the clip's rig, in a list; [] if the rig is the data set's skeleton."""
         model = self.catalogue.dataset(dataset)
         if model.synthetic is not None:
             name: str | None = self.catalogue.dataset(model.source or dataset).skeleton
@@ -227,7 +230,7 @@ class Clips:
         return self.catalogue.dataset(dataset).labels.files
 
     def _scanned(self, dataset: str) -> list[str]:
-        """The clips in the user's folder, without mirrors of clips that are there, too."""
+        """The clips in the user's folder. A mirror is left out if its original is in the folder."""
         folder, files = self.folder(dataset), self._files(dataset)
         for name in sorted(files):
             if not is_valid_clip_name(name):
@@ -244,7 +247,7 @@ class Clips:
         return sorted(name + MIRROR_SUFFIX for name in files if name + MIRROR_SUFFIX in files)
 
     def notes(self, dataset: str) -> list[str]:
-        """Sentences about files in the user's folder that are not used, and why."""
+        """Sentences that say which files in the user's folder are not used, and why."""
         model = self.catalogue.dataset(dataset)
         if model.synthetic is not None or not (folder := self.folder(dataset)).is_dir():
             return []
@@ -260,16 +263,18 @@ class Clips:
         return [*notes[:MAX_NOTES], *([f"{more} more files belong to no clip."] if more > 0 else [])]
 
     def _manifest(self, dataset: str) -> Path:
+        """Path of the data set's download list."""
         options = self.catalogue.dataset(dataset).download
         return self.base / "config" / "datasets" / (options.checksums if options else "")
 
     @functools.cache  # noqa: B019
     def _checksums(self, dataset: str) -> dict[str, str]:
-        downloads = self.catalogue.dataset(dataset).download is not None
-        return read_checksums(self._manifest(dataset)) if downloads else {}
+        """Clip -> SHA-256 from the download list; {} if the data set has no downloads."""
+        has_downloads = self.catalogue.dataset(dataset).download is not None
+        return read_checksums(self._manifest(dataset)) if has_downloads else {}
 
     @functools.cache  # noqa: B019
     def _files(self, dataset: str) -> dict[str, list[Path]]:
-        """The BVH files in the user's folder by clip."""
+        """Clip -> its BVH files in the user's folder."""
         folder = self.folder(dataset)
         return find_clips(folder) if folder.is_dir() else {}

@@ -8,7 +8,7 @@ from hobble.core.errors import HobbleError
 from hobble.workflow.configurations import Configurations
 from hobble.workflow.measurements import NAMES, result_file
 
-COMPARE = "compare"  # the folder under results/, and the key of --config
+COMPARE = "compare"  # name of a folder in results/, and of a key of --config
 
 
 class ComparedConfigurations:
@@ -21,7 +21,7 @@ class ComparedConfigurations:
         self.configurations, self._value = configurations, value
 
     def names(self) -> list[str]:
-        """Their names. Raises HobbleError unless it is a list of different names."""
+        """The names of the configurations. Raises HobbleError if the value is not a list of names."""
         names = self._value.split(",") if isinstance(self._value, str) else self._value
         if not isinstance(names, list) or not all(isinstance(name, str) and name for name in names):
             raise HobbleError(f"compare: must be a list of names, as in '[holden,injured]', not {names!r}")
@@ -32,7 +32,7 @@ class ComparedConfigurations:
         return list(names)
 
     def input_files(self) -> dict[str, list[str]]:
-        """Kind of file, or measurement -> its file for each compared configuration."""
+        """Kind of file, or name of a measurement -> this file of each compared configuration."""
         names = self.names()
         return {
             "configuration": [f"results/{name}/configuration.yaml" for name in names],

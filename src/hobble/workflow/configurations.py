@@ -1,4 +1,4 @@
-"""What the rules ask about a configuration: its sections, its clips, the paths of its inputs."""
+"""What rules have to know about a configuration: its sections, its clips, the paths of its inputs."""
 
 from __future__ import annotations
 
@@ -36,56 +36,56 @@ class Configurations:
         }
 
     def digest(self, configuration: str) -> str:
-        """A hash of `resolved`, which is short enough to be printed as a param of a rule in a dry run."""
+        """A hash of `resolved`, short enough to be printed as a rule's param in a dry run."""
         text = json.dumps(self.resolved(configuration), sort_keys=True)
         return hashlib.sha256(text.encode()).hexdigest()[:16]
 
     def dataset(self, configuration: str) -> str:
-        """The name of the data set that it learns from."""
+        """The name of the data set that the configuration learns from."""
         return self.catalogue.configuration(configuration).dataset
 
     def channels(self, configuration: str) -> tuple[str, ...]:
-        """The channels that are inputs of its network."""
+        """The channels that are inputs of the configuration's network."""
         return self.catalogue.configuration(configuration).channels
 
     def splits(self, configuration: str) -> dict[str, str]:
-        """Clip -> "train" or "held_out"."""
+        """Clip -> "train" or "held_out", for the clips that the network can learn from."""
         return self.datasets.selected(self.dataset(configuration), self.channels(configuration))
 
     def of_dataset(self, configuration: str, pattern: str) -> list[str]:
-        """Paths under the configuration's data set: `pattern` for each clip, or once if it has no {clip}."""
+        """Paths of the data set's files: one for each clip of `splits` if `pattern` has {clip}, else one."""
         root = f"{DATASETS}/{self.dataset(configuration)}"
         if "{clip}" not in pattern:
             return [f"{root}/{pattern}"]
         return [f"{root}/{pattern.format(clip=clip)}" for clip in self.splits(configuration)]
 
     def owner(self, configuration: str) -> str:
-        """The configuration that trains its network: itself, or the one that `network_of` names."""
+        """The configuration that trains the network: this one, or the one that `network_of` names."""
         return self.catalogue.configuration(configuration).network_of or configuration
 
     def kind(self, configuration: str) -> str:
-        """The package of its kind of network, such as hobble.models.pfnn."""
+        """The package of the kind of network, such as hobble.models.pfnn."""
         return f"hobble.models.{self.catalogue.configuration(self.owner(configuration)).network.kind}"
 
     def model(self, configuration: str) -> Model:
-        """Its kind of network."""
+        """The kind of network."""
         return model(self.catalogue.configuration(self.owner(configuration)).network.kind)
 
     def network(self, configuration: str, file: str) -> str:
-        """Path of `file` in the folder of its network."""
+        """Path of `file` in the folder of the configuration's network."""
         return f"results/{self.owner(configuration)}/network/{file}"
 
     def database(self, configuration: str) -> str:
-        """Path of its database."""
+        """Path of the database that the configuration learns from."""
         folder = database_folder(self.channels(configuration))
         return f"{DATASETS}/{self.dataset(configuration)}/database/{folder}"
 
     def is_built(self, configuration: str) -> bool:
-        """Whether its network is built directly from rows instead of trained."""
+        """Whether the network is built directly from rows instead of trained."""
         return isinstance(model(self.catalogue.configuration(configuration).network.kind), Built)
 
     def rows_in_order(self, configuration: str) -> list[str]:
-        """Paths of the training clips' rows if the network is built; [] if it is trained."""
+        """Files with the rows of training clips, in order of frames, if the network is built; else []."""
         if not self.is_built(configuration):
             return []
         root = f"{DATASETS}/{self.dataset(configuration)}/database/clips"
@@ -94,6 +94,6 @@ class Configurations:
         ]
 
     def start(self, configuration: str) -> list[str]:
-        """The checkpoint from which its training continues, if there is one."""
+        """The checkpoint from which the training continues, in a list; [] if there is none."""
         other = self.catalogue.configuration(configuration).training.continues
         return [f"results/{other}/network/checkpoint.npz"] if other else []

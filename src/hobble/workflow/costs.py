@@ -20,15 +20,15 @@ BATCH_RULES = {
 }
 DATASET_STAGES = tuple(BATCH_RULES)
 
-Places = dict[str, list[str]]
+Places = dict[str, list[str]]  # "benchmarks", "files", "batches" or "made" -> paths or names, see `stages`
 
 
 def stages(configurations: Configurations, batches: Batches, name: str) -> dict[str, Places]:
-    """Where to find the costs of configuration `name`: stage -> kind of place -> paths or names.
+    """Stage -> where to find its costs, for the configuration `name`.
 
-    `benchmarks`, `files`: folders of benchmark files and of artefacts. `batches`: names of the benchmark
-    files of the present batches (a folder may also have old files, from before a clip was added). `made`:
-    folders in which finished clips are kept.
+    benchmarks: folders of benchmark files. files: folders of artefacts. batches: names of the benchmark files
+    of the present batches; the folders may also have old files, from before a clip was added. made: folders
+    in which finished clips are kept.
     """
     dataset = configurations.dataset(name)
     source = configurations.catalogue.dataset(dataset).source or dataset
@@ -37,10 +37,10 @@ def stages(configurations: Configurations, batches: Batches, name: str) -> dict[
         for stage in DATASET_STAGES
     }
     out["database"]["files"] = [f"{DATASETS}/{dataset}/database/clips", configurations.database(name)]
-    own = Path("results", name)
+    results = Path("results", name)
     out["training"] = _places(Path("results", configurations.owner(name)), "training", "network")
-    out["runtime"] = _places(own, "runtime", "runtime")
-    out["evaluation"] = _places(own, "evaluation", "evaluation")
+    out["runtime"] = _places(results, "runtime", "runtime")
+    out["evaluation"] = _places(results, "evaluation", "evaluation")
     return out
 
 

@@ -1,4 +1,4 @@
-"""What the rules ask about a data set: its options, its clip entries, the clips for training."""
+"""What rules have to know about a data set: its options, its clip entries, the clips for training."""
 
 from __future__ import annotations
 
@@ -14,9 +14,10 @@ from hobble.workflow.clips import MIRROR_SUFFIX, Clips, original
 
 
 def shard_of(clip: str, shards: int) -> int:
-    """The shard, from 0, of a clip's rows. Mirrors and hurt versions are in the shard of their clip.
+    """The number, from 0, of the database shard with a clip's rows. shards: number of shards.
 
-    It depends on no other clip. If `shards` divides the number of batches, a batch has clips of one shard.
+    Mirrors and hurt versions are in the shard of their original. Other clips do not change the shard. If the
+    number of batches is a multiple of `shards`, all clips of a batch are in the same shard.
     """
     return batch_of(original(clip), shards)
 
@@ -33,11 +34,11 @@ class Datasets:
         return {key: values[key] for key in keys} if keys else values
 
     def part(self, dataset: str, section: str, model: type[Section]) -> dict[str, Any]:
-        """Key -> value of a section as plain data, for the keys of `model` only, which a rule depends on."""
+        """Key -> value of a section as plain data, only for keys that are fields of `model`."""
         return self.options(dataset, section, *model.model_fields)
 
     def motion_options(self, dataset: str, clip: str) -> dict[str, Any]:
-        """The motion section with the values of the clip's entry, and the clip's ground."""
+        """The section `motion`, but with the values that the clip's entry has, and the entry's `ground`."""
         keys = {"source_fps", "loops", "heading", "ground"}
         entry = self.clips.entry(dataset, clip).model_dump(include=keys, exclude_none=True)
         return {**self.options(dataset, "motion"), **entry}
@@ -50,25 +51,25 @@ class Datasets:
         return round(synthetic.frames * self.clips.entry(dataset, clip).share / total)
 
     def walkers(self, names: Iterable[str]) -> list[str]:
-        """The data sets from which the data sets `names` get synthetic clips."""
+        """The data sets whose walkers make the synthetic clips of the data sets `names`."""
         models = {name: self.catalogue.dataset(name) for name in names}
-        made = [model.source or name for name, model in models.items() if model.synthetic is not None]
-        return list(dict.fromkeys(made))
+        walkers = [model.source or name for name, model in models.items() if model.synthetic is not None]
+        return list(dict.fromkeys(walkers))
 
     def selected(self, dataset: str, channels: Sequence[str]) -> dict[str, str]:
         """Clip -> "train" or "held_out", for the clips that a network can learn from.
 
-        channels: the channels of the network. Clips with other channels that are not 0 are left out. A mirror
-        is on the same side as its original. Raises HobbleError if the data set lacks one of `channels`, or if
-        no clip is left for training.
+        channels: the channels of the network. A clip is left out if a channel that the network lacks is not 0
+        in it. A mirror is trained on or held out like its original. Raises HobbleError if the data set lacks
+        one of `channels`, if `held_out` names a clip that does not exist, or if no clip is left for training.
         """
-        there = self.channel_sources.channels(dataset)
-        if lacking := [name for name in channels if name not in there]:
+        available = self.channel_sources.channels(dataset)
+        if lacking := [name for name in channels if name not in available]:
             raise HobbleError(
                 f"data set {dataset} has no channel {', '.join(lacking)}. Give it a section "
                 f"`channels: {{{lacking[0]}: ...}}`, or use another data set"
             )
-        others = [name for name in there if name not in channels]
+        others = [name for name in available if name not in channels]
         model, clips = self.catalogue.dataset(dataset), self.clips.of(dataset)
         held_out = set(model.held_out)
         if missing := held_out - set(self.clips.listed(dataset)):
@@ -86,7 +87,7 @@ class Datasets:
         return splits
 
     def compared(self, dataset: str, channels: Sequence[str]) -> list[str]:
-        """The clips that are compared with each other, so that no motion is in both parts of the split.
+        """The clips among which jobs look for copies, so that no motion is both trained on and held out.
 
         Mirrors and hurt versions are not among them. [] if nothing is held out or the clips are synthetic.
         """
@@ -97,28 +98,31 @@ class Datasets:
         return [clip for clip in splits if both and clip == original(clip)]
 
     def shards(self, dataset: str) -> int:
-        """The number of shards of each of its databases."""
+        """The number of shards of each of the data set's databases."""
         return int(self.options(dataset, "database", "shards")["shards"])
 
     @functools.cache  # noqa: B019 - one project lives as long as the process
     def _splits_by_shard(self, dataset: str, channels: tuple[str, ...]) -> list[dict[str, str]]:
         count = self.shards(dataset)
-        found: list[dict[str, str]] = [{} for _ in range(count)]
+        splits: list[dict[str, str]] = [{} for _ in range(count)]
         for clip, split in self.selected(dataset, channels).items():
-            found[shard_of(clip, count)][clip] = split
-        return found
+            splits[shard_of(clip, count)][clip] = split
+        return splits
 
     def in_shard(self, dataset: str, channels: Sequence[str], shard: int) -> dict[str, str]:
-        """As `selected`, for the clips of one shard only. shard: its number, from 0."""
+        """What `selected` returns, for the clips of one shard only. shard: its number, from 0."""
         return self._splits_by_shard(dataset, tuple(channels))[shard]
 
     def every_row(self, dataset: str) -> int:
-        """n, if training uses every n-th row of hurt versions."""
+        """The n for which training uses every n-th row of hurt versions."""
         hurt = self.catalogue.dataset(dataset).hurt
         return hurt.every if hurt else 1
 
     def sources(self, chosen: Iterable[str]) -> dict[str, str]:
-        """Hurt version -> the healthy clip it is made from, for the chosen clips."""
+        """Hurt version -> its healthy original, for the hurt versions among the chosen clips.
+
+        For the mirror of a hurt version: the mirror of the original.
+        """
         chosen = list(chosen)
         mirrors = {clip: MIRROR_SUFFIX if clip.endswith(MIRROR_SUFFIX) else "" for clip in chosen}
         return {clip: original(clip) + mirrors[clip] for clip in chosen if self.clips.is_hurt_version(clip)}

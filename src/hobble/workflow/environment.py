@@ -1,6 +1,6 @@
 """Makes the virtual environment: python environment.py .venv. It needs only Python 3.11 or later.
 
-It shows one line of progress: what pip downloads, and how much of it is there.
+It shows one line of progress: what pip downloads, and how much of it has arrived.
 """
 
 from __future__ import annotations
@@ -16,9 +16,10 @@ from typing import TextIO
 
 OLDEST_PYTHON = (3, 11)
 DISK_SPACE = "2.0 GB"  # on Linux with the present constraints.txt
-PROGRESS_SECONDS = 10.0  # between lines of progress in a file
-# torch first, because it is the largest and the most likely to be unavailable.
+PROGRESS_SECONDS = 10.0  # between lines of progress if the output goes to a file
+# Arguments of each pip install: torch first, because it is the largest and most likely to be unavailable.
 STEPS = (["torch==2.13.0"], ["--editable", ".[dev]"])
+# Lines of pip: a download begins (its name and size); how many of its bytes have arrived.
 DOWNLOAD_LINE = re.compile(r"\s*(?:Downloading|Using cached) (\S+?)(?:-\d\S*)? \(([\d.]+) (kB|MB|GB)\)")
 PROGRESS_LINE = re.compile(r"Progress (\d+) of (\d+)")
 BYTES = {"kB": 1e3, "MB": 1e6, "GB": 1e9}
@@ -29,8 +30,10 @@ class ProgressLine:
 
     def __init__(self, stream: TextIO) -> None:
         self.stream, self.live = stream, stream.isatty()
-        self.fetched, self.name, self.size, self.now = 0.0, "", 0.0, 0.0
-        self.last = float("-inf")
+        self.fetched = 0.0  # bytes of the finished downloads
+        self.name, self.size = "", 0.0  # the present download and its bytes
+        self.now = 0.0  # how many of these bytes have arrived
+        self.last = float("-inf")  # time of the last line in a file
 
     def take(self, text: str) -> None:
         """Update the progress with a line of pip's output."""
@@ -63,25 +66,25 @@ class ProgressLine:
             self.stream.write("\r\x1b[K")
 
 
-def follow(lines: Iterable[str], line: ProgressLine) -> list[str]:
+def follow(output: Iterable[str], line: ProgressLine) -> list[str]:
     """Show pip's output as progress. Returns its last lines, for an error message."""
-    words: list[str] = []
-    for text in lines:
+    last_lines: list[str] = []
+    for text in output:
         line.take(text)
         if not PROGRESS_LINE.match(text):
-            words = [*words[-30:], text]
+            last_lines = [*last_lines[-30:], text]
     line.end()
-    return words
+    return last_lines
 
 
 def install(python: Path, arguments: list[str], line: ProgressLine) -> None:
-    """Run pip install. If it fails, exit with its last lines."""
+    """Run pip install. If it fails, exit with the last lines of its output."""
     command = [str(python), "-m", "pip", "install", "--disable-pip-version-check", *arguments]
     with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True) as pip:
         assert pip.stdout is not None
-        words = follow(pip.stdout, line)
+        last_lines = follow(pip.stdout, line)
     if pip.returncode:
-        sys.exit("".join(words) + f"\nThe environment could not be made: {' '.join(command)}")
+        sys.exit("".join(last_lines) + f"\nThe environment could not be made: {' '.join(command)}")
 
 
 def is_sound(python: Path) -> bool:
@@ -102,7 +105,7 @@ def main(folder: Path) -> None:
     print(f"This downloads packages and takes {DISK_SPACE} of disk, and a few minutes with a fast network.")
     began = time.monotonic()
     python, line = folder / "bin" / "python", ProgressLine(sys.stdout)
-    # Not again in a sound environment: venv copies the interpreter, which fails while it is in use.
+    # A sound environment is left as it is: venv would copy the interpreter, which fails while it is in use.
     if not is_sound(python):
         venv.create(folder, with_pip=True)
     install(python, ["--quiet", "--upgrade", "pip>=25"], line)  # older versions do not print progress

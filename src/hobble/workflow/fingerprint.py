@@ -1,8 +1,8 @@
 """A hash of a rule's code: its script and every project module that the script imports.
 
-It ignores what cannot change a result: comments, docstrings, annotations of functions, the text of errors and
-log messages, descriptions of options, and the modules of `INFRASTRUCTURE`. It also ignores the fields of
-configuration sections, because their values are params of the rules.
+The hash ignores what cannot change a result: comments, docstrings, annotations of functions, the text of
+errors and log messages, descriptions of options, and the modules of `INFRASTRUCTURE`. It also ignores the
+fields of configuration sections, because their values are params of the rules.
 """
 
 from __future__ import annotations
@@ -18,14 +18,15 @@ from pathlib import Path
 INFRASTRUCTURE = {
     "hobble.config": "its values are params of the rules",
     "hobble.workflow": "runs jobs and answers the Snakefile",
-    "hobble.core.errors": "only words errors",
+    "hobble.core.errors": "only the wording of errors",
     "hobble.core.files": "a file is read back as it was written, or refused",
     "hobble.core.section": "checks the configuration before any job",
     "hobble.core.untrusted": "only limits what is read",
 }
+# Calls such as logger.info(...) are not hashed. These are the names of loggers and of their methods.
 LOGGERS = {"log", "logger", "logging", "warnings"}
-LEVELS = {"debug", "info", "warning", "error", "exception", "critical", "warn"}
-NOT_HASHED = {"__future__", "collections.abc", "logging", "typing", "warnings"}
+LOG_METHODS = {"debug", "info", "warning", "error", "exception", "critical", "warn"}
+NOT_HASHED = {"__future__", "collections.abc", "logging", "typing", "warnings"}  # imports that are not hashed
 
 
 def fingerprint(script: Path, source: Path, modules: Iterable[str] = ()) -> str:
@@ -49,21 +50,22 @@ def closure(script: Path, source: Path, modules: Iterable[str] = ()) -> set[Path
 
     The modules of INFRASTRUCTURE are left out.
     """
-    found = {path for module in modules for path in _files_of(module, source)}
-    waiting = [script, *found]
+    files = {path for module in modules for path in _files_of(module, source)}
+    waiting = [script, *files]
     while waiting:
-        new = set(_module(waiting.pop(), source).imports) - found
-        found |= new
+        new = set(_module(waiting.pop(), source).imports) - files
+        files |= new
         waiting += new
-    return found
+    return files
 
 
 @dataclass(frozen=True)
 class _Module:
-    """The parts of a module that count.
+    """What the fingerprint needs of a module.
 
-    digest: hash of its code. texts: its string constants (name, value), which count if code other than
-    messages uses them. names: the names that its code uses. imports: the project files that it imports.
+    digest: hash of its code without string constants. texts: (name, value) of its string constants,
+    which are hashed only if code other than messages uses them. names: the names that its code uses. imports:
+    the project files that it imports.
     """
 
     digest: bytes
@@ -92,7 +94,7 @@ def _module(path: Path, source: Path) -> _Module:
 
 
 class _Bare(ast.NodeTransformer):
-    """Removes what cannot change a result. Collects the names that the rest uses, and its imports."""
+    """Removes what cannot change a result. Collects the names and the imports of the remaining code."""
 
     def __init__(self) -> None:
         self.names: set[str] = set()
@@ -112,8 +114,8 @@ class _Bare(ast.NodeTransformer):
         if isinstance(value, ast.Constant) and isinstance(value.value, str):
             return ast.Pass()  # a docstring
         if isinstance(value, ast.Call) and isinstance(value.func, ast.Attribute):
-            place = value.func.value
-            if value.func.attr in LEVELS and isinstance(place, ast.Name) and place.id in LOGGERS:
+            logger = value.func.value
+            if value.func.attr in LOG_METHODS and isinstance(logger, ast.Name) and logger.id in LOGGERS:
                 return ast.Pass()
         return self.generic_visit(node)
 

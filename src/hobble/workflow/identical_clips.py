@@ -28,8 +28,8 @@ def same_files(clips: Clips, dataset: str) -> list[tuple[str, str, str]]:
 
 
 def refuse_copies(clips: Clips, datasets: Datasets, dataset: str, channels: tuple[str, ...]) -> None:
-    """Raise HobbleError if identical files are in the training data and held out."""
+    """Raise HobbleError if a training clip and a held-out clip have identical files."""
     model = datasets.catalogue.dataset(dataset)
     if model.synthetic is None and model.held_out:
-        splits = {original(name): side for name, side in datasets.selected(dataset, channels).items()}
+        splits = {original(name): split for name, split in datasets.selected(dataset, channels).items()}
         refuse_both_sides(f"data set {dataset}", same_files(clips, dataset), splits)

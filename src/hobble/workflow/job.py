@@ -23,8 +23,8 @@ BUG = "This is a bug in Hobble, not a fault in your data. Please report it with 
 def job(snakemake: Any) -> Iterator[logging.Logger]:
     """Run a script with logging, checks of its files, and clear errors.
 
-    It is an error if an input differs from what its job wrote, or changes while this job runs. For the rest
-    see `reporting`.
+    snakemake: the object that Snakemake gives to scripts. It is an error if an input has changed since it was
+    made, or changes while this job runs. Logging and other errors are handled by `reporting`.
     """
     with reporting(snakemake) as report:
         checksums.forget(getattr(snakemake, "output", ()))
@@ -34,7 +34,7 @@ def job(snakemake: Any) -> Iterator[logging.Logger]:
 
 @contextlib.contextmanager
 def checked(inputs: Any, outputs: Any) -> Iterator[None]:
-    """Check inputs before and after the work in this context, then write the checksums of its outputs."""
+    """Check the inputs before and after the work in this context, then write the outputs' checksums."""
     before = checksums.stamps(inputs)
     checksums.verify(inputs)
     yield
@@ -44,9 +44,9 @@ def checked(inputs: Any, outputs: Any) -> Iterator[None]:
 
 @contextlib.contextmanager
 def reporting(snakemake: Any) -> Iterator[JobLog]:
-    """Run a script with logging and clear errors, until its run ends.
+    """Run a script with logging and clear errors. If the run of Snakemake ends, the script ends, too.
 
-    Everything is logged to the rule's log file; warnings and errors also go to the terminal. Every exception
+    Everything is logged to the job's log file; warnings and errors also go to the terminal. Every exception
     ends the process with status 1.
     """
     report = JobLog(str(snakemake.log[0]), family_of(snakemake.rule))
@@ -62,7 +62,7 @@ def reporting(snakemake: Any) -> Iterator[JobLog]:
 
 
 class JobLog:
-    """A job's log file and its messages on the terminal, which begin with the name of its rule."""
+    """A job's log file, and its messages on the terminal, which begin with the name of the rule."""
 
     def __init__(self, path: str, rule: str) -> None:
         self.path = path
@@ -76,24 +76,24 @@ class JobLog:
         self.terminal = logging.StreamHandler(sys.stderr)
         self.terminal.setLevel(logging.WARNING)
         # A message on a terminal first clears the line of progress.
-        wiped = "\r\x1b[K" if sys.stderr.isatty() else ""
-        self.terminal.setFormatter(logging.Formatter(f"{wiped}{rule}: %(message)s"))
+        clear = "\r\x1b[K" if sys.stderr.isatty() else ""
+        self.terminal.setFormatter(logging.Formatter(f"{clear}{rule}: %(message)s"))
         self.logger.handlers = [to_file, self.terminal]
         logging.captureWarnings(True)
 
     def error(self, error: Exception) -> None:
-        """Say what went wrong. For a HobbleError this is its message.
+        """Report an error. Of a HobbleError, only the message is reported.
 
-        Of other errors, the terminal shows one line, and the log has the traceback.
+        For most other errors the terminal shows one line, and the log file also has the traceback.
         """
         if isinstance(error, HobbleError):
             self.logger.error("%s", error)
         elif isinstance(error, MemoryError):
             self.logger.error("out of memory. Give the job more memory, or use a smaller data set or batch.")
         elif isinstance(error, OSError):
-            # An error of the disk or of permissions that no other code has explained.
-            place, reason = error.filename or "a file", error.strerror or error
-            self.logger.error("%s: %s. See %s", place, reason, self.path)
+            # Such as a full disk or a missing permission, if no other code has raised a HobbleError for it.
+            path, reason = error.filename or "a file", error.strerror or error
+            self.logger.error("%s: %s. See %s", path, reason, self.path)
             self._trace(error)
         else:
             self.logger.error("%s: %s. %s See %s", type(error).__name__, error, BUG, self.path)

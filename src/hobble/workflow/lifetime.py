@@ -1,4 +1,4 @@
-"""Clears locks of killed runs, and ends all jobs together with their run.
+"""Clears locks of killed runs, and ends all jobs together with their run. A run is one call of Snakemake.
 
 Snakemake's lock does not say which process it belongs to, so after a kill it stays until a person removes it.
 And on SIGINT or SIGTERM Snakemake waits for running jobs. So a run writes its process id next to its lock and
@@ -21,14 +21,14 @@ from types import FrameType
 from typing import Any
 
 LOCKS = Path(".snakemake/locks")  # Snakemake removes the folder when it unlocks
-OWNER = "owner.json"
+OWNER = "owner.json"  # file beside the locks; it says which process they belong to
 RUN_VARIABLE = "HOBBLE_RUN"  # environment variable of a job: process id and start time of its run
 CHECK_SECONDS = 0.5  # how often a job checks that its run exists
 GRACE_SECONDS = 2.0  # time for a job to clean up after SIGTERM
 
 
 def set_run_variable() -> None:
-    """Put this process id and its start time into the environment, which jobs inherit."""
+    """Put the id and start time of this process into the environment, which jobs inherit."""
     os.environ[RUN_VARIABLE] = this_process()
 
 
@@ -46,7 +46,7 @@ def record_lock_owner(locks: Path = LOCKS) -> None:
 
 
 def clear_stale_lock(locks: Path = LOCKS) -> bool:
-    """Remove a lock if its owner was a process of this machine and has ended. Returns whether it did."""
+    """Remove a lock if its owner, a process of this machine, has ended. Returns whether it was removed."""
     try:
         text = (locks / OWNER).read_text(encoding="utf-8")
         owner = json.loads(text)
@@ -59,48 +59,48 @@ def clear_stale_lock(locks: Path = LOCKS) -> bool:
     stale = locks.with_name(f"{locks.name}.stale.{os.getpid()}")
     try:
         os.rename(locks, stale)
-        mine = (stale / OWNER).read_text(encoding="utf-8") == text
-        if mine:
+        same_lock = (stale / OWNER).read_text(encoding="utf-8") == text
+        if same_lock:
             locks.mkdir(exist_ok=True)
             shutil.rmtree(stale, ignore_errors=True)
         else:
-            os.rename(stale, locks)
-        return mine
+            os.rename(stale, locks)  # another run has made a new lock meanwhile
+        return same_lock
     except OSError:
         return False
 
 
 def end_jobs_on_signal() -> None:
-    """On SIGINT or SIGTERM end the running jobs, then Snakemake as if by Ctrl-C, which removes its lock."""
+    """On SIGINT or SIGTERM, end the running jobs and interrupt Snakemake, which then removes its lock."""
     for number in (signal.SIGINT, signal.SIGTERM):
         signal.signal(number, _stop)
 
 
 def _stop(number: int, frame: FrameType | None) -> None:
-    for each in (signal.SIGINT, signal.SIGTERM):
-        signal.signal(each, signal.SIG_IGN)  # ignore further signals; stopping takes only seconds
+    for caught in (signal.SIGINT, signal.SIGTERM):
+        signal.signal(caught, signal.SIG_IGN)  # ignore further signals; stopping takes only seconds
     threading.Thread(target=end_children, args=(os.getpid(),), daemon=True).start()
     raise KeyboardInterrupt
 
 
 def end_children(pid: int, grace: float = GRACE_SECONDS) -> None:
-    """End all descendants of a process with SIGTERM. Those that run after `grace` seconds get SIGKILL."""
+    """End all descendants of a process with SIGTERM, and those that run on after `grace` s with SIGKILL."""
     import psutil  # a dependency of Snakemake; imported here because it is slow to import
 
     with contextlib.suppress(psutil.NoSuchProcess):
-        below = psutil.Process(pid).children(recursive=True)
-        for process in below:
+        descendants = psutil.Process(pid).children(recursive=True)
+        for process in descendants:
             with contextlib.suppress(psutil.Error):
                 process.terminate()
         until = time.monotonic() + grace
-        while time.monotonic() < until and any(map(_runs, below)):
+        while time.monotonic() < until and any(map(_is_running, descendants)):
             time.sleep(0.05)
-        for process in filter(_runs, below):
+        for process in filter(_is_running, descendants):
             with contextlib.suppress(psutil.Error):
                 process.kill()
 
 
-def _runs(process: Any) -> bool:
+def _is_running(process: Any) -> bool:
     import psutil
 
     with contextlib.suppress(psutil.Error):
@@ -112,7 +112,7 @@ def _runs(process: Any) -> bool:
 def ends_with_run() -> Iterator[None]:
     """Within this context the job ends cleanly on SIGINT and SIGTERM, and soon after its run ends."""
     before = {}
-    with contextlib.suppress(ValueError):  # a test may not run in the main thread, which alone sets signals
+    with contextlib.suppress(ValueError):  # only the main thread can set handlers; tests may use another one
         for number in (signal.SIGINT, signal.SIGTERM):
             before[number] = signal.signal(number, _exit)
     done = threading.Event()
@@ -130,8 +130,8 @@ def ends_with_run() -> Iterator[None]:
 def _exit(number: int, frame: FrameType | None) -> None:
     # Ctrl-C brings two signals: from the terminal and from Snakemake. The second would interrupt the
     # clean-up.
-    for each in (signal.SIGINT, signal.SIGTERM):
-        signal.signal(each, _disregard)
+    for caught in (signal.SIGINT, signal.SIGTERM):
+        signal.signal(caught, _disregard)
     raise SystemExit(128 + number)  # not caught by `except Exception`, and runs every `finally`
 
 

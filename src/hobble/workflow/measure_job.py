@@ -10,24 +10,27 @@ from hobble.measures.inputs import MeasureInputs
 from hobble.measures.measure import Measure
 from hobble.runtime.options import Runtime
 
-LISTS = ("clips", "summaries", "pieces")  # inputs of several files
+LIST_INPUTS = ("clips", "summaries", "pieces")  # names of inputs that have several files
 
 
 def measure_of(job: Any) -> Measure:
-    """The job's measurement. It is imported by name, so that a new measurement does not re-run the others."""
+    """The job's measurement.
+
+    Only its package is imported: if the script imported all measurements, a new one would re-run the others.
+    """
     return importlib.import_module(job.params.package).MEASURE
 
 
 def inputs_of_job(job: Any) -> MeasureInputs:
     """The inputs of a job of the rules `measure` and `measure_piece`."""
-    many = {name: [Path(file) for file in job.input.get(name, ())] for name in LISTS}
+    lists = {name: [Path(file) for file in job.input.get(name, ())] for name in LIST_INPUTS}
     return MeasureInputs(
         job.params.configuration,
-        {need: Path(file) for need, file in job.input.items() if need not in LISTS},
-        {path.stem: path for path in many["clips"]},
+        {name: Path(file) for name, file in job.input.items() if name not in LIST_INPUTS},
+        {path.stem: path for path in lists["clips"]},
         job.params.splits,
         job.params.people,
-        many["summaries"],
+        lists["summaries"],
         Runtime.model_validate(job.params.runtime),
-        {path.stem: path for path in many["pieces"]},
+        {path.stem: path for path in lists["pieces"]},
     )

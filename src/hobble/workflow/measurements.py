@@ -1,4 +1,7 @@
-"""The inputs of each measurement, and the keys of the configuration that it depends on."""
+"""The inputs of each measurement, and the keys of the configuration that it depends on.
+
+A long measurement is split into pieces, which run as jobs of their own.
+"""
 
 from __future__ import annotations
 
@@ -10,16 +13,16 @@ from hobble.workflow.clips import Clips, original
 from hobble.workflow.configurations import Configurations
 from hobble.workflow.package import Package
 
-NAMES = tuple(one.name for one in MEASURES)
+NAMES = tuple(each.name for each in MEASURES)  # of all measurements
 
 
 def piece_file(configuration: str, name: str, piece: str) -> str:
-    """Path of the JSON of a measurement's piece."""
+    """Path of the JSON of one piece of the measurement `name`."""
     return f"results/{configuration}/evaluation/pieces/{name}/{piece}.json"
 
 
 def result_file(configuration: str, name: str) -> str:
-    """Path of a measurement's JSON."""
+    """Path of the JSON of the measurement `name`."""
     return f"results/{configuration}/evaluation/{name}.json"
 
 
@@ -31,31 +34,32 @@ class Measurements:
 
     def inputs(self, configuration: str, name: str) -> dict[str, str | list[str]]:
         """Name of each input of the measurement -> its file or files."""
-        return {need: self._input(configuration, need) for need in measure(name).inputs}
+        return {item: self._input(configuration, item) for item in measure(name).inputs}
 
     def pieces(self, configuration: str, name: str) -> list[str]:
         """Files of the measurement's pieces, each made by a job; [] if there are fewer than two pieces."""
-        one = measure(name)
-        if one.pieces is None:
+        chosen = measure(name)
+        if chosen.pieces is None:
             return []
-        options = one.options.model_validate(self.options(configuration, name))
+        options = chosen.options.model_validate(self.options(configuration, name))
         runtime = Runtime.model_validate(self.runtime(configuration, name))
-        pieces = one.pieces(options, runtime, self.configurations.model(configuration).modes)
+        pieces = chosen.pieces(options, runtime, self.configurations.model(configuration).modes)
         return [piece_file(configuration, name, piece) for piece in pieces] if len(pieces) > 1 else []
 
-    def _input(self, configuration: str, need: str) -> str | list[str]:
+    def _input(self, configuration: str, item: str) -> str | list[str]:
+        """The file or files of one input; `item` is its name, which may be that of another measurement."""
         configurations = self.configurations
-        if need == "weights":
+        if item == "weights":
             return configurations.network(configuration, "weights.npz")
-        if need == "clips":
+        if item == "clips":
             return configurations.of_dataset(configuration, "database/clips/{clip}.npz")
-        if need == "summaries":
+        if item == "summaries":
             return configurations.of_dataset(configuration, "database/clips/{clip}.json")
-        if need == "skeleton":
+        if item == "skeleton":
             return self.clips.skeleton_file(configurations.dataset(configuration))
-        if need == "published":
+        if item == "published":
             return self.package.published()
-        return result_file(configuration, measure(need).name)
+        return result_file(configuration, measure(item).name)
 
     def splits(self, configuration: str, name: str) -> dict[str, str]:
         """Clip -> "train" or "held_out", if the measurement reads clips, else {}."""
@@ -88,5 +92,8 @@ class Measurements:
         return measure(name).package
 
     def code(self, name: str, *modules: str, script: str = "measure") -> str:
-        """Fingerprint of the measurement's code and of `modules`, which it imports dynamically."""
+        """Fingerprint of the code of measurement `name`.
+
+        modules: full names of modules that it imports dynamically. script: the rule's script, without .py.
+        """
         return self.package.code(script, measure(name).module("run"), *modules)

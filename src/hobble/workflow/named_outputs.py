@@ -1,8 +1,8 @@
-"""Finds the rule that makes a file by the file's full name, without trying every rule.
+"""Looks up in a dictionary of paths which rule makes a file, so that Snakemake need not try every rule.
 
-The rules of batches have no wildcards. But for each file of a clip, Snakemake tries the patterns of many
-rules, one regular expression after another. With tens of thousands of files this is a third of the time for
-planning.
+The rules for batches of clips have no wildcards: they list all their files. But for each of these files
+Snakemake tries the patterns of many rules, one regular expression after another. With tens of thousands of
+files this is a third of the time for planning.
 """
 
 from __future__ import annotations
@@ -23,17 +23,17 @@ class NamedOutputs(OutputIndex):  # type: ignore[misc]
 
     def __init__(self, rules: Sequence[Rule]) -> None:
         self._rules: dict[str, set[Rule]] = defaultdict(set)
-        patterns = []
+        with_wildcards = []
         for rule in rules:
             if rule.has_wildcards():
-                patterns.append(rule)
+                with_wildcards.append(rule)
             else:
                 for product in rule.products():
                     self._rules[str(product)].add(rule)
-        super().__init__(patterns)
+        super().__init__(with_wildcards)
 
     def match_producers(self, targetfile: str) -> set[Rule]:
-        """The rules that make a file: those that name it, or else those whose pattern matches."""
+        """The rules that make a file: those that list it, or else those with a matching pattern."""
         return self._rules.get(str(targetfile)) or super().match_producers(targetfile)
 
 

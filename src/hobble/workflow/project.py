@@ -17,8 +17,8 @@ from hobble.workflow.datasets import Datasets
 from hobble.workflow.measurements import Measurements
 from hobble.workflow.package import Package
 
-MOCAP = "mocap"
-RESERVED = (COMPARE, "datasets")  # folders of results/ that are not configurations
+MOCAP = "mocap"  # key of --config for the folder with the user's clips
+RESERVED = (COMPARE, "datasets", "page")  # folders of results/ that are not configurations
 
 
 class Project:
@@ -26,7 +26,8 @@ class Project:
 
     base: the folder of the Snakefile. config: Snakemake's config. Its `mocap` is the folder with the user's
     clips, `compare` lists the configurations to compare, and all other keys override those of every
-    configuration. Raises HobbleError if a configuration has a reserved name, or if `mocap` is not a name.
+    configuration. Raises HobbleError if a configuration has a reserved name, or if `mocap` is not the name of
+    a folder.
     """
 
     def __init__(self, base: Path, config: Mapping[str, Any]) -> None:

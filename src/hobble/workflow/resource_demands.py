@@ -1,8 +1,9 @@
-"""Memory and time that a job requests from a cluster, from the length of its clip and the number of joints.
+"""Computes the memory and time that jobs request from a cluster.
 
-Everything comes from the configuration and the sizes of the user's files, because requests are made before
-any job has run. The factors were measured on clips of 10,000 and 40,000 frames. `benchmarks/demands.py`
-compares them with the logs of a finished run.
+They grow with the length of the clips and the number of joints. Both are taken from the configuration and
+the sizes of the user's files, because requests are made before any job has run. The rates (MB or seconds for
+a thousand frames) were measured on clips of 10,000 and 40,000 frames. `benchmarks/demands.py` compares the
+requests with the logs of a finished run.
 """
 
 from __future__ import annotations
@@ -23,45 +24,50 @@ from hobble.workflow.clip_batches import ClipBatch
 from hobble.workflow.clips import original
 from hobble.workflow.project import Project
 
-ENGINE_MB = 400  # Snakemake runs twice in a cluster job: once for SLURM's step, once for the script
-PYTHON_MB = 400  # Python with numpy, scipy and the package
+ENGINE_MB = 400  # memory of Snakemake, which runs twice in a cluster job: for SLURM's step and for the script
+PYTHON_MB = 400  # memory of Python with numpy, scipy and the package
 MEMORY_MARGIN = 1.5  # requested memory / measured memory
 TIME_MARGIN = 10  # requested time / measured time, for an old and busy machine
-MEASURED_JOINTS = 31  # joints of the figure with which the factors were measured
-CLIP_SECONDS = 0.1  # time for a clip besides that for its frames
-ASSUMED_FRAMES = 20_000  # frames of a clip that is not downloaded yet
+MEASURED_JOINTS = 31  # joints of the skeleton with which the rates were measured
+CLIP_SECONDS = 0.1  # seconds for a clip, in addition to the seconds for its frames
+ASSUMED_FRAMES = 20_000  # of a clip that is not downloaded yet
 VISITS_PER_PASS = 10  # how often a pass of training uses a row
 HEADER_BYTES = 1 << 20  # the motion of a BVH file begins within this many bytes
-SHARD_MB = 10  # memory of a shard's job for each thousand frames of its longest clip
-ROW_BYTES = 24  # memory of a shard's job for each of its rows, which holds the row's place in the order
+SHARD_MB = 10  # MB for each thousand frames of the longest clip, in a job that makes a shard of a database
+ROW_BYTES = 24  # bytes for each row of the shard, in the same job: the row's position in the shuffled order
 EXCERPT_THOUSANDS = 2.0  # thousands of frames that a measurement of a sample reads at once
-WEEK_MINUTES = 7 * 24 * 60  # longest time that a job requests
+WEEK_MINUTES = 7 * 24 * 60  # a job requests at most this time
 
 
 class Demands:
-    """The requests of a project's jobs. They grow with the attempt, so that a killed job gets more."""
+    """The requests of a project's jobs.
+
+    attempt: 1 for a job's first try, 2 for the second, ... The requests grow with it, so that a killed job
+    gets more. least: the least number of minutes that is requested.
+    """
 
     def __init__(self, project: Project) -> None:
         self.project = project
 
     def batch_memory(self, batch: ClipBatch, rate: float, attempt: int = 1) -> int:
-        """MB for a job of a batch, whose longest clip takes `rate` MB for a thousand frames of 31 joints."""
+        """MB for a batch's job. rate: MB for a thousand frames of its longest clip, with 31 joints."""
         return _megabytes(rate * max(self._thousands_of(batch)), attempt)
 
     def batch_minutes(self, batch: ClipBatch, rate: float, attempt: int = 1, least: int = 1) -> int:
-        """Minutes, at least `least`, for a job of a batch that takes `rate` seconds for a thousand frames."""
+        """Minutes for a batch's job that takes `rate` seconds for a thousand frames."""
         return _minutes(sum(rate * some + CLIP_SECONDS for some in self._thousands_of(batch)), attempt, least)
 
     def memory_of_longest(self, dataset: str, rate: float, rows: float = 0.0, attempt: int = 1) -> int:
-        """MB for a job that reads clip after clip (`rate` MB for a thousand frames of the longest clip).
+        """MB for a job that reads one clip after another.
 
-        rows: bytes that it keeps for each frame of all clips.
+        rate: MB for a thousand frames of the longest clip. rows: bytes that the job keeps of each frame of
+        all clips.
         """
         longest = max(self.thousands(dataset, clip) for clip in self.project.clips.of(dataset))
         return _megabytes(rate * longest + rows * self.all_thousands(dataset) / 1e3, attempt)
 
     def shard_memory(self, dataset: str, attempt: int = 1) -> int:
-        """MB for a job that makes a shard. It holds a clip at a time, and a few numbers of each row."""
+        """MB for a job that makes a shard. It holds one clip at a time, and a few numbers of each row."""
         longest = max(self.thousands(dataset, clip) for clip in self.project.clips.of(dataset))
         return _megabytes(SHARD_MB * longest + ROW_BYTES * self._shard_thousands(dataset) / 1e3, attempt)
 
@@ -75,7 +81,7 @@ class Demands:
         return self.all_thousands(dataset) * min(1.0, 2 / shards if shards > 1 else 1.0)
 
     def minutes_of_all(self, dataset: str, rate: float, attempt: int = 1, least: int = 1) -> int:
-        """Minutes for a job that reads all clips and mirrors, `rate` seconds for a thousand frames."""
+        """Minutes for a job that takes `rate` seconds for a thousand frames of all clips and mirrors."""
         return _minutes(rate * self.all_thousands(dataset), attempt, least)
 
     def measure_memory(self, configuration: str, name: str, attempt: int = 1) -> int:
@@ -83,8 +89,8 @@ class Demands:
         cost = measure(name).cost
         if self._measured_share(configuration, name) < 1:
             return _megabytes(cost.memory_mb + cost.memory_each * EXCERPT_THOUSANDS, attempt)
-        more = math.ceil(MEMORY_MARGIN * cost.memory_mb * attempt)
-        return more + self.evaluation_memory(configuration, cost.memory_each, attempt)
+        fixed = math.ceil(MEMORY_MARGIN * cost.memory_mb * attempt)
+        return fixed + self.evaluation_memory(configuration, cost.memory_each, attempt)
 
     def measure_minutes(self, configuration: str, name: str, attempt: int = 1) -> int:
         """Minutes for the measurement `name`."""
@@ -102,7 +108,10 @@ class Demands:
         return min(1.0, section["sample_frames"] / max(frames, 1.0))
 
     def evaluation_memory(self, configuration: str, rate: float, attempt: int = 1) -> int:
-        """MB for a measurement that reads one clip of the data set after another."""
+        """MB for a measurement that reads one clip after another.
+
+        rate: MB for a thousand frames of the longest clip.
+        """
         return self.memory_of_longest(self.project.configurations.dataset(configuration), rate, 0.0, attempt)
 
     def evaluation_minutes(self, configuration: str, rate: float, attempt: int = 1, least: int = 1) -> int:
@@ -126,8 +135,9 @@ class Demands:
     def training_minutes(self, configuration: str, attempt: int = 1) -> int:
         """Minutes for a training, at most a week. If it is killed, it continues from its last checkpoint.
 
-        This assumes 6.4e9 products of weights a second: 10,700 samples of a network with layers of 342, 512,
-        512 and 311 on two cores.
+        This assumes that a machine multiplies by 6.4e9 weights per second. Two cores reach this: they train a
+        PFNN with layers of 342, 512, 512 and 311 on 10,700 samples per second. A PFNN has four parameters for
+        each weight.
         """
         training = self.project.configurations.section(configuration, "training")
         dataset = self.project.configurations.dataset(configuration)
@@ -137,20 +147,20 @@ class Demands:
         return _minutes(seconds / self.machines(configuration).count, attempt, least=60)
 
     def machines(self, configuration: str) -> Machines:
-        """The machines on which a configuration trains; one process if it has nothing to train."""
+        """The machines on which a configuration trains; one process if there is nothing to train."""
         if self.project.configurations.is_built(configuration):
             return Machines()
         return self.project.catalogue.configuration(configuration).training
 
     def training_threads(self, configuration: str) -> int:
-        """Threads of a training job: one for each process, at least 2; with GPUs 2, meant for each GPU."""
+        """Threads of a training job: one for each process, at least 2. With GPUs 2, in SLURM 2 per GPU."""
         machines = self.machines(configuration)
         return 2 if machines.gpus else max(2, machines.processes)
 
     def gpus(self, configuration: str) -> int:
         """GPUs that a training on one machine requests: `gpus`, or 1 for `device: cuda`.
 
-        `device: auto` may use a GPU but does not request one.
+        `device: auto` may use a GPU but does not request one. Several machines request theirs with `gres`.
         """
         machines = self.machines(configuration)
         if machines.gpus:
@@ -187,7 +197,7 @@ class Demands:
         channels = tuple((name, len(channel(name).columns(skeleton))) for name in chosen.channels)
         return RowLayout(joints=len(skeleton.joints), channels=channels, **of_rows)
 
-    @functools.cache  # noqa: B019 - one for as long as the process lives
+    @functools.cache  # noqa: B019 - one project lives as long as the process
     def all_thousands(self, dataset: str) -> float:
         """Thousands of frames of all clips and mirrors, scaled like `thousands`."""
         once = sum(self.thousands(dataset, clip) for clip in self.project.clips.of(dataset))

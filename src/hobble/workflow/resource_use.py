@@ -14,15 +14,17 @@ from hobble.report.pipeline import read_benchmark
 from hobble.workflow.clip_batches import family_of
 from hobble.workflow.resource_demands import ENGINE_MB
 
+# A job in the text of a dry run: the rule and the lines `key: value`.
 JOB_BLOCK = re.compile(r"^ *(?:local)?rule ([^\n]+):\n((?: +\w+: .*\n)+)", re.M)
-MEMORY_LINE = re.compile(r"took (\d+) MB of memory at most")
+MEMORY_LINE = re.compile(r"took (\d+) MB of memory at most")  # at the end of a job's log
 
 
 @dataclass(frozen=True)
 class JobResources:
     """What one job requests and, if it has run, what it used.
 
-    requested_mb, used_mb: memory, MB; the used memory comes from the log and excludes Snakemake's own.
+    rule: its name without data set and batch. log: path in the folder of the run. requested_mb, used_mb:
+    memory, MB; the used memory comes from the log and does not include that of Snakemake itself.
     requested_s, used_s: seconds; the used time comes from the benchmark file. A used amount is None if the
     run has no record of it.
     """
@@ -36,7 +38,7 @@ class JobResources:
 
     @property
     def memory_share(self) -> float:
-        """Used memory, with Snakemake's own, divided by the requested memory."""
+        """Used memory, including that of Snakemake itself, divided by the requested memory."""
         return ((self.used_mb or 0) + ENGINE_MB) / self.requested_mb
 
     @property
@@ -48,20 +50,22 @@ class JobResources:
 def planned_jobs(plan: str) -> Iterator[JobResources]:
     """The jobs in the text of a dry run. Raises KeyError for a job that requests no memory or time."""
     for rule, block in JOB_BLOCK.findall(plan):
-        of = dict(line.strip().split(": ", 1) for line in block.splitlines())
-        asks = dict(part.split("=", 1) for part in of["resources"].split(", "))
-        yield JobResources(family_of(rule), of["log"], int(asks["mem_mb"]), 60 * int(asks["runtime"]))
+        values = dict(line.strip().split(": ", 1) for line in block.splitlines())
+        requests = dict(part.split("=", 1) for part in values["resources"].split(", "))
+        yield JobResources(
+            family_of(rule), values["log"], int(requests["mem_mb"]), 60 * int(requests["runtime"])
+        )
 
 
 def with_use(jobs: Iterator[JobResources], run: Path) -> Iterator[JobResources]:
-    """The same jobs with what they used in the run of folder `run`. Jobs that did not run are left out."""
+    """The same jobs with what they used. run: the folder of the run. Jobs that did not run are left out."""
     for job in jobs:
         log = run / job.log
         benchmark = run / job.log.replace("/logs/", "/benchmarks/", 1).removesuffix(".log")
         if log.is_file():
-            took = MEMORY_LINE.findall(log.read_text(encoding="utf-8", errors="replace"))
+            peaks = MEMORY_LINE.findall(log.read_text(encoding="utf-8", errors="replace"))
             rows = read_benchmark(f"{benchmark}.tsv") if Path(f"{benchmark}.tsv").is_file() else []
-            memory = float(took[-1]) if took else None
+            memory = float(peaks[-1]) if peaks else None
             yield JobResources(
                 job.rule, job.log, job.requested_mb, job.requested_s, memory, rows[-1]["s"] if rows else None
             )

@@ -18,7 +18,7 @@ CHECKSUM_LINE = re.compile(r"([0-9a-fA-F]{64}) [ *](\S+)\.bvh")
 
 
 def joint_names(path: Path) -> set[str]:
-    """Joints in the first HEADER_BYTES of a BVH file, without prefixes. Empty if the file is missing."""
+    """The joints of a BVH file, without prefixes such as `mixamorig:`. Empty if it cannot be read."""
     try:
         with open(path, "rb") as file:
             header = file.read(HEADER_BYTES).partition(b"MOTION")[0].decode("latin-1")
@@ -28,7 +28,10 @@ def joint_names(path: Path) -> set[str]:
 
 
 def nearest_rig(joints: set[str], known: Mapping[str, Collection[str]], target: str) -> str | None:
-    """The known skeleton (name -> joints) that has the most of `joints`; None if `target` has as many."""
+    """The name of the known skeleton that has the most of `joints`; None if `target` has as many.
+
+    known: name -> joints. target: the name of the data set's skeleton.
+    """
     best, nearest = len(joints & set(known[target])), None
     for name in sorted(known):
         if len(joints & set(known[name])) > best:

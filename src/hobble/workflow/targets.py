@@ -1,4 +1,4 @@
-"""Checks the targets of a command line before Snakemake plans, and ends the run if there are mistakes."""
+"""Checks the targets of a command line before Snakemake plans, and finds the data sets that they need."""
 
 from __future__ import annotations
 
@@ -30,8 +30,8 @@ def check(project: Project, targets: Iterable[str]) -> None:
         if name == "datasets":
             _check_dataset(project, folder)
         elif name == COMPARE:
-            for one in project.comparison.names():
-                _check_configuration(project, one)
+            for compared in project.comparison.names():
+                _check_configuration(project, compared)
         elif name and name != PAGE:
             _check_configuration(project, name)
             _check_possible(project, name, folder, file)
@@ -44,9 +44,10 @@ def notes(project: Project, targets: Iterable[str]) -> list[str]:
 
 
 def needed_datasets(project: Project, arguments: Sequence[str]) -> list[str]:
-    """The data sets that a command line needs. arguments: of Snakemake, also of a job on another machine.
+    """The data sets that a run of Snakemake needs. arguments: its command line.
 
-    The data sets of configurations whose networks are used or continued are among them.
+    If the run is a job on another machine, it needs only the data set of its rule, if any. If a configuration
+    uses or continues the network of another one, the other one's data set is needed, too.
     """
     if rules := rules_of_job(arguments):
         return [name for name in dict.fromkeys(map(dataset_of, rules)) if name]
@@ -85,7 +86,9 @@ def _check_configuration(project: Project, name: str) -> None:
     model = project.catalogue.configuration(name)
     for other in filter(None, (model.network_of, model.training.continues)):
         if other == name:
-            raise HobbleError(f"configuration {name} cannot continue from itself")
+            raise HobbleError(
+                f"configuration {name} names itself in `network_of` or `training.continues`: name another"
+            )
         project.catalogue.configuration(other)
     if model.training.continues:
         _check_continues(project, name, model)
@@ -111,27 +114,30 @@ def _check_symmetric(project: Project, name: str, model: Configuration) -> None:
 
 
 def _check_continues(project: Project, name: str, model: Configuration) -> None:
-    """Check that a training can continue from another one: same channels, network and sections, and no fewer
-    passes.
+    """Check that a training can continue from another one.
+
+    Both must have the same channels, network and sections, and the later one must not have fewer passes.
     """
-    begun = model.training.continues
+    earlier = model.training.continues
     if project.configurations.is_built(name):
         kind = model.network.kind
-        raise HobbleError(f"configuration {name} continues from {begun}, but {kind} is built and not trained")
-    assert begun is not None
-    start = project.catalogue.configuration(begun)
-    for key, mine, of_start in (
+        raise HobbleError(
+            f"configuration {name} continues from {earlier}, but {kind} is built and not trained"
+        )
+    assert earlier is not None
+    start = project.catalogue.configuration(earlier)
+    for key, value, of_start in (
         ("channels", list(model.channels), list(start.channels)),
         ("network", model.network.model_dump(), start.network.model_dump()),
         ("training.sections", model.training.sections, start.training.sections),
     ):
-        if mine != of_start:
+        if value != of_start:
             raise HobbleError(
-                f"configuration {name} continues from {begun}, so its {key} must be {of_start}, not {mine}"
+                f"configuration {name} continues from {earlier}, so its {key} must be {of_start}, not {value}"
             )
     if model.training.passes < start.training.passes:
         raise HobbleError(
-            f"configuration {name} continues from {begun}, which has {start.training.passes} passes. Its "
+            f"configuration {name} continues from {earlier}, which has {start.training.passes} passes. Its "
             f"training.passes must not be fewer, but it is {model.training.passes}"
         )
 
@@ -140,7 +146,7 @@ def _check_dataset(project: Project, name: str) -> None:
     model = project.catalogue.dataset(name)
     skeleton = project.catalogue.skeleton(model.skeleton)
     for clip, entry in project.clips.listed(name).items():
-        project.clips.rig_files(name, clip)
+        project.clips.rig_files(name, clip)  # raises InputError if the clip has no file
         _check_entry(f"data set {name}: clips.{clip}", entry)
     _check_hurt(project, name, model, [f"{a}-{b}" for a, b in skeleton.links])
     project.datasets.channel_sources.check(name)
@@ -150,9 +156,9 @@ def _check_dataset(project: Project, name: str) -> None:
 
 
 def _check_entry(where: str, entry: ClipEntry) -> None:
-    """Check what a clip's entry says for the synthetic walker."""
+    """Check that the recipe in a clip's entry, for the synthetic walker, exists."""
     if entry.recipe is not None:
-        from hobble.synthetic.recipes import RECIPES  # imports numpy, which takes longer than all the rest
+        from hobble.synthetic.recipes import RECIPES  # imports numpy, which takes longer than all checks
 
         if entry.recipe not in RECIPES:
             raise InputError(
@@ -183,7 +189,7 @@ def _check_mirror(name: str, skeleton: SkeletonFile) -> None:
 
     rig = Skeleton.from_dict({"name": name, **skeleton.model_dump(exclude={"maps"})})
     mirror_skeleton(rig)
-    _ = rig.mirror_links
+    _ = rig.mirror_links  # raises HobbleError if a link has no counterpart
 
 
 def _check_possible(project: Project, name: str, folder: str, file: str) -> None:

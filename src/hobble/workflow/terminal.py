@@ -1,6 +1,7 @@
 """The terminal output of a run: one line of progress, each failure once, and a summary at the end.
 
-`snakemake_logger_plugin_hobble` passes Snakemake's log records to it. `snakemake -p` prints them all instead.
+The package `snakemake_logger_plugin_hobble` passes Snakemake's log records to this module. With
+`snakemake -p` it prints all of them itself, in Snakemake's form.
 """
 
 from __future__ import annotations
@@ -16,11 +17,11 @@ from typing import Any, TextIO
 
 from hobble.workflow.clip_batches import MARK, dataset_of, family_of
 
-PROGRESS_SECONDS = 10.0  # between lines of progress in a file
+PROGRESS_SECONDS = 10.0  # between lines of progress if the output goes to a file
 WIDTH = 100  # columns of the line of progress on a terminal
-MAX_FAILURES_LISTED = 20  # in the summary
-TAIL_BYTES = 1 << 16  # the end of a job's log, in which its error message is searched
-MESSAGE = re.compile(r"^\S+ \S+ ERROR (.*)$", re.M)
+MAX_FAILURES_LISTED = 20  # the summary lists at most this many failed jobs
+TAIL_BYTES = 1 << 16  # at the end of a job's log, where the job's error message is searched for
+MESSAGE = re.compile(r"^\S+ \S+ ERROR (.*)$", re.M)  # an error message in a job's log
 # Messages of Snakemake that are not shown, because this module reports the same in fewer words.
 JOB_ENDED = re.compile(r"CalledProcessError|Command 'set -euo pipefail|returned non-zero exit status")
 SUPERFLUOUS = re.compile(
@@ -29,7 +30,8 @@ SUPERFLUOUS = re.compile(
 )
 BATCH_RULES = re.compile(
     rf"(?<=^        )\w+(?:{MARK}[^,\n]+)?(?:, [^,\n]+)*$", re.M
-)  # in Snakemake's reasons
+)  # the list of rules in Snakemake's reasons for running jobs
+# Messages of Snakemake that are shown although they are not warnings.
 PASSED_ON = re.compile(r"^Nothing to be done|^Reasons:|^This was a dry-run|^Unlocking|^Touching|^Error")
 STOP_MESSAGE = "Terminating processes on user request"
 JOB_HINT = re.compile(r"^ *\(check individual jobs above for details\)\n", re.M)
@@ -37,7 +39,7 @@ JOB_HINT = re.compile(r"^ *\(check individual jobs above for details\)\n", re.M)
 
 @dataclass(frozen=True)
 class Job:
-    """The names of a job that are printed. about: its wildcards, or its data set and batch. log: its file."""
+    """What is printed about a job. about: its wildcards, or its data set and batch. log: its log file."""
 
     rule: str
     about: str
@@ -45,7 +47,7 @@ class Job:
 
     @property
     def name(self) -> str:
-        """Rule and what it is about."""
+        """The rule, and the job's wildcards or batch."""
         return f"{self.rule} {self.about}".strip()
 
 
@@ -60,15 +62,18 @@ class Terminal:
         self, stream: TextIO, live: bool, dryrun: bool = False, now: Callable[[], float] = time.monotonic
     ) -> None:
         self.stream, self.live, self.dryrun, self.now = stream, live, dryrun, now
-        self.began = self.last = now()
+        self.began = self.last = now()  # `last`: time of the last line of progress in a file
         self.jobs: dict[int, Job] = {}
         self.running: dict[int, Job] = {}
         self.failed: list[Job] = []
         self.done = self.total = 0
-        self.stopped = self.announced = self.shown = self.closed = False
+        self.stopped = False  # whether the user has stopped the run
+        self.announced = False  # whether the number of jobs is printed
+        self.shown = False  # whether the line of progress is on the terminal
+        self.closed = False  # whether the summary is printed
 
     def take(self, record: logging.LogRecord) -> None:
-        """Print what a record of Snakemake's logger needs."""
+        """Print a record of Snakemake's logger, if it is one that is shown."""
         event = str(getattr(record, "event", None) or "")
         handle = getattr(self, f"_{event}", None)
         if handle is not None:
@@ -145,6 +150,7 @@ class Terminal:
             self._line(f"{job.name}: ended without a message; it may have been killed. Its log: {job.log}")
 
     def _words(self, record: logging.LogRecord) -> None:
+        """Print a message without an event, if it is an error, a warning or PASSED_ON."""
         text = str(record.msg or "").strip()
         if STOP_MESSAGE in text:
             self.stopped = True
@@ -167,7 +173,7 @@ class Terminal:
 
 
 def _job(data: Mapping[str, Any]) -> Job:
-    """The job of one of Snakemake's events."""
+    """The job that an event of Snakemake is about."""
     rule, logs = str(data["rule_name"]), [str(log) for log in data.get("log") or ()]
     words = [str(value) for value in dict(data.get("wildcards") or {}).values()]
     if (dataset := dataset_of(rule)) and logs:
@@ -183,7 +189,7 @@ def _table(rules: Mapping[str, int]) -> str:
 
 
 def _folded(found: re.Match[str]) -> str:
-    """A list of rules without data sets and numbers of batches, each name once."""
+    """A list of rules that BATCH_RULES has found, without data sets and batch numbers, each name once."""
     return ", ".join(dict.fromkeys(family_of(rule) for rule in found[0].split(", ")))
 
 

@@ -22,7 +22,8 @@ FORMAT = "%(asctime)s %(levelname)s %(message)s"
 def main(job_file: Path) -> int:
     """Train together with the other processes. Returns the exit status.
 
-    After a HobbleError the status is 1, and the message is in the file error-<rank> beside `job_file`.
+    job_file: path of JOB.json. After a HobbleError the status is 1, and the message is in the file
+    error-<rank> beside `job_file`.
     """
     rank = int(os.environ["RANK"])
     job = json.loads(job_file.read_text(encoding="utf-8"))
@@ -32,10 +33,11 @@ def main(job_file: Path) -> int:
     to_file.setFormatter(logging.Formatter(FORMAT))
     logger.addHandler(to_file)
     try:
+        # On a single machine, this process ends when the job that started torchrun ends.
         with ends_with_run():
             _train(job)
     except HobbleError as error:
-        # Named by rank: the message of the lowest rank is shown, because its error stops the others.
+        # If several processes fail, the message of the lowest rank is shown.
         (job_file.parent / f"error-{rank:05d}").write_text(str(error), encoding="utf-8")
         return 1
     return 0
@@ -57,7 +59,7 @@ def _train(job: dict[str, Any]) -> None:
             checkpoints=Path(job["checkpoints"]),
             threads=job["threads"],
             start=Path(job["start"]) if job["start"] else None,
-            code=job["code"],
+            code=job["code"],  # hash of the source code
             processes=processes,
         )
 

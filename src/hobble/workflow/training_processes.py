@@ -25,10 +25,10 @@ GRACE_SECONDS = 10.0  # time for torchrun to end its processes
 
 
 def on_machines(training: Training, machines: Machines, gpus: bool) -> Training:
-    """The training options for these machines. gpus: with several processes, whether each uses a GPU."""
+    """The training options for these machines. gpus: whether each of several processes uses a GPU."""
     device = training.device if machines.count == 1 else "cuda" if gpus else "cpu"
-    own = {"nodes": machines.nodes, **({"gpus": machines.each} if gpus else {"processes": machines.each})}
-    return Training.model_validate({**training.model_dump(), **own, "device": device})
+    keys = {"nodes": machines.nodes, **({"gpus": machines.each} if gpus else {"processes": machines.each})}
+    return Training.model_validate({**training.model_dump(), **keys, "device": device})
 
 
 def train_together(
@@ -43,11 +43,11 @@ def train_together(
     start: Path | None,
     code: str | None,
 ) -> None:
-    """Train in `machines.count` processes until the last checkpoint is on disk.
+    """Train in `machines.count` processes. Returns when the last checkpoint is on disk.
 
-    threads: of all processes of one machine together. log: the output of the processes is appended to it. The
-    other arguments are those of `hobble.training.train.train`. All machines must see these files. Raises
-    HobbleError with the message of the process that failed, or with its exit status.
+    threads: for all processes of one machine together. log: file to which the output of the processes is
+    appended. The other arguments are those of `hobble.training.train.train`. All machines must
+    see the files. Raises HobbleError with the message of the process that failed, or with its exit status.
     """
     job = {
         "database": str(database),
@@ -78,9 +78,9 @@ def train_together(
 def command(machines: Machines, job_file: Path) -> list[str]:
     """The command that starts the processes. Raises HobbleError for several machines without SLURM."""
     torchrun = [sys.executable, "-m", "torch.distributed.run", f"--nproc-per-node={machines.each}"]
-    start = ["-m", training_process.__name__, str(job_file)]
+    program = ["-m", training_process.__name__, str(job_file)]
     if machines.nodes == 1:
-        return [*torchrun, "--standalone", *start]
+        return [*torchrun, "--standalone", *program]
     if SLURM_VARIABLE not in os.environ:
         raise HobbleError(
             f"training.nodes is {machines.nodes}, but this is not a SLURM job, so the processes cannot be "
@@ -93,7 +93,7 @@ def command(machines: Machines, job_file: Path) -> list[str]:
         f"--rdzv-id={uuid.uuid4().hex}",
     ]
     srun = ["srun", "--overlap", "--kill-on-bad-exit=1", f"--ntasks={machines.nodes}", "--cpu-bind=none"]
-    return [*srun, *torchrun, *rendezvous, *start]
+    return [*srun, *torchrun, *rendezvous, *program]
 
 
 def _run(command: list[str], environment: Mapping[str, str], output: IO[bytes]) -> int:
@@ -112,17 +112,17 @@ def _run(command: list[str], environment: Mapping[str, str], output: IO[bytes]) 
 
 
 def _environment(machines: Machines, threads: int) -> dict[str, str]:
-    """The environment of the processes. On a single machine they end when this process ends."""
+    """Environment variables for the processes. On a single machine, the processes end when this one ends."""
     variables = {**os.environ, "OMP_NUM_THREADS": str(threads)}
     variables["PYTHONPATH"] = os.pathsep.join(path for path in sys.path if path)
     if machines.nodes == 1:
         variables[lifetime.RUN_VARIABLE] = lifetime.this_process()
-    else:
+    else:  # other machines cannot see whether this process runs
         variables.pop(lifetime.RUN_VARIABLE, None)
     return variables
 
 
 def _free_port() -> int:
-    with socket.socket() as one:
-        one.bind(("", 0))
-        return int(one.getsockname()[1])
+    with socket.socket() as probe:
+        probe.bind(("", 0))
+        return int(probe.getsockname()[1])

@@ -15,9 +15,9 @@ DRY_RUN = re.compile(r"-[a-zA-Z]*n[a-zA-Z]*|--dry-?run")
 
 
 def ensure_user_name() -> None:
-    """If the user has no name, set the variable USER to the user's number. Jobs inherit it.
+    """If the user has no name, set the environment variable USER to the user's id. Jobs inherit it.
 
-    Snakemake and PyTorch need a name.
+    Snakemake and PyTorch need a user name.
     """
     try:
         getpass.getuser()
@@ -28,7 +28,7 @@ def ensure_user_name() -> None:
 def check_may_write(arguments: Sequence[str], own: Path = OWN) -> None:
     """Raise InputError if Snakemake cannot write its lock here, as in another user's checkout.
 
-    arguments: of the command line. A dry run is allowed, because it writes nothing.
+    arguments: the command line. own: Snakemake's own folder. A dry run is allowed, because it writes nothing.
     """
     if any(DRY_RUN.fullmatch(argument) for argument in arguments):
         return

@@ -192,7 +192,7 @@ def test_cross_validation_never_learns_from_the_windows_it_names() -> None:
 
 
 def test_too_little_data_is_reported_with_its_reason(network, hurtable, motion) -> None:
-    assert judged(network, motion)["reason"] == module.REASON
+    assert judged(network, motion)["reason"] == module.NO_SEVERITIES
     assert judged(hurtable, motion[:2])["reason"] == module.TOO_FEW
     assert rows(judged(network, motion)) == []
     # A part that hurts only in held-out clips is never named right, and is counted.

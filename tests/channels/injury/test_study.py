@@ -125,7 +125,8 @@ def test_the_command_writes_fourteen_tables(folder: Path, capsys: pytest.Capture
     files = [str(write(folder, says.__name__, says)) for says in (right, mirrored)]
     assert main(["study", str(folder / "films.json"), *files, "--out", str(folder / "out")]) == 0
     assert "2 people, 26 answers" in (said := capsys.readouterr().out)
-    assert "ticked: 50 %, without side 100 % (Ferre 2019: 82 %). Fluid: 4.00 of 5." in said
+    assert "ticked: 50 % (Ferre 2019: 82 %), 100 % if left and right count as the same." in said
+    assert "Fluid: 4.00 of 5." in said
     names = {f"table-{numeral}.csv" for numeral in NUMERALS} | {"tables.md"}
     assert {path.name for path in (folder / "out").iterdir()} == names
     with open(folder / "out" / "table-IX.csv") as file:

@@ -22,17 +22,17 @@ from .example import CUT, FRAMES, built, clip, layout_of
 
 def test_a_frame_that_two_cycles_share_is_kept_once(holden31: Skeleton) -> None:
     rows = clip(holden31, 0)
-    one, remaining = in_runs(rows)
-    np.testing.assert_array_equal(rows.frame[one], 100 + np.arange(FRAMES[0]))
-    assert rows.cycle[one[CUT]] == 1, "the row with which a cycle begins"
+    kept, remaining = in_runs(rows)
+    np.testing.assert_array_equal(rows.frame[kept], 100 + np.arange(FRAMES[0]))
+    assert rows.cycle[kept[CUT]] == 1, "the row with which a cycle begins"
     np.testing.assert_array_equal(remaining, np.arange(FRAMES[0])[::-1])
 
 
 def test_a_gap_between_cycles_ends_a_run(holden31: Skeleton) -> None:
     rows = clip(holden31, 0)
     rows = replace(rows, frame=np.where(rows.cycle > 0, rows.frame + 30, rows.frame))
-    one, remaining = in_runs(rows)
-    assert len(one) == len(rows)
+    kept, remaining = in_runs(rows)
+    assert len(kept) == len(rows)
     np.testing.assert_array_equal(remaining, [*range(CUT, -1, -1), *range(len(rows) - CUT - 2, -1, -1)])
 
 

@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 
 # The groups of Rueangsirarak et al. (2018), who distinguish them by gait.
 DIAGNOSES = ("joint problem", "muscle weakness", "neurological defect")
-HEALTHY = "healthy"
+HEALTHY = "healthy"  # stands in the table, or in a clip's entry, instead of a diagnosis
 COLUMNS = ("file", "diagnosis")  # columns that the table needs; others are ignored
 
 
@@ -35,7 +35,7 @@ class DiagnosisTable(Section):
 
 
 class Diagnosis(Channel):
-    """The diagnosis of a clip's person, the same in all frames."""
+    """The diagnosis of a clip's person, the same in all frames. For the class fields see `Channel`."""
 
     name = "diagnosis"
     title = "Diagnosis"
@@ -47,7 +47,7 @@ class Diagnosis(Channel):
     Options = DiagnosisTable
 
     def columns(self, rig: HasLinks) -> tuple[str, ...]:
-        """The diagnoses."""
+        """The three groups of diagnoses."""
         return DIAGNOSES
 
     def tables(self, options: Section | None) -> tuple[str, ...]:
@@ -56,7 +56,7 @@ class Diagnosis(Channel):
 
     def is_neutral(self, source: ClipSource) -> bool:
         """Whether the person is healthy or the diagnosis is unknown."""
-        return _of(source) in (HEALTHY, None)
+        return _diagnosis_of(source) in (HEALTHY, None)
 
     def check(self, source: ClipSource, rig: HasLinks) -> None:
         """Raise InputError if the data set's entry for the clip names a diagnosis that is not known."""
@@ -68,16 +68,16 @@ class Diagnosis(Channel):
         """1 for the person's diagnosis in every frame, and a warning if the table lacks the clip."""
         import numpy as np
 
-        found = _of(source)
+        found = _diagnosis_of(source)
         row = [float(diagnosis == found) for diagnosis in DIAGNOSES]
         warnings = [] if found else [f"{source.clip} is not in the table. The person is taken to be healthy."]
         return np.tile(np.array(row, np.float32), (len(clip), 1)), warnings
 
 
-def _of(source: ClipSource) -> str | None:
+def _diagnosis_of(source: ClipSource) -> str | None:
     """The diagnosis of a clip's person, or HEALTHY. None if neither the clip's entry nor the table has it.
 
-    The entry is in the configuration of the data set and comes first.
+    The entry, which is in the configuration of the data set, is used if both have it.
     """
     if source.value is not None:
         return str(source.value)
@@ -108,7 +108,7 @@ def read_table(path: str) -> dict[str, str]:
         if out.setdefault(clip, diagnosis) != diagnosis:
             problem = f"{printable(clip)} is {diagnosis} here and {out[clip]} above"
             raise InputError(
-                path, problem, line=reader.line_num, fix=f"Leave one of them in {Path(path).name}."
+                path, problem, line=reader.line_num, fix=f"Keep only one of them in {Path(path).name}."
             )
     return out
 

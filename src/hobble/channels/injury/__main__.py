@@ -1,5 +1,7 @@
 """Writes status files, which say what hurts in each clip, from a table of clips, links and severities.
 
+A link is a pair of neighbouring joints.
+
 python -m hobble.channels.injury TABLE.csv FOLDER --skeleton SKELETON.yaml
 """
 
@@ -17,11 +19,15 @@ from hobble.core.errors import HobbleError
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run the command. Returns the exit status."""
     parser = argparse.ArgumentParser(
-        prog="python -m hobble.channels.injury", description="Status files from a table."
+        prog="python -m hobble.channels.injury", description="Writes status files from a table."
     )
     parser.add_argument("table", help="CSV with the columns clip, link, severity, from, to")
     parser.add_argument("folder", help="folder of the clips' BVH files; the status files are written there")
-    parser.add_argument("--skeleton", default="config/skeletons/holden31.yaml", help="defines the links")
+    parser.add_argument(
+        "--skeleton",
+        default="config/skeletons/holden31.yaml",
+        help="skeleton that defines the links",
+    )
     options = parser.parse_args(arguments)
     try:
         for path in write_statuses(options.table, options.folder, skeleton_links(Path(options.skeleton))):

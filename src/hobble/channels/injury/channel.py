@@ -1,4 +1,4 @@
-"""The injury channel: a severity from 0 to 10 for each link of the skeleton."""
+"""The injury channel: a severity from 0 to 10 for each link (pair of neighbouring joints)."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ if TYPE_CHECKING:
     from hobble.core.clip import Clip
     from hobble.core.quat import Array
 
-ZERO = re.compile(r"\s*0+(\.0*)?\s*")
+ZERO = re.compile(r"\s*0+(\.0*)?\s*")  # a severity of 0, such as "0" or "0.00"
 
 
 def hurts(text: str) -> bool:
@@ -22,20 +22,20 @@ def hurts(text: str) -> bool:
 
 
 class Injury(Channel):
-    """Severities from a status file beside the clip.
+    """Severities from a status file beside the clip. For the class fields see `Channel`.
 
-    A status in the clip's entry of the data set is used instead and holds for all frames.
+    If the clip's entry in the data set has a status, it is used instead and holds for all frames.
     """
 
     name = "injury"
     title = "Injury"
     value = "severity"
     highest = 10.0
-    rate = 10.0
+    rate = 10.0  # severity per second: from healthy to the highest severity in one second
     suffix = "_injuries.txt"
     old_keys = ("links", "injury", "status", "severity")
     slows = True
-    targets = ("questionnaire",)
+    targets = ("questionnaire",)  # the page on which people tick what hurts in films of the character
 
     def columns(self, rig: HasLinks) -> tuple[str, ...]:
         """The links, with names such as "LeftUpLeg-LeftLeg"."""
@@ -50,8 +50,8 @@ class Injury(Channel):
     def check(self, source: ClipSource, rig: HasLinks) -> None:
         """Raise InputError if the entry's status breaks the grammar of status files.
 
-        A skeleton without links has no columns. Then the status only marks the clip as hurt, so that it is
-        left out.
+        A skeleton without links has no columns for severities. Then the status only marks the clip as hurt:
+        a network without this channel does not train on it.
         """
         from hobble.channels.injury.status import parse_links
         from hobble.core.errors import InputError
@@ -65,7 +65,7 @@ class Injury(Channel):
             parse_links(source.value, links, where)
 
     def read(self, clip: Clip, source: ClipSource, motion: Mapping[str, Any]) -> tuple[Array, list[str]]:
-        """See `clip_severity`."""
+        """Severities (F, L) float32 of F frames and L links, and warnings."""
         from hobble.channels.injury.severity import clip_severity
 
         return clip_severity(clip, next(iter(source.files), None), source.value, motion)

@@ -1,4 +1,7 @@
-"""Links and severities of the figures in a crowd."""
+"""Links and severities of a crowd of figures (copies of the character that walk at the same time).
+
+A link is a pair of neighbouring joints. It has one severity.
+"""
 
 from __future__ import annotations
 
@@ -17,10 +20,13 @@ def links(network: Network) -> tuple[str, ...]:
 
 
 def hurt_links(network: Network) -> tuple[str, ...]:
-    """The links that were hurt in training."""
+    """The links that were hurt in training; all links if none was."""
     return network.trained(INJURY)
 
 
 def severities(network: Network, each: Sequence[Mapping[str, float]]) -> dict[str, Array]:
-    """{"injury": (C, L) severities} of C figures; {} without such a channel. each: link -> severity."""
+    """{"injury": (C, L) severities} of C figures; {} if the network has no such channel.
+
+    each: for each figure, link -> severity. The other links have severity 0.
+    """
     return channel_values(network, INJURY, each)

@@ -1,4 +1,4 @@
-"""The looping picture at the top of the README: a healthy walk next to the same character hurt."""
+"""The looping picture at the top of the README: the same character walks healthy and hurt, side by side."""
 
 from __future__ import annotations
 
@@ -17,16 +17,16 @@ from hobble.figure.mesh import body
 from hobble.figure.pack import regions
 from hobble.models.network import Network
 from hobble.report.raster import BodyRenderer
-from hobble.report.stimuli import STRIDE, frames, walk
+from hobble.report.stimuli import FRAME_STEP, frames, walk
 from hobble.runtime.options import Runtime
 
 Picture = NDArray[np.uint8]
 
-INJURIES = {"left thigh": 8.0, "left shank": 8.0}
+INJURIES = {"left thigh": 8.0, "left shank": 8.0}  # part of the body -> severity
 CAPTIONS = ("healthy", "left knee hurts: 8 of 10")
-SIZE = 360  # pixels of each half
-MOST_BYTES = 1_000_000
-QUALITIES = (80, 65, 50, 35, 20)
+SIZE = 360  # width and height of each half, pixels
+MOST_BYTES = 1_000_000  # largest size of the file
+QUALITIES = (80, 65, 50, 35, 20)  # of the WebP encoder; the first that keeps to MOST_BYTES is used
 
 
 def write_limp_picture(network: Network, path: str | Path, runtime: Runtime) -> int:
@@ -35,29 +35,29 @@ def write_limp_picture(network: Network, path: str | Path, runtime: Runtime) -> 
     The healthy and the hurt character have the same target speed. Raises HobbleError if the network has no
     injury channel, or if the picture is too large at the lowest quality.
     """
-    known = links(network)
-    if network.skeleton is None or not known:
+    link_names = links(network)
+    if network.skeleton is None or not link_names:
         raise HobbleError("this network has no injury channel. Use a configuration with `channels: [injury]`")
-    parts = body_parts(network.skeleton, known, hurt_links(network))
-    hurt = {known[parts[label]]: value for label, value in INJURIES.items()}
-    studio = BodyRenderer(body(network.skeleton), regions(network.skeleton, known))
+    parts = body_parts(network.skeleton, link_names, hurt_links(network))
+    hurt = {link_names[parts[label]]: value for label, value in INJURIES.items()}
+    renderer = BodyRenderer(body(network.skeleton), regions(network.skeleton, link_names))
     halves = []
     for injury in ({}, hurt):
-        share = np.array([injury.get(link, 0.0) for link in known]) / 10
+        colours = np.array([injury.get(link, 0.0) for link in link_names]) / 10
         loop = walk(network, {"injury": injury}, runtime)
-        halves.append(frames(studio, network.skeleton, loop, share, SIZE))
+        halves.append(frames(renderer, network.skeleton, loop, colours, SIZE))
     return _save(Path(path), side_by_side(*halves))
 
 
 def side_by_side(healthy: Sequence[Picture], hurt: Sequence[Picture]) -> list[Image.Image]:
-    """The pictures of two loops side by side, as many as `hurt` has.
+    """The pictures of two loops side by side. There are as many as in `hurt`.
 
     While `hurt` plays once, `healthy` plays a whole number of times, so that both loop without a jump.
     """
     rounds = max(1, round(len(hurt) / len(healthy)))
     out = []
-    for number, right in enumerate(hurt):
-        left = healthy[number * rounds * len(healthy) // len(hurt) % len(healthy)]
+    for index, right in enumerate(hurt):
+        left = healthy[index * rounds * len(healthy) // len(hurt) % len(healthy)]
         both = Image.fromarray(np.concatenate([left, right], axis=1)[..., :3])
         draw, font = ImageDraw.Draw(both), ImageFont.load_default(size=18)
         for half, text in enumerate(CAPTIONS):
@@ -75,7 +75,7 @@ def _save(path: Path, images: Sequence[Image.Image]) -> int:
                 format="WEBP",
                 save_all=True,
                 append_images=images[1:],
-                duration=round(1000 * STRIDE / 60),
+                duration=round(1000 * FRAME_STEP / 60),
                 loop=0,
                 quality=quality,
                 method=4,

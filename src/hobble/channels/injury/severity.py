@@ -1,4 +1,8 @@
-"""Severities of F frames and L links, from a status file or from a status for the whole clip."""
+"""Severities of F frames and L links, from a status file or from a status for the whole clip.
+
+A link is the piece of the body between two neighbouring joints. A spell is a range of frames in which some
+links hurt. After its first line, a status file has a line for each spell.
+"""
 
 from __future__ import annotations
 
@@ -19,7 +23,7 @@ FPS = 60.0  # frame rate of every clip
 def severity_matrix(status: Status, links: Sequence[str]) -> Array:
     """(status.frames, L) float32 severities, one row for each frame of the clip's file.
 
-    If spells overlap, the later one counts.
+    Where spells overlap, the one that comes later in `status` counts for the links that it names.
     """
     out = np.zeros((status.frames, len(links)), np.float32)
     column = {link: i for i, link in enumerate(links)}
@@ -30,7 +34,10 @@ def severity_matrix(status: Status, links: Sequence[str]) -> Array:
 
 
 def range_warnings(status: Status, path: str | Path) -> list[str]:
-    """A warning for each range that starts at 0, goes past the clip's end or contradicts an earlier line."""
+    """A warning for each range that starts at 0, goes past the clip's end or contradicts an earlier line.
+
+    status: the content of the status file `path`.
+    """
     notes = []
     overlaps = _overlaps(status.spells)
     for i, spell in enumerate(status.spells):
@@ -40,24 +47,24 @@ def range_warnings(status: Status, path: str | Path) -> list[str]:
         elif spell.last > status.frames:
             notes.append(f"{place} goes past the last of {status.frames} frames; it was cut there.")
         if spell.first == 0:
-            notes.append(f"{place} starts at 0; frames count from 1, so it was taken to start there.")
+            notes.append(f"{place} starts at 0; frames count from 1, so it was taken to start at 1.")
         for earlier in overlaps.get(i, ()):
-            if both := _contested(earlier, spell):
+            if links := _contested(earlier, spell):
                 notes.append(
-                    f"{place} overlaps that of line {earlier.line}; the later one counts for {both}."
+                    f"{place} overlaps that of line {earlier.line}; the later line counts for {links}."
                 )
     return notes
 
 
 def _overlaps(spells: Sequence[InjurySpell]) -> dict[int, list[InjurySpell]]:
-    """For each spell the earlier spells that share frames with it, in order."""
+    """Index of a spell -> the spells before it in the list that share frames with it, in order."""
     found: dict[int, list[int]] = {}
-    going: list[int] = []
+    lasting: list[int] = []  # spells that have begun and may not have ended
     for i in sorted(range(len(spells)), key=lambda i: spells[i].first):
-        going = [j for j in going if spells[j].last >= spells[i].first]
-        for j in going:
+        lasting = [j for j in lasting if spells[j].last >= spells[i].first]
+        for j in lasting:
             found.setdefault(max(i, j), []).append(min(i, j))
-        going.append(i)
+        lasting.append(i)
     return {i: [spells[j] for j in sorted(others)] for i, others in found.items()}
 
 
@@ -73,10 +80,10 @@ def clip_severity(
     """Severities (F, L) float32 of a clip, and warnings.
 
     status_file: the file beside the clip. status: severities for all frames ("A-B[4];C-D[8]"), used instead
-    of the file. motion: the report of the motion stage, for `source_frames` and `source_fps`.
+    of the file. motion: the report of the motion stage, which tells how the clip was made from its BVH file.
 
-    Raises InputError if the status or its file cannot be read, or if the status file counts other frames than
-    the clip's file has. A difference of one frame is only a warning.
+    Raises InputError if the status or its file cannot be read, or if the status file states another number of
+    frames than the clip's file has. A difference of one frame is only a warning.
     """
     links = clip.skeleton.link_names
     if not links:  # the skeleton has no links, so there are no columns
@@ -109,13 +116,17 @@ def clip_severity(
 def source_rows(frames: int, rows: int, motion: Mapping[str, Any]) -> Array:
     """(frames,) index, from 0, of the source frame that each frame of a clip shows.
 
-    frames: of the clip. rows: frames of the source. motion: the report of the motion stage.
+    frames: number of frames of the clip. rows: number of frames of the source. motion: the report of the
+    motion stage, which tells how the clip was made from its source.
     """
-    once = np.arange(frames) % motion.get("cycle_frames", frames)  # a looped clip starts again
-    at = once * (motion["source_fps"] / FPS) + motion.get("source_start", 0)
-    return np.clip(np.floor(at + 1e-6).astype(int), 0, rows - 1)
+    in_cycle = np.arange(frames) % motion.get("cycle_frames", frames)  # a looped clip repeats its source
+    source_frame = in_cycle * (motion["source_fps"] / FPS) + motion.get("source_start", 0)
+    return np.clip(np.floor(source_frame + 1e-6).astype(int), 0, rows - 1)
 
 
 def mirror_severity(severity: Array, mirror_links: Array) -> Array:
-    """Severities (F, L) of the mirrored clip: left and right swapped."""
+    """Severities (F, L) of the mirrored clip: left and right swapped.
+
+    mirror_links: (L,) for each link, the index of the link on the other side of the body.
+    """
     return np.ascontiguousarray(severity[:, mirror_links])

@@ -49,10 +49,10 @@ PRESETS = {
     "Bad back": {"lower back": 8},
     "Knee and back": {"left thigh": 7, "left shank": 7, "lower back": 7},
 }
-SEVERITY = 8.0  # of the parts that hurt in the loops of STUDY
-# Looping pictures of walks: name -> parts that hurt. Injuries are not coloured in them. In the films of the
-# questionnaire (`study/films.py`) the injury begins during the film.
-STUDY: dict[str, tuple[str, ...]] = {
+LOOP_SEVERITY = 8.0  # of the parts that hurt in PLAIN_LOOPS
+# Looping pictures in which the injuries are not coloured: name -> parts that hurt during the whole loop. (In
+# the films of the questionnaire, the injury begins during the film: see `study/films.py`.)
+PLAIN_LOOPS: dict[str, tuple[str, ...]] = {
     "healthy": (),
     "left-thigh": ("left thigh",),
     "left-shank": ("left shank",),
@@ -67,8 +67,8 @@ STUDY: dict[str, tuple[str, ...]] = {
     "right-leg": ("right thigh", "right shank", "right foot"),
     "thigh-and-back": ("left thigh", "lower back"),
 }
-# Scenarios (walks in which the severity rises): name -> roles of the joints at the two ends of the hurt part.
-HURT = {
+# Sweeps (walks in which the severity rises): name -> roles of the joints at the two ends of the hurt part.
+SWEPT_PARTS = {
     "left_knee": ("left_hip", "left_knee"),
     "right_knee": ("right_hip", "right_knee"),
     "left_ankle": ("left_knee", "left_heel"),
@@ -78,7 +78,10 @@ HURT = {
 
 
 def shown(skeleton: Skeleton, links: Sequence[str], trained: Collection[str]) -> ChannelDisplay:
-    """Sliders and presets of the parts that were hurt in training, and the regions of the body."""
+    """Sliders and presets of the parts that were hurt in training, and the regions of the body.
+
+    links: the names of all links. trained: the names of those that were hurt in training.
+    """
     parts = {label: links[i] for label, i in body_parts(skeleton, links, trained).items()}
     felt = {label: link for label, link in parts.items() if link in trained}
     presets = {
@@ -90,11 +93,11 @@ def shown(skeleton: Skeleton, links: Sequence[str], trained: Collection[str]) ->
 
 
 def loops(skeleton: Skeleton, links: Sequence[str], trained: Collection[str]) -> list[SampleWalk]:
-    """The thirteen walks of the study, and the coloured presets."""
+    """PLAIN_LOOPS, and a loop in colour of each preset. links, trained: as in `shown`."""
     parts = {label: links[i] for label, i in body_parts(skeleton, links, trained).items()}
     out = [
-        SampleWalk(name, {parts[label]: SEVERITY for label in labels}, False)
-        for name, labels in STUDY.items()
+        SampleWalk(name, {parts[label]: LOOP_SEVERITY for label in labels}, False)
+        for name, labels in PLAIN_LOOPS.items()
     ]
     for title, values in PRESETS.items():
         hurt = {parts[label]: float(value) for label, value in values.items()}
@@ -103,42 +106,43 @@ def loops(skeleton: Skeleton, links: Sequence[str], trained: Collection[str]) ->
 
 
 def sweeps(skeleton: Skeleton, links: Sequence[str], trained: Collection[str]) -> dict[str, str]:
-    """The links that hurt in the scenarios: name -> link.
+    """The links that hurt in the sweeps: name -> link. links, trained: as in `shown`.
 
-    It is the part's uppermost link that was hurt in training. If there is none, it is the uppermost of all.
+    Of the hurt part's links, the uppermost that was hurt in training is taken. If none was, the part's
+    uppermost link is taken.
     """
     out = {}
-    for name, (upper, lower) in HURT.items():
+    for name, (upper, lower) in SWEPT_PARTS.items():
         child, top = skeleton.role(lower), skeleton.role(upper)
         path = [child]
         while path[-1] != top and skeleton.parents[path[-1]] >= 0:
             path.append(skeleton.parents[path[-1]])
         pairs = [f"{skeleton.joints[p]}-{skeleton.joints[c]}" for c, p in pairwise(path)]
-        for known in (trained, links):
-            if name not in out and (there := [pair for pair in reversed(pairs) if pair in known]):
-                out[name] = there[0]
+        for candidates in (trained, links):
+            if name not in out and (found := [pair for pair in reversed(pairs) if pair in candidates]):
+                out[name] = found[0]
     return out
 
 
 def body_parts(skeleton: Skeleton, links: Sequence[str], hurt: Collection[str] = ()) -> dict[str, int]:
-    """Label -> index of the link that stands for the part, for the parts that the network knows.
+    """Label of a part -> index in `links` of the link that stands for it. Parts without a link are left out.
 
-    It is the uppermost link between the part's two ends that was `hurt` in training. If there is none, it is
-    the uppermost of all. A link that was never hurt in training has no effect.
+    hurt: the links that were hurt in training. Of the part's links, the uppermost of these is taken. If there
+    is none, the part's uppermost link is taken, but it has no effect.
     """
-    found = {}
+    indices = {}
     for label, upper, lower in PARTS:
-        known = [name for name in links_between(skeleton, upper, lower) if name in links]
-        if known:
-            best = next((name for name in known if name in hurt), known[0])
-            found[label] = list(links).index(best)
-    return found
+        of_part = [name for name in links_between(skeleton, upper, lower) if name in links]
+        if of_part:
+            best = next((name for name in of_part if name in hurt), of_part[0])
+            indices[label] = list(links).index(best)
+    return indices
 
 
 def links_between(skeleton: Skeleton, upper: str, lower: str) -> list[str]:
-    """Links from the joint of the role `upper` down to that of `lower`, uppermost first.
+    """Links from the joint with the role `upper` down to the joint with the role `lower`, uppermost first.
 
-    It is empty if the skeleton lacks a role, or if the second joint is not below the first.
+    The list is empty if the skeleton lacks a role, or if the joint `lower` is not below the joint `upper`.
     """
     if any(skeleton.roles.get(role) not in skeleton.joints for role in (upper, lower)):
         return []
@@ -153,7 +157,7 @@ def links_between(skeleton: Skeleton, upper: str, lower: str) -> list[str]:
 
 
 def spoken(skeleton: Skeleton, link: str) -> str:
-    """The name of a link for readers, such as "left thigh". If there is none, it is the link's label."""
+    """The name of a link for readers, such as "left thigh". A link without such a name keeps its label."""
     for label, upper, lower in (*PARTS, *OTHERS):
         if link in links_between(skeleton, upper, lower):
             return label
@@ -167,10 +171,10 @@ def spoken(skeleton: Skeleton, link: str) -> str:
 
 def spoken_links(skeleton: Skeleton, links: Sequence[str]) -> list[str]:
     """A name for each link. If several links have the same name, their labels are added."""
-    found = [spoken(skeleton, link) for link in links]
+    names = [spoken(skeleton, link) for link in links]
     return [
-        word if found.count(word) == 1 or word == link else f"{word} ({link})"
-        for word, link in zip(found, links, strict=True)
+        name if names.count(name) == 1 or name == link else f"{name} ({link})"
+        for name, link in zip(names, links, strict=True)
     ]
 
 

@@ -1,14 +1,15 @@
 """Reads, checks and writes status files.
 
-The first line has the number of frames of the clip's file. Each further line says what hurts in a range::
+The first line has the number of frames of the clip's file. Each further line says which links hurt in a range
+of frames, and how severely, from 0 to 10. A link is the piece of the body between two neighbouring joints::
 
     frames:2500
     1-2500 RightUpLeg-RightLeg[10];
     500-2000 LeftShoulder-LeftArm[5];LeftUpLeg-LeftLeg[10];
 
-Frames are those of the clip's file, counted from 1, and both ends of a range are included. A range from 0
-starts at 1. A range past the end of the clip stops there. If lines overlap, the later line counts for the
-links that it names.
+Frames are those of the clip's file, counted from 1, and both ends of a range are included. A range that is
+written from 0 starts at 1. A range that goes past the end of the clip stops there. Where ranges overlap, the
+later line counts for the links that it names.
 """
 
 from __future__ import annotations
@@ -22,10 +23,11 @@ from hobble.core.errors import InputError
 from hobble.core.files import write_text
 from hobble.core.untrusted import read_text
 
-HIGHEST = 10.0
-MOST_SPELLS = 20_000  # a line for each frame of three minutes at 120 Hz
-RANGE = re.compile(r"(\d{1,12})\s*-\s*(\d{1,12})\s+(.*)")
-LINK = re.compile(r"\s*(.+?)\s*\[\s*([^\]]*?)\s*\]\s*")
+HIGHEST = 10.0  # the highest severity
+# A file may have at most this many ranges: about one for each frame of three minutes at 120 Hz.
+MOST_SPELLS = 20_000
+RANGE = re.compile(r"(\d{1,12})\s*-\s*(\d{1,12})\s+(.*)")  # first frame, last frame, links
+LINK = re.compile(r"\s*(.+?)\s*\[\s*([^\]]*?)\s*\]\s*")  # name, severity
 
 
 @dataclass(frozen=True)
@@ -43,7 +45,11 @@ class InjurySpell:
 
 @dataclass(frozen=True)
 class Status:
-    """What hurts in a clip. frames: how many its file has. If spells overlap, the later one counts."""
+    """What hurts in a clip.
+
+    frames: number of frames of the clip's file. spells: where some overlap, the last one counts for the links
+    that it names.
+    """
 
     frames: int
     spells: tuple[InjurySpell, ...] = ()
@@ -78,7 +84,8 @@ def parse_links(
 ) -> tuple[tuple[str, float], ...]:
     """The (link, severity) pairs of `A-B[4];C-D[8];`, as in status files and in a data set's entries.
 
-    Raises InputError with `path` and `line` if the text breaks this grammar or names an unknown link.
+    links: the names of the links that may hurt. path, line: where the text stands, for messages. Raises
+    InputError if the text breaks this grammar or names an unknown link.
     """
     pairs = []
     for part in text.split(";"):
@@ -133,13 +140,16 @@ def _spell(path: Path, number: int, line: str, links: Sequence[str]) -> InjurySp
 
 
 def check_link(path: str | Path, line: int | None, name: str, links: Sequence[str]) -> None:
-    """Raise InputError unless `name` is one of `links`."""
+    """Raise InputError unless `name` is one of `links`. path, line: where the name stands."""
     if name not in links:
         raise InputError(path, f"no such link: {name[:80]}", line=line, fix=_hint(name, links))
 
 
 def check_severity(path: str | Path, line: int | None, link: str, text: str) -> float:
-    """The severity in `text`. Raises InputError unless it is a number from 0 to 10."""
+    """The severity of a link, from its text. Raises InputError unless it is a number from 0 to 10.
+
+    path, line: where the text stands.
+    """
     try:
         value = float(text)
     except ValueError:

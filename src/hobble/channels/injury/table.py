@@ -1,7 +1,8 @@
 """Makes status files from a short table, so that nobody has to type them.
 
-The table is CSV with the columns clip, link, severity, from, to. Frames are those of the clip's file, counted
-from 1. An empty `from` means the first frame, an empty `to` the last::
+A status file says which links of a clip hurt, and when. A link is the piece of the body between two
+neighbouring joints. The table is CSV with the columns clip, link, severity, from, to. `from` and `to` are
+frames of the clip's file, counted from 1. An empty `from` means the first frame, an empty `to` the last::
 
     clip,link,severity,from,to
     walk_03,LeftUpLeg-LeftLeg,7,,
@@ -22,13 +23,16 @@ from hobble.core.clip_files import find_clips, only_file
 from hobble.core.errors import InputError
 from hobble.core.untrusted import read_text, read_yaml
 
-COUNT = re.compile(r"\d{1,12}")
+COUNT = re.compile(r"\d{1,12}")  # a frame, or a number of frames
 COLUMNS = ("clip", "link", "severity", "from", "to")
 
 
 @dataclass(frozen=True)
 class TableRow:
-    """One line of the table. `first` and `last` are None if the table leaves them empty."""
+    """One line of the table.
+
+    first, last: the frames `from` and `to`; None if empty. line: number of the line in the file.
+    """
 
     clip: str
     link: str
@@ -39,11 +43,12 @@ class TableRow:
 
 
 def skeleton_links(path: Path) -> list[str]:
-    """Names of the links in a skeleton file. Raises InputError if it has no `links`."""
+    """Names of the links that a skeleton file lists. Raises InputError if it has no `links`."""
     try:
         links = read_yaml(path)["links"]
     except (KeyError, TypeError):
-        raise InputError(path, "does not list `links`") from None
+        fix = "Name a skeleton that can be hurt, such as holden31."
+        raise InputError(path, "does not list `links`", fix=fix) from None
     return [f"{a}-{b}" for a, b in links]
 
 
@@ -79,7 +84,8 @@ def statuses(
     spells: dict[str, dict[tuple[int, int], list[tuple[str, float]]]] = {}
     for row in rows:
         if row.clip not in frames:
-            raise InputError(path, f"no such clip: {row.clip}", line=row.line)
+            fix = "Write the name of a BVH file of the folder, without .bvh."
+            raise InputError(path, f"no such clip: {row.clip}", line=row.line, fix=fix)
         first, last = row.first or 1, row.last or frames[row.clip]
         if not first <= last <= frames[row.clip]:
             raise InputError(
@@ -114,8 +120,8 @@ def write_statuses(table: str | Path, folder: str | Path, links: Sequence[str]) 
     """
     rows = read_table(table, links)
     folder = Path(folder)
-    there = find_clips(folder)
-    files = {row.clip: only_file(row.clip, there[row.clip]) for row in rows if row.clip in there}
+    in_folder = find_clips(folder)
+    files = {row.clip: only_file(row.clip, in_folder[row.clip]) for row in rows if row.clip in in_folder}
     frames = {clip: bvh_frames(file) for clip, file in files.items()}
     written = []
     for clip, status in statuses(rows, frames, table).items():
@@ -143,5 +149,5 @@ def _frame(path: Path, line: int, text: str) -> int | None:
     if not text:
         return None
     if not COUNT.fullmatch(text) or int(text) < 1:
-        raise InputError(path, f"{text!r} is not a frame number; they count from 1", line=line)
+        raise InputError(path, f"{text!r} is not a frame number; frames count from 1", line=line)
     return int(text)

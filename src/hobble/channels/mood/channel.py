@@ -20,10 +20,10 @@ Amount = Annotated[float, Field(ge=0, le=1)]
 
 
 class Patterns(Section):
-    """Which clips have which mood."""
+    """The section `channels.mood` of a data set: which clips have which mood."""
 
     patterns: dict[str, dict[Name, Amount]] = Field(
-        description="pattern of clip names -> mood; * stands for any text; the first that fits counts"
+        description="pattern of clip names -> mood; * stands for any text; the first pattern that fits counts"
     )
 
 
@@ -31,7 +31,7 @@ class Mood(Channel):
     """The mood of a whole clip.
 
     It comes from the clip's entry in the data set ({sad: .5}), else from the first pattern that fits the
-    clip's name.
+    clip's name. The fields are explained in `hobble.channels.channel.Channel`.
     """
 
     name = "mood"
@@ -44,11 +44,11 @@ class Mood(Channel):
     Options = Patterns
 
     def columns(self, rig: HasLinks) -> tuple[str, ...]:
-        """The moods."""
+        """The names of the moods, one for each column."""
         return get_args(Name)
 
     def is_neutral(self, source: ClipSource) -> bool:
-        """Whether the clip's entry or pattern has no mood above 0."""
+        """Whether all moods are 0 in the clip's entry or, without an entry, in its pattern."""
         return not any(_moods(source).values())
 
     def check(self, source: ClipSource, rig: HasLinks) -> None:

@@ -1,4 +1,4 @@
-"""One-step accuracy of every clip, training and held-out."""
+"""Measures how well the network predicts the next frame, on training and held-out clips."""
 
 from hobble.measures.joints import Joints
 from hobble.measures.measure import Cost, Measure
@@ -6,7 +6,7 @@ from hobble.measures.sample_options import SampleOptions
 
 
 class Options(Joints, SampleOptions):
-    """Its keys of the section `evaluation`."""
+    """The keys of this measurement in a configuration's section `evaluation`."""
 
 
 MEASURE = Measure(

@@ -1,4 +1,4 @@
-"""One-step accuracy of configurations side by side."""
+"""Compares the errors of one-step predictions of several configurations."""
 
 from __future__ import annotations
 
@@ -12,12 +12,12 @@ from hobble.evaluation.configuration_results import ConfigurationResults
 from hobble.measures.accuracy.run import SPLITS, clip_rows
 from hobble.measures.inputs import Json, Row
 
-NAME = "accuracy"
+NAME = "accuracy"  # of the measurement
 SPLIT_NAMES = {"train": "training", "held_out": "held-out"}
 
 
 def compared(all_measured: Sequence[ConfigurationResults], published: Json) -> SideBySide:
-    """Errors of each configuration, the difference of each pair, and the published errors with ours."""
+    """Errors of each configuration, the difference of each pair, and the published errors beside ours."""
     return SideBySide(
         entries=[{"dataset": m.dataset, **m.found(NAME), "configuration": m.name} for m in all_measured],
         about={m.name: {"joints": m.found(NAME)["joints"]} for m in all_measured},
@@ -30,7 +30,7 @@ def compared(all_measured: Sequence[ConfigurationResults], published: Json) -> S
 
 
 def tables(compared: Json) -> dict[str, list[Row]]:
-    """Every clip of every configuration."""
+    """A table with the errors of every clip in every configuration."""
     rows: list[Row] = [
         {"configuration": entry["configuration"], **row}
         for entry in compared[NAME]
@@ -54,7 +54,7 @@ def accuracy_differences(all_measured: Sequence[ConfigurationResults]) -> list[D
 
 
 def _of_splits(measured: ConfigurationResults) -> dict[str, Json]:
-    """Split -> its errors over all frames, and the `means` of its clips."""
+    """Split -> its errors over all frames, with the mean errors of its clips under `means`."""
     found = measured.found(NAME)
     return {split: {**found[split], "means": clip_means(found, split)} for split in SPLITS}
 
@@ -65,16 +65,16 @@ def clip_means(found: Json, split: str) -> list[float]:
 
 
 def _published_splits(all_measured: Sequence[ConfigurationResults], published: Json) -> list[PublishedRow]:
-    """Published errors of each configuration, next to ours of each split."""
-    found = {m.name: m for m in all_measured}
+    """Published errors of each configuration, beside our errors on each split."""
+    by_name = {m.name: m for m in all_measured}
     out = []
     for row in published["accuracy"]:
-        m = found.get(row["configuration"])
+        m = by_name.get(row["configuration"])
         for split in SPLITS:
             ours = m.found(NAME)[split]["mean_of_clips"] if m else None
             out.append(published_row(f"relative error, {SPLIT_NAMES[split]} clips", row, row["mean"], ours))
             if "sd" in row:
-                in_text = {**row, "table": None}  # published in the text, not in the table
+                in_text = {**row, "table": None}  # sd is published in the text, not in the table
                 means = clip_means(m.found(NAME), split) if m else []
                 sd = float(np.std(means)) if len(means) > 1 else None
                 what = f"standard deviation of the means of {SPLIT_NAMES[split]} clips"
@@ -83,11 +83,11 @@ def _published_splits(all_measured: Sequence[ConfigurationResults], published: J
 
 
 def _published_clips(all_measured: Sequence[ConfigurationResults], published: Json) -> list[PublishedRow]:
-    """Published errors of single clips, next to ours of the clips with the same names.
+    """Published errors of single clips, beside our errors on the clips with the same names.
 
-    Our names may end in _000, as files of the release do.
+    The names of the clips that Holden et al. (2017) released end in _000; the published names do not.
     Segerstedt (2021) published the errors of two networks: "segerstedt" is his own, "release" is the network
-    that Holden et al. (2017) released.
+    that Holden et al. released.
     """
     out = []
     for row in published["clips"]:

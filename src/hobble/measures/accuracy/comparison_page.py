@@ -1,4 +1,4 @@
-"""The errors of several configurations."""
+"""Shows the errors of several configurations side by side."""
 
 from __future__ import annotations
 
@@ -15,8 +15,8 @@ from hobble.report.page_parts import PageSection, SectionPart
 from hobble.report.tables import Column
 
 # The difference between two configurations is a difference of means, divided by standard deviations (eq. 3.2
-# of Segerstedt 2021). compare.json has it twice. Key -> whose standard deviations (sd) were taken.
-KINDS = {"difference_of_means": "sd of the means of clips", "difference": "sd of single frames"}
+# of Segerstedt 2021). compare.json has it twice, with two kinds of standard deviation (sd): key -> kind.
+DEVIATIONS = {"difference_of_means": "sd of the means of clips", "difference": "sd of single frames"}
 
 
 def section(compared: Compared) -> PageSection:
@@ -36,12 +36,14 @@ def section(compared: Compared) -> PageSection:
 
 
 def columns(compared: Compared) -> Iterator[OverviewColumn]:
-    """The error of each split, and the number of joints that were measured."""
-    found = {entry["configuration"]: entry for entry in compared["accuracy"]}
+    """Columns of the overview: the error on each split, and the number of joints that were measured."""
+    entries = {entry["configuration"]: entry for entry in compared["accuracy"]}
     for at, split, label in ((10, "held_out", "held-out error"), (20, "train", "training error")):
-        values = {name: entry[split]["mean"] for name, entry in found.items()}
+        values = {name: entry[split]["mean"] for name, entry in entries.items()}
         yield OverviewColumn(at, Column(label, _percent, "n"), values)
-    yield OverviewColumn(70, Column.count("joints"), {name: entry["joints"] for name, entry in found.items()})
+    yield OverviewColumn(
+        70, Column.count("joints"), {name: entry["joints"] for name, entry in entries.items()}
+    )
 
 
 def error_boxes(compared: Compared) -> Chart | None:
@@ -50,10 +52,10 @@ def error_boxes(compared: Compared) -> Chart | None:
     for split, label in SPLITS.items():
         traces: list[Trace] = []
         for entry in compared["accuracy"]:
-            found = quantiles(entry[split])
-            if found is None:
+            percentiles = quantiles(entry[split])
+            if percentiles is None:
                 continue
-            low, q1, median, q3, high = ([100 * value] for value in found)
+            low, q1, median, q3, high = ([100 * value] for value in percentiles)
             colour = colours(compared)[entry["configuration"]]
             traces.append(
                 {
@@ -131,12 +133,12 @@ def clip_dots(compared: Compared) -> Chart | None:
 def difference_map(compared: Compared) -> Chart | None:
     """Eq. 3.2 of Segerstedt for every pair, with both kinds of standard deviation."""
     order, options = names(compared), {}
-    for (over, split), (key, kind) in product(SPLITS.items(), KINDS.items()):
-        found = {(r["a"], r["b"]): r[key] for r in compared["difference"] if r["over"] == over}
-        if all(value is None for value in found.values()):
+    for (split, label), (key, kind) in product(SPLITS.items(), DEVIATIONS.items()):
+        values = {(r["a"], r["b"]): r[key] for r in compared["difference"] if r["over"] == split}
+        if all(value is None for value in values.values()):
             continue
-        cells = [[found.get((a, b), found.get((b, a))) for b in order] for a in order]
-        options[f"{split}, {kind}"] = [
+        cells = [[values.get((a, b), values.get((b, a))) for b in order] for a in order]
+        options[f"{label}, {kind}"] = [
             {
                 "type": "heatmap",
                 "x": order,
@@ -161,9 +163,9 @@ def difference_map(compared: Compared) -> Chart | None:
         "compare-difference",
         "Difference between two configurations",
         "Eq. 3.2 of Segerstedt: twice the difference of the two means, divided by the sum of the two "
-        "standard deviations. He uses the standard deviation of the clips' means. That of single frames is "
-        "several times as large. A value of 1 says that the means are one standard deviation apart. Our rule "
-        "of thumb: differences under 0.2 are too small to matter.",
+        "standard deviations. Segerstedt uses the standard deviation of the clips' means. The standard "
+        "deviation of single frames is several times as large. A value of 1 says that the means are one "
+        "standard deviation apart. Our rule of thumb: differences under 0.2 are too small to matter.",
         layout=layout,
         height=max(240, 90 + 42 * len(order)),
         choose="Clips and deviation",

@@ -1,4 +1,4 @@
-"""How well the next pose is predicted, clip by clip."""
+"""Shows in the report how well the next pose is predicted, clip by clip."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ INTRODUCTION = (
     "The network gets the captured input of a frame and predicts the next frame. The error is measured on "
     "every frame that belongs to a gait cycle."
 )
-# What the endings of clip names say. A reader may take the number of a hurt version for a severity.
+# What the endings of clip names say. Without this, readers may take the number in _hurt1 for a severity.
 ENDINGS = {
     "_hurt1": " A clip whose name ends in _hurt1 is the first hurt version of a healthy clip; the number is "
     "not its severity.",
@@ -33,6 +33,7 @@ QUANTILES = ("p05", "p25", "p50", "p75", "p95")
 
 
 def _rows(found: Json) -> list[dict[str, Any]]:
+    """The measured clips: held-out ones first, then by rising error."""
     rows = [row for row in found.get("clips", ()) if row.get("mean") is not None]
     return sorted(rows, key=lambda row: (row["split"] != "held_out", row["mean"]))
 
@@ -42,7 +43,7 @@ def _height(count: int) -> int:
 
 
 def clip_bars(found: Json, material: ReportMaterial) -> Chart | None:
-    """Mean relative error of each clip, with whiskers of one standard deviation and the published mean."""
+    """Mean relative error of each clip, its standard deviation as whiskers, a line at the published mean."""
     rows = _rows(found)[::-1]
     if not rows:
         return None
@@ -70,9 +71,9 @@ def clip_bars(found: Json, material: ReportMaterial) -> Chart | None:
             }
         )
     shapes, notes = [], []
-    theirs = material.published_entry("accuracy")
-    if theirs:
-        shape, note = mark(100 * theirs["mean"], f"{theirs['label']}, published")
+    published = material.published_entry("accuracy")
+    if published:
+        shape, note = mark(100 * published["mean"], f"{published['label']}, published")
         shapes, notes = [shape], [note]
     order = [row["clip"] for row in rows]
     return Chart(
@@ -100,7 +101,7 @@ def clip_bars(found: Json, material: ReportMaterial) -> Chart | None:
 
 
 def clip_boxes(found: Json) -> Chart | None:
-    """Quantiles of the error within each clip; None if the evaluation has none."""
+    """Quantiles of the error within each clip; None if no clip has them."""
     rows = [row for row in _rows(found)[::-1] if quantiles(row)]
     if not rows:
         return None
@@ -149,13 +150,16 @@ def clip_boxes(found: Json) -> Chart | None:
 
 
 def quantiles(row: dict[str, Any]) -> list[float] | None:
-    """The 5th, 25th, 50th, 75th and 95th percentile of a clip's error, or None."""
-    found = [row[key] for key in QUANTILES if row.get(key) is not None]
-    return found if len(found) == len(QUANTILES) else None
+    """The 5th, 25th, 50th, 75th and 95th percentile of the error in `row`; None if one is missing.
+
+    row: the errors of a clip or a split.
+    """
+    values = [row[key] for key in QUANTILES if row.get(key) is not None]
+    return values if len(values) == len(QUANTILES) else None
 
 
 def accuracy_table(found: Json, name: str) -> Table:
-    """A row per clip."""
+    """A row per clip. name: name of the configuration."""
     columns = [
         Column("clip"),
         Column("split", lambda value: NAMES.get(value, value)),
@@ -172,7 +176,7 @@ def accuracy_table(found: Json, name: str) -> Table:
 
 
 def published_table(found: Json, material: ReportMaterial) -> Table:
-    """The errors of our two splits, followed by the published means."""
+    """The errors of our network on both splits, followed by the published means."""
     rows: list[list[Any]] = []
     for split in ("held_out", "train"):
         part = found.get(split) or {}
@@ -193,7 +197,7 @@ def published_table(found: Json, material: ReportMaterial) -> Table:
 
 
 def section(found: Json, material: ReportMaterial) -> PageSection:
-    """Charts, tables, and the view of captured beside predicted motion. Empty without measured clips."""
+    """Charts, tables, and a view of captured next to predicted motion. Empty without measured clips."""
     if not found.get("clips"):
         return PageSection("accuracy", [])
     return PageSection(
@@ -232,7 +236,7 @@ def caveat(found: Json, material: ReportMaterial) -> str:
 
 
 def sampled(found: Json) -> str:
-    """A sentence on what was measured; empty if all clips were."""
+    """A sentence on which part of the clips was measured; empty if all clips were measured."""
     if not found.get("sample"):
         return ""
     widths = [
@@ -247,7 +251,7 @@ def sampled(found: Json) -> str:
 
 
 def figures(found: Json, material: ReportMaterial) -> Iterator[KeyFigure]:
-    """The error of each split."""
+    """The key figures: the error on each split."""
     for at, split, label in (
         (10, "held_out", "Error on held-out clips"),
         (11, "train", "Error on training clips"),
@@ -257,14 +261,15 @@ def figures(found: Json, material: ReportMaterial) -> Iterator[KeyFigure]:
             error = part.get("position_error_cm")
             note = "of a joint's distance from the root"
             note += f"; {_centimetres(error, split, material)}" if error is not None else ""
-            theirs = material.published_entry("accuracy") if split == "held_out" else None
-            if theirs:
-                note += f"; published for {theirs['label']}: {100 * theirs['mean']:.2f} %, on other clips"
+            published = material.published_entry("accuracy") if split == "held_out" else None
+            if published:
+                mean = 100 * published["mean"]
+                note += f"; published for {published['label']}: {mean:.2f} %, on other clips"
             yield KeyFigure(label, f"{100 * part['mean']:.2f}", "%", note, at)
 
 
 def _centimetres(error: float, split: str, material: ReportMaterial) -> str:
-    """The position error of the prediction, and of the drawn pose if the roll-outs measured it."""
+    """The mean position error as predicted, and as drawn if the measurement `rollouts` has it."""
     lengths = {entry["length"]: entry for entry in material.found("rollouts").get("lengths", ())}
     drawn = (lengths.get(1, {}).get(split) or {}).get("position_error_cm")
     if drawn is None:
@@ -296,8 +301,8 @@ def _generalisation(found: Json) -> Iterator[Hint]:
         yield Hint(
             "warn",
             f"The error on held-out clips is {ratio:.1f} times the error on training clips.",
-            "The network overfits. Add more varied clips (speeds, turns, performers) before you add units or "
-            "passes.",
+            "The network overfits. Add more varied clips (speeds, turns, performers) before you make the "
+            "network larger or train it longer.",
         )
     elif ratio < 1.2:
         yield Hint(
@@ -321,12 +326,12 @@ def _worst_clips(found: Json) -> Iterator[Hint]:
     median = float(np.median([row["mean"] for row in rows]))
     worst = max(rows, key=lambda row: row["mean"])
     if worst["mean"] > 1.8 * median:
-        # The sections Labels and Data show no mirrors.
+        # The section Labels does not show mirrored clips.
         source = worst["clip"].removesuffix("_mirror")
         whose = "its labels" if source == worst["clip"] else f"the labels of {source}, which it mirrors,"
         yield Hint(
             "note",
             f"{worst['clip']} has the largest error,",
             f"{worst['mean'] / median:.1f} times the median over all clips. "
-            f"Check {whose} under Labels, and the repairs under Data.",
+            f"Check {whose} in the section Labels.",
         )

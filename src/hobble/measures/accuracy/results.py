@@ -10,7 +10,8 @@ from hobble.measures.results import SampleSize
 class ErrorNumbers(TypedDict):
     """Errors over `frames` frames. mean, sd, p05 to p95 (percentiles): of the relative error.
 
-    If `frames` is 0, then mean, sd and position error are None and the percentiles are missing.
+    position_error_cm: mean distance between the predicted and the captured position of a joint. If `frames`
+    is 0, then the means and sd are None and the percentiles are missing.
     """
 
     frames: int
@@ -32,7 +33,7 @@ class ErrorsOfClip(ErrorNumbers):
 
 
 class ErrorsOfExcerpt(ErrorsOfClip):
-    """The errors of an excerpt of a clip, with the frames of its first and last row."""
+    """The errors of an excerpt of a clip. first_frame, last_frame: frames of the clip."""
 
     first_frame: int
     last_frame: int
@@ -51,9 +52,9 @@ class ErrorsOfSplit(ErrorNumbers):
 
 
 class Accuracy(TypedDict):
-    """accuracy.json. joints: how many were measured.
+    """The content of accuracy.json, and `excerpts`, which go to a table. joints: how many were measured.
 
-    sample, excerpts: only if a sample was measured; `excerpts` go to a table and not into the JSON.
+    sample, excerpts: only if a sample was measured.
     """
 
     configuration: str

@@ -1,8 +1,8 @@
-"""Errors of one-step predictions, per clip and over the training and held-out clips.
+"""Measures errors of one-step predictions, per clip and over the training and held-out clips.
 
 The relative error is eq. 3.1 of Segerstedt (2021): |t - p| / |t|, where t is the captured and p the predicted
 position of a joint relative to the root. Its mean and standard deviation are over frames and joints. The
-network gets the captured input of every frame.
+network gets the captured input of every frame, never its own output.
 """
 
 from __future__ import annotations
@@ -37,17 +37,18 @@ from hobble.rows.clip_rows import ClipRows, expanded
 from hobble.rows.excerpts import Excerpt
 from hobble.rows.layout import RowLayout
 
-Predict = Callable[[Array, Array], Array]  # inputs (n, X) and phases (n,) -> outputs (n, Y), in raw units
+Predict = Callable[[Array, Array], Array]  # inputs (n, X) and phases (n,) -> outputs (n, Y), not standardised
 
 BATCH = 256  # predictions at once; with more, their inputs do not fit the cache
-LEAST = 1e-3  # cm; least distance from the root to divide by
+LEAST_DISTANCE = 1e-3  # cm: a joint nearer to the root counts as this far from it
+# With `joints: equivalent`, only joints with a counterpart on this skeleton are measured.
 REFERENCE = "holden31"
 # The values that have a confidence interval.
-MEASURED: tuple[Literal["mean"], Literal["position_error_cm"]] = ("mean", "position_error_cm")
+WITH_INTERVAL: tuple[Literal["mean"], Literal["position_error_cm"]] = ("mean", "position_error_cm")
 QUANTILES = {"p05": 0.05, "p25": 0.25, "p50": 0.5, "p75": 0.75, "p95": 0.95}
 COLUMNS = ("clip", "split", "frames", "mean", "sd", "position_error_cm", *QUANTILES)
-# Edges of the bins of the relative error, each 2 % above the last. Quantiles are read from the bins, so that
-# the errors of single frames need not be stored.
+# Edges of the bins of the relative error, each 2 % above the one before. Quantiles are read from the bins, so
+# that the errors of single frames need not be stored.
 EDGES = np.concatenate([[0.0], np.geomspace(1e-4, 1e2, 701)])
 
 log = logging.getLogger("hobble")
@@ -55,9 +56,10 @@ log = logging.getLogger("hobble")
 
 @dataclass(frozen=True)
 class Errors:
-    """Relative error and position error (cm) over `frames` frames.
+    """The relative errors and the position errors (cm) in `frames` frames.
 
-    moments: of both errors. histogram: (bins,) weight of the relative errors between two EDGES.
+    moments: of both errors, weighted. histogram: (bins,) total weight of the relative errors in each bin
+    between two EDGES.
     """
 
     frames: int = 0
@@ -74,7 +76,7 @@ class Errors:
         return self if weight == 1 else Errors(self.frames, self.moments * weight, self.histogram * weight)
 
     def quantile(self, share: float) -> float:
-        """The relative error that `share` of frames and joints stay below, to about 1 % of its value."""
+        """The relative error below which `share` of all errors lie, accurate to about 1 % of its value."""
         below = np.concatenate([[0.0], np.cumsum(self.histogram)])
         return float(np.interp(share * below[-1], below, EDGES))
 
@@ -97,23 +99,27 @@ class Errors:
 
 
 def joint_errors(layout: RowLayout, truth: Array, predicted: Array, joints: Sequence[int]) -> Array:
-    """(n, joints, 2): relative error and distance in cm. truth, predicted: (n, Y) outputs in raw units."""
+    """(n, len(joints), 2): relative error, and distance in cm, of the joints with the indices `joints`.
+
+    truth, predicted: (n, Y) outputs, not standardised.
+    """
     block = layout.y_joint_position
     t = truth[:, block].reshape(len(truth), -1, 3)[:, joints].astype(np.float64)
     return relative_and_distance(t, predicted[:, block].reshape(len(truth), -1, 3)[:, joints])
 
 
 def relative_and_distance(truth: Array, predicted: Array) -> Array:
-    """(..., 2): relative error and distance in cm, of positions (..., 3) relative to the root, cm."""
+    """(..., 2): relative error, and distance in cm. truth, predicted: (..., 3) cm, relative to the root."""
     distance = np.linalg.norm(truth - predicted, axis=-1)
-    return np.stack([distance / np.maximum(np.linalg.norm(truth, axis=-1), LEAST), distance], axis=-1)
+    from_root = np.maximum(np.linalg.norm(truth, axis=-1), LEAST_DISTANCE)
+    return np.stack([distance / from_root, distance], axis=-1)
 
 
 def prediction(network: Network) -> Predict:
-    """The runtime's prediction in the exact mode, which takes two thirds of the time of `Network.predict`.
+    """The runtime's exact prediction, which takes two thirds of the time of `Network.predict`.
 
-    A network that remembers what a character did before is asked by `Network.predict`, because the frames of
-    a batch are not one character's.
+    For a network that remembers what a character did before (`Network.memory`), it is `Network.predict`,
+    because each frame is predicted on its own.
     """
     if network.memory:
         return network.predict
@@ -130,7 +136,7 @@ def prediction(network: Network) -> Predict:
 def clip_errors(
     network: Network, rows: ClipRows, joints: Sequence[int], predict: Predict | None = None
 ) -> Errors:
-    """The errors over every frame of a clip. A frame with several terrain fits counts once, as their mean.
+    """The errors in all frames of a clip. A frame with several terrain fits counts once, with its mean error.
 
     predict: how to evaluate the network; by default `Network.predict`.
     """
@@ -155,29 +161,30 @@ def measure(
 ) -> Accuracy:
     """accuracy.json: errors over the frames of each split, and of each clip, sorted by name.
 
-    clips: name -> file of rows. equivalents: names of the joints to measure; all by default. sample: the
-    excerpts to measure in place of all clips; the result then also has their number (`sample`), confidence
-    intervals, and the errors of each excerpt. `mean_of_clips` is the mean over clips, as in the published
-    tables. Raises InputError if rows and network have different layouts.
+    clips: name -> file of rows. splits: name -> "train" or "held_out". equivalents: names of the joints to
+    measure; all by default. sample: the excerpts to measure in place of all clips; then the result also has
+    the size of the sample, confidence intervals, and the errors of each excerpt. In the result,
+    `mean_of_clips` is the mean of the mean errors of clips, as in the published tables. Raises InputError if
+    rows and network have different layouts.
     """
     network = load_network(weights)
     joints, predict = joint_indices(network, equivalents), prediction(network)
     of_clip: dict[str, Errors] = {}
     excerpts: dict[Excerpt, ErrorsOfExcerpt] = {}
     totals: dict[str, Errors] = dict.fromkeys(SPLITS, Errors())
-    for one in clip_parts(clips, sample):
-        read = one.load()
-        check_layout(one.path, read.rows, network)
+    for part in clip_parts(clips, sample):
+        read = part.load()
+        check_layout(part.path, read.rows, network)
         errors = clip_errors(network, read.rows, joints, predict)
-        split = splits[one.clip]
-        totals[split] += errors.weighing(one.weight)
-        of_clip[one.clip] = of_clip.get(one.clip, Errors()) + errors.weighing(one.weight)
-        found = errors.to_dict()
-        if one.excerpt is not None:
+        split = splits[part.clip]
+        totals[split] += errors.weighing(part.weight)
+        of_clip[part.clip] = of_clip.get(part.clip, Errors()) + errors.weighing(part.weight)
+        values = errors.to_dict()
+        if part.excerpt is not None:
             first, last = read.frames
-            place = {"clip": one.clip, "split": split, "first_frame": first, "last_frame": last}
-            excerpts[one.excerpt] = ErrorsOfExcerpt(**place, **found)  # type: ignore[typeddict-item]
-        log.info("%s: %s", one.excerpt or one.clip, found)
+            place = {"clip": part.clip, "split": split, "first_frame": first, "last_frame": last}
+            excerpts[part.excerpt] = ErrorsOfExcerpt(**place, **values)  # type: ignore[typeddict-item]
+        log.info("%s: %s", part.excerpt or part.clip, values)
     entries: list[ErrorsOfClip] = [
         {"clip": name, "split": splits[name], **errors.to_dict()} for name, errors in of_clip.items()
     ]
@@ -201,27 +208,31 @@ def _of_split(split: str, errors: Errors, entries: Sequence[ErrorsOfClip]) -> Er
 def _with_intervals(
     result: Accuracy, sample: Sample, excerpts: Mapping[Excerpt, ErrorsOfExcerpt]
 ) -> Accuracy:
-    """The result with the size of the sample, and half widths of 95 % confidence intervals of each split.
+    """The result with the size of the sample, the excerpts, and 95 % confidence intervals for each split.
 
-    excerpts: the errors of each excerpt that was measured.
+    `mean_of_clips` is then weighted to represent all clips. excerpts: the errors of each excerpt that was
+    measured.
     """
     for split in SPLITS:
-        own = {one: entry for one, entry in excerpts.items() if entry["split"] == split}
-        weights = [sample.clip_weights[one] for one in own]
-        # Every excerpt of a sample has rows, so no value is None.
-        means, distances = ({one: entry[key] or 0.0 for one, entry in own.items()} for key in MEASURED)
-        found = result[split]
-        if own:
-            found["mean_of_clips"] = float(np.average(list(means.values()), weights=weights))
-        pairs = zip(MEASURED, (means, distances), strict=True) if own else ()
-        found["interval"] = {key: sample.half_width(split, values) for key, values in pairs}
+        of_split = {excerpt: entry for excerpt, entry in excerpts.items() if entry["split"] == split}
+        weights = [sample.clip_weights[excerpt] for excerpt in of_split]
+        # Every excerpt of a sample has rows, so no value is None. (`or 0.0` tells the type checker.)
+        means, distances = (
+            {excerpt: entry[key] or 0.0 for excerpt, entry in of_split.items()} for key in WITH_INTERVAL
+        )
+        errors = result[split]
+        if of_split:
+            errors["mean_of_clips"] = float(np.average(list(means.values()), weights=weights))
+        pairs = zip(WITH_INTERVAL, (means, distances), strict=True) if of_split else ()
+        errors["interval"] = {key: sample.half_width(split, values) for key, values in pairs}
     return {**result, "sample": sample.to_dict(), "excerpts": list(excerpts.values())}
 
 
 def equivalent_joints(skeleton: Json, of: str = REFERENCE) -> list[str] | None:
-    """Names of the joints that have a counterpart on the skeleton `of`; None (all joints) without such a map.
+    """Names of the joints of a skeleton that have a counterpart on the skeleton named `of`.
 
-    skeleton: as config/skeletons/<name>.yaml holds it.
+    skeleton: as config/skeletons/<name>.yaml holds it. If it has no map to `of`, the result is None, which
+    stands for all joints.
     """
     counterparts = skeleton.get("maps", {}).get(of)
     return None if counterparts is None else list(counterparts)
@@ -237,7 +248,7 @@ def joint_indices(network: Network, names: Sequence[str] | None = None) -> list[
     if names is None:
         return list(range(network.layout.joints))
     if network.skeleton is None:
-        raise HobbleError("The network's file names no joints, so none can be chosen.")
+        raise HobbleError("The network's file has no joint names, so only `joints: all` can be measured.")
     indices = [i for i, name in enumerate(network.skeleton.joints) if name in names]
     if not indices:
         raise HobbleError(f"None of {', '.join(names)} is a joint of {network.skeleton.name}.")
@@ -245,10 +256,13 @@ def joint_indices(network: Network, names: Sequence[str] | None = None) -> list[
 
 
 def check_layout(where: str | Path, rows: ClipRows, network: Network) -> None:
-    """Raise InputError at the file `where` unless the network was trained on rows of this layout."""
+    """Raise InputError, which names the file `where`, unless `rows` fit the network.
+
+    Rows may have more channels than the network.
+    """
     layout = network.layout
-    bare = rows.layout.with_channels(()) == replace(layout, channels=(), order=())
-    if not bare or not set(layout.channels) <= set(rows.layout.channels):
+    same_without_channels = rows.layout.with_channels(()) == replace(layout, channels=(), order=())
+    if not same_without_channels or not set(layout.channels) <= set(rows.layout.channels):
         raise InputError(where, f"its rows ({rows.layout}) are not those the network has learnt ({layout})")
 
 
@@ -258,7 +272,7 @@ def clip_rows(result: Accuracy) -> list[Row]:
 
 
 def run(inputs: MeasureInputs, options: Options) -> Outcome:
-    """accuracy.json, and its clips and excerpts as tables."""
+    """accuracy.json, and the errors of its clips and excerpts as tables."""
     sample = sample_of(inputs, options)
     result = measure(
         inputs.weights,

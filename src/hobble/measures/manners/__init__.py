@@ -1,7 +1,7 @@
 """Measures whether moods and diagnoses can be recognised in generated walks, and how they change the walk.
 
-The recogniser is trained on captured clips. Every channel is measured whose values describe how a whole clip
-walks (`Channel.manner`); such a value is called a manner.
+The recogniser is trained on captured clips. A mood or diagnosis is called a manner: a way of walking that
+holds for a whole clip. The measurement covers all channels whose columns are manners (`Channel.manner`).
 """
 
 from hobble.measures.measure import Cost, Measure

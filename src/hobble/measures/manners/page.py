@@ -1,4 +1,4 @@
-"""Shows whether moods and diagnoses can be seen."""
+"""Shows whether moods and diagnoses can be recognised in generated walks."""
 
 from __future__ import annotations
 
@@ -14,8 +14,15 @@ from hobble.report.charts import Chart
 from hobble.report.gather import ReportMaterial
 from hobble.report.page_parts import PageSection, Paragraph, SectionPart
 
-UNITS = {"speed": "m/s", "stride": "cm", "trunk": "° forward", "arms": "° of swing", "head": "° forward"}
-AMOUNTS: tuple[tuple[Literal["captured", "generated", "generated_at_half"], str, str], ...] = (
+UNITS = {  # of the EFFECTS of a manner
+    "speed": "m/s",
+    "stride": "cm",
+    "trunk": "° forward",
+    "arms": "° of swing",
+    "head": "° forward",
+}
+# The bars of each manner: key in `Effect`, label, colour. A generated manner has the value 1 or .5.
+BARS: tuple[tuple[Literal["captured", "generated", "generated_at_half"], str, str], ...] = (
     ("captured", "captured", "@muted"),
     ("generated", "generated at 1", "@accent"),
     ("generated_at_half", "generated at .5", "@predicted"),
@@ -23,9 +30,9 @@ AMOUNTS: tuple[tuple[Literal["captured", "generated", "generated_at_half"], str,
 
 
 def section(found: Json, material: ReportMaterial) -> PageSection:
-    """For each channel how often its manners are recognised and how much they change the walk.
+    """For each channel, how often its manners are recognised, and how much they change the walk.
 
-    Empty for a network without such a channel.
+    Empty for a network without manners.
     """
     if not found.get("applies"):
         return PageSection("manners", [])
@@ -41,11 +48,11 @@ def section(found: Json, material: ReportMaterial) -> PageSection:
 
 
 def summary(found: ChannelResult) -> str:
-    """A paragraph: how often the recogniser is right on generated walks, and on captured walks of others."""
+    """A paragraph: how often the recogniser is right on generated walks, and on walks of people left out."""
     captured = found["captured"]
     text = (
         f"A recogniser trained on captured clips finds the right {found['title'].lower()} in "
-        f"{_percent(found['right_at_1'])} of the windows of generated walks with a value of 1, and in "
+        f"{_percent(found['right_at_1'])} of one-second windows of generated walks with a value of 1, and in "
         f"{_percent(captured['right'])} of the windows of captured clips that it was not trained on "
         f"({captured['people']} clips or people, each left out in turn). All generated walks had the same "
         f"three target speeds around {found['speed_asked']:.2f} m/s."
@@ -57,7 +64,7 @@ def summary(found: ChannelResult) -> str:
 
 
 def together_chart(found: ChannelResult, shown_name: Callable[[str], str] = str) -> Chart | None:
-    """The share of windows in which each manner is named while a column of another channel is highest."""
+    """How often each manner is recognised while a column of another channel is at its highest value."""
     rows = found["together"]
     if not rows:
         return None
@@ -78,7 +85,7 @@ def together_chart(found: ChannelResult, shown_name: Callable[[str], str] = str)
         "ygap": 2,
         "hovertemplate": "%{x} with %{y}: %{z:.0%}<extra></extra>",
     }
-    manner = sum((row["share"] or 0.0) * row["windows"] for row in rows if row["manner"] != NONE)
+    right = sum((row["share"] or 0.0) * row["windows"] for row in rows if row["manner"] != NONE)
     whole = sum(row["windows"] for row in rows if row["manner"] != NONE)
     layout = {
         "xaxis": {"type": "category", "side": "top", "automargin": True, "showgrid": False},
@@ -87,7 +94,7 @@ def together_chart(found: ChannelResult, shown_name: Callable[[str], str] = str)
     words = (
         f"The share of windows in which the recogniser names the right {found['title'].lower()} while the "
         "value named at the left is at its highest. The darker a field, the larger the share. "
-        f'The mean of all columns but "{NONE}" is {_percent(manner / whole)}.'
+        f'The mean of all columns but "{NONE}" is {_percent(right / whole)}.'
     )
     return Chart(
         f"{found['channel']}-together", "Two at once", words, [trace], layout, 120 + 20 * len(columns)
@@ -95,7 +102,7 @@ def together_chart(found: ChannelResult, shown_name: Callable[[str], str] = str)
 
 
 def effect_chart(found: ChannelResult, effect: str) -> Chart:
-    """One effect of all manners, captured and generated."""
+    """One effect, such as the speed, of each manner in captured and in generated walks."""
     rows = [row for row in found["effects"] if row["effect"] == effect]
     traces = [
         {
@@ -105,7 +112,7 @@ def effect_chart(found: ChannelResult, effect: str) -> Chart:
             "y": [row[key] for row in rows],
             "marker": {"color": colour},
         }
-        for key, label, colour in AMOUNTS
+        for key, label, colour in BARS
     ]
     words = f"Change of {effect} ({UNITS[effect]}) from the neutral walk."
     title = effect.capitalize()

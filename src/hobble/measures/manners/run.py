@@ -35,10 +35,12 @@ from hobble.models.load import load_network
 from hobble.models.network import Network
 from hobble.runtime.options import Runtime
 
-PACES = (0.85, 1.0, 1.15)  # of the median speed of captured neutral walks; the same for every manner
-ASKED = 120.0  # cm a second; target speed if there are no captured neutral walks
+# Target speeds of generated walks, divided by the median speed of captured neutral walks. They are the same
+# for every manner.
+PACES = (0.85, 1.0, 1.15)
+USUAL_SPEED = 120.0  # cm a second; stands for the median if there are no captured neutral walks
 HALF, FULL = 0.5, 1.0  # values of a manner
-REASON = "none of this network's inputs is a manner of walking"
+NO_MANNERS = "none of this network's inputs is a manner of walking"
 TOO_FEW = "there are walking clips of fewer than two manners"
 
 
@@ -51,18 +53,18 @@ def manners(
 ) -> Manners:
     """The content of manners.json. If it cannot be measured, `applies` is false and `reason` says why.
 
-    people: clip -> the person who walks in it, or the clip's own name if the person is unknown. In the
-    result, channels: a result for each channel of manners, see `of_channel`.
+    motion: the captured stretches of all clips. splits: clip -> "train" or "held_out". people: clip ->
+    person.
     """
     names = [name for name in network.channels if channel(name).manner]
     if not names or network.skeleton is None:
-        return {"applies": False, "reason": REASON}
+        return {"applies": False, "reason": NO_MANNERS}
     windows: dict[str, list[MannerWindow]] = {name: [] for name in names}
     for clip in motion:
-        for name, some in windows.items():
-            some += captured_windows(clip, network, name)
-    found = [of_channel(network, name, windows[name], splits, people, runtime) for name in names]
-    measured = [one for one in found if one]
+        for name, channel_windows in windows.items():
+            channel_windows += captured_windows(clip, network, name)
+    results = [of_channel(network, name, windows[name], splits, people, runtime) for name in names]
+    measured = [result for result in results if result]
     return {"applies": True, "channels": measured} if measured else {"applies": False, "reason": TOO_FEW}
 
 
@@ -74,67 +76,74 @@ def of_channel(
     people: Mapping[str, str],
     runtime: Runtime,
 ) -> ChannelResult | None:
-    """The result for one channel; None if there are walks of fewer than two manners.
+    """The result for the channel `name`; None if there are training clips of fewer than two manners.
 
-    captured: recognition of captured people, see `left_out`. generated: for each manner and value, the share
-    of windows that a recogniser trained on the training clips names right. For two manners at once, either
-    name is right, and `between` says to which of the two the walk is closer. together: recognition of each
-    manner at 1 while a column of another channel is at its highest value. effects: how much each manner
-    changes the walk from neutral, captured and generated.
+    windows: the captured windows of all clips. splits: clip -> "train" or "held_out". people: clip -> person.
     """
-    known = [w for w in windows if splits[w.clip] == "train"]
-    found = sorted({w.manner for w in known} - {NONE})
-    if len(found) < 2:
+    training = [w for w in windows if splits[w.clip] == "train"]
+    learnt = sorted({w.manner for w in training} - {NONE})
+    if len(learnt) < 2:
         return None
     captured = left_out(windows, people)
-    judge = learn(table(known), [w.manner for w in known], captured["shrinkage"])
-    speed = float(np.median([w.values["speed"] for w in known if w.manner == NONE] or [ASKED])) / FPS
-    single = [{}, *({manner: value} for value in (HALF, FULL) for manner in found)]
-    combined = [*single, *(dict.fromkeys(pair, FULL) for pair in combinations(found, 2))]
-    figures = [WalkerInputs({name: values}, speed * pace) for values in combined for pace in PACES]
-    walks = generated(network, figures, name, runtime)
+    recogniser = learn(table(training), [w.manner for w in training], captured["shrinkage"])
+    speed = float(np.median([w.values["speed"] for w in training if w.manner == NONE] or [USUAL_SPEED])) / FPS
+    single = [{}, *({manner: value} for value in (HALF, FULL) for manner in learnt)]
+    combined = [*single, *(dict.fromkeys(pair, FULL) for pair in combinations(learnt, 2))]
+    walkers = [WalkerInputs({name: values}, speed * pace) for values in combined for pace in PACES]
+    walks = generated(network, walkers, name, runtime)
     per = len(PACES)
-    each = [[w for walk in walks[i : i + per] for w in walk] for i in range(0, len(walks), per)]
-    half, full = (dict(zip(found, each[1 + k * len(found) :], strict=False)) for k in (0, 1))
-    rows = [_named(judge, values, some) for values, some in zip(combined, each, strict=True)]
-    for row, values, some in zip(rows, combined, each, strict=True):
+    # The windows for each entry of `combined`, at all PACES.
+    by_entry = [[w for walk in walks[i : i + per] for w in walk] for i in range(0, len(walks), per)]
+    half, full = (dict(zip(learnt, by_entry[1 + k * len(learnt) :], strict=False)) for k in (0, 1))
+    rows = [_named(recogniser, values, some) for values, some in zip(combined, by_entry, strict=True)]
+    for row, values, some in zip(rows, combined, by_entry, strict=True):
         if len(values) == 2:
             row["between"] = _between(_mean(some), *(_mean(full[manner]) for manner in values))
     right = [(row["share"], row["windows"]) for row in rows if row["value"] == FULL]
     return {
         "channel": name,
         "title": channel(name).title,
-        "manners": found,
+        "manners": learnt,
         "speed_asked": round(speed * FPS / 100, 5),
         "captured": captured,
         "generated": rows,
         "right_at_1": _weighted(right),
-        "together": together(network, name, judge, found, speed, runtime),
-        "effects": [_effect(name, m, e, known, each[0], half[m], full[m]) for m in found for e in EFFECTS],
+        "together": together(network, name, recogniser, learnt, speed, runtime),
+        "effects": [
+            _effect(name, manner, effect, training, by_entry[0], half[manner], full[manner])
+            for manner in learnt
+            for effect in EFFECTS
+        ],
     }
 
 
 def together(
-    network: Network, name: str, judge: Discriminant, found: Sequence[str], speed: float, runtime: Runtime
+    network: Network,
+    name: str,
+    recogniser: Discriminant,
+    learnt: Sequence[str],
+    speed: float,
+    runtime: Runtime,
 ) -> list[CombinedResult]:
-    """How often each manner at 1 is named while a column of another channel is at its highest value.
+    """How often each manner at 1 is recognised while a column of another channel is at its highest value.
 
-    It has a row for each manner (or NONE) and each column that was above 0 in training.
+    The result has a row for each manner (and NONE) and each such column that was above 0 in training. learnt:
+    the manners that the recogniser knows. speed: target speed, cm a frame.
     """
     others = [
         (other, column) for other in network.channels if other != name for column in network.trained(other)
     ]
-    cases = [(manner, other, column) for manner in (NONE, *found) for other, column in others]
+    cases = [(manner, other, column) for manner in (NONE, *learnt) for other, column in others]
     if not cases:
         return []
-    figures = [
+    walkers = [
         WalkerInputs({name: {} if m == NONE else {m: FULL}, other: {column: channel(other).highest}}, speed)
         for m, other, column in cases
     ]
-    walks = generated(network, figures, name, runtime)
+    walks = generated(network, walkers, name, runtime)
     rows: list[CombinedResult] = []
     for (manner, other, column), some in zip(cases, walks, strict=True):
-        names = judge.names(table(some))
+        names = recogniser.names(table(some))
         rows.append(
             {
                 "channel": name,
@@ -154,25 +163,28 @@ def run(inputs: MeasureInputs, options: SampleOptions) -> Outcome:
     sample = sample_of(inputs, options)
     motion = captured_motion(inputs.clips, sample)
     result = manners(load_network(inputs.weights), motion, inputs.splits, inputs.people, inputs.runtime)
-    found = result.get("channels", [])
+    measured = result.get("channels", [])
     tables: dict[str, list[Row]] = {
-        "effects": [row for one in found for row in one["effects"]],
+        "effects": [row for one in measured for row in one["effects"]],
         "together": [
-            {k: v for k, v in row.items() if k != "named"} for one in found for row in one["together"]
+            {k: v for k, v in row.items() if k != "named"} for one in measured for row in one["together"]
         ],
     }
-    says = "; ".join(f"{one['channel']} named right: {one['right_at_1']}" for one in found)
+    says = "; ".join(f"{one['channel']} named right: {one['right_at_1']}" for one in measured)
     return Outcome(with_sample(result, sample), tables, says or result.get("reason", ""))
 
 
-def _named(judge: Discriminant, values: Mapping[str, float], windows: Sequence[MannerWindow]) -> NamedWindows:
-    names = judge.names(table(windows))
-    wanted = set(values) or {NONE}
+def _named(
+    recogniser: Discriminant, values: Mapping[str, float], windows: Sequence[MannerWindow]
+) -> NamedWindows:
+    """The names that the recogniser gives to the windows of a walk. values: manner -> its value."""
+    names = recogniser.names(table(windows))
+    right_names = set(values) or {NONE}
     return {
         "manners": list(values),
         "value": next(iter(values.values()), 0.0) if len(values) < 2 else None,
         "windows": len(names),
-        "share": share([name in wanted for name in names]),
+        "share": share([name in right_names for name in names]),
         "named": _counts(names),
     }
 
@@ -185,23 +197,26 @@ def _effect(
     name: str,
     manner: str,
     effect: str,
-    known: Sequence[MannerWindow],
+    training: Sequence[MannerWindow],
     plain: Sequence[MannerWindow],
     half: Sequence[MannerWindow],
     full: Sequence[MannerWindow],
 ) -> Effect:
     """One effect of one manner.
 
-    known: captured windows. plain, half, full: generated windows without the manner, with it at .5 and at 1.
+    name: the channel. training: captured windows of training clips. plain, half, full: generated windows
+    without the manner, with it at .5 and at 1.
     """
-    neutral = [w for w in known if w.manner == NONE]
-    mine = [w for w in known if w.manner == manner]
+    neutral = [w for w in training if w.manner == NONE]
+    captured = [w for w in training if w.manner == manner]
     base = mean_effect(plain, effect)
     return {
         "channel": name,
         "manner": manner,
         "effect": effect,
-        "captured": round(mean_effect(mine, effect) - mean_effect(neutral, effect), 4) if neutral else None,
+        "captured": round(mean_effect(captured, effect) - mean_effect(neutral, effect), 4)
+        if neutral
+        else None,
         "generated": round(mean_effect(full, effect) - base, 4),
         "generated_at_half": round(mean_effect(half, effect) - base, 4),
     }

@@ -20,20 +20,21 @@ from hobble.runtime.options import Runtime
 
 NONE = "none"  # the manner of a clip whose values are all 0
 WALK = GAITS.index("walk")
-WINDOW, STEP = 60, 15  # frames; a window is about a cycle
-AHEAD = 0.9  # least forward share of a window's speed; with less it is no straight walk
-LEAST_SPEED = 0.5  # cm a frame; a slower window is no walk
-WARM_UP, USED = 4 * FPS, 6 * FPS  # frames of a generated walk that are skipped, and that are used
+WINDOW, STEP = 60, 15  # frames: length of a window (about a cycle), and from one start to the next
+AHEAD = 0.9  # in straight walking, at least this share of the speed over a window is forward
+LEAST_SPEED = 0.5  # cm a frame; below this speed, a window does not count as walking
+WARM_UP, USED = 4 * FPS, 6 * FPS  # frames skipped at the start of a generated walk, and frames used
+# What is compared with and without a manner; units: see `MannerWindow.effects`.
 EFFECTS = ("speed", "stride", "trunk", "arms", "head")
 
 
 @dataclass(frozen=True)
 class MannerWindow:
-    """A stretch of straight walking.
+    """A stretch of straight walking, WINDOW frames long.
 
-    clip: empty for a generated walk. manner: a column of the channel, or NONE. values: its features by name.
-    effects: speed (m/s), stride (cm), trunk and head (degrees forward), arms (standard deviation of their
-    swing, degrees).
+    clip: empty for a generated walk. manner: a column of the channel, or NONE. values: feature -> value.
+    effects, with the keys EFFECTS: speed (m/s), stride (cm), trunk and head (degrees forward), arms (standard
+    deviation of their swing, degrees).
     """
 
     clip: str
@@ -51,9 +52,10 @@ class WalkerInputs:
 
 
 def captured_windows(clip: Captured, network: Network, name: str) -> list[MannerWindow]:
-    """The windows of a captured stretch that walk straight, with one manner at its highest value or none.
+    """The windows of straight walking in a captured stretch of a clip.
 
-    name: the channel of the manners. Windows with values of another channel are left out.
+    Each has either no manner or one manner at its highest value. name: the channel of the manners. Windows in
+    which another channel has a value above 0 are left out.
     """
     assert network.skeleton is not None
     columns, highest = network.channels[name], channel(name).highest
@@ -66,8 +68,8 @@ def captured_windows(clip: Captured, network: Network, name: str) -> list[Manner
         manners = [columns[i] for i in np.flatnonzero(values)]
         straight = clip.velocity[span, 1].mean() >= AHEAD * speed and speed >= LEAST_SPEED
         walks = clip.gait[span, WALK].mean() > 0.5
-        one = len(manners) < 2 and np.isin(values, (0, highest)).all()
-        if not (straight and walks and one) or any(np.any(other[span]) for other in others):
+        at_most_one = len(manners) < 2 and np.isin(values, (0, highest)).all()
+        if not (straight and walks and at_most_one) or any(np.any(other[span]) for other in others):
             continue
         parts = clip.local[span], clip.contacts[span], clip.root[span]
         out.append(_window(network.skeleton, clip.clip, manners[0] if manners else NONE, *parts))
@@ -75,19 +77,22 @@ def captured_windows(clip: Captured, network: Network, name: str) -> list[Manner
 
 
 def generated(
-    network: Network, figures: Sequence[WalkerInputs], name: str, runtime: Runtime
+    network: Network, walkers: Sequence[WalkerInputs], name: str, runtime: Runtime
 ) -> list[list[MannerWindow]]:
-    """The windows of each figure's straight walk. name: the channel whose columns are the manners."""
+    """The windows of a straight walk for each walker.
+
+    name: the channel whose columns are the manners.
+    """
     assert network.skeleton is not None
     channels: dict[str, Array] = {}
     for each in network.channels:
-        channels |= channel_values(network, each, [figure.channels.get(each, {}) for figure in figures])
-    speeds = [figure.speed for figure in figures]
-    script = CrowdTarget(WARM_UP + USED, ["walk"] * len(figures), channels, speeds)
+        channels |= channel_values(network, each, [walker.channels.get(each, {}) for walker in walkers])
+    speeds = [walker.speed for walker in walkers]
+    script = CrowdTarget(WARM_UP + USED, ["walk"] * len(walkers), channels, speeds)
     walks = run_walks(network, [script], runtime)
     out = []
-    for i, figure in enumerate(figures):
-        manner = " and ".join(figure.channels.get(name, {})) or NONE
+    for i, walker in enumerate(walkers):
+        manner = " and ".join(walker.channels.get(name, {})) or NONE
         spans = [slice(s, s + WINDOW) for s in range(WARM_UP, WARM_UP + USED - WINDOW + 1, STEP)]
         parts = [(walks.local[span, i], walks.contacts[span, i], walks.root[span, i]) for span in spans]
         out.append([_window(network.skeleton, "", manner, *part) for part in parts])
@@ -95,12 +100,12 @@ def generated(
 
 
 def table(windows: Sequence[MannerWindow]) -> Array:
-    """(n, D) features of n windows."""
+    """(n, D) values of the D features in n windows."""
     return np.array([list(w.values.values()) for w in windows])
 
 
 def mean_effect(windows: Iterable[MannerWindow], effect: str) -> float:
-    """The mean of one of EFFECTS."""
+    """The mean of `effect`, one of EFFECTS, over the windows."""
     return float(np.mean([w.effects[effect] for w in windows]))
 
 

@@ -1,4 +1,4 @@
-"""Laps of the waypoint track in each phase mode: milliseconds per frame, and distance from the track."""
+"""Measures laps of a waypoint track in each phase mode: milliseconds a frame, distance from the track."""
 
 from __future__ import annotations
 
@@ -13,11 +13,11 @@ from hobble.runtime.options import Runtime
 
 
 class Options(Section):
-    """Its keys of the section `evaluation`."""
+    """The keys of this measurement in a configuration's section `evaluation`."""
 
     laps: Positive = Field(19, description="laps in the phase mode of the runtime")
     laps_other_modes: Positive = Field(
-        3, description="most laps in each other phase mode; fewer, to save time"
+        3, description="at most this many laps in each other phase mode; a small number saves time"
     )
     lap_seconds: Annotated[float, Field(ge=1, allow_inf_nan=False)] = Field(
         400.0, description="seconds after which a lap is stopped"
@@ -29,7 +29,7 @@ class Options(Section):
 
 
 def pieces(options: Options, runtime: Runtime, modes: Sequence[str]) -> tuple[str, ...]:
-    """The phase modes in which laps are run. modes: those of the network."""
+    """The phase modes in which laps are measured, a piece for each. modes: all phase modes of the network."""
     return tuple(dict.fromkeys((*options.modes, runtime.mode))) if len(modes) > 1 else tuple(modes)
 
 

@@ -1,4 +1,4 @@
-"""Comparison of frame times and network sizes, with straight lines of time over size."""
+"""Frame times and network sizes of configurations side by side, with straight lines of time over size."""
 
 from __future__ import annotations
 
@@ -15,14 +15,17 @@ from hobble.evaluation.series import StraightLine, line
 from hobble.measures.inputs import Json, Row
 
 NAME = "responsivity"
+# The timed steps of a frame, then all of them together.
 STEPS = ("prepare", "input", "insert", "predict", "output", "update", "total")
+# Three ways to count the weights and biases that one frame uses, explained at `parameter_counts` in
+# hobble.measures.responsivity.run. compare.json calls such a count "computations".
 COUNTS = ("true", "table_6_1", "table_6_1_as_printed")
 
 
 class Sizes(TypedDict):
     """The size of a network.
 
-    computations: the counts of `parameter_counts` by name, each None for a network without layers.
+    computations: name in COUNTS -> that count of weights and biases, None for a network without layers.
     weights_bytes: phase mode -> bytes of weights in memory. exact: the phase mode that approximates nothing.
     """
 
@@ -32,9 +35,10 @@ class Sizes(TypedDict):
 
 
 class TimeLine(StraightLine):
-    """A straight line of milliseconds `y` over computations `x`. Its slope is None if none could be fitted.
+    """A straight line fitted to milliseconds `y` over computations `x`. The slope is None if the fit fails.
 
-    whose: "hobble" or "published". mode: phase mode; None for published times. For the other keys see `fits`.
+    whose: whose times, "hobble" or "published". mode: phase mode; None for published times. step,
+    computations: which times and which counts, see `fits`.
     """
 
     whose: str
@@ -46,7 +50,7 @@ class TimeLine(StraightLine):
 
 
 def compared(all_measured: Sequence[ConfigurationResults], published: Json) -> SideBySide:
-    """The laps of each mode, the counts of Table 6.1, and our times with the published ones."""
+    """The laps of the track in each phase mode, the networks' sizes, and published sizes and times."""
     about = {m.name: _sizes(m) for m in all_measured}
     return SideBySide(
         entries=[entry for m in all_measured for entry in by_mode(m)],
@@ -61,7 +65,7 @@ def compared(all_measured: Sequence[ConfigurationResults], published: Json) -> S
 
 
 def tables(compared: Json) -> dict[str, Sequence[Row]]:
-    """Every lap, and the lines of time over size."""
+    """Two tables: every lap, and the lines of time over size."""
     fit = compared["milliseconds"]["fit"]
     return {
         NAME: [lap for entry in compared[NAME] for lap in _laps(entry)],
@@ -70,7 +74,7 @@ def tables(compared: Json) -> dict[str, Sequence[Row]]:
 
 
 def by_mode(measured: ConfigurationResults) -> list[Json]:
-    """The responsivity of each phase mode that was run."""
+    """The results of each phase mode that was run, each with the name of the configuration."""
     found = measured.found(NAME)
     return [{**entry, "configuration": measured.name} for entry in found.get("modes", [found])]
 
@@ -86,7 +90,10 @@ def _sizes(measured: ConfigurationResults) -> Sizes:
 
 
 def time_differences(all_measured: Sequence[ConfigurationResults]) -> list[DifferenceOf]:
-    """The difference of the frame times of each pair (eq. 3.2 of Segerstedt), in the modes that both have."""
+    """How much the frame times of each two configurations differ, in the modes that both have.
+
+    The difference is that of eq. 3.2 of Segerstedt (2021).
+    """
     out: list[DifferenceOf] = []
     for a, b in combinations(all_measured, 2):
         theirs = {entry["mode"]: entry for entry in by_mode(b)}
@@ -105,12 +112,13 @@ def time_differences(all_measured: Sequence[ConfigurationResults]) -> list[Diffe
 
 
 def fits(all_measured: Sequence[ConfigurationResults], published: Json) -> list[TimeLine]:
-    """Straight lines of milliseconds per frame over computations: ours for each mode and step, and published.
+    """Straight lines of milliseconds per frame over computations, for our times and for the published times.
 
-    computations: which of COUNTS. step: which time. "total" is the mean over whole frames, as published;
-    "predict" is the mean of that step; "median" is the median over whole frames, which other programs on the
-    machine change least. slope: milliseconds per computation. Each configuration is a point, also if it uses
-    the network of another one or has the same size. A network without layers is left out.
+    computations: one of COUNTS. step: which time. "total" is the mean time of a whole frame, as published;
+    "predict" is the mean time of the step `predict`; "median" is the median time of a whole frame, which
+    other programs on the machine change least. slope: milliseconds per computation. Each configuration is a
+    point of its own, even if it uses the same network as another, or one of the same size. A network without
+    layers is left out.
     """
     out = []
     entries = [(m, entry) for m in all_measured if m.found(NAME)["parameters"] for entry in by_mode(m)]
@@ -140,8 +148,8 @@ def _time(milliseconds: Json, step: str) -> float:
 
 
 def _fit(whose: str, mode: str | None, step: str, counts: str, points: list[tuple[int, float]]) -> TimeLine:
-    none: StraightLine = {"slope": None, "intercept": None, "r2": None, "points": len(points)}
-    found = line([x for x, _ in points], [y for _, y in points])
+    unfitted: StraightLine = {"slope": None, "intercept": None, "r2": None, "points": len(points)}
+    fitted = line([x for x, _ in points], [y for _, y in points])
     return {
         "whose": whose,
         "mode": mode,
@@ -149,7 +157,7 @@ def _fit(whose: str, mode: str | None, step: str, counts: str, points: list[tupl
         "computations": counts,
         "x": [x for x, _ in points],
         "y": [y for _, y in points],
-        **(found or none),
+        **(fitted or unfitted),
     }
 
 
@@ -163,9 +171,9 @@ def _published_sizes(about: Mapping[str, Sizes], published: Json) -> list[Publis
     for row in published["computations"]:
         sizes = about.get(row["configuration"])
         counts = sizes["computations"] if sizes else {}
-        printed = {**row, "table": "6.1"}
+        in_table = {**row, "table": "6.1"}
         out.append(
-            published_row("computations of Table 6.1", printed, row["table_6_1"], counts.get(COUNTS[2]))
+            published_row("computations of Table 6.1", in_table, row["table_6_1"], counts.get(COUNTS[2]))
         )
         out.append(published_row("parameters of a phase", row, row["parameters"], counts.get("true")))
     for row in published["stages"]:
@@ -177,19 +185,19 @@ def _published_sizes(about: Mapping[str, Sizes], published: Json) -> list[Publis
 
 
 def _published_times(all_measured: Sequence[ConfigurationResults], published: Json) -> list[PublishedRow]:
-    found = {m.name: m for m in all_measured}
+    by_name = {m.name: m for m in all_measured}
     out = []
     for row in published["responsivity"]:
-        m = found.get(row["configuration"])
+        m = by_name.get(row["configuration"])
         ours = m.found(NAME)["milliseconds"]["total"] if m else None
         out.append(published_row("a frame", row, row["milliseconds"], ours, "ms"))
         if "sd" in row:
-            in_text = {**row, "table": None}
+            in_text = {**row, "table": None}  # the standard deviation is only in the text of the thesis
             means = lap_means(m.found(NAME)) if m else []
             sd = float(np.std(means)) if len(means) > 1 else None
             out.append(published_row("standard deviation of the means of laps", in_text, row["sd"], sd, "ms"))
     for row in published["modes"]:
-        m = found.get(row["configuration"])
+        m = by_name.get(row["configuration"])
         times = {e["mode"]: e["milliseconds"]["predict"] for e in by_mode(m)} if m else {}
         what = f"a prediction, {row['mode']}"
         out.append(published_row(what, row, row["milliseconds"], times.get(row["mode"]), "ms"))

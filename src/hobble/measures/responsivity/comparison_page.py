@@ -32,22 +32,25 @@ def columns(compared: Compared) -> Iterator[OverviewColumn]:
 
 
 def verdicts(compared: Compared) -> Iterator[Verdict]:
-    """Which configuration stays closest to the track, and which is smoothest, fastest and smallest."""
+    """Which configuration stays closest to the track, and which is smoothest, fastest and smallest.
+
+    Only configurations that reached every waypoint can be the closest or the smoothest.
+    """
     exact = in_exact_mode(compared)
-    whole = {name: e for name, e in exact.items() if e["waypoints_reached"] == e["waypoints"]}
-    astray = [name for name in exact if name not in whole]
-    lost = f" Did not reach every waypoint: {', '.join(astray)}." if astray else ""
+    arrived = {name: e for name, e in exact.items() if e["waypoints_reached"] == e["waypoints"]}
+    astray = [name for name in exact if name not in arrived]
+    left_out = f" Did not reach every waypoint: {', '.join(astray)}." if astray else ""
     yield from best(
         20,
         "Closest to the track",
-        {name: e["path_overshoot_cm"] for name, e in whole.items()},
+        {name: e["path_overshoot_cm"] for name, e in arrived.items()},
         lambda name, v: f"{name} is never more than {number(v, 3)} cm off the track",
-        lost,
+        left_out,
     )
     yield from best(
         30,
         "Smoothest",
-        {name: e["foot_slide_cm"] for name, e in whole.items()},
+        {name: e["foot_slide_cm"] for name, e in arrived.items()},
         lambda name, v: (
             f"the feet of {name} slide {number(v, 2)} cm a step, and no joint turns more than "
             f"{number(exact[name]['largest_turn_degrees'], 2)} degrees in a frame"
@@ -67,9 +70,10 @@ def verdicts(compared: Compared) -> Iterator[Verdict]:
 def in_exact_mode(compared: Compared) -> dict[str, Any]:
     """Configuration -> its laps in the exact phase mode, or in the only mode that was run."""
     exact = {entry["configuration"]: entry["exact"] for entry in compared["configurations"]}
+    # In this order, the exact mode of a configuration replaces its other modes in the mapping below.
     ordered = sorted(compared["responsivity"], key=lambda e: e["mode"] == exact[e["configuration"]])
-    found = {entry["configuration"]: entry for entry in ordered}
-    return {name: found[name] for name in names(compared) if name in found}
+    by_name = {entry["configuration"]: entry for entry in ordered}
+    return {name: by_name[name] for name in names(compared) if name in by_name}
 
 
 def _bytes(compared: Compared) -> dict[str, float]:
@@ -83,8 +87,8 @@ def lap_lines(compared: Compared) -> Chart | None:
         laps = [lap for lap in entry["laps"] if isinstance(lap.get("milliseconds"), dict)]
         x, y = [lap["lap"] for lap in laps], [lap["milliseconds"]["spread"]["median"] for lap in laps]
         colour = colours(compared)[entry["configuration"]]
-        one = line(entry["configuration"], x, y, colour, mode="lines+markers")
-        options.setdefault(f"{entry['mode']} phase", []).append(one)
+        trace = line(entry["configuration"], x, y, colour, mode="lines+markers")
+        options.setdefault(f"{entry['mode']} phase", []).append(trace)
     if not options:
         return None
     for traces in options.values():
@@ -106,7 +110,7 @@ def lap_lines(compared: Compared) -> Chart | None:
 
 
 def fit_chart(compared: Compared) -> Chart | None:
-    """Frame time over the number of parameters, with a straight line fitted to ours and to the published."""
+    """Frame time over the number of parameters: our times and the published ones, each with a fitted line."""
     shown = [
         f
         for f in compared["milliseconds"]["fit"]
@@ -126,7 +130,7 @@ def fit_chart(compared: Compared) -> Chart | None:
     if not traces:
         return None
     layout = {
-        "xaxis": axis("parameters per phase", tickformat="~s", rangemode="tozero"),
+        "xaxis": axis("parameters of one frame", tickformat="~s", rangemode="tozero"),
         "yaxis": axis("ms per frame", rangemode="tozero"),
     }
     caption = (

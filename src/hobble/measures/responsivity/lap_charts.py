@@ -1,4 +1,4 @@
-"""Charts of the laps: the time of each step of a frame in milliseconds, and the paths on the track."""
+"""Charts of the laps of the track: the time of each step of a frame, and the paths of the character."""
 
 from __future__ import annotations
 
@@ -22,7 +22,10 @@ OFF_TRACK = 100.0  # cm from the line between two waypoints; places farther away
 
 
 def lap_steps(lap: dict[str, Any]) -> dict[str, float]:
-    """Milliseconds per frame of each step in one lap, without the total."""
+    """Milliseconds per frame of each step in one lap, without the total.
+
+    If the lap has only one number, the time of a whole frame, its key is "frame".
+    """
     value = lap.get("milliseconds")
     if isinstance(value, dict):
         return {k: v for k, v in value.items() if k not in ("total", "sd") and isinstance(v, (int, float))}
@@ -30,7 +33,7 @@ def lap_steps(lap: dict[str, Any]) -> dict[str, float]:
 
 
 def step_place(step: str) -> int:
-    """The place of a step in a frame; unknown steps come last."""
+    """A key to sort the steps of a frame: by their order in STEPS, then unknown steps."""
     return list(STEPS).index(step) if step in STEPS else len(STEPS)
 
 
@@ -83,17 +86,19 @@ def track_chart(found: Json) -> Chart | None:
     track, runs = found.get("track") or {}, found.get("runs") or []
     if not runs or not track.get("x"):
         return None
-    ends = [f"{i}, {gait}" for i, gait in enumerate(track["gaits"])]
+    labels = [f"{i}, {gait}" for i, gait in enumerate(track["gaits"])]
     along = {"x": [*track["x"], track["x"][0]], "z": [*track["z"], track["z"][0]]}
     traces = [line("track", along["x"], along["z"], "@faint", dash="dash", width=1.2, hoverinfo="skip")]
     for run in runs:
         name = "laps" if run is runs[0] else f"lap {run['lap']}"
         shown = {"legendgroup": "runs", "showlegend": run is runs[0]}
         traces.append(line(name, run["x"], run["z"], "@accent", width=1.5, hoverinfo="skip", **shown))
-    off = [(x, z, cm, r["lap"]) for r in runs for x, z, cm in zip(r["x"], r["z"], r["off_cm"], strict=True)]
-    left = [row for row in off if row[2] > OFF_TRACK]
-    if left:
-        traces.append(_off_track_markers(left))
+    places = [
+        (x, z, cm, r["lap"]) for r in runs for x, z, cm in zip(r["x"], r["z"], r["off_cm"], strict=True)
+    ]
+    off_track = [place for place in places if place[2] > OFF_TRACK]
+    if off_track:
+        traces.append(_off_track_markers(off_track))
     traces.append(
         {
             "type": "scatter",
@@ -101,21 +106,22 @@ def track_chart(found: Json) -> Chart | None:
             "name": "waypoints",
             "x": track["x"],
             "y": track["z"],
-            "text": ends,
+            "text": labels,
             "textposition": "top center",
             "textfont": {"size": 11, "color": "@soft"},
             "marker": {"symbol": "circle-open", "size": 12, "color": "@ink"},
             "hoverinfo": "skip",
         }
     )
-    largest = max(row[2] for row in off)
-    where = f"Places more than {OFF_TRACK:.0f} cm from the track are red. " if left else ""
+    largest = max(place[2] for place in places)
+    where = f"Places more than {OFF_TRACK:.0f} cm from the track are red. " if off_track else ""
     return Chart(
         "track",
         "The track, and the path of the character",
         "From above. Dashed lines join the waypoints. Each waypoint has a number and the gait on the way to "
-        "it; it counts as reached within a metre. Solid lines are the paths of the first laps. "
-        f"{where}The largest distance from the track was {largest:.0f} cm.",
+        "it. It is reached when the character is within a metre. Solid lines are the paths of the first "
+        "laps. "
+        f"{where}On these laps, the largest distance from the track was {largest:.0f} cm.",
         traces,
         {
             "xaxis": axis("x, m", constrain="domain", zeroline=False),

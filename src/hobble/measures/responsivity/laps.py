@@ -1,8 +1,9 @@
-"""Laps of the waypoint track, walked by a crowd with one figure for each lap.
+"""Laps of the waypoint track, walked by a crowd with one character for each lap.
 
-Lap 1 begins and ends at one waypoint, lap 2 at the next, and so on around the track. There are more laps than
-waypoints, so in each further round the figures start farther before the waypoint where their lap begins. They
-come to it at another moment of their gait and by a slightly different path, so no two laps are the same.
+Lap 1 begins and ends at one waypoint, lap 2 at the next, and so on around the track. If there are more laps
+than waypoints, several laps begin at the same waypoint. Their characters start at different distances before
+it, and reach it at different moments of their gait and by slightly different paths. So no two laps are the
+same.
 """
 
 from __future__ import annotations
@@ -21,14 +22,18 @@ from hobble.runtime.options import Runtime
 from hobble.runtime.waypoints import Waypoint
 
 FPS = 60
-EVERY = 15  # frames between two stored places of a path
-AT_ONCE = 60  # frames whose rotations are in memory together
-RUN_UP = 1000.0  # cm; figures start at most this far before the waypoint where their laps begin
+PATH_STEP = 15  # frames from one stored place of a path to the next
+AT_ONCE = 60  # the rotations of at most this many frames are in memory together
+RUN_UP = 1000.0  # cm; a character starts at most this far before the waypoint where its lap begins
 
 
 @dataclass(frozen=True)
 class Starts:
-    """Where the figures of C laps start. places: (C, 2) cm. facing: (C, 2). waypoints: (C,) the next one."""
+    """Where the characters of C laps start.
+
+    places: (C, 2) x and z, cm. facing: (C, 2) direction. waypoints: (C,) index of the waypoint where the lap
+    begins.
+    """
 
     places: Array
     facing: Array
@@ -42,28 +47,33 @@ class Starts:
 
 
 def starts_of(track: Sequence[Waypoint], laps: int) -> Starts:
-    """The starts of `laps` laps. The first lap begins at the last waypoint of the track, the next at the
-    first waypoint."""
+    """The starts of `laps` laps.
+
+    The first lap begins at the last waypoint of the track, the second lap at the first waypoint.
+    """
     count = len(track)
     waypoints = (np.arange(laps) - 1) % count
     corners = np.array([waypoint.position for waypoint in track], float)
     ways = corners - np.roll(corners, 1, axis=0)  # way n leads to waypoint n
     lengths = np.hypot(ways[:, 0], ways[:, 1])
+    # Laps that begin at the same waypoint start at evenly spaced distances before it.
     rounds = -(-laps // count)
-    ahead = np.arange(laps) // count / rounds * np.minimum(lengths, RUN_UP)[waypoints]
-    places = corners[waypoints] - (ahead / np.maximum(lengths[waypoints], 1e-9))[:, None] * ways[waypoints]
-    # A figure that stands at a waypoint has reached it, so it faces the one after it.
-    facing = ways[np.where(ahead > 0, waypoints, (waypoints + 1) % count)]
+    distances = np.arange(laps) // count / rounds * np.minimum(lengths, RUN_UP)[waypoints]
+    places = (
+        corners[waypoints] - (distances / np.maximum(lengths[waypoints], 1e-9))[:, None] * ways[waypoints]
+    )
+    # A character that starts at its waypoint has already reached it, so it faces the next waypoint.
+    facing = ways[np.where(distances > 0, waypoints, (waypoints + 1) % count)]
     return Starts(places, facing, waypoints)
 
 
 def walk_laps(
     network: Network, runtime: Runtime, laps: int, longest: int, track: Sequence[Waypoint]
 ) -> list[tuple[LapWalk, LapPath]]:
-    """Walk `laps` laps, at most `longest` frames each. Returns how each went, and its path.
+    """Walk `laps` laps, at most `longest` frames each. Returns how each lap went, and its path.
 
-    A figure that does not come to its first waypoint in that time has reached none, and its lap begins where
-    it starts.
+    If a character does not reach the waypoint where its lap begins within `longest` frames, the lap is
+    counted from the character's start, with no waypoint reached.
     """
     starts = starts_of(track, laps)
     animation = ProceduralAnimation(network, characters=laps, waypoints=track, **dict(runtime))
@@ -74,11 +84,13 @@ def walk_laps(
 
 @dataclass(frozen=True)
 class _Recorded:
-    """F frames of C figures. Each is one array with these two axes first.
+    """F frames of C characters.
 
-    toes: (F, C, 2, 3) cm. contacts: (F, C, 4). places: (F, C, 2) of the root on the ground, cm. off: cm from
-    the track. reached: number of waypoints. drawn, predicted: degrees, the largest turn of a joint since the
-    frame before (0 in the first). held: whether the runtime limited the turn of a joint.
+    toes: (F, C, 2, 3) positions of the toe joints, cm. contacts: (F, C, 4) of heels and toes with the ground.
+    places: (F, C, 2) x and z of the root, cm. The other fields are (F, C). off: distance from the track, cm.
+    reached: number of waypoints reached so far, counted from waypoint 0 of the track. drawn, predicted: the
+    largest turn of a joint since the frame before, as drawn and as predicted, degrees (0 in the first frame).
+    held: whether the runtime limited the turn of a joint.
     """
 
     toes: Array
@@ -92,17 +104,20 @@ class _Recorded:
 
 
 def _record(animation: ProceduralAnimation, first: np.ndarray, longest: int) -> _Recorded:
-    """Walk until the laps of all figures are over. first: (C,) the value of `reached` at which laps begin."""
+    """Walk until the laps of all characters are over.
+
+    first: (C,) value of `reached` at which a lap begins. longest: a lap lasts at most this many frames.
+    """
     follower, skeleton, count = animation.follower, animation.skeleton, animation.characters
     assert follower is not None
     goal = first + len(follower.track)
     toes = [skeleton.role("left_toe"), skeleton.role("right_toe")]
     kept: list[list[Array]] = [[], [], [], [], []]
-    turns, since, frames = _Turns(), np.zeros(count, int), 0
+    turns, lap_frames, frames = _Turns(), np.zeros(count, int), 0
     while True:
         begun = follower.reached >= first
-        since[begun] += 1
-        if np.all((follower.reached >= goal) | (since >= longest) | (~begun & (frames >= longest))):
+        lap_frames[begun] += 1
+        if np.all((follower.reached >= goal) | (lap_frames >= longest) | (~begun & (frames >= longest))):
             break
         pose = animation.next_pose()
         positions = pose.positions.reshape(count, -1, 3)
@@ -122,7 +137,11 @@ def _record(animation: ProceduralAnimation, first: np.ndarray, longest: int) -> 
 
 
 class _Turns:
-    """The turns of joints from frame to frame. Only the rotations of AT_ONCE frames are kept."""
+    """The turns of joints from frame to frame, measured whenever AT_ONCE frames have been added.
+
+    A rotation has three stages: predicted by the network, taken over by the runtime, which limits the turn,
+    and drawn after the feet are placed.
+    """
 
     def __init__(self) -> None:
         self._drawn: list[Array] = []
@@ -132,7 +151,7 @@ class _Turns:
         self._found: list[tuple[Array, Array, np.ndarray]] = []
 
     def add(self, animation: ProceduralAnimation, drawn: Array) -> None:
-        """Add the last frame of C characters. drawn: (C, J, 4) rotations that the caller got."""
+        """Add the last frame of C characters. drawn: (C, J, 4) rotations of the drawn pose."""
         self._drawn.append(drawn)
         self._taken.append(animation.state.joint_rotation.copy())
         self._predicted.append(animation.predicted_turns)
@@ -171,7 +190,11 @@ def held_back(predicted: Array, taken: Array) -> np.ndarray:
 
 
 def _lap(recorded: _Recorded, c: int, first: int, waypoints: int, longest: int) -> tuple[LapWalk, LapPath]:
-    """Lap c + 1. first: the value of `reached` at which it begins; waypoints: of the track."""
+    """How lap c + 1 went, and its path.
+
+    first: the value of `reached` at which the lap begins. waypoints: number of waypoints of the track.
+    longest: the lap lasts at most this many frames.
+    """
     reached = recorded.reached[:, c]
     begin = int(np.searchsorted(reached, first))
     begin = 0 if begin == len(reached) else begin
@@ -193,20 +216,20 @@ def _lap(recorded: _Recorded, c: int, first: int, waypoints: int, longest: int) 
         "predicted_turn_degrees": round(float(recorded.predicted[inside, c].max(initial=0.0)), 3),
         "turns_held_back": int(recorded.held[span, c].sum()),
     }
-    return lap, _run(c + 1, recorded.places[span, c], off)
+    return lap, _path(c + 1, recorded.places[span, c], off)
 
 
-def _run(number: int, places: Array, off: Array) -> LapPath:
-    """The path of a lap, with a place every EVERY frames.
+def _path(number: int, places: Array, off: Array) -> LapPath:
+    """The path of a lap, of which one place in PATH_STEP frames is stored.
 
-    places: (F, 2), cm. off: (F,) distance from the line between waypoints, cm. A stored place has the largest
-    distance since the stored place before it.
+    places: (F, 2), cm. off: (F,) distance from the line between waypoints, cm. Each stored place has the
+    largest distance since the stored place before it.
     """
-    kept = range(0, len(places), EVERY)
+    kept = range(0, len(places), PATH_STEP)
     return {
         "lap": number,
-        "seconds_between": EVERY / FPS,
+        "seconds_between": PATH_STEP / FPS,
         "x": np.round(places[kept, 0] / 100, 2).tolist(),
         "z": np.round(places[kept, 1] / 100, 2).tolist(),
-        "off_cm": [round(float(off[max(0, f - EVERY + 1) : f + 1].max()), 1) for f in kept],
+        "off_cm": [round(float(off[max(0, f - PATH_STEP + 1) : f + 1].max()), 1) for f in kept],
     }

@@ -24,9 +24,9 @@ from hobble.report.summary import Hint, KeyFigure, placed
 from hobble.report.tables import Column, Table
 from hobble.runtime.network_rows import FASTEST_TURN
 
-FEWEST_STEPS = 10  # with fewer steps, the mean foot slide is not shown
+FEWEST_STEPS = 10  # if the character takes fewer steps, the mean foot slide is not shown
 FRAME_BUDGET_MS = 1000 / 60
-# Columns of the table of laps, by the key of a lap.
+# Columns of the table of laps, by the keys of `LapWalk` in hobble.measures.responsivity.results.
 LAP_COLUMNS = {
     "lap": Column.count("lap"),
     "finished": Column("finished", lambda finished: "yes" if finished else "no"),
@@ -64,7 +64,7 @@ def section(found: Json, material: ReportMaterial) -> PageSection:
 
 
 def figures(found: Json, material: ReportMaterial) -> Iterator[KeyFigure]:
-    """The time of a frame."""
+    """A key figure for the top of the report: the time of a frame."""
     milliseconds = frame_milliseconds(found)
     if milliseconds is not None:
         theirs = material.published_entry("responsivity")
@@ -86,12 +86,12 @@ def lap_table(found: Json, name: str) -> Table | None:
     if not isinstance(laps, list) or not laps:
         return None
     known = {key: column for key, column in LAP_COLUMNS.items() if key in laps[0]}
-    steps = sorted(lap_steps(laps[0]), key=step_place)
-    columns = [*known.values(), *(Column.number(f"{step}, mean ms") for step in steps)]
+    of_frame = sorted(lap_steps(laps[0]), key=step_place)
+    columns = [*known.values(), *(Column.number(f"{step}, mean ms") for step in of_frame)]
     columns.append(Column.number("all, median ms"))
     rows = [
         [None if key == "foot_slide_cm" and _few(lap.get("steps")) else lap.get(key) for key in known]
-        + [lap_steps(lap).get(step) for step in steps]
+        + [lap_steps(lap).get(step) for step in of_frame]
         + [lap_median(lap)]
         for lap in laps
     ]
@@ -99,6 +99,7 @@ def lap_table(found: Json, name: str) -> Table | None:
 
 
 def _few(steps: int | None) -> bool:
+    """Whether the character took too few steps for a mean foot slide."""
     return steps is not None and steps < FEWEST_STEPS
 
 
@@ -134,12 +135,13 @@ def _turn(found: Json) -> KeyFigure:
         return KeyFigure("Largest turn of a joint", drawn, "°", f"in one frame, as drawn; {allowed}")
     frames = sum(lap.get("frames") or 0 for lap in found["laps"])
     held = f"{found['turns_held_back']:,} of {frames:,} frames"
-    note = f"of a joint in one frame; {allowed}, which changed {held}; largest turn drawn: {drawn}°"
+    note = f"of a joint in one frame; {allowed}, and did so in {held}"
+    note += f"; as drawn, with the feet placed, at most {drawn}°"
     return KeyFigure("Largest predicted turn", predicted, "°", note)
 
 
 def speed_published(found: Json, material: ReportMaterial) -> Table | None:
-    """Our milliseconds, followed by the published means."""
+    """A table of milliseconds per frame: ours, followed by the published means."""
     ours = frame_milliseconds(found)
     if ours is None:
         return None
@@ -174,14 +176,17 @@ def speed_published(found: Json, material: ReportMaterial) -> Table | None:
 
 
 def frame_milliseconds(found: Json) -> float | None:
-    """Median milliseconds per frame over all laps, all steps together; robust against outliers."""
+    """Median milliseconds of a whole frame over all laps; the mean if there is no median.
+
+    A few slow frames hardly change the median.
+    """
     value = found.get("milliseconds")
     median = (value.get("spread") or {}).get("median") if isinstance(value, dict) else None
     return frame_mean(found) if median is None else float(median)
 
 
 def frame_mean(found: Json) -> float | None:
-    """Mean milliseconds per frame, to compare with the published means."""
+    """Mean milliseconds of a whole frame, to compare with the published means."""
     value = found.get("milliseconds")
     if isinstance(value, dict):
         value = value.get("total", sum(v for v in value.values() if isinstance(v, (int, float))))
@@ -193,7 +198,11 @@ def _speed(found: Json) -> Iterator[Hint]:
     if milliseconds is None:
         return
     if milliseconds > FRAME_BUDGET_MS:
-        yield Hint("warn", f"A frame takes {milliseconds:.1f} ms, too slow for 60 Hz.", "Try mode: linear.")
+        yield Hint(
+            "warn",
+            f"A frame takes {milliseconds:.1f} ms, too slow for 60 Hz.",
+            "Try mode: linear in the section runtime.",
+        )
         return
     share = milliseconds / FRAME_BUDGET_MS
     value = found.get("milliseconds")

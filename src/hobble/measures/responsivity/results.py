@@ -12,9 +12,8 @@ from typing import TypedDict
 class Spread(TypedDict):
     """Spread of the time of a frame, ms. The time of a frame is the sum of its `Steps`.
 
-    sd, median, p99: standard deviation, median and 99th percentile.
-
-    whole_call: mean time of a call of `next_pose`, ms. It includes what is done between the steps.
+    sd, median, p99: standard deviation, median and 99th percentile. whole_call: mean time of a call of
+    `next_pose`, which includes what is done between the steps.
     """
 
     sd: float
@@ -35,7 +34,11 @@ class Steps(TypedDict):
 
 
 class Milliseconds(Steps):
-    """Mean time of each step and of their `total`, ms. sd: standard deviation of each step, ms."""
+    """Mean time of each step, ms.
+
+    total: mean time of a whole frame, ms. sd: standard deviation of the time of each step, ms. spread: of the
+    time of a whole frame.
+    """
 
     total: float
     sd: Steps
@@ -47,8 +50,9 @@ class LapWalk(TypedDict):
 
     path_overshoot_cm, path_distance_cm: the largest and the mean distance from the line between waypoints.
     foot_slide_cm: mean slide of a toe in a stance. steps: number of stances. largest_turn_degrees: largest
-    turn of a joint in one frame, as drawn. predicted_turn_degrees: the same before the runtime limits turns.
-    turns_held_back: frames in which the runtime limited a turn.
+    turn of a joint in one frame, as drawn. predicted_turn_degrees: largest turn of a joint in one frame, as
+    the network predicts it, before the runtime limits turns. turns_held_back: number of frames in which the
+    runtime limited a turn.
     """
 
     lap: int
@@ -66,7 +70,10 @@ class LapWalk(TypedDict):
 
 
 class Lap(LapWalk):
-    """One lap, with the mean time of each of the `Steps` of a frame, over the first frames of the lap."""
+    """One lap.
+
+    milliseconds: times of a frame. To measure them, one character alone walks the first frames again.
+    """
 
     milliseconds: Milliseconds
 
@@ -85,10 +92,10 @@ class LapPath(TypedDict):
 
 
 class ModeResults(TypedDict):
-    """All laps of one phase mode, such as cubic (`Network.modes`).
+    """All laps of one phase mode: a way to evaluate the network, such as cubic interpolation over the phase.
 
-    waypoints: how many there are in all laps. foot_slide_cm: mean over laps. path_overshoot_cm,
-    largest_turn_degrees, predicted_turn_degrees: the largest values of all laps. See `LapWalk`.
+    waypoints: number of waypoints in all laps together. foot_slide_cm: mean over laps. path_overshoot_cm,
+    largest_turn_degrees, predicted_turn_degrees: the largest values of all laps, see `LapWalk`.
     """
 
     mode: str
@@ -106,7 +113,10 @@ class ModeResults(TypedDict):
 
 
 class PieceResults(TypedDict):
-    """The file of one job of this measurement: all laps of a phase mode, and the paths of the first laps."""
+    """What one job of this measurement writes: all laps in one phase mode.
+
+    laps: the results. runs: the paths of the first laps.
+    """
 
     laps: ModeResults
     runs: list[LapPath]
@@ -115,7 +125,8 @@ class PieceResults(TypedDict):
 class Track(TypedDict):
     """The closed track, a line through waypoints.
 
-    metres: its length. gaits: one for each waypoint. x, z: places of the waypoints, m.
+    waypoints: how many. metres: length of the line. gaits: the gait on the way to each waypoint. x, z: places
+    of the waypoints, m.
     """
 
     waypoints: int
@@ -130,10 +141,10 @@ class Responsivity(ModeResults):
 
     runs: the paths of the first laps in the configured mode. parameters: three counts of the weights and
     biases that one frame uses, None for a network without layers. `true`: the actual count; `table_6_1`: by
-    the formula of Segerstedt (2021, table 6.1); `table_6_1_as_printed`: by the same formula, with one hidden
-    layer fewer than the network has, which gives the numbers that his table prints. stored: mode -> how many
-    numbers of `bytes_each` bytes the network keeps in memory. exact: the mode that evaluates the network
-    without approximation. laps_other_modes: laps in each other mode.
+    the formula of Segerstedt (2021, table 6.1); `table_6_1_as_printed`: by the same formula, but with one
+    hidden layer fewer than the network has, as in the numbers printed in that table. stored: mode -> how many
+    numbers the network keeps in memory, each of `bytes_each` bytes. exact: the mode that evaluates the
+    network without approximation. laps_other_modes: number of laps in each other mode.
     """
 
     configuration: str

@@ -1,4 +1,4 @@
-"""Laps of the waypoint track: how closely it is followed, and the time of each step of a frame.
+"""Laps of the waypoint track: how closely the character follows it, and the time of each step of a frame.
 
 All laps are walked at the same time by a crowd (`laps`). For the times, one character alone walks the
 beginning of each lap again (`times`).
@@ -23,7 +23,7 @@ from hobble.runtime.controller import STEPS
 from hobble.runtime.options import Runtime
 from hobble.runtime.waypoints import TRACK, Waypoint
 
-RUNS = 5  # laps whose path is stored
+STORED_PATHS = 5  # the paths of this many laps are stored
 
 
 def responsivity(
@@ -38,17 +38,19 @@ def responsivity(
     track: Sequence[Waypoint] = TRACK,
     done: Mapping[str, PieceResults] | None = None,
 ) -> Responsivity:
-    """Laps of the track of Segerstedt 2021: `laps` in the runtime's phase mode, fewer in other `modes`.
+    """Laps of the track of Segerstedt (2021), in the phase mode of `runtime` and in other modes.
 
-    laps_other_modes: laps in each other mode; by default, and at most, `laps`. modes: by default all modes of
-    the network. done: mode -> its laps, if they have already been run (`laps_of_mode`). A lap that takes
-    longer than `lap_seconds` of simulated time ends without its remaining waypoints.
+    laps: number of laps in the mode of `runtime`. laps_other_modes: number of laps in each other mode; by
+    default, and at most, `laps`. modes: the phase modes to run; by default all modes of the network. done:
+    mode -> what `laps_of_mode` returned for it, if its laps have already been walked. A lap that takes longer
+    than `lap_seconds` of simulated time ends without its remaining waypoints.
 
-    The result is described in docs/artefacts.md. `modes` has the laps and the summary of each mode; those of
-    the runtime's own mode are also at the top level. Only the values under "milliseconds" depend on the
-    clock. `largest_turn_degrees` is the largest turn of a joint from one frame to the next as drawn,
-    `predicted_turn_degrees` the largest as predicted by the network; in `turns_held_back` frames the runtime
-    let a joint turn less than predicted. `runs`: the paths of the first RUNS laps in the runtime's own mode.
+    The result is described in docs/artefacts.md. Its key `modes` has the laps and the summary of each mode;
+    those of the mode of `runtime` are also at the top level. Only the values under "milliseconds" depend on
+    the clock. `largest_turn_degrees` is the largest turn of a joint from one frame to the next as drawn, and
+    `predicted_turn_degrees` the largest turn as the network predicts it; in `turns_held_back` frames the
+    runtime let a joint turn less than predicted. `runs` are the paths of the first STORED_PATHS laps in the
+    mode of `runtime`.
     """
     own = network.mode(runtime.mode)
     fewer = min(laps, laps_other_modes or laps)
@@ -108,15 +110,16 @@ def laps_of_mode(
         "turns_held_back": sum(lap["turns_held_back"] for lap in results),
         "milliseconds": milliseconds(np.concatenate(times)),
     }
-    return {"laps": entry, "runs": [run for _, run in walked[:RUNS]]}
+    return {"laps": entry, "runs": [run for _, run in walked[:STORED_PATHS]]}
 
 
 def parameter_counts(sizes: Sequence[int]) -> dict[str, int]:
-    """Weights and biases that one frame uses: as they are, and as Table 6.1 of Segerstedt counts them.
+    """Number of weights and biases that one frame uses, actual and as Table 6.1 of Segerstedt counts them.
 
     sizes: units of each layer, from inputs to outputs. true: the actual number. table_6_1: by the formula of
-    the table, the sum of n_l (1 + n_(l+1)) over the layers, plus n_out. table_6_1_as_printed: by that formula
-    with one hidden layer fewer, as the thesis's text states the layers.
+    the table, the sum of n_l (1 + n_(l+1)) over the layers, plus the number of outputs.
+    table_6_1_as_printed: by the same formula without one of the hidden layers, because the text of the thesis
+    states one hidden layer fewer.
 
     >>> parameter_counts((342, 512, 512, 311))
     {'true': 597815, 'table_6_1': 598157, 'table_6_1_as_printed': 335501}
@@ -130,13 +133,13 @@ def parameter_counts(sizes: Sequence[int]) -> dict[str, int]:
 
 
 def lap_rows(result: Responsivity) -> list[Row]:
-    """The laps of every mode as rows for a CSV file. The last columns are the times and their deviations."""
+    """The laps of every mode as rows for a CSV file. The last columns are the times and their spread."""
     rows: list[Row] = []
     for entry in result["modes"]:
         for lap in entry["laps"]:
-            # The keys of a piece come sorted from its file. The table has them in the order of the types.
-            known: Row = {"mode": entry["mode"]} | lap
-            row = {key: known[key] for key in ("mode", *Lap.__annotations__) if key != "milliseconds"}
+            # Laps read from a file have sorted keys. The columns have the order of the fields of `Lap`.
+            values: Row = {"mode": entry["mode"]} | lap
+            row = {key: values[key] for key in ("mode", *Lap.__annotations__) if key != "milliseconds"}
             times: dict[str, Any] = {**lap["milliseconds"]}
             row |= {f"milliseconds_{key}": times[key] for key in (*STEPS, "total")}
             row |= {f"milliseconds_{key}_sd": times["sd"][key] for key in STEPS}

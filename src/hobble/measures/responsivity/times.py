@@ -16,25 +16,25 @@ from hobble.runtime.controller import STEPS
 from hobble.runtime.options import Runtime
 from hobble.runtime.waypoints import Waypoint
 
-# Most frames that are timed: of each lap, and of all laps together.
-OF_LAP, OF_ALL = 10 * FPS, 100 * FPS
-WARM_UP = 60  # frames that are not measured, because compiled code is loaded in them
+# At most this many frames are timed: of each lap, and of all laps together.
+TIMED_OF_LAP, TIMED_OF_ALL = 10 * FPS, 100 * FPS
+WARM_UP = 60  # the first frames are not measured, because compiled code is loaded in them
 
 
 def timed_frames(
     network: Network, runtime: Runtime, laps: int, longest: int, track: Sequence[Waypoint]
 ) -> list[Array]:
-    """For each lap, (F, steps + 1) seconds of its first F frames: of each step, and last of the whole call.
+    """For each lap, (F, steps + 1) seconds of its first F frames: of each step, then of the whole call.
 
-    The figures of `laps.walk_laps` walk one after another, each alone and from its own start. F is OF_LAP, an
-    equal share of OF_ALL, or `longest`, whichever is least. A character alone does the same as in the crowd,
-    to the last bit.
+    The characters of `hobble.measures.responsivity.laps.walk_laps` walk one after another, each alone and
+    from its own start. A character alone does the same as in the crowd, to the last bit. F is the least of
+    three numbers: TIMED_OF_LAP, `longest`, and TIMED_OF_ALL divided by the number of laps.
     """
     starts = starts_of(track, laps)
     animation = ProceduralAnimation(network, waypoints=track, **dict(runtime))
     for _ in range(WARM_UP):
         animation.next_pose()
-    frames = max(1, min(OF_LAP, OF_ALL // laps, longest))
+    frames = max(1, min(TIMED_OF_LAP, TIMED_OF_ALL // laps, longest))
     out: list[Array] = []
     for lap in range(laps):
         starts.begin(animation, slice(lap, lap + 1))
@@ -49,7 +49,7 @@ def timed_frames(
 
 
 def milliseconds(seconds: Array) -> Milliseconds:
-    """Means and standard deviations of the times (F, steps + 1) that `timed_frames` returns for one lap."""
+    """Means, standard deviations and percentiles. seconds: (F, steps + 1), from `timed_frames`."""
     ms = 1000 * seconds
     total = ms[:, : len(STEPS)].sum(axis=1)
     return {
@@ -66,7 +66,7 @@ def milliseconds(seconds: Array) -> Milliseconds:
 
 
 def _of_steps(values: Array) -> Steps:
-    """Names the values of the steps. values: in the order of STEPS; later ones are ignored."""
+    """The values of the steps by name. values: in the order of STEPS; any after them are ignored."""
     prepare, inputs, insert, predict, output, update = (round(float(v), 6) for v in values[: len(STEPS)])
     return {
         "prepare": prepare,

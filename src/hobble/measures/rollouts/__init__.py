@@ -20,7 +20,7 @@ def _at_least_one(lengths: tuple[int, ...]) -> tuple[int, ...]:
 
 
 class Options(Joints, SampleOptions):
-    """Its keys of the section `evaluation`."""
+    """The keys of this measurement in the section `evaluation`."""
 
     rollouts: Annotated[tuple[Positive, ...], AfterValidator(_at_least_one)] = Field(
         (1, 10, 60, 300), description="lengths of roll-outs, in frames"

@@ -13,7 +13,7 @@ NAME = "rollouts"
 
 
 def compared(all_measured: Sequence[ConfigurationResults], published: Json) -> SideBySide:
-    """An entry for each configuration and length."""
+    """An entry for each configuration and each length of roll-outs, without the errors of single clips."""
     return SideBySide(
         entries=[
             {"configuration": m.name, **{k: v for k, v in entry.items() if k != "clips"}}
@@ -24,7 +24,7 @@ def compared(all_measured: Sequence[ConfigurationResults], published: Json) -> S
 
 
 def tables(compared: Json) -> dict[str, list[Row]]:
-    """Every configuration, length and split."""
+    """One table, with a row for each configuration, length and split."""
     rows: list[Row] = [
         {"configuration": entry["configuration"], "length": entry["length"], "split": split, **entry[split]}
         for entry in compared[NAME]

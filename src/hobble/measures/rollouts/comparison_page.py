@@ -11,7 +11,7 @@ from hobble.report.formats import number
 from hobble.report.page_parts import PageSection, SectionPart
 from hobble.report.verdicts import Verdict, best
 
-SECOND = 60  # frames
+SECOND = 60  # frames in a second
 
 
 def section(compared: Compared) -> PageSection:
@@ -20,24 +20,28 @@ def section(compared: Compared) -> PageSection:
 
 
 def verdicts(compared: Compared) -> Iterator[Verdict]:
-    """Which configuration stays closest to the captured motion in roll-outs of about a second."""
+    """Which configuration stays closest to the captured motion in roll-outs of about a second.
+
+    The held-out clips are compared, or the training clips if there are no errors of held-out clips.
+    """
     length = min({row["length"] for row in compared["rollouts"]}, key=lambda n: abs(n - SECOND), default=None)
     rows = [row for row in compared["rollouts"] if row["length"] == length]
     for split, label in SPLITS.items():
         off = {row["configuration"]: (row[split] or {}).get("position_error_cm") for row in rows}
         if any(value is not None for value in off.values()):
-            where = f"cm from the captured joints on average, in roll-outs of {length} frames on {label}"
+            ending = f"cm from the captured joints on average, in roll-outs of {length} frames on {label}"
             yield from best(
                 10,
                 "Closest to captured motion",
                 off,
-                partial(_distance, where),
+                partial(_distance, ending),
             )
             return
 
 
-def _distance(where: str, name: str, value: float) -> str:
-    return f"the joints of {name} are {number(value, 3)} {where}"
+def _distance(ending: str, name: str, value: float) -> str:
+    """Half of a sentence about a configuration. value: mean distance. ending: its unit and the rest."""
+    return f"the joints of {name} are {number(value, 3)} {ending}"
 
 
 def rollout_chart(compared: Compared) -> Chart | None:
@@ -59,8 +63,8 @@ def rollout_chart(compared: Compared) -> Chart | None:
     return Chart(
         "compare-rollouts",
         "Error when a network continues from its own poses",
-        "Mean distance between a joint and its captured position when a network continues from its own "
-        "poses, for this many frames (60 frames are one second).",
+        "Mean distance between a joint and its captured position in roll-outs, in which a network continues "
+        "from its own poses. Their length is on the horizontal axis (60 frames are one second).",
         layout={
             "xaxis": log_axis("frames", [x for t in options.values() for one in t for x in one["x"]]),
             "yaxis": axis("cm per joint", rangemode="tozero"),

@@ -18,13 +18,13 @@ def section(found: Json, material: ReportMaterial) -> PageSection:
 
 
 def sampled(found: Json) -> str:
-    """A sentence on what was measured; empty if all clips were."""
+    """Sentences on the measured sample and on the error bars; empty if all clips were measured."""
     words = sampled_words(found)
     return f" Measured on {words}. Whiskers are 95 % confidence intervals." if words else ""
 
 
 def _whiskers(found: Json, split: str) -> dict[str, Any]:
-    """Error bars: half the width of the confidence interval of each length that has a mean."""
+    """Error bars of the mean errors: half the width of each confidence interval."""
     entries = [entry[split] for entry in found["lengths"]]
     known = [entry for entry in entries if entry.get("position_error_cm") is not None]
     widths = [(entry.get("interval") or {}).get("position_error_cm", 0.0) for entry in known]
@@ -49,13 +49,13 @@ def rollout_chart(found: Json) -> Chart | None:
     return Chart(
         "rollouts",
         "Error when the network continues from its own poses",
-        "Mean distance between a joint and its captured position when the network continues from its own "
-        "poses, as at run time, for this many frames (60 frames are one second). If the line flattens, the "
-        "character stays stable. This chart measures the pose as drawn: a joint is drawn halfway "
-        "between two estimates: its predicted position, and the place to which its predicted velocity takes "
-        "it from its last position. "
-        "The charts above measure the predicted position, so their error is not the value at 1 frame in this "
-        "chart." + sampled(found),
+        "Mean distance between a joint and its captured position in roll-outs, in which the network "
+        "continues from its own poses, as at run time. Their length is on the horizontal axis (60 frames are "
+        "one second). If the line flattens, the "
+        "character stays stable. This chart measures the pose as drawn. A joint is drawn halfway "
+        "between its predicted position and the position to which its predicted velocity takes it. "
+        "The charts above measure only the predicted position, so their error differs from the value at "
+        "1 frame in this chart." + sampled(found),
         traces,
         {
             "xaxis": log_axis("frames", [x for trace in traces for x in trace["x"]]),

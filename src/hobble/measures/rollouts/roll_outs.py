@@ -1,7 +1,7 @@
 """Roll-outs: a network continues from its own poses, with the path and the other inputs of a clip.
 
 Many roll-outs are computed together (a crowd), because a network predicts many poses at once faster than one
-by one. The result of a roll-out does not depend on the others, to the last bit. A short roll-out is the
+by one. Computed with others or alone, a roll-out is the same to the last bit. A short roll-out is the
 beginning of a longer one from the same frame, so only the longest from each frame is computed.
 """
 
@@ -19,7 +19,7 @@ from hobble.models.network import Predictor
 from hobble.rows.clip_rows import ClipRows, pairs
 from hobble.rows.layout import GAITS, RowLayout
 
-BATCH = 256  # poses predicted at once; with more, their inputs do not fit the cache
+BATCH = 256  # poses predicted at once; with more, their inputs do not fit into the cache
 
 
 @dataclass(frozen=True)
@@ -27,9 +27,9 @@ class RollOutInputs:
     """The inputs and targets of F consecutive frames of a clip, on the first terrain fit of each frame.
 
     x: (F, X) inputs with the captured joints. y: (F, Y) targets. Both are in raw units, with joint heights
-    minus `mean` (F,), the mean ground height. phase: (F,) in cycles. turn: (F,) radians and velocity: (F, 2)
-    cm, of the root until the next frame. moving: (F,) the share of the predicted movement that is applied,
-    see `hobble.character.rule.moving`.
+    relative to the mean ground height. mean: (F,) this ground height, cm. phase: (F,) in cycles. turn: (F,)
+    radians, and velocity: (F, 2) cm, by which the root turns and moves until the next frame. moving: (F,)
+    the share of the predicted movement that is applied, see `hobble.character.rule.moving`.
     """
 
     x: Array
@@ -42,7 +42,7 @@ class RollOutInputs:
 
 
 def inputs_of_clip(rows: ClipRows, chosen: np.ndarray, layout: RowLayout) -> RollOutInputs:
-    """The inputs of the rows `chosen` (F,), on the first fit of each, in the network's `layout`."""
+    """The inputs of the rows `chosen` (F,), on the first terrain fit of each, in the network's `layout`."""
     fit = rows.first_fit[chosen]
     x, y, *_ = pairs(rows, layout, chosen, fit)
     gait = x[:, layout.x_gait].reshape(len(x), len(GAITS), layout.samples)
@@ -60,7 +60,11 @@ def inputs_of_clip(rows: ClipRows, chosen: np.ndarray, layout: RowLayout) -> Rol
 
 @dataclass(frozen=True)
 class RollOuts:
-    """Roll-outs over `length` frames of the stretch `given`. starts: (n,) their first frames, ascending."""
+    """A group of n roll-outs over `length` frames in one stretch of consecutive frames.
+
+    inputs: of all frames of the stretch. starts: (n,) index in the stretch of each roll-out's first frame,
+    ascending.
+    """
 
     inputs: RollOutInputs
     starts: np.ndarray
@@ -68,10 +72,13 @@ class RollOuts:
 
 
 class Crowd:
-    """Computes all roll-outs of some groups together. Iterate over `frames` once, then call `phases`.
+    """Computes the roll-outs of several groups together. Iterate over `frames` once, then call `phases`.
 
-    It computes R roll-outs: the longest from each start frame. The arrays `first`, `stop`, `phase`, `place`,
-    `speed` and `memory` have a row for each of them. of: for each group, the rows (n,) of its roll-outs.
+    It computes R roll-outs: the longest from each start frame. x, y, mean, turn, velocity, moving: the fields
+    of `RollOutInputs`, for the frames of all stretches one after another. first, stop: (R,) index in `x` of
+    the first frame of a roll-out, and of the frame after its last. The present state of the roll-outs:
+    phase (R,); place, speed (R, J, 3), positions and velocities of the joints; memory (R, M), what the
+    network keeps between frames. of: for each group, the indices (n,) of its roll-outs among the R.
     """
 
     def __init__(self, predictor: Predictor, groups: Sequence[RollOuts]) -> None:
@@ -103,44 +110,46 @@ class Crowd:
     def frames(self) -> Iterator[tuple[np.ndarray, Array, dict[int, np.ndarray]]]:
         """Yield, for each number of frames since the start, the n roll-outs that are not yet over.
 
-        Each item has three parts. (n,): frames, as indices into `y`. (n, J, 3): joints in the root
-        coordinates of that frame, heights minus its mean, cm. Group index -> which of the n belong to the
-        group; a group whose roll-outs are all over is left out. Those of a group are its first ones, because
-        roll-outs that start later reach the end of the stretch after fewer frames.
+        An item is (at, joints, members). at: (n,) their present frames, as indices into `y`. joints:
+        (n, J, 3) cm, in the root coordinates of these frames, heights relative to the mean ground height.
+        members: group index -> which of the n belong to the group. In each group, the first roll-outs last
+        longest, because later ones reach the end of the stretch after fewer frames. A group is left out when
+        all its roll-outs are over.
         """
-        place = np.full(len(self.first), -1)
+        index = np.full(len(self.first), -1)  # index of each roll-out among the n; -1 if it is over
         for age in range(max((group.length for group in self.groups), default=0)):
             alive = np.flatnonzero(self.first + age < self.stop)
             if not len(alive):
                 return
             at = self.first[alive] + age
-            place[:] = -1
-            place[alive] = np.arange(len(alive))
+            index[:] = -1
+            index[alive] = np.arange(len(alive))
             joints = self._advanced(alive, at, age > 0)
-            places = {}
+            members = {}
             for g, (group, of) in enumerate(zip(self.groups, self.of, strict=True)):
-                if age < group.length and len(own := place[of][place[of] >= 0]):
-                    places[g] = own
+                if age < group.length and len(not_over := index[of][index[of] >= 0]):
+                    members[g] = not_over
                     self._phases[g] = self.phase[of]
-            yield at, joints, places
+            yield at, joints, members
 
     def phases(self) -> list[Array]:
-        """(n,) phase of each roll-out after its last frame, for each group."""
+        """For each group, the phases (n,) of its roll-outs after their last frames."""
         return self._phases
 
-    def _advanced(self, alive: np.ndarray, at: np.ndarray, own: bool) -> Array:
-        """Predict the roll-outs `alive` (n,) at frames `at` (n,), update their state, return their joints.
+    def _advanced(self, alive: np.ndarray, at: np.ndarray, continues: bool) -> Array:
+        """Predict a frame of the roll-outs `alive` (n,), update their state, return their joints (n, J, 3).
 
-        own: whether the input pose is the roll-out's own (else the captured one).
+        at: (n,) indices of their frames. continues: whether their input has the joints that they predicted in
+        the frame before; else it has the captured joints.
         """
         layout = self.predictor.network.layout
         row = self.x[at]
-        if own:
-            # Joint heights are relative to the mean ground height of the last frame. Make them relative to
-            # that of this frame.
-            lower = self.place[alive]
-            lower[..., 1] += (self.mean[at - 1] - self.mean[at])[:, None]
-            row[:, layout.x_joint_position] = lower.reshape(len(at), -1)
+        if continues:
+            # Joint heights are relative to the mean ground height of the frame before. Make them relative to
+            # the mean ground height of this frame.
+            joints = self.place[alive]
+            joints[..., 1] += (self.mean[at - 1] - self.mean[at])[:, None]
+            row[:, layout.x_joint_position] = joints.reshape(len(at), -1)
             row[:, layout.x_joint_velocity] = self.speed[alive].reshape(len(at), -1)
         y = self._predicted(row, alive)
         before = row[:, layout.x_joint_position].reshape(len(at), -1, 3).astype(float)
@@ -164,8 +173,11 @@ class Crowd:
         return y
 
     def _carried(self, place: Array, at: np.ndarray) -> Array:
-        """Joints (n, J, 3) converted from the root coordinates of frames at - 1 to those of frames `at`."""
+        """Convert joint positions from the root coordinates of frames at - 1 to those of frames `at`.
+
+        place: (n, J, 3). at: (n,).
+        """
         out = place.copy()
-        level = place[..., ::2] - self.velocity[at - 1][:, None]
-        out[..., ::2] = rotate_by_yaw(level, self.turn[at - 1][:, None])
+        horizontal = place[..., ::2] - self.velocity[at - 1][:, None]
+        out[..., ::2] = rotate_by_yaw(horizontal, self.turn[at - 1][:, None])
         return out

@@ -1,9 +1,9 @@
-"""Errors of roll-outs: the network continues from its own poses, with the path and inputs of a clip.
+"""Errors of roll-outs: the network continues from its own poses, with the path and other inputs of a clip.
 
 A roll-out starts at a captured frame and continues for n frames like the runtime. Its input has the joints
-that it predicted itself. Each new position is the mean of the predicted position and of the last position
+that it predicted itself. Each new position is the mean of two: the predicted position, and the old position
 plus the predicted velocity. The phase advances by its predicted change. Trajectory, gait, ground and channels
-come from the clip. All roll-outs of a stretch are computed together.
+come from the clip.
 """
 
 from __future__ import annotations
@@ -37,11 +37,11 @@ from hobble.rows.excerpts import Excerpt
 from hobble.rows.layout import RowLayout
 
 LENGTHS = (1, 10, 60, 300)  # frames
-# Number of roll-outs of one length that contain a frame. There are so many short ones that twice as many
-# change the mean error by less than .2 % (`limp`, 10 and 60 frames).
+# Roll-outs of one length overlap: each frame is in OVERLAP short or in OVERLAP_OF_LONG long ones. With twice
+# as many short ones, the mean error would change by less than .2 % (configuration `limp`, 10 and 60 frames).
 OVERLAP, OVERLAP_OF_LONG = 2, 4
-LONG = 100  # frames
-AT_ONCE = 6000  # frames of clips whose roll-outs are computed together, which takes about 100 MB
+LONG = 100  # frames: a roll-out of this length or more is long
+AT_ONCE = 6000  # the roll-outs of about this many frames of clips are computed together, in about 100 MB
 
 log = logging.getLogger("hobble")
 
@@ -50,7 +50,8 @@ log = logging.getLogger("hobble")
 class RollOutErrors:
     """Errors over `frames` frames of `starts` roll-outs.
 
-    moments: of relative error and position error (cm). last: of position error (cm) and phase error (cycles)
+    moments: of the relative error and of the position error (cm), see `RollOutNumbers` in
+    hobble.measures.rollouts.results. last: moments of the position error (cm) and of the phase error (cycles)
     in the last frame of the `ended` roll-outs that reached their full length.
     """
 
@@ -80,12 +81,12 @@ class RollOutErrors:
 
         phase: whether the network uses the phase. If not, the phase error has no meaning and is None.
         """
-        known, ended = self.frames > 0, self.ended > 0
+        measured, ended = self.frames > 0, self.ended > 0
         return {
             "frames": self.frames,
-            "mean": float(self.moments.mean[0]) if known else None,
-            "sd": float(self.moments.std[0]) if known else None,
-            "position_error_cm": float(self.moments.mean[1]) if known else None,
+            "mean": float(self.moments.mean[0]) if measured else None,
+            "sd": float(self.moments.std[0]) if measured else None,
+            "position_error_cm": float(self.moments.mean[1]) if measured else None,
             "ended": self.ended,
             "last_cm": float(self.last.mean[0]) if ended else None,
             "last_phase": float(self.last.mean[1]) if ended and phase else None,
@@ -93,10 +94,10 @@ class RollOutErrors:
 
 
 def _groups(read: LoadedPart, layout: RowLayout, lengths: Sequence[int]) -> list[RollOuts]:
-    """The roll-outs that begin in the chosen rows. They may end after these rows.
+    """The roll-outs that begin in the chosen rows of `read`. They may end after these rows.
 
-    Each frame is in OVERLAP roll-outs of a length (OVERLAP_OF_LONG from LONG frames on), or in one if the
-    length is one frame.
+    For each length, a frame is in OVERLAP roll-outs, or in OVERLAP_OF_LONG if they are long, or in one if
+    they last only one frame.
     """
     out = []
     for stretch in unbroken(read.rows.frame):
@@ -123,27 +124,27 @@ def _errors(
     truth = crowd.y[:, layout.y_joint_position].reshape(len(crowd.y), -1, 3)[:, joints]
     moments = [Moments.nothing(2) for _ in owners]
     last: list[Array] = [np.zeros((0, len(joints), 2)) for _ in owners]
-    for age, (at, place, places) in enumerate(crowd.frames()):
-        errors = relative_and_distance(truth[at].astype(float), place[:, joints])
-        for g, of_group in places.items():
+    for age, (at, joint_positions, members) in enumerate(crowd.frames()):
+        errors = relative_and_distance(truth[at].astype(float), joint_positions[:, joints])
+        for g, of_group in members.items():
             own = errors[of_group]
             weights = np.full(own[..., 0].size, 1 / len(joints))
             moments[g] = moments[g] + Moments.of(own.reshape(-1, 2), weights)
             if age == owners[g][1].length - 1:
                 last[g] = own
-    for (found, group), some, end, phase in zip(owners, moments, last, crowd.phases(), strict=True):
-        found[group.length] += _of_group(group, some, end, phase)
+    for (found, group), in_all, end, phase in zip(owners, moments, last, crowd.phases(), strict=True):
+        found[group.length] += _of_group(group, in_all, end, phase)
     return out
 
 
 def _of_group(group: RollOuts, moments: Moments, end: Array, phase: Array) -> RollOutErrors:
     """The errors of a group of n roll-outs.
 
-    end: (n', joints, 2) errors in the last frame, of those that reach their full length. phase: (n,) after
-    the last frame.
+    moments: of the errors in all frames. end: (m, joints, 2) errors in the last frame of the first m
+    roll-outs, which reach their full length. phase: (n,) after the last frame of each.
     """
     frames = int(np.minimum(group.length, len(group.inputs.x) - group.starts).sum())
-    # The phase is already that of the frame after the last, so that frame has to be in the stretch too.
+    # `phase` is that of the frame after a roll-out, so the stretch must have a captured phase for this frame.
     ended = int(np.searchsorted(group.starts, len(group.inputs.x) - group.length))
     if not ended:
         return RollOutErrors(frames, len(group.starts), moments)
@@ -163,12 +164,12 @@ def measure_roll_outs(
     mode: str = "cubic",
     sample: Sample | None = None,
 ) -> RollOutsFound:
-    """The content of rollouts.json: for each of `lengths`, errors of the splits and of the clips, by name.
+    """The content of rollouts.json: for each of `lengths`, the errors of the splits and of the clips.
 
-    clips: name -> file of rows. equivalents: names of the joints to measure; all by default. mode: the
-    network's phase mode. sample: measure only the roll-outs that begin in these excerpts; the result then has
-    their number in `sample` and half widths of 95 % confidence intervals in `interval`. Raises InputError if
-    rows and network have different layouts.
+    clips: name -> file of rows. splits: name -> "train" or "held_out". equivalents: names of the joints to
+    measure; all by default. mode: the network's phase mode. sample: measure only the roll-outs that begin in
+    its excerpts; the result then has the size of the sample in `sample` and half widths of 95 % confidence
+    intervals in `interval`. Raises InputError if rows and network have different layouts.
     """
     network = load_network(weights)
     predictor = network.predictor(mode)
@@ -177,15 +178,17 @@ def measure_roll_outs(
     total = {length: dict.fromkeys(SPLITS, RollOutErrors()) for length in lengths}
     of_clip: dict[int, dict[str, RollOutErrors]] = {length: {} for length in lengths}
     excerpts: dict[int, dict[Excerpt, float | None]] = {length: {} for length in lengths}
-    for some in _together(clip_parts(clips, sample), network, lengths):
-        for one, errors in zip(some, _errors(predictor, list(some.values()), joints, lengths), strict=True):
+    for parts in _together(clip_parts(clips, sample), network, lengths):
+        for part, errors in zip(
+            parts, _errors(predictor, list(parts.values()), joints, lengths), strict=True
+        ):
             for length, found in errors.items():
-                weighed, known = found.weighing(one.weight), of_clip[length]
-                total[length][splits[one.clip]] += weighed
-                known[one.clip] = known.get(one.clip, RollOutErrors()) + weighed
-                if one.excerpt is not None:
-                    excerpts[length][one.excerpt] = found.to_dict()["position_error_cm"]
-            log.info("%s: %s", one.excerpt or one.clip, errors[lengths[-1]].to_dict(network.phase))
+                weighed, by_clip = found.weighing(part.weight), of_clip[length]
+                total[length][splits[part.clip]] += weighed
+                by_clip[part.clip] = by_clip.get(part.clip, RollOutErrors()) + weighed
+                if part.excerpt is not None:
+                    excerpts[length][part.excerpt] = found.to_dict()["position_error_cm"]
+            log.info("%s: %s", part.excerpt or part.clip, errors[lengths[-1]].to_dict(network.phase))
     result: RollOutsFound = {
         "configuration": configuration,
         "joints": len(joints),
@@ -207,22 +210,22 @@ def measure_roll_outs(
 
 
 def _together(
-    every: Iterable[ClipPart], network: Network, lengths: Sequence[int]
+    parts: Iterable[ClipPart], network: Network, lengths: Sequence[int]
 ) -> Iterator[dict[ClipPart, list[RollOuts]]]:
-    """Yield the roll-outs of clips or excerpts in groups of about AT_ONCE frames."""
-    some: dict[ClipPart, list[RollOuts]] = {}
+    """Yield the roll-outs of a few clips or excerpts at a time, which have about AT_ONCE frames together."""
+    together: dict[ClipPart, list[RollOuts]] = {}
     frames = 0
-    for one in every:
+    for part in parts:
         # Twice as many rows as frames, because a frame that two cycles share has two rows.
-        read = one.load(before=2, after=2 * max(lengths))
-        check_layout(one.path, read.rows, network)
-        some[one] = _groups(read, network.layout, lengths)
+        read = part.load(before=2, after=2 * max(lengths))
+        check_layout(part.path, read.rows, network)
+        together[part] = _groups(read, network.layout, lengths)
         frames += len(read.rows)
         if frames >= AT_ONCE:
-            yield some
-            some, frames = {}, 0
-    if some:
-        yield some
+            yield together
+            together, frames = {}, 0
+    if together:
+        yield together
 
 
 def _with_intervals(
@@ -233,17 +236,17 @@ def _with_intervals(
 ) -> RollOutsFound:
     """The result with the size of the sample, and half widths of 95 % intervals of each split and length.
 
-    excerpts: length -> position error of each excerpt, cm; None if it is too short for a roll-out. Such an
-    excerpt counts with the mean of its split.
+    excerpts: length -> position error of each excerpt, cm; None for an excerpt that is too short for a
+    roll-out, for which the mean of its split is used.
     """
     for entry in result["lengths"]:
         for split in SPLITS:
-            usual = entry[split]["position_error_cm"]
-            if usual is not None:
+            mean = entry[split]["position_error_cm"]
+            if mean is not None:
                 values = {
-                    one: usual if error is None else error
-                    for one, error in excerpts[entry["length"]].items()
-                    if splits[one.clip] == split
+                    excerpt: mean if error is None else error
+                    for excerpt, error in excerpts[entry["length"]].items()
+                    if splits[excerpt.clip] == split
                 }
                 entry[split]["interval"] = {"position_error_cm": sample.half_width(split, values)}
     return {**result, "sample": sample.to_dict()}

@@ -1,4 +1,7 @@
-"""The mode-adaptive network (Zhang, Starke, Komura, Saito 2018). Start reading at `forward`."""
+"""The mode-adaptive network (Zhang, Starke, Komura, Saito 2018).
+
+Start reading at `hobble.models.mann.forward`.
+"""
 
 from __future__ import annotations
 

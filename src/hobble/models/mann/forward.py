@@ -1,14 +1,14 @@
 """The mode-adaptive network in plain numpy: start reading here (Zhang, Starke, Komura, Saito 2018).
 
 Each layer has K sets of weights, the experts. A small gating network gets some columns x' of the input x:
-velocities of the feet, gait and target velocity. It computes the shares c in which the experts are blended.
-The phase is not used:
+velocities of the feet, gait and target velocity. It computes the shares c in which the experts are blended
+(the phase is not used):
 
     c = softmax(V2 elu(V1 elu(V0 x' + d0) + d1) + d2)
     h1 = elu(sum_k c_k (W0_k x + b0_k))    ...    y = sum_k c_k (W2_k h2 + b2_k)
 
-The rest of this folder computes the same: `step` and `fused` with its gradient, `network` fast for one
-character or a crowd, `onnx_export` and `network.js` for other programs.
+Other modules of this folder compute the same: `step` and `fused`, with the gradient, for training;
+`predictor`, fast, for one character or a crowd; `onnx_export` and `network.js`, for other programs.
 """
 
 from __future__ import annotations
@@ -51,7 +51,7 @@ def forward(
     columns: NDArray[np.int64],
     z: Array,
 ) -> Array:
-    """Standardised outputs (n, Y) of standardised inputs z (n, X), float32.
+    """Standardised outputs (n, Y) of standardised inputs z (n, X), the x of the formulas above, float32.
 
     weights: per layer (K, out, in); biases: per layer (K, out); gate_weights: per layer (out, in);
     gate_biases: per layer (out,). columns: (G,) the columns of z that the gate gets.

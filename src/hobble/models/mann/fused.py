@@ -1,4 +1,4 @@
-"""The training step on a CPU: compiled loops over rows for everything but the experts' matrix products."""
+"""The training step on a CPU: compiled loops over rows between the experts' matrix products."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from hobble.models.mann.step import MannStep
 
 
 class FusedMannStep(FusedBase, MannStep):
-    """Like `MannStep`, but several times faster outside the products, with buffers reused for every batch."""
+    """Like `MannStep`, but several times faster outside the matrix products. The buffers are reused."""
 
     def prepared(self, number: int, x: Tensor, mask: Tensor) -> tuple[Tensor, Tensor]:
         """As in `MannStep`, in one sweep."""
@@ -41,7 +41,7 @@ class FusedMannStep(FusedBase, MannStep):
 
 @njit(parallel=True, error_model="numpy")
 def _prepare(x: Any, mask: Any, inputs: Any, slope: Any) -> None:
-    """Write inputs (B, n + 1) and slope (B, n) of x (B, n), see `MannStep.prepared`."""
+    """Write inputs (B, n + 1) and slope (B, n) of x (B, n); see `MannStep.prepared`."""
     rows, width = x.shape
     half = inputs.itemsize == 2
     one = slope.dtype.type(1)
@@ -75,10 +75,10 @@ def _blend(outputs: Any, c: Any, h: Any) -> None:
                     h[row, i] += share * outputs[row, start + i]
 
 
-# Reassociation lets the compiler sum several terms at a time.
+# With `reassoc` the compiler can sum several terms at a time.
 @njit(parallel=True, error_model="numpy", fastmath={"reassoc", "contract", "nsz"})
 def _spread(d: Any, outputs: Any, c: Any, da: Any, dc: Any) -> None:
-    """Write da (B, K out) from d (B, out), and add this layer's part to dc (B, K), see `MannStep.spread`."""
+    """Write da (B, K out) from d (B, out), and add the layer's part to dc (B, K); see `MannStep.spread`."""
     rows, width = d.shape
     half = outputs.itemsize == 2
     for row in numba.prange(rows):

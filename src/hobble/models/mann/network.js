@@ -1,4 +1,4 @@
-// The mode-adaptive network: a small network gives the shares by which the experts' outputs are blended. See `forward.py`.
+// The mode-adaptive network: a small network computes the shares in which the experts' outputs are blended. See `forward.py`.
 import { createLayers, createScales } from "../layers.js";
 
 export const createNetwork = (spec) => {

@@ -19,20 +19,22 @@ from hobble.models.mann.predictor import MannPredictor
 from hobble.models.network import Export, Network, standardised
 from hobble.models.packing import packed_rows
 
-MOST_EXPERTS = 64
+MOST_EXPERTS = 64  # largest number of experts in a file
 
 
 @dataclass(frozen=True)
 class Mann(Network):
     """A mode-adaptive network of K experts.
 
-    weights: per layer (K, out, in) float32; biases: per layer (K, out). gate_weights: per layer of the gating
-    network (out, in); gate_biases: (out,). columns: (G,) columns of X that the gating network gets.
+    weights: (K, out, in) float32 for each layer; biases: (K, out) for each layer. gate_weights: (out, in) for
+    each layer of the gating network; gate_biases: (out,) for each. columns: (G,) the columns of X that the
+    gating network gets.
     """
 
     kind: ClassVar[str] = "mann"
     phase: ClassVar[bool] = False
-    storage: ClassVar[str] = "int16"  # reading eight experts from memory takes most of the time of a frame
+    # Reading the weights of all experts takes most of a prediction's time, and int16 halves them.
+    storage: ClassVar[str] = "int16"
 
     weights: tuple[Array, ...] = field(repr=False)
     biases: tuple[Array, ...] = field(repr=False)
@@ -42,7 +44,11 @@ class Mann(Network):
 
     @classmethod
     def read(cls, path: str | Path, arrays: Mapping[str, Any], common: Mapping[str, Any]) -> Mann:
-        """From the arrays W0 (K, out, in), b0 (K, out), ..., V0 (out, in), d0 (out,), ... and `gate` (G,)."""
+        """From the arrays of a file.
+
+        W0 (K, out, in), b0 (K, out), ... are the experts' layers. V0 (out, in), d0 (out,), ... are the gating
+        network's. `gate` (G,) holds the columns that it gets.
+        """
         inputs, outputs = len(common["x_mean"]), len(common["y_mean"])
         columns = _columns(path, arrays, inputs)
         weights, biases = stacked(path, arrays, ("W", "b"), 3, inputs, outputs)
@@ -61,7 +67,7 @@ class Mann(Network):
 
     @property
     def experts(self) -> int:
-        """K, sets of weights of each layer."""
+        """K, the number of experts."""
         return len(self.weights[0])
 
     @property
@@ -95,41 +101,42 @@ class Mann(Network):
         return MannPredictor(self, storage or self.storage)
 
     def page(self, inputs: NDArray[np.int64], outputs: NDArray[np.int64]) -> dict[str, Any]:
-        """As in `Network`. Weights are integers with a factor for each row; `gate` holds the positions in
-        `inputs` that the gating network gets."""
+        """As in `Network`. Weights are integers with a factor for each row. The entry `gate` holds the
+        positions in `inputs` of the columns that the gating network gets."""
         weights, biases, gate = list(self.weights), list(self.biases), list(self.gate_weights)
         weights[0] = weights[0][:, :, inputs]
         weights[-1], biases[-1] = weights[-1][:, outputs], biases[-1][:, outputs]
-        place = {int(column): i for i, column in enumerate(inputs)}
-        there = [i for i, column in enumerate(self.columns) if int(column) in place]
-        gate[0] = gate[0][:, there]
+        position = {int(column): i for i, column in enumerate(inputs)}
+        kept = [i for i, column in enumerate(self.columns) if int(column) in position]
+        gate[0] = gate[0][:, kept]
         return {
             "layers": [packed_rows(w, b) for w, b in zip(weights, biases, strict=True)],
             "gateLayers": [
                 packed_rows(w[None], b[None]) for w, b in zip(gate, self.gate_biases, strict=True)
             ],
-            "gate": [place[int(self.columns[i])] for i in there],
+            "gate": [position[int(self.columns[i])] for i in kept],
         }
 
     @property
     def exports(self) -> dict[str, Export]:
-        """ONNX."""
+        """The format "onnx"."""
 
         def onnx(target: Path, mode: str) -> str:
             from hobble.models.mann.onnx_export import write_checked
 
-            return f"{target}: within {write_checked(target, self):.1g} of the runtime"
+            difference = write_checked(target, self)
+            return f"{target}: differs from Hobble's runtime by at most {difference:.1g}"
 
         return {"onnx": onnx}
 
 
 def _columns(path: str | Path, arrays: Mapping[str, Any], inputs: int) -> NDArray[np.int64]:
-    """The array `gate`: different columns of X."""
+    """The array `gate`: the columns of X that the gating network gets, each once."""
     if "gate" not in arrays:
         raise InputError(path, "not a network: no gate")
     array = np.asarray(arrays["gate"])
     if array.ndim != 1 or array.dtype.kind not in "iu" or not array.size:
         raise InputError(path, f"gate has shape {array.shape} and type {array.dtype}, not columns of X")
     if array.min() < 0 or array.max() >= inputs or len(np.unique(array)) != array.size:
-        raise InputError(path, f"gate does not name different columns of {inputs}")
+        raise InputError(path, f"gate must hold different columns of X, from 0 to {inputs - 1}")
     return array.astype(np.int64)

@@ -1,4 +1,4 @@
-"""The keys of a configuration's `network` section for kind mann."""
+"""The keys of a configuration's `network` section for the kind `mann`."""
 
 from __future__ import annotations
 
@@ -10,7 +10,11 @@ from hobble.models.options import Options
 
 
 class MannOptions(Options):
-    """The mode-adaptive network, with the sizes of Zhang et al. 2018."""
+    """The mode-adaptive network, with the sizes of Zhang et al. 2018.
+
+    hidden_layers, units: of each expert. gate_layers, gate_units: hidden layers of the gating network, and
+    units of each.
+    """
 
     kind: Literal["mann"] = "mann"
     experts: Annotated[int, Field(ge=2, le=32)] = 8

@@ -13,9 +13,10 @@ from hobble.models.stack import Stack, StackPredictor, blend_layers, exp_below_0
 if TYPE_CHECKING:
     from hobble.models.mann.network import Mann
 
-# Of a `Stack`, for compiled functions: weights, numbers, plan.
+# The fields `weights`, `numbers` and `plan` of a `Stack`, for compiled functions.
 Layers = tuple[Any, Any, Any]
-NEGLIGIBLE = 1e-7  # a smaller share changes nothing in single precision beside shares near 1
+# An expert with a smaller share is left out. Single precision rounds shares near 1 by about as much.
+NEGLIGIBLE_SHARE = 1e-7
 
 
 class MannPredictor(StackPredictor):
@@ -26,7 +27,7 @@ class MannPredictor(StackPredictor):
     def __init__(self, network: Mann, storage: str = "float32") -> None:
         super().__init__(network)
         self._experts = Stack(network.weights, network.biases, storage, network.y_mean, network.y_std)
-        # Always float32: it is small, and its rounding error would affect every expert.
+        # The gate stays float32: it is small, and rounding it would change the shares of all experts.
         self._gate = Stack([w[None] for w in network.gate_weights], [b[None] for b in network.gate_biases])
 
     def evaluate(self, z: Array, phase: Array, out: Array) -> None:
@@ -40,7 +41,10 @@ class MannPredictor(StackPredictor):
 
 @njit(error_model="numpy")
 def _evaluate(gate: Layers, columns: Any, experts: Layers, count: int, z: Any, out: Any) -> None:
-    """Rows z (C, X) to out (C, Y). columns: those of z that the gate reads. count: of the experts."""
+    """Write Y (C, Y) for standardised inputs z (C, X) into `out`.
+
+    columns: the columns of z that the gate gets. count: the number of experts.
+    """
     gate_z = np.empty((z.shape[0], len(columns)), np.float32)
     for c in range(z.shape[0]):
         for i in range(len(columns)):
@@ -56,7 +60,7 @@ def _evaluate(gate: Layers, columns: Any, experts: Layers, count: int, z: Any, o
 
 @njit(forceinline=True, cache=False)
 def _softmax(logits: Any) -> None:
-    """Turn logits (K,) into shares in place; a share below NEGLIGIBLE becomes 0."""
+    """Turn logits (K,) into shares in place; a share below NEGLIGIBLE_SHARE becomes 0."""
     largest = logits.max()
     total = np.float32(0)
     for k in range(len(logits)):
@@ -64,4 +68,4 @@ def _softmax(logits: Any) -> None:
         total += logits[k]
     for k in range(len(logits)):
         share = logits[k] / total
-        logits[k] = share if share > NEGLIGIBLE else np.float32(0)
+        logits[k] = share if share > NEGLIGIBLE_SHARE else np.float32(0)

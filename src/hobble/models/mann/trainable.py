@@ -21,8 +21,9 @@ class TrainableMann(Trainable):
 
     A layer of experts is stored as (K * out, 1, in + 1), expert after expert. One product gives the outputs
     of all experts, which are then blended.
-    sizes: units of an expert, from input to output. gate_sizes: units of the gate; the last number is K, the
-    number of experts. columns: the columns of X that the gate gets.
+
+    sizes: units of an expert, from input to output. gate_sizes: likewise for the gate; the last
+    number is K, the number of experts. columns: the columns of X that the gate gets.
     """
 
     kind: ClassVar[str] = "mann"
@@ -33,7 +34,7 @@ class TrainableMann(Trainable):
 
     @property
     def experts(self) -> int:
-        """K, sets of weights of each layer."""
+        """K, the number of experts."""
         return self.gate_sizes[-1]
 
     @property
@@ -53,12 +54,12 @@ class TrainableMann(Trainable):
 
     def __call__(self, x: Tensor, p: Tensor) -> Tensor:
         """As in `Trainable`; p is ignored."""
-        gates = len(self.gate_sizes) - 1
+        gate_layers = len(self.gate_sizes) - 1
         h = x[:, list(self.columns)]
-        for number, layer in enumerate(self.layers[:gates]):
+        for number, layer in enumerate(self.layers[:gate_layers]):
             h = product(with_one(torch.nn.functional.elu(h) if number else h), layer.flatten(1))
         shares = torch.softmax(h, dim=1)
-        for number, layer in enumerate(self.layers[gates:]):
+        for number, layer in enumerate(self.layers[gate_layers:]):
             x = product(with_one(torch.nn.functional.elu(x) if number else x), layer.flatten(1))
             x = torch.bmm(shares[:, None, :], x.view(len(x), self.experts, -1))[:, 0]
         return x
@@ -71,13 +72,17 @@ class TrainableMann(Trainable):
         return (fused.FusedMannStep if on_cpu else step.MannStep)(self, dropout, half)
 
     def arrays(self) -> dict[str, np.ndarray]:
-        """`V0` (out, in), `d0` (out,), ... of the gate; `W0` (K, out, in), `b0` (K, out), ...; `gate`."""
-        arrays, gates = {}, len(self.gate_sizes) - 1
+        """As in `Trainable`.
+
+        `V0` (out, in), `d0` (out,), ... are the gate's layers, and `W0` (K, out, in), `b0` (K, out), ... are
+        the experts'. `gate` holds the columns of X that the gate gets.
+        """
+        arrays, gate_layers = {}, len(self.gate_sizes) - 1
         for number, layer in enumerate(self.layers):
             values = layer[:, 0].cpu().numpy()
             names = f"V{number}", f"d{number}"
-            if number >= gates:
-                names = f"W{number - gates}", f"b{number - gates}"
+            if number >= gate_layers:
+                names = f"W{number - gate_layers}", f"b{number - gate_layers}"
                 values = values.reshape(self.experts, -1, values.shape[-1])
             arrays[names[0]] = np.ascontiguousarray(values[..., :-1])
             arrays[names[1]] = np.ascontiguousarray(values[..., -1])
@@ -93,8 +98,8 @@ class TrainableMann(Trainable):
         for i in range(len(self.sizes) - 2):
             inside = f"elu(W{i} {inside} + b{i})"
         last = len(self.sizes) - 2
-        text = f"y = W{last} {inside} + b{last} on standardised x and y; W and b are sums of those of the "
-        return {"experts": self.experts, "network": f"{text}experts in the shares softmax({gate})"}
+        text = f"y = W{last} {inside} + b{last} on standardised x and y; W and b are blended from those of "
+        return {"experts": self.experts, "network": f"{text}the experts, in the shares softmax({gate})"}
 
     @property
     def described(self) -> str:
@@ -114,12 +119,12 @@ def shapes(sizes: tuple[int, ...], gate_sizes: tuple[int, ...]) -> list[tuple[in
 def initialise(
     sizes: tuple[int, ...], gate_sizes: tuple[int, ...], columns: tuple[int, ...], seed: int
 ) -> TrainableMann:
-    """Weights of each expert and of the gate within +-sqrt(6 / (in * out)), biases 0."""
+    """A new network: weights of the experts and the gate uniform within +-sqrt(6 / (in * out)), biases 0."""
     flat = torch.zeros(sum(map(prod, shapes(sizes, gate_sizes))))
     network = TrainableMann(flat, tuple(sizes), tuple(gate_sizes), tuple(columns))
-    gates, generator = len(gate_sizes) - 1, np.random.default_rng([seed, 0])
-    uniform_start(network.layers[:gates], generator)
-    for layer in network.layers[gates:]:
+    gate_layers, generator = len(gate_sizes) - 1, np.random.default_rng([seed, 0])
+    uniform_start(network.layers[:gate_layers], generator)
+    for layer in network.layers[gate_layers:]:
         experts = layer.view(network.experts, -1, layer.shape[-1])
         uniform_start([experts.transpose(0, 1)], generator)
     return network

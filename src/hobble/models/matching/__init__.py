@@ -1,4 +1,4 @@
-"""Motion matching: plays the clips, without a network (Clavet 2016; features after Holden et al. 2020)."""
+"""Motion matching: plays recorded poses instead of predicting them (Clavet 2016; Holden et al. 2020)."""
 
 from __future__ import annotations
 

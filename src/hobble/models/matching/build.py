@@ -1,4 +1,4 @@
-"""Builds the tables that motion matching searches, from the rows of clips in their order."""
+"""Builds the tables that motion matching searches, from the rows of the clips, frame after frame."""
 
 from __future__ import annotations
 
@@ -26,7 +26,8 @@ class Tables:
 
     features: (R, n) float32, weighted. y: (R, Y) float32, raw units. phase: (R,) in cycles. remaining: (R,)
     int32, how many frames follow in the run. columns: (n,) the columns of X that are features. weights: (n,)
-    their factors. every, halflife: see `MatchingOptions`.
+    their factors. every: frames between two searches. halflife: frames in which the offset of a transition
+    falls to half.
     """
 
     kind: ClassVar[str] = "matching"
@@ -55,8 +56,9 @@ class Tables:
     def about(self) -> dict[str, Any]:
         """Entries in the file's meta, as JSON."""
         return {
-            "network": "y is the frame of the clips whose weighted columns of x are nearest, and the frames "
-            "that follow it until the next search",
+            "network": "a search finds the frame of the clips with the features (weighted columns of x) that "
+            "are nearest to those of the input; y is this frame, then the frames that follow it until the "
+            "next search",
             "every": self.every,
             "halflife": self.halflife,
         }
@@ -70,9 +72,11 @@ class Tables:
 def build(
     options: MatchingOptions, clips: Sequence[str | Path], layout: RowLayout, skeleton: Skeleton
 ) -> Tables:
-    """The tables of the clips' files of rows, with columns as in `layout`.
+    """Build the tables.
 
-    Raises InputError if a file is not a file of rows or has another layout, or if no file has a frame.
+    clips: the files with the rows of the clips. layout: the columns of the database; channels that it does
+    not have are left out. skeleton: of the layout. Raises InputError if a file is not a file of rows or has
+    another layout, or if no file has a frame.
     """
     xs, ys, phases, remainings = [], [], [], []
     for path in clips:
@@ -80,12 +84,12 @@ def build(
         if rows.layout.with_channels(()) != layout.with_channels(()) or not set(layout.channels) <= set(
             rows.layout.channels
         ):
-            raise InputError(path, f"its rows ({rows.layout}) are not those of the database ({layout})")
+            raise InputError(path, f"its columns ({rows.layout}) do not fit the database ({layout})")
         x, y = on_mean_ground(rows, layout)
-        one, remaining = in_runs(rows)
-        xs.append(x[one])
-        ys.append(y[one])
-        phases.append(rows.p[one])
+        kept, remaining = in_runs(rows)
+        xs.append(x[kept])
+        ys.append(y[kept])
+        phases.append(rows.p[kept])
         remainings.append(remaining)
     if not sum(map(len, ys)):
         raise InputError("the clips", "hold no frame to match", fix="Train on a clip with a whole cycle.")
@@ -104,27 +108,29 @@ def build(
 
 
 def on_mean_ground(rows: ClipRows, layout: RowLayout) -> tuple[Array, Array]:
-    """x (R, X) and y (R, Y), float32, raw units. Each row is there once, on the mean of its terrain fits."""
+    """x (R, X) and y (R, Y), float32, raw units. Each row is on the mean ground of all its terrain fits."""
     x = np.empty((len(rows), layout.x_size), np.float32)
     y = rows.y.astype(np.float32)
     if not len(rows):
         return x, y
     count = rows.fits[:, None]
+    # Means over each row's fits: of the mean ground height, and of the ground heights relative to it.
     ground = np.add.reduceat(rows.heights, rows.first_fit, axis=0) / count
-    lift = np.add.reduceat(rows.mean, rows.first_fit)[:, None] / count
+    mean_height = np.add.reduceat(rows.mean, rows.first_fit)[:, None] / count
     values = {name: rows.channels[name] for name, _ in layout.channels}
-    compose(layout, frame_inputs(layout, rows.x, values), ground, lift, x, y)
+    compose(layout, frame_inputs(layout, rows.x, values), ground, mean_height, x, y)
     return x, y
 
 
 def in_runs(rows: ClipRows) -> tuple[NDArray[np.int64], NDArray[np.int32]]:
-    """Indices (R',) of rows with each frame once, and how many frames follow each of them in its run (R',).
+    """Indices (R',) of the rows to keep, each frame once, and (R',) how many frames of its run follow each.
 
-    Adjacent cycles share a frame, which the file has twice. The later row is kept, because the next cycle
-    begins with it.
+    A run is a sequence of consecutive frames. Adjacent cycles share a frame, which has two rows in the file.
+    The later row is kept, because the next cycle begins with it.
     """
     frame = rows.frame
-    one = np.flatnonzero(np.diff(frame, append=-1) != 0)
-    frame = frame[one]
+    kept = np.flatnonzero(np.diff(frame, append=-1) != 0)
+    frame = frame[kept]
     ends = np.flatnonzero(np.diff(frame, append=frame[-1] + 2 if len(frame) else 0) != 1)
-    return one, (ends[np.searchsorted(ends, np.arange(len(one)))] - np.arange(len(one))).astype(np.int32)
+    numbers = np.arange(len(kept))
+    return kept, (ends[np.searchsorted(ends, numbers)] - numbers).astype(np.int32)

@@ -1,4 +1,4 @@
-// Motion matching: plays a run of the clips, searches every few frames, smooths the transitions. It computes the same as `predictor.py`
+// Motion matching: plays the clips, searches every few frames, smooths the transitions. It computes the same as `predictor.py`
 // and `inertia.py` in Python. memory: an array of `spec.network.memory` numbers for each character, zeros at first.
 import { bytes } from "../../report/web/numbers.js";
 import { createScales, floats } from "../layers.js";
@@ -10,7 +10,7 @@ const toQuaternion = (v, i) => {
   const half = sqrt(v[i] * v[i] + v[i + 1] * v[i + 1] + v[i + 2] * v[i + 2]), scale = half > 1e-8 ? sin(half) / half : 1;
   return [cos(half), v[i] * scale, v[i + 1] * scale, v[i + 2] * scale];
 };
-// The axis times half the angle of the product a b, along the shorter way, into v.
+// Writes into v, from index i on, the axis times half the angle of the product a b, along the shorter way.
 const toVector = (a, b, v, i) => {
   let w = a[0] * b[0] - a[1] * b[1] - a[2] * b[2] - a[3] * b[3], x = a[0] * b[1] + a[1] * b[0] + a[2] * b[3] - a[3] * b[2];
   let y = a[0] * b[2] - a[1] * b[3] + a[2] * b[0] + a[3] * b[1], z = a[0] * b[3] + a[1] * b[2] - a[2] * b[1] + a[3] * b[0];

@@ -1,4 +1,4 @@
-"""Motion matching with the interface of a network: reading, search, page data."""
+"""Motion matching with the interface of a network: reading, search, data for the report's page."""
 
 from __future__ import annotations
 
@@ -20,11 +20,13 @@ from hobble.models.matching.predictor import MatchingPredictor
 from hobble.models.network import Network, standardised
 from hobble.models.packing import packed, packed_columns
 
-MOST_ROWS = 1 << 24  # the page keeps row numbers in float32, which is exact up to here
-MOST_WEIGHT = 1e9
+MOST_ROWS = 1 << 24  # in the tables; the page keeps row numbers in float32, which is exact up to here
+MOST_WEIGHT = 1e9  # largest weight of a feature
 MOST_FRAMES = 1_000_000  # largest `every` and half-life, in frames
-FEWEST_LEFT = 20  # a search finds only rows that at least this many frames of their run follow
-MOST_ON_PAGE = 5500  # rows, about 5.5 MB of text; a page with several characters should stay below 20 MB
+FEWEST_LEFT = 20  # a search skips rows that have fewer frames left in their run
+# At most this many rows are put in the page: 5.5 MB of text. A page with several characters should stay below
+# 20 MB.
+MOST_ON_PAGE = 5500
 
 
 @dataclass(frozen=True)
@@ -33,7 +35,8 @@ class Matching(Network):
 
     features: (R, n) float32, weighted. frames: (R, Y) float32, raw units. phases: (R,) float32. remaining:
     (R,) how many frames follow in the run. columns: (n,) the columns of X that are features. weights: (n,)
-    their factors. every: frames between two searches. halflife: of the offsets of a transition, frames.
+    their factors. every: frames between two searches. halflife: frames in which the offset of a transition
+    falls to half.
     """
 
     kind: ClassVar[str] = "matching"
@@ -51,7 +54,7 @@ class Matching(Network):
 
     @classmethod
     def read(cls, path: str | Path, arrays: Mapping[str, Any], common: Mapping[str, Any]) -> Matching:
-        """From the arrays that `Tables.arrays` wrote; see `hobble.models.load`."""
+        """From the arrays of a file, which `hobble.models.matching.build` made."""
         meta, inputs, outputs = common["meta"], len(common["x_mean"]), len(common["y_mean"])
         frames = checks.numbers(path, arrays, "frames", 2, checks.LARGEST_MEAN)
         features = checks.numbers(path, arrays, "features", 2, checks.LARGEST_MEAN)
@@ -61,15 +64,15 @@ class Matching(Network):
         remaining = _whole(path, arrays, "remaining", MOST_ROWS)
         rows, n = len(frames), len(columns)
         expected = {"frames": (rows, outputs), "features": (rows, n), "phase": (rows,), "remaining": (rows,)}
-        found = {"frames": frames, "features": features, "phase": phases, "remaining": remaining}
+        arrays_read = {"frames": frames, "features": features, "phase": phases, "remaining": remaining}
         for name, shape in expected.items():
-            if found[name].shape != shape:
-                raise InputError(path, f"{name} has shape {found[name].shape}, expected {shape}")
+            if arrays_read[name].shape != shape:
+                raise InputError(path, f"{name} has shape {arrays_read[name].shape}, expected {shape}")
         if weights.shape != (n,) or weights.min() < 0:
             raise InputError(path, f"feature_weights has to hold {n} numbers of 0 or more")
         if rows > MOST_ROWS:
             raise InputError(path, f"{rows} frames; at most {MOST_ROWS} are allowed")
-        # This check guarantees that playing a run never leaves the table.
+        # With this check, a character that plays a run never gets beyond the end of the table.
         if (
             remaining[-1] != 0
             or (remaining[:-1][remaining[:-1] > 0] != remaining[1:][remaining[:-1] > 0] + 1).any()
@@ -99,25 +102,27 @@ class Matching(Network):
         kept = np.ceil(lengths * (most / rows)).astype(np.int64)
         within = np.arange(rows) - np.repeat(begins, lengths)
         remaining = np.repeat(kept, lengths) - 1 - within
-        some = remaining >= 0
+        in_copy = remaining >= 0
         return replace(
             self,
-            features=self.features[some],
-            frames=self.frames[some],
-            phases=self.phases[some],
-            remaining=remaining[some],
+            features=self.features[in_copy],
+            frames=self.frames[in_copy],
+            phases=self.phases[in_copy],
+            remaining=remaining[in_copy],
         )
 
     @cached_property
     def starts(self) -> NDArray[np.int64]:
-        """Indices of the rows that a search may find: not near the end of a run, and not its first row.
+        """Indices of the rows where a search may start playing: neither the first of a run nor near its end.
 
-        The first row of a run has no rotation speed. If all runs are too short, these are all rows but the
-        first of each run; if there are no such rows, they are all rows.
+        The first row of a run has no rotation speed. If all runs are too short, a search may find all rows
+        but the first of each run. If every run has only one row, it may find all rows.
         """
         begins = np.r_[True, self.remaining[:-1] == 0]
-        found = np.flatnonzero((self.remaining >= FEWEST_LEFT) & ~begins)
-        return found if len(found) else np.flatnonzero(~begins) if (~begins).any() else np.arange(len(begins))
+        starts = np.flatnonzero((self.remaining >= FEWEST_LEFT) & ~begins)
+        return (
+            starts if len(starts) else np.flatnonzero(~begins) if (~begins).any() else np.arange(len(begins))
+        )
 
     @cached_property
     def tree(self) -> cKDTree:
@@ -126,7 +131,7 @@ class Matching(Network):
 
     @property
     def memory(self) -> int:
-        """As in `Network`: the row shown, the frames since the search, and the offsets."""
+        """As in `Network`: numbers for the row shown, the frames since the search, and the offsets."""
         return memory_size(self.layout.joints)
 
     @property
@@ -136,7 +141,7 @@ class Matching(Network):
 
     @property
     def parameters(self) -> int:
-        """Numbers in its tables."""
+        """How many numbers its tables of frames and features hold."""
         return self.frames.size + self.features.size
 
     @property
@@ -156,7 +161,7 @@ class Matching(Network):
     def predict(self, x: Array, phase: Array) -> Array:
         """Y (C, Y) of the nearest frame for each row of x (C, X); the phase is ignored.
 
-        Each row is searched on its own, without the runs and transitions of a character.
+        Each row gets its own search. There are no runs and transitions, which need a character's memory.
         """
         return self.frames[self.nearest(self.queries(standardised(self, x)))]
 
@@ -171,17 +176,22 @@ class Matching(Network):
         return self.shortened(MOST_ON_PAGE)._packed(inputs, outputs)
 
     def _packed(self, inputs: NDArray[np.int64], outputs: NDArray[np.int64]) -> dict[str, Any]:
-        place = {int(column): i for i, column in enumerate(inputs)}
-        there = [i for i, column in enumerate(self.columns) if int(column) in place]
-        used, layout = self.columns[there], self.layout
-        rank = {int(column): i for i, column in enumerate(outputs)}
-        turn = layout.y_joint_rotation
-        turning = [j for j in range(layout.joints) if turn.start + 3 * j in rank]
+        """`page` without shortening.
+
+        `at`: positions in `outputs` of the first columns of joint positions and velocities, and of the change
+        of phase; -1 if left out. `turning`: the joints whose rotations are among `outputs`, each with the
+        position of its first column.
+        """
+        of_input = {int(column): i for i, column in enumerate(inputs)}
+        kept = [i for i, column in enumerate(self.columns) if int(column) in of_input]
+        of_output, layout = {int(column): i for i, column in enumerate(outputs)}, self.layout
+        blocks = layout.y_joint_position, layout.y_joint_velocity, layout.y_phase_change
+        firsts = {j: layout.y_joint_rotation.start + 3 * j for j in range(layout.joints)}
         return {
             "frames": packed_columns(self.frames[:, outputs]),
-            "features": packed(self.features[:, there].astype(np.float32)),
-            "columns": [place[int(c)] for c in used],
-            "weights": packed(self.weights[there]),
+            "features": packed(self.features[:, kept].astype(np.float32)),
+            "columns": [of_input[int(column)] for column in self.columns[kept]],
+            "weights": packed(self.weights[kept]),
             "phases": packed(self.phases),
             "remaining": packed(np.minimum(self.remaining, 1 << 30).astype(np.int32)),
             "start": packed(self.starts.astype(np.int32)),
@@ -189,13 +199,9 @@ class Matching(Network):
             "halflife": self.halflife,
             "memory": self.memory,
             "joints": layout.joints,
-            "at": [rank.get(block.start, -1) for block in _moving(layout)],
-            "turning": [[j, rank[turn.start + 3 * j]] for j in turning],
+            "at": [of_output.get(block.start, -1) for block in blocks],
+            "turning": [[j, of_output[first]] for j, first in firsts.items() if first in of_output],
         }
-
-
-def _moving(layout: Any) -> list[slice]:
-    return [layout.y_joint_position, layout.y_joint_velocity, layout.y_phase_change]
 
 
 def _whole(path: str | Path, arrays: Mapping[str, Any], name: str, most: int) -> NDArray[np.int64]:

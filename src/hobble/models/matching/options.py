@@ -1,4 +1,4 @@
-"""The keys of a configuration's `network` section for kind matching."""
+"""The keys of a configuration's `network` section for the kind `matching`."""
 
 from __future__ import annotations
 
@@ -15,9 +15,10 @@ Weight = Annotated[float, Field(ge=0, le=1000, allow_inf_nan=False)]
 class MatchingOptions(Options):
     """Motion matching.
 
-    Holden et al. 2020 use weights of .75 for feet, 1 for path and 1.5 for facing, and search every ten
-    frames. With their values, feet slide 4.8 cm a step and the character leaves the path by up to 2.3 m; with
-    the defaults here, it is 1.3 cm and 1.4 m (on the data set `synthetic`).
+    Holden et al. 2020 use weights of .75 for feet, 1 for path and 1.5 for facing, and search every 10 frames.
+    With their values, on the data set `synthetic`, feet slide 4.8 cm a step and the character leaves the path
+    by up to 2.3 m. With the defaults here, feet slide 1.3 cm a step and the character leaves the path by up
+    to 1.4 m.
     """
 
     kind: Literal["matching"] = "matching"
@@ -34,5 +35,5 @@ class MatchingOptions(Options):
     ground: Weight = Field(0.5, description="weight of the heights ahead")
     channels: Weight = Field(
         50.0,
-        description="weight of the channel values; high, because a found frame has to match them",
+        description="weight of the channel values; high, because the chosen frame has to match them",
     )

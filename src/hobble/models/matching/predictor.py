@@ -1,4 +1,4 @@
-"""Motion matching at run time: plays a run of a clip, searches every few frames, smooths the transitions.
+"""Motion matching at run time: plays the clips, searches every few frames, smooths the transitions.
 
 After Clavet, Motion Matching and the Road to Next-Gen Animation, GDC 2016.
 """
@@ -18,7 +18,9 @@ from hobble.models.stack import standardise
 if TYPE_CHECKING:
     from hobble.models.matching.network import Matching
 
-SURROUNDING = 20  # no transition to a row within this many rows of the following one (Holden et al. 2020)
+# If a search finds a row at most this many rows from the one that follows anyway, there is no transition
+# (Holden et al. 2020).
+SURROUNDING = 20
 
 
 class MatchingPredictor:
@@ -57,20 +59,24 @@ class MatchingPredictor:
         find_following(memory, network.remaining, network.every, before, following, due)
         shown = following.copy()
         if due.any():
-            some = np.flatnonzero(due)
-            shown[some] = self._searched(network.queries(z[some]), following[some])
+            searching = np.flatnonzero(due)
+            shown[searching] = self._searched(network.queries(z[searching]), following[searching])
         table, choice = (self._frames, self._scale, network.phases), (before, following, due, shown)
         show_rows(memory, table, choice, phase, (network.layout.joints, self._at, network.halflife), out)
 
     def _searched(self, queries: Array, following: NDArray[np.int64]) -> NDArray[np.int64]:
-        """The rows (C,) to show for queries (C, n): the following row (C,), unless another row is nearer."""
+        """The rows (C,) to show for queries (C, n).
+
+        following: (C,) the next row of each character's run, or -1. It is shown unless a row is nearer to the
+        query and more than SURROUNDING rows away from it.
+        """
         network = self.network
-        apart = queries - network.features[following]
-        known = np.where(following >= 0, np.sqrt(np.square(apart).sum(axis=1)), np.inf)
-        _, found = network.tree.query(queries, distance_upper_bound=float(known.max()))
+        difference = queries - network.features[following]
+        distance = np.where(following >= 0, np.sqrt(np.square(difference).sum(axis=1)), np.inf)
+        _, nearest = network.tree.query(queries, distance_upper_bound=float(distance.max()))
         # The tree returns len(starts) where no row is nearer.
-        rows = network.starts[np.minimum(found, len(network.starts) - 1)]
-        nearer = np.square(queries - network.features[rows]).sum(axis=1) < known**2
+        rows = network.starts[np.minimum(nearest, len(network.starts) - 1)]
+        nearer = np.square(queries - network.features[rows]).sum(axis=1) < distance**2
         stay = ~nearer | (np.abs(rows - following) <= SURROUNDING)
         return np.where(stay & (following >= 0), following, rows)
 

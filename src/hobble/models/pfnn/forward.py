@@ -20,7 +20,7 @@ from hobble.core.quat import Array
 # Rows: four neighbouring control points. Columns: powers 0 to 3 of t, which is 0 at the second point and 1 at
 # the third.
 CATMULL_ROM = 0.5 * np.array([[0, -1, 2, -1], [2, 0, -5, 3], [0, 1, 4, -3], [0, 0, -1, 1]], float)
-BINS = 50  # the original's constant mode stores its weights at this many phases
+BINS = 50  # the constant mode of Holden et al. (2017) stores the weights at this many phases
 
 
 def forward(weights: Sequence[Array], biases: Sequence[Array], z: Array, phase: Array) -> Array:
@@ -67,7 +67,7 @@ def weights_at(points: Array, phase: Array) -> Array:
 
 
 def binned(phase: Array) -> Array:
-    """Phases (n,) rounded down to the 50 bins of the original's constant mode."""
-    # In single precision, as in the original. In double precision, 0.24 stored as float32 would fall into bin
-    # 11, not 12.
+    """Phases (n,) rounded down to the 50 bins of the constant mode of Holden et al. (2017)."""
+    # In single precision, as in their program. In double precision, 0.24 stored as float32 would fall into
+    # bin 11, not 12.
     return np.minimum(np.floor(np.asarray(phase, np.float32) * np.float32(BINS)), BINS - 1) / BINS

@@ -1,4 +1,4 @@
-"""The training step on a CPU: compiled loops over rows for everything but the matrix products."""
+"""The training step on a CPU: compiled loops over rows between the matrix products."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from hobble.models.pfnn.step import PfnnStep
 
 
 class FusedPfnnStep(FusedBase, PfnnStep):
-    """Like `PfnnStep`, but several times faster outside the products, with buffers reused for every batch."""
+    """Like `PfnnStep`, but several times faster outside the matrix products. The buffers are reused."""
 
     def coefficients(self, p: Tensor) -> Tensor:
         """Spline coefficients (B, K) of phases (B,)."""
@@ -55,7 +55,7 @@ def _coefficients(p: Any, c: Any) -> None:
 
 @njit(parallel=True, error_model="numpy")
 def _expand(x: Any, c: Any, mask: Any, e: Any, slope: Any) -> None:
-    """Write e (B, K (n + 1)) and slope (B, n) of x (B, n), see `PfnnStep.expanded`."""
+    """Write e (B, K (n + 1)) and slope (B, n) of x (B, n); see `PfnnStep.expanded`."""
     rows, width = x.shape
     half = e.itemsize == 2
     one = slope.dtype.type(1)

@@ -19,14 +19,15 @@ from hobble.models.packing import packed_rows
 from hobble.models.pfnn.forward import binned, forward
 from hobble.models.pfnn.predictor import MODES, PfnnPredictor
 
-FEWEST_POINTS, MOST_POINTS = 4, 64  # control points: a cyclic cubic needs four
+FEWEST_POINTS, MOST_POINTS = 4, 64  # control points of a network; a cyclic cubic spline needs four
 
 
 @dataclass(frozen=True)
 class Pfnn(Network):
     """Layers whose weights and biases are cyclic cubic splines of the phase.
 
-    weights: per layer (K, out, in) float32; biases: per layer (K, out) float32.
+    The splines have K control points. weights: (K, out, in) float32 for each layer; biases: (K, out) float32
+    for each layer.
     """
 
     kind: ClassVar[str] = "pfnn"
@@ -50,7 +51,7 @@ class Pfnn(Network):
 
     @property
     def control_points(self) -> int:
-        """K, control points of each weight."""
+        """K, the number of control points."""
         return len(self.weights[0])
 
     @property
@@ -77,7 +78,7 @@ class Pfnn(Network):
         )
 
     def predict(self, x: Array, phase: Array, constant: bool = False) -> Array:
-        """As in `Network`. constant: use the weights at the phase's bin, as the original's constant mode."""
+        """As in `Network`. constant: round phases down to a bin, as the mode constant does."""
         z = standardised(self, x)
         y = forward(self.weights, self.biases, z, binned(phase) if constant else phase)
         return y * self.y_std + self.y_mean
@@ -95,12 +96,13 @@ class Pfnn(Network):
 
     @property
     def exports(self) -> dict[str, Export]:
-        """ONNX and the original release's .bin files."""
+        """The formats "onnx" and "bin", the .bin files of Holden et al. (2017)."""
 
         def onnx(target: Path, mode: str) -> str:
             from hobble.models.pfnn.onnx_export import write_checked
 
-            return f"{target}: within {write_checked(target, self, mode):.1g} of the runtime"
+            difference = write_checked(target, self, mode)
+            return f"{target}: differs from Hobble's runtime by at most {difference:.1g}"
 
         def release(target: Path, mode: str) -> str:
             from hobble.models.pfnn.release import write_release

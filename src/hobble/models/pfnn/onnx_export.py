@@ -17,20 +17,21 @@ __all__ = ["OPSET", "TOLERANCE", "check_onnx", "export_onnx", "write_checked"]
 
 
 def export_onnx(path: str | Path, network: Pfnn, mode: str = "cubic") -> None:
-    """Write the network in one phase mode, see `onnx_file.export`. Raises ValueError for an unknown mode.
+    """Write the network in a phase mode, see `onnx_file.export`. Raises ValueError for an unknown mode.
 
-    cubic blends the outputs of all control points, which is exact; linear and constant use tables of weights.
+    The mode cubic blends the outputs of all control points, which is exact. The modes linear and constant use
+    tables of the weights at some phases.
     """
     onnx_file.export(path, network, mode, _body(network, mode))
 
 
 def write_checked(path: str | Path, network: Pfnn, mode: str = "cubic") -> float:
-    """As `hobble.models.onnx_file.write`."""
+    """Write the network and check the file. Returns the largest difference, see `onnx_file.check`."""
     return onnx_file.write(path, network, mode, _body(network, mode))
 
 
 def check_onnx(path: str | Path, network: Pfnn, mode: str = "cubic") -> float:
-    """As `onnx_file.check`."""
+    """The largest difference between the file and Hobble's runtime, see `onnx_file.check`."""
     return onnx_file.check(path, network, mode)
 
 
@@ -50,7 +51,10 @@ def _body(network: Pfnn, mode: str) -> onnx_file.Body:
 
 
 def _lookup(g: Graph, mode: str, points: int) -> tuple[str, str]:
-    """The points (batch, n) that a phase blends, and their shares (batch, n, 1); all points for cubic."""
+    """The points (batch, n) to blend, and their shares (batch, n, 1).
+
+    In the mode cubic the shares are (batch, points, 1), and the first result is not needed.
+    """
     one = g.constant(1.0)
     # A phase of exactly 1 is the end of the cycle, not its start, as in `PfnnPredictor`.
     wrapped = g("Where", g("Equal", "phase", one), "phase", g("Sub", "phase", g("Floor", "phase")))
@@ -59,9 +63,9 @@ def _lookup(g: Graph, mode: str, points: int) -> tuple[str, str]:
     first = g("Min", g("Floor", scaled), last)
     column = g.constant([1], np.int64)
     t = g("Unsqueeze", g("Sub", scaled, first), column)
-    index = g("Unsqueeze", g("Cast", first, to=7), column)
+    index = g("Unsqueeze", g("Cast", first, to=7), column)  # 7 is int64
     if mode == "constant":
-        share = g("Add", g("Sub", t, t), one)
+        share = g("Add", g("Sub", t, t), one)  # 1 in the shape of t
     elif mode == "linear":
         both = g("Add", index, g.constant([[0, 1]], np.int64))
         index = g("Mod", both, g.constant(points, np.int64))
@@ -69,7 +73,8 @@ def _lookup(g: Graph, mode: str, points: int) -> tuple[str, str]:
     else:
         square = g("Mul", t, t)
         powers = g("Concat", g("Add", g("Sub", t, t), one), t, square, g("Mul", square, t), axis=1)
-        # One column for each point: four coefficients, then zeros, rotated to the position of the phase.
+        # A column for each point. The four coefficients stand in the first columns, zeros in the others; then
+        # the columns are turned to the points around the phase.
         table = np.pad(CATMULL_ROM.T, ((0, 0), (0, points - 4)))
         shares = g("MatMul", powers, g.constant(table))
         turned = g("Sub", g.constant([[k + 1 + points for k in range(points)]], np.int64), index)
@@ -79,14 +84,14 @@ def _lookup(g: Graph, mode: str, points: int) -> tuple[str, str]:
 
 def _all_points(g: Graph, w: Array, b: Array, share: str, h: str) -> str:
     """sum_k c_k (W_k h + b_k) over all points, as one product."""
-    points, rows, columns = w.shape
-    side_by_side = g("MatMul", h, g.constant(w.reshape(points * rows, columns).T))
-    each = g("Add", g("Reshape", side_by_side, g.constant([-1, points, rows], np.int64)), g.constant(b))
+    points, outputs, inputs = w.shape
+    side_by_side = g("MatMul", h, g.constant(w.reshape(points * outputs, inputs).T))
+    each = g("Add", g("Reshape", side_by_side, g.constant([-1, points, outputs], np.int64)), g.constant(b))
     return g("ReduceSum", g("Mul", each, share), g.constant([1], np.int64), keepdims=0)
 
 
 def _gathered(g: Graph, w: Array, b: Array, index: str, share: str, h: str) -> str:
-    """The same sum over only the points in `index` (batch, n)."""
+    """Like `_all_points`, but the sum is only over the points in `index` (batch, n)."""
     weights, biases = g("Gather", g.constant(w), index), g("Gather", g.constant(b), index)
     column = g("Unsqueeze", h, g.constant([1, 3], np.int64))
     each = g("Squeeze", g("MatMul", weights, column), g.constant([3], np.int64))

@@ -17,15 +17,17 @@ from hobble.models.stack import Stack, StackPredictor, blend_layers
 if TYPE_CHECKING:
     from hobble.models.pfnn.network import Pfnn
 
-MODES = {"constant": 50, "linear": 10, "cubic": None}  # mode: number of stored phases; None: control points
-BLENDED = {"constant": 1, "linear": 2, "cubic": 4}  # mode: how many of the stored phases it blends
+# Mode -> number of stored phases. None: the control points are stored.
+MODES = {"constant": 50, "linear": 10, "cubic": None}
+BLENDED = {"constant": 1, "linear": 2, "cubic": 4}  # mode -> how many of the stored phases it blends
 
 
 class PfnnPredictor(StackPredictor):
     """A network prepared for one phase mode.
 
     mode: "constant" (50 phases, rounded down), "linear" (10 phases, blended), "cubic" (exact).
-    storage: "float32", or "int16" with a scale for each row: half the memory traffic, poses within 0.1 mm.
+    storage: "float32", or "int16" with a factor for each row: half the memory traffic, joint positions
+    change by less than 0.1 mm.
     """
 
     def __init__(self, network: Pfnn, mode: str = "cubic", storage: str = "float32") -> None:
@@ -72,9 +74,9 @@ def _evaluate(
 @njit(forceinline=True, cache=False)
 def _share(phase: float, blended: int, points: int, shares: Any) -> None:
     """Write the shares of the `blended` (1, 2 or 4) points around `phase` into zeros (points,)."""
-    # A phase of exactly 1 is the end of the cycle, not its start; in constant mode their weights differ.
+    # A phase of exactly 1 is the end of the cycle, not its start. In constant mode the weights differ there.
     wrapped = phase if phase == 1.0 else phase - np.floor(phase)
-    # In single precision, as in the original: .04 * 50 is 2, not just below it.
+    # In single precision, as in the program of Holden et al. (2017): .04 * 50 is 2, not just below it.
     scaled = np.float64(np.float32(wrapped) * np.float32(points)) if blended == 1 else wrapped * points
     first = min(int(scaled), points - 1)
     t = scaled - first

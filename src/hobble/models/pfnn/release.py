@@ -1,4 +1,6 @@
-"""Reads and writes the original release's folder of .bin files, which its ports to other languages can play.
+"""Reads and writes a folder of .bin files, the format in which Holden et al. (2017) released their weights.
+
+Ports of their program to other languages can read it.
 
 W0_000.bin .. W2_049.bin and b0_000.bin .. b2_049.bin hold the weights at phases i / 50. Xmean.bin, Xstd.bin,
 Ymean.bin and Ystd.bin hold the statistics. All are raw little-endian float32, row-major (out, in).
@@ -22,12 +24,12 @@ from hobble.models.pfnn.forward import phase_shares, weights_at
 if TYPE_CHECKING:
     from hobble.models.pfnn.network import Pfnn
 
-PHASES = 50
-CONTROL_POINTS = 4
-MOST_COLUMNS = 1 << 16  # of a row; also units of a layer
-MOST_WEIGHTS = 1 << 21  # in one of the fifty files of a layer; the original's files have 262,144
-# Rounding of single precision weights near 1 stays below it. Weights that are not on our spline differ far
-# more.
+PHASES = 50  # at which the weights are stored, equally spaced over a cycle
+CONTROL_POINTS = 4  # of the splines on which these weights lie
+MOST_COLUMNS = 1 << 16  # largest number of columns of X or Y, and of units of a layer
+MOST_WEIGHTS = 1 << 21  # largest number of weights in a file; the released files have at most 262,144
+# Largest difference of a weight from the spline. Rounding weights near 1 to single precision gives less.
+# Weights that do not lie on such a spline differ by far more.
 LARGEST_RESIDUAL = 1e-4
 
 
@@ -70,16 +72,16 @@ def read_release(folder: str | Path) -> Mapping[str, Array]:
     return arrays
 
 
-def _control_points(folder: Path, name: str, phases: Array) -> Array:
-    """(4, n) control points of weights (50, n)."""
-    if beyond := np.flatnonzero(~(np.abs(phases) <= LARGEST_WEIGHT).all(axis=1)).tolist():
+def _control_points(folder: Path, name: str, values: Array) -> Array:
+    """(4, n) control points of splines with the values (50, n). name: W or b and the number of the layer."""
+    if beyond := np.flatnonzero(~(np.abs(values) <= LARGEST_WEIGHT).all(axis=1)).tolist():
         raise InputError(
             folder / f"{name}_{beyond[0]:03d}.bin",
             f"holds numbers that are not finite or above {LARGEST_WEIGHT:g}",
         )
     shares = phase_shares(np.arange(PHASES) / PHASES, CONTROL_POINTS)
-    points = np.linalg.lstsq(shares, phases.astype(float), rcond=None)[0]
-    residual = float(np.abs(shares @ points - phases).max())
+    points = np.linalg.lstsq(shares, values.astype(float), rcond=None)[0]
+    residual = float(np.abs(shares @ points - values).max())
     if not residual < LARGEST_RESIDUAL:
         raise InputError(
             folder, f"{name} at 50 phases is not a cyclic cubic of 4 control points (off by {residual:.2g})"
@@ -88,7 +90,7 @@ def _control_points(folder: Path, name: str, phases: Array) -> Array:
 
 
 def _read(path: Path, size: int | None = None) -> Array:
-    """The float32 numbers of a file. size: how many there must be; None: any number up to MOST_COLUMNS."""
+    """The float32 numbers of a file. size: how many it must hold; None: any number up to MOST_COLUMNS."""
     data = read_bytes(path, 4 * (MOST_COLUMNS if size is None else size))
     if len(data) % 4 or not data or (size is not None and len(data) != 4 * size):
         raise InputError(path, f"{len(data)} bytes" + (f", expected {4 * size}" if size else ""))

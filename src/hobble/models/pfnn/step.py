@@ -1,12 +1,13 @@
 """Loss and gradient of one batch, written out as three large products for each layer.
 
 e: inputs x of a layer with a 1 appended, times each of the K spline coefficients c, (B, K (in + 1)); W:
-weights and biases, (out, K (in + 1)). d: gradient of the loss by what follows; ' means transposed:
+weights and biases, (out, K (in + 1)); a: outputs, (B, out). dX is the gradient of the loss
+by X, and X' is X transposed:
 
     a = e W'        dW = da' e        de = da W        dx = sum_k c_k de_k
 
-The result equals that of weights blended for each sample, because sum_k c_k (W_k x) = (sum_k c_k W_k) x. It
-takes a fraction of the memory traffic.
+Blending the weights for each sample would give the same result, because sum_k c_k (W_k x) =
+(sum_k c_k W_k) x, but it would take several times the memory traffic.
 """
 
 from __future__ import annotations
@@ -23,10 +24,10 @@ class PfnnStep:
     """The gradient of the mean squared error of a network under dropout, in PyTorch, on any device.
 
     network: the network in training, read at every call.
-    dropout: share of units dropped before each layer, inputs included; the others are scaled up.
+    dropout: share of units dropped before each layer, inputs included; the units kept are scaled up.
     half: round the factors of the products to bfloat16; sums and everything else stay float32.
-    gradients: of the last call, (out, K (in + 1)) for each layer, in bfloat16 with `half`. error: of the last
-    call, (B, Y), prediction minus y.
+    gradients: of the last call, (out, K (in + 1)) for each layer, in bfloat16 with `half`.
+    error: of the last call, (B, Y), prediction minus y.
     """
 
     def __init__(self, network: TrainablePfnn, dropout: float, half: bool = False) -> None:
@@ -72,13 +73,16 @@ class PfnnStep:
         self.generator.manual_seed(seed)
 
     def masks(self, rows: int, own: slice = ALL_ROWS) -> list[Tensor]:
-        """Masks (rows, in) for each layer's inputs: 0 for dropped ones, 1 / keep for the others."""
+        """Draw the dropout masks of `rows` rows, and return those of the rows `own`.
+
+        A mask (rows, in) for each layer: 0 where an input is dropped, else 1 / keep.
+        """
         flat, widths = self.network.flat, self.widths
         drawn = torch.rand(rows, sum(widths), generator=self.generator, device=flat.device)[own]
         return list((drawn < self.keep).to(flat.dtype).mul_(1.0 / self.keep).split(widths, dim=1))
 
     def multiplied(self, name: str, a: Tensor, b: Tensor) -> Tensor:
-        """a @ b.T. name: a name for this product, which other classes use for buffers."""
+        """a @ b.T. name: of this product, for the buffers of the fused step (`hobble.models.fused_base`)."""
         return product(a, b)
 
     def coefficients(self, p: Tensor) -> Tensor:
@@ -88,12 +92,16 @@ class PfnnStep:
     def expanded(self, number: int, x: Tensor, c: Tensor, mask: Tensor) -> tuple[Tensor, Tensor]:
         """Layer `number`'s masked inputs x (B, n), expanded to (B, K (n + 1)), and the slopes (B, n).
 
-        x is the result of an ELU. A slope is the derivative of that ELU times the mask. It follows from x:
-        the derivative is x + 1 where x is below 0, else 1.
+        x is the result of an ELU (in layer 0, the slopes are not used). A slope is the derivative of that
+        ELU times the mask. The derivative is x + 1 where x is below 0, else 1.
         """
         return expand(x * mask, c).to(self.factors.dtype), mask * torch.clamp(x + 1, max=1)
 
     def contracted(self, number: int, de: Tensor, c: Tensor, slope: Tensor) -> Tensor:
-        """The gradient (B, n) before the ELU of layer `number`'s inputs, from de (B, K (n + 1)) after it."""
+        """The gradient (B, n) by the values before the ELU in front of layer `number`.
+
+        de: (B, K (n + 1)) the gradient by the layer's expanded inputs. c: (B, K) spline coefficients. slope:
+        (B, n) from `expanded`.
+        """
         parts = de.to(c.dtype).view(len(c), c.shape[1], -1)[:, :, :-1]
         return torch.bmm(c[:, None, :], parts)[:, 0, :] * slope

@@ -21,8 +21,8 @@ from hobble.rows.mirror_columns import ColumnMirror
 class TrainablePfnn(Trainable):
     """Layers of `sizes` units whose weights and biases are cyclic cubic splines of the phase.
 
-    sizes: units from input to output, such as (342, 512, 512, 311). control_points: K, the knots of the
-    spline, equally spaced over a cycle.
+    sizes: units from input to output, such as (342, 512, 512, 311). control_points: K, how many knots the
+    splines have, equally spaced over a cycle.
     """
 
     kind: ClassVar[str] = "pfnn"
@@ -55,7 +55,7 @@ class TrainablePfnn(Trainable):
         return x
 
     def mirrors(self, inputs: ColumnMirror, outputs: ColumnMirror) -> list[LayerMirror]:
-        """As in `Trainable`. Half a cycle is half of the control points."""
+        """As in `Trainable`. In half a cycle there are half of the control points."""
         return layer_mirrors(inputs, outputs, self.sizes[1:-1], self.control_points // 2)
 
     def step(self, dropout: float, half: bool) -> TrainingStep:
@@ -92,7 +92,7 @@ def parameters(sizes: tuple[int, ...], control_points: int) -> int:
 
 
 def initialise(sizes: tuple[int, ...], control_points: int, seed: int) -> TrainablePfnn:
-    """Weights uniform within +-sqrt(6 / (in * out)), biases 0 (Holden et al. 2017, as released)."""
+    """A new network: weights uniform within +-sqrt(6 / (in * out)), biases 0 (code of Holden et al. 2017)."""
     flat = torch.zeros(parameters(sizes, control_points))
     network = TrainablePfnn(flat, tuple(sizes), control_points)
     uniform_start(network.layers, np.random.default_rng([seed, 0]))
@@ -100,9 +100,9 @@ def initialise(sizes: tuple[int, ...], control_points: int, seed: int) -> Traina
 
 
 def coefficients(p: Tensor, control_points: int) -> Tensor:
-    """(B, K) weights of the control points at phases (B,): the cyclic cubic Catmull-Rom spline.
+    """(B, K) coefficients of the control points at phases (B,), for the cyclic cubic Catmull-Rom spline.
 
-    They sum to 1. At p = k / K only the weight of control point k is not 0.
+    They sum to 1. At p = k / K only the coefficient of control point k is not 0.
     """
     position = torch.remainder(p, 1.0) * control_points
     knot = torch.floor(position)

@@ -1,4 +1,4 @@
-"""A feed-forward network with the phase as input: the baseline that shows the gain of control points."""
+"""A feed-forward network with the phase as input: the baseline for the kind `pfnn`."""
 
 from __future__ import annotations
 

@@ -23,7 +23,7 @@ PHASE_COLUMNS = 2  # inputs after the columns of X: sine and cosine of the phase
 
 @dataclass(frozen=True)
 class Plain(Network):
-    """A feed-forward network. weights: per layer (out, in) float32; biases: (out,).
+    """A feed-forward network. weights: (out, in) float32 for each layer; biases: (out,) for each layer.
 
     The first layer gets X and PHASE_COLUMNS more inputs.
     """
@@ -80,12 +80,13 @@ class Plain(Network):
 
     @property
     def exports(self) -> dict[str, Export]:
-        """ONNX."""
+        """The format "onnx"."""
 
         def onnx(target: Path, mode: str) -> str:
             from hobble.models.plain.onnx_export import write_checked
 
-            return f"{target}: within {write_checked(target, self):.1g} of the runtime"
+            difference = write_checked(target, self)
+            return f"{target}: differs from Hobble's runtime by at most {difference:.1g}"
 
         return {"onnx": onnx}
 

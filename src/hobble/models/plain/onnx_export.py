@@ -11,7 +11,7 @@ from hobble.models.plain.network import Plain
 
 
 def write_checked(path: str | Path, network: Plain) -> float:
-    """As `hobble.models.onnx_file.write`."""
+    """Write and check the file. Returns the largest difference, see `hobble.models.onnx_file.check`."""
 
     def body(g: Graph, z: str) -> str:
         angle = g("Unsqueeze", g("Mul", "phase", g.constant(2 * np.pi)), g.constant([1], np.int64))

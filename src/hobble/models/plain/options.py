@@ -1,4 +1,4 @@
-"""The keys of a configuration's `network` section for kind plain."""
+"""The keys of a configuration's `network` section for the kind `plain`."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from hobble.models.options import Options
 
 
 class PlainOptions(Options):
-    """A feed-forward network with the sizes of the phase-functioned one."""
+    """A feed-forward network with the same layer sizes as the phase-functioned network."""
 
     kind: Literal["plain"] = "plain"
     hidden_layers: Annotated[int, Field(ge=1, le=8)] = 2
@@ -18,7 +18,7 @@ class PlainOptions(Options):
 
     @property
     def why_asymmetric(self) -> str:
-        """As in `Options`."""
+        """As in `Options`: empty, because it can always be trained symmetrically."""
         return ""
 
     @property

@@ -27,13 +27,13 @@ class TrainablePlain(Trainable):
     """
 
     kind: ClassVar[str] = "plain"
-    control_points: ClassVar[int] = 1  # sets of weights, under the name that the step of `pfnn` reads
+    control_points: ClassVar[int] = 1  # one set of weights; the step of `pfnn` reads this field
 
     units: tuple[int, ...]
 
     @property
     def sizes(self) -> tuple[int, ...]:
-        """Inputs of each layer, with those of the phase, then the outputs."""
+        """Number of inputs of each layer, the phase's included, then the number of outputs."""
         return (self.units[0] + PHASE_COLUMNS, *self.units[1:])
 
     @property
@@ -61,14 +61,14 @@ class TrainablePlain(Trainable):
         return x
 
     def mirrors(self, inputs: ColumnMirror, outputs: ColumnMirror) -> list[LayerMirror]:
-        """As in `Trainable`. Half a cycle later, sine and cosine of the phase have the other sign."""
+        """As in `Trainable`. Half a cycle later, sine and cosine of the phase have the opposite sign."""
         phase = np.arange(PHASE_COLUMNS)
-        with_phase = ColumnMirror(
+        extended = ColumnMirror(
             np.append(inputs.source, len(inputs.source) + phase),
             np.append(inputs.sign, -np.ones(PHASE_COLUMNS)),
             np.append(inputs.shift, np.zeros(PHASE_COLUMNS)),
         )
-        return layer_mirrors(with_phase, outputs, self.units[1:-1], 0)
+        return layer_mirrors(extended, outputs, self.units[1:-1], 0)
 
     def step(self, dropout: float, half: bool) -> TrainingStep:
         """Compiled loops on a CPU, PyTorch elsewhere."""
@@ -99,14 +99,14 @@ class TrainablePlain(Trainable):
 
 
 class _WithPhase:
-    """Appends sine and cosine of the phase to the inputs of a step with one set of weights."""
+    """A base class that appends sine and cosine of the phase to the inputs of a training step."""
 
     def __call__(self, x: Tensor, y: Tensor, p: Tensor, masks: list[Tensor]) -> Tensor:
         """As in `TrainingStep`."""
         return super().__call__(with_phase(x, p), y, p, masks)  # type: ignore[misc]
 
     def masks(self, rows: int, own: slice = ALL_ROWS) -> list[Tensor]:
-        """As in `TrainingStep`, but dropout never drops the phase, because it cannot do so in `pfnn`."""
+        """As in `TrainingStep`, but the phase is never dropped. In `pfnn` it is not dropped either."""
         masks: list[Tensor] = super().masks(rows, own)  # type: ignore[misc]
         masks[0][:, -PHASE_COLUMNS:] = 1
         return masks
@@ -137,7 +137,7 @@ def shapes(units: tuple[int, ...]) -> list[tuple[int, int, int]]:
 
 
 def initialise(units: tuple[int, ...], seed: int) -> TrainablePlain:
-    """Weights uniform within +-sqrt(6 / (in * out)), biases 0, as those of the phase-functioned network."""
+    """A new network: weights uniform within +-sqrt(6 / (in * out)), biases 0, as in `pfnn`."""
     network = TrainablePlain(torch.zeros(sum(map(prod, shapes(units)))), units)
     uniform_start(network.layers, np.random.default_rng([seed, 0]))
     return network

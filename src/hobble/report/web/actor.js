@@ -5,12 +5,12 @@ import { drawInputs } from "./inputs.js";
 import { createLab } from "./lab.js";
 import { channelColour } from "./paint.js";
 import { createRig } from "./rig.js";
-import { keyed, placed } from "./sliders.js";
+import { bodyChannel, keyed } from "./sliders.js";
 
 const KEPT = 1200; // frames that can be saved as motion
 
 export const createActor = (view, spec, { place = [0, 0], tint = null, ghost = false } = {}) => {
-  const figure = createFigure(view, spec.body, placed(spec)?.regions || [], { ghost }), rig = createRig(spec), stood = [false, false];
+  const figure = createFigure(view, spec.body, bodyChannel(spec)?.regions || [], { ghost }), rig = createRig(spec), stood = [false, false];
   const lab = createLab(spec.legs), actor = { spec, figure, rig, lab, place, watch: null, falls: 0, milliseconds: 0, frames: [] };
   let trail = [], floor = () => 0;
 
@@ -56,7 +56,7 @@ export const createActor = (view, spec, { place = [0, 0], tint = null, ghost = f
   };
   // withPath: whether the past and the predicted path are drawn on the ground. If it is null, footprints are not drawn either.
   actor.draw = (withPath = true) => {
-    const c = actor.character, { paint } = view, plain = tint ? paint[tint] : paint.body, one = placed(spec);
+    const c = actor.character, { paint } = view, plain = tint ? paint[tint] : paint.body, one = bodyChannel(spec);
     drawGround(withPath);
     if (view.inputs) drawInputs(view, c, spec);
     figure.take(rig);
@@ -69,7 +69,7 @@ export const createActor = (view, spec, { place = [0, 0], tint = null, ghost = f
   // body. deep: distance from the camera.
   actor.under = (x, y) => {
     const found = figure.under(x, y);
-    return found && { deep: found.deep, columns: found.links.map((l) => placed(spec).columns[l]) };
+    return found && { deep: found.deep, columns: found.links.map((l) => bodyChannel(spec).columns[l]) };
   };
   return actor;
 };

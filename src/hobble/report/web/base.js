@@ -8,7 +8,7 @@ export const material = Object.defineProperties({}, Object.fromEntries(PARTS.map
   return [part, { get, enumerable: true }];
 })));
 
-// Called when the colours change.
+// Functions to call when the colours change.
 export const onTheme = [];
 
 export const find = (id) => document.getElementById(id);

@@ -1,5 +1,5 @@
 // The controller of `hobble.runtime` in JavaScript, for one character. It has the same steps in the same order, so the
-// same test data check both. Centimetres, 60 Hz; yaw 0 faces +Z and grows toward +X.
+// same test data check both languages. Centimetres, 60 Hz; yaw 0 faces +Z and grows toward +X.
 import { networks } from "networks"; // kind -> createNetwork; made by `bundle.networks_module` from the folders of hobble.models
 import { createFeet } from "./feet.js";
 import { bytes } from "./numbers.js";
@@ -40,6 +40,7 @@ export const createCharacter = (spec, place = [0, 0], heading = 0) => {
     for (const point of c.legShown.flat()) { point[0] += by[0]; point[2] += by[1]; }
     c.root = [c.root[0] + by[0], c.root[1], c.root[2] + by[1]];
   };
+  // Runs one frame toward a target (see targets.js). ground(x, z): height in cm.
   c.frame = (velocity, facing, gait, ground) => {
     const [strafe, direction] = targets.facing(velocity, facing), share = targets.shares(velocity, direction, gait);
     velocity = targets.hold(velocity, share);

@@ -1,6 +1,6 @@
 // A dial from 0 to `most`: an arc that is turned by dragging, by keys, or by a click on it.
 const NS = "http://www.w3.org/2000/svg";
-const FROM = -130, SWEEP = 260, R = 46; // degrees from the top, clockwise; radius in the dial's own units
+const FROM = -130, SWEEP = 260, R = 46; // FROM, SWEEP: where the arc starts and how far it goes, degrees clockwise from the top; R: radius, units of the viewBox
 
 const point = (turn) => {
   const angle = (FROM + SWEEP * turn - 90) * Math.PI / 180;

@@ -7,12 +7,12 @@ import { firstShown, keyed } from "./sliders.js";
 import { createView } from "./view.js";
 
 const GHOST_OFFSET = -84; // cm from the figure to the transparent one; negative: to the right of the figure
-const MOST_AHEAD = 120; // cm that the transparent one may get ahead before it is moved back
-const FADE = 24; // frames in which it fades out, and in
+const MOST_AHEAD = 120; // cm that the transparent one may get ahead or behind before it is moved back
+const FADE = 24; // frames that it takes to fade out before this move, and to fade in after it
 const SPEED = 2.5; // target speed, cm per frame
 
 const createHero = (spec, opening) => {
-  const section = find("hero"), canvas = find("hero-view"), line = find("hero-line"), still = find("hero-walk");
+  const section = find("hero"), canvas = find("hero-view"), line = find("hero-line"), button = find("hero-walk");
   const one = firstShown(spec), labels = one ? Object.keys(one.sliders) : [];
   const values = new Map(), neutralValues = new Map(), flat = () => 0, hero = { frames: 0 };
   let drawn;
@@ -118,10 +118,10 @@ const createHero = (spec, opening) => {
     hurt();
   }
   const rest = () => {
-    still.textContent = walks ? "Pause" : "Walk";
-    still.setAttribute("aria-pressed", String(!walks));
+    button.textContent = walks ? "Pause" : "Walk";
+    button.setAttribute("aria-pressed", String(!walks));
   };
-  still.addEventListener("click", () => { walks = !walks; last = null; rest(); view.ask(); });
+  button.addEventListener("click", () => { walks = !walks; last = null; rest(); view.ask(); });
   rest();
 
   // The page contains the states of figures that already walk, because predicting their first steps here would take long.

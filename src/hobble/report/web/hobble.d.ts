@@ -7,7 +7,7 @@ export interface CharacterData { spec: object; body: object }
 export interface Target {
   /** How far to go in this frame, [x, z] in cm: 2.5 walks, 7 jogs. */
   velocity?: [number, number];
-  /** Where to look, [x, z], of any length; null looks where it goes. */
+  /** Where to look, [x, z], of any length; null: in the direction of the velocity. */
   facing?: [number, number] | null;
   /** One of `gaits`; null chooses by speed. */
   gait?: string | null;
@@ -38,5 +38,5 @@ export interface Character {
 
 export interface Figure { mesh: Three.SkinnedMesh; pose(character: Character): void }
 
-export function createCharacter(data: CharacterData, stand?: { place?: [number, number]; heading?: number }): Character;
+export function createCharacter(data: CharacterData, start?: { place?: [number, number]; heading?: number }): Character;
 export function createFigure(THREE: typeof Three, data: CharacterData, material?: Three.Material): Figure;

@@ -1,4 +1,4 @@
-// The report's page. `Hobble` gives access to its parts from the browser's console and from the tests.
+// Starts the parts of the page. `Hobble` gives access to them from the browser's console and from the tests.
 import { colour, material } from "./base.js";
 import { bvh } from "./bvh.js";
 import { openClip, startCaptured } from "./captured.js";

@@ -1,6 +1,6 @@
 // Draws inputs of the network in Play: ground heights and joint velocities.
-const AHEAD = 8; // frames of movement that a line shows
-const LEAST = .15; // cm a frame; slower joints have no line
+const AHEAD = 8; // frames of movement that a needle shows
+const LEAST = .15; // cm a frame; slower joints have no needle
 
 // The ground samples of the network's input: along the past and future path and to both sides of it. above: cm above the
 // mean height of the path.
@@ -15,7 +15,7 @@ export const groundSamples = (c, spec) => {
   return out;
 };
 
-// Lines from where the joints are to where they would be in AHEAD frames.
+// Needles from where the joints are to where they would be in AHEAD frames.
 export const jointVelocities = (c) => {
   const out = [];
   for (let j = 0; j < c.jointVelocity.length; j += 3) {

@@ -1,10 +1,10 @@
-// The ground around the point that the camera looks at. It has a grid of one metre, is darker under bodies and fades out
-// far away.
+// The ground around the point that the camera looks at. It has a grid of one metre and a fainter one of 25 cm. It is
+// darker under bodies and fades out far away.
 import { BufferAttribute, BufferGeometry, Color, Mesh, MeshLambertMaterial, Vector4 } from "three";
 import { linear } from "./paint.js";
 
 const REACH = 1100; // cm from the middle to the edge
-const STEP = 12.5;
+const STEP = 12.5; // cm between two heights of uneven ground
 const BALLS = 24; // most round parts of bodies that darken the ground
 
 const geometryOf = (place, index) => {
@@ -13,6 +13,7 @@ const geometryOf = (place, index) => {
   geometry.setIndex(index);
   return geometry;
 };
+// A flat grid of n by n corners, to be given heights.
 const sheet = (n) => {
   const index = [];
   for (let i = 0; i + 1 < n; i++) {

@@ -23,7 +23,7 @@ export const createCharacter = (data, { place = [0, 0], heading = 0 } = {}) => {
     if (!one) throw new RangeError(`no channel ${name}; there are: ${spec.channels.map((channel) => channel.name).join(", ") || "none"}`);
     for (const [column, much] of Object.entries(values)) {
       if (!one.trained.includes(column)) throw new RangeError(`${name}: ${column} was not trained; there are: ${one.trained.join(", ")}`);
-      if (!(much >= 0 && much <= one.highest)) throw new RangeError(`${name}: ${column} is ${much}, but it is a number from 0 to ${one.highest}`);
+      if (!(much >= 0 && much <= one.highest)) throw new RangeError(`${name}: ${column} is ${much}, but it must be a number from 0 to ${one.highest}`);
     }
     one.columns.forEach((column, l) => { c.channelTargets[one.first + l] = (values[column] || 0) / one.scale; });
   };

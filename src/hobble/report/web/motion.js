@@ -2,7 +2,7 @@
 import { bytes } from "./numbers.js";
 import { mixTurn } from "./turns.js";
 
-const TURN = 32767; // steps of a component of a rotation
+const TURN = 32767; // a component of a rotation that is 1 is stored as this integer
 
 // root, pose, turn: from `hobble.report.scenes.packed_motion`. B: number of bones. unit: cm of a step of `pose`.
 export const createMotion = ({ root, pose, turn }, B, unit) => {

@@ -33,7 +33,7 @@ export const startPage = () => {
     opened.forEach((details) => { details.open = true; });
     recolour();
     drawAll();
-    views.forEach((drawn) => drawn());
+    views.forEach((draw) => draw());
   });
   addEventListener("afterprint", () => {
     opened.forEach((details) => { details.open = false; });

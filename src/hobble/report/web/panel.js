@@ -51,7 +51,7 @@ export const createPanel = (host, actor, title = "") => {
   let judged = 0;
   if (looks) {
     actor.watch = createWatch(spec);
-    looks.title = "A recogniser trained on recordings of people who limp compares this walk with the healthy walk of the same figure. It does not know what hurts.";
+    looks.title = "A recogniser trained on recordings of people who limp compares this walk with the healthy walk of the same figure. It is not told what hurts.";
   }
 
   return {

@@ -8,7 +8,7 @@ import { film } from "./film.js";
 import { GROUNDS } from "./grounds.js";
 import { createPanel } from "./panel.js";
 import { createSteering } from "./steering.js";
-import { createSliders, placed } from "./sliders.js";
+import { bodyChannel, createSliders } from "./sliders.js";
 import { createView } from "./view.js";
 
 const START = { yaw: 3.9, pitch: .2, distance: 430 };
@@ -96,7 +96,7 @@ const createPlay = (stage, playables) => {
     const hits = player.actors.map((actor) => ({ actor, found: actor.under(event.offsetX, event.offsetY) })).filter(({ found }) => found);
     if (!hits.length) return;
     const { actor, found } = hits.reduce((best, hit) => (hit.found.deep < best.found.deep ? hit : best));
-    const one = placed(actor.spec);
+    const one = bodyChannel(actor.spec);
     if (!one) return;
     const felt = found.columns.filter((column) => one.trained.includes(column)); // others have no effect
     if (felt.length) sliders.more(one, felt.at(-1), event.shiftKey || heals ? -1 : 1);

@@ -91,8 +91,8 @@ export const createGrader = (learnt) => {
   };
 };
 
-// Recognises the limp of the played character. add(places): adds a frame. say(): the answer for the last SECONDS, {text, share},
-// or {text} if there is none.
+// Recognises the limp of the played character. add(places): adds a frame. say(): the answer for the last SECONDS, {text, share} with
+// its probability `share`, or, without an answer, {text} with the reason.
 export const createWatch = (spec) => {
   const { learnt, healthy } = spec.recogniser, grade = createGrader(learnt), most = 60 * SECONDS;
   let frames = [];

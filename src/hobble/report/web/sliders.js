@@ -3,14 +3,14 @@ import { find } from "./base.js";
 
 export const keyed = (one, column) => `${one.name}/${column}`;
 // The channel with parts of the body, if there is one.
-export const placed = (spec) => spec.channels.find((one) => one.regions.length);
+export const bodyChannel = (spec) => spec.channels.find((one) => one.regions.length);
 // The channel that the top of the page shows: one with parts of the body, else the first with a slider.
 export const firstShown = (spec) => {
   const some = spec.channels.filter((one) => Object.keys(one.sliders).length);
   return some.find((one) => one.regions.length) || some[0];
 };
 
-// specs: those of the played characters, which may have different channels. changed(): called after every change.
+// specs: data of the played characters, which may have different channels. changed(): called after every change.
 export const createSliders = (specs, changed) => {
   const channels = [];
   for (const one of specs.flatMap((spec) => spec.channels)) { // if channels have the same name, take the one with most trained columns

@@ -1,16 +1,18 @@
-// Converts targets like those of `ProceduralAnimation.next_pose`: velocity [x, z], facing [x, z] or null, gait or null. Applies the limits
-// of a hurt body, as in `hobble.runtime.limits`: a highest speed, and a walk instead of a jog if the body cannot jog.
+// Converts the targets of `ProceduralAnimation.next_pose` (velocity [x, z], facing [x, z] or null, gait or null) for the trajectory.
+// Applies the limits of a hurt body, as in `hobble.runtime.limits`: a highest speed, and a walk instead of a jog if the body cannot jog.
 import { wrap } from "./numbers.js";
 
 export const createTargets = (spec, c) => {
   const { gaits, constants: k } = spec, M = spec.window, G = gaits.length, { atan2, hypot, min, max, abs } = Math;
 
+  // [share of strafing from 0 to 1, direction [x, z] in which to look]
   const facing = (velocity, ahead) => {
     const going = hypot(...velocity) >= k.still;
     if (!ahead) return [0, going ? velocity : c.smoothedDirection];
     const aside = abs(wrap(atan2(...velocity) - atan2(...ahead)));
     return [going ? min(1, aside / k.strafeFrom) : 1, ahead];
   };
+  // The share of each gait.
   const shares = (velocity, direction, gait) => {
     const out = new Array(G).fill(0), speed = hypot(...velocity), name = gait || (speed >= k.jogFrom ? "jog" : "walk");
     if (speed < k.still) {
@@ -26,9 +28,10 @@ export const createTargets = (spec, c) => {
   };
 
   const limited = spec.channels.filter((one) => one.limits);
+  // The highest speed in gait g, cm a frame, under the limits of all channels, as in `together` of `hobble.channels.speed_limits`.
   const allowed = (g) => {
-    let least = Infinity, both = limited[0].limits.usual[g];
-    const usual = both;
+    let least = Infinity, slowed = limited[0].limits.usual[g];
+    const usual = slowed;
     for (const { first, limits } of limited) {
       const { levels, speeds } = limits;
       let most = Infinity;
@@ -41,10 +44,11 @@ export const createTargets = (spec, c) => {
         most = min(most, low + (v - levels[i]) / (levels[i + 1] - levels[i]) * (high - low));
       }
       least = min(least, most);
-      if (usual > 0) both *= min(1, most / usual);
+      if (usual > 0) slowed *= min(1, most / usual);
     }
-    return least < usual ? both : least;
+    return least < usual ? slowed : least;
   };
+  // The velocity within the limits. Changes the shares of gaits in `gait` if the body cannot jog.
   const hold = (velocity, gait) => {
     if (!limited.some(({ first, columns: own }) => own.some((_, l) => c.channelValues[first + l] > 0))) return velocity;
     const each = gaits.map((_, g) => allowed(g)), walk = gaits.indexOf("walk"), jog = gaits.indexOf("jog");

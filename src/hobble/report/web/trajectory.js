@@ -75,8 +75,8 @@ export const createTrajectory = (spec, c) => {
     }
   };
 
-  // The movement [a, b] of the root without half of its part against the target, or, while the target is to stand, without half of
-  // all movement.
+  // The movement [a, b] of the root. With steering, and without motion matching, its part against the target is halved. While the
+  // target is to stand, the whole movement is halved.
   const limited = (a, b, target) => {
     const loss = spec.steering > 0 && !spec.recordedPoses ? k.backwardLoss : 0, squared = target[0] ** 2 + target[1] ** 2;
     if (squared < k.still ** 2) return [(1 - loss) * a, (1 - loss) * b];

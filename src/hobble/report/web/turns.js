@@ -17,7 +17,8 @@ export const between = (a, b) => {
 export const at4 = (array, j) => [array[4 * j], array[4 * j + 1], array[4 * j + 2], array[4 * j + 3]];
 export const at3 = (array, j) => [array[3 * j], array[3 * j + 1], array[3 * j + 2]];
 
-// Writes into `out` (at `o`) the rotation between that of `a` (at `i`, t = 0) and that of `b` (at `k`, t = 1), along the shorter way.
+// Interpolates along the shorter way from the rotation at `i` of `a` (t = 0) to the rotation at `k` of `b` (t = 1). Writes the result
+// into `out` at `o`.
 export const mixTurn = (a, i, b, k, t, out, o) => {
   const near = a[i] * b[k] + a[i + 1] * b[k + 1] + a[i + 2] * b[k + 2] + a[i + 3] * b[k + 3] < 0 ? -t : t;
   let n = 0;

@@ -21,7 +21,7 @@ const requested = new URLSearchParams(location.search).get("quality");
 let level = 0, slow = 0;
 
 let renderer = null;
-// first: the canvas of the first view, whose size is the first size of the picture.
+// The renderer, false without WebGL. first: the canvas of the view that is drawn first; the renderer's canvas gets its size.
 const shared = (first) => {
   if (renderer === null) {
     try {

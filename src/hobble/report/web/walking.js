@@ -52,7 +52,7 @@ export const startWalks = () => {
     return out;
   };
   const flat = ([x, , z]) => [x, 0, z];
-  // The value of the swept column, as a share of its highest.
+  // The value of the swept column, which rises during the walk, as a share of its highest value.
   const share = (s, frame) => (s.values ? s.values[frame] / 250 : 0);
 
   // Drawing

@@ -1,10 +1,10 @@
-"""Write injury files from a table of clips, links and severities.
+"""Write status files, which say what hurts in each clip, from a table of clips, links and severities.
 
 hobble injury TABLE.csv FOLDER
 
-TABLE.csv has the columns clip, link, severity, from, to. `from` and `to` are frames of the clip's file,
-counted from 1. If they are empty, they are its first and its last frame. A file CLIP_injuries.txt is written
-beside each clip in FOLDER, where the workflow reads it.
+TABLE.csv has the columns clip, link (such as LeftLeg-LeftFoot), severity, from, to. `from` and `to` are
+frames of the clip's file, counted from 1. An empty `from` means the first frame, an empty `to` the last. A
+file CLIP_injuries.txt is written beside each clip in FOLDER, where the workflow reads it.
 """
 
 from __future__ import annotations

@@ -1,10 +1,11 @@
-"""Write tables III to XVI of the injury study of Ferre (2019) from the answers to its questionnaire.
+"""Write tables of the answers to our questionnaire, numbered III to XVI as in the study of Ferre (2019).
 
 hobble study results/limp/questionnaire/films.json ANSWERS.json ... --out FOLDER
 
-The page results/<configuration>/questionnaire/questionnaire.html saves a file of answers for each person.
-This writes a table for each film (how many people ticked each part of the body), a table for all films, and
-tables.md with all tables.
+People see films of a hurt character and tick the parts of the body that hurt. The page
+results/<configuration>/questionnaire/questionnaire.html saves a file of answers for each person. The command
+writes a table for each film (how many people ticked each part of the body), a table for all
+films, and tables.md with all tables.
 """
 
 from __future__ import annotations
@@ -22,7 +23,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the arguments of `hobble study`."""
     parser.add_argument("films", type=Path, help="films.json beside the questionnaire")
     parser.add_argument(
-        "answers", type=Path, nargs="+", help="files that the page saved, one for each person"
+        "answers", type=Path, nargs="+", help="files that the questionnaire saved, one for each person"
     )
     parser.add_argument(
         "--out", type=Path, default=Path("tables"), help="folder to write the tables into (default tables)"
@@ -33,12 +34,12 @@ def run(options: argparse.Namespace) -> int:
     """Write the tables and print the result over all films. Returns the exit status."""
     study = read_study(options.films)
     people = [read_answers(path, study) for path in options.answers]
-    theirs = read_yaml(PUBLISHED)["recognition"]["share"]
-    write_tables(options.out, study, tables(study, people), theirs)
-    film = {film.number: film for film in study.films}
-    all_of = scores([(film[answer.film], answer) for some in people for answer in some])
-    print(f"{len(people)} people, {all_of['answers']} answers. Tables: {options.out}/tables.md")
-    seen, sides = (100 * all_of[key] for key in ("seen", "seen_without_side"))
-    print(f"Parts that hurt and were ticked: {seen:.0f} %, without side {sides:.0f} %", end=" ")
-    print(f"(Ferre 2019: {100 * theirs:.0f} %). Fluid: {all_of['fluid']:.2f} of 5.")
+    published = read_yaml(PUBLISHED)["recognition"]["share"]
+    write_tables(options.out, study, tables(study, people), published)
+    films = {film.number: film for film in study.films}
+    overall = scores([(films[answer.film], answer) for answers in people for answer in answers])
+    print(f"{len(people)} people, {overall['answers']} answers. Tables: {options.out}/tables.md")
+    seen, sides = (100 * overall[key] for key in ("seen", "seen_without_side"))
+    print(f"Hurt parts that were ticked: {seen:.0f} % (Ferre 2019: {100 * published:.0f} %),", end=" ")
+    print(f"{sides:.0f} % if left and right count as the same. Fluid: {overall['fluid']:.2f} of 5.")
     return 0

@@ -1,4 +1,4 @@
-"""Measures the limp of each link: its size beside people's limps, and whether recognisers see it."""
+"""Measures the limp that each hurt link causes: its size beside people's limps, and if it is recognised."""
 
 from __future__ import annotations
 

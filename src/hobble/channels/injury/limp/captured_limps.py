@@ -1,4 +1,7 @@
-"""The walking of captured clips, hurt or healthy, and for how long each link hurts in the training clips."""
+"""The walks in captured clips, hurt or healthy, and for how long each link hurts in the training clips.
+
+A link is a pair of neighbouring joints. It has one severity.
+"""
 
 from __future__ import annotations
 
@@ -20,16 +23,18 @@ from hobble.gait.profile import Profile, profile
 from hobble.measures.clip_parts import ClipPart
 from hobble.rows.clip_rows import ClipRows
 
-VERSION = re.compile(r"_hurt[1-9](_mirror)?$")  # end of the name of a generated hurt version
-MIRROR = "_mirror"
-PERFORMER = re.compile(r"^([^_]+)_")  # "105" in "105_25"
+# End of the name of a hurt version of a healthy clip, which is generated.
+HURT_VERSION = re.compile(r"_hurt[1-9](_mirror)?$")
+MIRROR = "_mirror"  # end of the name of a mirrored clip
+PERFORMER = re.compile(r"^([^_]+)_")  # in a clip's name: "105" in "105_25"
 
 
 @dataclass(frozen=True)
 class CapturedWalk:
-    """The walking of one captured clip whose severities do not change.
+    """The walk in one captured clip whose severities do not change.
 
-    hurt: link -> severity, of links that hurt. walk: its cycles. speed: mean, cm a frame.
+    clip: its name. hurt: link -> severity, for the links that hurt. walk: the gait cycles. speed: mean speed,
+    cm a frame.
     """
 
     clip: str
@@ -50,9 +55,10 @@ class CapturedWalk:
 
 @dataclass
 class HurtSeconds:
-    """Link -> seconds in which it hurts in the training clips.
+    """For how many seconds of the training clips each link hurts.
 
-    captured: in captured motion. generated: in hurt versions that were generated from healthy clips.
+    captured: link -> seconds of captured motion. generated: link -> seconds of hurt versions, which were
+    generated from healthy clips.
     """
 
     captured: dict[str, float] = field(default_factory=dict)
@@ -67,19 +73,19 @@ def captured_walks(
     parts: the parts of the clips to read, sorted by clip. If they are only a sample, the seconds are
     estimates. splits: clip -> "train" or "held_out".
     """
-    found, hurt_seconds = [], HurtSeconds()
-    for clip, some in groupby(parts, key=lambda one: one.clip):
-        is_generated = VERSION.search(clip) is not None
-        seen: list[ClipRows] = []
-        for one in some:
-            rows = one.load().rows
+    walks, hurt_seconds = [], HurtSeconds()
+    for clip, parts_of_clip in groupby(parts, key=lambda part: part.clip):
+        is_generated = HURT_VERSION.search(clip) is not None
+        rows_of_clip: list[ClipRows] = []
+        for part in parts_of_clip:
+            rows = part.load().rows
             if splits.get(clip) == "train":
                 of_links = hurt_seconds.generated if is_generated else hurt_seconds.captured
-                _add_seconds(of_links, links, rows.channels.get(INJURY), one.weight)
+                _add_seconds(of_links, links, rows.channels.get(INJURY), part.weight)
             if not is_generated:
-                seen.append(rows)
-        found += _walked(clip, seen, links, skeleton)
-    return found, hurt_seconds
+                rows_of_clip.append(rows)
+        walks += _walk_of_clip(clip, rows_of_clip, links, skeleton)
+    return walks, hurt_seconds
 
 
 def _add_seconds(
@@ -87,7 +93,8 @@ def _add_seconds(
 ) -> None:
     """Add the seconds for which each link hurts to `of_links`.
 
-    severity: (R, links). weight: how many rows of the clip each row stands for.
+    severity: (R, links) of R rows; None if the clip has no severities. weight: how many rows of the clip each
+    of these rows stands for.
     """
     for link, column in zip(links, () if severity is None else severity.T, strict=False):
         if column.any():
@@ -95,41 +102,44 @@ def _add_seconds(
 
 
 def healthy_of(walk: CapturedWalk, walks: Sequence[CapturedWalk]) -> tuple[Profile, str]:
-    """The healthy walk to compare a clip with, and whose it is.
+    """The healthy walk to compare a clip with, and whose walk it is.
 
-    It is the performer's ("performer"). If the data set has none, it is that of all its healthy clips ("data
-    set"), and if there are none, the mean walk of the people in `hobble.gait.people` ("people").
+    The performer's healthy clips are used ("performer"). If there are none, all healthy clips of the data set
+    are used ("data set"). If there are none either, it is the mean normal walk in `hobble.gait.people`
+    ("people").
     """
     healthy = [one for one in walks if not one.hurt and len(one.walk)]
-    own = [one for one in healthy if one.performer == walk.performer]
-    for some, whose in ((own, "performer"), (healthy, "data set")):
-        if some:
-            return profile(joined(one.walk for one in some)), whose
+    of_performer = [one for one in healthy if one.performer == walk.performer]
+    for chosen, whose in ((of_performer, "performer"), (healthy, "data set")):
+        if chosen:
+            return profile(joined(one.walk for one in chosen)), whose
     return people().normal(), "people"
 
 
-def _walked(
-    clip: str, seen: Sequence[ClipRows], links: Sequence[str], skeleton: Skeleton
+def _walk_of_clip(
+    clip: str, rows_of_clip: Sequence[ClipRows], links: Sequence[str], skeleton: Skeleton
 ) -> list[CapturedWalk]:
-    """The walking of a clip, in a list. It is empty if severities change or no whole cycle is walked.
+    """The walk of a clip as a list of one; empty if severities change or no whole cycle is walked.
 
-    seen: the clip's rows, or excerpts of them.
+    rows_of_clip: all rows of the clip in one item, or an item for each excerpt.
     """
-    seen = [rows for rows in seen if len(rows)]
-    if not seen:
+    rows_of_clip = [rows for rows in rows_of_clip if len(rows)]
+    if not rows_of_clip:
         return []
-    severity = np.concatenate([rows.channels.get(INJURY, np.zeros((len(rows), len(links)))) for rows in seen])
+    severity = np.concatenate(
+        [rows.channels.get(INJURY, np.zeros((len(rows), len(links)))) for rows in rows_of_clip]
+    )
     if np.ptp(severity, axis=0).any():
         return []
     walks, speeds = [], []
-    for rows in seen:
+    for rows in rows_of_clip:
         turn = rows.y[:, rows.layout.y_turn][:, 0].astype(float)
-        for part in captured(rows):
-            if part.gait.mean(axis=0).argmax() != 1:  # not a walk
+        for stretch in captured(rows):
+            if stretch.gait.mean(axis=0).argmax() != 1:  # gait 1 is walking
                 continue
-            yaw = np.concatenate([[0.0], -np.cumsum(turn[part.rows])[:-1]])
-            walks.append(measure(skeleton, _placed(part.local, part.root, yaw), FPS))
-            speeds.append(np.hypot(part.velocity[:, 0], part.velocity[:, 1]).mean())
+            yaw = np.concatenate([[0.0], -np.cumsum(turn[stretch.rows])[:-1]])
+            walks.append(measure(skeleton, _in_world(stretch.local, stretch.root, yaw), FPS))
+            speeds.append(np.hypot(stretch.velocity[:, 0], stretch.velocity[:, 1]).mean())
     walk = joined(walks) if walks else WalkCycles(FPS, (), ())
     if not len(walk):
         return []
@@ -137,8 +147,11 @@ def _walked(
     return [CapturedWalk(clip, hurt, walk, float(np.mean(speeds)))]
 
 
-def _placed(local: Array, root: Array, yaw: Array) -> Array:
-    """(F, J, 3) positions in the world. local: (F, J, 3) seen from `root` (F, 3), turned by `yaw` (F,)."""
+def _in_world(local: Array, root: Array, yaw: Array) -> Array:
+    """(F, J, 3) positions in the world, from `local` (F, J, 3) in root coordinates.
+
+    root: (F, 3) position of the root. yaw: (F,) its rotation about the vertical, radians.
+    """
     out = local.copy()
     out[..., ::2] = rotate_by_yaw(local[..., ::2], yaw[:, None])
     return out + root[:, None]

@@ -1,4 +1,7 @@
-"""Lets a crowd of figures walk, each with its own injury, and measures the cycles of each figure."""
+"""Lets a crowd of figures walk, each with its own injury, and measures the gait cycles of each figure.
+
+A figure is a copy of the character.
+"""
 
 from __future__ import annotations
 
@@ -16,16 +19,15 @@ from hobble.models.network import Network
 from hobble.runtime.animation import ProceduralAnimation
 from hobble.runtime.options import Runtime
 
-BEGIN = 5 * FPS  # frames before the measurement, in which figures reach their speed and start to limp
-STANDING = 0.1  # cm a frame; slower figures stand
+WARM_UP = 5 * FPS  # frames before the measurement, in which figures reach their speed and start to limp
 
 
 @dataclass(frozen=True)
 class FigureWalk:
     """The walk of one figure.
 
-    walk: its cycles. profile: their profile, None without a cycle. speed: mean, cm a frame. frames: its
-    length.
+    walk: its gait cycles. profile: some fifty numbers that describe these cycles (see `hobble.gait.profile`);
+    None if there is no cycle. speed: mean speed, cm a frame. frames: length of the walk.
     """
 
     walk: WalkCycles = field(repr=False)
@@ -43,10 +45,10 @@ def walk_figures(
     runtime: Runtime,
     others: Mapping[str, Sequence[Mapping[str, float]]] | None = None,
 ) -> list[FigureWalk]:
-    """Let figures walk straight ahead for `seconds`.
+    """Let figures walk straight ahead for `seconds`, in the same `gait`.
 
-    each: link -> severity, for each figure. speeds: target speeds, cm a frame. others: name of another
-    channel -> column -> value, for each figure.
+    each: for each figure, link -> severity. speeds: target speed of all figures or of each, cm a frame.
+    others: name of another channel -> for each figure, column -> value.
     """
     assert network.skeleton is not None
     count, frames = len(each), max(4, round(seconds * FPS))
@@ -57,17 +59,17 @@ def walk_figures(
     for name, values in (others or {}).items():
         channels |= channel_values(network, name, values)
     shares = np.tile([float(name == gait) for name in network.gaits], (count, 1))
-    places = np.zeros((frames, count, len(network.skeleton.joints), 3), np.float32)
-    for frame in range(-BEGIN, frames):
+    positions = np.zeros((frames, count, len(network.skeleton.joints), 3), np.float32)
+    for frame in range(-WARM_UP, frames):
         pose = animation.next_pose(velocity, gait=shares.copy(), **channels)
         if frame >= 0:
-            places[frame] = pose.positions.reshape(count, -1, 3)
-    return [_figure_walk(network, places[:, i].astype(float)) for i in range(count)]
+            positions[frame] = pose.positions.reshape(count, -1, 3)
+    return [_figure_walk(network, positions[:, i].astype(float)) for i in range(count)]
 
 
-def _figure_walk(network: Network, places: Array) -> FigureWalk:
+def _figure_walk(network: Network, positions: Array) -> FigureWalk:
     assert network.skeleton is not None
     hips = network.skeleton.role("hips")
-    speed = float(np.linalg.norm((places[-1, hips] - places[0, hips])[::2])) / (len(places) - 1)
-    walk = measure(network.skeleton, places, FPS)
-    return FigureWalk(walk, profile(walk) if len(walk) else None, speed, len(places))
+    speed = float(np.linalg.norm((positions[-1, hips] - positions[0, hips])[::2])) / (len(positions) - 1)
+    walk = measure(network.skeleton, positions, FPS)
+    return FigureWalk(walk, profile(walk) if len(walk) else None, speed, len(positions))

@@ -1,4 +1,4 @@
-"""Shows the size of the limp next to people's, in the section on the response to injury."""
+"""Shows the size of the limp beside people's limps, in the report's section on the response to injury."""
 
 from __future__ import annotations
 
@@ -17,31 +17,28 @@ from hobble.report.tables import Column, Table
 
 # The effects in the chart and in the table of captured limps.
 SHOWN = ("speed", "stance", "step_hurt", "knee_hurt", "hip_hurt", "lean", "pelvis_drop", "arm_hurt")
-MOST_NAMED = 8  # links that a sentence lists
+MOST_NAMED = 8  # a sentence names the links if there are at most this many
 RECOGNISERS = (
     "Two recognisers judge each walk in pieces of four seconds. The linear one learnt from people's strong "
     "limps, the graded one also from milder versions of them."
 )
-# Columns of a table; the pieces are the windows of four seconds.
+# Columns of the tables of recognised limps. A piece is a window of four seconds.
 RECOGNISED = (
     Column.number("share of pieces in which the linear recogniser finds a limp"),
     Column.number("share of pieces in which the graded recogniser finds a limp on the hurt side"),
     Column.number("share of pieces in which the graded recogniser names the wrong side"),
 )
-COLOURS = {"hip": "@g1", "thigh": "@g2", "shank": "@g3", "foot": "@g4", "back": "@g5"}  # of parts; arms: @g0
-# Part of the body -> the impairment of people that is most like its limp.
-IMPAIRMENTS = {
-    "hip": "trendelenburg",
-    "pelvis": "trendelenburg",
-    "thigh": "antalgic",
-    "shank": "antalgic",
-    "foot": "antalgic",
-    "back": "lurch",
-}
+# Part of the body -> colour of its lines in the chart. Other parts, such as arms, get @g0.
+COLOURS = {"hip": "@g1", "thigh": "@g2", "shank": "@g3", "foot": "@g4", "back": "@g5"}
+# The chart has lines for the links of these parts of the body, and of the arms.
+CHART_PARTS = ("hip", "pelvis", "thigh", "shank", "foot", "back")
 
 
 def section(found: Json, material: ReportMaterial) -> PageSection:
-    """Where the training data came from, the chart of sizes, the recognition, and all tables."""
+    """Where the training data came from, the chart of sizes, the recognition, and all tables.
+
+    found: the content of limp.json.
+    """
     if not found.get("applies"):
         return PageSection("injury", [])
     name, shown_name = material.name, shown_names(material.network["skeleton"])
@@ -58,7 +55,7 @@ def section(found: Json, material: ReportMaterial) -> PageSection:
                 3,
                 Table(
                     f"{name}-limp-named",
-                    *_named(found["named"]),
+                    *_recognised_by_severity(found["named"]),
                     "Is the limp of a hurt leg recognised?",
                 ),
             ),
@@ -76,13 +73,13 @@ def provenance(
 ) -> str:
     """Which injuries of the training data were captured and which were generated from healthy clips."""
     sentences = []
-    for kind, words in (("captured", "captured"), ("made", "generated from healthy clips")):
-        if some := hurt_seconds[kind]:
-            names = f" ({', '.join(map(shown_name, sorted(some)))})" if len(some) <= MOST_NAMED else ""
-            links = f"summed over {len(some)} links" if len(some) != 1 else "of one link"
-            seconds = number(sum(some.values()), 3)
+    for key, words in (("captured", "captured"), ("made", "generated from healthy clips")):
+        if by_link := hurt_seconds[key]:
+            names = f" ({', '.join(map(shown_name, sorted(by_link)))})" if len(by_link) <= MOST_NAMED else ""
+            links = f"summed over {len(by_link)} links" if len(by_link) != 1 else "of one link"
+            seconds = number(sum(by_link.values()), 3)
             sentences.append(f"Hurt motion in training, {words}: {seconds} s, {links}{names}.")
-    if any(len(some) > 1 for some in hurt_seconds.values()):
+    if any(len(by_link) > 1 for by_link in hurt_seconds.values()):
         sentences.append("A second in which two links hurt counts twice.")
     return " ".join(sentences) or "No link was hurt in training."
 
@@ -94,7 +91,7 @@ def size_chart(found: Json) -> Chart:
     for effect in SHOWN:
         traces = []
         for link in dict.fromkeys(
-            row["link"] for row in rows if row["part"] in IMPAIRMENTS or "arm" in row["part"]
+            row["link"] for row in rows if row["part"] in CHART_PARTS or "arm" in row["part"]
         ):
             some = [row for row in rows if row["link"] == link]
             trace = line(
@@ -132,7 +129,8 @@ def size_chart(found: Json) -> Chart:
     )
 
 
-def _named(rows: Sequence[Mapping[str, Any]]) -> tuple[list[Column], list[list[Any]]]:
+def _recognised_by_severity(rows: Sequence[Mapping[str, Any]]) -> tuple[list[Column], list[list[Any]]]:
+    """Columns and rows of a table: how the limps of hurt legs are recognised at each severity."""
     columns = [
         Column.number("severity"),
         Column.count("walks"),
@@ -175,7 +173,7 @@ def held_out_table(
 
 
 def size_table(name: str, rows: Sequence[Mapping[str, Any]]) -> Table | None:
-    """Every walk with its effects and the limp that is recognised."""
+    """The effects of every walk, and which limp the recognisers find in it."""
     texts = ("gait", "link", "part", "side", "called", "graded")
     if not rows:
         return None
@@ -197,7 +195,7 @@ def together_table(name: str, rows: Sequence[Mapping[str, Any]]) -> Table | None
         *RECOGNISED,
     ]
     keys = ("column", "walks", "speed_share", "impaired", "named", "wrong_side")
-    title = "Is the limp of a hurt leg (severity 10) recognised if another channel is high too?"
+    title = "Is the limp of a hurt leg (severity 10) recognised while another channel is at its highest?"
     return Table(f"{name}-limp-together", columns, [[row.get(key) for key in keys] for row in rows], title)
 
 
@@ -226,7 +224,7 @@ def captured_table(
 
 
 def second_table(name: str, rows: Sequence[Mapping[str, Any]]) -> Table | None:
-    """Speeds with a second injury on top of a first one at severities 5 and 10."""
+    """Speeds with a second injury in addition to a first one, which is at severity 5 or 10."""
     if not rows:
         return None
     keys = list(rows[0])
@@ -235,5 +233,5 @@ def second_table(name: str, rows: Sequence[Mapping[str, Any]]) -> Table | None:
         f"{name}-limp-second",
         columns,
         [[r[k] for k in keys] for r in rows],
-        "Speed with a second injury on top of a first",
+        "Speed with a second injury in addition to a first",
     )

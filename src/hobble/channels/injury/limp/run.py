@@ -1,8 +1,9 @@
-"""Measures the size of each link's limp, and compares it with people's and captured limps.
+"""Measures the size of each link's limp, and compares it with the limps of people and of captured clips.
 
-A rank correlation says nothing about size: it is 1 even for a change of 2 %. So the size of each effect is
-measured at severities 3, 5, 7 and 10, relative to the healthy character of the same network. Two recognisers
-of `hobble.gait` judge the walks, the linear and the graded one. They learnt from real people only.
+The rank correlations of `hobble.channels.injury.response` say nothing about size: a correlation is 1 even if
+the walk changes by only 2 %. Here the size of each effect is measured at severities 3, 5, 7 and 10, relative
+to the healthy character of the same network. The two recognisers of `hobble.gait`, a linear and a graded one,
+judge the walks. They learnt only from real people.
 """
 
 from __future__ import annotations
@@ -35,12 +36,12 @@ from hobble.models.network import Network
 from hobble.runtime.options import Runtime
 
 NO_SEVERITIES = "this network has no severity inputs"
-NO_CYCLE = "its healthy character does not walk a whole cycle"
-SEVERITIES = (3.0, 5.0, 7.0, 10.0)
-SPEEDS = {"walk": 2.0, "jog": 7.0}  # target speeds, cm a frame; 2 is 1.2 m/s, as people walk
-FIRST_SEVERITIES = (5.0, 10.0)  # of an injury to which a second one is added
-SECOND_SEVERITIES = (0.0, 5.0, 10.0)
-LEG = ("hip", "thigh", "shank", "foot")
+NO_CYCLE = "the network's healthy character does not walk a whole cycle"
+SEVERITIES = (3.0, 5.0, 7.0, 10.0)  # of the one link that hurts
+SPEEDS = {"walk": 2.0, "jog": 7.0}  # target speeds, cm a frame; 2 is 1.2 m/s, a usual walking speed
+FIRST_SEVERITIES = (5.0, 10.0)  # of a first injury, to which a second one is added
+SECOND_SEVERITIES = (5.0, 10.0)  # of the second injury
+LEG = ("hip", "thigh", "shank", "foot")  # parts of the body that belong to a leg
 WINDOW = 4.0  # seconds of a walk that a recogniser judges at once
 
 
@@ -61,12 +62,13 @@ def limp(
     training. splits: clip -> "train" or "held_out". seconds: length of each walk. links: links to hurt, by
     default all.
 
-    `sizes`: a row for each gait, link and severity with the EFFECTS (the link's side counts as the hurt side)
-    and the recognised limp. `trends`: Spearman's rho of each effect with severity, and its size at 10.
-    `named`: how hurt legs are recognised, by severity. `people`: mean and standard deviation of each effect
-    of people's impairments. `captured`: effects of captured clips. `held_out_limps`: see `compare_held_out`.
-    `second`: see `second_injuries`. `together` and `named_together`: limps while another channel has a value,
-    see `hobble.channels.injury.limp.with_other_channel`.
+    `sizes`: a row for each gait, link and severity, with the effects of `hobble.gait.effect_sizes` (the
+    link's side counts as the hurt side) and the recognised limp. `trends`: Spearman's rho of each effect with
+    severity, and the size of the effect at severity 10. `named`: how hurt legs are recognised, by severity.
+    `people`: for each impairment that people imitated, mean and standard deviation of each effect.
+    `captured`: effects in captured clips. `held_out_limps`: see `compare_held_out`. `second`: see
+    `second_injuries`. `together` and `named_together`: limps while another channel is at its highest, see
+    `hobble.channels.injury.limp.with_other_channel`.
     """
     head: dict[str, Any] = {"configuration": configuration}
     if not links_of(network) or network.skeleton is None:
@@ -90,7 +92,7 @@ def limp(
             gait: {name: [round(v, 5) for v in pair] for name, pair in found.items()}
             for gait, found in effects_of_people(people()).items()
         },
-        "captured": [_of_clip(network.skeleton, one, captured) for one in captured if one.hurt],
+        "captured": [_row_of_clip(network.skeleton, one, captured) for one in captured if one.hurt],
         "held_out_limps": compare_held_out(network, captured, splits, seconds, runtime),
         "second": second_injuries(network, links, seconds, runtime),
         **_together(network, links, seconds, runtime),
@@ -119,7 +121,7 @@ def _sizes(
 def _together(
     network: Network, links: Sequence[str], seconds: float, runtime: Runtime
 ) -> dict[str, list[dict[str, Any]]]:
-    """Rows of walks with a hurt leg and a value of another channel, and how they are recognised."""
+    """The keys `together` and `named_together`: limps while another channel is at its highest."""
     assert network.skeleton is not None
     skeleton = network.skeleton
     legs = [link for link in links if part_of_link(skeleton, _pair(skeleton, link)).name in LEG]
@@ -146,10 +148,11 @@ def _row(
 ) -> dict[str, Any]:
     """The row of one walk: gait, link and severity, the effects, and how the walk is recognised.
 
-    called, graded: label and side by the linear and by the graded recogniser. The others are shares of
-    windows. impaired: the linear recogniser finds a limp. named: the graded one finds a limp and does not
-    name the other side. wrong_side: it names the other side. All are None if the figure does not walk a whole
-    cycle.
+    called, graded: the label and side that the linear and the graded recogniser give the whole walk.
+    impaired: share of windows in which the linear recogniser finds a limp. named: share of windows in which
+    the graded recogniser finds a limp and does not name the side opposite to the link's. wrong_side: share of
+    windows in which it names this opposite side; None for a link on the midline. If the figure does not walk
+    a whole cycle, the effects and all these are None.
     """
     assert network.skeleton is not None
     assert healthy.profile is not None
@@ -187,7 +190,7 @@ def _share(values: Sequence[bool]) -> float | None:
 
 
 def _trends(rows: Sequence[Mapping[str, Any]]) -> list[dict[str, Any]]:
-    """For each gait, link and effect: Spearman's rho with severity, and its size at 10."""
+    """For each gait, link and effect: Spearman's rho with severity, and the size at severity 10."""
     out = []
     for gait, link in dict.fromkeys((row["gait"], row["link"]) for row in rows):
         some = [row for row in rows if (row["gait"], row["link"]) == (gait, link)]
@@ -206,28 +209,29 @@ def _named(rows: Sequence[Mapping[str, Any]]) -> list[dict[str, Any]]:
         legs = [r for r in rows if r["gait"] == "walk" and r["severity"] == severity and r["part"] in LEG]
         row: dict[str, Any] = {"severity": severity, "walks": len(legs)}
         for key in ("impaired", "named", "wrong_side"):
-            known = [r[key] for r in legs if r[key] is not None]
-            row[key] = round(float(np.mean(known)), 5) if known else None
+            values = [r[key] for r in legs if r[key] is not None]
+            row[key] = round(float(np.mean(values)), 5) if values else None
         out.append(row)
     return out
 
 
-def _of_clip(skeleton: Skeleton, one: CapturedWalk, captured: Sequence[CapturedWalk]) -> dict[str, Any]:
-    """The effects of a captured clip relative to a healthy walk (`healthy_of`)."""
-    healthy, whose = healthy_of(one, captured)
-    side = hurt_side(skeleton, max(one.hurt, key=lambda link: one.hurt[link]))
-    sizes = _rounded_values(effects(profile(one.walk), healthy, side))
-    return {"clip": one.clip, "hurt": dict(one.hurt), "side": side, "healthy": whose, **sizes}
+def _row_of_clip(skeleton: Skeleton, clip: CapturedWalk, captured: Sequence[CapturedWalk]) -> dict[str, Any]:
+    """The effects in a captured clip relative to a healthy walk, and whose walk this is (`healthy_of`)."""
+    healthy, whose = healthy_of(clip, captured)
+    side = hurt_side(skeleton, max(clip.hurt, key=lambda link: clip.hurt[link]))
+    sizes = _rounded_values(effects(profile(clip.walk), healthy, side))
+    return {"clip": clip.clip, "hurt": dict(clip.hurt), "side": side, "healthy": whose, **sizes}
 
 
 def distance(walk: Profile, healthy: Profile, other: Profile, other_healthy: Profile) -> float:
-    """How much the limps of two bodies differ. The limp is what changes from the body's own healthy walk.
+    """How much the limps of two bodies differ. A limp is how a body's walk differs from its own healthy walk.
 
-    It is the root mean square over the features. The difference in a feature is divided by the standard
-    deviation of that feature over people's walks.
+    walk, healthy: profiles of the first body. other, other_healthy: profiles of the second. The distance is
+    the root mean square of the differences of all features. Each difference is divided by the standard
+    deviation of its feature over people's walks.
     """
-    known = examples(people(), range(people().count))[0]
-    spread = known.std(axis=0)
+    of_people = examples(people(), range(people().count))[0]
+    spread = of_people.std(axis=0)
     a, b = (np.array(list(features(*pair).values())) for pair in ((walk, healthy), (other, other_healthy)))
     return float(np.sqrt(np.mean(((a - b) / spread) ** 2)))
 
@@ -239,11 +243,12 @@ def compare_held_out(
     seconds: float,
     runtime: Runtime,
 ) -> list[dict[str, Any]]:
-    """Whether the hurt character comes nearer to captured limps that were held out of training.
+    """Whether limps in held-out clips are nearer to the hurt character than to the healthy one.
 
-    Each clip is compared with the character with the clip's severities, and with the healthy character. Both
-    have a target speed of 1.2 m/s, which is likely for the performer's healthy walk. `hurt` and `healthy`:
-    the `distance` of the clip from each. `nearer`: whether the hurt one is nearer, as it should be.
+    Each clip is compared with the character that has the clip's severities, and with the healthy character.
+    Both have a target speed of 1.2 m/s, a likely speed of the performer's healthy walk. `hurt` and
+    `healthy`: the `distance` of the clip from each. `nearer`: whether the hurt character is nearer, as it
+    should be.
     """
     limps = [one for one in captured if one.hurt and splits.get(one.clip) == "held_out"]
     if not limps:
@@ -251,16 +256,18 @@ def compare_held_out(
     figures = walk_figures(
         network, [{}, *(one.hurt for one in limps)], SPEEDS["walk"], "walk", seconds, runtime
     )
-    own = figures[0].profile
+    healthy_figure = figures[0].profile
     out = []
     for one, figure in zip(limps, figures[1:], strict=True):
         healthy, whose = healthy_of(one, captured)
         row: dict[str, Any] = {"clip": one.clip, "hurt_links": dict(one.hurt), "compared_with": whose}
-        if own is None or figure.profile is None:
+        if healthy_figure is None or figure.profile is None:
             out.append({**row, "healthy": None, "hurt": None, "nearer": False})
             continue
         walk_of_clip = profile(one.walk)
-        from_healthy, from_hurt = (distance(walk_of_clip, healthy, p, own) for p in (own, figure.profile))
+        from_healthy, from_hurt = (
+            distance(walk_of_clip, healthy, walk, healthy_figure) for walk in (healthy_figure, figure.profile)
+        )
         out.append(
             {
                 **row,
@@ -275,16 +282,17 @@ def compare_held_out(
 def second_injuries(
     network: Network, links: Sequence[str], seconds: float, runtime: Runtime
 ) -> list[dict[str, Any]]:
-    """Speeds with each link hurt in addition to a right thigh at severities 5 and 10.
+    """Speeds of walks with two injuries.
 
-    `speed_share`: speed as a share of the healthy walk's. `from_first`: speed as a share of that with the
-    first injury alone. A second injury must not make the walk faster, so it should be at most 1.
+    The first injury is the right thigh at severity 5 or 10, the second any other link at severity 5 or 10.
+    `speed_share`: speed divided by the speed of the healthy walk. `from_first`: speed divided by the speed
+    with the first injury alone. It should be at most 1: a second injury must not make the walk faster.
     """
     assert network.skeleton is not None
     first = next((link for link in links if _is_part_on_side(network.skeleton, link, "thigh", "right")), None)
     if first is None:
         return []
-    pairs = [(a, b, s) for a in FIRST_SEVERITIES for b in links if b != first for s in SECOND_SEVERITIES[1:]]
+    pairs = [(a, b, s) for a in FIRST_SEVERITIES for b in links if b != first for s in SECOND_SEVERITIES]
     each = [{}, *({first: a} for a in FIRST_SEVERITIES), *({first: a, b: s} for a, b, s in pairs)]
     figures = walk_figures(network, each, SPEEDS["walk"], "walk", min(seconds, 4.0), runtime)
     healthy = max(figures[0].speed, 1e-9)
@@ -327,5 +335,7 @@ def run(inputs: MeasureInputs, options: Options) -> Outcome:
     )
     tables = {name: result.get(name, []) for name in ("sizes", "trends", "named", "second", "together")}
     at_10 = next((row for row in result.get("named", []) if row["severity"] == SEVERITIES[-1]), None)
-    says = f"legs at 10: called impaired in {at_10['impaired']} of windows" if at_10 else result["reason"]
+    says = (
+        f"legs at severity 10: {at_10['impaired']} of windows called impaired" if at_10 else result["reason"]
+    )
     return Outcome(with_sample(result, sample), tables, says)

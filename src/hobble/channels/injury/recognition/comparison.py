@@ -9,7 +9,7 @@ from hobble.evaluation.comparison_rows import PublishedRow, SideBySide, publishe
 from hobble.evaluation.configuration_results import ConfigurationResults
 from hobble.measures.inputs import Json, Row
 
-NAME = "recognition"
+NAME = "recognition"  # the measurement
 
 
 def compared(all_measured: Sequence[ConfigurationResults], published: Json) -> SideBySide:
@@ -30,7 +30,7 @@ def _against_people(measured: ConfigurationResults, people: Json) -> list[Publis
     found = measured.found(NAME)
     if not found["applies"]:
         return []
-    named, generated = {**people, "configuration": measured.name}, found["generated"]
+    published, generated = {**people, "configuration": measured.name}, found["generated"]
     shares = {
         "all severities": generated["right"],
         "all severities, left and right not distinguished": generated["right_without_side"],
@@ -40,7 +40,7 @@ def _against_people(measured: ConfigurationResults, people: Json) -> list[Publis
     return [
         published_row(
             f"hurt part recognised, {which} (published: by people)",
-            named,
+            published,
             people["share"],
             ours,
         )

@@ -6,7 +6,7 @@ from typing import NotRequired, TypedDict
 
 
 class SeverityShare(TypedDict):
-    """How many windows, or walks, there are of one severity, and the share `right` that is recognised."""
+    """How many `windows`, or whole `walks`, have one severity, and the share that is recognised right."""
 
     severity: float
     windows: NotRequired[int]
@@ -17,8 +17,9 @@ class SeverityShare(TypedDict):
 class RecognisedWindows(TypedDict):
     """How windows, or whole walks, were recognised.
 
-    right: share in which the links that hurt are named. right_without_side: share in which the part of the
-    body is named, on either side. confusion: what hurts -> what was recognised -> how many.
+    windows, walks: how many; only one of these two keys is there. right: share in which the links that hurt
+    are named. right_without_side: share in which the part of the body is named, on either side. confusion:
+    what hurts -> what was recognised -> how many.
     """
 
     windows: NotRequired[int]
@@ -30,7 +31,7 @@ class RecognisedWindows(TypedDict):
 
 
 class RecognisedGenerated(RecognisedWindows):
-    """How windows of generated walks were recognised. by_walk: with one answer for each whole walk."""
+    """How windows of generated walks were recognised. by_walk: with one answer for a whole walk."""
 
     by_walk: RecognisedWindows
 
@@ -38,8 +39,8 @@ class RecognisedGenerated(RecognisedWindows):
 class RecognisedCaptured(TypedDict):
     """How captured windows were recognised.
 
-    cross_validated: those of training clips, with each quarter of every stretch left out of learning in turn.
-    held_out: those of the held-out clips.
+    cross_validated: windows of training clips. Each quarter of a stretch of motion is judged by a classifier
+    that learnt from the other quarters. held_out: windows of the held-out clips.
     """
 
     cross_validated: RecognisedWindows
@@ -49,8 +50,9 @@ class RecognisedCaptured(TypedDict):
 class Recognition(TypedDict):
     """recognition.json. If `applies` is false, it has only the first three keys and `reason`.
 
-    people: share that people recognised in a published study. chance: share that a random guess gets right.
-    See `recognition`.
+    people: share of hurt parts that people recognised in a published study. classes: what the classifier can
+    answer: "healthy", or the links that hurt. features: names of its inputs. chance: share that a random
+    guess gets right. captured, generated: how captured clips and generated walks were recognised.
     """
 
     configuration: str

@@ -1,8 +1,8 @@
 """Measures whether a classifier that learnt from captured motion recognises the hurt part of generated walks.
 
 It learns from windows of the training clips and the link that hurts in each. Its accuracy on other captured
-windows is the most that can be expected. Its accuracy on generated walks is compared with that of people who
-saw animated figures (Ferre 2019).
+windows is the most that can be expected on generated ones. Its accuracy on generated walks is compared with
+that of people who saw animated figures (Ferre 2019).
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ import numpy as np
 
 from hobble.channels.injury.crowd_severities import links as links_of
 from hobble.channels.injury.crowd_severities import severities
-from hobble.channels.injury.limp.captured_limps import VERSION
+from hobble.channels.injury.limp.captured_limps import HURT_VERSION
 from hobble.channels.injury.recognition.results import RecognisedWindows, Recognition
 from hobble.core.quat import Array
 from hobble.core.skeleton import Skeleton
@@ -37,25 +37,27 @@ INJURY = "injury"  # the channel
 HEALTHY = "healthy"
 WINDOW = 60  # frames, about a cycle; windows of 75 or 90 are recognised less well
 STEP = 15  # frames from the start of one window to the start of the next
-FOLDS = 4  # the cross-validation leaves out each quarter of a stretch in turn
-GENERATED = (3.0, 5.0, 7.0, 10.0)  # severities of the generated walks
-SPEEDS = (1.8, 2.2, 2.6)  # their target speeds, cm a frame
-WARM_UP, USED = 4 * FPS, 6 * FPS  # frames of a generated walk that are skipped, and that are used
-AHEAD = 0.9  # a window counts as walking if at least this share of the root's speed is forward
+FOLDS = 4  # the cross-validation leaves out each quarter of a stretch (consecutive frames of a clip) in turn
+SEVERITIES = (3.0, 5.0, 7.0, 10.0)  # of the generated walks
+SPEEDS = (1.8, 2.2, 2.6)  # target speeds of the generated walks, cm a frame
+WARM_UP = 4 * FPS  # frames at the beginning of a generated walk that are not used
+USED = 6 * FPS  # the frames after them that are used
+AHEAD = 0.9  # a window counts as walking only if at least this share of the root's speed is forward
 LEAST_SPEED = 0.5  # cm a frame; a slower window does not count as walking
-# Class -> parts of the body without their side; see `parts_of_classes`.
+# A function that `parts_of_classes` returns: class -> parts of the body, without their side.
 PartsOfClass = Callable[[str], tuple[str, ...]]
-REASON = "this network has no severity inputs"
-TOO_FEW = "fewer than two parts hurt in the captured clips, or no clip walks"
+NO_SEVERITIES = "this network has no severity inputs"
+TOO_FEW = "the captured training clips have no walks, or only one kind (all healthy, or all hurt alike)"
 
 
 @dataclass(frozen=True)
 class InjuryWindow:
     """A second of walking.
 
-    clip: its clip, or the name of a generated walk. hurt: its class, that is the links that hurt, joined by
-    " and ", or HEALTHY. severity: the highest. values: the features of `hobble.evaluation.gait_features`.
-    quarter: which quarter of a captured stretch it is in, for the cross-validation.
+    clip: name of the captured clip or generated walk. hurt: the class: HEALTHY, or the links that hurt,
+    joined by " and ". severity: the highest severity in the window. values: name -> value of the features of
+    `hobble.evaluation.gait_features`. quarter: 0 to 3, the quarter of a captured stretch that the window is
+    in, for the cross-validation.
     """
 
     clip: str
@@ -74,7 +76,9 @@ def recognition(
     runtime: Runtime,
     people: float,
 ) -> Recognition:
-    """How well a classifier of captured clips recognises generated walks: the content of recognition.json.
+    """The content of recognition.json: how well generated walks are recognised.
+
+    The classifier learns from the captured training clips.
 
     motion: the captured clips. splits: clip -> "train" or "held_out". people: share of hurt parts that people
     recognised in a published study.
@@ -86,13 +90,13 @@ def recognition(
     """
     refused: Recognition = {"configuration": configuration, "people": people, "applies": False}
     if not links_of(network) or network.skeleton is None:
-        return {**refused, "reason": REASON}
+        return {**refused, "reason": NO_SEVERITIES}
     windows = [w for clip in motion for w in walking_windows(clip, network)]
-    known = [w for w in windows if splits[w.clip] == "train"]
-    classes = sorted({w.hurt for w in known})
+    training = [w for w in windows if splits[w.clip] == "train"]
+    classes = sorted({w.hurt for w in training})
     if len(classes) < 2:
         return {**refused, "reason": TOO_FEW}
-    classifier = learn(table(known), [w.hurt for w in known])
+    classifier = learn(table(training), [w.hurt for w in training])
     parts_of_class = parts_of_classes(network.skeleton)
     walks = generated(network, [c for c in classes if c != HEALTHY], HEALTHY in classes, runtime)
     return {
@@ -100,10 +104,10 @@ def recognition(
         "people": people,
         "applies": True,
         "classes": classes,
-        "features": list(known[0].values),
+        "features": list(training[0].values),
         "chance": round(1 / len(classes), 5),
         "captured": {
-            "cross_validated": _cross_validated(known, parts_of_class),
+            "cross_validated": _cross_validated(training, parts_of_class),
             "held_out": _judged(
                 classifier, [w for w in windows if splits[w.clip] == "held_out"], parts_of_class
             ),
@@ -116,7 +120,7 @@ def recognition(
 
 
 def walking_windows(clip: Captured, network: Network) -> list[InjuryWindow]:
-    """The windows of a captured stretch in which the figure walks ahead and the hurt links stay the same."""
+    """The windows of a captured stretch in which the person walks ahead and the same links hurt."""
     assert network.skeleton is not None
     walk = clip.gait[:, network.gaits.index("walk")]
     hurts = clip.channels[INJURY] > 0
@@ -145,7 +149,7 @@ def generated(
     healthy: whether to add healthy walks.
     """
     assert network.skeleton is not None
-    cases = [(name, s, v) for name, s, v in product(classes, GENERATED, SPEEDS)]
+    cases = [(name, s, v) for name, s, v in product(classes, SEVERITIES, SPEEDS)]
     cases += [(HEALTHY, 0.0, v) for v in SPEEDS] if healthy else []
     hurt = [{} if name == HEALTHY else dict.fromkeys(name.split(" and "), s) for name, s, _ in cases]
     script = CrowdTarget(
@@ -164,7 +168,7 @@ def generated(
 
 
 def parts_of_classes(skeleton: Skeleton) -> PartsOfClass:
-    """A function that returns the parts of the body of a class, without left and right.
+    """A function that returns the parts of the body that hurt in a class, without left and right.
 
     For the class "LeftLeg-LeftFoot" it returns ("shank",), for HEALTHY ().
     """
@@ -194,8 +198,8 @@ def rows(result: Recognition) -> list[Row]:
         "generated": result["generated"],
     }
     return [
-        {"motion": of, "hurt": hurt, "named": named, "windows": count}
-        for of, found in tables.items()
+        {"motion": motion, "hurt": hurt, "named": named, "windows": count}
+        for motion, found in tables.items()
         for hurt, row in found["confusion"].items()
         for named, count in row.items()
     ]
@@ -203,8 +207,9 @@ def rows(result: Recognition) -> list[Row]:
 
 def run(inputs: MeasureInputs, options: SampleOptions) -> Outcome:
     """recognition.json, and all its confusion tables as one table."""
-    # Generated hurt versions are left out: the classifier would learn the generator's table of injuries.
-    clips = {clip: file for clip, file in inputs.clips.items() if not VERSION.search(clip)}
+    # Hurt versions are left out, because they are generated from healthy clips by rules for each injury. The
+    # classifier would learn these rules.
+    clips = {clip: file for clip, file in inputs.clips.items() if not HURT_VERSION.search(clip)}
     summaries = [file for file in inputs.summaries if file.stem in clips]
     sample = sample_of(replace(inputs, summaries=summaries), options)
     result = recognition(
@@ -215,7 +220,7 @@ def run(inputs: MeasureInputs, options: SampleOptions) -> Outcome:
         runtime=inputs.runtime,
         people=inputs.published["recognition"]["share"],
     )
-    right = f"named right: {result['generated']['right']} of generated windows" if result["applies"] else ""
+    right = f"{result['generated']['right']} of generated windows named right" if result["applies"] else ""
     return Outcome(with_sample(result, sample), {"confusion": rows(result)}, right or result["reason"])
 
 
@@ -251,9 +256,9 @@ def _by_walk(
     scores = classifier.scores(table(windows))
     walks, named = [], []
     for walk in dict.fromkeys(w.clip for w in windows):
-        mine = [i for i, w in enumerate(windows) if w.clip == walk]
-        walks.append(windows[mine[0]])
-        named.append(classifier.classes[int(np.argmax(scores[mine].sum(axis=0)))])
+        of_walk = [i for i, w in enumerate(windows) if w.clip == walk]
+        walks.append(windows[of_walk[0]])
+        named.append(classifier.classes[int(np.argmax(scores[of_walk].sum(axis=0)))])
     return _confusion(classifier.classes, walks, named, parts_of_class, "walks")
 
 

@@ -13,8 +13,8 @@ from hobble.runtime.options import Runtime
 class Options(SampleOptions):
     """The keys of this measurement in the section `evaluation`."""
 
-    # With 4, the mean distance from the healthy walk and the mean share of its speed differ by 1 % (`limp`).
-    seconds: PositiveFloat = Field(3.0, description="time at each severity of the injury sweeps")
+    # With 4 s instead, the mean effects on pose and speed differ by only 1 % (configuration `limp`).
+    seconds: PositiveFloat = Field(3.0, description="how long a figure walks at each severity")
 
 
 MEASURE = Measure(

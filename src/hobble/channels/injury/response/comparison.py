@@ -9,12 +9,12 @@ from hobble.evaluation.comparison_rows import SideBySide
 from hobble.evaluation.configuration_results import ConfigurationResults
 from hobble.measures.inputs import Json
 
-NAME = "injury"
-KEPT = ("applies", "reason", "summary")
+NAME = "injury"  # the measurement
+KEPT = ("applies", "reason", "summary")  # keys of injury.json that are compared
 
 
 def compared(all_measured: Sequence[ConfigurationResults], published: Json) -> SideBySide:
-    """For each configuration whether it can be hurt, and the means over its links."""
+    """For each configuration: whether its character can be hurt, and the means over its links."""
     return SideBySide(entries=[_entry(m) for m in all_measured])
 
 

@@ -1,4 +1,4 @@
-"""Shows the response to injury of several configurations."""
+"""Shows the response to injury of several configurations side by side, in one table."""
 
 from __future__ import annotations
 
@@ -13,13 +13,13 @@ INTRODUCTION = (
     "mean over the links that were hurt in training. ρ is Spearman's rank correlation: 1 means that the "
     "measure always rises with severity, −1 that it always falls, 0 that it does neither."
 )
-# Keys of a `Summary` in injury.json -> words.
-INJURY = {
+# Key of a summary in injury.json -> words for it.
+WORDS = {
     "from_healthy_cm": "distance from the healthy pose at severity 10, cm per joint",
     "speed_share": "share of the healthy speed at severity 10",
     "spearman_from_healthy": "ρ of pose and severity",
     "spearman_speed": "ρ of speed and severity",
-    "spearman_falling_from_healthy": "ρ of pose and severity, healing",
+    "spearman_falling_from_healthy": "ρ of pose and severity, while severity falls",
     "settle_seconds": "time to settle, s",
     "heal_seconds": "time to heal, s",
     "after_healing_cm": "remaining distance after healing, cm per joint",
@@ -30,7 +30,7 @@ INJURY = {
 
 
 def section(compared: Compared) -> PageSection:
-    """A table of means, if any configuration can be hurt."""
+    """A table of means, if the character of any configuration can be hurt. compared: from compare.json."""
     table = injury_table(compared)
     words = Paragraph(INTRODUCTION) if table else None
     parts = [SectionPart(0, words), SectionPart(10, table, open=True, short=True)]
@@ -38,7 +38,7 @@ def section(compared: Compared) -> PageSection:
 
 
 def injury_table(compared: Compared) -> Table | None:
-    """Mean effects of severities in the configurations with injuries."""
+    """A row for each measure, and a column for each gait of each configuration with injuries."""
     rows = [
         (entry["configuration"], gait, summary)
         for entry in compared["injury"]
@@ -48,13 +48,18 @@ def injury_table(compared: Compared) -> Table | None:
     if not rows:
         return None
     found = {key for *_, summary in rows for key in summary}
-    keys = [*(key for key in INJURY if key in found), *sorted(found - set(INJURY))]
+    keys = [*(key for key in WORDS if key in found), *sorted(found - set(WORDS))]
     columns = [Column("measure"), *(Column.number(f"{name}, {gait}") for name, gait, _ in rows)]
     table: list[list[Any]] = [
-        [INJURY.get(key, key.replace("_", " ")), *(summary.get(key) for *_, summary in rows)] for key in keys
+        [WORDS.get(key, key.replace("_", " ")), *(summary.get(key) for *_, summary in rows)] for key in keys
     ]
-    right = {e["configuration"]: e["generated"]["right"] for e in compared["recognition"] if e.get("applies")}
-    if right:
-        row = ["share of hurt parts that a classifier recognises", *(right.get(name) for name, *_ in rows)]
+    shares = {
+        e["configuration"]: e["generated"]["right"] for e in compared["recognition"] if e.get("applies")
+    }
+    if shares:
+        row = [
+            "share of hurt parts that a classifier recognises",
+            *(shares.get(name) for name, *_ in rows),
+        ]
         table.append(row)
     return Table("compare-injury", columns, table, "Means over the links that were hurt in training")

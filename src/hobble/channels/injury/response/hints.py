@@ -1,4 +1,4 @@
-"""Sentences about the response to injury."""
+"""Sentences about the response to injury, for the top of the report."""
 
 from __future__ import annotations
 
@@ -15,47 +15,47 @@ from hobble.report.summary import Hint
 def injury_hints(found: Json) -> Iterator[Hint]:
     """Whether and how much each link changes the walk, and whether the walk recovers.
 
-    Changes are compared with the drift of a healthy walk.
+    Changes are compared with the drift of a healthy walk: how much it changes although nothing hurts.
     """
     responses = [r for r in found.get("responses") or () if r["gait"] == "walk"]
     walks = [r for r in responses if r.get("trained", True)]
     if not walks:
         return
-    drift, left = (_unhurt(responses, key) for key in ("from_healthy_cm", "after_healing_cm"))
+    drift, drift_at_end = (_drift(responses, key) for key in ("from_healthy_cm", "after_healing_cm"))
     if drift > 2:
         yield Hint(
             "warn",
-            f"A healthy walk also drifts, by {number(drift)} cm per joint.",
+            f"Even a healthy walk changes, by {number(drift)} cm per joint.",
             "So the effect of severity is hard to measure. Train for longer, or measure for longer.",
         )
-    deaf = [r["link"] for r in walks if (r.get("from_healthy_cm") or 0) < max(0.5, 2 * drift)]
-    if deaf:
+    unchanged = [r["link"] for r in walks if (r.get("from_healthy_cm") or 0) < max(0.5, 2 * drift)]
+    if unchanged:
         yield Hint(
             "note",
-            f"{len(deaf)} of {_plural(len(walks), 'link')} hardly "
-            f"{'changes' if len(deaf) == 1 else 'change'} the walk at severity 10",
-            "(by less than half a centimetre per joint, or by less than twice the drift of a healthy walk): "
-            f"{', '.join(deaf[:4])}{' …' if len(deaf) > 4 else ''}. Add clips in which they hurt.",
+            f"{len(unchanged)} of {_plural(len(walks), 'link')} hardly "
+            f"{'changes' if len(unchanged) == 1 else 'change'} the walk at severity 10",
+            "(by less than half a centimetre per joint, or by less than twice the change of a healthy walk): "
+            f"{', '.join(unchanged[:4])}{' …' if len(unchanged) > 4 else ''}. Add clips in which they hurt.",
         )
-    stuck = [
+    not_healed = [
         r["link"]
         for r in walks
-        if r["link"] not in deaf and (r.get("after_healing_cm") or 0) > max(2, 2 * left)
+        if r["link"] not in unchanged and (r.get("after_healing_cm") or 0) > max(2, 2 * drift_at_end)
     ]
-    if stuck:
+    if not_healed:
         yield Hint(
             "note",
-            f"After healing, the walk stays changed for {', '.join(stuck[:4])}.",
+            f"After healing, the walk stays changed for {', '.join(not_healed[:4])}.",
             "The network keeps limping although nothing hurts any more.",
         )
-    if not deaf:
-        felt = [r["from_healthy_cm"] for r in walks]
+    if not unchanged:
+        changes = [r["from_healthy_cm"] for r in walks]
         yield Hint(
             "good",
             f"{len(walks)} of {_plural(len(responses), 'link')} {'was' if len(walks) == 1 else 'were'} hurt "
             "in training.",
             f"At severity 10, {'it' if len(walks) == 1 else 'each of them'} changes the walk by "
-            f"{_span(min(felt), max(felt))} cm per joint. A link is the piece of the body between two "
+            f"{_span(min(changes), max(changes))} cm per joint. A link is the piece of the body between two "
             "neighbouring joints.",
         )
 
@@ -69,10 +69,10 @@ def _span(low: float, high: float) -> str:
     return number(low) if low == high else f"{number(low)} to {number(high)}"
 
 
-def _unhurt(responses: Sequence[Mapping[str, Any]], key: str) -> float:
-    """The mean of `key` over links that were never hurt in training: how far a healthy walk drifts.
+def _drift(responses: Sequence[Mapping[str, Any]], key: str) -> float:
+    """The drift of a healthy walk: the mean of `key` over links that were never hurt in training.
 
-    0 if all links were hurt.
+    Such links have no effect. 0 if all links were hurt in training.
     """
     values = [r[key] for r in responses if not r.get("trained", True) and r.get(key) is not None]
     return float(np.mean(values)) if values else 0.0

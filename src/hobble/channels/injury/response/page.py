@@ -15,13 +15,14 @@ from hobble.report.page_parts import ChartPair, PageSection, SectionPart
 from hobble.report.summary import Hint, placed
 from hobble.report.tables import Column, Table
 
-LINKS = ("link", "first", "second")  # keys of the JSON that hold a link
+LINKS = ("link", "first", "second")  # keys of injury.json whose values are links
 UNTRAINED = "never hurt in training"
 GAIT_COLOURS = {"walk": "@accent", "jog": "@g2"}
+# The marker of links that were never hurt in training.
 HOLLOW = {"symbol": "circle-open", "size": 8, "line": {"width": 1.2}}
-SIDES = (("left", "@accent"), ("right", "@g2"))
-# A small chart: name, title, unit, lines as (column, label, colour), least range of the axis, whether it
-# starts at 0.
+SIDES = (("left", "@accent"), ("right", "@g2"))  # side of the body, colour
+# A small chart: name, title, unit, lines as (column, label, colour), least range of the axis, whether the
+# axis starts at 0.
 Panel = tuple[str, str, str, tuple[tuple[str, str, str], ...], float, bool]
 PANELS: tuple[Panel, ...] = (
     (
@@ -58,7 +59,7 @@ PANELS: tuple[Panel, ...] = (
 
 
 def section(found: Json, material: ReportMaterial) -> PageSection:
-    """The charts and tables of injury.json. Empty for a network without severities."""
+    """The charts and tables of injury.json, which is `found`. Empty for a network without severities."""
     parts = _parts(in_words(found, material), material.name) if found.get("applies") else []
     return PageSection("injury", parts, title="Injury response", at=20)
 
@@ -106,13 +107,13 @@ def _parts(found: Json, name: str) -> list[SectionPart]:
 
 def curves(
     rows: Sequence[Mapping[str, Any]],
-    back: Sequence[Mapping[str, Any]] = (),
+    falling: Sequence[Mapping[str, Any]] = (),
     untrained: Collection[str] = (),
 ) -> ChartGroup:
     """A small chart of each measure over severity, for a chosen gait and link.
 
-    rows, back: injury.json's rows of rising and of falling severity; the latter are dotted. untrained: links
-    that come last and are marked.
+    rows, falling: injury.json's rows of rising and of falling severity; lines of falling severity are dotted.
+    untrained: links never hurt in training, which come last and are marked.
     """
 
     def label_of(row: Mapping[str, Any]) -> str:
@@ -123,7 +124,7 @@ def curves(
     for row in sorted(rows, key=lambda row: row["link"] in untrained):
         sweeps.setdefault(label_of(row), []).append(row)
     healing: dict[str, list[Mapping[str, Any]]] = {}
-    for row in back:
+    for row in falling:
         healing.setdefault(label_of(row), []).append(row)
     charts = [_panel(panel, rows, sweeps, healing) for panel in PANELS]
     caption = (
@@ -133,7 +134,7 @@ def curves(
         "the network switches between two gaits. Pose distances are distances from the healthy walk at the "
         "same phase, means over joints."
     )
-    if back:
+    if falling:
         caption += " Dotted lines: falling severity."
     if untrained:
         caption += " Links that were never hurt in training show how much a healthy walk varies."
@@ -146,8 +147,12 @@ def _panel(
     sweeps: Mapping[str, Sequence[Mapping[str, Any]]],
     healing: Mapping[str, Sequence[Mapping[str, Any]]],
 ) -> Chart:
-    """The small chart of an entry of PANELS. sweeps, healing: option of the menu -> its rows."""
-    name, title, unit, lines, span, from_zero = panel
+    """The small chart of an entry of PANELS.
+
+    sweeps, healing: option of the menu -> its rows of rising and of falling severity. rows: those of all
+    options, for the range of the axis.
+    """
+    name, title, unit, lines, least_range, from_zero = panel
     options: dict[str, list[Trace]] = {}
     for sweep, some in sweeps.items():
         x = [row["severity"] for row in some]
@@ -169,7 +174,7 @@ def _panel(
     }
     columns = [column for column, *_ in lines]
     ranges = {
-        sweep: {"yaxis": {"range": y_range(rows, some[0]["gait"], columns, span, from_zero)}}
+        sweep: {"yaxis": {"range": y_range(rows, some[0]["gait"], columns, least_range, from_zero)}}
         for sweep, some in sweeps.items()
     }
     return Chart(
@@ -178,18 +183,18 @@ def _panel(
 
 
 def y_range(
-    rows: Sequence[Mapping[str, Any]], gait: str, columns: Sequence[str], span: float, from_zero: bool
+    rows: Sequence[Mapping[str, Any]], gait: str, columns: Sequence[str], least_range: float, from_zero: bool
 ) -> list[float] | None:
     """The range of the vertical axis, the same for all links of a gait, so that they can be compared.
 
-    columns: those that the chart shows. span: least length of the range, so that noise looks small.
-    from_zero: whether it starts at 0. None if no row has a value.
+    columns: those that the chart shows. least_range: the range is at least this long, so that noise looks
+    small. from_zero: whether the axis starts at 0. None if no row has a value.
     """
     found = [row[c] for row in rows if row["gait"] == gait for c in columns if row.get(c) is not None]
     if not found:
         return None
     low, high = (0.0 if from_zero else min(found)), max(found)
-    spare = max(span - (high - low), 0.08 * (high - low))
+    spare = max(least_range - (high - low), 0.08 * (high - low))
     return [low if from_zero else low - spare / 2, high + spare / (1 if from_zero else 2)]
 
 
@@ -197,7 +202,7 @@ def overview(responses: Sequence[Mapping[str, Any]]) -> list[Chart]:
     """Effect of severity 10 on pose and speed, for each link."""
     charts = []
     untrained = any(not r.get("trained", True) for r in responses)
-    for name, key, title, label, least, caption, of_hollow in (
+    for name, key, title, label, least_range, caption, on_hollow in (
         (
             "injury-pose",
             "from_healthy_cm",
@@ -219,7 +224,7 @@ def overview(responses: Sequence[Mapping[str, Any]]) -> list[Chart]:
         ),
     ):
         if untrained:
-            caption = f"{caption} Hollow dots are links that were never hurt in training. {of_hollow}".strip()
+            caption = f"{caption} Hollow dots are links that were never hurt in training. {on_hollow}".strip()
         traces: list[Trace] = []
         for gait, colour in GAIT_COLOURS.items():
             for hurt in (True, False):
@@ -245,7 +250,7 @@ def overview(responses: Sequence[Mapping[str, Any]]) -> list[Chart]:
         downwards = sorted(responses, key=lambda r: not r.get("trained", True))
         links = list(dict.fromkeys(r["link"] for r in downwards))[::-1]
         furthest = max((r[key] for r in responses if r.get(key) is not None), default=0.0)
-        across = axis(label, range=[0, 1.08 * max(least, furthest)])
+        across = axis(label, range=[0, 1.08 * max(least_range, furthest)])
         rows = {"categoryorder": "array", "categoryarray": links, "automargin": True, "type": "category"}
         if traces:
             layout = {"xaxis": across, "yaxis": rows}
@@ -291,7 +296,7 @@ def response_table(name: str, responses: Sequence[Mapping[str, Any]]) -> Table:
 
 
 def sweep_table(name: str, rows: Sequence[Mapping[str, Any]]) -> Table | None:
-    """All walks of the sweep, as in injury.csv."""
+    """All walks of the sweep at rising severity, as in injury/sweep.csv."""
     if not rows:
         return None
     keys = list(rows[0])

@@ -8,6 +8,7 @@ from typing import Any
 from hobble.report.charts import Chart, Trace, axis, line
 from hobble.report.tables import Column, Table
 
+# Colours of the lines in a chart.
 COLOURS = ("@accent", "@g2", "@g3", "@g4", "@g5", "@g0")
 
 
@@ -52,7 +53,7 @@ def second_chart(rows: Sequence[Mapping[str, Any]]) -> Chart | None:
 
 
 def second_table(name: str, rows: Sequence[Mapping[str, Any]]) -> Table | None:
-    """Every walk with two injuries, as in injury_second.csv."""
+    """Every walk with two injuries, as in injury/second.csv."""
     if not rows:
         return None
     keys = [key for key, value in rows[0].items() if not isinstance(value, (dict, list))]
@@ -65,7 +66,7 @@ def second_table(name: str, rows: Sequence[Mapping[str, Any]]) -> Table | None:
 
 
 def divided_chart(rows: Sequence[Mapping[str, Any]]) -> Chart | None:
-    """How far the walk of a chosen link is from the healthy walk, with a line for each divisor."""
+    """How far the walk with a chosen link hurt is from the healthy walk, with a line for each divisor."""
     options: dict[str, list[Trace]] = {}
     scales = sorted({row["scale"] for row in rows})
     for link in dict.fromkeys(row["link"] for row in rows):
@@ -99,24 +100,26 @@ def jog_chart(rows: Sequence[Mapping[str, Any]], untrained: Collection[str] = ()
         x, y = [row["severity"] for row in some], [row.get("jog_from_healthy_cm") for row in some]
         dash = "solid" if i < len(COLOURS) else "dash"
         traces.append(line(link, x, y, COLOURS[i % len(COLOURS)], dash=dash, mode="lines+markers", width=1.4))
-    found: dict[float, list[float]] = {}
+    untrained_jogs: dict[float, list[float]] = {}
     for row in rows:
         if row["link"] in untrained and row.get("jog_from_healthy_cm") is not None:
-            found.setdefault(row["severity"], []).append(row["jog_from_healthy_cm"])
-    if found:
-        means = [sum(values) / len(values) for values in found.values()]
-        traces.append(line("never hurt in training", list(found), means, "@muted", dash="dot", width=1.4))
+            untrained_jogs.setdefault(row["severity"], []).append(row["jog_from_healthy_cm"])
+    if untrained_jogs:
+        means = [sum(values) / len(values) for values in untrained_jogs.values()]
+        traces.append(
+            line("never hurt in training", list(untrained_jogs), means, "@muted", dash="dot", width=1.4)
+        )
     if not traces:
         return None
     caption = (
         "The character walks hurt, then jogs and is still hurt. The chart shows how far its jog is from the "
         "healthy jog."
     )
-    if found:
+    if untrained_jogs:
         caption += (
-            " The dotted line is the mean of links that were never hurt in training, so it shows how much "
-            "two healthy jogs differ. If the line of a link is not above it, the injury does not show in the "
-            "jog."
+            " The dotted line is the mean of links that were never hurt in training. They have no effect, so "
+            "the line shows how much two healthy jogs differ. If the line of a link is not above it, the "
+            "injury does not show in the jog."
         )
     return Chart(
         "into-a-jog",

@@ -8,10 +8,14 @@ Number = float | None  # None if it cannot be measured
 
 
 class SweepRow(TypedDict):
-    """The walk at one severity of one link: the measures of `gait_measures`, and distances of the pose, cm.
+    """The walk at one severity of one link: measures of the gait, and distances of the pose, cm.
+
+    The measures are those of `hobble.evaluation.motion_measures.gait_measures`: speed in cm/s, stance as a
+    share of the frames, steps and height of the hips in cm, ranges of knee and arm and lean of the trunk in
+    degrees.
 
     direction: "rising" or "falling" severity. from_healthy: distance from the healthy walk. from_worst: from
-    the walk at severity 10. from_rising: from the walk at the same severity while it rose.
+    the walk at severity 10. from_rising: from the walk at the same severity while the severity rose.
     largest_acceleration: of any joint, cm per frame squared.
     """
 
@@ -40,7 +44,10 @@ class SweepRow(TypedDict):
 
 
 class Response(TypedDict):
-    """How the walk responds to the severity of one link. See `SeveritySweep.response`."""
+    """How the walk responds to the severity of one link.
+
+    For the fields see `SeveritySweep.response` in `hobble.channels.injury.response.sweep`.
+    """
 
     spearman: dict[str, Number]
     spearman_falling: dict[str, Number]
@@ -58,9 +65,9 @@ class LinkResponse(Response):
     """The response of one link in one gait.
 
     trained: whether the link was hurt in training. clip_acceleration: largest acceleration of a joint in
-    captured motion, cm per frame squared. clip_acceleration_of: which captured motion that is, "link" if the
-    link hurts in it, "gait" if it is all motion in that gait. clip_acceleration_share: the character's
-    largest acceleration as a share of it.
+    captured motion, cm per frame squared. clip_acceleration_of: "link" if it is from motion in which the
+    link hurts, "gait" if it is from all motion in that gait. clip_acceleration_share: the character's largest
+    acceleration, divided by `clip_acceleration`.
     """
 
     gait: str
@@ -72,7 +79,11 @@ class LinkResponse(Response):
 
 
 class Summary(TypedDict):
-    """Means of the responses of several links in one gait."""
+    """Means over the responses of several links in one gait. For the fields see `LinkResponse`.
+
+    spearman_<measure>, spearman_falling_<measure>: means of `spearman` and `spearman_falling` for this
+    measure.
+    """
 
     spearman_from_healthy: Number
     spearman_speed: Number
@@ -88,7 +99,10 @@ class Summary(TypedDict):
 
 
 class SecondInjury(TypedDict):
-    """A second injury at severity 10 in addition to a first one. See `second_injuries`."""
+    """A second injury at severity 10 in addition to a first one.
+
+    For the fields see `second_injuries` in `hobble.channels.injury.response.cases`.
+    """
 
     first: str
     second: str
@@ -99,7 +113,10 @@ class SecondInjury(TypedDict):
 
 
 class IntoAJog(TypedDict):
-    """The change from walking to jogging. See `into_a_jog`. Speeds in cm/s."""
+    """The change from walking to jogging. Speeds in cm/s.
+
+    For the fields see `into_a_jog` in `hobble.channels.injury.response.cases`.
+    """
 
     link: str | None
     severity: float
@@ -113,7 +130,11 @@ class IntoAJog(TypedDict):
 
 
 class Divided(TypedDict):
-    """The walk with severities divided by `scale`."""
+    """The walk with one link hurt, if its `severity` is divided by `scale`.
+
+    from_healthy_cm: distance of the pose from the healthy walk. speed_share: speed, divided by the healthy
+    speed.
+    """
 
     scale: float
     link: str
@@ -125,7 +146,7 @@ class Divided(TypedDict):
 class InjuryResponse(TypedDict):
     """injury.json. If `applies` is false, it has only the first two keys and `reason`.
 
-    See `hobble.channels.injury.response.run.injury_response`.
+    For the fields see `hobble.channels.injury.response.run.injury_response`.
     """
 
     configuration: str

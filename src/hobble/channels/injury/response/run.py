@@ -1,4 +1,7 @@
-"""Measures the response to injury: every link from healthy to severity 10 and back, in two gaits."""
+"""Measures the response to injury: every link from healthy to severity 10 and back, in two gaits.
+
+A link is the piece of the body between two neighbouring joints.
+"""
 
 from __future__ import annotations
 
@@ -21,8 +24,8 @@ from hobble.models.load import load_network
 from hobble.models.network import Network
 from hobble.runtime.options import Runtime
 
-INJURY = "injury"  # the channel
-GAITS = tuple(SPEEDS)
+INJURY = "injury"  # name of the channel
+GAITS = tuple(SPEEDS)  # walk and jog
 NO_SEVERITIES = "this network has no severity inputs"
 
 
@@ -35,14 +38,16 @@ def injury_response(
     seconds: float,
     links: Sequence[str] | None = None,
 ) -> InjuryResponse:
-    """The content of injury.json: a sweep of each of `links` (default: all).
+    """The content of injury.json, whose types are in `hobble.channels.injury.response.results`.
 
-    motion: the captured clips, whose largest accelerations are compared with the character's. seconds: time
-    at each severity. `rows`: one for each gait, link and rising severity. `falling`: one for each gait, link
-    and falling severity. `responses`: one for each gait and link (see `SeveritySweep.response`). `second`,
-    `into_a_jog`, `divided`: see `hobble.channels.injury.response.cases`. `trained`: the links that were hurt
-    in training. `summary`: means over these. `summary_untrained`: means over the others. `applies` is false
-    for a network without severities.
+    motion: the captured clips; their largest accelerations are compared with the character's. seconds: time
+    at each severity. links: the links to hurt, by default all.
+
+    Keys of the result. applies: false for a network without severities. trained: the links that were hurt
+    in training. rows: one for each gait, link and rising severity. falling: one for each gait, link and
+    falling severity. responses: one for each gait and link. second, into_a_jog, divided: see the functions
+    in `hobble.channels.injury.response.cases`. summary: means over the trained links. summary_untrained:
+    means over the other links.
     """
     if not links_of(network):
         return {"configuration": configuration, "applies": False, "reason": NO_SEVERITIES}
@@ -84,20 +89,22 @@ def _sweeps(
     for sweep in sweeps(network, links, GAITS, seconds, runtime):
         gait = sweep.gait
         for figure, link in enumerate(links):
-            found = sweep.rows(figure)
-            rows += found[: len(SEVERITIES)]
-            falling += found[len(SEVERITIES) :]
-            response = sweep.response(figure, found)
-            clips = largest.get((gait, link), largest.get((gait, None)))
-            share = round(response["largest_acceleration"] / clips, 5) if clips else None
+            figure_rows = sweep.rows(figure)
+            rows += figure_rows[: len(SEVERITIES)]
+            falling += figure_rows[len(SEVERITIES) :]
+            response = sweep.response(figure, figure_rows)
+            captured = largest.get((gait, link), largest.get((gait, None)))
+            share = round(response["largest_acceleration"] / captured, 5) if captured else None
             responses.append(
                 {
                     "gait": gait,
                     "link": link,
                     "trained": link in trained,
                     **response,
-                    "clip_acceleration": clips,
-                    "clip_acceleration_of": "link" if (gait, link) in largest else "gait" if clips else None,
+                    "clip_acceleration": captured,
+                    "clip_acceleration_of": (
+                        "link" if (gait, link) in largest else "gait" if captured else None
+                    ),
                     "clip_acceleration_share": share,
                 }
             )
@@ -107,54 +114,58 @@ def _sweeps(
 def largest_accelerations(
     motion: Iterable[Captured], network: Network
 ) -> dict[tuple[str, str | None], float]:
-    """(gait, link) -> largest joint acceleration (cm per frame squared) in captured motion with that injury.
+    """(gait, link) -> largest acceleration of a joint, cm per frame squared, in captured motion.
 
-    (gait, None): the largest in that gait with any injury or none.
+    Only motion in this gait in which this link hurts is counted. (gait, None): the largest in all motion in
+    this gait, whatever hurts.
     """
     out: dict[tuple[str, str | None], float] = {}
     for clip in motion:
         for gait in GAITS:
-            going = clip.gait[:, network.gaits.index(gait)] > 0.5
-            hurt: list[tuple[str | None, Any]] = [(None, going)]
-            hurt += [
-                (link, going & (clip.channels[INJURY][:, i] > 0)) for i, link in enumerate(links_of(network))
+            in_gait = clip.gait[:, network.gaits.index(gait)] > 0.5
+            chosen: list[tuple[str | None, Any]] = [(None, in_gait)]
+            chosen += [
+                (link, in_gait & (clip.channels[INJURY][:, i] > 0))
+                for i, link in enumerate(links_of(network))
             ]
-            for link, chosen in hurt:
-                if np.any(chosen):
-                    found = round(float(clip.acceleration[chosen].max()), 5)
-                    out[gait, link] = max(found, out.get((gait, link), 0.0))
+            for link, frames in chosen:
+                if np.any(frames):
+                    highest = round(float(clip.acceleration[frames].max()), 5)
+                    out[gait, link] = max(highest, out.get((gait, link), 0.0))
     return out
 
 
 def _summary(responses: Sequence[LinkResponse]) -> dict[str, Summary]:
-    """Gait -> means over links; {} without links."""
+    """Gait -> means over the links of `responses`. Empty if there are no responses."""
     out: dict[str, Summary] = {}
     for gait in GAITS:
-        some = [r for r in responses if r["gait"] == gait]
-        if some:
+        group = [r for r in responses if r["gait"] == gait]
+        if group:
             out[gait] = {
-                "spearman_from_healthy": _mean([r["spearman"]["from_healthy"] for r in some]),
-                "spearman_speed": _mean([r["spearman"]["speed"] for r in some]),
-                "spearman_falling_from_healthy": _mean([r["spearman_falling"]["from_healthy"] for r in some]),
-                "from_healthy_cm": _mean([r["from_healthy_cm"] for r in some]),
-                "after_healing_cm": _mean([r["after_healing_cm"] for r in some]),
-                "hysteresis_cm": _mean([r["hysteresis_cm"] for r in some]),
-                "speed_share": _mean([r["speed_share"] for r in some]),
-                "settle_seconds": _mean([r["settle_seconds"] for r in some]),
-                "heal_seconds": _mean([r["heal_seconds"] for r in some]),
-                "acceleration_share": _mean([r["acceleration_share"] for r in some]),
-                "clip_acceleration_share": _mean([r["clip_acceleration_share"] for r in some]),
+                "spearman_from_healthy": _mean([r["spearman"]["from_healthy"] for r in group]),
+                "spearman_speed": _mean([r["spearman"]["speed"] for r in group]),
+                "spearman_falling_from_healthy": _mean(
+                    [r["spearman_falling"]["from_healthy"] for r in group]
+                ),
+                "from_healthy_cm": _mean([r["from_healthy_cm"] for r in group]),
+                "after_healing_cm": _mean([r["after_healing_cm"] for r in group]),
+                "hysteresis_cm": _mean([r["hysteresis_cm"] for r in group]),
+                "speed_share": _mean([r["speed_share"] for r in group]),
+                "settle_seconds": _mean([r["settle_seconds"] for r in group]),
+                "heal_seconds": _mean([r["heal_seconds"] for r in group]),
+                "acceleration_share": _mean([r["acceleration_share"] for r in group]),
+                "clip_acceleration_share": _mean([r["clip_acceleration_share"] for r in group]),
             }
     return out
 
 
 def _mean(values: Sequence[float | None]) -> float | None:
-    known = [v for v in values if v is not None]
-    return round(float(np.mean(known)), 5) if known else None
+    measured = [v for v in values if v is not None]
+    return round(float(np.mean(measured)), 5) if measured else None
 
 
 def run(inputs: MeasureInputs, options: Options) -> Outcome:
-    """injury.json, and its sweeps as tables."""
+    """The content of injury.json and of its tables."""
     sample = sample_of(inputs, options)
     result = injury_response(
         load_network(inputs.weights),

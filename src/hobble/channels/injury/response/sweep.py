@@ -1,8 +1,9 @@
 """Measures one gait while the severity of one link rises and falls.
 
-There is a figure for each link. It walks healthy until it has reached its speed. Then the severity of its
-link is 0, 1, ..., 10, 9, ..., 0, each for the same time (a stretch). In a second crowd each figure is hurt at
-severity 10 at once and healed at once, to see how fast the walk follows.
+A link is the piece of the body between two neighbouring joints. There is a figure (a character) for each
+link. It walks healthy until it has reached its speed. Then the severity of its link is 0, 1, ..., 10, 9, ...,
+0, each for the same time (a stretch). There is also a second crowd, to measure how fast the walk changes. In
+it, the severity of each figure's link jumps from 0 to 10 and later back to 0.
 """
 
 from __future__ import annotations
@@ -23,19 +24,21 @@ from hobble.models.network import Network
 from hobble.runtime.options import Runtime
 
 SEVERITIES = np.arange(11.0)
-STEPS = [*SEVERITIES, *SEVERITIES[-2::-1]]
-WALK_IN = 0.75  # length of the first part, in which figures reach their speed, in stretches
-HURT = 2  # for how many stretches the figures of the second crowd are hurt, and then healed
+STEPS = [*SEVERITIES, *SEVERITIES[-2::-1]]  # severity in each stretch: 0, 1, ..., 10, 9, ..., 0
+WALK_IN = 0.75  # length of the beginning, in which figures reach their speed, as a share of a stretch
+# The figures of the second crowd are hurt for a time of this many stretches. After it they walk healthy for a
+# time of the same length.
+HURT = 2
 # Columns of a row that are not measures of the walk.
-NAMES = ("gait", "link", "direction", "severity")
+LABELS = ("gait", "link", "direction", "severity")
 
 
 class SeveritySweep:
     """The walks of one gait, with a figure for each of `links`.
 
-    steps: the severities in the order of the stretches. walks: the motion of the figures, with a first
-    stretch in which they reach their speed. at_once: the motion of the figures that are hurt at once and
-    healed at once. See `sweeps`.
+    steps: the severity in each stretch. walks: the motion of the figures whose severity rises and falls.
+    Before the stretches of `steps` it has a shorter one, in which the figures reach their speed. at_once: the
+    motion of the second crowd, whose severities jump to 10 and back to 0.
     """
 
     def __init__(
@@ -46,7 +49,10 @@ class SeveritySweep:
         self.walks, self.at_once = walks, at_once
 
     def rows(self, figure: int) -> list[SweepRow]:
-        """One row for each of `steps`. Distances are means over joints at the same phase. See `SweepRow`."""
+        """One row for each of `steps`; `SweepRow` in the module `results` beside this one explains its keys.
+
+        figure: index of the figure. Distances are means over the joints, between poses of the same phase.
+        """
         walks = self.walks
         spans = [walks.measured(1 + step, figure) for step in range(len(self.steps))]
         cycles = [mean_cycle(walks.local[s, figure], walks.phase[s, figure]) for s in spans]
@@ -63,7 +69,7 @@ class SeveritySweep:
             row |= gait_measures(self.skeleton, local, walks.contacts[span, figure], walks.root[span, figure])
             row["from_healthy"] = float(np.mean(distance_to_cycle(local, phase, cycles[0])))
             row["from_worst"] = float(np.mean(distance_to_cycle(local, phase, cycles[worst])))
-            # The cycle at the same severity while the severity rose.
+            # The mean cycle at this severity while the severity rose.
             same = cycles[step if step <= worst else 2 * worst - step]
             row["from_rising"] = float(np.mean(distance_to_cycle(local, phase, same)))
             row["largest_acceleration"] = float(walks.acceleration[span, figure].max())
@@ -74,20 +80,24 @@ class SeveritySweep:
     def response(self, figure: int, rows: Sequence[SweepRow]) -> Response:
         """How the walk responds to severity.
 
-        spearman, spearman_falling: rank correlation of each measure with rising and with falling severity,
-        None if the measure is constant. Distances are in cm, minus the distance of the healthy walk from its
-        own mean cycle: from_healthy_cm at severity 10, after_healing_cm at the end, hysteresis_cm the largest
-        between the walks at the same rising and falling severity. speed_share: speed at severity 10, share of
-        healthy. settle_seconds, heal_seconds: until the walk no longer changes after being hurt or healed at
-        once. largest_acceleration: of any joint in the whole sweep; acceleration_share: relative to the
-        healthy walk's.
+        figure: index of the figure. rows: the figure's rows.
+
+        Keys of the result. spearman, spearman_falling: rank correlation of each measure with rising and with
+        falling severity, None if the measure is constant. from_healthy_cm, after_healing_cm: distance from
+        the healthy walk at severity 10 and at the end. hysteresis_cm: largest distance between two walks at
+        the same severity, one while it rose and one while it fell. From each of these three distances, the
+        distance of the healthy walk from its own mean cycle is subtracted. speed_share: speed at severity 10,
+        divided by the healthy speed. settle_seconds, heal_seconds: time until the walk no longer changes
+        after the severity jumped to 10 or back to 0. largest_acceleration: of any joint in the whole sweep,
+        cm per frame squared. acceleration_share: largest_acceleration, divided by the largest acceleration in
+        the healthy walk.
         """
         worst = len(SEVERITIES) - 1
         rising, falling = rows[: worst + 1], rows[worst:]
-        names = [k for k in rows[0] if k not in (*NAMES, "from_rising")]
+        names = [k for k in rows[0] if k not in (*LABELS, "from_rising")]
         numbers = cast(Sequence[Mapping[str, float | None]], rows)
         measures = {name: [row[name] for row in numbers] for name in names}
-        own = rows[0]["from_healthy"]
+        healthy_cm = rows[0]["from_healthy"]  # distance of the healthy walk from its own mean cycle
         largest = float(self.walks.acceleration[int(self.walks.starts[1]) :, figure].max())
         hurt, healed = self._settling(figure)
         return {
@@ -95,9 +105,9 @@ class SeveritySweep:
             "spearman_falling": {
                 n: spearman(SEVERITIES[::-1], values[worst:]) for n, values in measures.items()
             },
-            "from_healthy_cm": round(rising[-1]["from_healthy"] - own, 5),
-            "after_healing_cm": round(rows[-1]["from_healthy"] - own, 5),
-            "hysteresis_cm": round(max(row["from_rising"] for row in falling[1:]) - own, 5),
+            "from_healthy_cm": round(rising[-1]["from_healthy"] - healthy_cm, 5),
+            "after_healing_cm": round(rows[-1]["from_healthy"] - healthy_cm, 5),
+            "hysteresis_cm": round(max(row["from_rising"] for row in falling[1:]) - healthy_cm, 5),
             "speed_share": round(rising[-1]["speed"] / rising[0]["speed"], 5)
             if rising[0]["speed"] > 0
             else None,
@@ -108,6 +118,7 @@ class SeveritySweep:
         }
 
     def _settling(self, figure: int) -> tuple[float | None, float | None]:
+        """`settle_seconds` and `heal_seconds` of `response`."""
         walks: Walks = self.at_once
         local, phase = walks.local[:, figure], walks.phase[:, figure]
         healthy = walks.measured(1, figure)
@@ -126,14 +137,14 @@ def sweeps(
 ) -> Iterator[SeveritySweep]:
     """The sweep of each gait, with `seconds` at each severity. The figures of all gaits are in one crowd."""
     assert network.skeleton is not None
-    names = [gait for gait in gaits for _ in links]
+    gait_of_figure = [gait for gait in gaits for _ in links]
 
     def stretch(share: float, severity: float) -> CrowdTarget:
         hurt = severities(network, [{link: severity} for link in links] * len(gaits))
-        return CrowdTarget(max(4, round(share * seconds * FPS)), names, hurt)
+        return CrowdTarget(max(4, round(share * seconds * FPS)), gait_of_figure, hurt)
 
     walks = run(network, [stretch(WALK_IN, 0), *(stretch(1, s) for s in STEPS)], runtime)
     at_once = run(network, [stretch(WALK_IN, 0), stretch(1, 0), stretch(HURT, 10), stretch(HURT, 0)], runtime)
     for number, gait in enumerate(gaits):
-        own = slice(number * len(links), (number + 1) * len(links))
-        yield SeveritySweep(network.skeleton, links, gait, walks.of(own), at_once.of(own))
+        figures = slice(number * len(links), (number + 1) * len(links))
+        yield SeveritySweep(network.skeleton, links, gait, walks.of(figures), at_once.of(figures))

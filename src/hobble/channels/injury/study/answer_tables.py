@@ -1,7 +1,7 @@
 """Makes the tables of the study from people's answers: III to XV for the thirteen films, XVI for all.
 
-Of Quentin Ferre's tables we only know how many there are, and that 82 % of hurt parts were named. We assume
-one table for each film and one for all films.
+The numerals are those of the tables of Quentin Ferre (2019). Of his tables we only know how many there are,
+and that people named 82 % of the hurt parts. We assume one table for each film and one for all films.
 """
 
 from __future__ import annotations
@@ -18,23 +18,29 @@ from hobble.core.files import write_text
 from hobble.evaluation.csv_tables import write_csv
 
 NUMERALS = ("III", "IV", "V", "VI", "VII", "VIII", "IX", "X", "XI", "XII", "XIII", "XIV", "XV", "XVI")
-ALL = "all"
+ALL = "all"  # in place of a film's number or kind, in rows for all films or kinds
 Rows = list[dict[str, Any]]
 
 
 def tables(study: Study, people: Sequence[Sequence[FilmAnswer]]) -> dict[str, Rows]:
-    """Numeral -> rows of that table. people: each person's answers. The last table is for all films."""
-    of = {film.number: [a for some in people for a in some if a.film == film.number] for film in study.films}
-    named = [*NUMERALS, *(f"XVI+{i}" for i in range(1, len(study.films)))]
-    out = {named[i]: film_rows(study, film, of[film.number]) for i, film in enumerate(study.films)}
-    out[named[len(study.films)]] = summary_rows(study, of)
+    """Numeral -> rows of that table. people: each person's answers. The last table is for all films.
+
+    With more than thirteen films, the numerals go on as XVI+1, XVI+2 and so on.
+    """
+    answers: dict[int, list[FilmAnswer]] = {
+        film.number: [a for of_person in people for a in of_person if a.film == film.number]
+        for film in study.films
+    }
+    numerals = [*NUMERALS, *(f"XVI+{i}" for i in range(1, len(study.films)))]
+    out = {numerals[i]: film_rows(study, film, answers[film.number]) for i, film in enumerate(study.films)}
+    out[numerals[len(study.films)]] = summary_rows(study, answers)
     return out
 
 
 def film_rows(study: Study, film: ShownFilm, answers: Sequence[FilmAnswer]) -> Rows:
     """A row for each part in one film.
 
-    hurts: whether it hurts. people: how many people ticked it. share: their share.
+    hurts: whether the part hurts. people: how many people ticked it. share: share of people who ticked it.
     """
     return [
         {
@@ -47,26 +53,29 @@ def film_rows(study: Study, film: ShownFilm, answers: Sequence[FilmAnswer]) -> R
     ]
 
 
-def summary_rows(study: Study, of: Mapping[int, Sequence[FilmAnswer]]) -> Rows:
-    """A row of `scores` for each film, for each kind of film, and for all."""
+def summary_rows(study: Study, answers: Mapping[int, Sequence[FilmAnswer]]) -> Rows:
+    """A row of `scores` for each film, for each kind of film, and for all films.
+
+    answers: film number -> the answers to this film.
+    """
     rows = [
         {"film": str(film.number), "kind": film.kind, "parts": ", ".join(film.parts)}
-        | scores([(film, a) for a in of[film.number]])
+        | scores([(film, a) for a in answers[film.number]])
         for film in study.films
     ]
     for kind in [*dict.fromkeys(film.kind for film in study.films), ALL]:
-        some = [(f, a) for f in study.films if kind in (f.kind, ALL) for a in of[f.number]]
-        rows.append({"film": ALL, "kind": kind, "parts": ""} | scores(some))
+        of_kind = [(f, a) for f in study.films if kind in (f.kind, ALL) for a in answers[f.number]]
+        rows.append({"film": ALL, "kind": kind, "parts": ""} | scores(of_kind))
     return rows
 
 
 def scores(answers: Sequence[tuple[ShownFilm, FilmAnswer]]) -> dict[str, Any]:
-    """How well people answered. answers: pairs of a film and an answer.
+    """How well people answered. answers: pairs of a film and one person's answer to it.
 
-    seen: share of the hurt parts that were ticked. wrong: mean number of ticked parts that do not hurt.
-    exact: share of the answers that tick exactly the hurt parts. seen_without_side, exact_without_side: seen
-    and exact if left and right are not distinguished. fluid: mean of the marks from 1 to 5 for how fluid the
-    motion is. fluid_sd: their standard deviation.
+    Keys of the result. answers: their number. seen: share of the hurt parts that were ticked. wrong: mean
+    number of ticked parts that do not hurt. exact: share of the answers that tick exactly the hurt parts.
+    seen_without_side, exact_without_side: seen and exact if left and right are not distinguished. fluid: mean
+    of the marks from 1 to 5 for how fluid the motion is. fluid_sd: standard deviation of these marks.
     """
     seen = sum(part in a.parts for film, a in answers for part in film.parts)
     sides = [({without_side(p) for p in f.parts}, {without_side(p) for p in a.parts}) for f, a in answers]
@@ -83,16 +92,22 @@ def scores(answers: Sequence[tuple[ShownFilm, FilmAnswer]]) -> dict[str, Any]:
     }
 
 
-def write_tables(folder: str | Path, study: Study, made: Mapping[str, Rows], published: float) -> None:
-    """Write table-III.csv and so on, and tables.md with all tables."""
+def write_tables(folder: str | Path, study: Study, numbered: Mapping[str, Rows], published: float) -> None:
+    """Write table-III.csv and so on, and tables.md with all tables.
+
+    numbered: numeral -> rows, from `tables`. published: the share of hurt parts that people named in the
+    study of Quentin Ferre (2019).
+    """
     folder = Path(folder)
     folder.mkdir(parents=True, exist_ok=True)
     text = [f"# What people saw in the films of {study.configuration}\n"]
-    for (numeral, rows), film in zip(made.items(), [*study.films, None], strict=True):
+    for (numeral, rows), film in zip(numbered.items(), [*study.films, None], strict=True):
         write_csv(folder / f"table-{numeral}.csv", rows)
         hurt = f"film {film.number}, {film.kind}: {', '.join(film.parts)}" if film else "all films"
         text += [f"## Table {numeral}: {hurt}\n", _markdown(rows), ""]
-    text.append(f"Compare `seen` with Quentin Ferre (2019): {100 * published:.0f} % named what hurts.\n")
+    text.append(
+        f"Compare `seen` with Quentin Ferre (2019): people named {100 * published:.0f} % of the hurt parts.\n"
+    )
     write_text(folder / "tables.md", "\n".join(text))
 
 

@@ -10,12 +10,16 @@ from hobble.core.errors import InputError
 from hobble.core.files import read_json
 from hobble.core.untrusted import printable
 
-FLUID = range(1, 6)
+FLUID = range(1, 6)  # marks for how fluid a motion is
+USE_FILMS_JSON = "Use the films.json in the folder of questionnaire.html."
 
 
 @dataclass(frozen=True)
 class ShownFilm:
-    """A film of the questionnaire. kind: as in `Film`. parts: the parts that hurt in it."""
+    """A film of the questionnaire.
+
+    kind: "one part", "several parts" or "change of gait". parts: the parts of the body that hurt in it.
+    """
 
     number: int
     kind: str
@@ -26,8 +30,9 @@ class ShownFilm:
 class Study:
     """The films of a questionnaire.
 
-    name: identifies the questionnaire; it is also in each file of answers, to check that they belong
-    together. configuration: whose network made the films. parts: the parts that people can tick.
+    name: identifies the questionnaire. Each file of answers states the name, so that answers to another
+    questionnaire are refused. configuration: the configuration whose network made the films. parts: the parts
+    of the body that people can tick.
     """
 
     name: str
@@ -38,7 +43,10 @@ class Study:
 
 @dataclass(frozen=True)
 class FilmAnswer:
-    """One person's answer to a film. parts: those ticked. fluid: how fluid the motion is, 1 to 5."""
+    """One person's answer to a film.
+
+    film: its number. parts: the ticked parts. fluid: mark for how fluid the motion is, from 1 to 5.
+    """
 
     film: int
     parts: tuple[str, ...]
@@ -46,23 +54,23 @@ class FilmAnswer:
 
 
 def read_study(path: str | Path) -> Study:
-    """Read films.json, which the rule `questionnaire` writes. Raises InputError."""
-    data = _object(path, read_json(path))
+    """Read films.json, which the rule `questionnaire` writes. Raises InputError if it is damaged."""
+    data = _object(path, read_json(path), USE_FILMS_JSON)
     try:
         films = tuple(ShownFilm(row["film"], row["kind"], tuple(row["parts"])) for row in data["films"])
         return Study(data["study"], data["configuration"], tuple(data["parts"]), films)
     except (KeyError, TypeError) as error:
-        fix = "Use the films.json in the folder of questionnaire.html."
-        raise InputError(path, f"is no list of films: {printable(repr(error))}", fix=fix) from None
+        what = f"is no list of films: {printable(repr(error))}"
+        raise InputError(path, what, fix=USE_FILMS_JSON) from None
 
 
 def read_answers(path: str | Path, study: Study) -> list[FilmAnswer]:
     """One person's answers, in the order in which the films were shown.
 
-    Raises InputError with the answer's number for another study's file, a film that is missing or answered
-    twice, an unknown part, or a mark that is not from 1 to 5.
+    Raises InputError for a file of another questionnaire, a film that is not answered or answered twice, an
+    unknown film or part, or a mark that is not from 1 to 5.
     """
-    data = _object(path, read_json(path))
+    data = _object(path, read_json(path), "Use the file that the page saved.")
     if data.get("study") != study.name:
         raise InputError(
             path,
@@ -96,7 +104,7 @@ def _answer(path: str | Path, number: int, row: Any, study: Study) -> FilmAnswer
     return FilmAnswer(film, tuple(dict.fromkeys(parts)), fluid)
 
 
-def _object(path: str | Path, data: Any) -> dict[str, Any]:
+def _object(path: str | Path, data: Any, fix: str) -> dict[str, Any]:
     if not isinstance(data, dict):
-        raise InputError(path, "is not an object of keys and values", fix="Use the file that the page saved.")
+        raise InputError(path, "is not an object of keys and values", fix=fix)
     return data

@@ -3,8 +3,8 @@
 A healthy character walks, then something begins to hurt. In some films the gait changes, too.
 
 Quentin Ferre (2019) showed four films with one hurt part, five with several and four with a change of gait,
-each with the transition from healthy to hurt. We do not know which parts hurt in each. In his clips, thigh,
-shank and forearm hurt, so these hurt here, too.
+each with the transition from healthy to hurt. We do not know which parts hurt in each film. In his injured
+clips, thigh, shank and forearm hurt, so these parts hurt in our films.
 """
 
 from __future__ import annotations
@@ -25,12 +25,12 @@ from hobble.runtime.animation import ProceduralAnimation
 from hobble.runtime.options import Runtime
 
 FPS = 60
-SEVERITY = 10.0  # as in the study
+SEVERITY = 10.0  # the highest, as in the films of Quentin Ferre (2019)
 SPEEDS = {"walk": 2.5, "jog": 6.0}  # target speeds, cm a frame
 WARM_UP = 4.0  # seconds of walking before a film begins
-# Seconds before the injury, seconds with it, and more seconds with it if the gait changes. The gait changes
-# in the middle of the film.
-HEALTHY, HURT, CHANGED = 3.0, 7.0, 5.0
+HEALTHY, HURT = 3.0, 7.0  # seconds before and after the injury begins
+CHANGED = 5.0  # seconds that a film with a change of gait is longer; the gait changes in its middle
+# The kinds of films.
 ONE, SEVERAL, GAIT = "one part", "several parts", "change of gait"
 # Parts that people can tick: those that hurt in some film, on both sides, and some that hurt in none.
 SIDED = ("thigh", "shank", "foot", "upper arm", "forearm")
@@ -41,8 +41,8 @@ PARTS = (*(f"{side} {part}" for part in SIDED for side in ("left", "right")), "l
 class Film:
     """One film.
 
-    number: from 1, in the order of the tables. kind: ONE, SEVERAL or GAIT. parts: those that hurt. gaits: at
-    the beginning and at the end.
+    number: from 1, in the order of the tables of answers. kind: ONE, SEVERAL or GAIT. parts: the parts that
+    hurt. gaits: target gaits at the beginning and at the end.
     """
 
     number: int
@@ -52,7 +52,7 @@ class Film:
 
     @property
     def seconds(self) -> float:
-        """Its length."""
+        """Length of the film."""
         return HEALTHY + HURT + (CHANGED if self.gaits[0] != self.gaits[1] else 0.0)
 
 
@@ -77,8 +77,8 @@ FILMS = (
 class FilmMotion:
     """The motion of a film at 60 Hz, F frames of J joints in the world.
 
-    positions: (F, J, 3) cm. rotations: (F, J, 4) quaternions. from_healthy: mean distance, cm, of the joints
-    from those of a healthy character, from the beginning of the injury on.
+    positions: (F, J, 3) cm. rotations: (F, J, 4) quaternions. from_healthy: mean distance, cm, between the
+    joints and those of a healthy character, averaged over all frames after the injury begins.
     """
 
     positions: Array
@@ -94,21 +94,22 @@ def without_side(part: str) -> str:
 def part_links(network: Network, parts: Sequence[str]) -> list[str]:
     """The link that stands for each part.
 
-    It is the part's uppermost link that was hurt in training. If there is none, it is the uppermost of all.
-    Raises HobbleError if the network has no injury channel, or if the skeleton has no such part.
+    A link is the piece of the body between two neighbouring joints. Of the part's links, the uppermost that
+    was hurt in training is taken. If none was, the part's uppermost link is taken. Raises HobbleError if the
+    network has no injury channel, or if the skeleton has no such part.
     """
-    known, hurt = links_of(network), hurt_links(network)
-    if network.skeleton is None or not known:
+    links, hurt = links_of(network), hurt_links(network)
+    if network.skeleton is None or not links:
         raise HobbleError("this network has no injury channel. Use a configuration with `channels: [injury]`")
     ends = {label: roles for label, *roles in (*SLIDERS, *OTHERS)}
     out = []
     for part in parts:
-        there = [link for link in links_between(network.skeleton, *ends[part]) if link in known]
-        if not there:
+        of_part = [link for link in links_between(network.skeleton, *ends[part]) if link in links]
+        if not of_part:
             raise HobbleError(
                 f"the skeleton of this network has no {part} that can hurt, but a film needs one"
             )
-        out.append(next((link for link in there if link in hurt), there[0]))
+        out.append(next((link for link in of_part if link in hurt), of_part[0]))
     return out
 
 
@@ -122,7 +123,7 @@ def film_motion(network: Network, film: Film, runtime: Runtime) -> FilmMotion:
 
 
 def hurts_and_gait(film: Film, frame: int) -> tuple[bool, str]:
-    """Whether the parts of a film hurt at a frame, and the target gait."""
+    """Whether the parts of a film hurt at a frame, and the target gait at this frame."""
     hurts = frame >= HEALTHY * FPS
     changed = frame >= (HEALTHY + HURT) * FPS - CHANGED * FPS / 2
     return hurts, film.gaits[1] if changed else film.gaits[0]
@@ -131,6 +132,7 @@ def hurts_and_gait(film: Film, frame: int) -> tuple[bool, str]:
 def _walked(
     network: Network, film: Film, severities: dict[str, float], runtime: Runtime
 ) -> tuple[Array, Array]:
+    """Positions and rotations of a character that walks as in a film. severities: link -> value."""
     animation = ProceduralAnimation(network, **dict(runtime))
     before, frames = round(WARM_UP * FPS), round(film.seconds * FPS)
     positions, rotations = [], []
@@ -146,5 +148,5 @@ def _walked(
 
 
 def _local(positions: Array) -> Array:
-    """Positions relative to the root's place on the ground."""
+    """Positions relative to the ground below the first joint, the root."""
     return positions - positions[:, :1] * [1.0, 0.0, 1.0]

@@ -38,12 +38,13 @@ from hobble.report.templates import questionnaire_script, style, template
 from hobble.runtime.export import jointed
 from hobble.runtime.options import Runtime
 
-STRIDE = 2  # every second frame of the motion is shown
-SIZE = 360  # width and height of the films, pixels
-QUALITY = 45
+FRAME_STEP = 2  # every second frame of the motion is shown
+SIZE = 360  # default width and height of the films, pixels
+QUALITY = 45  # of the WebP encoder, 0 to 100
 EFFORT = 2  # of the WebP encoder, 0 to 6; 3 takes twice the time for files that are 6 % smaller
 CAMERA_SMOOTHING = 25.0  # frames, sigma of the Gaussian over the camera's path
-LOOK_AT, DISTANCE = 82.0, 400.0  # cm: height of the point that the camera looks at, and its distance
+LOOK_AT = 82.0  # cm: height of the point that the camera looks at
+DISTANCE = 400.0  # cm: from the camera to this point
 
 
 def write_questionnaire(
@@ -55,11 +56,11 @@ def write_questionnaire(
     size: int = SIZE,
     threads: int = 1,
 ) -> dict[str, Any]:
-    """Write questionnaire.html and films.json. films.json has the right answers; its content is returned.
+    """Write questionnaire.html and films.json. Returns the content of films.json, the right answers.
 
     Nothing on the page says what hurts in a film. size: width and height of the films, pixels. threads: how
     many films are drawn at once; the files do not depend on it. Raises HobbleError if the network has no
-    injury channel.
+    injury channel, or if the skeleton lacks a part that hurts in a film.
     """
     folder = Path(folder)
     for film in films:
@@ -68,7 +69,7 @@ def write_questionnaire(
     folder.mkdir(parents=True, exist_ok=True)
     studio, skeleton = BodyRenderer(body(network.skeleton)), network.skeleton
 
-    def made(film: Film) -> tuple[dict[str, Any], dict[str, Any]]:
+    def drawn(film: Film) -> tuple[dict[str, Any], dict[str, Any]]:
         motion = film_motion(network, film, runtime)
         data = encoded(pictures(studio, skeleton, motion, size))
         return _row(network, film, motion), {
@@ -77,7 +78,7 @@ def write_questionnaire(
         }
 
     with ThreadPoolExecutor(threads) as pool:
-        rows, shown = map(list, zip(*pool.map(made, films), strict=True))
+        rows, shown = map(list, zip(*pool.map(drawn, films), strict=True))
     study = hashlib.sha256(json.dumps([rows, shown]).encode()).hexdigest()[:12]
     solution = {
         "study": study,
@@ -112,7 +113,10 @@ def _row(network: Network, film: Film, motion: FilmMotion) -> dict[str, Any]:
 
 
 def doubts(solution: dict[str, Any]) -> list[str]:
-    """Warnings about films in which nobody can see the injury, and about links never hurt in training."""
+    """Warnings about films in which nobody can see the injury, and about links never hurt in training.
+
+    solution: the content of films.json.
+    """
     same = [str(row["film"]) for row in solution["films"] if row["from_healthy_cm"] < VISIBLE]
     never = sorted({link for row in solution["films"] for link in row["untrained"]})
     out = [f"film {', '.join(same)}: nobody can see the injury (less than {VISIBLE} cm)."] if same else []
@@ -123,13 +127,13 @@ def pictures(
     studio: BodyRenderer, skeleton: Skeleton, motion: FilmMotion, size: int
 ) -> list[NDArray[np.uint8]]:
     """The pictures (size, size, 3) of a film, without colours for injuries. The camera follows smoothly."""
-    keep = body(skeleton).bones
+    shown = body(skeleton).bones  # the bones that move the body's mesh
     world, places = jointed(skeleton, motion.positions, motion.rotations)
     path = gaussian(motion.positions[:, 0], CAMERA_SMOOTHING)
     path[:, 1] = LOOK_AT
     return [
-        studio.draw(places[f, keep], world[f, keep], Camera(path[f], distance=DISTANCE, size=size))
-        for f in range(0, len(places), STRIDE)
+        studio.draw(places[f, shown], world[f, shown], Camera(path[f], distance=DISTANCE, size=size))
+        for f in range(0, len(places), FRAME_STEP)
     ]
 
 
@@ -137,6 +141,10 @@ def encoded(frames: Sequence[NDArray[np.uint8]]) -> bytes:
     """An animated WebP that plays once."""
     images = [Image.fromarray(frame) for frame in frames]
     out = io.BytesIO()
-    options: dict[str, Any] = {"quality": QUALITY, "method": EFFORT, "duration": round(1000 * STRIDE / FPS)}
+    options: dict[str, Any] = {
+        "quality": QUALITY,
+        "method": EFFORT,
+        "duration": round(1000 * FRAME_STEP / FPS),
+    }
     images[0].save(out, "WEBP", save_all=True, append_images=images[1:], loop=1, **options)
     return out.getvalue()
