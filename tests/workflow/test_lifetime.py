@@ -59,6 +59,28 @@ def test_the_lock_of_a_dead_run_is_removed(locks: Path) -> None:
     assert [path.name for path in locks.parent.iterdir()] == ["locks"]
 
 
+def test_the_file_of_the_owner_is_never_seen_half_written(
+    locks: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A run that is killed while it writes leaves no file. An empty one could never be cleared."""
+    (locks / lifetime.OWNER).unlink()
+    write = Path.write_text
+
+    def interrupted(path: Path, text: str, **options: str) -> int:
+        write(path, text[:9], **options)
+        raise KeyboardInterrupt
+
+    with monkeypatch.context() as patch:
+        patch.setattr(Path, "write_text", interrupted)
+        with pytest.raises(KeyboardInterrupt):
+            lifetime.record_lock_owner(locks)
+    assert not (locks / lifetime.OWNER).exists()
+    lifetime.record_lock_owner(locks)
+    owned_by(locks, pid=ended())
+    assert lifetime.clear_stale_lock(locks)
+    assert list(locks.iterdir()) == []
+
+
 def test_a_new_process_with_the_same_id_does_not_own_the_lock(locks: Path) -> None:
     owned_by(locks, began="1")
     assert lifetime.clear_stale_lock(locks)

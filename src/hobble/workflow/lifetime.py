@@ -41,8 +41,11 @@ def record_lock_owner(locks: Path = LOCKS) -> None:
     """Write this process as the owner into the folder of Snakemake's lock."""
     if locks.is_dir():
         owner = {"host": platform.node(), "pid": os.getpid(), "began": _start_time(os.getpid())}
+        unfinished = locks / f"{OWNER}.{os.getpid()}.part"
         with contextlib.suppress(OSError):
-            (locks / OWNER).write_text(json.dumps(owner), encoding="utf-8")
+            # A run that is killed here must not leave an empty file: nobody could clear such a lock.
+            unfinished.write_text(json.dumps(owner), encoding="utf-8")
+            os.replace(unfinished, locks / OWNER)
 
 
 def clear_stale_lock(locks: Path = LOCKS) -> bool:
