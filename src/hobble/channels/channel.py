@@ -108,7 +108,7 @@ class Channel(ABC):
         return ClipSource(**{**fields, "options": self.options_of(fields.get("options", {}))}, files=files)
 
     def options_of(self, section: Mapping[str, Any]) -> Section | None:
-        """The data set's section for this channel, read by `Options`; None if the section is empty."""
+        """The data set's section for this channel, read by `Options`; None without section or `Options`."""
         return self.Options.model_validate(section) if self.Options is not None and section else None
 
     def tables(self, options: Section | None) -> Sequence[str]:

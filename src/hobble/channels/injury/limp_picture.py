@@ -54,8 +54,8 @@ def write_limp_picture(network: Network, path: str | Path, runtime: Runtime) -> 
 def put_side_by_side(healthy: Sequence[Picture], hurt: Sequence[Picture]) -> list[Image.Image]:
     """One loop of pictures, each with a picture of `healthy` on the left and one of `hurt` on the right.
 
-    It has as many pictures as `hurt`. While `hurt` plays once, `healthy` plays a whole number of times, faster
-    or slower if need be. So the loop repeats without a jump.
+    The loop is as long as `hurt`. While `hurt` plays once, `healthy` plays a whole number of times, faster or
+    slower if need be. So the loop repeats without a jump.
     """
     repeats = max(1, round(len(hurt) / len(healthy)))
     out = []
@@ -71,7 +71,7 @@ def put_side_by_side(healthy: Sequence[Picture], hurt: Sequence[Picture]) -> lis
 
 
 def _save_webp(path: Path, images: Sequence[Image.Image]) -> int:
-    """Write the images with the first of QUALITIES that gives at most MOST_BYTES. Returns the size in bytes."""
+    """Write the images with the first of QUALITIES that gives at most MOST_BYTES. Returns the file's size."""
     for quality in QUALITIES:
         with atomic_path(path) as temporary:
             images[0].save(

@@ -1,4 +1,4 @@
-"""Shows limp.json in the report's section on injuries: where limps come from, their sizes, their recognition."""
+"""Shows the sizes of limps, and how well they are recognised, in the report's section on injuries."""
 
 from __future__ import annotations
 
@@ -129,8 +129,8 @@ def size_chart(found: Json) -> Chart:
         "limp-sizes",
         "Size of the limp",
         "The character walks at a target speed of 1.2 m/s with one link at severity 3, 5, 7 or 10, and is "
-        "compared with its healthy walk. Lines of links on the right side are dotted. Grey markers show mean and "
-        "standard deviation over ten people who imitated strong limps.",
+        "compared with its healthy walk. Lines of links on the right side are dotted. Grey markers show mean "
+        "and standard deviation over ten people who imitated strong limps.",
         layout={"xaxis": axis("severity", range=[2.5, 11]), "yaxis": axis("size")},
         height=560,
         choose="Effect",
@@ -185,7 +185,7 @@ def held_out_table(
 
 
 def size_table(name: str, rows: Sequence[Mapping[str, Any]]) -> Table | None:
-    """A table of the effects in each walk, and of the limp that the recognisers find. rows: `sizes` of limp.json."""
+    """A table of the effects in each walk and of the recognised limp. rows: `sizes` of limp.json."""
     text_keys = ("gait", "link", "part", "side", "called", "graded")
     if not rows:
         return None
@@ -199,14 +199,14 @@ def size_table(name: str, rows: Sequence[Mapping[str, Any]]) -> Table | None:
 
 
 def other_channel_table(name: str, rows: Sequence[Mapping[str, Any]]) -> Table | None:
-    """A table that says how well limps of hurt legs are recognised while another channel has its highest value.
+    """A table: how well limps of hurt legs are recognised while another channel has its highest value.
 
     rows: `named_together` of limp.json.
     """
     if not rows:
         return None
     columns = [
-        Column("column of another channel"),
+        Column("with"),
         Column.count("walks"),
         Column.number("speed, share of the same walk without injury"),
         *RECOGNISED_COLUMNS,

@@ -1,6 +1,6 @@
 """Measures the size of each link's limp, and compares it with the limps of people and of captured clips.
 
-A link is a pair of neighbouring joints. A severity from 0 to 10 says how much it hurts.
+A link is a pair of neighbouring joints. A severity from 0 to 10 says how much a link hurts.
 
 The rank correlations of `hobble.channels.injury.response` say nothing about size, because a correlation is 1
 even if the walk changes by only 2 %. Here the size of each effect of an injury on the walk is measured at
