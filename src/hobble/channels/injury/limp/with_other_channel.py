@@ -27,7 +27,10 @@ def limps_together(
     There is a row for each pair of a column, such as "sad", and a link in `legs`, which hurts at severity 10.
     Only columns that were above 0 in training are used (all columns if none was). The row's effects are
     relative to the walk with the same value of the column and no injury. A column is left out if this walk
-    has no whole cycle. legs: names of the links of legs. speed: target speed, cm a frame. seconds: length of each walk. row_of: makes a row.
+    has no whole cycle.
+
+    legs: names of the links of legs. speed: target speed, cm a frame. seconds: length of each walk. row_of:
+    makes a row.
     """
     names = [name for name in network.channels if name != INJURY]
     columns = [(name, column) for name in names for column in network.trained(name)]
