@@ -16,7 +16,7 @@ from pathlib import Path
 import numpy as np
 import yaml
 
-from hobble.channels.injury.limp.run import distance
+from hobble.channels.injury.limp.run import limp_distance
 from hobble.channels.injury.status import parse_links
 from hobble.core.clip import Clip
 from hobble.core.errors import HobbleError
@@ -157,8 +157,8 @@ def made(folder: Path) -> None:
             hurt_clip(clip, labels, np.tile(severity, (len(clip), 1))).clip for clip, labels in sources
         ]
         captured_limp = walks([read(name)[0]])
-        far = distance(captured_limp, healthy, healthy, healthy)
-        near = distance(captured_limp, healthy, walks(versions), healthy)
+        far = limp_distance(captured_limp, healthy, healthy, healthy)
+        near = limp_distance(captured_limp, healthy, walks(versions), healthy)
         print(f"  {name} {far:.2f} {near:.2f}")
 
 

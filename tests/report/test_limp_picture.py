@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from hobble.channels.injury import limp_picture
-from hobble.channels.injury.limp_picture import side_by_side
+from hobble.channels.injury.limp_picture import put_side_by_side
 
 
 def loop(length: int, shade: int) -> list[np.ndarray]:
@@ -21,7 +21,7 @@ def loop(length: int, shade: int) -> list[np.ndarray]:
 
 @pytest.mark.parametrize(("healthy", "hurt"), [(10, 10), (7, 10), (10, 7), (4, 12), (12, 4)])
 def test_two_loops_of_different_length_end_together(healthy, hurt):
-    images = side_by_side(loop(healthy, 200), loop(hurt, 100))
+    images = put_side_by_side(loop(healthy, 200), loop(hurt, 100))
     assert len(images) == hurt
     lefts = [image.getpixel((0, 39))[0] for image in images]
     assert [image.getpixel((40, 39))[0] for image in images] == list(range(hurt))
@@ -33,4 +33,4 @@ def test_two_loops_of_different_length_end_together(healthy, hurt):
 def test_a_picture_that_stays_too_large_is_refused(tmp_path, monkeypatch):
     monkeypatch.setattr(limp_picture, "MOST_BYTES", 10)
     with pytest.raises(limp_picture.HobbleError, match="at the lowest quality"):
-        limp_picture._save(tmp_path / "x.webp", side_by_side(loop(3, 200), loop(3, 100)))
+        limp_picture._save_webp(tmp_path / "x.webp", put_side_by_side(loop(3, 200), loop(3, 100)))

@@ -1,4 +1,4 @@
-"""Channels: inputs of the network besides motion and ground, such as an injury. NAMES lists them."""
+"""Channels. A channel is an input of the network besides motion and ground, such as an injury."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ __all__ = [
     "shown_modules",
 ]
 
-# All channels. Each name is a package in this folder. The package's CHANNEL is an instance of `Channel`.
+# The names of all channels. Each is also a package in this folder, whose CHANNEL is an instance of `Channel`.
 NAMES = ("injury", "mood", "diagnosis")
 
 
@@ -28,15 +28,15 @@ NAMES = ("injury", "mood", "diagnosis")
 def channel(name: str) -> Channel:
     """The channel `name`. Raises KeyError with all names if there is no such channel.
 
-    The module is imported here and not at the top, so that a job depends only on the code of the channels
-    that it uses.
+    The channel's package is imported only here. So a job of the workflow depends only on the code of the
+    channels that it uses.
     """
     if name not in NAMES:
-        raise KeyError(f"no channel {name!r}: there are {', '.join(NAMES)}")
-    found = importlib.import_module(f"{__name__}.{name}").CHANNEL
-    assert isinstance(found, Channel)
-    assert found.name == name
-    return found
+        raise KeyError(f"there is no channel {name!r}. The channels are {', '.join(NAMES)}")
+    definition = importlib.import_module(f"{__name__}.{name}").CHANNEL
+    assert isinstance(definition, Channel)
+    assert definition.name == name
+    return definition
 
 
 def all_channels() -> tuple[Channel, ...]:
@@ -45,22 +45,25 @@ def all_channels() -> tuple[Channel, ...]:
 
 
 def modules_of(names: Iterable[str]) -> list[str]:
-    """Full names of the packages of these channels. A job that uses the channels depends on their code."""
+    """Full names of the packages of these channels. The workflow runs a job again if their code changes."""
     return [f"{__name__}.{name}" for name in names]
 
 
 def shown_modules() -> list[str]:
-    """Full names of the existing modules channels.<name>.shown, which say how a page shows a channel."""
-    found = (f"{__name__}.{name}.shown" for name in NAMES)
-    return [module for module in found if importlib.util.find_spec(module) is not None]
+    """Full names of the modules channels.<name>.shown that exist.
+
+    Such a module says how a page shows the channel. A channel without it is shown in the default way.
+    """
+    modules = (f"{__name__}.{name}.shown" for name in NAMES)
+    return [module for module in modules if importlib.util.find_spec(module) is not None]
 
 
 def channel_of_old_key(key: str) -> str:
-    """The channel that `key` stands for in old files, which do not name channels.
+    """Name of the channel that `key` stands for in a network file from before there were channels.
 
     Raises ValueError for an unknown key.
     """
-    for one in all_channels():
-        if key in one.old_keys:
-            return one.name
+    for definition in all_channels():
+        if key in definition.old_keys:
+            return definition.name
     raise ValueError(f"there is no such key: {key}")

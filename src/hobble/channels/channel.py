@@ -1,4 +1,7 @@
-"""The base class of channels. A channel's values are 0 or more; 0 means no effect."""
+"""The base class of channels. A channel is an input of the network besides motion and ground.
+
+In each frame of a clip, a channel has a value in each of its columns. Values are 0 or more. 0 has no effect.
+"""
 
 from __future__ import annotations
 
@@ -9,7 +12,8 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Protocol
 
-# Methods import numpy themselves: the list of clips is read at planning, which should not wait for numpy.
+# Methods import numpy themselves, because Snakemake imports this module while it plans its jobs. It does not
+# need numpy there and should not wait for it.
 if TYPE_CHECKING:
     from hobble.core.clip import Clip
     from hobble.core.quat import Array
@@ -17,21 +21,24 @@ if TYPE_CHECKING:
 
 
 class HasLinks(Protocol):
-    """What the columns of a channel may depend on: the links of a clip's skeleton or of a skeleton file."""
+    """A clip's skeleton or a skeleton file. The columns of a channel may depend on its links.
+
+    A link is a pair of neighbouring joints.
+    """
 
     @property
     def links(self) -> Sequence[tuple[str, str]]:
-        """The links: pairs of neighbouring joints (parent, child). A channel may have a column for each."""
+        """The links, as (parent joint, child joint). A channel may have a column for each link."""
 
 
 @dataclass(frozen=True)
 class ClipSource:
     """Where the values of one clip come from.
 
-    clip: its name; a mirrored clip has the name of its original. entry: the clip's entry in the data set.
-    value: what the entry says for this channel, or None. options: the data set's section `channels.<name>`,
-    read by the channel's `Options`. files: the existing files of the channel beside the clip, and the tables
-    that the data set names.
+    clip: the clip's name; for a mirrored clip, the name of its original. entry: the clip's entry in the data
+    set. value: what the entry says for this channel; None if it says nothing. options: the data set's section
+    `channels.<name>`, read by the channel's `Options`. files: the channel's file beside the clip, if it
+    exists, and the channel's tables (`Channel.tables`).
     """
 
     clip: str
@@ -42,19 +49,19 @@ class ClipSource:
 
 
 class Channel(ABC):
-    """An input of the network besides motion and ground. Each channel is a subclass in channels/<name>/.
+    """A channel. Each channel is a subclass in channels/<name>/.
 
-    name: the name of the channel's folder, also used in configurations and as keyword argument of
-    `next_pose`. title, value: words on the page for the channel and for one of its values. highest: the
-    highest value. rate: how much a value may change in a second at run time, unless the configuration says
-    otherwise. suffix: the file beside a clip that holds its values is called <clip><suffix>; None if there
-    are no such files. old_keys: keys that stand for this channel in old configurations and network files.
-    Options: pydantic model of the data set's section `channels.<name>`. If `Options` is None, every data set
-    has the channel, else only those with the section. slows: whether values above 0 make the body slower.
-    Then `hobble.channels.speed_limits` learns from the database how fast such a body goes. manner: whether
-    each column is a way of walking that lasts for a whole clip, such as a mood. Then
-    `hobble.measures.manners` measures whether a recogniser finds it in generated walks. targets: folders of
-    results/<configuration>/ that only a configuration with this channel can have.
+    name: the name of the channel's folder. It is also used in configurations and as a keyword argument of
+    `next_pose`. title: the page's word for the channel. value: the page's word for one of its values.
+    highest: the highest value. rate: how much a value may change in a second at run time, unless the
+    configuration says otherwise. suffix: a file <clip><suffix> beside a clip holds the clip's values; None if
+    the channel has no such files. old_keys: keys that stand for this channel in old configurations and
+    network files. Options: pydantic model of the data set's section `channels.<name>`. If `Options` is None,
+    every data set has the channel, else only data sets with this section have it. slows: whether values above
+    0 make the body slower. If so, `hobble.channels.speed_limits` learns from the database how fast such a
+    body goes. manner: whether each column is a way of walking that lasts for a whole clip, such as a mood. If
+    so, `hobble.measures.manners` measures whether a recogniser finds it in generated walks. targets: folders
+    of results/<configuration>/ that only a configuration with this channel can have.
     """
 
     name: str
@@ -75,35 +82,37 @@ class Channel(ABC):
 
     @abstractmethod
     def is_neutral(self, source: ClipSource) -> bool:
-        """Whether the values are 0 in all frames.
+        """Whether all values of the clip are 0.
 
-        A network without this channel trains only on such clips. Raises InputError if the source cannot be
-        read.
+        A network without this channel trains only on clips whose values are all 0. Raises InputError if the
+        source cannot be read.
         """
 
     @abstractmethod
     def read(self, clip: Clip, source: ClipSource, motion: Mapping[str, Any]) -> tuple[Array, list[str]]:
-        """Values (F, C) float32 of a clip with F frames, in the order of `columns`, and warnings.
+        """Values (F, C) float32 of a clip with F frames, columns in the order of `columns`, and warnings.
 
-        motion: the report of the motion stage. Raises InputError if the source cannot be read.
+        motion: the report on how the clip was made from its BVH file. Raises InputError if the source cannot
+        be read.
         """
 
     def check(self, source: ClipSource, rig: HasLinks) -> None:  # noqa: B027 - most channels check nothing
         """Raise InputError if the clip's entry or the options are wrong. Called before any job runs."""
 
     def source(self, fields: Mapping[str, Any], files: Sequence[str | Path] = ()) -> ClipSource:
-        """A `ClipSource` from plain data. fields: all but `files`, with `options` as a plain mapping.
+        """A `ClipSource` from plain data.
 
-        Raises pydantic.ValidationError for options that the channel does not have.
+        fields: the fields of `ClipSource` without `files`; its `options` are a plain mapping. Raises
+        pydantic.ValidationError for options that the channel does not have.
         """
         return ClipSource(**{**fields, "options": self.options_of(fields.get("options", {}))}, files=files)
 
     def options_of(self, section: Mapping[str, Any]) -> Section | None:
-        """The data set's section for this channel, read by `Options`; None without a section."""
+        """The data set's section for this channel, read by `Options`; None without section or `Options`."""
         return self.Options.model_validate(section) if self.Options is not None and section else None
 
     def tables(self, options: Section | None) -> Sequence[str]:
-        """Files in the mocap folder that the options name, such as a table of all clips."""
+        """Names of files in the mocap folder that the options refer to, such as a table of all clips."""
         return ()
 
     def mirror(self, values: Array, rig: Any) -> Array:
@@ -111,12 +120,14 @@ class Channel(ABC):
         return values
 
     def deviation(self, std: Array) -> Array:
-        """(C,) divisors of the network's input columns. std: (C,) standard deviations of the columns.
+        """The divisors (C,) by which the channel's columns are divided before the network reads them.
 
-        All columns get the same divisor: the length of the vector `std`, but at least a tenth of `highest`.
-        If each were divided by its own deviation, a column that is above 0 in 1 frame of 1,000 would reach 30
-        in this frame. A column that never varies gets a divisor so large that it has no effect,
-        because the network cannot know its meaning.
+        std: (C,) standard deviations of the columns over the training rows.
+
+        The columns that vary all get the same divisor, which is the length of the vector `std`, but at least
+        a tenth of `highest`. If each column were divided by its own deviation, a column that is above 0 in 1
+        frame of 1,000 would reach 30 in this frame. A column that never varies gets a divisor so large that
+        the column has no effect, because the network cannot learn what it means.
         """
         import numpy as np
 
@@ -124,9 +135,9 @@ class Channel(ABC):
         return np.where(std > CONSTANT, max(self.highest / 10, length), SILENT)
 
     def summary(self, values: Array, labels: Sequence[str], fps: float) -> dict[str, Any]:
-        """For the clip's report: label -> seconds above 0, highest value, and `spells` (stretches above 0).
+        """For the clip's report: label of a column -> `seconds` above 0, `highest` value and `spells`.
 
-        Labels whose values are all 0 are left out.
+        For spells see `find_spells`. Columns whose values are all 0 are left out.
         """
         import numpy as np
 
@@ -134,7 +145,7 @@ class Channel(ABC):
             label: {
                 "seconds": float(np.sum(column > 0) / fps),
                 "highest": float(column.max()),
-                "spells": spells(column, fps, self.highest),
+                "spells": find_spells(column, fps, self.highest),
             }
             for label, column in zip(labels, values.T, strict=True)
             if column.any()
@@ -142,23 +153,23 @@ class Channel(ABC):
 
 
 SILENT = 1e10  # divisor of an input that must have no effect
-JUMP = 0.05  # a larger change between two frames starts a new spell; share of the channel's highest value
+JUMP = 0.05  # share of the channel's highest value; a larger change between two frames starts a new spell
 CONSTANT = 1e-6  # a column with a smaller standard deviation counts as constant
 
 
-def spells(column: Array, fps: float, highest: float) -> list[list[float]]:
-    """The spells of a column (F,): stretches above 0, each as [start, end, highest value], times in seconds.
+def find_spells(column: Array, fps: float, highest: float) -> list[list[float]]:
+    """The spells of a column (F,), each as [start in seconds, end in seconds, highest value].
 
-    A jump of the value also starts a new spell. A value that rises or falls over many frames does not jump.
-    highest: the channel's highest value.
+    A spell is a stretch of frames with values above 0 and without a jump. A value that rises or falls over
+    many frames does not jump. highest: the channel's highest value.
     """
     import numpy as np
 
-    on = column > 0
-    jumps = (np.abs(np.diff(column)) > JUMP * highest) | (on[1:] != on[:-1])
-    edges = np.concatenate([[0], np.flatnonzero(jumps) + 1, [len(column)]])
+    above = column > 0
+    is_edge = (np.abs(np.diff(column)) > JUMP * highest) | (above[1:] != above[:-1])
+    edges = np.concatenate([[0], np.flatnonzero(is_edge) + 1, [len(column)]])
     return [
         [round(float(a / fps), 3), round(float(b / fps), 3), float(column[a:b].max())]
         for a, b in itertools.pairwise(edges)
-        if on[a]
+        if above[a]
     ]

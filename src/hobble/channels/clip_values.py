@@ -1,6 +1,6 @@
 """Makes, checks, saves and loads the values of one channel in each frame of a clip.
 
-F: frames of the clip. C: columns of the channel.
+Below, F is the number of frames of the clip, and C the number of columns of the channel.
 """
 
 from __future__ import annotations
@@ -23,19 +23,23 @@ def clip_values(
 ) -> tuple[Array, list[str]]:
     """Values (F, C) float32 of channel `name` for a clip, and warnings.
 
-    motion: the report of the motion stage. Raises InputError if the values cannot be read, are not finite or
-    are outside the channel's range.
+    motion: the report on how the clip was made from its BVH file. Raises InputError if the values cannot be
+    read, are not finite or are outside the channel's range.
     """
-    one = channel(name)
-    values, warnings = one.read(clip, source, motion)
-    labels = one.columns(clip.skeleton)
+    definition = channel(name)
+    values, warnings = definition.read(clip, source, motion)
+    labels = definition.columns(clip.skeleton)
     if values.shape != (len(clip), len(labels)):
         expected = (len(clip), len(labels))
-        raise InputError(clip.name, f"{one.title.lower()}: {values.shape} values instead of {expected}")
-    wrong = ~((values >= 0) & (values <= one.highest))
+        problem = (
+            f"channel {name} has values of shape {values.shape} instead of {expected}, (frames, columns)"
+        )
+        raise InputError(clip.name, problem)
+    wrong = ~((values >= 0) & (values <= definition.highest))
     if wrong.any():
         frame, column = (int(i) for i in np.argwhere(wrong)[0])
-        problem = f"{one.value} {values[frame, column]:g} of {labels[column]} is not in 0..{one.highest:g}"
+        value = f"{definition.value} {values[frame, column]:g} of {labels[column]}"
+        problem = f"{value} is not between 0 and {definition.highest:g}"
         raise InputError(clip.name, problem, frame=frame)
     return values, warnings
 
@@ -46,18 +50,20 @@ def save_values(path: str | Path, values: Array, labels: Sequence[str]) -> None:
 
 
 def load_values(path: str | Path) -> tuple[Array, tuple[str, ...]]:
-    """Values (F, C) and the labels of their columns."""
+    """Read a file of `save_values`. Returns the values (F, C) and the labels of their columns."""
     data = load_npz(path)
     if set(data) != {"values", "labels"} or data["values"].shape[1:] != data["labels"].shape:
-        raise InputError(path, "is no file of channel values", fix="Delete it; the next run makes it again.")
+        raise InputError(
+            path, "is not a file of channel values", fix="Delete it. The next run makes it again."
+        )
     return data["values"], tuple(str(label) for label in data["labels"])
 
 
 def write_report(
     path: str | Path, name: str, clip: Clip, values: Array, labels: Sequence[str], warnings: Sequence[str]
 ) -> None:
-    """Write a clip's report as JSON: `Channel.summary`, the channel's highest value, and warnings."""
-    one = channel(name)
-    summary = one.summary(values, labels, clip.fps)
-    report = {"clip": clip.name, "channel": name, "title": one.title, "values": summary}
-    write_json(path, {**report, "highest": one.highest, "warnings": list(warnings)})
+    """Write a clip's report as JSON, with `Channel.summary`, the channel's highest value and the warnings."""
+    definition = channel(name)
+    summary = definition.summary(values, labels, clip.fps)
+    report = {"clip": clip.name, "channel": name, "title": definition.title, "values": summary}
+    write_json(path, {**report, "highest": definition.highest, "warnings": list(warnings)})

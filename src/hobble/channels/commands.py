@@ -1,4 +1,4 @@
-"""Finds the subcommands of `hobble` that channels add: `COMMANDS` of channels/<name>/commands."""
+"""Finds the subcommands of `hobble` that channels add. A channel lists them in channels/<name>/commands."""
 
 from __future__ import annotations
 
@@ -10,7 +10,11 @@ from hobble.channels import NAMES
 
 
 def channel_commands() -> dict[str, ModuleType]:
-    """Subcommand -> module with a docstring, `add_arguments(parser)` and `run(options)`, of all channels."""
+    """Name of each subcommand of a channel -> the module that implements it.
+
+    The module has a docstring, which becomes the help text, and the functions `add_arguments(parser)` and
+    `run(options)`.
+    """
     found: dict[str, ModuleType] = {}
     for name in NAMES:
         module = f"hobble.channels.{name}.commands"

@@ -51,7 +51,7 @@ def test_a_diagnosis_holds_in_every_frame_of_a_clip(
     ("text", "message"),
     [
         ("file,who\na.bvh,1\n", r"line 1: has no column diagnosis"),
-        ("file,diagnosis\na.bvh,flu\n", r"line 2: a has 'flu'"),
+        ("file,diagnosis\na.bvh,flu\n", r"line 2: a has the unknown diagnosis 'flu'"),
         (
             "file,diagnosis\na.bvh,healthy\nb/a.bvh,joint problem\n",
             r"line 3: a is joint problem here and healthy",

@@ -13,9 +13,14 @@ import pytest
 from hobble.channels import channel
 from hobble.channels.injury.limp import page, with_other_channel
 from hobble.channels.injury.limp import run as module
-from hobble.channels.injury.limp.captured_limps import HURT_VERSION, CapturedWalk, HurtSeconds, healthy_of
+from hobble.channels.injury.limp.captured_limps import (
+    HURT_VERSION,
+    CapturedWalk,
+    HurtSeconds,
+    healthy_reference,
+)
 from hobble.channels.injury.limp.crowd_walks import FigureWalk
-from hobble.channels.injury.limp.run import SEVERITIES, distance, hurt_side, limp
+from hobble.channels.injury.limp.run import SEVERITIES, hurt_side, limp_distance, measure_limps
 from hobble.gait.cycles import SCALARS, Cycle, WalkCycles
 from hobble.gait.people import NORMAL, people
 from hobble.gait.profile import profile
@@ -83,7 +88,7 @@ def measured(hurtable, holden31, monkeypatch):
             "seconds": 8.0,
             "links": [LEFT_KNEE, RIGHT_KNEE],
         }
-        return limp(hurtable, list(every), HurtSeconds(), splits or {}, **options)
+        return measure_limps(hurtable, list(every), HurtSeconds(), splits or {}, **options)
 
     return run
 
@@ -150,7 +155,7 @@ def test_a_limp_is_compared_with_the_healthy_walk_of_the_same_mood(
         return out
 
     def row(link: str, figure: FigureWalk, healthy: FigureWalk) -> dict[str, Any]:
-        return module._row(network, "walk", link, 10.0, figure, healthy)
+        return module._row_of_walk(network, "walk", link, 10.0, figure, healthy)
 
     monkeypatch.setattr(with_other_channel, "walk_figures", walk_figures)
     rows = with_other_channel.limps_together(network, [LEFT_KNEE, RIGHT_KNEE], 2.0, 8.0, Runtime(), row)
@@ -164,7 +169,7 @@ def test_a_limp_is_compared_with_the_healthy_walk_of_the_same_mood(
         "angry": 1.0,
     }
     assert [r["wrong_side"] for r in found.values()] == [0.0] * 4
-    table = page.together_table("x", list(found.values()))
+    table = page.other_channel_table("x", list(found.values()))
     assert [line[0] for line in table.rows] == list(found)
     assert with_other_channel.limps_together(hurtable, [LEFT_KNEE], 2.0, 8.0, Runtime(), row) == []
 
@@ -191,11 +196,11 @@ def test_a_held_out_limp_is_nearer_only_if_the_same_leg_is_hurt(measured) -> Non
 def test_a_captured_limp_is_compared_with_its_own_performer() -> None:
     own, other = clip("7_1", {}, {}), clip("8_1", {}, {"left": 0.3})
     hurt = clip("7_2", {RIGHT_KNEE: 8.0}, {"right": 0.8})
-    healthy, whose = healthy_of(hurt, [other, own, hurt])
+    healthy, whose = healthy_reference(hurt, [other, own, hurt])
     assert whose == "performer"
     assert healthy == profile(own.walk)
-    assert healthy_of(hurt, [hurt])[1] == "people"
-    assert distance(healthy, healthy, healthy, healthy) == 0
+    assert healthy_reference(hurt, [hurt])[1] == "people"
+    assert limp_distance(healthy, healthy, healthy, healthy) == 0
 
 
 def test_generated_hurt_clips_are_recognised_by_their_names() -> None:

@@ -10,7 +10,13 @@ import numpy as np
 import pytest
 
 from hobble.channels.injury.recognition import run as module
-from hobble.channels.injury.recognition.run import HEALTHY, InjuryWindow, recognition, rows, walking_windows
+from hobble.channels.injury.recognition.run import (
+    HEALTHY,
+    InjuryWindow,
+    confusion_rows,
+    measure_recognition,
+    walking_windows,
+)
 from hobble.core import quat
 from hobble.core.skeleton import Skeleton, forward_kinematics
 from hobble.evaluation.captured import Captured
@@ -71,7 +77,7 @@ SPLITS = {f"{link}-{n}": "train" if n == 1 else "held_out" for link in (None, KN
 
 
 def judged(network, motion, splits=SPLITS) -> dict[str, Any]:
-    return recognition(network, motion, splits, configuration="x", runtime=RUNTIME, people=0.82)
+    return measure_recognition(network, motion, splits, configuration="x", runtime=RUNTIME, people=0.82)
 
 
 def test_two_classes_are_separated_along_fishers_direction() -> None:
@@ -136,7 +142,7 @@ def test_captured_windows_are_named_after_the_link_that_hurts(hurtable, motion) 
     assert found["generated"]["windows"] % walks["walks"] == 0
     assert [s["severity"] for s in found["generated"]["by_severity"]] == [0, 3, 5, 7, 10]
     json.dumps(found, allow_nan=False)
-    table = rows(found)
+    table = confusion_rows(found)
     assert sum(r["windows"] for r in table if r["motion"] == "generated") == found["generated"]["windows"]
     assert judged(hurtable, motion) == found
 
@@ -170,7 +176,7 @@ def test_without_sides_both_legs_are_one_class(holden31: Skeleton) -> None:
     hurt = ["LeftLeg-LeftFoot", "LeftLeg-LeftFoot", "RightUpLeg-RightLeg", HEALTHY]
     named = ["RightLeg-RightFoot", "LeftLeg-LeftFoot", "LeftLeg-LeftFoot", HEALTHY]
     windows = [InjuryWindow("a", link, 5.0, {}, 0) for link in hurt]
-    found = module._confusion(sorted(set(named)), windows, named, parts)
+    found = module._count_answers(sorted(set(named)), windows, named, parts)
     assert found["right"] == 0.5
     assert found["right_without_side"] == 0.75
 
@@ -184,17 +190,19 @@ def test_cross_validation_never_learns_from_the_windows_it_names() -> None:
         )
         for n in range(40)
     ]
-    found = module._cross_validated(windows, lambda name: (name,))
+    found = module._cross_validate(windows, lambda name: (name,))
     assert found["windows"] == 40
     assert found["right"] < 0.8
-    leaked = learn(module.table(windows), [w.hurt for w in windows]).names(module.table(windows))
+    leaked = learn(module.feature_table(windows), [w.hurt for w in windows]).names(
+        module.feature_table(windows)
+    )
     assert leaked == [w.hurt for w in windows]
 
 
 def test_too_little_data_is_reported_with_its_reason(network, hurtable, motion) -> None:
     assert judged(network, motion)["reason"] == module.NO_SEVERITIES
     assert judged(hurtable, motion[:2])["reason"] == module.TOO_FEW
-    assert rows(judged(network, motion)) == []
+    assert confusion_rows(judged(network, motion)) == []
     # A part that hurts only in held-out clips is never named right, and is counted.
     found = judged(hurtable, motion, {**SPLITS, f"{ARM}-1": "held_out"})
     assert found["classes"] == sorted([HEALTHY, KNEE])

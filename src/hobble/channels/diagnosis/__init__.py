@@ -1,4 +1,4 @@
-"""The diagnosis channel. A patient's diagnosis comes from a table of the recordings."""
+"""The diagnosis channel. A table lists the diagnosis of the person in each recording."""
 
 from hobble.channels.diagnosis.channel import CHANNEL
 

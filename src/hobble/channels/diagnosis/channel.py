@@ -1,4 +1,7 @@
-"""The diagnosis channel: a column, 0 or 1, for each of three groups of diagnoses. All are 0 if healthy."""
+"""The diagnosis channel, with a column for each of three groups of diagnoses.
+
+In a patient's clip, the column of the patient's diagnosis is 1. In a healthy person's clip, all are 0.
+"""
 
 from __future__ import annotations
 
@@ -20,10 +23,10 @@ if TYPE_CHECKING:
     from hobble.core.clip import Clip
     from hobble.core.quat import Array
 
-# The groups of Rueangsirarak et al. (2018), who distinguish them by gait.
+# Three groups of diagnoses that Rueangsirarak et al. (2018) distinguish by gait.
 DIAGNOSES = ("joint problem", "muscle weakness", "neurological defect")
-HEALTHY = "healthy"  # stands in the table, or in a clip's entry, instead of a diagnosis
-COLUMNS = ("file", "diagnosis")  # columns that the table needs; others are ignored
+HEALTHY = "healthy"  # what the table or a clip's entry says of a person without a diagnosis
+COLUMNS = ("file", "diagnosis")  # the columns that the table must have; all others are ignored
 
 
 class DiagnosisTable(Section):
@@ -47,11 +50,11 @@ class Diagnosis(Channel):
     Options = DiagnosisTable
 
     def columns(self, rig: HasLinks) -> tuple[str, ...]:
-        """The three groups of diagnoses."""
+        """Labels of the three columns, one for each group of diagnoses."""
         return DIAGNOSES
 
     def tables(self, options: Section | None) -> tuple[str, ...]:
-        """The table that the data set names."""
+        """The name of the table, as the data set states it."""
         return (options.table,) if isinstance(options, DiagnosisTable) else ()
 
     def is_neutral(self, source: ClipSource) -> bool:
@@ -59,25 +62,29 @@ class Diagnosis(Channel):
         return _diagnosis_of(source) in (HEALTHY, None)
 
     def check(self, source: ClipSource, rig: HasLinks) -> None:
-        """Raise InputError if the data set's entry for the clip names a diagnosis that is not known."""
+        """Raise InputError if the clip's entry in the data set has an unknown diagnosis."""
         if source.value is not None and source.value not in (*DIAGNOSES, HEALTHY):
             where = f"{source.clip}.channels.{self.name}"
             raise InputError(where, f"cannot be {source.value!r:.80}", fix=f"Write one of {_known_names()}.")
 
     def read(self, clip: Clip, source: ClipSource, motion: Mapping[str, Any]) -> tuple[Array, list[str]]:
-        """1 for the person's diagnosis in every frame, and a warning if the table lacks the clip."""
+        """Values (F, 3), with 1 in the column of the person's diagnosis, and a warning if it is unknown."""
         import numpy as np
 
         found = _diagnosis_of(source)
         row = [float(diagnosis == found) for diagnosis in DIAGNOSES]
-        warnings = [] if found else [f"{source.clip} is not in the table. The person is taken to be healthy."]
+        warnings = (
+            []
+            if found
+            else [f"{source.clip} is not in the table of diagnoses. The person is taken to be healthy."]
+        )
         return np.tile(np.array(row, np.float32), (len(clip), 1)), warnings
 
 
 def _diagnosis_of(source: ClipSource) -> str | None:
-    """The diagnosis of a clip's person, or HEALTHY. None if neither the clip's entry nor the table has it.
+    """The diagnosis of a clip's person, or HEALTHY; None if it is unknown.
 
-    The entry, which is in the configuration of the data set, is used if both have it.
+    It comes from the clip's entry in the data set or, if the entry has none, from the table.
     """
     if source.value is not None:
         return str(source.value)
@@ -89,9 +96,10 @@ def _diagnosis_of(source: ClipSource) -> str | None:
 
 @functools.cache  # the table is one file for all clips of a data set
 def read_table(path: str) -> dict[str, str]:
-    """Clip -> diagnosis.
+    """Clip -> diagnosis or HEALTHY, from the CSV file `path`.
 
-    Raises InputError with the line for a missing column, an unknown diagnosis, or a clip with two diagnoses.
+    Raises InputError, which names the line, for a missing column, an unknown diagnosis, or a clip with two
+    diagnoses.
     """
     reader = csv.DictReader(
         io.StringIO(read_bytes(path, MAX_TEXT_BYTES).decode("utf-8-sig", "replace"), newline="")
@@ -99,21 +107,22 @@ def read_table(path: str) -> dict[str, str]:
     if missing := [name for name in COLUMNS if name not in (reader.fieldnames or ())]:
         fix = f"The first line must name them: {','.join(COLUMNS)}."
         raise InputError(path, f"has no column {' and no '.join(missing)}", line=1, fix=fix)
-    out: dict[str, str] = {}
+    diagnoses: dict[str, str] = {}
     for row in reader:
         clip, diagnosis = PurePosixPath(row["file"] or "").stem, (row["diagnosis"] or "").strip()
         if diagnosis not in (*DIAGNOSES, HEALTHY):
-            problem = f"{printable(clip)} has {printable(diagnosis, 80)!r}"
+            problem = f"{printable(clip)} has the unknown diagnosis {printable(diagnosis, 80)!r}"
             raise InputError(path, problem, line=reader.line_num, fix=f"Write one of {_known_names()}.")
-        if out.setdefault(clip, diagnosis) != diagnosis:
-            problem = f"{printable(clip)} is {diagnosis} here and {out[clip]} above"
+        if diagnoses.setdefault(clip, diagnosis) != diagnosis:
+            problem = f"{printable(clip)} is {diagnosis} here and {diagnoses[clip]} above"
             raise InputError(
                 path, problem, line=reader.line_num, fix=f"Keep only one of them in {Path(path).name}."
             )
-    return out
+    return diagnoses
 
 
 def _known_names() -> str:
+    """All words that are allowed as a diagnosis, separated by commas."""
     return ", ".join((*DIAGNOSES, HEALTHY))
 
 

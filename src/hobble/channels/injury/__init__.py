@@ -1,4 +1,7 @@
-"""The injury channel: status files and the severity of each link in each frame."""
+"""The injury channel: how much each link of the body hurts, in each frame.
+
+A link is a pair of neighbouring joints. A status file beside a clip says which links hurt in it, and when.
+"""
 
 from hobble.channels.injury.channel import CHANNEL
 

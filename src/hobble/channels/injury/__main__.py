@@ -1,4 +1,4 @@
-"""Writes status files, which say what hurts in each clip, from a table of clips, links and severities.
+"""Writes status files from a table. A status file says which links hurt in a clip, when and how much.
 
 A link is a pair of neighbouring joints.
 
@@ -22,11 +22,13 @@ def main(arguments: Sequence[str] | None = None) -> int:
         prog="python -m hobble.channels.injury", description="Writes status files from a table."
     )
     parser.add_argument("table", help="CSV with the columns clip, link, severity, from, to")
-    parser.add_argument("folder", help="folder of the clips' BVH files; the status files are written there")
+    parser.add_argument(
+        "folder", help="folder with the clips' BVH files; the status files are written beside them"
+    )
     parser.add_argument(
         "--skeleton",
         default="config/skeletons/holden31.yaml",
-        help="skeleton that defines the links",
+        help="skeleton file that lists the links",
     )
     options = parser.parse_args(arguments)
     try:

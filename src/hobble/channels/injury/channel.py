@@ -13,18 +13,23 @@ if TYPE_CHECKING:
     from hobble.core.clip import Clip
     from hobble.core.quat import Array
 
-ZERO = re.compile(r"\s*0+(\.0*)?\s*")  # a severity of 0, such as "0" or "0.00"
+ZERO = re.compile(r"\s*0+(\.0*)?\s*")  # matches a severity of 0, such as "0" or "0.00"
 
 
-def hurts(text: str) -> bool:
-    """Whether a text has a severity above 0. text: a status (`A-B[4];`) or the content of a status file."""
+def has_injury(text: str) -> bool:
+    """Whether a text states a severity above 0.
+
+    text: the content of a status file, or a status such as `A-B[4];`, which gives the link from joint A to
+    joint B the severity 4.
+    """
     return any(ZERO.fullmatch(severity) is None for severity in re.findall(r"\[([^\]]*)", text))
 
 
 class Injury(Channel):
-    """Severities from a status file beside the clip. For the class fields see `Channel`.
+    """Reads severities from the status file beside a clip. For the class fields see `Channel`.
 
-    If the clip's entry in the data set has a status, it is used instead and holds for all frames.
+    If the clip's entry in the data set has a status, the file is not used. The entry's status holds for all
+    frames.
     """
 
     name = "injury"
@@ -35,23 +40,25 @@ class Injury(Channel):
     suffix = "_injuries.txt"
     old_keys = ("links", "injury", "status", "severity")
     slows = True
-    targets = ("questionnaire",)  # the page on which people tick what hurts in films of the character
+    targets = ("questionnaire",)  # a page on which people watch films of the character and tick what hurts
 
     def columns(self, rig: HasLinks) -> tuple[str, ...]:
-        """The links, with names such as "LeftUpLeg-LeftLeg"."""
+        """Names of the L links, such as "LeftUpLeg-LeftLeg"."""
         return tuple(f"{a}-{b}" for a, b in rig.links)
 
     def is_neutral(self, source: ClipSource) -> bool:
-        """Whether no status has a severity above 0."""
+        """Whether no link hurts in any frame."""
         if source.value is not None:
-            return not hurts(str(source.value))
-        return not any(hurts(read_bytes(file, MAX_TEXT_BYTES).decode("latin-1")) for file in source.files)
+            return not has_injury(str(source.value))
+        return not any(
+            has_injury(read_bytes(file, MAX_TEXT_BYTES).decode("latin-1")) for file in source.files
+        )
 
     def check(self, source: ClipSource, rig: HasLinks) -> None:
         """Raise InputError if the entry's status breaks the grammar of status files.
 
-        A skeleton without links has no columns for severities. Then the status only marks the clip as hurt:
-        a network without this channel does not train on it.
+        If the skeleton has no links, the channel has no columns and the status is not parsed. It then only
+        marks the clip as hurt, so that networks without this channel do not train on the clip.
         """
         from hobble.channels.injury.status import parse_links
         from hobble.core.errors import InputError
@@ -60,7 +67,7 @@ class Injury(Channel):
             return
         where = f"{source.clip}.channels.{self.name}"
         if not isinstance(source.value, str):
-            raise InputError(where, "is not a text", fix="Write Joint-Joint[severity];")
+            raise InputError(where, "is not a text", fix="Write a status such as LeftUpLeg-LeftLeg[4];")
         if links := self.columns(rig):
             parse_links(source.value, links, where)
 
@@ -71,7 +78,7 @@ class Injury(Channel):
         return clip_severity(clip, next(iter(source.files), None), source.value, motion)
 
     def mirror(self, values: Array, rig: Any) -> Array:
-        """Swap left and right."""
+        """Severities (F, L) of the mirrored clip. The severities of left and right links are swapped."""
         from hobble.channels.injury.severity import mirror_severity
 
         return mirror_severity(values, rig.mirror_links)

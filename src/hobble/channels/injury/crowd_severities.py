@@ -1,6 +1,7 @@
-"""Links and severities of a crowd of figures (copies of the character that walk at the same time).
+"""The severities of a crowd of figures, as inputs of a network.
 
-A link is a pair of neighbouring joints. It has one severity.
+A figure is one of several copies of the character that walk at the same time. A link is a pair of
+neighbouring joints, such as hip and knee. A severity from 0 to 10 says how much a link hurts.
 """
 
 from __future__ import annotations
@@ -11,22 +12,22 @@ from hobble.core.quat import Array
 from hobble.evaluation.crowd import channel_values
 from hobble.models.network import Network
 
-INJURY = "injury"  # the channel
+INJURY = "injury"  # name of the channel
 
 
 def links(network: Network) -> tuple[str, ...]:
-    """The links of a network's injury channel; empty if it has none."""
+    """Names of the links of a network's injury channel; () if the network lacks this channel."""
     return network.channels.get(INJURY, ())
 
 
 def hurt_links(network: Network) -> tuple[str, ...]:
-    """The links that were hurt in training; all links if none was."""
+    """Names of the links that were hurt in training; all links if none was hurt."""
     return network.trained(INJURY)
 
 
-def severities(network: Network, each: Sequence[Mapping[str, float]]) -> dict[str, Array]:
-    """{"injury": (C, L) severities} of C figures; {} if the network has no such channel.
+def severities(network: Network, injuries: Sequence[Mapping[str, float]]) -> dict[str, Array]:
+    """{"injury": (C, L) severities of C figures and L links}; {} if the network lacks this channel.
 
-    each: for each figure, link -> severity. The other links have severity 0.
+    injuries: for each figure, link -> severity. All other links have severity 0.
     """
-    return channel_values(network, INJURY, each)
+    return channel_values(network, INJURY, injuries)

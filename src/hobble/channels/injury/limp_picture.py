@@ -1,4 +1,4 @@
-"""The looping picture at the top of the README: the same character walks healthy and hurt, side by side."""
+"""Draws the looping picture at the top of the README. The character walks healthy and hurt, side by side."""
 
 from __future__ import annotations
 
@@ -22,42 +22,45 @@ from hobble.runtime.options import Runtime
 
 Picture = NDArray[np.uint8]
 
-INJURIES = {"left thigh": 8.0, "left shank": 8.0}  # part of the body -> severity
-CAPTIONS = ("healthy", "left knee hurts: 8 of 10")
+INJURIES = {"left thigh": 8.0, "left shank": 8.0}  # part of the hurt character's body -> severity
+CAPTIONS = ("healthy", "left knee hurts: 8 of 10")  # of the left and the right half
 SIZE = 360  # width and height of each half, pixels
-MOST_BYTES = 1_000_000  # largest size of the file
-QUALITIES = (80, 65, 50, 35, 20)  # of the WebP encoder; the first that keeps to MOST_BYTES is used
+MOST_BYTES = 1_000_000  # largest allowed size of the file
+QUALITIES = (80, 65, 50, 35, 20)  # of the WebP encoder; the first that gives at most MOST_BYTES is used
 
 
 def write_limp_picture(network: Network, path: str | Path, runtime: Runtime) -> int:
-    """Write an endless animated WebP of at most MOST_BYTES. Returns its size in bytes.
+    """Write the picture as an endless animated WebP of at most MOST_BYTES. Returns its size in bytes.
 
     The healthy and the hurt character have the same target speed. Raises HobbleError if the network has no
-    injury channel, or if the picture is too large at the lowest quality.
+    injury channel, or if the picture is too large even at the lowest quality.
     """
     link_names = links(network)
     if network.skeleton is None or not link_names:
         raise HobbleError("this network has no injury channel. Use a configuration with `channels: [injury]`")
-    parts = body_parts(network.skeleton, link_names, hurt_links(network))
-    hurt = {link_names[parts[label]]: value for label, value in INJURIES.items()}
+    # name of a part of the body -> index of its link
+    link_of_part = body_parts(network.skeleton, link_names, hurt_links(network))
+    hurt = {link_names[link_of_part[part]]: severity for part, severity in INJURIES.items()}
     renderer = BodyRenderer(body(network.skeleton), regions(network.skeleton, link_names))
     halves = []
     for injury in ({}, hurt):
+        # A link is drawn in a colour from 0 (healthy) to 1 (severity 10).
         colours = np.array([injury.get(link, 0.0) for link in link_names]) / 10
         loop = walk(network, {"injury": injury}, runtime)
         halves.append(frames(renderer, network.skeleton, loop, colours, SIZE))
-    return _save(Path(path), side_by_side(*halves))
+    return _save_webp(Path(path), put_side_by_side(*halves))
 
 
-def side_by_side(healthy: Sequence[Picture], hurt: Sequence[Picture]) -> list[Image.Image]:
-    """The pictures of two loops side by side. There are as many as in `hurt`.
+def put_side_by_side(healthy: Sequence[Picture], hurt: Sequence[Picture]) -> list[Image.Image]:
+    """One loop of pictures, each with a picture of `healthy` on the left and one of `hurt` on the right.
 
-    While `hurt` plays once, `healthy` plays a whole number of times, so that both loop without a jump.
+    The loop is as long as `hurt`. While `hurt` plays once, `healthy` plays a whole number of times, faster or
+    slower if need be. So the loop repeats without a jump.
     """
-    rounds = max(1, round(len(hurt) / len(healthy)))
+    repeats = max(1, round(len(hurt) / len(healthy)))
     out = []
     for index, right in enumerate(hurt):
-        left = healthy[index * rounds * len(healthy) // len(hurt) % len(healthy)]
+        left = healthy[index * repeats * len(healthy) // len(hurt) % len(healthy)]
         both = Image.fromarray(np.concatenate([left, right], axis=1)[..., :3])
         draw, font = ImageDraw.Draw(both), ImageFont.load_default(size=18)
         for half, text in enumerate(CAPTIONS):
@@ -67,7 +70,8 @@ def side_by_side(healthy: Sequence[Picture], hurt: Sequence[Picture]) -> list[Im
     return out
 
 
-def _save(path: Path, images: Sequence[Image.Image]) -> int:
+def _save_webp(path: Path, images: Sequence[Image.Image]) -> int:
+    """Write the images with the first of QUALITIES that gives at most MOST_BYTES. Returns the file's size."""
     for quality in QUALITIES:
         with atomic_path(path) as temporary:
             images[0].save(
@@ -82,4 +86,7 @@ def _save(path: Path, images: Sequence[Image.Image]) -> int:
             )
         if (size := path.stat().st_size) <= MOST_BYTES:
             return size
-    raise HobbleError(f"{path}: {size} bytes at the lowest quality, more than {MOST_BYTES}")
+    raise HobbleError(
+        f"{path}: the picture has {size} bytes at the lowest quality. At most {MOST_BYTES} are allowed. "
+        "Make SIZE in limp_picture.py smaller"
+    )

@@ -1,11 +1,11 @@
-"""Write tables of the answers to our questionnaire, numbered III to XVI as in the study of Ferre (2019).
+"""Write tables of people's answers to the questionnaire, numbered III to XVI as in the study of Ferre (2019).
 
 hobble study results/limp/questionnaire/films.json ANSWERS.json ... --out FOLDER
 
-People see films of a hurt character and tick the parts of the body that hurt. The page
-results/<configuration>/questionnaire/questionnaire.html saves a file of answers for each person. The command
-writes a table for each film (how many people ticked each part of the body), a table for all
-films, and tables.md with all tables.
+On the page results/<configuration>/questionnaire/questionnaire.html, people see films of a hurt character and
+tick the parts of the body that hurt. The page saves a file of answers for each person. From these files, the
+command writes a table for each film, with how many people ticked each part of the body, and a table for all
+films. It also writes tables.md, which has all tables.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ from hobble.report.gather import PUBLISHED
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the arguments of `hobble study`."""
-    parser.add_argument("films", type=Path, help="films.json beside the questionnaire")
+    parser.add_argument("films", type=Path, help="the file films.json in the folder of the questionnaire")
     parser.add_argument(
         "answers", type=Path, nargs="+", help="files that the questionnaire saved, one for each person"
     )
@@ -31,7 +31,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(options: argparse.Namespace) -> int:
-    """Write the tables and print the result over all films. Returns the exit status."""
+    """Write the tables and print the scores over all films. Returns the exit status."""
     study = read_study(options.films)
     people = [read_answers(path, study) for path in options.answers]
     published = read_yaml(PUBLISHED)["recognition"]["share"]
@@ -39,7 +39,9 @@ def run(options: argparse.Namespace) -> int:
     films = {film.number: film for film in study.films}
     overall = scores([(films[answer.film], answer) for answers in people for answer in answers])
     print(f"{len(people)} people, {overall['answers']} answers. Tables: {options.out}/tables.md")
-    seen, sides = (100 * overall[key] for key in ("seen", "seen_without_side"))
+    seen, seen_without_side = (100 * overall[key] for key in ("seen", "seen_without_side"))
     print(f"Hurt parts that were ticked: {seen:.0f} % (Ferre 2019: {100 * published:.0f} %),", end=" ")
-    print(f"{sides:.0f} % if left and right count as the same. Fluid: {overall['fluid']:.2f} of 5.")
+    print(
+        f"{seen_without_side:.0f} % if left and right count as the same. Fluid: {overall['fluid']:.2f} of 5."
+    )
     return 0

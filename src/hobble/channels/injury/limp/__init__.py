@@ -1,4 +1,7 @@
-"""Measures the limp that each hurt link causes: its size beside people's limps, and if it is recognised."""
+"""Measures the limp that each hurt link causes.
+
+The size of the limp is compared with people's limps. Two recognisers say whether they find the limp.
+"""
 
 from __future__ import annotations
 
@@ -11,7 +14,7 @@ from hobble.runtime.options import Runtime
 
 
 class Options(SampleOptions):
-    """The keys of this measurement in the section `evaluation`."""
+    """The keys of this measurement in a configuration's section `evaluation`."""
 
     limp_seconds: PositiveFloat = Field(8.0, description="length of each walk whose limp is measured")
 

@@ -1,6 +1,6 @@
-"""The walks in captured clips, hurt or healthy, and for how long each link hurts in the training clips.
+"""Measures the walks in captured clips, and for how many seconds each link hurts in the training clips.
 
-A link is a pair of neighbouring joints. It has one severity.
+A link is a pair of neighbouring joints. A severity from 0 to 10 says how much a link hurts.
 """
 
 from __future__ import annotations
@@ -23,18 +23,18 @@ from hobble.gait.profile import Profile, profile
 from hobble.measures.clip_parts import ClipPart
 from hobble.rows.clip_rows import ClipRows
 
-# End of the name of a hurt version of a healthy clip, which is generated.
+# A hurt version is a copy of a healthy clip that `hobble.hurt` made limp. Its name ends like this:
 HURT_VERSION = re.compile(r"_hurt[1-9](_mirror)?$")
 MIRROR = "_mirror"  # end of the name of a mirrored clip
-PERFORMER = re.compile(r"^([^_]+)_")  # in a clip's name: "105" in "105_25"
+PERFORMER = re.compile(r"^([^_]+)_")  # the performer in a clip's name, such as "105" in "105_25"
 
 
 @dataclass(frozen=True)
 class CapturedWalk:
-    """The walk in one captured clip whose severities do not change.
+    """The walk in one captured clip. The severities are the same in all its frames.
 
-    clip: its name. hurt: link -> severity, for the links that hurt. walk: the gait cycles. speed: mean speed,
-    cm a frame.
+    clip: name of the clip. hurt: link -> severity, for the links that hurt. walk: the gait cycles. speed:
+    mean speed, cm a frame.
     """
 
     clip: str
@@ -44,9 +44,9 @@ class CapturedWalk:
 
     @property
     def performer(self) -> str:
-        """The part of the clip's name before the first underscore.
+        """Who walks: the part of the clip's name before the first underscore.
 
-        A mirrored clip counts as another performer, because left and right are swapped.
+        Mirrored clips count as clips of another performer, because their left and right are swapped.
         """
         found = PERFORMER.match(self.clip)
         name = found[1] if found else self.clip
@@ -57,8 +57,7 @@ class CapturedWalk:
 class HurtSeconds:
     """For how many seconds of the training clips each link hurts.
 
-    captured: link -> seconds of captured motion. generated: link -> seconds of hurt versions, which were
-    generated from healthy clips.
+    captured: link -> seconds in captured clips. generated: link -> seconds in hurt versions.
     """
 
     captured: dict[str, float] = field(default_factory=dict)
@@ -70,8 +69,8 @@ def captured_walks(
 ) -> tuple[list[CapturedWalk], HurtSeconds]:
     """The walks of all captured clips, and the seconds for which each link hurts in the training clips.
 
-    parts: the parts of the clips to read, sorted by clip. If they are only a sample, the seconds are
-    estimates. splits: clip -> "train" or "held_out".
+    parts: the parts of the clips to read, sorted by clip. If they are only a sample of the clips, the seconds
+    are estimates. splits: clip -> "train" or "held_out". links: names of the links.
     """
     walks, hurt_seconds = [], HurtSeconds()
     for clip, parts_of_clip in groupby(parts, key=lambda part: part.clip):
@@ -80,8 +79,8 @@ def captured_walks(
         for part in parts_of_clip:
             rows = part.load().rows
             if splits.get(clip) == "train":
-                of_links = hurt_seconds.generated if is_generated else hurt_seconds.captured
-                _add_seconds(of_links, links, rows.channels.get(INJURY), part.weight)
+                seconds_of_links = hurt_seconds.generated if is_generated else hurt_seconds.captured
+                _add_seconds(seconds_of_links, links, rows.channels.get(INJURY), part.weight)
             if not is_generated:
                 rows_of_clip.append(rows)
         walks += _walk_of_clip(clip, rows_of_clip, links, skeleton)
@@ -89,39 +88,41 @@ def captured_walks(
 
 
 def _add_seconds(
-    of_links: dict[str, float], links: Sequence[str], severity: Array | None, weight: float
+    seconds_of_links: dict[str, float], links: Sequence[str], severity: Array | None, weight: float
 ) -> None:
-    """Add the seconds for which each link hurts to `of_links`.
+    """Add to `seconds_of_links` for how many seconds each link hurts in R rows of a clip.
 
-    severity: (R, links) of R rows; None if the clip has no severities. weight: how many rows of the clip each
-    of these rows stands for.
+    severity: (R, L) of the L links; None if the clip has no severities. weight: how many rows of the clip
+    each of these rows stands for.
     """
     for link, column in zip(links, () if severity is None else severity.T, strict=False):
         if column.any():
-            of_links[link] = round(of_links.get(link, 0.0) + float(np.sum(column > 0)) * weight / FPS, 2)
+            seconds = float(np.sum(column > 0)) * weight / FPS
+            seconds_of_links[link] = round(seconds_of_links.get(link, 0.0) + seconds, 2)
 
 
-def healthy_of(walk: CapturedWalk, walks: Sequence[CapturedWalk]) -> tuple[Profile, str]:
-    """The healthy walk to compare a clip with, and whose walk it is.
+def healthy_reference(captured_walk: CapturedWalk, walks: Sequence[CapturedWalk]) -> tuple[Profile, str]:
+    """The healthy walk to compare a captured walk with, and whose walk it is.
 
-    The performer's healthy clips are used ("performer"). If there are none, all healthy clips of the data set
-    are used ("data set"). If there are none either, it is the mean normal walk in `hobble.gait.people`
-    ("people").
+    "performer": it is measured over the performer's healthy clips. "data set": if the performer has no
+    healthy clip, it is measured over all healthy clips. "people": if there is no healthy clip at all, it is
+    the mean normal walk in `hobble.gait.people`. walks: all captured walks.
     """
-    healthy = [one for one in walks if not one.hurt and len(one.walk)]
-    of_performer = [one for one in healthy if one.performer == walk.performer]
+    healthy = [other for other in walks if not other.hurt and len(other.walk)]
+    of_performer = [other for other in healthy if other.performer == captured_walk.performer]
     for chosen, whose in ((of_performer, "performer"), (healthy, "data set")):
         if chosen:
-            return profile(joined(one.walk for one in chosen)), whose
+            return profile(joined(other.walk for other in chosen)), whose
     return people().normal(), "people"
 
 
 def _walk_of_clip(
     clip: str, rows_of_clip: Sequence[ClipRows], links: Sequence[str], skeleton: Skeleton
 ) -> list[CapturedWalk]:
-    """The walk of a clip as a list of one; empty if severities change or no whole cycle is walked.
+    """The walk of a clip, as a list of one item.
 
-    rows_of_clip: all rows of the clip in one item, or an item for each excerpt.
+    The list is empty if the severities change in the clip, or if nobody walks a whole cycle in it.
+    rows_of_clip: all rows of the clip as one item, or an item for each of the clip's excerpts.
     """
     rows_of_clip = [rows for rows in rows_of_clip if len(rows)]
     if not rows_of_clip:
@@ -137,6 +138,7 @@ def _walk_of_clip(
         for stretch in captured(rows):
             if stretch.gait.mean(axis=0).argmax() != 1:  # gait 1 is walking
                 continue
+            # `turn` is the change of yaw in each frame, negated.
             yaw = np.concatenate([[0.0], -np.cumsum(turn[stretch.rows])[:-1]])
             walks.append(measure(skeleton, _in_world(stretch.local, stretch.root, yaw), FPS))
             speeds.append(np.hypot(stretch.velocity[:, 0], stretch.velocity[:, 1]).mean())
@@ -148,9 +150,10 @@ def _walk_of_clip(
 
 
 def _in_world(local: Array, root: Array, yaw: Array) -> Array:
-    """(F, J, 3) positions in the world, from `local` (F, J, 3) in root coordinates.
+    """Joint positions (F, J, 3) in the world, cm.
 
-    root: (F, 3) position of the root. yaw: (F,) its rotation about the vertical, radians.
+    local: (F, J, 3) joint positions in root coordinates. root: (F, 3) position of the root. yaw: (F,)
+    rotation of the root about the vertical, radians.
     """
     out = local.copy()
     out[..., ::2] = rotate_by_yaw(local[..., ::2], yaw[:, None])

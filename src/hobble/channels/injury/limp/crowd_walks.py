@@ -1,6 +1,6 @@
 """Lets a crowd of figures walk, each with its own injury, and measures the gait cycles of each figure.
 
-A figure is a copy of the character.
+A figure is one of several copies of the character that walk at the same time.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ from hobble.models.network import Network
 from hobble.runtime.animation import ProceduralAnimation
 from hobble.runtime.options import Runtime
 
-WARM_UP = 5 * FPS  # frames before the measurement, in which figures reach their speed and start to limp
+WARM_UP = 5 * FPS  # frames that are not measured, while figures reach their speed and begin to limp
 
 
 @dataclass(frozen=True)
@@ -27,7 +27,7 @@ class FigureWalk:
     """The walk of one figure.
 
     walk: its gait cycles. profile: some fifty numbers that describe these cycles (see `hobble.gait.profile`);
-    None if there is no cycle. speed: mean speed, cm a frame. frames: length of the walk.
+    None if there is no whole cycle. speed: mean speed, cm a frame. frames: length of the walk in frames.
     """
 
     walk: WalkCycles = field(repr=False)
@@ -38,25 +38,25 @@ class FigureWalk:
 
 def walk_figures(
     network: Network,
-    each: Sequence[Mapping[str, float]],
+    injuries: Sequence[Mapping[str, float]],
     speeds: float | Sequence[float],
     gait: str,
     seconds: float,
     runtime: Runtime,
-    others: Mapping[str, Sequence[Mapping[str, float]]] | None = None,
+    other_channels: Mapping[str, Sequence[Mapping[str, float]]] | None = None,
 ) -> list[FigureWalk]:
-    """Let figures walk straight ahead for `seconds`, in the same `gait`.
+    """Let figures walk straight ahead for `seconds`, all in the gait `gait`. Returns the walk of each figure.
 
-    each: for each figure, link -> severity. speeds: target speed of all figures or of each, cm a frame.
-    others: name of another channel -> for each figure, column -> value.
+    injuries: for each figure, link -> severity. speeds: target speed in cm a frame, one for all figures or
+    one for each figure. other_channels: name of another channel -> for each figure, column -> value.
     """
     assert network.skeleton is not None
-    count, frames = len(each), max(4, round(seconds * FPS))
+    count, frames = len(injuries), max(4, round(seconds * FPS))
     animation = ProceduralAnimation(network, characters=count, **dict(runtime))
     velocity = np.zeros((count, 2))
     velocity[:, 1] = speeds
-    channels = severities(network, each)
-    for name, values in (others or {}).items():
+    channels = severities(network, injuries)
+    for name, values in (other_channels or {}).items():
         channels |= channel_values(network, name, values)
     shares = np.tile([float(name == gait) for name in network.gaits], (count, 1))
     positions = np.zeros((frames, count, len(network.skeleton.joints), 3), np.float32)
@@ -68,8 +68,10 @@ def walk_figures(
 
 
 def _figure_walk(network: Network, positions: Array) -> FigureWalk:
+    """The walk of one figure. positions: (F, J, 3) of its joints in the world, cm."""
     assert network.skeleton is not None
     hips = network.skeleton.role("hips")
+    # Distance on the ground between the first and the last position, divided by the frames between them.
     speed = float(np.linalg.norm((positions[-1, hips] - positions[0, hips])[::2])) / (len(positions) - 1)
     walk = measure(network.skeleton, positions, FPS)
     return FigureWalk(walk, profile(walk) if len(walk) else None, speed, len(positions))

@@ -1,4 +1,4 @@
-"""Shows the size of the limp beside people's limps, in the report's section on the response to injury."""
+"""Shows the sizes of limps, and how well they are recognised, in the report's section on injuries."""
 
 from __future__ import annotations
 
@@ -16,28 +16,29 @@ from hobble.report.page_parts import PageSection, Paragraph, SectionPart
 from hobble.report.tables import Column, Table
 
 # The effects in the chart and in the table of captured limps.
-SHOWN = ("speed", "stance", "step_hurt", "knee_hurt", "hip_hurt", "lean", "pelvis_drop", "arm_hurt")
-MOST_NAMED = 8  # a sentence names the links if there are at most this many
+SHOWN_EFFECTS = ("speed", "stance", "step_hurt", "knee_hurt", "hip_hurt", "lean", "pelvis_drop", "arm_hurt")
+MOST_NAMED = 8  # a sentence lists the hurt links if there are at most this many
 RECOGNISERS = (
-    "Two recognisers judge each walk in pieces of four seconds. The linear one learnt from people's strong "
-    "limps, the graded one also from milder versions of them."
+    "Two recognisers judge each walk in windows of four seconds. The linear recogniser learnt from people's "
+    "strong limps. The graded recogniser learnt from milder versions of these limps, too."
 )
-# Columns of the tables of recognised limps. A piece is a window of four seconds.
-RECOGNISED = (
-    Column.number("share of pieces in which the linear recogniser finds a limp"),
-    Column.number("share of pieces in which the graded recogniser finds a limp on the hurt side"),
-    Column.number("share of pieces in which the graded recogniser names the wrong side"),
+# Columns of the tables of recognised limps: impaired, named and wrong_side in limp.json.
+RECOGNISED_COLUMNS = (
+    Column.number("share of windows in which the linear recogniser finds a limp"),
+    Column.number("share of windows in which the graded recogniser finds a limp, and not on the wrong side"),
+    Column.number("share of windows in which the graded recogniser finds a limp on the wrong side"),
 )
-# Part of the body -> colour of its lines in the chart. Other parts, such as arms, get @g0.
+# Part of the body -> colour of its lines in the chart. All other parts, such as arms, have the colour @g0.
 COLOURS = {"hip": "@g1", "thigh": "@g2", "shank": "@g3", "foot": "@g4", "back": "@g5"}
 # The chart has lines for the links of these parts of the body, and of the arms.
 CHART_PARTS = ("hip", "pelvis", "thigh", "shank", "foot", "back")
 
 
 def section(found: Json, material: ReportMaterial) -> PageSection:
-    """Where the training data came from, the chart of sizes, the recognition, and all tables.
+    """The part of the section on injuries that shows limp.json.
 
-    found: the content of limp.json.
+    It says where the limps of the training data come from. It has the chart of sizes, and all tables. found:
+    the content of limp.json.
     """
     if not found.get("applies"):
         return PageSection("injury", [])
@@ -47,7 +48,8 @@ def section(found: Json, material: ReportMaterial) -> PageSection:
         "injury",
         [
             SectionPart(
-                1, Paragraph(provenance(found["hurt_seconds"], shown_name) + captured_sampled(found))
+                1,
+                Paragraph(hurt_motion_in_words(found["hurt_seconds"], shown_name) + captured_sampled(found)),
             ),
             SectionPart(2, size_chart(found)),
             SectionPart(3, Paragraph(RECOGNISERS)),
@@ -59,19 +61,23 @@ def section(found: Json, material: ReportMaterial) -> PageSection:
                     "Is the limp of a hurt leg recognised?",
                 ),
             ),
-            SectionPart(5, together_table(name, found["named_together"])),
+            SectionPart(5, other_channel_table(name, found["named_together"])),
             SectionPart(4, held_out_table(name, found["held_out_limps"], shown_name)),
             SectionPart(80, size_table(name, found["sizes"])),
             SectionPart(81, captured_table(name, found["captured"], shown_name)),
-            SectionPart(82, second_table(name, found["second"])),
+            SectionPart(82, second_injury_table(name, found["second"])),
         ],
     )
 
 
-def provenance(
+def hurt_motion_in_words(
     hurt_seconds: Mapping[str, Mapping[str, float]], shown_name: Callable[[str], str] = str
 ) -> str:
-    """Which injuries of the training data were captured and which were generated from healthy clips."""
+    """Sentences that say how much captured and how much generated hurt motion the training data have.
+
+    hurt_seconds: key of limp.json ("captured", "made") -> link -> seconds. shown_name: turns the name of a
+    link into words for readers.
+    """
     sentences = []
     for key, words in (("captured", "captured"), ("made", "generated from healthy clips")):
         if by_link := hurt_seconds[key]:
@@ -85,22 +91,25 @@ def provenance(
 
 
 def size_chart(found: Json) -> Chart:
-    """The chosen effect over severity: a line for each link, and the means over people."""
+    """A chart of one effect over severity, with a line for each link, and the means over people.
+
+    The effect is chosen in a menu. found: the content of limp.json.
+    """
     options: dict[str, list[Trace]] = {}
     rows = [row for row in found["sizes"] if row["gait"] == "walk"]
-    for effect in SHOWN:
+    for effect in SHOWN_EFFECTS:
         traces = []
         for link in dict.fromkeys(
             row["link"] for row in rows if row["part"] in CHART_PARTS or "arm" in row["part"]
         ):
-            some = [row for row in rows if row["link"] == link]
+            of_link = [row for row in rows if row["link"] == link]
             trace = line(
                 link,
-                [r["severity"] for r in some],
-                [r[effect] for r in some],
-                COLOURS.get(some[0]["part"].replace("pelvis", "hip"), "@g0"),
+                [r["severity"] for r in of_link],
+                [r[effect] for r in of_link],
+                COLOURS.get(of_link[0]["part"].replace("pelvis", "hip"), "@g0"),
             )
-            trace["line"]["dash"] = "dot" if some[0]["side"] == "right" else "solid"
+            trace["line"]["dash"] = "dot" if of_link[0]["side"] == "right" else "solid"
             traces.append(trace)
         for i, (gait, values) in enumerate(found["people"].items()):
             mean, spread = values[effect]
@@ -109,7 +118,7 @@ def size_chart(found: Json) -> Chart:
                     "type": "scatter",
                     "mode": "markers",
                     "name": f"people, {gait.replace('_', ' ')}",
-                    "x": [10.3 + 0.1 * i],
+                    "x": [10.3 + 0.1 * i],  # side by side, to the right of severity 10
                     "y": [mean],
                     "error_y": {"type": "data", "array": [spread], "visible": True},
                     "marker": {"color": "@muted", "size": 8},
@@ -120,8 +129,8 @@ def size_chart(found: Json) -> Chart:
         "limp-sizes",
         "Size of the limp",
         "The character walks at a target speed of 1.2 m/s with one link at severity 3, 5, 7 or 10, and is "
-        "compared with its healthy walk. Lines of the right side are dotted. Grey: mean and standard "
-        "deviation of ten people who imitated strong limps.",
+        "compared with its healthy walk. Lines of links on the right side are dotted. Grey markers show mean "
+        "and standard deviation over ten people who imitated strong limps.",
         layout={"xaxis": axis("severity", range=[2.5, 11]), "yaxis": axis("size")},
         height=560,
         choose="Effect",
@@ -130,11 +139,11 @@ def size_chart(found: Json) -> Chart:
 
 
 def _recognised_by_severity(rows: Sequence[Mapping[str, Any]]) -> tuple[list[Column], list[list[Any]]]:
-    """Columns and rows of a table: how the limps of hurt legs are recognised at each severity."""
+    """Columns and rows of a table that says how well limps of hurt legs are recognised at each severity."""
     columns = [
         Column.number("severity"),
         Column.count("walks"),
-        *RECOGNISED,
+        *RECOGNISED_COLUMNS,
     ]
     return columns, [[r["severity"], r["walks"], r["impaired"], r["named"], r["wrong_side"]] for r in rows]
 
@@ -142,7 +151,10 @@ def _recognised_by_severity(rows: Sequence[Mapping[str, Any]]) -> tuple[list[Col
 def held_out_table(
     name: str, rows: Sequence[Mapping[str, Any]], shown_name: Callable[[str], str]
 ) -> Table | None:
-    """Captured limps that were held out of training, compared with the character."""
+    """A table that compares captured limps, which were held out of training, with the character.
+
+    rows: `held_out_limps` of limp.json.
+    """
     if not rows:
         return None
     columns = [
@@ -168,63 +180,68 @@ def held_out_table(
         f"{name}-limp-exam",
         columns,
         table,
-        "Held-out captured limps: is the hurt character nearer to them than the healthy one?",
+        "Held-out captured limps: is the hurt character nearer to them than the healthy character?",
     )
 
 
 def size_table(name: str, rows: Sequence[Mapping[str, Any]]) -> Table | None:
-    """The effects of every walk, and which limp the recognisers find in it."""
-    texts = ("gait", "link", "part", "side", "called", "graded")
+    """A table of the effects in each walk and of the recognised limp. rows: `sizes` of limp.json."""
+    text_keys = ("gait", "link", "part", "side", "called", "graded")
     if not rows:
         return None
     words = {"called": "linear recogniser", "graded": "graded recogniser"}
-    words |= dict(zip(("impaired", "named", "wrong_side"), (c.label for c in RECOGNISED), strict=True))
-    named = {key: words.get(key, key.replace("_", " ")) for key in rows[0]}
-    columns = [Column(word) if key in texts else Column.number(word) for key, word in named.items()]
+    words |= dict(
+        zip(("impaired", "named", "wrong_side"), (c.label for c in RECOGNISED_COLUMNS), strict=True)
+    )
+    titles = {key: words.get(key, key.replace("_", " ")) for key in rows[0]}
+    columns = [Column(title) if key in text_keys else Column.number(title) for key, title in titles.items()]
     return Table(f"{name}-limp-sizes", columns, [list(row.values()) for row in rows], "Sizes of all effects")
 
 
-def together_table(name: str, rows: Sequence[Mapping[str, Any]]) -> Table | None:
-    """How limps of hurt legs are recognised while a value of another channel is at its highest."""
+def other_channel_table(name: str, rows: Sequence[Mapping[str, Any]]) -> Table | None:
+    """A table: how well limps of hurt legs are recognised while another channel has its highest value.
+
+    rows: `named_together` of limp.json.
+    """
     if not rows:
         return None
     columns = [
         Column("with"),
         Column.count("walks"),
         Column.number("speed, share of the same walk without injury"),
-        *RECOGNISED,
+        *RECOGNISED_COLUMNS,
     ]
     keys = ("column", "walks", "speed_share", "impaired", "named", "wrong_side")
-    title = "Is the limp of a hurt leg (severity 10) recognised while another channel is at its highest?"
+    title = "Is the limp of a hurt leg (severity 10) recognised while another channel has its highest value?"
     return Table(f"{name}-limp-together", columns, [[row.get(key) for key in keys] for row in rows], title)
 
 
 def captured_table(
     name: str, rows: Sequence[Mapping[str, Any]], shown_name: Callable[[str], str]
 ) -> Table | None:
-    """The SHOWN effects of captured limps."""
+    """A table of the SHOWN_EFFECTS of captured limps. rows: `captured` of limp.json."""
     if not rows:
         return None
     columns = [
         Column("clip"),
         Column("hurt"),
         Column("healthy walk of"),
-        *(Column.number(k.replace("_", " ")) for k in SHOWN),
+        *(Column.number(k.replace("_", " ")) for k in SHOWN_EFFECTS),
     ]
     table = [
         [
             r["clip"],
             ", ".join(f"{shown_name(k)} {v:g}" for k, v in r["hurt"].items()),
             r["healthy"],
-            *(r[k] for k in SHOWN),
+            *(r[k] for k in SHOWN_EFFECTS),
         ]
         for r in rows
     ]
     return Table(f"{name}-limp-captured", columns, table, "Effects of captured limps")
 
 
-def second_table(name: str, rows: Sequence[Mapping[str, Any]]) -> Table | None:
-    """Speeds with a second injury in addition to a first one, which is at severity 5 or 10."""
+def second_injury_table(name: str, rows: Sequence[Mapping[str, Any]]) -> Table | None:
+    """A table of the speeds of walks with two injuries. rows: `second` of limp.json."""
     if not rows:
         return None
     keys = list(rows[0])
@@ -233,5 +250,5 @@ def second_table(name: str, rows: Sequence[Mapping[str, Any]]) -> Table | None:
         f"{name}-limp-second",
         columns,
         [[r[k] for k in keys] for r in rows],
-        "Speed with a second injury in addition to a first",
+        "Speed with a second injury in addition to the first",
     )

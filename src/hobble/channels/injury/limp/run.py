@@ -1,9 +1,11 @@
 """Measures the size of each link's limp, and compares it with the limps of people and of captured clips.
 
-The rank correlations of `hobble.channels.injury.response` say nothing about size: a correlation is 1 even if
-the walk changes by only 2 %. Here the size of each effect is measured at severities 3, 5, 7 and 10, relative
-to the healthy character of the same network. The two recognisers of `hobble.gait`, a linear and a graded one,
-judge the walks. They learnt only from real people.
+A link is a pair of neighbouring joints. A severity from 0 to 10 says how much a link hurts.
+
+The rank correlations of `hobble.channels.injury.response` say nothing about size, because a correlation is 1
+even if the walk changes by only 2 %. Here the size of each effect of an injury on the walk is measured at
+severities 3, 5, 7 and 10, relative to the healthy walk of the same network. The two recognisers of
+`hobble.gait`, a linear and a graded one, judge the walks. They learnt only from real people.
 """
 
 from __future__ import annotations
@@ -16,7 +18,12 @@ import numpy as np
 from hobble.channels.injury.crowd_severities import hurt_links
 from hobble.channels.injury.crowd_severities import links as links_of
 from hobble.channels.injury.limp import Options
-from hobble.channels.injury.limp.captured_limps import CapturedWalk, HurtSeconds, captured_walks, healthy_of
+from hobble.channels.injury.limp.captured_limps import (
+    CapturedWalk,
+    HurtSeconds,
+    captured_walks,
+    healthy_reference,
+)
 from hobble.channels.injury.limp.crowd_walks import FigureWalk, walk_figures
 from hobble.channels.injury.limp.with_other_channel import limps_together, named_together
 from hobble.core.errors import HobbleError
@@ -37,15 +44,15 @@ from hobble.runtime.options import Runtime
 
 NO_SEVERITIES = "this network has no severity inputs"
 NO_CYCLE = "the network's healthy character does not walk a whole cycle"
-SEVERITIES = (3.0, 5.0, 7.0, 10.0)  # of the one link that hurts
+SEVERITIES = (3.0, 5.0, 7.0, 10.0)  # of the link that hurts; only one link hurts in a walk
 SPEEDS = {"walk": 2.0, "jog": 7.0}  # target speeds, cm a frame; 2 is 1.2 m/s, a usual walking speed
-FIRST_SEVERITIES = (5.0, 10.0)  # of a first injury, to which a second one is added
-SECOND_SEVERITIES = (5.0, 10.0)  # of the second injury
+FIRST_SEVERITIES = (5.0, 10.0)  # of the first injury in walks with two injuries
+SECOND_SEVERITIES = (5.0, 10.0)  # of the second injury in these walks
 LEG = ("hip", "thigh", "shank", "foot")  # parts of the body that belong to a leg
-WINDOW = 4.0  # seconds of a walk that a recogniser judges at once
+WINDOW = 4.0  # seconds; length of the stretches (windows) of a walk that a recogniser judges one by one
 
 
-def limp(
+def measure_limps(
     network: Network,
     captured: Sequence[CapturedWalk],
     hurt_seconds: HurtSeconds,
@@ -59,22 +66,23 @@ def limp(
     """The content of limp.json. If nothing can be measured, `applies` is false and `reason` says why.
 
     captured: the walks of the data set's captured clips. hurt_seconds: seconds for which each link hurts in
-    training. splits: clip -> "train" or "held_out". seconds: length of each walk. links: links to hurt, by
-    default all.
+    training. splits: clip -> "train" or "held_out". seconds: length of each generated walk. links: names of
+    the links to hurt, by default all.
 
-    `sizes`: a row for each gait, link and severity, with the effects of `hobble.gait.effect_sizes` (the
-    link's side counts as the hurt side) and the recognised limp. `trends`: Spearman's rho of each effect with
-    severity, and the size of the effect at severity 10. `named`: how hurt legs are recognised, by severity.
-    `people`: for each impairment that people imitated, mean and standard deviation of each effect.
-    `captured`: effects in captured clips. `held_out_limps`: see `compare_held_out`. `second`: see
-    `second_injuries`. `together` and `named_together`: limps while another channel is at its highest, see
+    Keys of the result. `sizes`: a row for each gait, link and severity, with the effects of
+    `hobble.gait.effect_sizes` and the limp that is recognised; the link's side counts as the hurt side.
+    `trends`: Spearman's rho of each effect with severity, and the size of the effect at severity 10. `named`:
+    at each severity, how well the limps of hurt legs are recognised. `people`: for each impairment that
+    people imitated, mean and standard deviation of each effect. `captured`: effects in captured clips.
+    `held_out_limps`: see `compare_held_out`. `second`: see `second_injuries`. `together` and
+    `named_together`: limps while another channel has its highest value, see
     `hobble.channels.injury.limp.with_other_channel`.
     """
     head: dict[str, Any] = {"configuration": configuration}
     if not links_of(network) or network.skeleton is None:
         return {**head, "applies": False, "reason": NO_SEVERITIES}
     links = list(links or links_of(network))
-    rows = _sizes(network, links, seconds, runtime)
+    rows = _size_rows(network, links, seconds, runtime)
     if rows is None:
         return {**head, "applies": False, "reason": NO_CYCLE}
     return {
@@ -86,23 +94,27 @@ def limp(
         "trained": [link for link in links if link in hurt_links(network)],
         "hurt_seconds": {"captured": hurt_seconds.captured, "made": hurt_seconds.generated},
         "sizes": rows,
-        "trends": _trends(rows),
-        "named": _named(rows),
+        "trends": _trend_rows(rows),
+        "named": _recognition_by_severity(rows),
         "people": {
-            gait: {name: [round(v, 5) for v in pair] for name, pair in found.items()}
-            for gait, found in effects_of_people(people()).items()
+            gait: {name: [round(v, 5) for v in mean_and_sd] for name, mean_and_sd in of_gait.items()}
+            for gait, of_gait in effects_of_people(people()).items()
         },
-        "captured": [_row_of_clip(network.skeleton, one, captured) for one in captured if one.hurt],
+        "captured": [_row_of_clip(network.skeleton, clip, captured) for clip in captured if clip.hurt],
         "held_out_limps": compare_held_out(network, captured, splits, seconds, runtime),
         "second": second_injuries(network, links, seconds, runtime),
-        **_together(network, links, seconds, runtime),
+        **_limps_with_other_channel(network, links, seconds, runtime),
     }
 
 
-def _sizes(
+def _size_rows(
     network: Network, links: Sequence[str], seconds: float, runtime: Runtime
 ) -> list[dict[str, Any]] | None:
-    """The row of each gait, link and severity; None if the healthy character does not walk a whole cycle."""
+    """A row of `_row_of_walk` for each gait, link and severity.
+
+    None if the healthy character does not walk a whole cycle in the gait "walk". If it does not in another
+    gait, the rows of this gait are left out.
+    """
     rows: list[dict[str, Any]] = []
     cases = [(link, severity) for link in links for severity in SEVERITIES]
     injuries = [{}, *({link: severity} for link, severity in cases)]
@@ -113,50 +125,57 @@ def _sizes(
                 return None
             continue
         rows += [
-            _row(network, gait, *case, figure, healthy) for case, figure in zip(cases, hurt, strict=True)
+            _row_of_walk(network, gait, *case, figure, healthy)
+            for case, figure in zip(cases, hurt, strict=True)
         ]
     return rows
 
 
-def _together(
+def _limps_with_other_channel(
     network: Network, links: Sequence[str], seconds: float, runtime: Runtime
 ) -> dict[str, list[dict[str, Any]]]:
-    """The keys `together` and `named_together`: limps while another channel is at its highest."""
+    """The keys `together` and `named_together`: limps while another channel has its highest value."""
     assert network.skeleton is not None
     skeleton = network.skeleton
-    legs = [link for link in links if part_of_link(skeleton, _pair(skeleton, link)).name in LEG]
+    legs = [link for link in links if part_of_link(skeleton, _joints_of_link(skeleton, link)).name in LEG]
 
     def row(link: str, figure: FigureWalk, healthy: FigureWalk) -> dict[str, Any]:
-        return _row(network, "walk", link, SEVERITIES[-1], figure, healthy)
+        return _row_of_walk(network, "walk", link, SEVERITIES[-1], figure, healthy)
 
     rows = limps_together(network, legs, SPEEDS["walk"], seconds, runtime, row)
     return {"together": rows, "named_together": named_together(rows)}
 
 
 def hurt_side(skeleton: Skeleton, link: str) -> str:
-    """The side of the body that a link is on; right for links on the midline."""
-    side = part_of_link(skeleton, _pair(skeleton, link)).side
+    """The side of the body that a link is on: "left" or "right".
+
+    Links on the midline count as right, because the effects need a hurt side.
+    """
+    side = part_of_link(skeleton, _joints_of_link(skeleton, link)).side
     return RIGHT if side is None else ("left", "right")[side]
 
 
-def _pair(skeleton: Skeleton, link: str) -> tuple[str, str]:
+def _joints_of_link(skeleton: Skeleton, link: str) -> tuple[str, str]:
+    """The names of the parent joint and the child joint of a link."""
     return skeleton.links[skeleton.link_names.index(link)]
 
 
-def _row(
+def _row_of_walk(
     network: Network, gait: str, link: str, severity: float, figure: FigureWalk, healthy: FigureWalk
 ) -> dict[str, Any]:
     """The row of one walk: gait, link and severity, the effects, and how the walk is recognised.
 
-    called, graded: the label and side that the linear and the graded recogniser give the whole walk.
-    impaired: share of windows in which the linear recogniser finds a limp. named: share of windows in which
-    the graded recogniser finds a limp and does not name the side opposite to the link's. wrong_side: share of
-    windows in which it names this opposite side; None for a link on the midline. If the figure does not walk
-    a whole cycle, the effects and all these are None.
+    called: label and side that the linear recogniser gives to the whole walk. graded: label and side that the
+    graded recogniser gives to it. impaired: share of windows in which the linear recogniser finds a limp. The
+    wrong side is the side opposite to `hurt_side`. named: share of windows in which the graded recogniser
+    finds a limp, and not on the wrong side. wrong_side: share of windows in which the graded recogniser finds
+    a limp on the wrong side; None for a link on the midline. speed_share: speed, divided by the speed of the
+    healthy walk. If the figure does not walk a whole cycle, only `speed_share` is measured. The effects and
+    the keys of the recognisers are then None.
     """
     assert network.skeleton is not None
     assert healthy.profile is not None
-    part = part_of_link(network.skeleton, _pair(network.skeleton, link))
+    part = part_of_link(network.skeleton, _joints_of_link(network.skeleton, link))
     side = hurt_side(network.skeleton, link)
     row: dict[str, Any] = {"gait": gait, "link": link, "part": part.name, "severity": severity}
     row["side"] = side if part.side is not None else None
@@ -169,41 +188,44 @@ def _row(
         }
     row |= _rounded_values(effects(figure.profile, healthy.profile, side))
     found = compare_walk(figure.walk, figure.frames, healthy.profile, WINDOW)
-    answers, grades = ([answer for _, answer in some] for some in (found.windows, found.grades))
-    other = SIDES[1 - SIDES.index(side)]
+    answers = [answer for _, answer in found.windows]  # of the linear recogniser, for each window
+    grades = [grade for _, grade in found.grades]  # of the graded recogniser, for each window
+    wrong_side = SIDES[1 - SIDES.index(side)]
     row["called"] = " ".join(filter(None, (found.answer.label, found.answer.side)))
     row["graded"] = " ".join(filter(None, (found.grade.label, found.grade.side)))
     row["impaired"] = _share([a.impaired for a in answers])
-    row["named"] = _share([g.impaired and g.side != other for g in grades])
+    row["named"] = _share([g.impaired and g.side != wrong_side for g in grades])
     row["wrong_side"] = (
-        _share([g.impaired and g.side == other for g in grades]) if part.side is not None else None
+        _share([g.impaired and g.side == wrong_side for g in grades]) if part.side is not None else None
     )
     return row
 
 
 def _rounded_values(values: Mapping[str, float]) -> dict[str, float | None]:
+    """The values, rounded to 5 decimals. None in place of a value that is not finite."""
     return {name: round(float(v), 5) if np.isfinite(v) else None for name, v in values.items()}
 
 
 def _share(values: Sequence[bool]) -> float | None:
+    """The share of the values that are True; None if there are no values."""
     return round(sum(values) / len(values), 5) if values else None
 
 
-def _trends(rows: Sequence[Mapping[str, Any]]) -> list[dict[str, Any]]:
-    """For each gait, link and effect: Spearman's rho with severity, and the size at severity 10."""
+def _trend_rows(rows: Sequence[Mapping[str, Any]]) -> list[dict[str, Any]]:
+    """A row for each gait, link and effect: Spearman's rho with severity, and the size at severity 10."""
     out = []
     for gait, link in dict.fromkeys((row["gait"], row["link"]) for row in rows):
-        some = [row for row in rows if (row["gait"], row["link"]) == (gait, link)]
+        rows_of_link = [row for row in rows if (row["gait"], row["link"]) == (gait, link)]
         for name in EFFECTS:
-            values = [row[name] for row in some]
+            values = [row[name] for row in rows_of_link]
             if None not in values:
-                rho = spearman([row["severity"] for row in some], values)
+                rho = spearman([row["severity"] for row in rows_of_link], values)
                 out.append({"gait": gait, "link": link, "effect": name, "at_10": values[-1], "spearman": rho})
     return out
 
 
-def _named(rows: Sequence[Mapping[str, Any]]) -> list[dict[str, Any]]:
-    """How walks with a hurt leg are recognised, by severity: means over the walks."""
+def _recognition_by_severity(rows: Sequence[Mapping[str, Any]]) -> list[dict[str, Any]]:
+    """A row for each severity: how well walks with a hurt leg are recognised, as means over these walks."""
     out = []
     for severity in SEVERITIES:
         legs = [r for r in rows if r["gait"] == "walk" and r["severity"] == severity and r["part"] in LEG]
@@ -216,22 +238,26 @@ def _named(rows: Sequence[Mapping[str, Any]]) -> list[dict[str, Any]]:
 
 
 def _row_of_clip(skeleton: Skeleton, clip: CapturedWalk, captured: Sequence[CapturedWalk]) -> dict[str, Any]:
-    """The effects in a captured clip relative to a healthy walk, and whose walk this is (`healthy_of`)."""
-    healthy, whose = healthy_of(clip, captured)
+    """The effects of the injury in a captured clip, relative to a healthy walk.
+
+    Its key `healthy` says whose healthy walk this is (see `healthy_reference`). If several links hurt, the
+    side of the one with the highest severity counts as hurt.
+    """
+    healthy, whose = healthy_reference(clip, captured)
     side = hurt_side(skeleton, max(clip.hurt, key=lambda link: clip.hurt[link]))
     sizes = _rounded_values(effects(profile(clip.walk), healthy, side))
     return {"clip": clip.clip, "hurt": dict(clip.hurt), "side": side, "healthy": whose, **sizes}
 
 
-def distance(walk: Profile, healthy: Profile, other: Profile, other_healthy: Profile) -> float:
-    """How much the limps of two bodies differ. A limp is how a body's walk differs from its own healthy walk.
+def limp_distance(walk: Profile, healthy: Profile, other: Profile, other_healthy: Profile) -> float:
+    """How much the limps of two bodies differ. A limp is how a body's walk differs from its healthy walk.
 
-    walk, healthy: profiles of the first body. other, other_healthy: profiles of the second. The distance is
-    the root mean square of the differences of all features. Each difference is divided by the standard
-    deviation of its feature over people's walks.
+    walk, healthy: profiles of the first body. other, other_healthy: profiles of the second body. The distance
+    is the root mean square of the differences of all features of the limps. Each difference is divided by the
+    standard deviation of its feature over people's walks.
     """
-    of_people = examples(people(), range(people().count))[0]
-    spread = of_people.std(axis=0)
+    features_of_people = examples(people(), range(people().count))[0]
+    spread = features_of_people.std(axis=0)
     a, b = (np.array(list(features(*pair).values())) for pair in ((walk, healthy), (other, other_healthy)))
     return float(np.sqrt(np.mean(((a - b) / spread) ** 2)))
 
@@ -245,28 +271,30 @@ def compare_held_out(
 ) -> list[dict[str, Any]]:
     """Whether limps in held-out clips are nearer to the hurt character than to the healthy one.
 
-    Each clip is compared with the character that has the clip's severities, and with the healthy character.
-    Both have a target speed of 1.2 m/s, a likely speed of the performer's healthy walk. `hurt` and
-    `healthy`: the `distance` of the clip from each. `nearer`: whether the hurt character is nearer, as it
-    should be.
+    Each clip is compared with the hurt character, which has the clip's severities, and with the healthy
+    character. Both have a target speed of 1.2 m/s, a likely speed of the performer's healthy walk. Returns a
+    row for each clip. `hurt`, `healthy`: the `limp_distance` of the clip from the hurt and from the healthy
+    character; None if either of them does not walk a whole cycle. `nearer`: whether the hurt character is
+    nearer, as it should be; False without distances.
     """
-    limps = [one for one in captured if one.hurt and splits.get(one.clip) == "held_out"]
+    limps = [clip for clip in captured if clip.hurt and splits.get(clip.clip) == "held_out"]
     if not limps:
         return []
     figures = walk_figures(
-        network, [{}, *(one.hurt for one in limps)], SPEEDS["walk"], "walk", seconds, runtime
+        network, [{}, *(clip.hurt for clip in limps)], SPEEDS["walk"], "walk", seconds, runtime
     )
     healthy_figure = figures[0].profile
     out = []
-    for one, figure in zip(limps, figures[1:], strict=True):
-        healthy, whose = healthy_of(one, captured)
-        row: dict[str, Any] = {"clip": one.clip, "hurt_links": dict(one.hurt), "compared_with": whose}
+    for clip, figure in zip(limps, figures[1:], strict=True):
+        healthy, whose = healthy_reference(clip, captured)
+        row: dict[str, Any] = {"clip": clip.clip, "hurt_links": dict(clip.hurt), "compared_with": whose}
         if healthy_figure is None or figure.profile is None:
             out.append({**row, "healthy": None, "hurt": None, "nearer": False})
             continue
-        walk_of_clip = profile(one.walk)
+        walk_of_clip = profile(clip.walk)
         from_healthy, from_hurt = (
-            distance(walk_of_clip, healthy, walk, healthy_figure) for walk in (healthy_figure, figure.profile)
+            limp_distance(walk_of_clip, healthy, walk, healthy_figure)
+            for walk in (healthy_figure, figure.profile)
         )
         out.append(
             {
@@ -282,49 +310,54 @@ def compare_held_out(
 def second_injuries(
     network: Network, links: Sequence[str], seconds: float, runtime: Runtime
 ) -> list[dict[str, Any]]:
-    """Speeds of walks with two injuries.
+    """A row with the speed of each walk with two injuries. Empty if `links` has no right thigh.
 
-    The first injury is the right thigh at severity 5 or 10, the second any other link at severity 5 or 10.
-    `speed_share`: speed divided by the speed of the healthy walk. `from_first`: speed divided by the speed
-    with the first injury alone. It should be at most 1: a second injury must not make the walk faster.
+    The first injury is the right thigh at severity 5 or 10. The second is any other link at severity 5 or 10.
+    A walk lasts `seconds`, but at most 4. `speed_share`: speed, divided by the speed of the healthy walk.
+    `from_first`: speed, divided by the speed with the first injury alone. This should be at most 1, because a
+    second injury must not make the walk faster.
     """
     assert network.skeleton is not None
     first = next((link for link in links if _is_part_on_side(network.skeleton, link, "thigh", "right")), None)
     if first is None:
         return []
-    pairs = [(a, b, s) for a in FIRST_SEVERITIES for b in links if b != first for s in SECOND_SEVERITIES]
-    each = [{}, *({first: a} for a in FIRST_SEVERITIES), *({first: a, b: s} for a, b, s in pairs)]
-    figures = walk_figures(network, each, SPEEDS["walk"], "walk", min(seconds, 4.0), runtime)
+    # (severity of the first injury, link of the second injury, its severity)
+    cases = [
+        (a, link, b) for a in FIRST_SEVERITIES for link in links if link != first for b in SECOND_SEVERITIES
+    ]
+    injuries = [{}, *({first: a} for a in FIRST_SEVERITIES), *({first: a, link: b} for a, link, b in cases)]
+    figures = walk_figures(network, injuries, SPEEDS["walk"], "walk", min(seconds, 4.0), runtime)
     healthy = max(figures[0].speed, 1e-9)
-    alone = dict(zip(FIRST_SEVERITIES, figures[1:], strict=False))
+    with_first_alone = dict(zip(FIRST_SEVERITIES, figures[1:], strict=False))
     return [
         {
             "first": first,
             "first_severity": a,
-            "second": b,
-            "severity": s,
+            "second": link,
+            "severity": b,
             "speed_share": round(figure.speed / healthy, 5),
-            "from_first": round(figure.speed / max(alone[a].speed, 1e-9), 5),
+            "from_first": round(figure.speed / max(with_first_alone[a].speed, 1e-9), 5),
         }
-        for (a, b, s), figure in zip(pairs, figures[1 + len(FIRST_SEVERITIES) :], strict=True)
+        for (a, link, b), figure in zip(cases, figures[1 + len(FIRST_SEVERITIES) :], strict=True)
     ]
 
 
 def _is_part_on_side(skeleton: Skeleton, link: str, part: str, side: str) -> bool:
-    found = part_of_link(skeleton, _pair(skeleton, link))
+    """Whether a link belongs to a part of the body, such as "thigh", on a side."""
+    found = part_of_link(skeleton, _joints_of_link(skeleton, link))
     return found.name == part and hurt_side(skeleton, link) == side
 
 
 def run(inputs: MeasureInputs, options: Options) -> Outcome:
-    """limp.json and its tables."""
+    """Measure the limps. The outcome has the content of limp.json and its tables."""
     network = load_network(inputs.weights)
     if network.skeleton is None:
-        raise HobbleError(f"{inputs.weights} has no skeleton")
-    # Without severities there is nothing to measure.
+        raise HobbleError(f"{inputs.weights}: this network file has no skeleton, so limps cannot be measured")
     sample = sample_of(inputs, options)
+    # A network without severities has no limps, so no clips are read.
     parts = clip_parts(inputs.clips, sample) if links_of(network) else ()
     captured, hurt_seconds = captured_walks(parts, inputs.splits, links_of(network), network.skeleton)
-    result = limp(
+    result = measure_limps(
         network,
         captured,
         hurt_seconds,
@@ -336,6 +369,8 @@ def run(inputs: MeasureInputs, options: Options) -> Outcome:
     tables = {name: result.get(name, []) for name in ("sizes", "trends", "named", "second", "together")}
     at_10 = next((row for row in result.get("named", []) if row["severity"] == SEVERITIES[-1]), None)
     says = (
-        f"legs at severity 10: {at_10['impaired']} of windows called impaired" if at_10 else result["reason"]
+        f"a limp is found in {at_10['impaired']} of the windows with a leg at severity 10"
+        if at_10
+        else result["reason"]
     )
     return Outcome(with_sample(result, sample), tables, says)

@@ -1,4 +1,4 @@
-"""Measures whether a classifier, trained on captured clips, recognises the hurt part of generated walks."""
+"""Measures whether a classifier that learns from captured clips recognises hurt parts in generated walks."""
 
 from hobble.measures.measure import Cost, Measure
 from hobble.measures.sample_options import SampleOptions

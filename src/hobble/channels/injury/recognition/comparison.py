@@ -4,16 +4,19 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from hobble.channels.injury.recognition.run import rows
+from hobble.channels.injury.recognition.run import confusion_rows
 from hobble.evaluation.comparison_rows import PublishedRow, SideBySide, published_row
 from hobble.evaluation.configuration_results import ConfigurationResults
 from hobble.measures.inputs import Json, Row
 
-NAME = "recognition"  # the measurement
+NAME = "recognition"  # name of the measurement
 
 
 def compared(all_measured: Sequence[ConfigurationResults], published: Json) -> SideBySide:
-    """The result of each configuration, beside the share of hurt parts that people recognised."""
+    """The result of each configuration, and rows that compare it with people's recognition of hurt parts.
+
+    published: name of a measurement -> its published result.
+    """
     return SideBySide(
         entries=[{**m.found(NAME), "configuration": m.name} for m in all_measured],
         against_published=[row for m in all_measured for row in _against_people(m, published["recognition"])],
@@ -21,12 +24,16 @@ def compared(all_measured: Sequence[ConfigurationResults], published: Json) -> S
 
 
 def tables(compared: Json) -> dict[str, list[Row]]:
-    """The confusion tables of all configurations."""
-    found = [(entry["configuration"], row) for entry in compared[NAME] for row in rows(entry)]
-    return {NAME: [{"configuration": name, **row} for name, row in found]}
+    """The confusion tables of all configurations, as one table. compared: the content of compare.json."""
+    named_rows = [(entry["configuration"], row) for entry in compared[NAME] for row in confusion_rows(entry)]
+    return {NAME: [{"configuration": name, **row} for name, row in named_rows]}
 
 
 def _against_people(measured: ConfigurationResults, people: Json) -> list[PublishedRow]:
+    """The shares of hurt parts that the classifier recognises, each next to the share of people.
+
+    people: the published result, with the key `share`.
+    """
     found = measured.found(NAME)
     if not found["applies"]:
         return []

@@ -1,4 +1,4 @@
-"""Shows whether hurt parts are recognised, in the section on the response to injury."""
+"""Shows in the report's section on injuries whether hurt parts are recognised."""
 
 from __future__ import annotations
 
@@ -10,12 +10,16 @@ from hobble.report.page_parts import PageSection, SectionPart
 
 
 def section(found: Json, material: ReportMaterial) -> PageSection:
-    """The chart, which is added to the section on the response to injury."""
+    """The part of the section on injuries that shows recognition.json, which is `found`."""
     return PageSection("injury", [SectionPart(30, recognition_chart(found))])
 
 
 def recognition_chart(found: Json) -> Chart | None:
-    """Confusion tables of the classifier that recognises the hurt part. None if nothing was measured."""
+    """A chart of one confusion table of the classifier, chosen in a menu. None if nothing was measured.
+
+    found: the content of recognition.json. In a confusion table, a row is what hurts, a column is what was
+    recognised, and a cell is how often.
+    """
     if not found.get("applies"):
         return None
     generated, captured = found["generated"], found["captured"]
@@ -30,9 +34,11 @@ def recognition_chart(found: Json) -> Chart | None:
         if not table or not table.get("confusion"):
             continue
         confusion = table["confusion"]
-        named = list(dict.fromkeys(name for row in confusion.values() for name in row))
+        answers = list(dict.fromkeys(answer for row in confusion.values() for answer in row))
         hurt = list(confusion)
-        share = [[confusion[h].get(n, 0) / max(1, sum(confusion[h].values())) for n in named] for h in hurt]
+        shares = [
+            [confusion[h].get(a, 0) / max(1, sum(confusion[h].values())) for a in answers] for h in hurt
+        ]
         title = label
         if table.get("right") is not None:
             title += f": {100 * table['right']:.0f} % right"
@@ -41,10 +47,10 @@ def recognition_chart(found: Json) -> Chart | None:
         options[title] = [
             {
                 "type": "heatmap",
-                "x": named,
+                "x": answers,
                 "y": hurt,
-                "z": [[v or None for v in row] for row in share],
-                "customdata": [[confusion[h].get(n, 0) for n in named] for h in hurt],
+                "z": [[v or None for v in row] for row in shares],
+                "customdata": [[confusion[h].get(a, 0) for a in answers] for h in hurt],
                 "colorscale": [[0, "@sunken"], [1, "@accent"]],
                 "zmin": 0,
                 "zmax": 1,

@@ -1,4 +1,7 @@
-"""The types of recognition.json."""
+"""The types of recognition.json.
+
+A window is one second of a walk. For each window, the classifier names the links that hurt, or "healthy".
+"""
 
 from __future__ import annotations
 
@@ -6,7 +9,11 @@ from typing import NotRequired, TypedDict
 
 
 class SeverityShare(TypedDict):
-    """How many `windows`, or whole `walks`, have one severity, and the share that is recognised right."""
+    """How windows, or whole walks, of one severity were recognised.
+
+    windows, walks: how many have this severity; only one of these two keys is there. right: share in which
+    the answer is right.
+    """
 
     severity: float
     windows: NotRequired[int]
@@ -17,9 +24,9 @@ class SeverityShare(TypedDict):
 class RecognisedWindows(TypedDict):
     """How windows, or whole walks, were recognised.
 
-    windows, walks: how many; only one of these two keys is there. right: share in which the links that hurt
-    are named. right_without_side: share in which the part of the body is named, on either side. confusion:
-    what hurts -> what was recognised -> how many.
+    windows, walks: how many were judged; only one of these two keys is there. right: share in which the
+    classifier names exactly what hurts. right_without_side: share in which it names the right parts of the
+    body, on either side. confusion: what hurts -> what was recognised -> how many.
     """
 
     windows: NotRequired[int]
@@ -31,7 +38,7 @@ class RecognisedWindows(TypedDict):
 
 
 class RecognisedGenerated(RecognisedWindows):
-    """How windows of generated walks were recognised. by_walk: with one answer for a whole walk."""
+    """How windows of generated walks were recognised. by_walk: the same, with one answer for each walk."""
 
     by_walk: RecognisedWindows
 
@@ -48,11 +55,12 @@ class RecognisedCaptured(TypedDict):
 
 
 class Recognition(TypedDict):
-    """recognition.json. If `applies` is false, it has only the first three keys and `reason`.
+    """The content of recognition.json. If `applies` is false, it has only the first three keys and `reason`.
 
-    people: share of hurt parts that people recognised in a published study. classes: what the classifier can
-    answer: "healthy", or the links that hurt. features: names of its inputs. chance: share that a random
-    guess gets right. captured, generated: how captured clips and generated walks were recognised.
+    people: share of hurt parts that people recognised in a published study. applies: whether anything could
+    be measured. classes: the possible answers of the classifier: "healthy", and the links that hurt together
+    in training. features: names of the classifier's inputs. chance: share that random guesses get right.
+    captured: how captured clips were recognised. generated: how generated walks were recognised.
     """
 
     configuration: str

@@ -1,8 +1,9 @@
 """Measures whether a classifier that learnt from captured motion recognises the hurt part of generated walks.
 
-It learns from windows of the training clips and the link that hurts in each. Its accuracy on other captured
-windows is the most that can be expected on generated ones. Its accuracy on generated walks is compared with
-that of people who saw animated figures (Ferre 2019).
+A window is one second of a walk. A link is a pair of neighbouring joints. The classifier learns from windows
+of the training clips and from the links that hurt in each window. Its accuracy on other captured windows is
+the most that can be expected on generated windows. Its accuracy on generated walks is compared with the
+accuracy of people who saw animated figures (Ferre 2019).
 """
 
 from __future__ import annotations
@@ -33,18 +34,19 @@ from hobble.models.load import load_network
 from hobble.models.network import Network
 from hobble.runtime.options import Runtime
 
-INJURY = "injury"  # the channel
-HEALTHY = "healthy"
+INJURY = "injury"  # name of the channel
+HEALTHY = "healthy"  # the class of windows in which no link hurts
 WINDOW = 60  # frames, about a cycle; windows of 75 or 90 are recognised less well
 STEP = 15  # frames from the start of one window to the start of the next
-FOLDS = 4  # the cross-validation leaves out each quarter of a stretch (consecutive frames of a clip) in turn
-SEVERITIES = (3.0, 5.0, 7.0, 10.0)  # of the generated walks
+# A stretch (consecutive frames of a clip) has four quarters. The cross-validation leaves out each in turn.
+FOLDS = 4
+SEVERITIES = (3.0, 5.0, 7.0, 10.0)  # of the links that hurt in generated walks
 SPEEDS = (1.8, 2.2, 2.6)  # target speeds of the generated walks, cm a frame
 WARM_UP = 4 * FPS  # frames at the beginning of a generated walk that are not used
-USED = 6 * FPS  # the frames after them that are used
-AHEAD = 0.9  # a window counts as walking only if at least this share of the root's speed is forward
+USED = 6 * FPS  # frames after WARM_UP, which are used
+AHEAD = 0.9  # a window counts as walking ahead only if at least this share of the root's speed is forward
 LEAST_SPEED = 0.5  # cm a frame; a slower window does not count as walking
-# A function that `parts_of_classes` returns: class -> parts of the body, without their side.
+# A function that maps a class to the parts of the body that hurt, without their side (`parts_of_classes`)
 PartsOfClass = Callable[[str], tuple[str, ...]]
 NO_SEVERITIES = "this network has no severity inputs"
 TOO_FEW = "the captured training clips have no walks, or only one kind (all healthy, or all hurt alike)"
@@ -52,12 +54,12 @@ TOO_FEW = "the captured training clips have no walks, or only one kind (all heal
 
 @dataclass(frozen=True)
 class InjuryWindow:
-    """A second of walking.
+    """A window of a walk, WINDOW frames long.
 
-    clip: name of the captured clip or generated walk. hurt: the class: HEALTHY, or the links that hurt,
-    joined by " and ". severity: the highest severity in the window. values: name -> value of the features of
-    `hobble.evaluation.gait_features`. quarter: 0 to 3, the quarter of a captured stretch that the window is
-    in, for the cross-validation.
+    clip: name of the captured clip or generated walk. hurt: the window's class, which is HEALTHY or the names
+    of the links that hurt, joined by " and ". severity: the highest severity in the window. values: name ->
+    value of the features of `hobble.evaluation.gait_features`. quarter: from 0 to 3, the quarter of a
+    captured stretch in which the window lies; 0 in a generated walk.
     """
 
     clip: str
@@ -67,7 +69,7 @@ class InjuryWindow:
     quarter: int
 
 
-def recognition(
+def measure_recognition(
     network: Network,
     motion: Iterable[Captured],
     splits: Mapping[str, str],
@@ -76,29 +78,27 @@ def recognition(
     runtime: Runtime,
     people: float,
 ) -> Recognition:
-    """The content of recognition.json: how well generated walks are recognised.
+    """The content of recognition.json, which says how well generated walks are recognised.
 
-    The classifier learns from the captured training clips.
-
-    motion: the captured clips. splits: clip -> "train" or "held_out". people: share of hurt parts that people
-    recognised in a published study.
-
-    `classes`: what the classifier can recognise. `captured`: results on captured clips. `generated`: results
-    on walks with the links of each class at severities 3, 5, 7 and 10. For their keys see
+    The classifier learns from the captured training clips. The generated walks have the links of each class
+    hurt, at severities 3, 5, 7 and 10. For the keys of the result see
     `hobble.channels.injury.recognition.results`. If the network or the clips do not allow the measurement,
     `applies` is false and `reason` says why.
+
+    motion: stretches of the captured clips. splits: clip -> "train" or "held_out". people: share of hurt
+    parts that people recognised in a published study.
     """
-    refused: Recognition = {"configuration": configuration, "people": people, "applies": False}
+    not_measured: Recognition = {"configuration": configuration, "people": people, "applies": False}
     if not links_of(network) or network.skeleton is None:
-        return {**refused, "reason": NO_SEVERITIES}
-    windows = [w for clip in motion for w in walking_windows(clip, network)]
+        return {**not_measured, "reason": NO_SEVERITIES}
+    windows = [w for stretch in motion for w in walking_windows(stretch, network)]
     training = [w for w in windows if splits[w.clip] == "train"]
     classes = sorted({w.hurt for w in training})
     if len(classes) < 2:
-        return {**refused, "reason": TOO_FEW}
-    classifier = learn(table(training), [w.hurt for w in training])
+        return {**not_measured, "reason": TOO_FEW}
+    classifier = learn(feature_table(training), [w.hurt for w in training])
     parts_of_class = parts_of_classes(network.skeleton)
-    walks = generated(network, [c for c in classes if c != HEALTHY], HEALTHY in classes, runtime)
+    generated = generated_windows(network, [c for c in classes if c != HEALTHY], HEALTHY in classes, runtime)
     return {
         "configuration": configuration,
         "people": people,
@@ -107,60 +107,64 @@ def recognition(
         "features": list(training[0].values),
         "chance": round(1 / len(classes), 5),
         "captured": {
-            "cross_validated": _cross_validated(training, parts_of_class),
-            "held_out": _judged(
+            "cross_validated": _cross_validate(training, parts_of_class),
+            "held_out": _judge_windows(
                 classifier, [w for w in windows if splits[w.clip] == "held_out"], parts_of_class
             ),
         },
         "generated": {
-            **_judged(classifier, walks, parts_of_class),
-            "by_walk": _by_walk(classifier, walks, parts_of_class),
+            **_judge_windows(classifier, generated, parts_of_class),
+            "by_walk": _judge_walks(classifier, generated, parts_of_class),
         },
     }
 
 
-def walking_windows(clip: Captured, network: Network) -> list[InjuryWindow]:
-    """The windows of a captured stretch in which the person walks ahead and the same links hurt."""
+def walking_windows(stretch: Captured, network: Network) -> list[InjuryWindow]:
+    """The windows of a captured stretch in which the person walks ahead and the same links hurt throughout.
+
+    A window lies completely in one quarter of the stretch.
+    """
     assert network.skeleton is not None
-    walk = clip.gait[:, network.gaits.index("walk")]
-    hurts = clip.channels[INJURY] > 0
+    walk_share = stretch.gait[:, network.gaits.index("walk")]
+    is_hurt = stretch.channels[INJURY] > 0  # (frames, links)
     out = []
-    for quarter, start in product(range(FOLDS), range(0, len(clip), STEP)):
-        first = quarter * len(clip) // FOLDS + start
+    for quarter, start in product(range(FOLDS), range(0, len(stretch), STEP)):
+        first = quarter * len(stretch) // FOLDS + start
         span = slice(first, first + WINDOW)
-        if span.stop > (quarter + 1) * len(clip) // FOLDS:
+        if span.stop > (quarter + 1) * len(stretch) // FOLDS:
             continue
-        speed = np.hypot(*clip.velocity[span].mean(axis=0))
-        ahead = clip.velocity[span, 1].mean() >= AHEAD * speed and speed >= LEAST_SPEED
-        same = np.all(hurts[span] == hurts[first])
-        if walk[span].mean() > 0.5 and ahead and same:
-            names = [links_of(network)[i] for i in np.flatnonzero(hurts[first])]
-            values = _values(network.skeleton, clip.local, clip.contacts, clip.root, span)
-            severity = float(clip.channels[INJURY][span].max())
-            out.append(InjuryWindow(clip.clip, " and ".join(names) or HEALTHY, severity, values, quarter))
+        speed = np.hypot(*stretch.velocity[span].mean(axis=0))
+        walks_ahead = stretch.velocity[span, 1].mean() >= AHEAD * speed and speed >= LEAST_SPEED
+        same_links = np.all(is_hurt[span] == is_hurt[first])
+        if walk_share[span].mean() > 0.5 and walks_ahead and same_links:
+            names = [links_of(network)[i] for i in np.flatnonzero(is_hurt[first])]
+            values = _features(network.skeleton, stretch.local, stretch.contacts, stretch.root, span)
+            severity = float(stretch.channels[INJURY][span].max())
+            out.append(InjuryWindow(stretch.clip, " and ".join(names) or HEALTHY, severity, values, quarter))
     return out
 
 
-def generated(
-    network: Network, classes: Sequence[str], healthy: bool, runtime: Runtime
+def generated_windows(
+    network: Network, classes: Sequence[str], with_healthy: bool, runtime: Runtime
 ) -> list[InjuryWindow]:
-    """Windows of generated walks, with the links of each class hurt at each severity and speed.
+    """Windows of generated walks, one walk for each class, severity and speed.
 
-    healthy: whether to add healthy walks.
+    classes: classes of hurt links, without HEALTHY. with_healthy: whether to add healthy walks.
     """
     assert network.skeleton is not None
+    # (class, severity, target speed) of each walk
     cases = [(name, s, v) for name, s, v in product(classes, SEVERITIES, SPEEDS)]
-    cases += [(HEALTHY, 0.0, v) for v in SPEEDS] if healthy else []
-    hurt = [{} if name == HEALTHY else dict.fromkeys(name.split(" and "), s) for name, s, _ in cases]
+    cases += [(HEALTHY, 0.0, v) for v in SPEEDS] if with_healthy else []
+    injuries = [{} if name == HEALTHY else dict.fromkeys(name.split(" and "), s) for name, s, _ in cases]
     script = CrowdTarget(
-        WARM_UP + USED, ["walk"] * len(cases), severities(network, hurt), [v for *_, v in cases]
+        WARM_UP + USED, ["walk"] * len(cases), severities(network, injuries), [v for *_, v in cases]
     )
     walks = run_walks(network, [script], runtime)
     out = []
     for i, (name, severity, speed) in enumerate(cases):
         for start in range(WARM_UP, WARM_UP + USED - WINDOW + 1, STEP):
             span = slice(start, start + WINDOW)
-            values = _values(
+            values = _features(
                 network.skeleton, walks.local[:, i], walks.contacts[:, i], walks.root[:, i], span
             )
             out.append(InjuryWindow(f"{name} {severity:g} {speed:g}", name, severity, values, 0))
@@ -168,27 +172,32 @@ def generated(
 
 
 def parts_of_classes(skeleton: Skeleton) -> PartsOfClass:
-    """A function that returns the parts of the body that hurt in a class, without left and right.
+    """Returns a function that maps a class to the parts of the body that hurt, without left and right.
 
-    For the class "LeftLeg-LeftFoot" it returns ("shank",), for HEALTHY ().
+    The function maps the class "LeftLeg-LeftFoot" to ("shank",), and HEALTHY to ().
     """
-    pairs = dict(zip(skeleton.link_names, skeleton.links, strict=True))
+    joints_of_link = dict(zip(skeleton.link_names, skeleton.links, strict=True))
 
     def parts(name: str) -> tuple[str, ...]:
         if name == HEALTHY:
             return ()
-        return tuple(sorted({part_of_link(skeleton, pairs[link]).name for link in name.split(" and ")}))
+        return tuple(
+            sorted({part_of_link(skeleton, joints_of_link[link]).name for link in name.split(" and ")})
+        )
 
     return parts
 
 
-def table(windows: Sequence[InjuryWindow]) -> Array:
-    """(n, D) features of n windows."""
+def feature_table(windows: Sequence[InjuryWindow]) -> Array:
+    """The D features of n windows, as an array (n, D)."""
     return np.array([list(w.values.values()) for w in windows])
 
 
-def rows(result: Recognition) -> list[Row]:
-    """The confusion tables as flat rows: kind of motion, what hurts, what was recognised, count."""
+def confusion_rows(result: Recognition) -> list[Row]:
+    """The confusion tables by window, with a row for each cell.
+
+    Columns: kind of motion, what hurts, what was recognised, number of windows.
+    """
     if not result["applies"]:
         return []
     captured = result["captured"]
@@ -206,13 +215,13 @@ def rows(result: Recognition) -> list[Row]:
 
 
 def run(inputs: MeasureInputs, options: SampleOptions) -> Outcome:
-    """recognition.json, and all its confusion tables as one table."""
-    # Hurt versions are left out, because they are generated from healthy clips by rules for each injury. The
-    # classifier would learn these rules.
+    """Measure the recognition. The outcome has the content of recognition.json and a table."""
+    # Hurt versions are copies of healthy clips that were made limp by rules for each injury. They are left
+    # out, because the classifier would learn these rules.
     clips = {clip: file for clip, file in inputs.clips.items() if not HURT_VERSION.search(clip)}
     summaries = [file for file in inputs.summaries if file.stem in clips]
     sample = sample_of(replace(inputs, summaries=summaries), options)
-    result = recognition(
+    result = measure_recognition(
         load_network(inputs.weights),
         captured_motion(clips, sample),
         inputs.splits,
@@ -220,77 +229,92 @@ def run(inputs: MeasureInputs, options: SampleOptions) -> Outcome:
         runtime=inputs.runtime,
         people=inputs.published["recognition"]["share"],
     )
-    right = f"{result['generated']['right']} of generated windows named right" if result["applies"] else ""
-    return Outcome(with_sample(result, sample), {"confusion": rows(result)}, right or result["reason"])
-
-
-def _values(skeleton: Skeleton, local: Array, contacts: Array, root: Array, span: slice) -> dict[str, float]:
-    return features(skeleton, local[span], contacts[span], root[span])
-
-
-def _cross_validated(windows: Sequence[InjuryWindow], parts_of_class: PartsOfClass) -> RecognisedWindows:
-    """How windows are recognised if a classifier judges each quarter and learns from the other three."""
-    judged: list[InjuryWindow] = []
-    named: list[str] = []
-    for quarter in range(FOLDS):
-        rest = [w for w in windows if w.quarter != quarter]
-        of_quarter = [w for w in windows if w.quarter == quarter]
-        if of_quarter and len({w.hurt for w in rest}) > 1:
-            named += learn(table(rest), [w.hurt for w in rest]).names(table(of_quarter))
-            judged += of_quarter
-    return _confusion(sorted({w.hurt for w in windows}), judged, named, parts_of_class)
-
-
-def _judged(
-    classifier: Discriminant, windows: Sequence[InjuryWindow], parts_of_class: PartsOfClass
-) -> RecognisedWindows:
-    return _confusion(
-        classifier.classes, windows, classifier.names(table(windows)) if windows else [], parts_of_class
+    right = (
+        f"the hurt part is recognised in {result['generated']['right']} of the generated windows"
+        if result["applies"]
+        else ""
+    )
+    return Outcome(
+        with_sample(result, sample), {"confusion": confusion_rows(result)}, right or result["reason"]
     )
 
 
-def _by_walk(
+def _features(
+    skeleton: Skeleton, local: Array, contacts: Array, root: Array, span: slice
+) -> dict[str, float]:
+    """Name -> value of the features of the frames `span`. For the arrays see `Captured`."""
+    return features(skeleton, local[span], contacts[span], root[span])
+
+
+def _cross_validate(windows: Sequence[InjuryWindow], parts_of_class: PartsOfClass) -> RecognisedWindows:
+    """How windows are recognised if the classifier for each quarter learns from the other three quarters."""
+    judged: list[InjuryWindow] = []
+    named: list[str] = []
+    for quarter in range(FOLDS):
+        others = [w for w in windows if w.quarter != quarter]
+        of_quarter = [w for w in windows if w.quarter == quarter]
+        if of_quarter and len({w.hurt for w in others}) > 1:
+            named += learn(feature_table(others), [w.hurt for w in others]).names(feature_table(of_quarter))
+            judged += of_quarter
+    return _count_answers(sorted({w.hurt for w in windows}), judged, named, parts_of_class)
+
+
+def _judge_windows(
     classifier: Discriminant, windows: Sequence[InjuryWindow], parts_of_class: PartsOfClass
 ) -> RecognisedWindows:
-    """One answer for each walk, from all its windows together."""
-    scores = classifier.scores(table(windows))
-    walks, named = [], []
+    """How the classifier recognises windows."""
+    named = classifier.names(feature_table(windows)) if windows else []
+    return _count_answers(classifier.classes, windows, named, parts_of_class)
+
+
+def _judge_walks(
+    classifier: Discriminant, windows: Sequence[InjuryWindow], parts_of_class: PartsOfClass
+) -> RecognisedWindows:
+    """How the classifier recognises whole walks. Its answer for a walk is the class with the highest score.
+
+    A class's score for a walk is the sum of its scores for all windows of the walk.
+    """
+    scores = classifier.scores(feature_table(windows))  # (windows, classes)
+    walks, named = [], []  # a window of each walk, the class that is recognised in the walk
     for walk in dict.fromkeys(w.clip for w in windows):
         of_walk = [i for i, w in enumerate(windows) if w.clip == walk]
         walks.append(windows[of_walk[0]])
         named.append(classifier.classes[int(np.argmax(scores[of_walk].sum(axis=0)))])
-    return _confusion(classifier.classes, walks, named, parts_of_class, "walks")
+    return _count_answers(classifier.classes, walks, named, parts_of_class, "walks")
 
 
-def _confusion(
+def _count_answers(
     classes: Sequence[str],
     windows: Sequence[InjuryWindow],
     named: Sequence[str],
     parts_of_class: PartsOfClass,
-    what: str = "windows",
+    counted: str = "windows",
 ) -> RecognisedWindows:
-    """How windows were recognised. named: the recognised class of each window.
+    """How windows were recognised.
 
-    what: "windows", or "walks" if each window stands for a whole walk.
+    classes: all possible answers. named: the recognised class of each window. counted: "windows", or "walks"
+    if each window stands for a whole walk.
     """
-    counts = {h: dict.fromkeys(classes, 0) for h in sorted({w.hurt for w in windows})}
-    right: dict[float, list[bool]] = {}
+    confusion = {h: dict.fromkeys(classes, 0) for h in sorted({w.hurt for w in windows})}
+    right: dict[float, list[bool]] = {}  # severity -> whether each answer is right
     for w, name in zip(windows, named, strict=True):
-        counts[w.hurt][name] += 1
+        confusion[w.hurt][name] += 1
         right.setdefault(w.severity, []).append(w.hurt == name)
     found = {
-        what: len(windows),
-        "right": _share([r for some in right.values() for r in some]),
+        counted: len(windows),
+        "right": _share([is_right for of_severity in right.values() for is_right in of_severity]),
         "right_without_side": _share(
             [parts_of_class(w.hurt) == parts_of_class(name) for w, name in zip(windows, named, strict=True)]
         ),
         "by_severity": [
-            {"severity": s, what: len(some), "right": _share(some)} for s, some in sorted(right.items())
+            {"severity": severity, counted: len(of_severity), "right": _share(of_severity)}
+            for severity, of_severity in sorted(right.items())
         ],
-        "confusion": counts,
+        "confusion": confusion,
     }
     return cast(RecognisedWindows, found)
 
 
 def _share(right: Sequence[bool]) -> float | None:
+    """The share of the values that are True; None if there are no values."""
     return round(sum(right) / len(right), 5) if right else None
