@@ -99,9 +99,9 @@ def _parts(found: Json, name: str) -> list[SectionPart]:
     rows, responses, second = (found.get(key) or [] for key in ("rows", "responses", "second"))
     untrained = {r["link"] for r in responses if not r.get("trained", True)}
     return [
-        SectionPart(0, ChartPair(overview(responses))),
+        SectionPart(0, ChartPair(effect_charts(responses))),
         SectionPart(10, response_table(name, responses)),
-        SectionPart(20, curves(rows, found.get("falling") or (), untrained) if rows else None),
+        SectionPart(20, sweep_charts(rows, found.get("falling") or (), untrained) if rows else None),
         SectionPart(40, cases.second_chart(second)),
         SectionPart(50, cases.second_table(name, second)),
         SectionPart(
@@ -117,7 +117,7 @@ def _parts(found: Json, name: str) -> list[SectionPart]:
     ]
 
 
-def curves(
+def sweep_charts(
     rows: Sequence[Mapping[str, Any]],
     falling: Sequence[Mapping[str, Any]] = (),
     untrained: Collection[str] = (),
@@ -139,7 +139,7 @@ def curves(
     falling_rows: dict[str, list[Mapping[str, Any]]] = {}
     for row in falling:
         falling_rows.setdefault(menu_option(row), []).append(row)
-    charts = [_panel(panel, rows, rising_rows, falling_rows) for panel in PANELS]
+    charts = [_panel_chart(panel, rows, rising_rows, falling_rows) for panel in PANELS]
     caption = (
         "The character moves on while the severity of one link rises from 0 to 10 and falls again. Each "
         "point is measured over whole gait cycles at one severity. A smooth curve means that the walk "
@@ -154,7 +154,7 @@ def curves(
     return ChartGroup("sweeps", "One link at rising severity", caption, charts, "Link and gait")
 
 
-def _panel(
+def _panel_chart(
     panel: Panel,
     rows: Sequence[Mapping[str, Any]],
     rising_rows: Mapping[str, Sequence[Mapping[str, Any]]],
@@ -213,7 +213,7 @@ def y_range(
     return [low if from_zero else low - spare / 2, high + spare / (1 if from_zero else 2)]
 
 
-def overview(responses: Sequence[Mapping[str, Any]]) -> list[Chart]:
+def effect_charts(responses: Sequence[Mapping[str, Any]]) -> list[Chart]:
     """Two charts of each link at severity 10: the change of the pose, and the remaining speed.
 
     responses: those of injury.json.
