@@ -9,8 +9,8 @@ neighbouring joints::
     500-2000 LeftShoulder-LeftArm[5];LeftUpLeg-LeftLeg[10];
 
 Frames are those of the BVH file, counted from 1. Both ends of a range are included. A range from 0 is read
-as a range from 1. A range that goes past the last frame stops there. Where ranges overlap, the
-later line counts for the links that it names.
+as a range from 1. A range that goes past the last frame stops there. Where ranges overlap, the later
+line counts for the links that it names.
 """
 
 from __future__ import annotations

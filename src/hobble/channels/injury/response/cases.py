@@ -35,12 +35,12 @@ JOG_SEVERITIES = (5.0, 10.0)  # of figures that change from walking to jogging
 JOG_SPEED_SHARE = 0.9  # a figure jogs once it has this share of its final speed
 
 
-def _frames(share: float, seconds: float) -> int:
+def _frame_count(share: float, seconds: float) -> int:
     """Length in frames of a stretch that lasts `share` times `seconds`; at least 4."""
     return max(4, round(share * seconds * FPS))
 
 
-def _cycle(walks: Walks, stretch: int, figure: int) -> Array:
+def _mean_cycle(walks: Walks, stretch: int, figure: int) -> Array:
     """The mean pose of a figure in each phase bin of its gait cycle, measured in a stretch."""
     span = walks.measured(stretch, figure)
     return mean_cycle(walks.local[span, figure], walks.phase[span, figure])
@@ -52,8 +52,8 @@ def _distance_from_cycle(walks: Walks, stretch: int, figure: int, cycle: Array) 
     return float(np.mean(distance_to_cycle(walks.local[span, figure], walks.phase[span, figure], cycle)))
 
 
-def _speed(network: Network, walks: Walks, stretch: int, figure: int) -> float:
-    """A figure's speed in a stretch, cm/s."""
+def _mean_speed(network: Network, walks: Walks, stretch: int, figure: int) -> float:
+    """A figure's mean speed in a stretch, cm/s."""
     assert network.skeleton is not None
     span = walks.measured(stretch, figure)
     local, contacts, root = (a[span, figure] for a in (walks.local, walks.contacts, walks.root))
@@ -66,8 +66,8 @@ def second_injuries(
     """Walks in which a first link hurts at severity 7 and a second link at severities 0, 5 and 10.
 
     There is one first link for each part of the body (`first_link_of_each_part`), because all 30 links would
-    take longer than all other measurements. All other links are second links. The result has an entry for
-    each pair.
+    take longer than all other measurements. Each of the other links is a second link. The result has an
+    entry for each pair.
 
     Keys of an entry. first, second: the links. from_first_cm: distance between the walk with both injuries,
     the second at 10, and the walk with only the first. share: `from_first_cm`, divided by the distance
@@ -87,8 +87,8 @@ def second_injuries(
         return severities(network, each)
 
     healthy = severities(network, [{}] * len(pairs))
-    script = [CrowdTarget(_frames(WALK_IN, seconds), gait, healthy)]
-    script += [CrowdTarget(_frames(1, seconds), gait, with_second_at(s)) for s in SECOND_SEVERITIES]
+    script = [CrowdTarget(_frame_count(WALK_IN, seconds), gait, healthy)]
+    script += [CrowdTarget(_frame_count(1, seconds), gait, with_second_at(s)) for s in SECOND_SEVERITIES]
     walks = run(network, script, runtime)
     last = len(SECOND_SEVERITIES)  # index of the last stretch, because stretch 0 is only the beginning
     alone = {b: _effect_of_one(walks, last, i) for i, (a, b) in enumerate(pairs) if a is None}
@@ -97,7 +97,7 @@ def second_injuries(
         if first is None:
             continue
         cycle_of_second, spread, effect_alone = alone[second]
-        cycle_of_first = _cycle(walks, 1, i)
+        cycle_of_first = _mean_cycle(walks, 1, i)
         from_first = [_distance_from_cycle(walks, 1 + k, i, cycle_of_first) for k in range(last)]
         added = from_first[-1] - from_first[0]  # the second item is the spread
         from_second = _distance_from_cycle(walks, last, i, cycle_of_second) - spread
@@ -121,7 +121,7 @@ def _effect_of_one(walks: Walks, last: int, figure: int) -> tuple[Array, float, 
     (its spread), cm; and the effect, cm. The effect is the distance of the hurt walk from the mean healthy
     cycle, minus the distance of the healthy walk from the same cycle.
     """
-    healthy, cycle = _cycle(walks, 1, figure), _cycle(walks, last, figure)
+    healthy, cycle = _mean_cycle(walks, 1, figure), _mean_cycle(walks, last, figure)
     effect = _distance_from_cycle(walks, last, figure, healthy) - _distance_from_cycle(
         walks, 1, figure, healthy
     )
@@ -155,7 +155,7 @@ def into_a_jog(network: Network, links: Sequence[str], seconds: float, runtime: 
     # (link, severity) of each figure.
     figures: list[tuple[str | None, float]] = [(None, 0.0), *product(links, JOG_SEVERITIES)]
     hurt = severities(network, [{link: s} if link else {} for link, s in figures])
-    frames = _frames(1, seconds)
+    frames = _frame_count(1, seconds)
     walk, jog = ["walk"] * len(figures), ["jog"] * len(figures)
     walks = run(
         network,
@@ -166,20 +166,20 @@ def into_a_jog(network: Network, links: Sequence[str], seconds: float, runtime: 
         ],
         runtime,
     )
-    healthy = {stretch: _cycle(walks, stretch, 0) for stretch in (1, 2)}
+    healthy = {stretch: _mean_cycle(walks, stretch, 0) for stretch in (1, 2)}
     spread = {stretch: _distance_from_cycle(walks, stretch, 0, healthy[stretch]) for stretch in (1, 2)}
     jog_start = int(walks.starts[2])  # a frame
     out: list[IntoAJog] = []
     for i, (link, severity) in enumerate(figures):
         walking, jogging = (_distance_from_cycle(walks, s, i, healthy[s]) - spread[s] for s in (1, 2))
-        jog_speed = _speed(network, walks, 2, i)
+        jog_speed = _mean_speed(network, walks, 2, i)
         speeds = np.linalg.norm(np.diff(walks.root[jog_start:, i, ::2], axis=0), axis=1) * FPS
         fast = np.flatnonzero(speeds >= JOG_SPEED_SHARE * jog_speed)
         out.append(
             {
                 "link": link,
                 "severity": severity,
-                "walk_speed": round(_speed(network, walks, 1, i), 5),
+                "walk_speed": round(_mean_speed(network, walks, 1, i), 5),
                 "jog_speed": round(jog_speed, 5),
                 "reach_seconds": round(float(fast[0]) / FPS, 5) if len(fast) else None,
                 "walk_from_healthy_cm": round(walking, 5),
@@ -201,17 +201,17 @@ def divided_severities(
     The result has an entry for each divisor, link and severity; `Divided` explains its keys.
     """
     gait = ["walk"] * len(links)
-    script = [CrowdTarget(_frames(WALK_IN, seconds), gait, severities(network, [{}] * len(links)))]
+    script = [CrowdTarget(_frame_count(WALK_IN, seconds), gait, severities(network, [{}] * len(links)))]
     script += [
-        CrowdTarget(_frames(1, seconds), gait, severities(network, [{link: s} for link in links]))
+        CrowdTarget(_frame_count(1, seconds), gait, severities(network, [{link: s} for link in links]))
         for s in SEVERITIES_TO_DIVIDE
     ]
     out: list[Divided] = []
     for divisor in DIVISORS:
         walks = run(network, script, runtime.model_copy(update={"scales": {"injury": divisor}}))
         for i, link in enumerate(links):
-            healthy = _cycle(walks, 1, i)
-            spread, speed = _distance_from_cycle(walks, 1, i, healthy), _speed(network, walks, 1, i)
+            healthy = _mean_cycle(walks, 1, i)
+            spread, speed = _distance_from_cycle(walks, 1, i, healthy), _mean_speed(network, walks, 1, i)
             for k, severity in enumerate(SEVERITIES_TO_DIVIDE):
                 out.append(
                     {
@@ -219,7 +219,7 @@ def divided_severities(
                         "link": link,
                         "severity": severity,
                         "from_healthy_cm": round(_distance_from_cycle(walks, 1 + k, i, healthy) - spread, 5),
-                        "speed_share": round(_speed(network, walks, 1 + k, i) / max(speed, 1e-9), 5),
+                        "speed_share": round(_mean_speed(network, walks, 1 + k, i) / max(speed, 1e-9), 5),
                     }
                 )
     return out

@@ -23,7 +23,7 @@ def second_chart(rows: Sequence[Mapping[str, Any]]) -> Chart | None:
     """
     if not rows:
         return None
-    firsts, seconds = (list(dict.fromkeys(row[key] for row in rows)) for key in ("first", "second"))
+    first_links, second_links = (list(dict.fromkeys(row[key] for row in rows)) for key in ("first", "second"))
     by_pair = {(row["first"], row["second"]): row for row in rows}
     # Option of the menu -> key of a row, and format of its value.
     units = {
@@ -35,9 +35,9 @@ def second_chart(rows: Sequence[Mapping[str, Any]]) -> Chart | None:
         options[unit] = [
             {
                 "type": "heatmap",
-                "x": seconds,
-                "y": firsts,
-                "z": [[by_pair.get((a, b), {}).get(key) for b in seconds] for a in firsts],
+                "x": second_links,
+                "y": first_links,
+                "z": [[by_pair.get((a, b), {}).get(key) for b in second_links] for a in first_links],
                 "colorscale": [[0, "@sunken"], [1, "@accent"]],
                 "zmin": 0,
                 "xgap": 2,
@@ -58,7 +58,7 @@ def second_chart(rows: Sequence[Mapping[str, Any]]) -> Chart | None:
             "xaxis": {"type": "category", "tickangle": -50, "automargin": True},
             "yaxis": {"type": "category", "autorange": "reversed", "automargin": True},
         },
-        height=max(300, 190 + 24 * len(firsts)),
+        height=max(300, 190 + 24 * len(first_links)),
         choose="Unit",
         options=options,
     )
