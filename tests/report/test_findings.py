@@ -102,10 +102,10 @@ def test_links_never_hurt_in_training_only_show_the_drift_of_the_walk(material: 
     found = heads(material, injury=like_it)
     assert found["Even a healthy walk changes, by 10.0 cm per joint."] == "warn"
     assert "1 of 1 link hardly changes the walk at severity 10" in found
-    assert not [head for head in found if "stays changed" in head]
+    assert not [head for head in found if "does not recover" in head]
     caught = {"responses": [swept("never", False, 0.1, 0.1), swept("hurt", True, 11.0, 6.5)]}
     found = heads(material, injury=caught)
-    assert "After healing, the walk stays changed for hurt." in found
+    assert "The walk does not recover after these links have healed: hurt." in found
     head = "1 of 2 links was hurt in training."
     assert found[head] == "good"
     texts = {hint.head: hint.text for hint in hints(changed(material, injury=caught))}

@@ -96,7 +96,7 @@ WALKER = "skeleton: s\nsynthetic: {frames: 600}\nclips: {b: {%s}}\n"
     [
         (
             LISTED % "channels: {injury: 'LeftLeg-LeftFoot[11]'}",
-            "clips.b.channels.injury: severity 11 of LeftLeg-LeftFoot is not in 0",
+            "clips.b.channels.injury: severity 11 of LeftLeg-LeftFoot is not a number from 0",
         ),
         (
             LISTED % "channels: {injury: 'LeftLeg-NoSuch[4]'}",

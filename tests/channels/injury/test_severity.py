@@ -74,7 +74,7 @@ def test_odd_frame_ranges_are_reported_with_their_lines():
         "walk_injuries.txt, line 4",
     ]
     for sentence, word in zip(
-        said, ("past the last", "starts at 0", "overlaps that of line 2", "was ignored"), strict=True
+        said, ("past the last", "starts at 0", "overlaps the range of line 2", "was ignored"), strict=True
     ):
         assert word in sentence
     out = severity_matrix(Status(10, spells), (THIGH, ARM))

@@ -58,7 +58,7 @@ def test_extra_spaces_case_and_line_ends_are_accepted(status_file, text):
         ("frames:10\n1-5 LeftUpLeg-LeftLeg[11];\n", 2, "severity 11"),
         ("frames:10\n1-5 LeftUpLeg-LeftLeg[-1];\n", 2, "severity -1"),
         ("frames:10\n1-5 LeftUpLeg-LeftLeg[nan];\n", 2, "severity nan"),
-        ("frames:10\n1-5 LeftUpLeg-LeftLeg[];\n", 2, "severity nothing"),
+        ("frames:10\n1-5 LeftUpLeg-LeftLeg[];\n", 2, "severity (empty)"),
         ("frames:10\n\n5-1 LeftUpLeg-LeftLeg[3];\n", 3, "backwards"),
         ("frames:10\n1-5 LeftUpLeg-LeftLeg\n", 2, "does not read as"),
         ("frames:10\nLeftUpLeg-LeftLeg[3];\n", 2, "does not read as"),

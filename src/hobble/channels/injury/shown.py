@@ -1,4 +1,9 @@
-"""How injuries are shown: names of body parts, sliders, colours and presets."""
+"""How injuries are shown: names of body parts, sliders, presets, loops and sweeps.
+
+A link is the piece of the body between two neighbouring joints. Its label is a pair of joints, such as
+"LeftUpLeg-LeftLeg". A role is a name for a joint that is the same in all skeletons, such as "left_knee". A
+loop is a walk for a looping picture. A sweep is a walk in which the severity of one link rises.
+"""
 
 from __future__ import annotations
 
@@ -9,6 +14,7 @@ from hobble.channels.shown import ChannelDisplay, ChannelWords, SampleWalk
 from hobble.core.skeleton import Skeleton
 from hobble.figure.pack import link_ends, regions
 
+# Words on the report page; `ChannelWords` explains them. {} stands for the name of a link.
 WORDS = ChannelWords(
     rest="Healthy",
     step=1,
@@ -19,7 +25,7 @@ WORDS = ChannelWords(
     says="that its {} hurts",
     on="hurt",
 )
-# Parts of the body that have a slider on the page: label, roles of the joints at the two ends.
+# Parts of the body that have a slider on the page: label, roles of the joints at the upper and the lower end.
 PARTS = (
     ("left thigh", "left_hip", "left_knee"),
     ("left shank", "left_knee", "left_heel"),
@@ -31,8 +37,8 @@ PARTS = (
     ("left upper arm", "left_shoulder", "left_elbow"),
     ("right upper arm", "right_shoulder", "right_elbow"),
 )
-# Parts of the body with a name but no slider.
-OTHERS = (
+# Parts of the body with a name but no slider: label and roles as in PARTS.
+OTHER_PARTS = (
     ("left forearm", "left_elbow", "left_wrist"),
     ("right forearm", "right_elbow", "right_wrist"),
     ("upper back", "spine", "chest"),
@@ -43,6 +49,7 @@ OTHERS = (
     ("left shoulder", "chest", "left_shoulder"),
     ("right shoulder", "chest", "right_shoulder"),
 )
+# Name of a preset (a button on the page) -> label of a part -> severity.
 PRESETS = {
     "Hurt knee": {"left thigh": 7, "left shank": 7},
     "Sprained ankle": {"right shank": 6, "right foot": 8},
@@ -50,8 +57,7 @@ PRESETS = {
     "Knee and back": {"left thigh": 7, "left shank": 7, "lower back": 7},
 }
 LOOP_SEVERITY = 8.0  # of the parts that hurt in PLAIN_LOOPS
-# Looping pictures in which the injuries are not coloured: name -> parts that hurt during the whole loop. (In
-# the films of the questionnaire, the injury begins during the film: see `study/films.py`.)
+# Loops in which the hurt parts are not coloured: name -> labels of the parts that hurt during the whole loop.
 PLAIN_LOOPS: dict[str, tuple[str, ...]] = {
     "healthy": (),
     "left-thigh": ("left thigh",),
@@ -67,7 +73,7 @@ PLAIN_LOOPS: dict[str, tuple[str, ...]] = {
     "right-leg": ("right thigh", "right shank", "right foot"),
     "thigh-and-back": ("left thigh", "lower back"),
 }
-# Sweeps (walks in which the severity rises): name -> roles of the joints at the two ends of the hurt part.
+# Name of a sweep -> roles of the joints at the upper and the lower end of the part that hurts.
 SWEPT_PARTS = {
     "left_knee": ("left_hip", "left_knee"),
     "right_knee": ("right_hip", "right_knee"),
@@ -78,22 +84,29 @@ SWEPT_PARTS = {
 
 
 def shown(skeleton: Skeleton, links: Sequence[str], trained: Collection[str]) -> ChannelDisplay:
-    """Sliders and presets of the parts that were hurt in training, and the regions of the body.
+    """What the page shows of the channel: names, sliders, presets and regions of the body.
 
-    links: the names of all links. trained: the names of those that were hurt in training.
+    Only parts that were hurt in training have sliders and presets. links: the labels of all links. trained:
+    the labels of the links that were hurt in training.
     """
+    # Label of a part -> label of its link; then only those that were hurt in training.
     parts = {label: links[i] for label, i in body_parts(skeleton, links, trained).items()}
-    felt = {label: link for label, link in parts.items() if link in trained}
+    trained_parts = {label: link for label, link in parts.items() if link in trained}
     presets = {
-        name: {felt[label]: float(value) for label, value in values.items()}
+        name: {trained_parts[label]: float(value) for label, value in values.items()}
         for name, values in PRESETS.items()
-        if all(label in felt for label in values)
+        if all(label in trained_parts for label in values)
     }
-    return ChannelDisplay(tuple(spoken_links(skeleton, links)), felt, presets, regions(skeleton, links))
+    return ChannelDisplay(
+        tuple(spoken_links(skeleton, links)), trained_parts, presets, regions(skeleton, links)
+    )
 
 
 def loops(skeleton: Skeleton, links: Sequence[str], trained: Collection[str]) -> list[SampleWalk]:
-    """PLAIN_LOOPS, and a loop in colour of each preset. links, trained: as in `shown`."""
+    """The loops of PLAIN_LOOPS, and for each preset a loop in which the hurt parts are coloured.
+
+    links, trained: as in `shown`.
+    """
     parts = {label: links[i] for label, i in body_parts(skeleton, links, trained).items()}
     out = [
         SampleWalk(name, {parts[label]: LOOP_SEVERITY for label in labels}, False)
@@ -106,36 +119,37 @@ def loops(skeleton: Skeleton, links: Sequence[str], trained: Collection[str]) ->
 
 
 def sweeps(skeleton: Skeleton, links: Sequence[str], trained: Collection[str]) -> dict[str, str]:
-    """The links that hurt in the sweeps: name -> link. links, trained: as in `shown`.
+    """Name of each sweep -> label of the link that hurts in it. links, trained: as in `shown`.
 
-    Of the hurt part's links, the uppermost that was hurt in training is taken. If none was, the part's
-    uppermost link is taken.
+    A part may consist of several links. The link of a sweep is the uppermost of them that was hurt in
+    training, or the uppermost of all if none was.
     """
     out = {}
     for name, (upper, lower) in SWEPT_PARTS.items():
-        child, top = skeleton.role(lower), skeleton.role(upper)
-        path = [child]
+        top = skeleton.role(upper)
+        path = [skeleton.role(lower)]  # joints from the lower end of the part to its upper end
         while path[-1] != top and skeleton.parents[path[-1]] >= 0:
             path.append(skeleton.parents[path[-1]])
-        pairs = [f"{skeleton.joints[p]}-{skeleton.joints[c]}" for c, p in pairwise(path)]
+        of_part = [f"{skeleton.joints[p]}-{skeleton.joints[c]}" for c, p in pairwise(path)]
         for candidates in (trained, links):
-            if name not in out and (found := [pair for pair in reversed(pairs) if pair in candidates]):
+            if name not in out and (found := [link for link in reversed(of_part) if link in candidates]):
                 out[name] = found[0]
     return out
 
 
 def body_parts(skeleton: Skeleton, links: Sequence[str], hurt: Collection[str] = ()) -> dict[str, int]:
-    """Label of a part -> index in `links` of the link that stands for it. Parts without a link are left out.
+    """Label of each part in PARTS -> index in `links` of the link that its slider sets.
 
-    hurt: the links that were hurt in training. Of the part's links, the uppermost of these is taken. If there
-    is none, the part's uppermost link is taken, but it has no effect.
+    hurt: the links that were hurt in training. A part may consist of several links. Its slider sets the
+    uppermost of them that is in `hurt`, or the uppermost of all if none is; then the slider has no effect.
+    Parts without a link are left out.
     """
     indices = {}
     for label, upper, lower in PARTS:
         of_part = [name for name in links_between(skeleton, upper, lower) if name in links]
         if of_part:
-            best = next((name for name in of_part if name in hurt), of_part[0])
-            indices[label] = list(links).index(best)
+            chosen = next((name for name in of_part if name in hurt), of_part[0])
+            indices[label] = list(links).index(chosen)
     return indices
 
 
@@ -156,30 +170,31 @@ def links_between(skeleton: Skeleton, upper: str, lower: str) -> list[str]:
     return out[::-1]
 
 
-def spoken(skeleton: Skeleton, link: str) -> str:
-    """The name of a link for readers, such as "left thigh". A link without such a name keeps its label."""
-    for label, upper, lower in (*PARTS, *OTHERS):
+def spoken_link(skeleton: Skeleton, link: str) -> str:
+    """The name of a link for readers, such as "left thigh". A link without a name keeps its label."""
+    for label, upper, lower in (*PARTS, *OTHER_PARTS):
         if link in links_between(skeleton, upper, lower):
             return label
+    # The links below a wrist are the hand, and those below a toe joint the toes.
     ends = link_ends(skeleton.joints, [link])[0]
     for side in ("left", "right"):
         for role, word in (("wrist", "hand"), ("toe", "toes")):
-            if ends and skeleton.roles.get(f"{side}_{role}") in _above(skeleton, ends[0]):
+            if ends and skeleton.roles.get(f"{side}_{role}") in _joint_and_ancestors(skeleton, ends[0]):
                 return f"{side} {word}"
     return link
 
 
 def spoken_links(skeleton: Skeleton, links: Sequence[str]) -> list[str]:
-    """A name for each link. If several links have the same name, their labels are added."""
-    names = [spoken(skeleton, link) for link in links]
+    """The name of each link from `spoken_link`. If links share a name, their labels are added to it."""
+    names = [spoken_link(skeleton, link) for link in links]
     return [
         name if names.count(name) == 1 or name == link else f"{name} ({link})"
         for name, link in zip(names, links, strict=True)
     ]
 
 
-def _above(skeleton: Skeleton, joint: int) -> list[str]:
-    """Names of the joint and of all above it."""
+def _joint_and_ancestors(skeleton: Skeleton, joint: int) -> list[str]:
+    """Names of a joint and of all joints from it up to the root. joint: its index."""
     names = [skeleton.joints[joint]]
     while skeleton.parents[joint] >= 0:
         joint = skeleton.parents[joint]

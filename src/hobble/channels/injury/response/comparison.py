@@ -10,14 +10,17 @@ from hobble.evaluation.configuration_results import ConfigurationResults
 from hobble.measures.inputs import Json
 
 NAME = "injury"  # the measurement
-KEPT = ("applies", "reason", "summary")  # keys of injury.json that are compared
+COMPARED_KEYS = ("applies", "reason", "summary")  # of injury.json
 
 
 def compared(all_measured: Sequence[ConfigurationResults], published: Json) -> SideBySide:
-    """For each configuration: whether its character can be hurt, and the means over its links."""
+    """Whether the character of each configuration can be hurt, and means over the links hurt in training.
+
+    published: not used; every module `comparison` has a function with these arguments.
+    """
     return SideBySide(entries=[_entry(m) for m in all_measured])
 
 
 def _entry(measured: ConfigurationResults) -> dict[str, Any]:
     found = measured.found(NAME)
-    return {"configuration": measured.name, **{key: found[key] for key in KEPT if key in found}}
+    return {"configuration": measured.name, **{key: found[key] for key in COMPARED_KEYS if key in found}}

@@ -1,4 +1,8 @@
-"""Shows the response to injury of several configurations side by side, in one table."""
+"""Shows the response to injury of several configurations side by side, in one table.
+
+A configuration names the data and the settings of one character. A link is the piece of the body between two
+neighbouring joints.
+"""
 
 from __future__ import annotations
 
@@ -9,13 +13,14 @@ from hobble.report.page_parts import PageSection, Paragraph, SectionPart
 from hobble.report.tables import Column, Table
 
 INTRODUCTION = (
-    "The character walks or jogs while one link is hurt, from severity 0 to 10 and back. Each value is the "
-    "mean over the links that were hurt in training. ρ is Spearman's rank correlation: 1 means that the "
-    "measure always rises with severity, −1 that it always falls, 0 that it does neither."
+    "The character walks or jogs while the severity of one link (the piece of the body between two "
+    "neighbouring joints) rises from 0 to 10 and falls again. Each value is a mean over the links that were "
+    "hurt in training, except the share that a classifier recognises. ρ is Spearman's rank correlation: "
+    "1 means that the measure always rises with severity, −1 that it always falls, 0 that it has no trend."
 )
-# Key of a summary in injury.json -> words for it.
-WORDS = {
-    "from_healthy_cm": "distance from the healthy pose at severity 10, cm per joint",
+# Key of a summary in injury.json -> label of its row.
+ROW_LABELS = {
+    "from_healthy_cm": "distance from the healthy walk at severity 10, cm per joint",
     "speed_share": "share of the healthy speed at severity 10",
     "spearman_from_healthy": "ρ of pose and severity",
     "spearman_speed": "ρ of speed and severity",
@@ -24,42 +29,51 @@ WORDS = {
     "heal_seconds": "time to heal, s",
     "after_healing_cm": "remaining distance after healing, cm per joint",
     "hysteresis_cm": "difference between rising and falling severity, cm per joint",
-    "acceleration_share": "largest acceleration, share of the healthy walk's",
-    "clip_acceleration_share": "largest acceleration, share of the captured clips'",
+    "acceleration_share": "largest acceleration, divided by the healthy walk's",
+    "clip_acceleration_share": "largest acceleration, divided by the captured clips'",
 }
 
 
 def section(compared: Compared) -> PageSection:
-    """A table of means, if the character of any configuration can be hurt. compared: from compare.json."""
+    """A table of means. It is empty if no configuration has a character that can be hurt.
+
+    compared: the content of compare.json.
+    """
     table = injury_table(compared)
-    words = Paragraph(INTRODUCTION) if table else None
-    parts = [SectionPart(0, words), SectionPart(10, table, open=True, short=True)]
+    introduction = Paragraph(INTRODUCTION) if table else None
+    parts = [SectionPart(0, introduction), SectionPart(10, table, open=True, short=True)]
     return PageSection("injury", parts, title="Injury response", at=20)
 
 
 def injury_table(compared: Compared) -> Table | None:
-    """A row for each measure, and a column for each gait of each configuration with injuries."""
-    rows = [
+    """A row for each measure, and a column for each gait of each configuration with injuries.
+
+    None if no configuration has injuries. compared: the content of compare.json.
+    """
+    # One item for each column of numbers: configuration, gait, and the summary from injury.json.
+    summaries = [
         (entry["configuration"], gait, summary)
         for entry in compared["injury"]
         if entry.get("applies")
         for gait, summary in (entry.get("summary") or {}).items()
     ]
-    if not rows:
+    if not summaries:
         return None
-    found = {key for *_, summary in rows for key in summary}
-    keys = [*(key for key in WORDS if key in found), *sorted(found - set(WORDS))]
-    columns = [Column("measure"), *(Column.number(f"{name}, {gait}") for name, gait, _ in rows)]
-    table: list[list[Any]] = [
-        [WORDS.get(key, key.replace("_", " ")), *(summary.get(key) for *_, summary in rows)] for key in keys
+    found = {key for *_, summary in summaries for key in summary}
+    keys = [*(key for key in ROW_LABELS if key in found), *sorted(found - set(ROW_LABELS))]
+    columns = [Column("measure"), *(Column.number(f"{name}, {gait}") for name, gait, _ in summaries)]
+    rows: list[list[Any]] = [
+        [ROW_LABELS.get(key, key.replace("_", " ")), *(summary.get(key) for *_, summary in summaries)]
+        for key in keys
     ]
-    shares = {
+    # The measurement `recognition` gives one share for each configuration. It is from walks, not from jogs.
+    recognised = {
         e["configuration"]: e["generated"]["right"] for e in compared["recognition"] if e.get("applies")
     }
-    if shares:
+    if recognised:
         row = [
-            "share of hurt parts that a classifier recognises",
-            *(shares.get(name) for name, *_ in rows),
+            "share of walks of 1 s in which a classifier recognises what hurts",
+            *(recognised.get(name) for name, *_ in summaries),
         ]
-        table.append(row)
-    return Table("compare-injury", columns, table, "Means over the links that were hurt in training")
+        rows.append(row)
+    return Table("compare-injury", columns, rows, "Means over the links that were hurt in training")

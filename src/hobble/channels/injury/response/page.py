@@ -1,4 +1,8 @@
-"""Shows how the gait responds to injury, link by link."""
+"""Shows how the gait responds to injury, link by link.
+
+A link is the piece of the body between two neighbouring joints. Its label in files is a pair of joints, such
+as "LeftUpLeg-LeftLeg". Readers of the page see a name such as "left thigh".
+"""
 
 from __future__ import annotations
 
@@ -15,14 +19,14 @@ from hobble.report.page_parts import ChartPair, PageSection, SectionPart
 from hobble.report.summary import Hint, placed
 from hobble.report.tables import Column, Table
 
-LINKS = ("link", "first", "second")  # keys of injury.json whose values are links
+LINK_KEYS = ("link", "first", "second")  # keys of injury.json whose values are labels of links
 UNTRAINED = "never hurt in training"
 GAIT_COLOURS = {"walk": "@accent", "jog": "@g2"}
 # The marker of links that were never hurt in training.
 HOLLOW = {"symbol": "circle-open", "size": 8, "line": {"width": 1.2}}
 SIDES = (("left", "@accent"), ("right", "@g2"))  # side of the body, colour
-# A small chart: name, title, unit, lines as (column, label, colour), least range of the axis, whether the
-# axis starts at 0.
+# A small chart: its name, title and unit; its lines as (key of a row of injury.json, label, colour); the
+# least length of the vertical axis; whether this axis starts at 0.
 Panel = tuple[str, str, str, tuple[tuple[str, str, str], ...], float, bool]
 PANELS: tuple[Panel, ...] = (
     (
@@ -59,37 +63,45 @@ PANELS: tuple[Panel, ...] = (
 
 
 def section(found: Json, material: ReportMaterial) -> PageSection:
-    """The charts and tables of injury.json, which is `found`. Empty for a network without severities."""
+    """The charts and tables of the response to injury. Empty for a network without severities.
+
+    found: the content of injury.json. material: what the report is made from.
+    """
     parts = _parts(in_words(found, material), material.name) if found.get("applies") else []
     return PageSection("injury", parts, title="Injury response", at=20)
 
 
 def hints(found: Json, material: ReportMaterial) -> Iterator[Hint]:
-    """Sentences about the response."""
+    """Sentences about the response, for the top of the report. found, material: as for `section`."""
     return placed(50, injury_hints(in_words(found, material)))
 
 
 def in_words(found: Json, material: ReportMaterial) -> dict[str, Any]:
-    """The results with names for readers in place of the labels of links."""
+    """`found` with names such as "left thigh" in place of the labels of links.
+
+    found: the JSON of a measurement, such as injury.json.
+    """
     shown_name = shown_names(material.network["skeleton"])
 
-    def named(value: Any, key: str = "") -> Any:
+    def renamed(value: Any, key: str = "") -> Any:
+        """`value` with its links renamed. key: the key under which it stands, "" for an item of a list."""
         if isinstance(value, Mapping):
-            return {k: named(v, k) for k, v in value.items()}
+            return {k: renamed(v, k) for k, v in value.items()}
         if isinstance(value, list | tuple):
-            return [named(item) for item in value]
-        return shown_name(value) if key in LINKS and isinstance(value, str) else value
+            return [renamed(item) for item in value]
+        return shown_name(value) if key in LINK_KEYS and isinstance(value, str) else value
 
-    return {key: named(value) for key, value in found.items()}
+    return {key: renamed(value) for key, value in found.items()}
 
 
 def _parts(found: Json, name: str) -> list[SectionPart]:
+    """The parts of the section. found: injury.json, with links renamed. name: of the configuration."""
     rows, responses, second = (found.get(key) or [] for key in ("rows", "responses", "second"))
     untrained = {r["link"] for r in responses if not r.get("trained", True)}
     return [
-        SectionPart(0, ChartPair(overview(responses))),
+        SectionPart(0, ChartPair(effect_charts(responses))),
         SectionPart(10, response_table(name, responses)),
-        SectionPart(20, curves(rows, found.get("falling") or (), untrained) if rows else None),
+        SectionPart(20, sweep_charts(rows, found.get("falling") or (), untrained) if rows else None),
         SectionPart(40, cases.second_chart(second)),
         SectionPart(50, cases.second_table(name, second)),
         SectionPart(
@@ -105,66 +117,67 @@ def _parts(found: Json, name: str) -> list[SectionPart]:
     ]
 
 
-def curves(
+def sweep_charts(
     rows: Sequence[Mapping[str, Any]],
     falling: Sequence[Mapping[str, Any]] = (),
     untrained: Collection[str] = (),
 ) -> ChartGroup:
     """A small chart of each measure over severity, for a chosen gait and link.
 
-    rows, falling: injury.json's rows of rising and of falling severity; lines of falling severity are dotted.
-    untrained: links never hurt in training, which come last and are marked.
+    rows, falling: the rows of injury.json with rising and with falling severity. Lines of falling severity
+    are dotted. untrained: links that were never hurt in training. They come last in the menu, with a remark.
     """
 
-    def label_of(row: Mapping[str, Any]) -> str:
-        never = f" ({UNTRAINED})" if row["link"] in untrained else ""
-        return f"{row['link']}, {row['gait']}{never}"
+    def menu_option(row: Mapping[str, Any]) -> str:
+        remark = f" ({UNTRAINED})" if row["link"] in untrained else ""
+        return f"{row['link']}, {row['gait']}{remark}"
 
-    sweeps: dict[str, list[Mapping[str, Any]]] = {}
+    # Option of the menu -> its rows of rising and of falling severity.
+    rising_rows: dict[str, list[Mapping[str, Any]]] = {}
     for row in sorted(rows, key=lambda row: row["link"] in untrained):
-        sweeps.setdefault(label_of(row), []).append(row)
-    healing: dict[str, list[Mapping[str, Any]]] = {}
+        rising_rows.setdefault(menu_option(row), []).append(row)
+    falling_rows: dict[str, list[Mapping[str, Any]]] = {}
     for row in falling:
-        healing.setdefault(label_of(row), []).append(row)
-    charts = [_panel(panel, rows, sweeps, healing) for panel in PANELS]
+        falling_rows.setdefault(menu_option(row), []).append(row)
+    charts = [_panel_chart(panel, rows, rising_rows, falling_rows) for panel in PANELS]
     caption = (
         "The character moves on while the severity of one link rises from 0 to 10 and falls again. Each "
         "point is measured over whole gait cycles at one severity. A smooth curve means that the walk "
-        "changes gradually. A gap between left and right is a limp. A jump between neighbours means that "
-        "the network switches between two gaits. Pose distances are distances from the healthy walk at the "
-        "same phase, means over joints."
+        "changes gradually. A gap between left and right is a limp. A jump between neighbouring points means "
+        "that the network switches between two gaits. The first chart shows how far the pose is from the "
+        "healthy walk and from the walk at severity 10: the mean distance of the joints at the same phase."
     )
     if falling:
-        caption += " Dotted lines: falling severity."
+        caption += " Dotted lines show falling severity."
     if untrained:
         caption += " Links that were never hurt in training show how much a healthy walk varies."
     return ChartGroup("sweeps", "One link at rising severity", caption, charts, "Link and gait")
 
 
-def _panel(
+def _panel_chart(
     panel: Panel,
     rows: Sequence[Mapping[str, Any]],
-    sweeps: Mapping[str, Sequence[Mapping[str, Any]]],
-    healing: Mapping[str, Sequence[Mapping[str, Any]]],
+    rising_rows: Mapping[str, Sequence[Mapping[str, Any]]],
+    falling_rows: Mapping[str, Sequence[Mapping[str, Any]]],
 ) -> Chart:
     """The small chart of an entry of PANELS.
 
-    sweeps, healing: option of the menu -> its rows of rising and of falling severity. rows: those of all
-    options, for the range of the axis.
+    rows: the rows of all options of the menu, for the range of the axis. rising_rows, falling_rows: option of
+    the menu -> its rows of rising and of falling severity.
     """
     name, title, unit, lines, least_range, from_zero = panel
     options: dict[str, list[Trace]] = {}
-    for sweep, some in sweeps.items():
-        x = [row["severity"] for row in some]
-        options[sweep] = [
-            line(label, x, [row.get(column) for row in some], colour, mode="lines+markers")
+    for option, rising in rising_rows.items():
+        x = [row["severity"] for row in rising]
+        options[option] = [
+            line(label, x, [row.get(key) for row in rising], colour, mode="lines+markers")
             | {"marker": {"size": 5}}
-            for column, label, colour in lines
+            for key, label, colour in lines
         ]
-        falling = healing.get(sweep, ())
-        for column, label, colour in lines if falling else ():
-            x, y = [row["severity"] for row in falling], [row.get(column) for row in falling]
-            options[sweep].append(
+        falling = falling_rows.get(option, ())
+        for key, label, colour in lines if falling else ():
+            x, y = [row["severity"] for row in falling], [row.get(key) for row in falling]
+            options[option].append(
                 line(f"{label}, healing", x, y, colour, width=1.3, dash="dot", showlegend=False)
             )
     layout = {
@@ -172,10 +185,10 @@ def _panel(
         "yaxis": axis(unit),
         "showlegend": len(lines) > 1,
     }
-    columns = [column for column, *_ in lines]
+    keys = [key for key, *_ in lines]
     ranges = {
-        sweep: {"yaxis": {"range": y_range(rows, some[0]["gait"], columns, least_range, from_zero)}}
-        for sweep, some in sweeps.items()
+        option: {"yaxis": {"range": y_range(rows, rising[0]["gait"], keys, least_range, from_zero)}}
+        for option, rising in rising_rows.items()
     }
     return Chart(
         f"sweep-{name}", title, "", layout=layout, height=230, options=options, option_layouts=ranges
@@ -183,26 +196,31 @@ def _panel(
 
 
 def y_range(
-    rows: Sequence[Mapping[str, Any]], gait: str, columns: Sequence[str], least_range: float, from_zero: bool
+    rows: Sequence[Mapping[str, Any]], gait: str, keys: Sequence[str], least_range: float, from_zero: bool
 ) -> list[float] | None:
-    """The range of the vertical axis, the same for all links of a gait, so that they can be compared.
+    """[lowest, highest] value of the vertical axis. It is the same for all links of a gait, to compare them.
 
-    columns: those that the chart shows. least_range: the range is at least this long, so that noise looks
-    small. from_zero: whether the axis starts at 0. None if no row has a value.
+    keys: keys of a row whose values the chart shows. least_range: the axis is at least this long, so that
+    noise looks small. from_zero: whether the axis starts at 0. None if no row has a value.
     """
-    found = [row[c] for row in rows if row["gait"] == gait for c in columns if row.get(c) is not None]
-    if not found:
+    values = [row[k] for row in rows if row["gait"] == gait for k in keys if row.get(k) is not None]
+    if not values:
         return None
-    low, high = (0.0 if from_zero else min(found)), max(found)
+    low, high = (0.0 if from_zero else min(values)), max(values)
+    # The empty space: 8 % of the range of the values, or more to reach `least_range`. An axis from 0 has all
+    # of it at the top; another axis has one half at each end.
     spare = max(least_range - (high - low), 0.08 * (high - low))
     return [low if from_zero else low - spare / 2, high + spare / (1 if from_zero else 2)]
 
 
-def overview(responses: Sequence[Mapping[str, Any]]) -> list[Chart]:
-    """Effect of severity 10 on pose and speed, for each link."""
+def effect_charts(responses: Sequence[Mapping[str, Any]]) -> list[Chart]:
+    """Two charts of each link at severity 10: the change of the pose, and the remaining speed.
+
+    responses: those of injury.json.
+    """
     charts = []
-    untrained = any(not r.get("trained", True) for r in responses)
-    for name, key, title, label, least_range, caption, on_hollow in (
+    has_untrained = any(not r.get("trained", True) for r in responses)
+    for name, key, title, axis_title, least_range, caption, on_hollow_dots in (
         (
             "injury-pose",
             "from_healthy_cm",
@@ -210,8 +228,8 @@ def overview(responses: Sequence[Mapping[str, Any]]) -> list[Chart]:
             "cm per joint at severity 10",
             2.0,
             "Distance from the healthy walk at the same phase, mean over joints.",
-            "They have no effect, so they show how much healthy walks differ. A filled dot as far left as "
-            "the hollow ones means that this link has no effect either.",
+            "They have no effect, so they show how much healthy walks differ. If a filled dot is not to the "
+            "right of the hollow dots, its link has no effect either.",
         ),
         (
             "injury-speed",
@@ -223,43 +241,44 @@ def overview(responses: Sequence[Mapping[str, Any]]) -> list[Chart]:
             "",
         ),
     ):
-        if untrained:
-            caption = f"{caption} Hollow dots are links that were never hurt in training. {on_hollow}".strip()
+        if has_untrained:
+            hollow_dots = "Hollow dots are links that were never hurt in training."
+            caption = f"{caption} {hollow_dots} {on_hollow_dots}".strip()
         traces: list[Trace] = []
         for gait, colour in GAIT_COLOURS.items():
             for hurt in (True, False):
-                some = [
+                dots = [
                     r
                     for r in responses[::-1]
                     if r["gait"] == gait and r.get("trained", True) is hurt and r.get(key) is not None
                 ]
-                if some:
+                if dots:
                     marker = {"color": colour, "size": 9} if hurt else HOLLOW | {"color": colour}
                     traces.append(
                         {
                             "type": "scatter",
                             "mode": "markers",
                             "name": gait if hurt else f"{gait}, {UNTRAINED}",
-                            "y": [r["link"] for r in some],
-                            "x": [r[key] for r in some],
+                            "y": [r["link"] for r in dots],
+                            "x": [r[key] for r in dots],
                             "marker": marker,
                             "hovertemplate": "%{y}: %{x:.2f}<extra>%{fullData.name}</extra>",
                         }
                     )
-        # Links that were hurt in training are at the top. Plotly counts from below.
-        downwards = sorted(responses, key=lambda r: not r.get("trained", True))
-        links = list(dict.fromkeys(r["link"] for r in downwards))[::-1]
+        # Links that were hurt in training are at the top. Plotly counts from below, so the list is reversed.
+        from_top = sorted(responses, key=lambda r: not r.get("trained", True))
+        links = list(dict.fromkeys(r["link"] for r in from_top))[::-1]
         furthest = max((r[key] for r in responses if r.get(key) is not None), default=0.0)
-        across = axis(label, range=[0, 1.08 * max(least_range, furthest)])
-        rows = {"categoryorder": "array", "categoryarray": links, "automargin": True, "type": "category"}
+        x_axis = axis(axis_title, range=[0, 1.08 * max(least_range, furthest)])
+        y_axis = {"categoryorder": "array", "categoryarray": links, "automargin": True, "type": "category"}
         if traces:
-            layout = {"xaxis": across, "yaxis": rows}
+            layout = {"xaxis": x_axis, "yaxis": y_axis}
             charts.append(Chart(name, title, caption, traces, layout, 150 + 21 * len(links)))
     return charts
 
 
 def response_table(name: str, responses: Sequence[Mapping[str, Any]]) -> Table:
-    """A row for each gait and link."""
+    """A row for each gait and link. name: of the configuration. responses: those of injury.json."""
     columns = [
         Column("gait"),
         Column("link"),
@@ -270,7 +289,7 @@ def response_table(name: str, responses: Sequence[Mapping[str, Any]]) -> Table:
         Column.number("time to heal, s"),
         Column.number("change left after healing, cm"),
         Column.number("difference between rising and falling severity, cm"),
-        Column.number("largest acceleration, times healthy"),
+        Column.number("largest acceleration, divided by the healthy walk's"),
         Column.number("ρ of pose"),
         Column.number("ρ of speed"),
     ]
@@ -296,11 +315,14 @@ def response_table(name: str, responses: Sequence[Mapping[str, Any]]) -> Table:
 
 
 def sweep_table(name: str, rows: Sequence[Mapping[str, Any]]) -> Table | None:
-    """All walks of the sweep at rising severity, as in injury/sweep.csv."""
+    """The rows of injury/sweep.csv with rising severity. None if there are none.
+
+    name: of the configuration. rows: those of injury.json.
+    """
     if not rows:
         return None
     keys = list(rows[0])
     words = {key: key.replace("_", " ") for key in keys} | {"from_worst": "from severity 10"}
     columns = [Column(k) if isinstance(rows[0][k], str) else Column.number(words[k]) for k in keys]
     table = [[row.get(k) for k in keys] for row in rows]
-    return Table(f"{name}-injury", columns, table, "Every walk and jog measured, at each severity")
+    return Table(f"{name}-injury", columns, table, "Every walk and jog at rising severity")

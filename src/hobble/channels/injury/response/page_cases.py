@@ -1,4 +1,8 @@
-"""More charts of the response to injury: a second injury, a jog after a hurt walk, divided severities."""
+"""More charts of the response to injury: a second injury, a jog after a hurt walk, divided severities.
+
+A link is the piece of the body between two neighbouring joints. `hobble.channels.injury.response.cases`
+measures what is shown here.
+"""
 
 from __future__ import annotations
 
@@ -13,47 +17,55 @@ COLOURS = ("@accent", "@g2", "@g3", "@g4", "@g5", "@g0")
 
 
 def second_chart(rows: Sequence[Mapping[str, Any]]) -> Chart | None:
-    """The effect of a second injury in addition to a first, for every pair of injury.json's `second`."""
+    """The effect of a second injury in addition to a first one, with a cell for each pair of links.
+
+    rows: `second` of injury.json. None if it is empty.
+    """
     if not rows:
         return None
-    firsts, seconds = (list(dict.fromkeys(row[key] for row in rows)) for key in ("first", "second"))
+    first_links, second_links = (list(dict.fromkeys(row[key] for row in rows)) for key in ("first", "second"))
     by_pair = {(row["first"], row["second"]): row for row in rows}
-    shown = {"centimetres per joint": ("from_first_cm", ".1f"), "share of its effect alone": ("share", ".0%")}
+    # Option of the menu -> key of a row, and format of its value.
+    units = {
+        "centimetres per joint": ("from_first_cm", ".1f"),
+        "share of its effect on a healthy body": ("share", ".0%"),
+    }
     options: dict[str, list[Trace]] = {}
-    for label, (key, form) in shown.items():
-        options[label] = [
+    for unit, (key, number_format) in units.items():
+        options[unit] = [
             {
                 "type": "heatmap",
-                "x": seconds,
-                "y": firsts,
-                "z": [[by_pair.get((a, b), {}).get(key) for b in seconds] for a in firsts],
+                "x": second_links,
+                "y": first_links,
+                "z": [[by_pair.get((a, b), {}).get(key) for b in second_links] for a in first_links],
                 "colorscale": [[0, "@sunken"], [1, "@accent"]],
                 "zmin": 0,
                 "xgap": 2,
                 "ygap": 2,
-                "texttemplate": f"%{{z:{form}}}",
+                "texttemplate": f"%{{z:{number_format}}}",
                 "showscale": False,
-                "hovertemplate": f"%{{x}} over %{{y}}: %{{z:{form}}}<extra></extra>",
+                "hovertemplate": f"%{{x}} in addition to %{{y}}: %{{z:{number_format}}}<extra></extra>",
             }
         ]
     return Chart(
         "second-injury",
         "A second injury in addition to a first",
-        "Rows: the first injury, at severity 7, one link of each part of the body. Columns: the second, at "
-        "10. The cell says how much the second changes the walk, in centimetres or as a share of its effect "
-        "on a healthy body. A pale cell means that the first injury hides the second.",
+        "Each row is a first injury, at severity 7, in one link of each part of the body. Each column is "
+        "a second injury, at severity 10. The cell says how much the second injury changes the walk, in "
+        "centimetres or as a share of its effect on a healthy body. A pale cell means that the second injury "
+        "hardly shows.",
         layout={
             "xaxis": {"type": "category", "tickangle": -50, "automargin": True},
             "yaxis": {"type": "category", "autorange": "reversed", "automargin": True},
         },
-        height=max(300, 190 + 24 * len(firsts)),
+        height=max(300, 190 + 24 * len(first_links)),
         choose="Unit",
         options=options,
     )
 
 
 def second_table(name: str, rows: Sequence[Mapping[str, Any]]) -> Table | None:
-    """Every walk with two injuries, as in injury/second.csv."""
+    """Every walk with two injuries, as in injury/second.csv. name: of the configuration."""
     if not rows:
         return None
     keys = [key for key, value in rows[0].items() if not isinstance(value, (dict, list))]
@@ -66,21 +78,24 @@ def second_table(name: str, rows: Sequence[Mapping[str, Any]]) -> Table | None:
 
 
 def divided_chart(rows: Sequence[Mapping[str, Any]]) -> Chart | None:
-    """How far the walk with a chosen link hurt is from the healthy walk, with a line for each divisor."""
+    """How far the walk with one link hurt is from the healthy walk, with a line for each divisor.
+
+    A menu selects the link. rows: `divided` of injury.json. None if it is empty.
+    """
     options: dict[str, list[Trace]] = {}
     scales = sorted({row["scale"] for row in rows})
     for link in dict.fromkeys(row["link"] for row in rows):
         traces = []
         for scale, colour in zip(scales, COLOURS, strict=False):
-            some = [row for row in rows if row["link"] == link and row["scale"] == scale]
-            x, y = [row["severity"] for row in some], [row["from_healthy_cm"] for row in some]
+            of_line = [row for row in rows if row["link"] == link and row["scale"] == scale]
+            x, y = [row["severity"] for row in of_line], [row["from_healthy_cm"] for row in of_line]
             traces.append(line(f"divided by {scale:g}", x, y, colour, mode="lines+markers"))
         options[link] = traces
     if not options:
         return None
     return Chart(
         "divided",
-        "Weaker inputs",
+        "Divided severities",
         "This shows how much of the effect remains if the severities are divided before the network gets "
         "them. Each line belongs to one divisor. Its height is the distance of the pose from the "
         "healthy walk.",
@@ -91,16 +106,20 @@ def divided_chart(rows: Sequence[Mapping[str, Any]]) -> Chart | None:
 
 
 def jog_chart(rows: Sequence[Mapping[str, Any]], untrained: Collection[str] = ()) -> Chart | None:
-    """How much of an injury remains when a walk becomes a jog. All `untrained` links share one line."""
+    """How much of an injury shows in a jog after a hurt walk, with a line for each link.
+
+    rows: `into_a_jog` of injury.json. untrained: links that were never hurt in training. They share one line.
+    None if there is nothing to show.
+    """
     links = [link for link in dict.fromkeys(row["link"] for row in rows) if link is not None]
     hurt = [link for link in links if link not in untrained]
     traces: list[Trace] = []
     for i, link in enumerate(hurt):
-        some = [row for row in rows if row["link"] == link]
-        x, y = [row["severity"] for row in some], [row.get("jog_from_healthy_cm") for row in some]
+        of_link = [row for row in rows if row["link"] == link]
+        x, y = [row["severity"] for row in of_link], [row.get("jog_from_healthy_cm") for row in of_link]
         dash = "solid" if i < len(COLOURS) else "dash"
         traces.append(line(link, x, y, COLOURS[i % len(COLOURS)], dash=dash, mode="lines+markers", width=1.4))
-    untrained_jogs: dict[float, list[float]] = {}
+    untrained_jogs: dict[float, list[float]] = {}  # severity -> distance of each link's jog, cm
     for row in rows:
         if row["link"] in untrained and row.get("jog_from_healthy_cm") is not None:
             untrained_jogs.setdefault(row["severity"], []).append(row["jog_from_healthy_cm"])

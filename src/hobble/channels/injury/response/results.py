@@ -1,22 +1,28 @@
-"""The types of injury.json."""
+"""The types of injury.json, the result of the measurement of the response to injury.
+
+A link is the piece of the body between two neighbouring joints. The distance between two walks is the mean
+distance of their joints at the same phase, in cm.
+"""
 
 from __future__ import annotations
 
 from typing import NotRequired, TypedDict
 
-Number = float | None  # None if it cannot be measured
+Number = float | None  # None if the value cannot be measured
 
 
 class SweepRow(TypedDict):
-    """The walk at one severity of one link: measures of the gait, and distances of the pose, cm.
+    """The walk at one severity of one link.
 
-    The measures are those of `hobble.evaluation.motion_measures.gait_measures`: speed in cm/s, stance as a
-    share of the frames, steps and height of the hips in cm, ranges of knee and arm and lean of the trunk in
-    degrees.
+    gait: "walk" or "jog". direction: "rising" or "falling" severity.
 
-    direction: "rising" or "falling" severity. from_healthy: distance from the healthy walk. from_worst: from
-    the walk at severity 10. from_rising: from the walk at the same severity while the severity rose.
-    largest_acceleration: of any joint, cm per frame squared.
+    Measures from `hobble.evaluation.motion_measures.gait_measures`: speed in cm/s; stance as a share of the
+    frames; steps and hip_height in cm; knee and arm, how far each bends or swings, in degrees; lean of the
+    trunk in degrees. An asymmetry is left minus right, divided by their mean.
+
+    from_healthy: distance from the healthy walk. from_worst: distance from the walk at severity 10.
+    from_rising: distance from the walk at the same severity while the severity rose. largest_acceleration: of
+    any joint, cm per frame squared.
     """
 
     gait: str
@@ -64,9 +70,10 @@ class Response(TypedDict):
 class LinkResponse(Response):
     """The response of one link in one gait.
 
-    trained: whether the link was hurt in training. clip_acceleration: largest acceleration of a joint in
-    captured motion, cm per frame squared. clip_acceleration_of: "link" if it is from motion in which the
-    link hurts, "gait" if it is from all motion in that gait. clip_acceleration_share: the character's largest
+    trained: whether the link was hurt in training. clip_acceleration: largest acceleration of any joint in
+    captured motion, cm per frame squared; None if there is no such motion. clip_acceleration_of: the motion
+    that `clip_acceleration` comes from: "link" for motion in this gait in which this link hurts, "gait" for
+    all motion in this gait, because this link hurts in none. clip_acceleration_share: the character's largest
     acceleration, divided by `clip_acceleration`.
     """
 
@@ -81,8 +88,8 @@ class LinkResponse(Response):
 class Summary(TypedDict):
     """Means over the responses of several links in one gait. For the fields see `LinkResponse`.
 
-    spearman_<measure>, spearman_falling_<measure>: means of `spearman` and `spearman_falling` for this
-    measure.
+    spearman_<measure>: mean of `spearman[<measure>]`. spearman_falling_<measure>: mean of
+    `spearman_falling[<measure>]`.
     """
 
     spearman_from_healthy: Number
@@ -113,7 +120,7 @@ class SecondInjury(TypedDict):
 
 
 class IntoAJog(TypedDict):
-    """The change from walking to jogging. Speeds in cm/s.
+    """A change from walking to jogging with one link hurt, or with none.
 
     For the fields see `into_a_jog` in `hobble.channels.injury.response.cases`.
     """
@@ -130,10 +137,9 @@ class IntoAJog(TypedDict):
 
 
 class Divided(TypedDict):
-    """The walk with one link hurt, if its `severity` is divided by `scale`.
+    """The walk with one link hurt, if the runtime divides `severity` by `scale`.
 
-    from_healthy_cm: distance of the pose from the healthy walk. speed_share: speed, divided by the healthy
-    speed.
+    from_healthy_cm: distance from the healthy walk. speed_share: speed, divided by the healthy speed.
     """
 
     scale: float
@@ -144,7 +150,7 @@ class Divided(TypedDict):
 
 
 class InjuryResponse(TypedDict):
-    """injury.json. If `applies` is false, it has only the first two keys and `reason`.
+    """The content of injury.json. If `applies` is false, it has only `configuration`, `applies` and `reason`.
 
     For the fields see `hobble.channels.injury.response.run.injury_response`.
     """

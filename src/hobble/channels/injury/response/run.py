@@ -1,6 +1,6 @@
-"""Measures the response to injury: every link from healthy to severity 10 and back, in two gaits.
+"""Measures how a walk and a jog change while the severity of one link rises from 0 to 10 and falls again.
 
-A link is the piece of the body between two neighbouring joints.
+A link is the piece of the body between two neighbouring joints. Each link is measured.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ from hobble.models.network import Network
 from hobble.runtime.options import Runtime
 
 INJURY = "injury"  # name of the channel
-GAITS = tuple(SPEEDS)  # walk and jog
+GAITS = tuple(SPEEDS)  # "walk" and "jog"
 NO_SEVERITIES = "this network has no severity inputs"
 
 
@@ -40,14 +40,15 @@ def injury_response(
 ) -> InjuryResponse:
     """The content of injury.json, whose types are in `hobble.channels.injury.response.results`.
 
-    motion: the captured clips; their largest accelerations are compared with the character's. seconds: time
-    at each severity. links: the links to hurt, by default all.
+    motion: the captured clips; their largest accelerations are compared with the character's. configuration:
+    its name. seconds: time at each severity. links: the links to hurt, by default all.
 
-    Keys of the result. applies: false for a network without severities. trained: the links that were hurt
-    in training. rows: one for each gait, link and rising severity. falling: one for each gait, link and
-    falling severity. responses: one for each gait and link. second, into_a_jog, divided: see the functions
-    in `hobble.channels.injury.response.cases`. summary: means over the trained links. summary_untrained:
-    means over the other links.
+    Keys of the result. applies: false for a network without severities; `reason` says so. mode: how the
+    network's weights follow from the phase. trained: those of `links` that were hurt in training; all of them
+    if the network was trained on healthy clips only. rows: one for each gait, link and rising severity.
+    falling: one for each gait, link and falling severity. responses: one for each gait and link. second,
+    into_a_jog, divided: see the functions in `hobble.channels.injury.response.cases`. summary: means over the
+    links in `trained`. summary_untrained: means over the other links.
     """
     if not links_of(network):
         return {"configuration": configuration, "applies": False, "reason": NO_SEVERITIES}
@@ -82,7 +83,7 @@ def _sweeps(
     runtime: Runtime,
 ) -> tuple[list[SweepRow], list[SweepRow], list[LinkResponse]]:
     """`rows`, `falling` and `responses` of `injury_response`."""
-    largest = largest_accelerations(motion, network)
+    captured_largest = largest_accelerations(motion, network)
     rows: list[SweepRow] = []
     falling: list[SweepRow] = []
     responses: list[LinkResponse] = []
@@ -93,7 +94,8 @@ def _sweeps(
             rows += figure_rows[: len(SEVERITIES)]
             falling += figure_rows[len(SEVERITIES) :]
             response = sweep.response(figure, figure_rows)
-            captured = largest.get((gait, link), largest.get((gait, None)))
+            # If this link hurts in no captured motion, all captured motion in this gait is compared.
+            captured = captured_largest.get((gait, link), captured_largest.get((gait, None)))
             share = round(response["largest_acceleration"] / captured, 5) if captured else None
             responses.append(
                 {
@@ -103,7 +105,7 @@ def _sweeps(
                     **response,
                     "clip_acceleration": captured,
                     "clip_acceleration_of": (
-                        "link" if (gait, link) in largest else "gait" if captured else None
+                        "link" if (gait, link) in captured_largest else "gait" if captured else None
                     ),
                     "clip_acceleration_share": share,
                 }
@@ -114,21 +116,22 @@ def _sweeps(
 def largest_accelerations(
     motion: Iterable[Captured], network: Network
 ) -> dict[tuple[str, str | None], float]:
-    """(gait, link) -> largest acceleration of a joint, cm per frame squared, in captured motion.
+    """(gait, link) -> largest acceleration of any joint in captured motion, cm per frame squared.
 
-    Only motion in this gait in which this link hurts is counted. (gait, None): the largest in all motion in
-    this gait, whatever hurts.
+    For (gait, link), only the motion in this gait in which this link hurts counts. For (gait, None), all
+    motion in this gait counts, hurt and healthy.
     """
     out: dict[tuple[str, str | None], float] = {}
     for clip in motion:
         for gait in GAITS:
             in_gait = clip.gait[:, network.gaits.index(gait)] > 0.5
-            chosen: list[tuple[str | None, Any]] = [(None, in_gait)]
-            chosen += [
+            # (link or None, (F,) whether a frame counts) for each key of the result.
+            counted: list[tuple[str | None, Any]] = [(None, in_gait)]
+            counted += [
                 (link, in_gait & (clip.channels[INJURY][:, i] > 0))
                 for i, link in enumerate(links_of(network))
             ]
-            for link, frames in chosen:
+            for link, frames in counted:
                 if np.any(frames):
                     highest = round(float(clip.acceleration[frames].max()), 5)
                     out[gait, link] = max(highest, out.get((gait, link), 0.0))
@@ -136,7 +139,7 @@ def largest_accelerations(
 
 
 def _summary(responses: Sequence[LinkResponse]) -> dict[str, Summary]:
-    """Gait -> means over the links of `responses`. Empty if there are no responses."""
+    """Gait -> means over `responses`, which are of several links. Empty if there are no responses."""
     out: dict[str, Summary] = {}
     for gait in GAITS:
         group = [r for r in responses if r["gait"] == gait]
@@ -160,12 +163,13 @@ def _summary(responses: Sequence[LinkResponse]) -> dict[str, Summary]:
 
 
 def _mean(values: Sequence[float | None]) -> float | None:
+    """The mean of the values that are not None; None if there are none."""
     measured = [v for v in values if v is not None]
     return round(float(np.mean(measured)), 5) if measured else None
 
 
 def run(inputs: MeasureInputs, options: Options) -> Outcome:
-    """The content of injury.json and of its tables."""
+    """The content of injury.json and of the tables in injury/."""
     sample = sample_of(inputs, options)
     result = injury_response(
         load_network(inputs.weights),

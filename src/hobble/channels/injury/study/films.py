@@ -16,7 +16,7 @@ import numpy as np
 
 from hobble.channels.injury.crowd_severities import INJURY, hurt_links
 from hobble.channels.injury.crowd_severities import links as links_of
-from hobble.channels.injury.shown import OTHERS, links_between
+from hobble.channels.injury.shown import OTHER_PARTS, links_between
 from hobble.channels.injury.shown import PARTS as SLIDERS
 from hobble.core.errors import HobbleError
 from hobble.core.quat import Array
@@ -101,7 +101,7 @@ def part_links(network: Network, parts: Sequence[str]) -> list[str]:
     links, hurt = links_of(network), hurt_links(network)
     if network.skeleton is None or not links:
         raise HobbleError("this network has no injury channel. Use a configuration with `channels: [injury]`")
-    ends = {label: roles for label, *roles in (*SLIDERS, *OTHERS)}
+    ends = {label: roles for label, *roles in (*SLIDERS, *OTHER_PARTS)}
     out = []
     for part in parts:
         of_part = [link for link in links_between(network.skeleton, *ends[part]) if link in links]
