@@ -63,8 +63,7 @@ class ChannelDisplay:
 class SampleWalk:
     """A walk for a looping picture.
 
-    name: the name of the picture's file. values: column -> value. coloured: whether the values colour the
-    body.
+    name: of the walk and its picture. values: column -> value. coloured: whether the values colour the body.
     """
 
     name: str
