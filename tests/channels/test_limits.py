@@ -7,7 +7,15 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from hobble.channels.speed_limits import CANNOT_HURRY, TOP, UNLIMITED, USUAL, LimitLearner, Limits, together
+from hobble.channels.speed_limits import (
+    CANNOT_HURRY,
+    TOP,
+    UNLIMITED,
+    USUAL,
+    LimitLearner,
+    Limits,
+    combine_limits,
+)
 
 WALK, JOG, GAITS = 1, 2, 6
 LIMITS = Limits(
@@ -36,13 +44,13 @@ def pace(labels: int = 2, across=None) -> LimitLearner:
     [((0, 0), np.inf), ((5, 0), 3.0), ((10, 0), 1.0), ((7.5, 0), 2.0), ((2.5, 0), 3.5), ((0, 7.5), 3.0)],
 )
 def test_between_levels_the_speed_is_interpolated(values, speed: float) -> None:
-    np.testing.assert_array_equal(LIMITS.allowed(np.array([values], float)), [[speed]])
+    np.testing.assert_array_equal(LIMITS.highest_speeds(np.array([values], float)), [[speed]])
 
 
 def test_two_injuries_have_the_limit_of_the_slower_one() -> None:
     values = np.random.default_rng(1).uniform(0, 10, (50, 2))
-    both = LIMITS.allowed(values)
-    alone = [LIMITS.allowed(values * keep) for keep in ([1, 0], [0, 1])]
+    both = LIMITS.highest_speeds(values)
+    alone = [LIMITS.highest_speeds(values * keep) for keep in ([1, 0], [0, 1])]
     np.testing.assert_array_equal(both, np.minimum(*alone))
 
 
@@ -75,7 +83,7 @@ def test_a_captured_injury_is_compared_with_the_usual_speed_of_its_gait() -> Non
     found.add("limps", **rows(np.full(60, 1.0), np.tile([8.0, 0.0], (60, 1))))
     limits = found.learn()
     assert limits is not None
-    walk, jog = (limits.allowed(np.array([[8.0, 0.0]]))[0, g] for g in (WALK, JOG))
+    walk, jog = (limits.highest_speeds(np.array([[8.0, 0.0]]))[0, g] for g in (WALK, JOG))
     assert walk == pytest.approx(1.0, rel=0.1)
     assert jog == pytest.approx(3.0, rel=0.1)  # by what the link does in other gaits
 
@@ -100,11 +108,11 @@ def test_the_shares_of_speed_that_two_channels_allow_are_multiplied() -> None:
     free, half, third, fast = (np.full((1, 2), v) for v in (np.inf, 1.0, 2 / 3, 2.6))
     usual = np.array([2.0, 0.0])  # no body without values goes in the second gait
     for one in (free, half, fast):
-        np.testing.assert_array_equal(together([one], usual), one)
-        np.testing.assert_array_equal(together([one, free], usual), one)
-    np.testing.assert_allclose(together([half, third], usual), [[1 / 3, 2 / 3]])
-    np.testing.assert_allclose(together([third, fast, half], usual), [[1 / 3, 2 / 3]])
-    np.testing.assert_allclose(together([fast, fast + 1], usual), [[2.6, 2.6]])
+        np.testing.assert_array_equal(combine_limits([one], usual), one)
+        np.testing.assert_array_equal(combine_limits([one, free], usual), one)
+    np.testing.assert_allclose(combine_limits([half, third], usual), [[1 / 3, 2 / 3]])
+    np.testing.assert_allclose(combine_limits([third, fast, half], usual), [[1 / 3, 2 / 3]])
+    np.testing.assert_allclose(combine_limits([fast, fast + 1], usual), [[2.6, 2.6]])
 
 
 def test_the_slowness_of_one_channel_is_not_learnt_for_another() -> None:
@@ -138,7 +146,7 @@ def test_without_channel_values_no_limit_is_learnt() -> None:
         ({"levels": np.array([0.0, 5.0])}, "do not fit 1 gaits and 2 labels"),
         ({"speeds": -LIMITS.speeds}, "above 0"),
         ({"speeds": LIMITS.speeds * np.nan}, "above 0"),
-        ({"speeds": LIMITS.speeds[..., ::-1]}, "faster"),
+        ({"speeds": LIMITS.speeds[..., ::-1]}, "stay the same or fall"),
         ({"usual": np.array([3.5, 3.5])}, "do not fit 1 gaits and 2 labels"),
         ({"usual": np.array([-1.0])}, "usual speeds"),
     ],

@@ -13,7 +13,7 @@ from hobble.runtime import advance, network_rows
 
 def test_places_standing_and_phase_follow_the_formulas() -> None:
     assert rule.joint_place(2.0, 5.0) == 3.5
-    assert [rule.moving(s) for s in (0.0, 0.9375, 1.0, 1.5)] == [1.0, 0.5, 0.0, 0.0]
+    assert [rule.movement_share(s) for s in (0.0, 0.9375, 1.0, 1.5)] == [1.0, 0.5, 0.0, 0.0]
     assert rule.phase_change(0.0, 2.0) == pytest.approx(0.2)
     assert rule.phase_change(1.0, 2.0) == pytest.approx(2.0)
 
@@ -23,9 +23,9 @@ def test_the_rule_is_the_same_compiled_and_in_python() -> None:
 
     @njit
     def compiled(a: float, b: float) -> tuple[float, float, float]:
-        return network_rows.joint_place(a, b), advance.moving_share(a), advance.phase_change(a, b)
+        return network_rows.joint_place(a, b), advance.movement_share(a), advance.phase_change(a, b)
 
     for a, b in rng.random((100, 2)):
-        assert compiled(a, b) == (rule.joint_place(a, b), rule.moving(a), rule.phase_change(a, b))
+        assert compiled(a, b) == (rule.joint_place(a, b), rule.movement_share(a), rule.phase_change(a, b))
     a, b = torch.rand(2, 50, generator=torch.Generator().manual_seed(0))
     np.testing.assert_array_equal(rule.joint_place(a, b).numpy(), rule.joint_place(a.numpy(), b.numpy()))

@@ -124,7 +124,7 @@ def test_all_problems_are_reported_at_once() -> None:
         ),
         ({"skeleton": "s", "folder": "f", "terrain": {"heightmaps": []}}, "`heightmaps` is empty"),
         ({"skeleton": "s", "folder": "f", "terrain": {"sole": float("nan")}}, r"terrain\.sole: .*finite"),
-        ({"skeleton": "s", "folder": "f", "held_out": ["../a"]}, "a clip's name has no .*slashes"),
+        ({"skeleton": "s", "folder": "f", "held_out": ["../a"]}, "a clip's name must have no .*slashes"),
         ({"skeleton": "../s", "folder": "f"}, "skeleton: string should match"),
     ],
 )

@@ -137,7 +137,7 @@ def test_limits_of_two_channels_are_those_of_python(
         _, at = jointed(network.skeleton, pose.positions[None], pose.rotations[None])
         assert np.abs(np.reshape(found, (-1, 3)) - at[0])[turning].max() < 1e-2
         now = animation.state.channel_values
-        alone = [both.limits[name].allowed(now[:, part])[0, 1] for name, part in PARTS]
+        alone = [both.limits[name].highest_speeds(now[:, part])[0, 1] for name, part in PARTS]
         assert np.hypot(*animation.state.smoothed_velocity[0]) < min(alone) - 0.01
 
 

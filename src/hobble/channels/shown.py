@@ -1,10 +1,13 @@
-"""How channels are shown for a skeleton: words, sliders, presets, sweeps and loops.
+"""How a channel is shown on the report page and in pictures: words, sliders, presets, sweeps and loops.
 
-A channel is a group of inputs of the network, such as the severities of injuries, with a label for each
-column. A sweep is a walk in which one column rises from 0 to its highest value. A loop is a walk for a
-looping picture. "Trained" columns are those that were above 0 in training. A channel may have a module
-channels/<name>/shown.py with its own WORDS, `shown`, `sweeps` and `loops`. The functions here find these by
-name, or return defaults. Neither training nor measurements depend on these modules.
+A channel is a group of inputs of the network, such as the severities of injuries. Each input is a column with
+a label. "Trained" columns are those that were above 0 in training. A preset is a button that sets several
+columns. A sweep is a walk in which one column rises from 0 to its highest value. A loop is a walk for a
+looping picture.
+
+A channel may have a module channels/<name>/shown.py with its own WORDS, `shown`, `sweeps` and `loops`. The
+functions here use what this module has, and otherwise return defaults. Neither training nor measurements
+depend on these modules.
 """
 
 from __future__ import annotations
@@ -22,13 +25,12 @@ from hobble.core.skeleton import Skeleton
 
 @dataclass(frozen=True)
 class ChannelWords:
-    """Words of a channel on the report page. {} stands for the name of a column.
+    """Texts of a channel for the report page. {} stands for the name of a column.
 
     rest: label of the button that sets all values to 0. step: step of a slider. key: name of the values in
-    the address of the page, by default the channel's name. grows: says that a column rises. never: says that
-    a column was 0 in all of training. headline: headline of the page. says: what the network is told when a
-    value is above 0. on: a word for a character with a value above 0; if it is empty, the column's name is
-    used.
+    the address of the page, by default the channel's name. grows: description of a sweep. never: note on a
+    column that is not trained. headline: headline of the page. says: what the network is told if the column
+    is above 0. on: a word for a character with a value above 0; if it is empty, the column's name is used.
     """
 
     rest: str = "Neutral"
@@ -45,9 +47,10 @@ class ChannelWords:
 class ChannelDisplay:
     """How a channel is shown.
 
-    spoken: a name for each column. sliders: label -> column, for the sliders that are there at the start.
-    presets: button -> column -> value. regions: for each bone, the indices of the columns that stand
-    for a place on the part of the body that this bone moves; empty if columns stand for no places.
+    spoken: for each column, the name that readers see. sliders: label of a slider -> its column, for the
+    sliders that are there at the start. presets: label of a button -> {column: value}. regions: for each bone
+    of the body, the indices of the columns whose values colour the part that this bone moves; empty if
+    columns do not belong to parts of the body.
     """
 
     spoken: Sequence[str]
@@ -58,7 +61,10 @@ class ChannelDisplay:
 
 @dataclass(frozen=True)
 class SampleWalk:
-    """A walk for a looping picture. values: column -> value. coloured: whether the values colour the body."""
+    """A walk for a looping picture.
+
+    name: of the walk and its picture. values: column -> value. coloured: whether the values colour the body.
+    """
 
     name: str
     values: Mapping[str, float]
@@ -66,7 +72,7 @@ class SampleWalk:
 
 
 def words(name: str) -> ChannelWords:
-    """The words of the channel `name`."""
+    """The texts of the channel `name`."""
     own_words = _from_module(name, "WORDS")
     return own_words if isinstance(own_words, ChannelWords) else ChannelWords()
 
@@ -76,17 +82,20 @@ def shown(name: str, skeleton: Skeleton, columns: Sequence[str], trained: Collec
 
     columns: the labels of all columns. trained: the labels of the trained columns.
     """
-    if of_channel := _from_module(name, "shown"):
-        return of_channel(skeleton, columns, trained)
+    if own_shown := _from_module(name, "shown"):
+        return own_shown(skeleton, columns, trained)
     return ChannelDisplay(tuple(columns), {column: column for column in columns if column in trained})
 
 
 def sweeps(
     name: str, skeleton: Skeleton, columns: Sequence[str], trained: Collection[str]
 ) -> Mapping[str, str]:
-    """Name of each sweep -> its column. By default there is one for each trained column."""
-    if of_channel := _from_module(name, "sweeps"):
-        return of_channel(skeleton, columns, trained)
+    """Name of each sweep -> the column that rises. By default there is a sweep for each trained column.
+
+    columns, trained: as in `shown`.
+    """
+    if own_sweeps := _from_module(name, "sweeps"):
+        return own_sweeps(skeleton, columns, trained)
     return {column.replace(" ", "_"): column for column in columns if column in trained}
 
 
@@ -95,38 +104,39 @@ def loops(
 ) -> list[SampleWalk]:
     """Walks for looping pictures.
 
-    By default all values are 0 in the first. Then there is one for each trained column, at its highest value.
+    By default there is a walk with all values 0, then one for each trained column with its highest value.
+    columns, trained: as in `shown`.
     """
-    if of_channel := _from_module(name, "loops"):
-        return of_channel(skeleton, columns, trained)
-    used, highest = [column for column in columns if column in trained], channel(name).highest
+    if own_loops := _from_module(name, "loops"):
+        return own_loops(skeleton, columns, trained)
+    chosen, highest = [column for column in columns if column in trained], channel(name).highest
     return [
         SampleWalk(words(name).rest.lower(), {}),
-        *(SampleWalk(c.replace(" ", "-"), {c: highest}) for c in used),
+        *(SampleWalk(c.replace(" ", "-"), {c: highest}) for c in chosen),
     ]
 
 
 def shown_names(skeleton: Mapping[str, Any]) -> Callable[[str], str]:
-    """A function that turns a column's label into the name that readers see, and leaves other texts alone.
+    """A function from a column's label to the name that readers see. It returns any other text unchanged.
 
     skeleton: the entry `skeleton` of a network's file; empty if the file has none.
     """
     if not skeleton:
         return str
     rig = Skeleton.from_dict({"name": "", **skeleton})
-    names: dict[str, str] = {}
+    names: dict[str, str] = {}  # label of a column of any channel -> the name that readers see
     for each in all_channels():
         columns = each.columns(rig)
         names |= dict(zip(columns, shown(each.name, rig, columns, columns).spoken, strict=True))
     return lambda column: names.get(column, column)
 
 
-def module(name: str) -> ModuleType | None:
-    """The channel's own module `shown`, or None."""
-    full = f"hobble.channels.{name}.shown"
-    return importlib.import_module(full) if importlib.util.find_spec(full) is not None else None
+def _own_module(name: str) -> ModuleType | None:
+    """The module channels/<name>/shown.py, or None if the channel has none."""
+    full_name = f"hobble.channels.{name}.shown"
+    return importlib.import_module(full_name) if importlib.util.find_spec(full_name) is not None else None
 
 
-def _from_module(name: str, what: str) -> Any:
-    """`what` of the channel's own module `shown`, or None if there is no such module or attribute."""
-    return getattr(module(name), what, None)
+def _from_module(name: str, attribute: str) -> Any:
+    """An attribute of the module channels/<name>/shown.py. None if the module or the attribute is missing."""
+    return getattr(_own_module(name), attribute, None)

@@ -4,11 +4,10 @@ A channel is a group of inputs of the network that tell how hurt or how sad a bo
 a label, such as the name of a bone or mood, and values from 0 (no effect) to the channel's highest value. A
 body is healthy if the values of all channels are 0.
 
-A hurt body cannot go as fast as a healthy one. The rows of the database, one for each frame of a clip, show
-how fast it goes. Some hurt clips are computed from a healthy clip, as a hurt person would walk it: they are
-hurt versions of this clip. Each cycle of a hurt version is compared with the same cycle of the healthy clip.
-Captured hurt clips have no healthy counterpart, so their cycles are compared with the usual speed of their
-gait.
+A hurt body cannot go as fast as a healthy one. How fast it goes is measured in the rows of the database, one
+for each frame of a clip. A hurt version is a clip that is computed from a healthy clip, as a hurt person
+would walk it. Each gait cycle of a hurt version is compared with the same cycle of the healthy clip. Captured
+hurt clips have no healthy counterpart, so their cycles are compared with the usual speed of their gait.
 """
 
 from __future__ import annotations
@@ -21,49 +20,50 @@ import numpy as np
 
 from hobble.core.quat import Array
 
-UNLIMITED = 1e4  # cm a frame: limit of a gait in which no healthy clip goes forward
+UNLIMITED = 1e4  # cm a frame: limit of a gait if the database has no healthy forward cycle in this gait
 LEVELS = 5  # the limits are stored for this many values of a column, evenly spaced from 0 to the highest
-# Percentiles of the speeds of all healthy cycles in a gait: the limit of a healthy body, and its usual speed.
-# The median would be too low for the usual speed, because clips also contain starts and stops.
+# Percentiles of the speeds of all healthy cycles in a gait: TOP gives the limit of a healthy body, USUAL its
+# usual speed. The median would be too low for the usual speed, because clips also contain starts and stops.
 TOP, USUAL = 95, 70
 # A body that an injury slows to this share of the usual speed or less cannot hurry: its limit is the slowed
 # speed. A body that keeps the whole usual speed can hurry up to the limit of a healthy one (TOP). Between
 # these two shares the limit is interpolated.
 CANNOT_HURRY = 0.85
-AHEAD = 0.9  # a cycle counts if at least this share of its speed is forward
+AHEAD = 0.9  # a cycle counts as forward if at least this share of its speed is forward
 STEADY = 0.35  # a cycle is left out if a value changes in it by more than this share of the highest value
 FAINT = 0.05  # if the mean value in a cycle is below this share of the highest value, it counts as 0
-MOVING = 0.1  # cm a frame: slower cycles of a healthy body are left out
-# A curve is fitted to cycles, but it should stay near an expected curve, which counts as much as this many
-# cycles at each level.
+MOVING = 0.1  # cm a frame: cycles in which a healthy body is slower are left out
+# Where there are few cycles, a fitted curve should stay near an expected curve. So the expected curve counts
+# as much as this many cycles at each level.
 EXPECTED_WEIGHT = 2.0
-SLOWEST = 0.1  # lower shares of the healthy speed are raised to this
+SLOWEST = 0.1  # lowest share of the healthy speed; lower shares are raised to it
 
 
 @dataclass(frozen=True)
 class Limits:
     """Speed limits of a channel with L labels in G gaits.
 
-    levels: (K,) values from 0 to the channel's highest. speeds: (G, L, K) highest speeds, cm a frame, for
-    each gait, label and level; a higher level is never faster. usual: (G,) usual speeds of a healthy body, cm
-    a frame.
+    levels: (K,) ascending values from 0 to the channel's highest. speeds: (G, L, K) highest speeds, cm a
+    frame, for each gait, label and level; they never rise with the level. usual: (G,) usual speeds of a
+    healthy body, cm a frame.
     """
 
     levels: Array = field(repr=False)
     speeds: Array = field(repr=False)
     usual: Array = field(repr=False)
 
-    def allowed(self, values: Array) -> Array:
-        """(C, G) highest speeds of C characters in each gait, cm a frame. values: (C, L).
+    def highest_speeds(self, values: Array) -> Array:
+        """(C, G) highest speeds of C characters in each gait, cm a frame, interpolated between the levels.
 
-        If several values are above 0, the lowest of their limits counts. If all are 0, the speed is inf.
+        values: (C, L) value of each label for each character. If several values are above 0, the lowest of
+        their limits counts. If all are 0, the speed is inf.
         """
-        at = np.clip(np.searchsorted(self.levels, values, side="right") - 1, 0, len(self.levels) - 2)
-        low, high = self.levels[at], self.levels[at + 1]
-        share = (values - low) / (high - low)
+        below = np.clip(np.searchsorted(self.levels, values, side="right") - 1, 0, len(self.levels) - 2)
+        low, high = self.levels[below], self.levels[below + 1]
+        weight = (values - low) / (high - low)
         label = np.arange(values.shape[1])
-        below, above = self.speeds[:, label, at], self.speeds[:, label, at + 1]
-        speeds = np.where(values > 0, below + share * (above - below), np.inf)
+        speed_low, speed_high = self.speeds[:, label, below], self.speeds[:, label, below + 1]
+        speeds = np.where(values > 0, speed_low + weight * (speed_high - speed_low), np.inf)
         return np.min(speeds, axis=2, initial=np.inf).T
 
     def to_dict(self) -> dict[str, Any]:
@@ -73,10 +73,10 @@ class Limits:
 
     @classmethod
     def from_dict(cls, data: Mapping[str, Any], gaits: int, labels: int, highest: float) -> Limits:
-        """The inverse of `to_dict`. In older files without `usual`, each gait's highest speed is used.
+        """The inverse of `to_dict`. In older files without `usual`, it is the highest of the gait's `speeds`.
 
-        highest: the highest value of the channel. Raises ValueError if a key is missing, a shape does not fit
-        the number of gaits and labels, or a number is not possible.
+        gaits, labels: how many there are. highest: the highest value of the channel. Raises ValueError if a
+        key is missing, a shape does not fit these numbers, or a value is not possible.
         """
         try:
             levels, speeds = (np.array(data[key], float) for key in ("levels", "speeds"))
@@ -92,35 +92,34 @@ class Limits:
         if not ((speeds > 0) & (speeds <= UNLIMITED)).all():
             raise ValueError(f"speeds are not all above 0 and at most {UNLIMITED:g}")
         if (np.diff(speeds, axis=2) > 0).any():
-            raise ValueError("speeds rise with the level; a higher level must not be faster")
+            raise ValueError("speeds rise with the level; they must stay the same or fall")
         if not ((usual >= 0) & (usual <= UNLIMITED)).all():
             raise ValueError(f"usual speeds are not all from 0 to {UNLIMITED:g}")
         return cls(levels, speeds, usual)
 
 
-def together(allowed: Sequence[Array], usual: Array) -> Array:
+def combine_limits(limits: Sequence[Array], usual: Array) -> Array:
     """(C, G) highest speeds of C characters in each gait under the limits of several channels, cm a frame.
 
-    allowed: for each channel, the highest speeds (C, G). usual: (G,) usual speeds of a healthy body. Each
-    channel leaves a share of the usual speed, and the shares multiply: a sad person who limps is slower than
-    one who is only sad or only limps. A channel that allows the usual speed has the share 1. If all channels
-    allow the usual speed, the lowest of their limits counts.
+    limits: for each channel, (C, G) `Limits.highest_speeds`. usual: (G,) usual speeds of a healthy body. Each
+    channel leaves a share of the usual speed, and these shares are multiplied: a sad person who limps is
+    slower than a person who is only sad or only limps. A channel that allows the usual speed has the share 1.
+    If all channels allow the usual speed, the lowest of their limits counts.
     """
     shares = [
-        np.minimum(1.0, np.divide(speed, usual, out=np.ones_like(speed), where=usual > 0))
-        for speed in allowed
+        np.minimum(1.0, np.divide(speed, usual, out=np.ones_like(speed), where=usual > 0)) for speed in limits
     ]
-    lowest = np.min(allowed, axis=0)
+    lowest = np.min(limits, axis=0)
     return np.where(lowest < usual, usual * np.prod(shares, axis=0), lowest)
 
 
 @dataclass(frozen=True)
 class _Cycles:
-    """N cycles of one clip.
+    """N gait cycles of one clip.
 
     gait: (N,) index of the main gait. speed: (N,) mean speed, cm a frame. ahead: (N,) mean forward speed, cm
-    a frame; negative: backwards. values: (N, L) mean value of each label. number: (N,) number of the cycle in
-    the clip. others: (N,) bool, whether another channel has a value above 0.
+    a frame; negative: backwards. values: (N, L) mean value of each label, 0 if it is below FAINT. number:
+    (N,) number of the cycle in the clip. others: (N,) bool, whether another channel has a value above 0.
     """
 
     gait: np.ndarray
@@ -132,14 +131,15 @@ class _Cycles:
 
 
 class LimitLearner:
-    """Gathers the cycles of clips, one clip at a time, and learns the limits of a channel from them.
+    """Collects the gait cycles of clips, one clip at a time, and learns the limits of one channel from them.
 
-    highest: the channel's highest value. across: (L,) for each label the index of the label on the other side
-    of the body. Both sides get the same limits. gaits: number of gaits.
+    highest: the channel's highest value. across: (L,) for each label, the index of its counterpart on the
+    other side of the body, or its own index. Both sides get the same limits. gaits: number of gaits.
     """
 
     def __init__(self, highest: float, across: np.ndarray, gaits: int) -> None:
         self.highest, self.across, self.gaits = highest, across, gaits
+        # Name of a clip -> name of its source (as in `add`) or None, and the cycles of the clip.
         self._clips: dict[str, tuple[str | None, _Cycles]] = {}
 
     def add(
@@ -153,18 +153,20 @@ class LimitLearner:
         others: np.ndarray,
         source: str | None = None,
     ) -> None:
-        """Add a clip with R rows.
+        """Add a clip with R rows, one for each frame.
 
         gait: (R, G) shares of the gaits. velocity: (R, 2) of the root, to the side and forward in root
-        coordinates, cm per frame. values: (R, L) of this channel. cycle: (R,) number of the row's cycle.
-        others: (R,) bool, whether another channel has a value above 0. source: name of the clip
-        that this clip is a hurt version of, if it is one.
+        coordinates, cm per frame. values: (R, L) values of this channel. cycle: (R,) number of the row's gait
+        cycle in the clip. others: (R,) bool, whether another channel has a value above 0. source: if the clip
+        is a hurt version, the name of the clip from which it was computed.
         """
         numbers, of_row, count = np.unique(cycle, return_inverse=True, return_counts=True)
 
         def mean(rows: Array) -> Array:
+            """(N,) the mean of `rows` (R,) in each cycle."""
             return np.asarray(np.bincount(of_row, rows, len(numbers)) / np.maximum(count, 1))
 
+        # Rows sorted by cycle, and where each cycle starts among them: `reduceat` needs consecutive rows.
         order = np.argsort(of_row, kind="stable")
         starts = np.cumsum(count) - count
         highest = np.maximum.reduceat(values[order], starts) if len(order) else values
@@ -179,12 +181,13 @@ class LimitLearner:
             numbers,
             mean(others.astype(float)) > 0,
         )
+        # Only cycles with one main gait and with steady values.
         keep = (shares.max(axis=1) > 0.5) & ((highest - lowest).max(axis=1) <= STEADY * self.highest)
         kept = _Cycles(**{name: getattr(cycles, name)[keep] for name in vars(cycles)})
         self._clips[clip] = (source, kept)
 
     def to_arrays(self, clip: str) -> dict[str, np.ndarray]:
-        """The cycles of an added clip, for a file. Empty if the clip was not added."""
+        """The cycles of an added clip as named arrays, for a file. Empty if the clip was not added."""
         if clip not in self._clips:
             return {}
         source, cycles = self._clips[clip]
@@ -196,10 +199,10 @@ class LimitLearner:
         self._clips[clip] = (str(arrays["source"]) or None, _Cycles(**named))
 
     def learn(self) -> Limits | None:
-        """The limits, or None if no cycle has a value above 0.
+        """The limits, or None if no cycle with a value above 0 can be compared with a healthy one.
 
         For each label, the share of the healthy speed is fitted as a function of the value, in three steps.
-        First, a straight line is fitted to the cycles of all gaits. Second, a curve is fitted to these
+        First, a straight line is fitted to the cycles of all gaits. Second, a curve is fitted to the same
         cycles; where there are few, it stays near the line. Third, a curve is fitted to the cycles of each
         gait; where there are few, it stays near the curve of all gaits.
         """
@@ -216,21 +219,24 @@ class LimitLearner:
         labels = values.shape[1]
         speeds = np.repeat(top[:, None, None], labels, axis=1).repeat(LEVELS, axis=2)
         for label in range(labels):
-            sides = _of_label(label, values, self.across)
+            both_sides = _cycles_of_label(label, values, self.across)
             value, shares, gaits = (
-                np.concatenate(part) for part in zip(*((v, share[i], gait[i]) for i, v in sides), strict=True)
+                np.concatenate(part)
+                for part in zip(*((v, share[i], gait[i]) for i, v in both_sides), strict=True)
             )
+            # Slope of the line 1 - fall * value, fitted to the shares by least squares.
             fall = float(value @ (1 - shares) / (value @ value)) if len(value) else 0.0
             line = np.maximum(1 - fall * levels, SLOWEST)
-            curve = _fitted(levels, value, shares, line)
-            for k in np.flatnonzero(top < UNLIMITED):
-                in_gait = _fitted(levels, value[gaits == k], shares[gaits == k], curve)
-                hurries = np.maximum(in_gait - CANNOT_HURRY, 0.0) / (1 - CANNOT_HURRY)
-                speeds[k, label] = usual[k] * in_gait + (top[k] - usual[k]) * hurries
+            curve = _fit_shares(levels, value, shares, line)
+            for g in np.flatnonzero(top < UNLIMITED):
+                in_gait = _fit_shares(levels, value[gaits == g], shares[gaits == g], curve)
+                # How much the body can hurry: 0 not at all, 1 as much as a healthy one.
+                hurry = np.maximum(in_gait - CANNOT_HURRY, 0.0) / (1 - CANNOT_HURRY)
+                speeds[g, label] = usual[g] * in_gait + (top[g] - usual[g]) * hurry
         return Limits(levels, speeds, usual)
 
     def _healthy(self) -> Array:
-        """(n, 2) gait and speed of the forward cycles in which the values of all channels are 0."""
+        """(n, 2) index of the gait, and speed, of each forward cycle in which all channels are 0."""
         found = [np.zeros((0, 2))]
         for _, cycles in self._clips.values():
             neutral = ~cycles.values.any(axis=1) & ~cycles.others
@@ -241,9 +247,10 @@ class LimitLearner:
     def _shares(self, usual: Array) -> tuple[np.ndarray, Array, Array]:
         """Gait (n,), share of the healthy speed (n,) and values (n, L) of the cycles with a value above 0.
 
-        A cycle of a hurt version is compared with the same cycle of its source, the clip that it was computed
-        from. The cycle is left out if the source already has a value above 0 in this channel. For example, a
-        sad clip and its hurt version are equally sad, so they say nothing about the limits of sadness.
+        usual: (G,) usual speed of each gait, cm a frame. A cycle of a hurt version is compared with the same
+        cycle of its source, the clip from which it was computed. The cycle is left out if the source already
+        has a value above 0 in this channel. For example, a sad clip and its hurt version are equally sad, so
+        they say nothing about the limits of sadness.
         """
         parts = []
         for source, cycles in self._clips.values():
@@ -253,9 +260,9 @@ class LimitLearner:
                 source_speed = np.where(origin.values.any(axis=1), 0.0, origin.speed)  # 0: left out below
                 speed_of = dict(zip(origin.number.tolist(), source_speed.tolist(), strict=True))
                 healthy_speed = np.array([speed_of.get(n, 0.0) for n in cycles.number.tolist()])
-            else:  # captured: only forward cycles can be compared with the usual speed
-                counts = (cycles.ahead >= AHEAD * cycles.speed) & ~cycles.others
-                healthy_speed = np.where(counts, usual[cycles.gait], 0.0)
+            else:  # without a source, only forward cycles without values in other channels can be compared
+                comparable = (cycles.ahead >= AHEAD * cycles.speed) & ~cycles.others
+                healthy_speed = np.where(comparable, usual[cycles.gait], 0.0)
             kept = changed & (healthy_speed > MOVING)
             share = np.clip(cycles.speed[kept] / healthy_speed[kept], SLOWEST, 1.0)
             parts.append((cycles.gait[kept], share, cycles.values[kept]))
@@ -265,36 +272,38 @@ class LimitLearner:
         return gait, share, values
 
 
-def _of_label(label: int, values: Array, across: np.ndarray) -> Sequence[tuple[np.ndarray, Array]]:
+def _cycles_of_label(label: int, values: Array, across: np.ndarray) -> Sequence[tuple[np.ndarray, Array]]:
     """The cycles that count for a label and for its counterpart on the other side of the body.
 
-    Returns (indices of cycles, values of the label in them) for both labels, or for the label alone if it has
-    no counterpart. values: (n, L) of all cycles. across: (L,) index of each label's counterpart. A cycle
-    counts for a label if all other labels are 0 in it. If there is no such cycle for either label, a cycle
-    counts if no other label has a higher value in it.
+    values: (n, L) of all cycles. across: (L,) index of each label's counterpart, or its own index. A cycle
+    counts for a label if only this label is above 0 in it. If neither label has such a cycle, a cycle counts
+    if the label is above 0 and no other label has a higher value in it.
+
+    Returns a pair for both labels, or for the label alone if it has no counterpart: the indices of its
+    cycles, and its values in them.
     """
     sides = sorted({label, int(across[label])})
-    alone = [np.flatnonzero((values[:, k] > 0) & ((values > 0).sum(axis=1) == 1)) for k in sides]
-    if not any(len(found) for found in alone):
+    cycles = [np.flatnonzero((values[:, k] > 0) & ((values > 0).sum(axis=1) == 1)) for k in sides]
+    if not any(len(indices) for indices in cycles):
         highest = values.max(axis=1, initial=0.0)
-        alone = [np.flatnonzero((values[:, k] > 0) & (values[:, k] >= highest)) for k in sides]
-    return [(found, values[found, k]) for found, k in zip(alone, sides, strict=True)]
+        cycles = [np.flatnonzero((values[:, k] > 0) & (values[:, k] >= highest)) for k in sides]
+    return [(indices, values[indices, k]) for indices, k in zip(cycles, sides, strict=True)]
 
 
-def _fitted(levels: Array, values: Array, shares: Array, expected: Array) -> Array:
+def _fit_shares(levels: Array, values: Array, shares: Array, expected: Array) -> Array:
     """(K,) shares of the healthy speed at `levels` (K,), fitted to n cycles by least squares.
 
     values, shares: (n,) value of the label and share of the healthy speed in each cycle. Shares between two
-    levels are interpolated. The first share is 1, and a higher level never has a higher share. expected: (K,)
+    levels are interpolated. The first share is 1, and the shares never rise with the level. expected: (K,)
     share at each level, which counts as much as EXPECTED_WEIGHT cycles there.
     """
-    at = np.clip(np.searchsorted(levels, values, side="right") - 1, 0, len(levels) - 2)
-    far = (values - levels[at]) / (levels[at + 1] - levels[at])
-    basis = np.zeros((len(values), len(levels)))
+    below = np.clip(np.searchsorted(levels, values, side="right") - 1, 0, len(levels) - 2)
+    weight = (values - levels[below]) / (levels[below + 1] - levels[below])
+    basis = np.zeros((len(values), len(levels)))  # basis @ (shares at the levels) = shares in the cycles
     rows = np.arange(len(values))
-    basis[rows, at], basis[rows, at + 1] = 1 - far, far
-    inner = basis[:, 1:]
+    basis[rows, below], basis[rows, below + 1] = 1 - weight, weight
+    inner = basis[:, 1:]  # without the first level, whose share is known to be 1
     matrix = inner.T @ inner + EXPECTED_WEIGHT * np.eye(len(levels) - 1)
     vector = inner.T @ (shares - basis[:, 0]) + EXPECTED_WEIGHT * expected[1:]
-    found = np.concatenate([[1.0], np.linalg.solve(matrix, vector)])
-    return np.minimum.accumulate(np.clip(found, SLOWEST, 1.0))
+    fitted = np.concatenate([[1.0], np.linalg.solve(matrix, vector)])
+    return np.minimum.accumulate(np.clip(fitted, SLOWEST, 1.0))

@@ -1,9 +1,11 @@
-"""How a prediction changes the character's state, as in the runtime of Holden et al. 2017.
+"""How a network's prediction changes the character's state, as in the runtime of Holden et al. (2017).
 
 The functions take numbers, numpy arrays or tensors. The runtime compiles them with numba; roll-outs and
-training call them directly. The only other implementation is in the report page's JavaScript. numba caches
-the runtime's compiled functions on disk, and compiles each again only when its own file changes. So after a
-change here, delete the `__pycache__` of the package `hobble.runtime`.
+training call them directly. The only other implementation is in the report page's JavaScript.
+
+numba caches the runtime's compiled functions on disk. It compiles such a function again only if the file in
+`hobble.runtime` changes, not if this file does. So after a change here, delete the `__pycache__` of the
+package `hobble.runtime`.
 """
 
 from __future__ import annotations
@@ -13,7 +15,7 @@ from typing import Any
 import numpy as np
 
 CARRIED_SHARE = 0.5  # weight of `carried` and of `predicted` in a joint's new position
-STANDING_SHARE = 0.1  # share of the predicted change of phase that a standing figure keeps
+STANDING_SHARE = 0.1  # share of the predicted change of phase that is applied to a standing character
 
 
 def joint_place(carried: Any, predicted: Any) -> Any:
@@ -21,14 +23,17 @@ def joint_place(carried: Any, predicted: Any) -> Any:
     return CARRIED_SHARE * (carried + predicted)
 
 
-def moving(stand: Any) -> Any:
-    """The share of the root's predicted movement that is applied. stand: share of the gait "stand"."""
+def movement_share(stand: Any) -> Any:
+    """The share (0 to 1) of the root's predicted movement that is applied. It is 0 for a standing character.
+
+    stand: share of the gait "stand". At 0.9375, half of the movement is still applied.
+    """
     return np.maximum(0.0, 1.0 - stand) ** 0.25
 
 
 def phase_change(share: Any, predicted: Any) -> Any:
     """The change of phase that is applied, cycles.
 
-    share: from `moving`. predicted: the change that the network predicts, cycles.
+    share: from `movement_share`. predicted: the change that the network predicts, cycles.
     """
     return ((1.0 - STANDING_SHARE) * share + STANDING_SHARE) * predicted

@@ -14,9 +14,9 @@ COMMANDS = {"motion": motion, "labels": labels, **channel_commands(), "play": pl
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Run the command. Returns 0, 1 if something failed, or 130 after Ctrl+C.
+    """Run a subcommand. Returns the exit status: 0, 1 if something failed, or 130 after Ctrl+C.
 
-    arguments: by default those of the command line. Wrong arguments exit with status 2.
+    arguments: by default those of the command line. With wrong arguments, the process exits with status 2.
     """
     parser = argparse.ArgumentParser(
         prog="hobble",
@@ -25,7 +25,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     )
     commands = parser.add_subparsers(dest="command", required=True, metavar="COMMAND")
     for name, module in COMMANDS.items():
-        text = str(module.__doc__)
+        text = str(module.__doc__)  # its first line is the entry in the list of subcommands
         command = commands.add_parser(
             name,
             help=text.splitlines()[0],

@@ -1,7 +1,4 @@
-"""What several subcommands share: work on every BVH file of a folder, and the search for skeleton files.
-
-A bad BVH file does not stop the work on the other files.
-"""
+"""Functions for several subcommands: to process each BVH file of a folder, and to find skeleton files."""
 
 from __future__ import annotations
 
@@ -18,7 +15,7 @@ from hobble.motion.rig import TargetSkeleton, load_skeleton
 
 
 def add_folders(parser: argparse.ArgumentParser, out: str) -> None:
-    """Add the arguments FOLDER and OUT. out: help text of OUT."""
+    """Add the arguments FOLDER and OUT to a subcommand. out: help text of OUT."""
     parser.add_argument("folder", type=Path, help="a folder of BVH files, or one file")
     parser.add_argument("out", type=Path, help=out)
 
@@ -38,21 +35,22 @@ def clips_in(folder: Path) -> dict[str, Path]:
     return found
 
 
-def for_each(clips: dict[str, Path], work: Callable[[str, Path], list[str]]) -> int:
-    """Call `work(name, file)` for every clip. Print the notes that `work` returns, and a summary.
+def process_clips(clips: dict[str, Path], process: Callable[[str, Path], list[str]]) -> int:
+    """Call `process(name, file)` for every clip. Print the notes that it returns, and a summary.
 
-    clips: name -> file. If a clip fails, the message of its error is printed, and the next clip follows.
+    clips: name -> file. If a clip fails, its error message is printed, and the next clip is processed.
     Returns the exit status: 1 if a clip failed, else 0.
     """
     failed = 0
     bar = tqdm(clips.items(), unit=" clips", disable=None, file=sys.stderr)
     for name, file in bar:
         try:
-            notes = work(name, file)
+            notes = process(name, file)
         except HobbleError as error:
             failed += 1
             notes = [f"{error}"]
         for note in notes:
+            # An error message already begins with the path of the file.
             bar.write(note if note.startswith(str(file)) else f"{name}: {note}")
     done = len(clips) - failed
     print(f"{done} of {len(clips)} clips done" + (f", {failed} failed: see above" if failed else ""))
@@ -60,10 +58,10 @@ def for_each(clips: dict[str, Path], work: Callable[[str, Path], list[str]]) -> 
 
 
 def skeleton_folder() -> Path:
-    """The folder of the skeleton files, in the checkout or in the installed package."""
-    here = Path(__file__).resolve().parents[1]
-    checkout = here.parents[1] / "config" / "skeletons"
-    return checkout if checkout.is_dir() else here / "skeletons"
+    """The folder of the skeleton files, in the repository or else in the installed package."""
+    package = Path(__file__).resolve().parents[1]
+    in_repository = package.parents[1] / "config" / "skeletons"
+    return in_repository if in_repository.is_dir() else package / "skeletons"
 
 
 def skeleton_file(name: str) -> Path:
@@ -77,14 +75,14 @@ def skeleton_file(name: str) -> Path:
     path = folder / f"{name}.yaml"
     if not path.is_file():
         known = ", ".join(sorted(p.stem for p in folder.glob("*.yaml")))
-        raise InputError(path, "no such skeleton", fix=f"There are {known}. A path to a file works too.")
+        raise InputError(path, "no such skeleton", fix=f"Use {known}, or the path of a YAML file.")
     return path
 
 
-def skeleton(name: str) -> TargetSkeleton:
-    """The skeleton, with its maps to other skeletons. name: a skeleton's name, or a path to a YAML file.
+def read_skeleton(name: str) -> TargetSkeleton:
+    """Read a skeleton, and which of its joints are which joints of other skeletons.
 
-    Raises InputError if the skeleton's file is missing or wrong.
+    name: a skeleton's name, or a path to a YAML file. Raises InputError if the file is missing or wrong.
     """
     path = skeleton_file(name)
     return load_skeleton(path, path.stem)

@@ -2,8 +2,9 @@
 
 hobble labels FOLDER OUT
 
-For each clip this writes CLIP_footsteps.txt, CLIP_gait.txt and CLIP.phase, with the frame numbers of the
-clip's file. Correct them and put them beside the clip. The workflow then uses them instead of its own labels.
+For each clip, three files are written: CLIP_footsteps.txt, CLIP_gait.txt and CLIP.phase. They tell when the
+feet land, and which gait and phase each frame has. Frame numbers are those of the clip's file. Correct the
+files and put them beside the clip. The workflow then uses them instead of its own labels.
 """
 
 from __future__ import annotations
@@ -24,16 +25,17 @@ from hobble.labels.write_files import write_label_files
 from hobble.motion.make import make_clip
 from hobble.motion.options import ClipMotion
 
-# Clips are retargeted to this skeleton for labelling. The label files fit any skeleton.
+# Clips are retargeted to this skeleton before they are labelled. The label files can be used with any
+# skeleton, because they name no joints.
 SKELETON = "holden31"
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the arguments of `hobble labels`."""
-    batch.add_folders(
-        parser, "the folder to write into; it may be FOLDER, so that the files lie beside the clips"
+    batch.add_folders(parser, "the folder to write into; if it is FOLDER, label files lie beside the clips")
+    parser.add_argument(
+        "--gait", choices=GAITS, help="the main gait of the clips; used where the gait is unclear"
     )
-    parser.add_argument("--gait", choices=GAITS, help="the main gait of the clips; decides unclear cases")
     parser.add_argument(
         "--source-fps", type=float, help="frame rate of the files, if their Frame Time is wrong"
     )
@@ -47,7 +49,7 @@ def run(options: argparse.Namespace) -> int:
         return write_labels(name, file, options.out, options.gait, options.source_fps, options.overwrite)
 
     options.out.mkdir(parents=True, exist_ok=True)
-    return batch.for_each(batch.clips_in(options.folder), label)
+    return batch.process_clips(batch.clips_in(options.folder), label)
 
 
 def write_labels(
@@ -55,14 +57,17 @@ def write_labels(
 ) -> list[str]:
     """Write the three label files of one clip. Returns notes and warnings.
 
-    Raises InputError for a clip that cannot be read, and for label files that exist already, unless
-    `overwrite`.
+    file: the clip's BVH file. out: the folder to write into. gait: the main gait, if known. source_fps: frame
+    rate of the file, if its Frame Time is wrong. Raises InputError if the clip cannot be read, or if a label
+    file exists already and `overwrite` is False.
     """
     paths = [out / f"{name}{end}" for end in ("_footsteps.txt", "_gait.txt", ".phase")]
-    there = [path.name for path in paths if path.exists()]
-    if there and not overwrite:
+    existing = [path.name for path in paths if path.exists()]
+    if existing and not overwrite:
         raise InputError(
-            out, f"{', '.join(there)} would be replaced", fix="Use --overwrite or another folder."
+            out,
+            f"{', '.join(existing)} would be replaced",
+            fix="Use --overwrite, or write into another folder.",
         )
     skeleton = batch.skeleton_file(SKELETON)
     clip, report = make_clip(
@@ -75,9 +80,10 @@ def write_labels(
     )
     # The ground is unknown. It must not be called "flat", because on flat ground the height of the head alone
     # decides whether a person crouches.
-    labels, checked = label_clip(clip, [], report, gait, "rocky", LabelOptions())
+    labels, label_report = label_clip(clip, [], report, gait, "rocky", LabelOptions())
     time = SourceTime(report["source_frames"], report["source_fps"], report["source_start"])
     write_label_files(paths[0], paths[1], paths[2], labels, time)
+    # Seconds of each gait, for the note.
     seconds = np.bincount(labels.gait.argmax(axis=1), minlength=len(GAITS)) / clip.fps
     gaits = ", ".join(f"{s:.1f} s {g}" for s, g in zip(seconds, GAITS, strict=True) if s > 0)
-    return [f"{len(labels.cycles)} cycles, {gaits}", *report["repairs"], *checked.warnings]
+    return [f"{len(labels.cycles)} cycles, {gaits}", *report["repairs"], *label_report.warnings]

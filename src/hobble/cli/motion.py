@@ -3,7 +3,7 @@
 hobble motion FOLDER OUT --fps 60
 hobble motion FOLDER OUT --skeleton holden31 --mirror
 
-Files may have any rotation order, unit, axes and frame rate. Each file is checked, repaired if that is safe,
+Files may have any rotation order, unit, axes and frame rate. Each file is checked, repaired if this is safe,
 and written in centimetres, Y up. Rotations are interpolated as quaternions, not as Euler angles.
 """
 
@@ -24,8 +24,8 @@ from hobble.motion.mirror import mirror_clip
 from hobble.motion.options import ClipMotion
 from hobble.motion.read import read_bvh
 
-# Roles tell which joint is which: hips, head, left heel and so on. Without --skeleton, the joints of a file
-# are matched with the roles of this skeleton.
+# Roles tell which joint is the hips, the head, the left heel and so on. Without --skeleton, the joints of
+# each file are matched with the roles of this skeleton.
 ROLES_FROM = "holden31"
 
 
@@ -37,12 +37,14 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--source-fps", type=float, help="frame rate of the files, if their Frame Time is wrong"
     )
     parser.add_argument(
-        "--skeleton", help="put the motion on this skeleton: a name of config/skeletons or a file"
+        "--skeleton", help="retarget to this skeleton: a name from config/skeletons, or a YAML file"
     )
     parser.add_argument(
         "--mirror", action="store_true", help="also write each clip's mirror image, as CLIP_mirror.bvh"
     )
-    parser.add_argument("--loops", type=int, default=1, help="repeat a clip of one cycle this many times")
+    parser.add_argument(
+        "--loops", type=int, default=1, help="repeat each clip this many times; it must be one cycle"
+    )
     parser.add_argument(
         "--refuse", action="store_true", help="refuse a file with broken frames instead of repairing them"
     )
@@ -52,18 +54,21 @@ def run(options: argparse.Namespace) -> int:
     """Convert every clip. Returns the exit status."""
 
     def convert(name: str, file: Path) -> list[str]:
-        clip, notes = converted(name, file, options)
+        clip, notes = convert_file(name, file, options)
         write_bvh(options.out / f"{name}.bvh", clip)
         if options.mirror:
             write_bvh(options.out / f"{name}_mirror.bvh", mirror_clip(clip, f"{name}_mirror"))
         return notes
 
     options.out.mkdir(parents=True, exist_ok=True)
-    return batch.for_each(batch.clips_in(options.folder), convert)
+    return batch.process_clips(batch.clips_in(options.folder), convert)
 
 
-def converted(name: str, file: Path, options: argparse.Namespace) -> tuple[Clip, list[str]]:
-    """The converted clip of a file, and notes on repairs. Raises InputError for a bad file."""
+def convert_file(name: str, file: Path, options: argparse.Namespace) -> tuple[Clip, list[str]]:
+    """Convert a BVH file. Returns the clip and notes, such as what was repaired.
+
+    name: of the clip. options: the arguments of `hobble motion`. Raises InputError for a bad file.
+    """
     defects: Literal["repair", "refuse"] = "refuse" if options.refuse else "repair"
     settings = ClipMotion(source_fps=options.source_fps, defects=defects, loops=options.loops)
     folder = batch.skeleton_folder()
@@ -71,8 +76,8 @@ def converted(name: str, file: Path, options: argparse.Namespace) -> tuple[Clip,
         target = batch.skeleton_file(options.skeleton)
         clip, report = make_clip(file, target, folder, clip=name, skeleton_name=target.stem, options=settings)
         return resample(clip, options.fps), report["repairs"] + report["unsure"] + report["notes"]
-    source = load_source(read_bvh(file), batch.skeleton(ROLES_FROM), folder, settings)
+    source = load_source(read_bvh(file), batch.read_skeleton(ROLES_FROM), folder, settings)
     clip = resample(source.clip, options.fps)
     if options.loops > 1:
-        clip = loop_clip(clip, options.loops, None)
+        clip = loop_clip(clip, options.loops, None)  # None: keep the heading
     return replace(clip, name=name), source.repairs + source.notes

@@ -1,7 +1,7 @@
 """Open the page on which you control a trained character with the keyboard.
 
-hobble play                    the newest report under results/
-hobble play results/injured    the report of this configuration
+hobble play                    opens the newest report under results/
+hobble play results/injured    opens the report of the configuration `injured`
 """
 
 from __future__ import annotations
@@ -17,30 +17,35 @@ REPORT = "report.html"
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the arguments of `hobble play`."""
-    parser.add_argument("results", nargs="?", type=Path, help="results/<configuration>, or a report file")
+    parser.add_argument(
+        "results",
+        nargs="?",
+        type=Path,
+        help="results/<configuration>, or a report file; default: the newest report",
+    )
     parser.add_argument("--print", action="store_true", help="print the address, open no browser")
 
 
 def run(options: argparse.Namespace) -> int:
     """Open the page. Returns the exit status."""
-    address = report_of(options.results).resolve().as_uri() + "#play"
+    address = find_report(options.results).resolve().as_uri() + "#play"
     print(address)
     if not options.print and not webbrowser.open(address):
         print("No browser could be started. Open the address above in one.")
     return 0
 
 
-def report_of(results: Path | None) -> Path:
-    """The report file. results: a folder of results or a report; None for the newest report under results/.
+def find_report(results: Path | None) -> Path:
+    """The path of a report. results: a report, or the folder that holds it; None: the newest under results/.
 
-    Raises InputError, with the command that makes a report, if there is none.
+    If there is no report, raises InputError with the command that makes one.
     """
     if results is None:
         found = sorted(Path("results").glob(f"*/{REPORT}"), key=lambda path: path.stat().st_mtime)
         if not found:
-            raise InputError("results", "holds no report", fix="Make one: make report.")
+            raise InputError("results", "holds no report", fix="`make report` makes one.")
         return found[-1]
     path = results / REPORT if results.is_dir() or results.suffix != ".html" else results
     if not path.is_file():
-        raise InputError(path, "no such report", fix=f"Make it: snakemake -c2 {path}.")
+        raise InputError(path, "no such report", fix=f"`snakemake -c2 {path}` makes it.")
     return path

@@ -1,4 +1,7 @@
-"""Reads YAML files and command-line overrides into validated models. Errors name the file and the key."""
+"""Reads configurations, data sets and skeletons from YAML files and validates them.
+
+Values from the command line override those of a configuration. Errors name the file and the key.
+"""
 
 from __future__ import annotations
 
@@ -20,50 +23,54 @@ Model = TypeVar("Model", bound=BaseModel)
 # Names that cannot lead out of their folder and are not too long for a file name.
 NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9_.-]{0,99}")
 MOST_PROBLEMS = 20  # a message lists at most this many problems of a configuration, data set or skeleton
-# What YAML makes of on, 02_01, 1e5 and 2020-01-01 without quotes.
+# The types that YAML gives to on, 02_01, 1.5 and 2020-01-01 without quotes.
 NOT_STRINGS = (bool, int, float, date)
 QUOTES_HINT = 'Put the name in quotes, as in "02_01"; otherwise YAML reads it as a number or a date.'
 NAME_HINT = "Names may have letters, digits, dots, dashes and underscores, 100 at most."
 
 
 def merge(base: Mapping[str, Any], over: Mapping[str, Any]) -> dict[str, Any]:
-    """Put `over` on top of `base`: mappings are merged recursively, everything else is replaced.
+    """A copy of `base` with the values of `over`. Mappings are merged recursively; other values are replaced.
 
-    If `over` chooses another kind of network, its section `network` replaces the whole section of `base`,
-    because each kind has its own keys.
+    If `over` chooses another kind of network, its section `network` replaces the whole section `network` of
+    `base`, because each kind has its own keys.
     """
-    out = copy.deepcopy(dict(base))
+    merged = copy.deepcopy(dict(base))
     for key, value in over.items():
-        mergeable = isinstance(value, Mapping) and isinstance(out.get(key), Mapping)
-        if mergeable and key == "network" and _kind(value, out[key]) != _kind(out[key]):
+        mergeable = isinstance(value, Mapping) and isinstance(merged.get(key), Mapping)
+        if mergeable and key == "network" and _network_kind(value, merged[key]) != _network_kind(merged[key]):
             mergeable = False
-        out[key] = merge(out[key], value) if mergeable else copy.deepcopy(value)
-    return out
+        merged[key] = merge(merged[key], value) if mergeable else copy.deepcopy(value)
+    return merged
 
 
-def _kind(network: Mapping[str, Any], below: Mapping[str, Any] | None = None) -> Any:
-    """The kind in a section `network`. If it has none: the kind in the section `below`, or else DEFAULT."""
-    return network.get("kind", _kind(below) if below is not None else DEFAULT)
+def _network_kind(network: Mapping[str, Any], base: Mapping[str, Any] | None = None) -> Any:
+    """The kind of network in a section `network`. If it names none, the kind in `base`, or else DEFAULT.
+
+    base: the section that this section overrides, if there is one.
+    """
+    return network.get("kind", _network_kind(base) if base is not None else DEFAULT)
 
 
 def read_yaml(path: Path) -> dict[str, Any]:
-    """Read a YAML mapping. Raises InputError; if a line does not parse, with its number."""
+    """Read a YAML mapping; an empty file gives {}. Raises InputError for a missing or bad file."""
     if not path.is_file():
-        there = ", ".join(sorted(p.stem for p in path.parent.glob("*.yaml"))) or "none"
-        raise InputError(path, "no such file", fix=f"There are: {there}.")
+        existing = ", ".join(sorted(p.stem for p in path.parent.glob("*.yaml"))) or "none"
+        raise InputError(path, "no such file", fix=f"There are: {existing}.")
     data = untrusted.read_yaml(path)
     if data is None:
         return {}
     if not isinstance(data, dict):
-        raise InputError(path, "must hold keys and values")
+        raise InputError(path, "must be a mapping of keys to values")
     return data
 
 
 def read_layers(folder: Path, name: str, within: tuple[str, ...] = ()) -> tuple[dict[str, Any], list[Path]]:
-    """The values of `<folder>/<name>.yaml` merged over those of the file that it `extends`.
+    """The values of `<folder>/<name>.yaml`, merged over those of the files that it extends.
 
-    Also returns the files that were read. within: names of the configurations whose `training: NAME` led to
-    this one, to find a loop of such references.
+    A file extends another file with `extends: NAME`. The other file may extend a third one, and so on.
+    within: names of the configurations that led to this one through `training: NAME`; they are needed to find
+    circular references. Returns the values, and the files that were read, `<name>.yaml` first.
     """
     files: list[Path] = []
     chain: list[dict[str, Any]] = []
@@ -71,7 +78,7 @@ def read_layers(folder: Path, name: str, within: tuple[str, ...] = ()) -> tuple[
     while next_name is not None:
         if not isinstance(next_name, str) or not NAME.fullmatch(next_name):
             where = files[-1] if files else folder
-            raise InputError(where, f"{next_name!r:.80} is not a name", fix=NAME_HINT)
+            raise InputError(where, f"{next_name!r:.80} is not a valid name", fix=NAME_HINT)
         path = folder / f"{next_name}.yaml"
         if path in files:
             raise InputError(path, f"extends itself through {' -> '.join(p.stem for p in files)}")
@@ -85,16 +92,17 @@ def read_layers(folder: Path, name: str, within: tuple[str, ...] = ()) -> tuple[
 
 
 def with_training(folder: Path, values: dict[str, Any], within: tuple[str, ...] = ()) -> dict[str, Any]:
-    """Replace `training: NAME` in `values` by the training section of configuration NAME.
+    """Replace `training: NAME` in `values` by the section `training` of the configuration NAME.
 
-    within: names of the configurations that led to this section; see `read_layers`.
+    within: names of the configurations that led here, as in `read_layers`. The last one contains `values`. It
+    is empty if NAME comes from the command line.
     """
     name = values.get("training")
     if not isinstance(name, str):
         return values
     if within and not NAME.fullmatch(name):
         raise InputError(
-            folder / f"{within[-1]}.yaml", f"training: {name!r:.80} is not a name", fix=NAME_HINT
+            folder / f"{within[-1]}.yaml", f"training: {name!r:.80} is not a valid name", fix=NAME_HINT
         )
     if name in within:
         raise InputError(folder / f"{name}.yaml", f"`training: {name}` refers to itself")
@@ -102,7 +110,10 @@ def with_training(folder: Path, values: dict[str, Any], within: tuple[str, ...] 
 
 
 def validate(model: type[Model], values: Mapping[str, Any], where: str) -> Model:
-    """Validate `values`. Raises one HobbleError that lists the problems as `where: key: what is allowed`."""
+    """Validate `values`. Raises a HobbleError that lists the problems, each as `where: key: what is allowed`.
+
+    where: the files from which the values come.
+    """
     try:
         return model.model_validate(values)
     except ValidationError as error:
@@ -114,14 +125,15 @@ def validate(model: type[Model], values: Mapping[str, Any], where: str) -> Model
 
 
 def _problem(item: Any, model: type[BaseModel]) -> str:
-    """The message for one of pydantic's errors: the key and what is allowed."""
+    """The message for one error of pydantic: the key and what is allowed. item: a dict from `errors()`."""
     key = ".".join(str(part) for part in item["loc"]) or "(whole file)"
     if item["type"] == "extra_forbidden":
         allowed = ", ".join(_keys_at(model, item["loc"][:-1])) or "none"
         return f"{key}: there is no such key. Allowed here: {allowed}."
     message = item["msg"].removeprefix("Value error, ")
-    of_a_section = isinstance(item["input"], Mapping)
-    if item["type"] == "value_error" and of_a_section:  # a section's own message needs no `not ...`
+    about_section = isinstance(item["input"], Mapping)
+    # A message about a whole section does not end with `not <value>`, because the section would be too long.
+    if item["type"] == "value_error" and about_section:
         return f"{key}: {message}." if item["loc"] else f"{message}."
     text = f"{key}: {message[0].lower()}{message[1:]}, not {item['input']!r:.80}."
     if item["type"] == "string_type" and isinstance(item["input"], NOT_STRINGS):
@@ -130,11 +142,15 @@ def _problem(item: Any, model: type[BaseModel]) -> str:
 
 
 def _keys_at(model: Any, location: tuple[Any, ...]) -> list[str]:
-    """The keys that a model allows in the section at a location, which is a path of keys and indices."""
+    """The keys that a model allows in one of its sections.
+
+    location: the keys and indices that lead to the section, from the top of the file.
+    """
     for part in location:
         field = getattr(model, "model_fields", {}).get(part)
         if field is not None:
             model = field.annotation
+        # The section's model may be inside a type, as in dict[str, ClipEntry | None].
         arguments = [model, *getattr(model, "__args__", ())]
         arguments += [inner for a in arguments for inner in getattr(a, "__args__", ())]
         model = next((a for a in arguments if isinstance(a, type) and issubclass(a, BaseModel)), model)
@@ -144,7 +160,7 @@ def _keys_at(model: Any, location: tuple[Any, ...]) -> list[str]:
 class Catalogue:
     """The configurations, data sets and skeletons under config/, each read and validated when first needed.
 
-    overrides: values from the command line, merged over every configuration.
+    folder: the path of config/. overrides: values from the command line, merged over every configuration.
     """
 
     def __init__(self, folder: Path, overrides: Mapping[str, Any] | None = None) -> None:
@@ -157,23 +173,26 @@ class Catalogue:
         return sorted(path.stem for path in self.folder.glob("*.yaml"))
 
     def configuration(self, name: str) -> Configuration:
-        """The configuration `name`, with everything it extends."""
+        """The configuration `name`, merged over those that it extends."""
         return self._get("configuration", name, self.folder, Configuration, self.overrides)
 
     @staticmethod
     def _model_for(model: type[Model], values: Mapping[str, Any], where: str) -> type[Model]:
-        """The model to validate with. For a configuration it depends on the kind of network."""
+        """The model that validates `values`. For a configuration it depends on the kind of network.
+
+        where: as in `validate`.
+        """
         network = values.get("network")
         if model is not Configuration or not isinstance(network, Mapping):
             return model
-        kind = _kind(network)
+        kind = _network_kind(network)
         if kind not in MODELS:
             kinds = ", ".join(MODELS)
             raise HobbleError(f"{where}: network.kind: there is no kind {kind!r:.40}, only {kinds}.")
         return configuration_of(kind)  # type: ignore[return-value]
 
     def dataset(self, name: str) -> Dataset:
-        """The data set `name`, with everything it extends."""
+        """The data set `name`, merged over those that it extends."""
         return self._get("dataset", name, self.folder / "datasets", Dataset, {})
 
     def skeleton(self, name: str) -> SkeletonFile:
@@ -181,6 +200,10 @@ class Catalogue:
         return self._get("skeleton", name, self.folder / "skeletons", SkeletonFile, {})
 
     def _get(self, kind: str, name: str, folder: Path, model: type[Model], over: Mapping[str, Any]) -> Model:
+        """The file `<folder>/<name>.yaml`, merged and validated, or the result of an earlier call.
+
+        kind: what the file describes, such as "dataset". over: values that are merged over those of the file.
+        """
         if (kind, name) not in self._cache:
             values, files = read_layers(folder, name)
             where = " < ".join(str(path) for path in files)

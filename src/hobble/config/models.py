@@ -15,16 +15,17 @@ from hobble.models import DEFAULT, model
 from hobble.models.options import Options
 
 
-def _clip_name(name: str) -> str:
+def _check_clip_name(name: str) -> str:
     if not is_valid_clip_name(name):
-        raise ValueError(f"a clip's name has {CLIP_NAME_RULE}")
+        raise ValueError(f"a clip's name must have {CLIP_NAME_RULE}")
     return name
 
 
 def _refuse_old_keys(values: Any, model: type[s.Section], how: str) -> Any:
-    """Raise ValueError for a key in OLD_KEYS. how: what to write instead, with {} for the channel's name.
+    """Raise ValueError if a section has a key that is in OLD_KEYS and not in its model.
 
-    values: a section before validation. model: the section's model. Returns `values`.
+    values: the section before validation. model: the section's model. how: what to write instead of the key,
+    with {} for the channel's name. Returns `values`.
     """
     for key in values if isinstance(values, dict) else ():
         if key not in model.model_fields and isinstance(key, str) and key in OLD_KEYS:
@@ -32,23 +33,23 @@ def _refuse_old_keys(values: Any, model: type[s.Section], how: str) -> Any:
     return values
 
 
-def _channel(name: str) -> str:
+def _check_channel_name(name: str) -> str:
     if name not in NAMES_OF_CHANNELS:
         raise ValueError(f"must be a channel ({', '.join(NAMES_OF_CHANNELS)})")
     return name
 
 
 Name = Annotated[str, Field(pattern=r"^[A-Za-z0-9][A-Za-z0-9_.-]{0,99}$")]
-ClipName = Annotated[str, AfterValidator(_clip_name)]
-ChannelName = Annotated[str, AfterValidator(_channel)]
-# Key of older files -> the channel that replaces it.
+ClipName = Annotated[str, AfterValidator(_check_clip_name)]
+ChannelName = Annotated[str, AfterValidator(_check_channel_name)]
+# Key of older files -> name of the channel that replaces it.
 OLD_KEYS = {key: each.name for each in all_channels() for key in each.old_keys}
-# Keys of a clip that only the generator of synthetic clips reads. It computes clips of a walker.
-WALKER_KEYS = ("recipe", "share")
+# Keys of a clip's entry that only the generator of synthetic clips reads.
+GENERATOR_KEYS = ("recipe", "share")
 
 
 class ClipEntry(s.Section):
-    """One clip of a data set."""
+    """The entry of one clip in a data set."""
 
     gait: s.Gait | None = Field(None, description="the main gait of the clip, for automatic labels")
     ground: s.Ground = "flat"
@@ -56,12 +57,16 @@ class ClipEntry(s.Section):
     person: Name | None = Field(
         None, description="who walks; needed by measurements that leave out all clips of a person"
     )
-    recipe: str | None = Field(None, description="for synthetic clips: which plan the walker follows")
+    recipe: str | None = Field(
+        None,
+        description="for synthetic clips: what the generated walker does, a key of "
+        "`hobble.synthetic.recipes.RECIPES`",
+    )
     share: s.PositiveFloat = Field(1.0, description="for synthetic clips: length relative to the other clips")
     source_fps: s.PositiveFloat | None = Field(None, description="overrides the file's Frame Time")
     hurt: Annotated[float, Field(ge=0, le=9, allow_inf_nan=False)] | None = Field(
         None,
-        description="total length of the clip's hurt versions, as a multiple of its own length; overrides "
+        description="total length of the clip's hurt versions, as a multiple of the clip's length; overrides "
         "`hurt.versions` and `hurt.longest` of the data set",
     )
     loops: s.Positive | None = Field(None, description="overrides motion.loops")
@@ -78,37 +83,48 @@ class Dataset(s.Section):
 
     extends: Name | None = None
     skeleton: Name
-    source: Name | None = Field(None, description="data set whose generated or downloaded BVH files are used")
+    source: Name | None = Field(
+        None, description="use the generated or downloaded BVH files of this data set"
+    )
     folder: s.MocapPath | None = Field(None, description="folder of the BVH files, inside the mocap folder")
-    download: s.Download | None = Field(None, description="address of clips that are not in the folder")
+    download: s.Download | None = Field(
+        None, description="where to download clips that are not in the folder"
+    )
     clips: dict[ClipName, ClipEntry | None] = Field(
         default_factory=dict, description="clips by name; empty: every .bvh in the folder and its subfolders"
     )
-    held_out: tuple[ClipName, ...] = Field((), description="clips kept from training, with their mirrors")
+    held_out: tuple[ClipName, ...] = Field(
+        (), description="clips that, with their mirror images, are not used for training"
+    )
     mirror: bool = False
     channels: dict[ChannelName, dict[str, Any]] = Field(
-        {}, description="options of each channel that needs them"
+        {}, description="channel -> its options, for channels that have options"
     )
     synthetic: s.Synthetic | None = None
     motion: s.MotionOptions = s.MotionOptions()
     labels: s.LabelOptions = s.LabelOptions()
-    hurt: s.Hurt | None = Field(None, description="hurt versions of the healthy clips, as further clips")
+    hurt: s.Hurt | None = Field(
+        None, description="how to compute hurt versions of healthy clips, which are added as further clips"
+    )
     terrain: s.Terrain = s.Terrain()
     database: s.DatabaseOptions = s.DatabaseOptions()
 
     @field_validator("channels")
     @classmethod
-    def _sections(cls, given: dict[str, dict[str, Any]]) -> dict[str, dict[str, Any]]:
-        out = {}
-        for name, values in given.items():
+    def _validate_options(cls, sections: dict[str, dict[str, Any]]) -> dict[str, dict[str, Any]]:
+        """Validate the options of each channel, and fill in their defaults."""
+        validated = {}
+        for name, values in sections.items():
             options = channel(name).Options
             if options is None:
-                raise ValueError(f"channel {name} has no section: it is read from files beside the clips")
-            out[name] = options.model_validate(values).model_dump(mode="json")
-        return out
+                raise ValueError(
+                    f"channel {name} has no options; its values are read from files beside the clips"
+                )
+            validated[name] = options.model_validate(values).model_dump(mode="json")
+        return validated
 
     @model_validator(mode="after")
-    def _one_source(self) -> Dataset:
+    def _check_clips(self) -> Dataset:
         if self.synthetic is None and self.folder is None:
             raise ValueError("a data set needs `folder` (BVH files) or `synthetic` (generated clips)")
         if self.synthetic is not None and not self.clips:
@@ -116,7 +132,7 @@ class Dataset(s.Section):
         if self.download is not None and not (self.folder and self.clips):
             raise ValueError("a data set that downloads its clips needs a list of its `clips` and a `folder`")
         if self.synthetic is None:
-            self._no_walker_keys()
+            self._refuse_generator_keys()
         unknown = [c for c in self.held_out if self.clips and c not in self.clips]
         if unknown:
             raise ValueError(f"held_out names clips that are not in `clips`: {', '.join(unknown)}")
@@ -126,9 +142,9 @@ class Dataset(s.Section):
                     raise ValueError(f"clips.{clip}.hurt: the data set has no section `hurt`")
         return self
 
-    def _no_walker_keys(self) -> None:
+    def _refuse_generator_keys(self) -> None:
         for clip, entry in self.clips.items():
-            for key in WALKER_KEYS:
+            for key in GENERATOR_KEYS:
                 if entry and getattr(entry, key) != ClipEntry.model_fields[key].default:
                     raise ValueError(
                         f"clips.{clip}.{key}: only clips of a `synthetic` data set have this key"
@@ -141,10 +157,13 @@ class Configuration(s.Section):
     extends: Name | None = None
     dataset: Name = "synthetic"
     channels: tuple[ChannelName, ...] = Field(
-        (), description="inputs of the network; clips with values of another channel are left out"
+        (),
+        description="input channels of the network; clips with values of other channels are left out",
     )
-    network_of: Name | None = Field(None, description="use another configuration's network, train none")
-    network: Options = model(DEFAULT).options()()  # its type depends on its kind: `configuration_of`
+    network_of: Name | None = Field(
+        None, description="use the network of this other configuration instead of training one"
+    )
+    network: Options = model(DEFAULT).options()()  # for other kinds of network, see `configuration_of`
     training: s.Training = s.Training()
     runtime: s.Runtime = s.Runtime()
     evaluation: s.Evaluation = s.Evaluation()
@@ -157,20 +176,26 @@ class Configuration(s.Section):
 
     @field_validator("channels")
     @classmethod
-    def _in_order(cls, names: tuple[str, ...]) -> tuple[str, ...]:
-        """Each channel once, in the order of `hobble.channels.NAMES`, so that equal sets share a database."""
+    def _sort_channels(cls, names: tuple[str, ...]) -> tuple[str, ...]:
+        """Each channel once, in the order of `hobble.channels.NAMES`.
+
+        So configurations that name the same channels in different orders share a database.
+        """
         return tuple(name for name in NAMES_OF_CHANNELS if name in names)
 
 
 @functools.cache
 def configuration_of(kind: str) -> type[Configuration]:
-    """`Configuration` whose section `network` has the keys of this kind of network, one of MODELS."""
-    of_network = model(kind).options()
-    return create_model("Configuration", __base__=Configuration, network=(of_network, of_network()))
+    """A subclass of `Configuration` whose section `network` has the keys of this kind of network.
+
+    kind: one of `hobble.models.MODELS`.
+    """
+    options = model(kind).options()
+    return create_model("Configuration", __base__=Configuration, network=(options, options()))
 
 
 class JointEntry(s.Section):
-    """A joint of a skeleton. offset: from the parent, in the rest pose, cm."""
+    """A joint of a skeleton. parent: None for the root. offset: from the parent, in the rest pose, cm."""
 
     parent: str | None
     offset: tuple[float, float, float]
@@ -185,26 +210,27 @@ class SkeletonFile(s.Section):
     links: tuple[tuple[str, str], ...] = ()
     unseen: tuple[str, ...] = ()
     maps: dict[Name, dict[str, str]] = Field(
-        {}, description="for retargeting: name of another skeleton -> {joint of this one: joint of the other}"
+        {},
+        description="for retargeting: name of another skeleton -> {joint of this one: joint of the other}",
     )
 
     @model_validator(mode="after")
     def _joints_are_consistent(self) -> SkeletonFile:
-        seen: set[str] = set()
+        known: set[str] = set()  # names of the joints listed so far
         for name, joint in self.joints.items():
-            if joint.parent is None and seen:
+            if joint.parent is None and known:
                 raise ValueError(f"joint {name}: only the first joint may have no parent")
-            if joint.parent is not None and joint.parent not in seen:
+            if joint.parent is not None and joint.parent not in known:
                 raise ValueError(f"joint {name}: its parent {joint.parent!r} must be listed before it")
-            seen.add(name)
-        named: dict[str, Any] = {
+            known.add(name)
+        joint_names: dict[str, Any] = {  # key of the file -> names of joints in its value
             "roles": self.roles.values(),
             "end_sites": self.end_sites,
             "links": [joint for link in self.links for joint in link],
             "unseen": self.unseen,
         }
-        for key, names in named.items():
+        for key, names in joint_names.items():
             for name in names:
-                if name not in seen:
+                if name not in known:
                     raise ValueError(f"{key}: there is no joint {name!r}")
         return self

@@ -1,8 +1,8 @@
-"""Collects the typed sections of data sets and configurations from the stages that read them.
+"""Collects the types of the sections of data sets and configurations, for `hobble.config.models`.
 
-A stage is a package such as `hobble.motion`. Its `options.py` has the keys of its section with defaults,
-units and ranges. Sections are validated before Snakemake plans its jobs, and each job gets its section as the
-same type.
+A stage of the workflow is a package such as `hobble.motion`. Its `options.py` defines a class for each
+section that the stage reads, with keys, defaults, units and ranges. Sections are validated before Snakemake
+plans its jobs, and each job gets its section as an instance of this class.
 """
 
 from hobble.core.section import (
@@ -52,6 +52,6 @@ __all__ = [
     "Training",
 ]
 
-# The configurations in results/compare/ unless --config compare names others: the published networks, and the
-# character that can be hurt.
+# Names of the configurations that are compared in results/compare/, unless --config compare=... names others:
+# the published networks, and the character that can be hurt.
 COMPARED = ("holden", "holden-xl", "holden-xt", "ava", "ava-m", "injured")

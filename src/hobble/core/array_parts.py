@@ -1,4 +1,4 @@
-"""Reads single rows of the arrays in an npz file, so that a large file need not fit into memory."""
+"""Reads some rows of an array in an npz file, so that a large file need not fit into memory."""
 
 from __future__ import annotations
 
@@ -12,16 +12,17 @@ from hobble.core.errors import InputError
 from hobble.core.files import DAMAGE_ERRORS, DELETE_IT, HEADER_READERS, check_archive, check_header
 from hobble.core.untrusted import check_regular, printable
 
-# Before each array, a zip file has a header: 30 bytes, then the array's file name, then an extra field. The
-# last four of the 30 bytes hold the lengths of the name and of the extra field.
-LOCAL_HEADER = 30
+# An npz file is a zip file with an npy file for each array. Before each npy file there is a zip header: 30
+# bytes, then the name of the npy file, then an extra field. The last four of the 30 bytes hold the lengths of
+# the name and of the extra field.
+ZIP_HEADER_BYTES = 30
 
 
 class ArrayParts:
     """The arrays of an uncompressed npz, such as `hobble.core.files.save_npz` writes.
 
-    Unlike `hobble.core.files.load_npz`, this class does not verify checksums, because each checksum covers a
-    whole array. Raises InputError if the file is missing or damaged.
+    Unlike `hobble.core.files.load_npz`, this class does not verify checksums, because it would have to read
+    whole arrays for that. Raises InputError if the file is missing or damaged.
     """
 
     def __init__(self, path: str | Path) -> None:
@@ -30,8 +31,9 @@ class ArrayParts:
             check_regular(path)
             with zipfile.ZipFile(path) as archive:
                 check_archive(path, archive)
+                # Name of an array -> where its numbers begin, its shape and its type.
                 self._places = {
-                    entry.filename.removesuffix(".npy"): self._place(archive, entry)
+                    entry.filename.removesuffix(".npy"): self._find_array(archive, entry)
                     for entry in archive.infolist()
                 }
         except FileNotFoundError as error:
@@ -53,53 +55,59 @@ class ArrayParts:
 
     def shape(self, name: str) -> tuple[int, ...]:
         """The shape of a whole array."""
-        return self._of(name)[1]
+        return self._place_of(name)[1]
 
     def whole(self, name: str) -> np.ndarray:
-        """A whole array. Use it for a scalar, which has no rows."""
-        at, shape, dtype = self._of(name)
-        return self._read(name, at, shape, dtype)
+        """A whole array. A scalar has no rows, so it can only be read with this method."""
+        start, shape, dtype = self._place_of(name)
+        return self._read(name, start, shape, dtype)
 
     def rows(self, name: str, first: int, stop: int) -> np.ndarray:
-        """The rows of an array from `first` up to `stop`, as in a slice."""
-        at, shape, dtype = self._of(name)
+        """The rows `first:stop` of an array. As with a slice, rows that do not exist are left out."""
+        start, shape, dtype = self._place_of(name)
         if not shape:
             raise InputError(self.path, f"{printable(name)} has no rows", fix=DELETE_IT)
         first, stop, _ = slice(first, stop).indices(shape[0])
         row_bytes = int(np.prod(shape[1:], dtype=np.int64)) * dtype.itemsize
-        return self._read(name, at + first * row_bytes, (max(0, stop - first), *shape[1:]), dtype)
+        return self._read(name, start + first * row_bytes, (max(0, stop - first), *shape[1:]), dtype)
 
-    def _of(self, name: str) -> tuple[int, tuple[int, ...], np.dtype]:
+    def _place_of(self, name: str) -> tuple[int, tuple[int, ...], np.dtype]:
+        """As in `_find_array`. Raises InputError if there is no such array."""
         if name not in self._places:
             raise InputError(self.path, f"holds no array {printable(name)!r}", fix=DELETE_IT)
         return self._places[name]
 
-    def _read(self, name: str, at: int, shape: tuple[int, ...], dtype: np.dtype) -> np.ndarray:
+    def _read(self, name: str, start: int, shape: tuple[int, ...], dtype: np.dtype) -> np.ndarray:
+        """An array of this shape and type. start: its first byte in the file. name: for messages."""
         count = int(np.prod(shape, dtype=np.int64))
         with open(self.path, "rb") as file:
-            file.seek(at)
+            file.seek(start)
             data = file.read(count * dtype.itemsize)
         if len(data) != count * dtype.itemsize:
             raise InputError(self.path, f"{printable(name)} does not fit into the file", fix=DELETE_IT)
+        # bytearray, because an array over `bytes` would be read-only.
         return np.frombuffer(bytearray(data), dtype).reshape(shape)
 
-    def _place(
+    def _find_array(
         self, archive: zipfile.ZipFile, entry: zipfile.ZipInfo
     ) -> tuple[int, tuple[int, ...], np.dtype]:
-        """Where the numbers of an array begin in the file, and the shape and type of the array."""
+        """Where the numbers of an array begin (bytes from the start of the file), its shape and its type.
+
+        entry: the array's npy file in the archive. Raises ValueError or EOFError if its rows cannot be read.
+        """
         if entry.compress_type != zipfile.ZIP_STORED:
             raise ValueError(f"{entry.filename} is compressed")
         if entry.header_offset + entry.file_size > archive.start_dir:
             raise EOFError(f"{entry.filename} does not fit into the file")
         with open(self.path, "rb") as file:
             file.seek(entry.header_offset)
-            name_length, extra_length = struct.unpack("<26xHH", file.read(LOCAL_HEADER))
-            start = entry.header_offset + LOCAL_HEADER + name_length + extra_length
+            name_length, extra_length = struct.unpack("<26xHH", file.read(ZIP_HEADER_BYTES))
+            npy_start = entry.header_offset + ZIP_HEADER_BYTES + name_length + extra_length
         with archive.open(entry) as file:
             check_header(file, entry.file_size)
-            header_length = file.tell()
+            npy_header_length = file.tell()
             file.seek(0)
             shape, by_columns, dtype = HEADER_READERS[np.lib.format.read_magic(file)](file)
         if by_columns and len(shape) > 1:
             raise ValueError(f"{entry.filename} is stored column by column")
-        return start + header_length, shape, dtype
+        return npy_start + npy_header_length, shape, dtype

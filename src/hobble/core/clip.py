@@ -1,4 +1,4 @@
-"""A clip: the motion of one skeleton over time."""
+"""The motion of one skeleton over time, in memory and as an npz file."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from hobble.core.skeleton import Skeleton, forward_kinematics
 
 @dataclass(frozen=True)
 class Clip:
-    """F frames of a skeleton of J joints: centimetres, right-handed, Y up, +Z forward.
+    """A motion: F frames of a skeleton with J joints, in centimetres, right-handed, Y up, +Z forward.
 
     fps: frames per second. rotations: (F, J, 4) local unit quaternions, w first. root: (F, 3) positions of
     the root joint. translations: (F, J, 3) positions of the joints relative to their parents, or None if all
@@ -35,6 +35,7 @@ class Clip:
 
     @cached_property
     def _world(self) -> tuple[Array, Array]:
+        """World rotations and positions of all joints, computed at the first use."""
         return forward_kinematics(self.skeleton, self.rotations, self.root, self.translations)
 
     @property
@@ -49,7 +50,7 @@ class Clip:
 
 
 def save_clip(path: str | Path, clip: Clip) -> None:
-    """Write a clip with its skeleton as one npz file."""
+    """Write a clip with its skeleton as one npz file. Rotations and translations are stored as float32."""
     extra = {} if clip.translations is None else {"translations": clip.translations.astype(np.float32)}
     save_npz(
         path,
@@ -63,7 +64,7 @@ def save_clip(path: str | Path, clip: Clip) -> None:
 
 
 def load_clip(path: str | Path) -> Clip:
-    """Read what `save_clip` wrote. Rotations are returned as float64 of unit length."""
+    """Read what `save_clip` wrote. Rotations are float64 and have unit length again."""
     data = load_npz(path)
     rotations = data["rotations"].astype(float)
     rotations /= np.linalg.norm(rotations, axis=-1, keepdims=True)

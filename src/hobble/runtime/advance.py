@@ -16,7 +16,7 @@ from hobble.core.compiled import njit
 from hobble.rows.layout import RowLayout
 from hobble.runtime.trajectory import STILL, Trajectory
 
-phase_change, moving_share = register_jitable(rule.phase_change), register_jitable(rule.moving)
+phase_change, movement_share = register_jitable(rule.phase_change), register_jitable(rule.movement_share)
 
 # If the predicted poses are recorded frames (motion matching), the root's movement is changed toward the
 # target velocity. Across the target, the change is at most this share of the movement's length.
@@ -91,7 +91,7 @@ def advance(
                 direction[c, i, k] = direction[c, i + 1, k]
             for k in range(gait.shape[2]):
                 gait[c, i, k] = gait[c, i + 1, k]
-        moving = 1.0 if recorded_poses else moving_share(gait[c, middle, 0])
+        moving = 1.0 if recorded_poses else movement_share(gait[c, middle, 0])
         yaw = np.arctan2(direction[c, middle, 0], direction[c, middle, 1])
         sin, cos = np.sin(yaw), np.cos(yaw)
         vx, vz = y[c, at[0]], y[c, at[0] + 1]

@@ -6,7 +6,7 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from hobble.channels.speed_limits import together
+from hobble.channels.speed_limits import combine_limits
 from hobble.core.quat import Array
 from hobble.models.network import Network
 
@@ -39,8 +39,8 @@ class SpeedLimiter:
             return
         if self._values is None or not np.array_equal(values, self._values):
             self._values = values.copy()
-            each = [limits.allowed(values[:, columns]) for columns, limits in self._tables]
-            self._allowed[:] = together(each, self._tables[0][1].usual)
+            each = [limits.highest_speeds(values[:, columns]) for columns, limits in self._tables]
+            self._allowed[:] = combine_limits(each, self._tables[0][1].usual)
         if not np.isfinite(self._allowed).any():
             return
         walk, jog = self._gaits["walk"], self._gaits["jog"]

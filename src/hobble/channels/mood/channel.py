@@ -1,4 +1,4 @@
-"""The mood channel: a column from 0 to 1 for each of five moods. All are 0 in a neutral clip."""
+"""The mood channel: for each of five moods a column with values from 0 to 1. A neutral clip has 0 in all."""
 
 from __future__ import annotations
 
@@ -15,23 +15,25 @@ if TYPE_CHECKING:
     from hobble.core.clip import Clip
     from hobble.core.quat import Array
 
-Name = Literal["tired", "old", "happy", "sad", "angry"]
+MoodName = Literal["tired", "old", "happy", "sad", "angry"]
 Amount = Annotated[float, Field(ge=0, le=1)]
 
 
 class Patterns(Section):
     """The section `channels.mood` of a data set: which clips have which mood."""
 
-    patterns: dict[str, dict[Name, Amount]] = Field(
-        description="pattern of clip names -> mood; * stands for any text; the first pattern that fits counts"
+    patterns: dict[str, dict[MoodName, Amount]] = Field(
+        description="pattern of clip names -> {mood: amount}; * in a pattern stands for any text; the first "
+        "pattern that fits a clip's name counts"
     )
 
 
 class Mood(Channel):
-    """The mood of a whole clip.
+    """The channel whose values say how tired, old, happy, sad or angry the person in a clip is.
 
-    It comes from the clip's entry in the data set ({sad: .5}), else from the first pattern that fits the
-    clip's name. The fields are explained in `hobble.channels.channel.Channel`.
+    A clip has the same values in all frames. They come from the clip's entry in the data set, such as
+    {sad: .5}. If the entry has none, they come from the first pattern that fits the clip's name. The fields
+    below are explained in `hobble.channels.channel.Channel`.
     """
 
     name = "mood"
@@ -45,7 +47,7 @@ class Mood(Channel):
 
     def columns(self, rig: HasLinks) -> tuple[str, ...]:
         """The names of the moods, one for each column."""
-        return get_args(Name)
+        return get_args(MoodName)
 
     def is_neutral(self, source: ClipSource) -> bool:
         """Whether all moods are 0 in the clip's entry or, without an entry, in its pattern."""
@@ -56,15 +58,15 @@ class Mood(Channel):
         from hobble.core.errors import InputError
 
         given = source.value
-        moods = isinstance(given, Mapping) and set(given) <= set(self.columns(rig))
+        names_are_known = isinstance(given, Mapping) and set(given) <= set(self.columns(rig))
         if given is not None and not (
-            moods and all(isinstance(v, int | float) and 0 <= v <= 1 for v in given.values())
+            names_are_known and all(isinstance(v, int | float) and 0 <= v <= 1 for v in given.values())
         ):
             fix = f"Use {', '.join(self.columns(rig))} with numbers from 0 to 1, as in {{sad: .5}}."
             raise InputError(f"{source.clip}.channels.{self.name}", f"cannot be {given!r:.80}", fix=fix)
 
     def read(self, clip: Clip, source: ClipSource, motion: Mapping[str, Any]) -> tuple[Array, list[str]]:
-        """The same values in all frames, and a warning if no pattern fits."""
+        """Values (F, 5) of a clip with F frames, the same in each. A warning if nothing says its mood."""
         import numpy as np
 
         moods = _moods(source)
@@ -76,11 +78,13 @@ class Mood(Channel):
         return np.tile(np.array(row, np.float32), (len(clip), 1)), warnings
 
 
-def _patterns(source: ClipSource) -> Mapping[str, Mapping[Name, float]]:
+def _patterns(source: ClipSource) -> Mapping[str, Mapping[MoodName, float]]:
+    """Pattern of clip names -> {mood: amount}, from the data set's section `channels.mood`."""
     return source.options.patterns if isinstance(source.options, Patterns) else {}
 
 
 def _moods(source: ClipSource) -> Mapping[Any, float]:
+    """Mood -> amount, for the clip of `source`. Moods that are not in it have the amount 0."""
     if source.value is not None:
         return source.value
     for pattern, moods in _patterns(source).items():

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from hobble.character.rule import joint_place, moving, phase_change
+from hobble.character.rule import joint_place, movement_share, phase_change
 from hobble.core.quat import Array
 from hobble.evaluation.captured import rotate_by_yaw
 from hobble.models.network import Predictor
@@ -29,7 +29,7 @@ class RollOutInputs:
     x: (F, X) inputs with the captured joints. y: (F, Y) targets. Both are in raw units, with joint heights
     relative to the mean ground height. mean: (F,) this ground height, cm. phase: (F,) in cycles. turn: (F,)
     radians, and velocity: (F, 2) cm, by which the root turns and moves until the next frame. moving: (F,)
-    the share of the predicted movement that is applied, see `hobble.character.rule.moving`.
+    the share of the predicted movement that is applied, see `hobble.character.rule.movement_share`.
     """
 
     x: Array
@@ -54,7 +54,7 @@ def inputs_of_clip(rows: ClipRows, chosen: np.ndarray, layout: RowLayout) -> Rol
         rows.p[chosen].astype(float),
         y[:, layout.y_turn][:, 0].astype(float),
         y[:, layout.y_root_velocity].astype(float),
-        moving(stand),
+        movement_share(stand),
     )
 
 

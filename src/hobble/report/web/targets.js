@@ -28,7 +28,7 @@ export const createTargets = (spec, c) => {
   };
 
   const limited = spec.channels.filter((one) => one.limits);
-  // The highest speed in gait g, cm a frame, under the limits of all channels, as in `together` of `hobble.channels.speed_limits`.
+  // The highest speed in gait g, cm a frame, under the limits of all channels, as in `combine_limits` of `hobble.channels.speed_limits`.
   const allowed = (g) => {
     let least = Infinity, slowed = limited[0].limits.usual[g];
     const usual = slowed;

@@ -1,10 +1,11 @@
 """The thirteen films of the questionnaire.
 
-A healthy character walks, then something begins to hurt. In some films the gait changes, too.
+In each film, a healthy character walks or jogs. Then one or more parts of its body begin to hurt. In some
+films the gait changes afterwards.
 
-Quentin Ferre (2019) showed four films with one hurt part, five with several and four with a change of gait,
-each with the transition from healthy to hurt. We do not know which parts hurt in each film. In his injured
-clips, thigh, shank and forearm hurt, so these parts hurt in our films.
+Quentin Ferre (2019) showed thirteen films, each with the transition from healthy to hurt: four with one hurt
+part, five with several and four with a change of gait. We do not know which parts hurt in each of his films.
+In his injured clips, thigh, shank and forearm hurt, so these parts hurt in our films.
 """
 
 from __future__ import annotations
@@ -16,23 +17,25 @@ import numpy as np
 
 from hobble.channels.injury.crowd_severities import INJURY, hurt_links
 from hobble.channels.injury.crowd_severities import links as links_of
-from hobble.channels.injury.shown import OTHER_PARTS, links_between
-from hobble.channels.injury.shown import PARTS as SLIDERS
+from hobble.channels.injury.shown import OTHER_PARTS as PARTS_WITHOUT_SLIDER
+from hobble.channels.injury.shown import PARTS as PARTS_WITH_SLIDER
+from hobble.channels.injury.shown import links_between
 from hobble.core.errors import HobbleError
 from hobble.core.quat import Array
 from hobble.models.network import Network
 from hobble.runtime.animation import ProceduralAnimation
 from hobble.runtime.options import Runtime
 
-FPS = 60
-SEVERITY = 10.0  # the highest, as in the films of Quentin Ferre (2019)
-SPEEDS = {"walk": 2.5, "jog": 6.0}  # target speeds, cm a frame
+FPS = 60  # frames a second of the motion
+SEVERITY = 10.0  # the highest severity, as in the films of Quentin Ferre (2019)
+SPEEDS = {"walk": 2.5, "jog": 6.0}  # gait -> target speed, cm a frame
 WARM_UP = 4.0  # seconds of walking before a film begins
-HEALTHY, HURT = 3.0, 7.0  # seconds before and after the injury begins
-CHANGED = 5.0  # seconds that a film with a change of gait is longer; the gait changes in its middle
-# The kinds of films.
+HEALTHY, HURT = 3.0, 7.0  # seconds of a film before and after the injury begins
+# A film with a change of gait is this many seconds longer. The gait changes in the middle of the film.
+EXTRA_FOR_CHANGE = 5.0
+# The three kinds of films.
 ONE, SEVERAL, GAIT = "one part", "several parts", "change of gait"
-# Parts that people can tick: those that hurt in some film, on both sides, and some that hurt in none.
+# Parts that people can tick in the questionnaire. They include parts that hurt in no film, such as the neck.
 SIDED = ("thigh", "shank", "foot", "upper arm", "forearm")
 PARTS = (*(f"{side} {part}" for part in SIDED for side in ("left", "right")), "lower back", "neck")
 
@@ -41,8 +44,8 @@ PARTS = (*(f"{side} {part}" for part in SIDED for side in ("left", "right")), "l
 class Film:
     """One film.
 
-    number: from 1, in the order of the tables of answers. kind: ONE, SEVERAL or GAIT. parts: the parts that
-    hurt. gaits: target gaits at the beginning and at the end.
+    number: counted from 1; the tables of answers have this order. kind: ONE, SEVERAL or GAIT. parts: the
+    parts that hurt. gaits: target gaits at the beginning and at the end.
     """
 
     number: int
@@ -52,8 +55,8 @@ class Film:
 
     @property
     def seconds(self) -> float:
-        """Length of the film."""
-        return HEALTHY + HURT + (CHANGED if self.gaits[0] != self.gaits[1] else 0.0)
+        """Length of the film, in seconds."""
+        return HEALTHY + HURT + (EXTRA_FOR_CHANGE if self.gaits[0] != self.gaits[1] else 0.0)
 
 
 FILMS = (
@@ -75,10 +78,11 @@ FILMS = (
 
 @dataclass(frozen=True)
 class FilmMotion:
-    """The motion of a film at 60 Hz, F frames of J joints in the world.
+    """The motion of a film: F frames at 60 Hz of a character with J joints, in world coordinates.
 
-    positions: (F, J, 3) cm. rotations: (F, J, 4) quaternions. from_healthy: mean distance, cm, between the
-    joints and those of a healthy character, averaged over all frames after the injury begins.
+    positions: (F, J, 3) cm. rotations: (F, J, 4) quaternions. from_healthy: distance, cm, between the joints
+    and the same joints of a character that stays healthy; the mean over all joints and over all frames after
+    the injury begins.
     """
 
     positions: Array
@@ -87,56 +91,66 @@ class FilmMotion:
 
 
 def without_side(part: str) -> str:
-    """The part without its side: "left thigh" and "right thigh" become "thigh" alone."""
+    """The part without its side: "left thigh" and "right thigh" become "thigh"."""
     return part.removeprefix("left ").removeprefix("right ")
 
 
 def part_links(network: Network, parts: Sequence[str]) -> list[str]:
-    """The link that stands for each part.
+    """For each part, the name of the link whose severity is set to make the part hurt.
 
-    A link is the piece of the body between two neighbouring joints. Of the part's links, the uppermost that
-    was hurt in training is taken. If none was, the part's uppermost link is taken. Raises HobbleError if the
-    network has no injury channel, or if the skeleton has no such part.
+    A link is the piece of the body between two neighbouring joints. A part may have several links. The
+    uppermost link that was hurt in training is taken. If no link of the part was hurt in training, its
+    uppermost link is taken. Raises HobbleError if the network has no injury channel, or if the skeleton has
+    no such part.
     """
-    links, hurt = links_of(network), hurt_links(network)
+    links, trained = links_of(network), hurt_links(network)
     if network.skeleton is None or not links:
         raise HobbleError("this network has no injury channel. Use a configuration with `channels: [injury]`")
-    ends = {label: roles for label, *roles in (*SLIDERS, *OTHER_PARTS)}
-    out = []
+    # Part -> roles of the joints at its two ends.
+    ends = {label: roles for label, *roles in (*PARTS_WITH_SLIDER, *PARTS_WITHOUT_SLIDER)}
+    chosen = []
     for part in parts:
         of_part = [link for link in links_between(network.skeleton, *ends[part]) if link in links]
         if not of_part:
             raise HobbleError(
-                f"the skeleton of this network has no {part} that can hurt, but a film needs one"
+                f"the skeleton of this network has no {part} that can hurt, but a film of the questionnaire "
+                "needs it"
             )
-        out.append(next((link for link in of_part if link in hurt), of_part[0]))
-    return out
+        chosen.append(next((link for link in of_part if link in trained), of_part[0]))
+    return chosen
 
 
 def film_motion(network: Network, film: Film, runtime: Runtime) -> FilmMotion:
-    """The motion of a film. The character goes straight ahead. The injury begins after HEALTHY seconds."""
+    """Generate the motion of a film. The character goes straight ahead."""
     severities = dict.fromkeys(part_links(network, film.parts), SEVERITY)
-    hurt, healthy = _walked(network, film, severities, runtime), _walked(network, film, {}, runtime)
-    begun = round(HEALTHY * FPS)
-    apart = np.linalg.norm(_local(hurt[0]) - _local(healthy[0]), axis=-1)[begun:].mean()
-    return FilmMotion(*hurt, float(apart))
+    positions, rotations = _walk(network, film, severities, runtime)
+    healthy_positions, _ = _walk(network, film, {}, runtime)
+    first_hurt = round(HEALTHY * FPS)  # the first frame in which the parts hurt
+    distances = np.linalg.norm(_local(positions) - _local(healthy_positions), axis=-1)
+    return FilmMotion(positions, rotations, float(distances[first_hurt:].mean()))
 
 
 def hurts_and_gait(film: Film, frame: int) -> tuple[bool, str]:
-    """Whether the parts of a film hurt at a frame, and the target gait at this frame."""
+    """Whether the parts of a film hurt at a frame, and the target gait at this frame.
+
+    frame: 0 is the first frame of the film; frames of the warm-up are negative.
+    """
     hurts = frame >= HEALTHY * FPS
-    changed = frame >= (HEALTHY + HURT) * FPS - CHANGED * FPS / 2
+    changed = frame >= (HEALTHY + HURT) * FPS - EXTRA_FOR_CHANGE * FPS / 2
     return hurts, film.gaits[1] if changed else film.gaits[0]
 
 
-def _walked(
+def _walk(
     network: Network, film: Film, severities: dict[str, float], runtime: Runtime
 ) -> tuple[Array, Array]:
-    """Positions and rotations of a character that walks as in a film. severities: link -> value."""
+    """Positions and rotations, as in `FilmMotion`, of a character that does what a film shows.
+
+    severities: link -> its severity after the injury has begun.
+    """
     animation = ProceduralAnimation(network, **dict(runtime))
-    before, frames = round(WARM_UP * FPS), round(film.seconds * FPS)
+    warm_up_frames, film_frames = round(WARM_UP * FPS), round(film.seconds * FPS)
     positions, rotations = [], []
-    for frame in range(-before, frames):
+    for frame in range(-warm_up_frames, film_frames):
         hurts, gait = hurts_and_gait(film, frame)
         pose = animation.next_pose(
             np.array([0.0, SPEEDS[gait]]), None, gait, **{INJURY: severities if hurts else {}}

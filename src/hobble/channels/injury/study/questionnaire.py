@@ -1,4 +1,7 @@
-"""Makes the page of the questionnaire, which contains its films, and the file with the right answers."""
+"""Makes the questionnaire: an HTML page that contains its films, and a file with the right answers.
+
+People watch each film and say which parts of the character's body hurt.
+"""
 
 from __future__ import annotations
 
@@ -40,9 +43,9 @@ from hobble.runtime.options import Runtime
 
 FRAME_STEP = 2  # every second frame of the motion is shown
 SIZE = 360  # default width and height of the films, pixels
-QUALITY = 45  # of the WebP encoder, 0 to 100
-EFFORT = 2  # of the WebP encoder, 0 to 6; 3 takes twice the time for files that are 6 % smaller
-CAMERA_SMOOTHING = 25.0  # frames, sigma of the Gaussian over the camera's path
+QUALITY = 45  # of the WebP images, 0 to 100
+EFFORT = 2  # of the WebP encoder, 0 to 6; with 3 it needs twice the time, and files are only 6 % smaller
+CAMERA_SMOOTHING = 25.0  # frames: sigma of the Gaussian that smooths the camera's path
 LOOK_AT = 82.0  # cm: height of the point that the camera looks at
 DISTANCE = 400.0  # cm: from the camera to this point
 
@@ -56,41 +59,44 @@ def write_questionnaire(
     size: int = SIZE,
     threads: int = 1,
 ) -> dict[str, Any]:
-    """Write questionnaire.html and films.json. Returns the content of films.json, the right answers.
+    """Write questionnaire.html (the page) and films.json (the right answers) into a folder.
 
-    Nothing on the page says what hurts in a film. size: width and height of the films, pixels. threads: how
-    many films are drawn at once; the files do not depend on it. Raises HobbleError if the network has no
-    injury channel, or if the skeleton lacks a part that hurts in a film.
+    Nothing on the page says what hurts in a film. configuration: its name, for films.json. size: width and
+    height of the films, pixels. threads: how many films are drawn at once; the files are the same for any
+    number. Returns the content of films.json. Raises HobbleError if the network has no injury channel, or if
+    the skeleton lacks a part that hurts in a film.
     """
     folder = Path(folder)
     for film in films:
-        part_links(network, film.parts)
+        part_links(network, film.parts)  # raises an error before anything is drawn or written
     assert network.skeleton is not None
     folder.mkdir(parents=True, exist_ok=True)
-    studio, skeleton = BodyRenderer(body(network.skeleton)), network.skeleton
+    renderer, skeleton = BodyRenderer(body(network.skeleton)), network.skeleton
 
-    def drawn(film: Film) -> tuple[dict[str, Any], dict[str, Any]]:
+    def draw_film(film: Film) -> tuple[dict[str, Any], dict[str, Any]]:
+        """The film's entry in films.json, and its entry in the data of the page."""
         motion = film_motion(network, film, runtime)
-        data = encoded(pictures(studio, skeleton, motion, size))
-        return _row(network, film, motion), {
+        data = encode_webp(draw_pictures(renderer, skeleton, motion, size))
+        return _solution_of(network, film, motion), {
             "film": film.number,
             "webp": base64.b64encode(data).decode("ascii"),
         }
 
     with ThreadPoolExecutor(threads) as pool:
-        rows, shown = map(list, zip(*pool.map(drawn, films), strict=True))
-    study = hashlib.sha256(json.dumps([rows, shown]).encode()).hexdigest()[:12]
+        solutions, films_on_page = map(list, zip(*pool.map(draw_film, films), strict=True))
+    # Answers are saved with this id, which shows to which version of the films they belong.
+    study = hashlib.sha256(json.dumps([solutions, films_on_page]).encode()).hexdigest()[:12]
     solution = {
         "study": study,
         "configuration": configuration,
         "severity": SEVERITY,
         "parts": PARTS,
-        "films": rows,
+        "films": solutions,
     }
     page = template("questionnaire.html.j2").render(
         style=style(),
         script=questionnaire_script(),
-        embedded=embedded({"study": study, "parts": PARTS, "films": shown, "size": size}),
+        embedded=embedded({"study": study, "parts": PARTS, "films": films_on_page, "size": size}),
         count=len(films),
     )
     write_text(folder / "questionnaire.html", page)
@@ -98,7 +104,8 @@ def write_questionnaire(
     return solution
 
 
-def _row(network: Network, film: Film, motion: FilmMotion) -> dict[str, Any]:
+def _solution_of(network: Network, film: Film, motion: FilmMotion) -> dict[str, Any]:
+    """The entry of a film in films.json. untrained: links of the film never hurt in training."""
     links = part_links(network, film.parts)
     return {
         "film": film.number,
@@ -113,7 +120,7 @@ def _row(network: Network, film: Film, motion: FilmMotion) -> dict[str, Any]:
 
 
 def doubts(solution: dict[str, Any]) -> list[str]:
-    """Warnings about films in which nobody can see the injury, and about links never hurt in training.
+    """Warnings: films in which nobody can see the injury, and hurt links that were never hurt in training.
 
     solution: the content of films.json.
     """
@@ -123,28 +130,31 @@ def doubts(solution: dict[str, Any]) -> list[str]:
     return out + ([f"Never hurt in training: {', '.join(never)}."] if never else [])
 
 
-def pictures(
-    studio: BodyRenderer, skeleton: Skeleton, motion: FilmMotion, size: int
+def draw_pictures(
+    renderer: BodyRenderer, skeleton: Skeleton, motion: FilmMotion, size: int
 ) -> list[NDArray[np.uint8]]:
-    """The pictures (size, size, 3) of a film, without colours for injuries. The camera follows smoothly."""
-    shown = body(skeleton).bones  # the bones that move the body's mesh
-    world, places = jointed(skeleton, motion.positions, motion.rotations)
-    path = gaussian(motion.positions[:, 0], CAMERA_SMOOTHING)
+    """The pictures of a film, each (size, size, 3). The camera follows the character smoothly.
+
+    The character has one colour, so that people have to judge by its motion what hurts.
+    """
+    bones = body(skeleton).bones  # indices of the joints that move the body's mesh
+    rotations, positions = jointed(skeleton, motion.positions, motion.rotations)
+    path = gaussian(motion.positions[:, 0], CAMERA_SMOOTHING)  # the points that the camera looks at
     path[:, 1] = LOOK_AT
     return [
-        studio.draw(places[f, shown], world[f, shown], Camera(path[f], distance=DISTANCE, size=size))
-        for f in range(0, len(places), FRAME_STEP)
+        renderer.draw(positions[f, bones], rotations[f, bones], Camera(path[f], distance=DISTANCE, size=size))
+        for f in range(0, len(positions), FRAME_STEP)
     ]
 
 
-def encoded(frames: Sequence[NDArray[np.uint8]]) -> bytes:
-    """An animated WebP that plays once."""
-    images = [Image.fromarray(frame) for frame in frames]
+def encode_webp(pictures: Sequence[NDArray[np.uint8]]) -> bytes:
+    """The bytes of an animated WebP that plays the pictures once."""
+    images = [Image.fromarray(picture) for picture in pictures]
     out = io.BytesIO()
     options: dict[str, Any] = {
         "quality": QUALITY,
         "method": EFFORT,
-        "duration": round(1000 * FRAME_STEP / FPS),
+        "duration": round(1000 * FRAME_STEP / FPS),  # milliseconds a picture
     }
     images[0].save(out, "WEBP", save_all=True, append_images=images[1:], loop=1, **options)
     return out.getvalue()
