@@ -18,8 +18,8 @@ def count_cores(processors: Iterable[int] | None = None, topology: Path = TOPOLO
     """Number of physical cores, at least 1, to which the given processors belong.
 
     processors: numbers of logical processors, as Linux counts them; None: those this process may use. Two
-    processors (hardware threads) of a core count once, because matrix products gain nothing from the second
-    one: on one core, one thread was 1.06 to 1.2 times faster than two. If the system does not say which
+    processors (hardware threads) of a core count once, because matrix products gain nothing from a second
+    thread: on one core, two threads took 1.06 to 1.2 times as long as one. If the system does not say which
     processors share a core, each processor counts.
     """
     if processors is None:

@@ -161,7 +161,7 @@ def log(q: ArrayLike) -> Array:
 
 
 def exp(v: ArrayLike) -> Array:
-    """The rotations (..., 4) whose `log` is v (..., 3)."""
+    """Rotations (..., 4), the inverse of `log`. v: (..., 3) axis times HALF the angle in radians."""
     v = np.asarray(v)
     half = np.linalg.norm(v, axis=-1, keepdims=True)
     return np.concatenate([np.cos(half), v * np.sinc(half / np.pi)], axis=-1)  # np.sinc: sin(half) / half

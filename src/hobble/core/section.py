@@ -26,7 +26,7 @@ def _check_mocap_path(path: str) -> str:
     return path
 
 
-# The upper bound prevents that a mistyped or hostile configuration uses up the memory.
+# The upper bound keeps a mistyped or hostile configuration from using up the memory.
 Positive = Annotated[int, Field(gt=0, le=1_000_000)]
 PositiveFloat = Annotated[float, Field(gt=0, allow_inf_nan=False)]
 Finite = Annotated[float, Field(allow_inf_nan=False)]
