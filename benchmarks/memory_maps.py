@@ -60,7 +60,7 @@ class Mapped:
         self.db = db
         for name in TABLES:
             setattr(self, name, np.load(folder / f"{name}.npy", mmap_mode="r"))
-        self.first = order.starts(self.count)
+        self.first = order.first_fits(self.count)
         self.chunk_rows = [c.rows for c in db.manifest.chunks["train"]]
         self.shards = db.manifest.shard_of_chunk("train")
         self.starts = np.cumsum(self.chunk_rows) - self.chunk_rows
@@ -70,7 +70,7 @@ class Mapped:
         visits, rows = self.db.manifest.visits, self.db.rows("train")
         parts = chain.from_iterable(
             self.parts((seed, 0, layer), start, stop, window)
-            for layer, start, stop in order.spans(rows, visits, section, SECTIONS)
+            for layer, start, stop in order.layer_parts(rows, visits, section, SECTIONS)
         )
         return read_ahead(
             self.db._composed(parts, self.db.section_samples("train", section, SECTIONS), block_rows)
@@ -79,7 +79,7 @@ class Mapped:
     def parts(self, of: tuple[int, int, int], start: int, stop: int, window: int) -> Iterator[tuple]:
         """Rows and fits of the places start to stop of a layer, as indices into the whole tables."""
         every = range(len(self.chunk_rows))
-        some = [np.array(every)] if window >= len(every) else order.groups(self.shards, window, *of)
+        some = [np.array(every)] if window >= len(every) else order.chunk_groups(self.shards, window, *of)
         done = 0
         for group, members in enumerate(some):
             own = np.concatenate([np.arange(n) + s for n, s in self.pieces(members)])

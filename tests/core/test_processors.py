@@ -2,7 +2,7 @@ from pathlib import Path
 
 import pytest
 
-from hobble.core.processors import cores, multiplies_bfloat16
+from hobble.core.processors import count_cores, multiplies_bfloat16
 
 
 def topology(folder: Path, shared: dict[int, str]) -> Path:
@@ -15,14 +15,14 @@ def topology(folder: Path, shared: dict[int, str]) -> Path:
 
 def test_two_threads_of_one_core_count_once(tmp_path: Path) -> None:
     folder = topology(tmp_path, {0: "0,4", 4: "0,4", 1: "1,5", 5: "1,5"})
-    assert cores([0, 4], folder) == 1
-    assert cores([0, 1], folder) == 2
-    assert cores([0, 1, 4, 5], folder) == 2
+    assert count_cores([0, 4], folder) == 1
+    assert count_cores([0, 1], folder) == 2
+    assert count_cores([0, 1, 4, 5], folder) == 2
 
 
 def test_without_topology_each_processor_counts(tmp_path: Path) -> None:
-    assert cores([0, 1, 2], tmp_path) == 3
-    assert cores([], tmp_path) == 1
+    assert count_cores([0, 1, 2], tmp_path) == 3
+    assert count_cores([], tmp_path) == 1
 
 
 @pytest.mark.parametrize(

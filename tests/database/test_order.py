@@ -15,7 +15,7 @@ def test_sections_cut_the_layers_into_near_equal_parts(rows, visits, sections):
     seen = np.zeros((visits, rows), int)
     sizes = []
     for section in range(sections):
-        parts = list(order.spans(rows, visits, section, sections))
+        parts = list(order.layer_parts(rows, visits, section, sections))
         sizes.append(sum(stop - start for _, start, stop in parts))
         for layer, start, stop in parts:
             assert 0 <= start < stop <= rows
@@ -28,24 +28,24 @@ def test_sections_cut_the_layers_into_near_equal_parts(rows, visits, sections):
 @settings(max_examples=30, deadline=None)
 def test_over_all_layers_each_row_uses_each_fit_equally_often(rows, seed, pass_index):
     count = np.random.default_rng(seed).choice([1, 2, 5, 10], rows)
-    shown = np.stack([order.picks(count, 10, seed, pass_index, layer, 3) for layer in range(10)], axis=1)
+    shown = np.stack([order.pick_fits(count, 10, seed, pass_index, layer, 3) for layer in range(10)], axis=1)
     for fits, of_row in zip(count, shown, strict=True):
         np.testing.assert_array_equal(np.bincount(of_row, minlength=fits), np.full(fits, 10 // fits))
 
 
 def test_each_row_has_its_own_order_of_fits():
-    shown = np.stack([order.picks(np.full(500, 10), 10, 1, 0, layer, 0) for layer in range(10)], axis=1)
+    shown = np.stack([order.pick_fits(np.full(500, 10), 10, 1, 0, layer, 0) for layer in range(10)], axis=1)
     assert len(np.unique(shown, axis=0)) > 480
-    again = np.stack([order.picks(np.full(500, 10), 10, 1, 1, layer, 0) for layer in range(10)], axis=1)
+    again = np.stack([order.pick_fits(np.full(500, 10), 10, 1, 1, layer, 0) for layer in range(10)], axis=1)
     assert (shown == again).mean() < 0.15  # a tenth by chance
 
 
 def test_every_layer_has_every_chunk_once_in_a_new_order():
     one_shard = np.zeros(37, int)
-    groups = order.groups(one_shard, 8, seed=1, pass_index=0, layer=0)
+    groups = order.chunk_groups(one_shard, 8, seed=1, pass_index=0, layer=0)
     assert [len(g) for g in groups] == [1, 2, 4, 8, 8, 8, 6]  # the first is soon read
     np.testing.assert_array_equal(np.sort(np.concatenate(groups)), np.arange(37))
-    other = order.groups(one_shard, 8, seed=1, pass_index=0, layer=1)
+    other = order.chunk_groups(one_shard, 8, seed=1, pass_index=0, layer=1)
     assert not np.array_equal(np.concatenate(groups), np.concatenate(other))
 
 
@@ -54,7 +54,7 @@ def test_every_layer_has_every_chunk_once_in_a_new_order():
 def test_a_window_has_chunks_of_all_shards_in_proportion(of_each, seed, window):
     """Each chunk comes once, and a group has the share of each shard, up to two chunks."""
     shards = np.repeat(np.arange(len(of_each)), of_each)
-    groups = order.groups(shards, window, seed, pass_index=0, layer=0)
+    groups = order.chunk_groups(shards, window, seed, pass_index=0, layer=0)
     found = np.concatenate([[], *groups]).astype(int)
     np.testing.assert_array_equal(np.sort(found), np.arange(len(shards)))
     assert [len(g) for g in groups[:1]] == [min(np.count_nonzero(of_each), window, len(shards))][
@@ -67,7 +67,7 @@ def test_a_window_has_chunks_of_all_shards_in_proportion(of_each, seed, window):
 
 def test_chunks_of_a_shard_come_in_another_order_each_layer():
     shards = np.repeat([0, 1, 2], [30, 50, 20])
-    layers = [np.concatenate(order.groups(shards, 16, 1, 0, layer)) for layer in range(2)]
+    layers = [np.concatenate(order.chunk_groups(shards, 16, 1, 0, layer)) for layer in range(2)]
     assert (layers[0] == layers[1]).mean() < 0.1
     for number in range(3):
         own = [layer[shards[layer] == number] for layer in layers]

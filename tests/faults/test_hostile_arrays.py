@@ -215,8 +215,8 @@ MERGES = "a0: &a0 {k: v}\n" + "".join(
 @pytest.mark.parametrize(
     ("text", "says"),
     [
-        (LAUGHS, "aliases expand to more"),
-        (MERGES, "aliases expand to more"),
+        (LAUGHS, "values, with its aliases expanded"),
+        (MERGES, "values, with its aliases expanded"),
         ("a: &a [*a]\n", "contains itself"),
         ("a: " + "[" * 100_000, "a.yaml"),
         ("- " * 50_000 + "x", "a.yaml"),

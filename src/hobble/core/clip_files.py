@@ -1,4 +1,8 @@
-"""Finds the BVH file of each clip in a folder, and the label files that belong to no clip."""
+"""Finds the BVH file of each clip in a folder, and the files beside the clips that belong to none of them.
+
+A clip has the name of its BVH file, without the suffix. Files with the same name and another suffix may stand
+beside it: labels (footsteps, gait, phase), and where the person is hurt.
+"""
 
 from __future__ import annotations
 
@@ -12,51 +16,55 @@ from pathlib import Path
 from hobble.core.errors import InputError
 from hobble.core.untrusted import check_regular
 
-SUFFIX = ".bvh"
-# The name of a label or status file is the name of its clip with one of these at the end.
+BVH_SUFFIX = ".bvh"
+# A file beside a clip is called <clip><suffix>, with one of these suffixes.
 SIDE_FILE_SUFFIXES = ("_footsteps.txt", "_injuries.txt", "_injuries", "_gait.txt", ".phase", ".gait")
-VALID_NAME = re.compile(r"(?![.\s])[^{}<>\\/]+(?<!\s)")  # Snakemake fills in {x} and <x>
+VALID_NAME = re.compile(r"(?![.\s])[^{}<>\\/]+(?<!\s)")  # Snakemake would replace {x} and <x>
 CLIP_NAME_RULE = (
     "no control characters, braces, angle brackets, slashes or backslashes, no dot or space first and no "
     "space last, 200 bytes at most"
 )
-# Bytes. Files of a clip have names that are up to 50 bytes longer, and systems allow 255 bytes.
+# Bytes. Systems allow 255 bytes; the files that Hobble makes of a clip add up to 50 bytes to its name.
 LONGEST_CLIP_NAME = 200
 
 
 def is_valid_clip_name(clip: str) -> bool:
     """Whether a clip's name works in a path, a log and a Snakemake wildcard; see CLIP_NAME_RULE."""
-    short = len(clip.encode(errors="surrogateescape")) <= LONGEST_CLIP_NAME
-    return short and clip.isprintable() and VALID_NAME.fullmatch(clip) is not None
+    is_short = len(clip.encode(errors="surrogateescape")) <= LONGEST_CLIP_NAME
+    return is_short and clip.isprintable() and VALID_NAME.fullmatch(clip) is not None
 
 
 def find_clips(folder: Path) -> dict[str, list[Path]]:
-    """Clip -> its BVH files (.bvh or .BVH) in a folder and its subfolders, sorted.
+    """The BVH files (.bvh or .BVH) in a folder and its subfolders, as clip name -> paths.
 
-    Follows links, but enters each folder only once. Skips hidden files and folders. Raises InputError if a
-    folder cannot be read.
+    A clip has several paths if files in several folders have its name. Folders are searched in alphabetical
+    order. Follows links, but enters each folder only once. Skips hidden files and folders. Raises InputError
+    if a folder cannot be read.
     """
 
-    def refuse(error: OSError) -> None:
+    def raise_input_error(error: OSError) -> None:
         raise InputError(error.filename or folder, f"cannot be read: {error.strerror}") from None
 
     found: dict[str, list[Path]] = {}
     seen: set[str] = set()
-    for here, folders, files in os.walk(folder, onerror=refuse, followlinks=True):
+    for here, folders, files in os.walk(folder, onerror=raise_input_error, followlinks=True):
         if (real := os.path.realpath(here)) in seen:
-            folders.clear()
+            folders.clear()  # os.walk enters the folders that this list has
             continue
         seen.add(real)
         folders[:] = sorted(name for name in folders if not name.startswith("."))
         for name in sorted(files):
             stem, suffix = os.path.splitext(name)
-            if suffix.lower() == SUFFIX and not name.startswith("."):
+            if suffix.lower() == BVH_SUFFIX and not name.startswith("."):
                 found.setdefault(stem, []).append(Path(here, name))
     return found
 
 
 def only_file(clip: str, files: list[Path]) -> Path:
-    """The one file of a clip. Raises InputError if there are more, or if the file is a device or a pipe."""
+    """The only file in `files`, the BVH files of a clip.
+
+    Raises InputError if there is more than one, or if the file is a device or a pipe.
+    """
     if len(files) > 1:
         raise InputError(
             files[1],
@@ -69,8 +77,11 @@ def only_file(clip: str, files: list[Path]) -> Path:
 
 
 def unused_file_notes(folder: Path, clips: Collection[str]) -> list[str]:
-    """A sentence for each label or status file in a folder or its subfolders that belongs to no clip."""
-    out = []
+    """Warnings about the files in a folder and its subfolders that belong to no clip.
+
+    Only files with a suffix in SIDE_FILE_SUFFIXES count. clips: the names of all clips.
+    """
+    notes = []
     for here, folders, files in os.walk(folder):
         folders[:] = sorted(name for name in folders if not name.startswith("."))
         for name in sorted(files):
@@ -78,5 +89,5 @@ def unused_file_notes(folder: Path, clips: Collection[str]) -> list[str]:
             if suffix and (stem := name.removesuffix(suffix)) not in clips:
                 near = next(iter(get_close_matches(stem, clips, 1, 0.75)), None)
                 fix = f"If it belongs to {near}, rename it." if near else "Rename it or take it out."
-                out.append(f"{Path(here, name)} belongs to no clip and is not read. {fix}")
-    return out
+                notes.append(f"{Path(here, name)} belongs to no clip and is not read. {fix}")
+    return notes

@@ -2,8 +2,8 @@
 
 numba stores compiled functions next to the package, or in the user's home if it cannot write there. If it can
 write to neither, it raises an error at import. If the disk is full or a cached file is damaged, it raises an
-error at the first call. The `njit` of this module only warns in these cases, once in a process, and the
-functions are compiled again.
+error at the first call. In these cases the `njit` of this module only warns, once in a process. Each process
+then compiles the functions again.
 """
 
 from __future__ import annotations
@@ -19,12 +19,15 @@ CACHE_HINT = "Set NUMBA_CACHE_DIR to a folder that can be written."
 
 
 def njit(function: Callable | None = None, **options: Any) -> Any:
-    """Like `numba.njit(cache=True)`, with or without options; a cache that fails only gives a warning."""
+    """The decorator `numba.njit(cache=True)`. A cache that fails only gives a warning.
+
+    Written as `@njit`, or as `@njit(...)` with options of `numba.njit`.
+    """
     if function is None:
-        return lambda later: njit(later, **options)
-    caches = options.pop("cache", True)
+        return lambda decorated: njit(decorated, **options)
+    use_cache = options.pop("cache", True)
     dispatcher = numba.njit(**options)(function)
-    if caches:
+    if use_cache:
         try:
             dispatcher.enable_caching()
         except (RuntimeError, OSError) as error:  # numba found no folder that it may write to
@@ -35,7 +38,10 @@ def njit(function: Callable | None = None, **options: Any) -> Any:
 
 
 class ForgivingCache:
-    """A numba cache. If it fails, the function counts as not cached. Everything else is left to numba."""
+    """Wraps the numba cache of a function. If the cache fails, the function counts as not cached.
+
+    All methods but those below are numba's.
+    """
 
     def __init__(self, cache: Any) -> None:
         self._cache = cache
@@ -44,7 +50,7 @@ class ForgivingCache:
         return getattr(self._cache, name)
 
     def load_overload(self, signature: Any, target_context: Any) -> Any:
-        """The compiled function, or None if there is none or it cannot be read."""
+        """The compiled function; None if the cache does not have it or cannot be read."""
         try:
             return self._cache.load_overload(signature, target_context)
         except Exception as error:  # numba unpickles the file; a damaged one can raise anything
@@ -52,7 +58,7 @@ class ForgivingCache:
             return None
 
     def save_overload(self, signature: Any, data: Any) -> None:
-        """Store the compiled function; only warns if that fails."""
+        """Store the compiled function. If this fails, only warn."""
         try:
             self._cache.save_overload(signature, data)
         except Exception as error:  # numba first reads the cache's index, which may be damaged
@@ -61,12 +67,12 @@ class ForgivingCache:
 
 @functools.cache
 def _warn_once(text: str) -> None:
-    """Warn. `_warn` looks into the cache of this function to see whether it was called before."""
+    """Give a warning. Its cache tells `_warn` whether this function was called before."""
     warnings.warn(text, RuntimeWarning, stacklevel=4)
 
 
 def _warn(error: Exception) -> None:
-    """Warn at most once in a process."""
+    """Warn that the cache failed, at most once in a process."""
     if _warn_once.cache_info().currsize == 0:
-        what = f"{type(error).__name__}: {error}"
-        _warn_once(f"compiled functions are not kept for the next start ({what}). {CACHE_HINT}")
+        reason = f"{type(error).__name__}: {error}"
+        _warn_once(f"compiled functions are not kept for the next start ({reason}). {CACHE_HINT}")

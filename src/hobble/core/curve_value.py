@@ -8,10 +8,11 @@ from hobble.core.quat import Array
 
 
 def value_at(curve: Array, when: Array | float) -> Array:
-    """Linear interpolation of a curve (F,) at times in frames: `np.interp(when, np.arange(F), curve)`.
+    """The values of a curve (F,) at the times `when`, interpolated linearly. They have the shape of `when`.
 
-    np.interp reads the whole curve at every call. If it were called for each step of a long clip, the time
-    would grow with the square of the clip's length. This function reads only the frames around `when`.
+    when: times in frames. Before frame 0 and after the last frame the curve is constant. The result is that
+    of `np.interp(when, np.arange(F), curve)`. np.interp reads the whole curve at every call, which is slow
+    for many calls with a long curve. This function reads only the frames around `when`.
 
     >>> float(value_at(np.array([0.0, 10.0, 40.0]), 1.5))
     25.0
@@ -21,5 +22,5 @@ def value_at(curve: Array, when: Array | float) -> Array:
         return np.zeros(times.shape)
     last = len(curve) - 1
     first = min(max(int(times.min()), 0), last)
-    part = curve[first : min(max(int(times.max()), 0), last) + 2]
-    return np.asarray(np.interp(times, np.arange(first, first + len(part)), part))
+    near = curve[first : min(max(int(times.max()), 0), last) + 2]
+    return np.asarray(np.interp(times, np.arange(first, first + len(near)), near))

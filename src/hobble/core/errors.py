@@ -1,4 +1,4 @@
-"""Errors that a user can mend. Each is one message with the file, the place in the file, and what to do."""
+"""Errors that a user can mend. The message names the file, the place in it, and what to do."""
 
 from __future__ import annotations
 
@@ -10,7 +10,10 @@ class HobbleError(Exception):
 
 
 class InputError(HobbleError):
-    """Something is wrong with a file, at a line or a frame if one is known.
+    """Something is wrong with a file.
+
+    problem: what is wrong, without a final dot. line, frame: where in the file, if known. fix: a sentence
+    that says what to do.
 
     >>> str(InputError("walk.bvh", "rotation is NaN", line=12, fix="Export the clip again."))
     'walk.bvh, line 12: rotation is NaN. Export the clip again.'

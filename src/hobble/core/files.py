@@ -22,11 +22,11 @@ import numpy as np
 from hobble.core.errors import HobbleError, InputError
 from hobble.core.untrusted import check_regular, printable, read_text
 
-# Limit for all compressed arrays of a file together, after unpacking. Hobble itself does not compress arrays.
+# The compressed arrays of a file may together unpack to at most this. Hobble itself does not compress arrays.
 MAX_INFLATED_BYTES = 1 << 30
 MAX_JSON_BYTES = 1 << 30
 DELETE_IT = "Delete it; the next run makes it again."
-# version of the npy format -> NumPy's function that reads the header of an array
+# Version of the npy format -> NumPy's function that reads the header of an array in this version.
 HEADER_READERS = {
     (1, 0): np.lib.format.read_array_header_1_0,
     (2, 0): np.lib.format.read_array_header_2_0,
@@ -47,10 +47,11 @@ DAMAGE_ERRORS = (
 
 @contextlib.contextmanager
 def atomic_path(path: str | Path) -> Iterator[Path]:
-    """Yield a temporary path in the folder of `path`. On success flush it to disk and rename it to `path`.
+    """Yield a temporary path, in the folder of `path`, for the caller to write a file.
 
-    On any failure `path` keeps its old content and the temporary file is removed. Raises HobbleError if the
-    disk is full or the folder cannot be written.
+    If the `with` block succeeds, the file is flushed to disk and renamed to `path`. If it fails, `path` keeps
+    its old content and the temporary file is removed. Raises HobbleError if the disk is full or the folder
+    cannot be written.
     """
     path = Path(path)
     temporary = path.with_name(f".{path.name}.{os.getpid()}.part")
@@ -80,9 +81,10 @@ def sync_folder(folder: Path) -> None:
 
 
 def _remove_leftovers(path: Path) -> None:
-    """Remove half-written temporary files of `path` from processes that were killed."""
+    """Remove the unfinished temporary files of `path` that killed processes left."""
     for left in path.parent.glob(f".{glob.escape(path.name)}.*.part"):
         try:
+            # The name contains the process id. Signal 0 only asks whether the process exists.
             os.kill(int(left.name.split(".")[-2]), 0)
         except ProcessLookupError:
             left.unlink(missing_ok=True)
@@ -130,7 +132,7 @@ def save_npz(path: str | Path, **arrays: Any) -> None:
 
 
 class Arrays(dict[str, np.ndarray]):
-    """Arrays of a file by name. A missing name raises InputError."""
+    """The arrays of the file `path`, as name -> array. A missing name raises InputError."""
 
     def __init__(self, path: str | Path, arrays: Iterable[tuple[str, np.ndarray]]) -> None:
         super().__init__(arrays)
@@ -141,7 +143,7 @@ class Arrays(dict[str, np.ndarray]):
 
 
 def load_npz(path: str | Path, names: Iterable[str] | None = None) -> Arrays:
-    """Read all arrays of an npz, or those in `names`. Checks all checksums and refuses pickles.
+    """Read all arrays of an npz, or those in `names`. Checks the checksum of each array and refuses pickles.
 
     Raises InputError if the file or an array is missing or damaged, or if a header claims more data than the
     file holds.
@@ -150,9 +152,9 @@ def load_npz(path: str | Path, names: Iterable[str] | None = None) -> Arrays:
         check_regular(path)
         with zipfile.ZipFile(path) as archive:
             check_archive(path, archive)
-            there = [name.removesuffix(".npy") for name in archive.namelist()]
-            wanted = there if names is None else list(names)
-            return Arrays(path, [(name, _array(archive, f"{name}.npy")) for name in wanted])
+            stored = [name.removesuffix(".npy") for name in archive.namelist()]
+            wanted = stored if names is None else list(names)
+            return Arrays(path, [(name, _read_array(archive, f"{name}.npy")) for name in wanted])
     except FileNotFoundError as error:
         raise InputError(path, "no such file") from error
     except OSError as error:
@@ -164,12 +166,15 @@ def load_npz(path: str | Path, names: Iterable[str] | None = None) -> Arrays:
 def check_archive(path: str | Path, archive: zipfile.ZipFile) -> None:
     """Raise ValueError or BadZipFile if an archive's list of files is damaged or claims too much data."""
     if _entry_count(path, archive) != len(archive.infolist()):
-        raise zipfile.BadZipFile("its directory has lost an entry")
+        raise zipfile.BadZipFile("its list of files has lost an entry")
     _check_sizes(path, archive)
 
 
 def _entry_count(path: str | Path, archive: zipfile.ZipFile) -> int:
-    """The number of files that the archive's end record states. zipfile does not check this number."""
+    """The number of files that the archive's end record states. zipfile does not check this number.
+
+    The end record has 22 bytes, with the number at byte 10, and then the archive's comment.
+    """
     with open(path, "rb") as file:
         file.seek(-22 - len(archive.comment), os.SEEK_END)
         (count,) = struct.unpack("<10xH10x", file.read(22))
@@ -179,7 +184,7 @@ def _entry_count(path: str | Path, archive: zipfile.ZipFile) -> int:
 def _check_sizes(path: str | Path, archive: zipfile.ZipFile) -> None:
     """Raise ValueError if the entries would need too much memory.
 
-    All entries together may not be larger than the file; they would be if several entries shared the same
+    All entries together may not be larger than the file. They are larger if several entries share the same
     bytes. Compressed entries may not unpack to more than MAX_INFLATED_BYTES.
     """
     entries = archive.infolist()
@@ -193,9 +198,10 @@ def _check_sizes(path: str | Path, archive: zipfile.ZipFile) -> None:
         raise ValueError(f"would unpack to more than {MAX_INFLATED_BYTES >> 20} MB")
 
 
-def _array(archive: zipfile.ZipFile, member: str) -> np.ndarray:
-    """Read the array in file `member` of the archive, after its header was checked against its size."""
+def _read_array(archive: zipfile.ZipFile, member: str) -> np.ndarray:
+    """Read the array in the archive's file `member`. First check that the array's header fits its size."""
     info = archive.getinfo(member)
+    # The archive's list of files begins at `start_dir`, behind all arrays.
     if not info.compress_type and info.header_offset + info.file_size > archive.start_dir:
         raise EOFError(f"{member} does not fit into the file")
     with archive.open(info) as file:
@@ -226,17 +232,17 @@ def load_npy(path: str | Path) -> np.ndarray:
 def check_header(file: IO[bytes], size: int) -> None:
     """Raise ValueError if an array's header is damaged or does not match the `size` bytes of the array.
 
-    file: open at the start of the header. NumPy parses a header as a Python expression, so a damaged one can
-    raise almost any error.
+    file: open at the start of the header. NumPy parses the header as a Python expression, so a damaged header
+    can raise almost any error.
     """
     try:
         shape, _, dtype = HEADER_READERS[np.lib.format.read_magic(file)](file)
     except OSError:
         raise
     except (Exception, MemoryError):  # Python raises MemoryError for a header that is nested too deeply
-        raise ValueError("an array whose header cannot be understood") from None
+        raise ValueError("the header of an array cannot be understood") from None
     count = 1
     for length in shape:
         count *= length
     if dtype.hasobject or min(shape, default=0) < 0 or count * dtype.itemsize != size - file.tell():
-        raise ValueError("an array does not hold what its header says")
+        raise ValueError("an array has another size than its header says, or holds Python objects")

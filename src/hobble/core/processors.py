@@ -7,18 +7,20 @@ import platform
 from collections.abc import Iterable, Mapping
 from pathlib import Path
 
-TOPOLOGY = Path("/sys/devices/system/cpu")
-CPUINFO = Path("/proc/cpuinfo")
-# With one of these values of ONEDNN_MAX_CPU_ISA, oneDNN uses no instructions for bfloat16.
+TOPOLOGY = Path("/sys/devices/system/cpu")  # where Linux says which processors share a core
+CPUINFO = Path("/proc/cpuinfo")  # where Linux lists the processors with their names and features
+# oneDNN is the library that multiplies matrices for PyTorch. With one of these values of the environment
+# variable ONEDNN_MAX_CPU_ISA, it uses no instructions for bfloat16.
 WITHOUT_BFLOAT16 = ("SSE41", "AVX", "AVX2", "AVX2_VNNI", "AVX512_CORE", "AVX512_CORE_VNNI")
 
 
-def cores(processors: Iterable[int] | None = None, topology: Path = TOPOLOGY) -> int:
-    """Number of cores among `processors` (default: those this process may use), at least 1.
+def count_cores(processors: Iterable[int] | None = None, topology: Path = TOPOLOGY) -> int:
+    """Number of physical cores, at least 1, to which the given processors belong.
 
-    Two hardware threads of one core count once, because matrix products gain nothing from the second thread:
-    on one core, one thread was 1.06 to 1.2 times faster than two. If the system does not say which processors
-    share a core, each processor counts.
+    processors: numbers of logical processors, as Linux counts them; None: those this process may use. Two
+    processors (hardware threads) of a core count once, because matrix products gain nothing from a second
+    thread: on one core, two threads took 1.06 to 1.2 times as long as one. If the system does not say which
+    processors share a core, each processor counts.
     """
     if processors is None:
         processors = (
@@ -37,9 +39,9 @@ def cores(processors: Iterable[int] | None = None, topology: Path = TOPOLOGY) ->
 def multiplies_bfloat16(cpuinfo: Path = CPUINFO, environment: Mapping[str, str] = os.environ) -> bool:
     """Whether this CPU multiplies bfloat16 in hardware (AVX-512 BF16 or AMX).
 
-    If it does, a matrix product takes half as long as with float32. Also False if ONEDNN_MAX_CPU_ISA forbids
-    these instructions: oneDNN would then emulate them, and a product would take many times as long as with
-    float32.
+    If it does, a matrix product in bfloat16 takes half as long as in float32. The result is also False if
+    ONEDNN_MAX_CPU_ISA forbids these instructions. oneDNN would then emulate them, and a product would take
+    many times as long as in float32.
     """
     if environment.get("ONEDNN_MAX_CPU_ISA", "").upper() in WITHOUT_BFLOAT16:
         return False
@@ -51,7 +53,7 @@ def multiplies_bfloat16(cpuinfo: Path = CPUINFO, environment: Mapping[str, str] 
 
 
 def processor(cpuinfo: Path = CPUINFO) -> str:
-    """The name of this machine's processor."""
+    """The name of this machine's processor model, or "unknown"."""
     try:
         lines = cpuinfo.read_text(encoding="utf-8", errors="replace").splitlines()
     except OSError:

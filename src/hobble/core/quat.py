@@ -1,4 +1,4 @@
-"""Unit quaternions as arrays (..., 4), w first. All functions take any leading axes."""
+"""Rotations as unit quaternions: arrays (..., 4) of w, x, y, z. The leading axes may be any."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ def normalize(q: ArrayLike) -> Array:
 
 
 def mul(a: ArrayLike, b: ArrayLike) -> Array:
-    """Hamilton product: rotate by `b` first, then by `a`. (..., 4) x (..., 4) -> (..., 4)."""
+    """Hamilton product (..., 4): the rotation by `b` first, then by `a`."""
     a, b = np.asarray(a), np.asarray(b)
     aw, ax, ay, az = a[..., 0], a[..., 1], a[..., 2], a[..., 3]
     bw, bx, by, bz = b[..., 0], b[..., 1], b[..., 2], b[..., 3]
@@ -42,7 +42,8 @@ def inv(q: ArrayLike) -> Array:
 
 def rotate(q: ArrayLike, v: ArrayLike) -> Array:
     """Rotate vectors (..., 3) by unit quaternions (..., 4)."""
-    # Written out, because np.cross takes two to three times as long for the same numbers.
+    # v + w t + cross(u, t), with u = (x, y, z) and t = 2 cross(u, v) = (d, e, f). It is written out, because
+    # np.cross takes two to three times as long for the same numbers.
     q, v = np.asarray(q), np.asarray(v)
     w, x, y, z = q[..., 0], q[..., 1], q[..., 2], q[..., 3]
     a, b, c = v[..., 0], v[..., 1], v[..., 2]
@@ -65,61 +66,62 @@ def from_axis_angle(axis: ArrayLike, angle: ArrayLike) -> Array:
 def between(a: ArrayLike, b: ArrayLike) -> Array:
     """The shortest rotation (..., 4) from direction `a` to direction `b`, each (..., 3) of any length.
 
-    For opposite directions, any axis at right angles to `a` would do. The axis nearest to Y is used, or the
-    one nearest to X if `a` itself is near Y.
+    If the directions are opposite, any axis at right angles to `a` gives such a rotation. The axis nearest to
+    Y is used, or the one nearest to X if `a` itself is near Y.
     """
     a = np.asarray(a, float) / np.linalg.norm(a, axis=-1, keepdims=True)
     b = np.asarray(b, float) / np.linalg.norm(b, axis=-1, keepdims=True)
     a, b = np.broadcast_arrays(a, b)
+    # For the angle t, (1 + cos t, sin t * axis) is a multiple of (cos t/2, sin t/2 * axis).
     w = 1.0 + np.sum(a * b, axis=-1, keepdims=True)
     q = np.concatenate([w, np.cross(a, b)], axis=-1)
     opposite = w[..., 0] < 1e-9
     if np.any(opposite):
-        side = np.where(np.abs(a[..., 1:2]) < 0.9, [0.0, 1.0, 0.0], [1.0, 0.0, 0.0])
-        across = side - a * np.sum(a * side, axis=-1, keepdims=True)
-        q = np.where(opposite[..., None], np.concatenate([np.zeros_like(w), across], axis=-1), q)
+        y_or_x = np.where(np.abs(a[..., 1:2]) < 0.9, [0.0, 1.0, 0.0], [1.0, 0.0, 0.0])
+        axis = y_or_x - a * np.sum(a * y_or_x, axis=-1, keepdims=True)
+        q = np.where(opposite[..., None], np.concatenate([np.zeros_like(w), axis], axis=-1), q)
     return normalize(q)
 
 
 def from_euler(angles: ArrayLike, order: str) -> Array:
     """Rotations (..., 4) from intrinsic Euler angles (..., 3) in radians.
 
-    order: the axes of the three angles, as in the channels of a BVH file: R = R_first R_second R_third. In
-    "ZYX" the first axis is Z.
+    order: the axes of the three angles, in the order in which a BVH file lists its rotation channels. "ZYX"
+    gives R = R_z R_y R_x, where angles[..., 0] is the angle about Z.
     """
     angles = np.asarray(angles, float)
     q = None
     for i, axis in enumerate(order.upper()):
-        step = from_axis_angle(np.eye(3)["XYZ".index(axis)], angles[..., i])
-        q = step if q is None else mul(q, step)
+        about_axis = from_axis_angle(np.eye(3)["XYZ".index(axis)], angles[..., i])
+        q = about_axis if q is None else mul(q, about_axis)
     assert q is not None
     return q
 
 
 def to_euler(q: ArrayLike, order: str = "ZYX") -> Array:
-    """Intrinsic Tait-Bryan angles (..., 3) in radians, the inverse of `from_euler`.
+    """Intrinsic Euler angles (..., 3) in radians of rotations (..., 4), the inverse of `from_euler`.
 
-    The middle angle is within +-90 degrees.
+    order: three different axes. The middle angle is within +-90 degrees.
     """
     from scipy.spatial.transform import Rotation
 
     q = np.asarray(q, float)
     flat = Rotation.from_quat(q.reshape(-1, 4), scalar_first=True)
     with warnings.catch_warnings():
-        # With the middle angle at 90 degrees several triples give the same rotation; any of them is right.
+        # If the middle angle is +-90 degrees, several triples of angles give the same rotation. Any is right.
         warnings.filterwarnings("ignore", "Gimbal lock")
         return flat.as_euler(order.upper()).reshape(*q.shape[:-1], 3)
 
 
 def to_matrix(q: ArrayLike) -> Array:
-    """(..., 4) -> rotation matrices (..., 3, 3) that act on column vectors."""
+    """Rotation matrices (..., 3, 3), which act on column vectors, from quaternions (..., 4)."""
     q = np.asarray(q)
     eye = np.broadcast_to(np.eye(3, dtype=q.dtype), (*q.shape[:-1], 3, 3))
     return np.swapaxes(rotate(q[..., None, :], eye), -1, -2)
 
 
 def from_matrix(m: ArrayLike) -> Array:
-    """Rotation matrices (..., 3, 3) -> (..., 4), w >= 0.
+    """Quaternions (..., 4) with w >= 0, from rotation matrices (..., 3, 3).
 
     The largest of the four components is computed first, and the others from it. This is precise at any angle
     (Shepperd 1978).
@@ -128,6 +130,7 @@ def from_matrix(m: ArrayLike) -> Array:
     a, b, c = m[..., 0, 0], m[..., 1, 1], m[..., 2, 2]
     x, y, z = m[..., 2, 1] - m[..., 1, 2], m[..., 0, 2] - m[..., 2, 0], m[..., 1, 0] - m[..., 0, 1]
     xy, yz, zx = m[..., 0, 1] + m[..., 1, 0], m[..., 1, 2] + m[..., 2, 1], m[..., 2, 0] + m[..., 0, 2]
+    # The rows are 4 w q, 4 x q, 4 y q and 4 z q. Each is a multiple of q = (w, x, y, z).
     rows = np.stack(
         [
             np.stack([1 + a + b + c, x, y, z], axis=-1),
@@ -143,13 +146,13 @@ def from_matrix(m: ArrayLike) -> Array:
 
 
 def positive(q: ArrayLike) -> Array:
-    """The same rotations with w >= 0."""
+    """The same rotations (..., 4) with w >= 0: -q and q are the same rotation."""
     q = np.asarray(q)
     return np.where(q[..., :1] < 0, -q, q)
 
 
 def log(q: ArrayLike) -> Array:
-    """Axis times HALF the angle in radians, (..., 4) -> (..., 3). q and -q give the same result."""
+    """Axis times HALF the angle in radians (..., 3) of rotations (..., 4). q and -q give the same result."""
     q = positive(q)
     length = np.linalg.norm(q[..., 1:], axis=-1, keepdims=True)
     half = np.arctan2(length, q[..., :1])
@@ -158,23 +161,26 @@ def log(q: ArrayLike) -> Array:
 
 
 def exp(v: ArrayLike) -> Array:
-    """Inverse of `log`: (..., 3) -> (..., 4)."""
+    """Rotations (..., 4), the inverse of `log`. v: (..., 3) axis times HALF the angle in radians."""
     v = np.asarray(v)
     half = np.linalg.norm(v, axis=-1, keepdims=True)
-    return np.concatenate([np.cos(half), v * np.sinc(half / np.pi)], axis=-1)
+    return np.concatenate([np.cos(half), v * np.sinc(half / np.pi)], axis=-1)  # np.sinc: sin(half) / half
 
 
 def slerp(a: ArrayLike, b: ArrayLike, t: ArrayLike) -> Array:
     """Rotations on the shorter arc from `a` (t = 0) to `b` (t = 1).
 
-    t: broadcasts against the leading axes of `a` and `b`.
+    a, b: (..., 4). t: a number, or an array that broadcasts against their leading axes.
     """
     a, b = np.asarray(a), np.asarray(b)
     return mul(a, exp(log(mul(inv(a), b)) * np.asarray(t)[..., None]))
 
 
 def continuous(q: ArrayLike) -> Array:
-    """Quaternions (F, ..., 4) with signs such that the dot product of successive frames is not negative."""
+    """The same rotations (F, ..., 4) without jumps between q and -q from one frame to the next.
+
+    The dot product of successive frames is then never negative.
+    """
     q = np.array(q)
     flips = np.sum(q[1:] * q[:-1], axis=-1) < 0
     signs = np.where(np.cumsum(flips, axis=0) % 2 == 1, -1.0, 1.0)
@@ -183,10 +189,10 @@ def continuous(q: ArrayLike) -> Array:
 
 
 def angle(a: ArrayLike, b: ArrayLike) -> Array:
-    """Angle in radians between two rotations, 0 to pi."""
+    """Angles (...) in radians, 0 to pi, between rotations `a` and `b`, each (..., 4)."""
     return 2.0 * np.linalg.norm(log(mul(inv(a), b)), axis=-1)
 
 
 def yaw(angle: ArrayLike) -> Array:
-    """Rotation about +Y by `angle` radians: takes +Z to (sin, 0, cos)."""
+    """Rotations (..., 4) about +Y by `angle` (...) radians. They turn +Z to (sin angle, 0, cos angle)."""
     return from_axis_angle(np.array([0.0, 1.0, 0.0]), angle)

@@ -1,4 +1,4 @@
-"""Base class and value types of the sections of a YAML file. Unknown keys are refused."""
+"""Base class and value types of the sections of a YAML configuration file."""
 
 from __future__ import annotations
 
@@ -11,29 +11,36 @@ LONGEST_FILE_NAME = 255  # bytes of a file's or folder's name; the limit of Linu
 LONGEST_PATH = 1000  # characters of a path in the mocap folder
 
 
-def _inside(path: str) -> str:
-    """Check that a path is relative to the mocap folder, does not leave it, is printable and not too long."""
+def _check_mocap_path(path: str) -> str:
+    """Return `path` if it is relative to the mocap folder, stays in it, is printable and not too long.
+
+    The mocap folder holds all motion files. Raises ValueError for other paths.
+    """
     if Path(path).is_absolute() or ".." in Path(path).parts or not path.isprintable():
-        raise ValueError("must be relative to the mocap folder and stay in it")
+        raise ValueError("must be relative to the mocap folder, stay in it and have no control characters")
     if any(len(part.encode()) > LONGEST_FILE_NAME for part in Path(path).parts) or len(path) > LONGEST_PATH:
         raise ValueError(
-            f"must have at most {LONGEST_PATH} characters, and each name in it {LONGEST_FILE_NAME} bytes"
+            f"must have at most {LONGEST_PATH} characters, and each name in it at most "
+            f"{LONGEST_FILE_NAME} bytes"
         )
     return path
 
 
-# The upper bound stops a mistyped or hostile configuration from using up the memory.
+# The upper bound keeps a mistyped or hostile configuration from using up the memory.
 Positive = Annotated[int, Field(gt=0, le=1_000_000)]
 PositiveFloat = Annotated[float, Field(gt=0, allow_inf_nan=False)]
 Finite = Annotated[float, Field(allow_inf_nan=False)]
 Share = Annotated[float, Field(ge=0, lt=1)]
-MocapPath = Annotated[str, AfterValidator(_inside)]
+MocapPath = Annotated[str, AfterValidator(_check_mocap_path)]
+# The ground on which a clip was captured. "jumpy": uneven, with jumps. "beam": a narrow beam above the floor.
 Ground = Literal["flat", "rocky", "jumpy", "beam"]
 Gait = Literal["stand", "walk", "jog", "crouch", "jump", "bump"]
+# How a phase-functioned network gets its weights for a phase. "constant": those of the last one of 50 stored
+# phases. "linear": a blend of two of 10 stored phases. "cubic": computed exactly.
 PhaseMode = Literal["constant", "linear", "cubic"]
 
 
 class Section(BaseModel):
-    """A part of a YAML file. Unknown keys are refused."""
+    """A part of a YAML file. An unknown key is an error."""
 
     model_config = ConfigDict(extra="forbid", frozen=True, str_strip_whitespace=True)

@@ -1,4 +1,4 @@
-"""A skeleton: joints, parents, rest offsets, roles of joints, and the bones that can be hurt (its links)."""
+"""A skeleton: joints, parents, rest offsets, roles of joints, and links (the bones that can be hurt)."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ PAIRED_NAMES = "the same except for Left and Right, or L and R, as in LeftLeg, L
 
 
 def other_side(name: str) -> str:
-    """The name of the joint on the other side, or the same name for a joint in the middle.
+    """The name of the joint on the other side of the body; the same name for a joint in the middle.
 
     >>> other_side("LeftUpLeg"), other_side("LHipJoint"), other_side("Neck1"), other_side("Hand_R")
     ('RightUpLeg', 'RHipJoint', 'Neck1', 'Hand_L')
@@ -37,7 +37,7 @@ def other_side(name: str) -> str:
 
 @dataclass(frozen=True)
 class Skeleton:
-    """The rig that a clip moves.
+    """The skeleton that a clip moves, with J joints and L links.
 
     joints: J names, each parent before its children; the first is the root.
     parents: J indices, -1 for the root.
@@ -45,8 +45,9 @@ class Skeleton:
     roles: role ("hips", "left_heel", ...) -> name of the joint; see config/skeletons/README.md.
     links: (upper joint, lower joint) of each bone that can be hurt. Arrays of severities (how badly the bones
     are hurt) have a column for each link.
-    unseen: joints that the network predicts but in effect does not see: their inputs have the weight 1e-10.
-    end_sites: joint without children -> (x, y, z) from the joint to the end of its bone, cm.
+    unseen: joints that the network predicts, but whose inputs are multiplied by 1e-10, so that the network in
+    effect does not see them.
+    end_sites: name of a joint without children -> vector (x, y, z) from the joint to the end of its bone, cm.
     """
 
     name: str
@@ -102,7 +103,10 @@ class Skeleton:
 
     @property
     def leg_length(self) -> float:
-        """Length of the left thigh and shank together, cm: a unit for comparing bodies of any size."""
+        """Length of the left thigh and shank together, cm.
+
+        Other lengths are divided by it, to compare bodies of any size.
+        """
         bones = np.linalg.norm(self.offsets, axis=1)
         knee, heel = self.role("left_knee"), self.role("left_heel")
         length, joint = 0.0, heel
@@ -120,7 +124,8 @@ class Skeleton:
     def mirror_joints(self) -> np.ndarray:
         """(J,) index of each joint's counterpart on the other side, found by name.
 
-        Raises HobbleError if the names do not pair the joints of roles such as "left_knee" and "right_knee".
+        A joint without a counterpart has its own index. Raises HobbleError if the joints of two roles such
+        as "left_knee" and "right_knee" are not counterparts by name.
         """
         swap = np.array([self._counterpart(name) for name in self.joints])
         for role, left in self.roles.items():
@@ -134,7 +139,7 @@ class Skeleton:
 
     @property
     def mirror_links(self) -> np.ndarray:
-        """(L,) index of each link's counterpart on the other side.
+        """(L,) index of each link's counterpart, the link between the counterparts of its joints.
 
         Raises HobbleError like `mirror_joints`, and also if a link has no counterpart: its severity would
         stay on the wrong side of the mirrored body.
@@ -156,12 +161,12 @@ class Skeleton:
         return self.joints.index(other if other in self.joints else name)
 
     def children(self, joint: int) -> list[int]:
-        """Indices of the joints directly below `joint`."""
+        """Indices of the joints whose parent is the joint with index `joint`."""
         return [i for i, p in enumerate(self.parents) if p == joint]
 
 
 def rest_positions(skeleton: Skeleton) -> Array:
-    """(J, 3) joint positions with every rotation at identity and the root at the origin."""
+    """(J, 3) joint positions, cm, with every rotation at the identity and the root at the origin."""
     out = np.zeros_like(skeleton.offsets, dtype=float)
     for j, p in enumerate(skeleton.parents):
         if p >= 0:
@@ -172,10 +177,10 @@ def rest_positions(skeleton: Skeleton) -> Array:
 def forward_kinematics(
     skeleton: Skeleton, rotations: Array, root: Array, translations: Array | None = None
 ) -> tuple[Array, Array]:
-    """World rotations (F, J, 4) and positions (F, J, 3), cm.
+    """The joints' world rotations (F, J, 4) and world positions (F, J, 3), cm, in F frames.
 
     rotations: (F, J, 4) local. root: (F, 3) position of the root, cm. translations: (F, J, 3) positions of
-    the joints relative to their parents, which replace the rest offsets of every joint but the root.
+    the joints in the axes of their parents, cm. They replace the rest offsets of all joints but the root.
     """
     global_rotations = np.empty_like(rotations, dtype=float)
     positions = np.empty((*rotations.shape[:-1], 3))
@@ -192,7 +197,7 @@ def forward_kinematics(
 
 
 def local_rotations(skeleton: Skeleton, global_rotations: Array) -> Array:
-    """Local rotations (..., J, 4) from world rotations (..., J, 4), the inverse of `forward_kinematics`."""
+    """Local rotations (..., J, 4), relative to the parent, from world rotations (..., J, 4)."""
     out = np.array(global_rotations, float)
     for j, p in enumerate(skeleton.parents):
         if p >= 0:

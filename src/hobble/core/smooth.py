@@ -1,6 +1,7 @@
-"""Filters over time for arrays (F, ...). Past the ends, the first and the last value are repeated.
+"""Filters over time for arrays (F, ...) of F frames. They return an array of the same shape.
 
-They use numpy only, because importing SciPy would slow the start of every job.
+Before the first frame and after the last one, the first and the last value are repeated. The filters use
+NumPy only, because importing SciPy would slow the start of every job.
 """
 
 from __future__ import annotations
@@ -11,15 +12,15 @@ from hobble.core.quat import Array
 
 
 def gaussian(values: Array, sigma: float) -> Array:
-    """Weighted mean with a Gaussian of `sigma` frames, cut off at four sigma."""
+    """Mean around each frame, weighted by a Gaussian of `sigma` frames that is cut off at four sigma."""
     reach = int(4 * sigma + 0.5)
     weights = np.exp(-0.5 * (np.arange(-reach, reach + 1) / sigma) ** 2)
-    return _weighted(values, weights / weights.sum())
+    return _weighted_sum(values, weights / weights.sum())
 
 
 def mean(values: Array, width: int) -> Array:
     """Mean over `width` frames (an odd number) around each frame."""
-    return _weighted(values, np.full(width, 1.0 / width))
+    return _weighted_sum(values, np.full(width, 1.0 / width))
 
 
 def lowest(values: Array, width: int) -> Array:
@@ -33,17 +34,20 @@ def median_of_three(values: Array) -> Array:
 
 
 def smooth_above(values: Array, frames: int) -> Array:
-    """(F,) a smooth curve that is nowhere below `values` (F,): the running maximum of the values, smoothed.
+    """(F,) a smooth curve that is nowhere below `values` (F,).
 
-    The maximum and the smoothing both reach over 2 * `frames` frames before and after each frame.
+    It is the maximum of the values around each frame, smoothed. The maximum and the smoothing both reach
+    2 * `frames` frames before and after each frame. So all maxima that are averaged in a frame include its
+    value.
     """
     highest = _windows(values, 4 * frames + 1).max(axis=-1)
+    # Two moving means over 2 * `frames` + 1 frames, one after the other.
     kernel = np.convolve(np.ones(2 * frames + 1), np.ones(2 * frames + 1))
-    return _weighted(highest, kernel / kernel.sum())
+    return _weighted_sum(highest, kernel / kernel.sum())
 
 
-def _weighted(values: Array, weights: Array) -> Array:
-    """Weighted sum of the values around each frame; the middle weight is that of the frame."""
+def _weighted_sum(values: Array, weights: Array) -> Array:
+    """Weighted sum of the values around each frame. The middle weight is that of the frame itself."""
     columns = np.reshape(values, (len(values), -1)).T
     reach = len(weights) // 2
     padded = np.pad(columns, ((0, 0), (reach, reach)), mode="edge")
@@ -52,6 +56,6 @@ def _weighted(values: Array, weights: Array) -> Array:
 
 
 def _windows(values: Array, width: int) -> Array:
-    """(F, ..., width) values around each frame."""
+    """(F, ..., width) the values in the `width` frames around each frame."""
     padding = [(width // 2, width // 2)] + [(0, 0)] * (np.ndim(values) - 1)
     return np.lib.stride_tricks.sliding_window_view(np.pad(values, padding, mode="edge"), width, axis=0)

@@ -16,17 +16,17 @@ if TYPE_CHECKING:
 MB = 1 << 20  # bytes
 MAX_TEXT_BYTES = 64 * MB  # enough for a label file of ten minutes at 100 Hz with 1 kB for each frame
 MAX_YAML_BYTES = 4 * MB  # enough for a data set of 20,000 clips with five keys each
-MAX_YAML_DEPTH = 100  # lists and mappings within each other
-# At most this many values in a file, counted after aliases are replaced by what they stand for. They take
-# about 100 MB of memory.
+MAX_YAML_DEPTH = 100  # levels of lists and mappings within each other
+# At most this many values in a file, counted after each alias (`*name`) is replaced by what it stands for. So
+# many values take about 100 MB of memory.
 MAX_YAML_NODES = 1_000_000
 
 
 def check_regular(path: str | Path) -> os.stat_result:
     """The stat result of a regular file, or of the file that a link points to.
 
-    Raises InputError for a folder, a device or a pipe: reading from a device or a pipe may never end. Raises
-    OSError if there is no such file.
+    Raises InputError for a folder, a device or a pipe, because reading from a device or a pipe may never end.
+    Raises OSError if there is no such file.
     """
     status = os.stat(path)
     if not stat.S_ISREG(status.st_mode):
@@ -37,7 +37,10 @@ def check_regular(path: str | Path) -> os.stat_result:
 
 
 def printable(text: object, most: int = 200) -> str:
-    """Untrusted text for a terminal: one line, at most `most` characters, no control characters."""
+    """Untrusted text, made safe for a terminal: one line, with "?" for each control character.
+
+    After `most` characters it is cut off with "...".
+    """
     plain = "".join(c if c.isprintable() else "?" for c in str(text)[: most + 1])
     return plain if len(plain) <= most else f"{plain[:most]}..."
 
@@ -50,7 +53,7 @@ def read_bytes(path: str | Path, most: int) -> bytes:
     try:
         size = check_regular(path).st_size
         with open(path, "rb") as file:
-            # read(n) allocates n bytes, so n comes from the file's size and not from `most`.
+            # read(n) allocates n bytes, so n is the file's size, not `most`; + 1 shows whether the file grew.
             data = file.read(size + 1) if size <= most else b""
     except FileNotFoundError:
         raise InputError(path, "no such file") from None
@@ -65,19 +68,19 @@ def read_bytes(path: str | Path, most: int) -> bytes:
 def read_text(path: str | Path, most: int = MAX_TEXT_BYTES) -> str:
     """The content of a UTF-8 text file, without a byte order mark.
 
-    Raises InputError if it is too large or not text.
+    most: largest number of bytes. Raises InputError if the file is missing, too large or not UTF-8.
     """
     try:
         return read_bytes(path, most).decode("utf-8-sig")
     except UnicodeDecodeError:
-        raise InputError(path, "is not a text file") from None
+        raise InputError(path, "not a text file in UTF-8") from None
 
 
 def read_yaml(path: str | Path) -> Any:
     """The content of a YAML file as plain data.
 
     Raises InputError, with the line if it is known, for invalid YAML, tags that would create Python objects,
-    duplicate keys, deep nesting, and aliases that would expand to more than MAX_YAML_NODES values.
+    duplicate keys, nesting deeper than MAX_YAML_DEPTH, and more than MAX_YAML_NODES values.
     """
     import yaml  # imported here because most jobs do not need it
 
@@ -90,14 +93,14 @@ def read_yaml(path: str | Path) -> Any:
         if node is None:
             return None
         if _size_without_aliases(node, {}, set()) > MAX_YAML_NODES:
-            raise InputError(path, f"its aliases expand to more than {MAX_YAML_NODES} values")
+            raise InputError(path, f"has more than {MAX_YAML_NODES} values, with its aliases expanded")
         _check_keys(path, node)
         return loader.construct_document(node)
     except yaml.MarkedYAMLError as error:
         line = error.problem_mark.line + 1 if error.problem_mark else None
         raise InputError(path, f"not valid YAML: {error.problem}", line=line) from None
     except RecursionError:
-        raise InputError(path, "nested too deeply, or an alias that contains itself") from None
+        raise InputError(path, "nested too deeply, or has an alias that contains itself") from None
     except (yaml.YAMLError, ValueError) as error:
         raise InputError(path, f"not valid YAML: {' '.join(str(error).split())}") from None
     finally:
@@ -105,7 +108,7 @@ def read_yaml(path: str | Path) -> Any:
 
 
 def _check_depth(events: Iterable[yaml.Event]) -> None:
-    """Raise RecursionError for deep nesting, on which libyaml would recurse and crash the process."""
+    """Raise RecursionError for too deep nesting. libyaml would recurse into it and crash the process."""
     import yaml
 
     depth = 0
@@ -116,7 +119,7 @@ def _check_depth(events: Iterable[yaml.Event]) -> None:
 
 
 def _check_keys(path: str | Path, top: yaml.Node) -> None:
-    """Raise InputError for a duplicate key. The loader would silently take the last one."""
+    """Raise InputError for a duplicate key. YAML's loader would silently take the last value."""
     todo, seen = [top], set()
     while todo:
         node = todo.pop()
@@ -124,7 +127,7 @@ def _check_keys(path: str | Path, top: yaml.Node) -> None:
             continue
         seen.add(id(node))
         todo += _children(node)
-        lines: dict[tuple[str, str], int] = {}
+        lines: dict[tuple[str, str], int] = {}  # (type, text) of a key -> its line, from 1
         for key in (child[0] for child in node.value if isinstance(child, tuple)):
             if not isinstance(key.value, str):
                 continue  # not a valid key; the loader reports it
@@ -136,7 +139,7 @@ def _check_keys(path: str | Path, top: yaml.Node) -> None:
 
 
 def _children(node: yaml.Node) -> list[yaml.Node]:
-    """The items of a sequence, or the keys and values of a mapping."""
+    """The items of a list, or the keys and values of a mapping."""
     pairs = (child if isinstance(child, tuple) else (child,) for child in node.value)
     return [part for pair in pairs for part in pair]
 
@@ -144,8 +147,8 @@ def _children(node: yaml.Node) -> list[yaml.Node]:
 def _size_without_aliases(node: yaml.Node, known: dict[int, int], above: set[int]) -> int:
     """Number of values in a node after every alias is replaced by what it stands for.
 
-    known: id of each node counted so far -> its number of values. above: ids of the nodes that contain this
-    one. Raises RecursionError for an alias that contains itself.
+    known: `id` of each list or mapping counted so far -> its number of values. above: `id`s of the nodes that
+    contain `node`. Raises RecursionError for an alias that contains itself.
     """
     if not isinstance(node.value, list):
         return 1

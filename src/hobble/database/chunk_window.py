@@ -1,4 +1,4 @@
-"""Rows of some chunks in memory, and the function that loads them."""
+"""Loads the rows of some chunks into memory. A chunk is a file of a few MB with rows of a database."""
 
 from __future__ import annotations
 
@@ -21,13 +21,13 @@ Buffers = Mapping[str, np.ndarray]
 
 @dataclass(frozen=True)
 class ChunkWindow:
-    """The rows of some chunks, in memory one after another.
+    """The rows of some chunks of a split ("train" or "held_out"), chunk after chunk.
 
-    chunks: their numbers in the split. rows: number of rows of each chunk. The arrays hold R rows, and S
-    patches of terrain fitted under them, in the types of the chunk files. x: (R, columns of X without
-    terrain). y: (R, Y). count: (R,) number of fits of each row. fits: (S, columns) the fits, row after row.
-    first: (R,) index of each row's first fit in `fits`. clip, frame, phase: (R,) each row's clip (its
-    number in the database), frame in this clip, and phase.
+    chunks: the numbers of the chunks in the split. rows: number of rows of each chunk. The arrays hold R rows
+    with together S terrain fits (patches of ground that suit the motion), in the types of the chunk files.
+    x: (R, columns of X without terrain). y: (R, Y). count: (R,) number of fits of each row. fits: (S,
+    columns) the fits, row after row. first: (R,) index of each row's first fit in `fits`. clip: (R,) number
+    of each row's clip in the database. frame: (R,) frame in this clip. phase: (R,).
     """
 
     chunks: Sequence[int]
@@ -43,11 +43,12 @@ class ChunkWindow:
 
 
 def empty_buffers(manifest: Manifest, split: str, count: int) -> dict[str, np.ndarray]:
-    """Empty arrays that are large enough for any `count` chunks of a split.
+    """Empty arrays, by name, that are large enough for any `count` chunks of a split.
 
-    Their order is that of the arrays in a chunk file.
+    The names and their order are those of the arrays in a chunk file.
     """
     chunks = manifest.chunks[split]
+    # the `count` largest chunks together
     rows = sum(sorted(chunk.rows for chunk in chunks)[-count:])
     fits = sum(sorted(chunk.fits for chunk in chunks)[-count:])
     floats = STORED[manifest.dtype]
@@ -71,16 +72,17 @@ def load_chunks(
     shards: Shards,
     verified: set[str],
 ) -> ChunkWindow:
-    """Read the chunks with these numbers of a split, one after another, directly into the arrays `into`.
+    """Read some chunks of a split, one after another, directly into the arrays `into` (`empty_buffers`).
 
-    folder: the chunks' folder. shards: converts the chunks to the statistics of the whole database. verified:
-    names of chunk files with a correct checksum. They are not checked again; newly checked ones are added.
-    Raises InputError, which names the file, if a chunk is damaged.
+    folder: the chunks' folder. numbers: the numbers of the chunks. shards: converts the rows, which are
+    standardised by the statistics of their shard (a part of the database), to the statistics of the whole
+    database. verified: names of chunk files with a correct checksum, which are not checked again. The names
+    of the files read are added to it. Raises InputError, which names the file, if a chunk is damaged.
     """
     wanted = [manifest.chunks[split][i] for i in numbers]
     all_rows, all_fits = sum(c.rows for c in wanted), sum(c.fits for c in wanted)
     tables = {name: table[: all_fits if name == "fits" else all_rows] for name, table in into.items()}
-    row = fit = 0
+    row = fit = 0  # where the rows and the fits of the next chunk begin
     for number, chunk in zip(numbers, wanted, strict=True):
         rows, fits = slice(row, row + chunk.rows), slice(fit, fit + chunk.fits)
         parts = {name: table[fits if name == "fits" else rows] for name, table in tables.items()}
@@ -88,4 +90,4 @@ def load_chunks(
         verified.add(chunk.file)
         shards.convert(split, number, parts)
         row, fit = rows.stop, fits.stop
-    return ChunkWindow(numbers, [c.rows for c in wanted], order.starts(tables["count"]), **tables)
+    return ChunkWindow(numbers, [c.rows for c in wanted], order.first_fits(tables["count"]), **tables)

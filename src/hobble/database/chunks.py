@@ -1,7 +1,7 @@
 """Chunks: a database stores its rows in files of a few MB, each with a checksum in the database's manifest.
 
-A chunk is a safetensors file, which other tools can open. Such a file has the length of its header (8 bytes,
-little-endian), the header (JSON: type, shape and place of each array), then the arrays.
+A chunk is a safetensors file, which other tools can open. It begins with the length of its header (8 bytes,
+little-endian). Then come the header (JSON: type, shape and place of each array) and the arrays.
 """
 
 from __future__ import annotations
@@ -19,8 +19,8 @@ import numpy as np
 from hobble.core.errors import InputError
 
 LENGTH = 8  # bytes of the number, at the start of the file, that says how long the header is
-MOST_PARTS = 16  # at most this many buffers in one vectored read; every POSIX system allows as many
-# NumPy's name of a type -> its name in safetensors. uint16 numbers hold the bits of bfloat16.
+MOST_PARTS = 16  # one call of `preadv` fills at most this many buffers; every POSIX system allows so many
+# NumPy's name of a type -> its name in safetensors. NumPy has no bfloat16, so uint16 numbers hold its bits.
 TYPES = {"<f2": "F16", "<u2": "BF16", "<f4": "F32", "<i4": "I32"}
 HINT = "Delete the folders of the database and of its shards. The next run makes them again."
 
@@ -29,8 +29,8 @@ HINT = "Delete the folders of the database and of its shards. The next run makes
 class Chunk:
     """A chunk's entry in the manifest.
 
-    file: its path in the database. rows, fits, bytes: its numbers of rows, of terrain fits and of bytes.
-    crc32: its checksum.
+    file: path of the chunk in the database's folder of chunks. rows, fits, bytes: number of its rows, of its
+    terrain fits (ground heights that suit a row) and of its bytes. crc32: its checksum.
     """
 
     file: str
@@ -45,7 +45,10 @@ class Chunk:
 
 
 def write_chunk(folder: Path, file: str, arrays: Mapping[str, np.ndarray]) -> Chunk:
-    """Write arrays to folder/file. `x` and `fits` have to be among them, and each type has to be in TYPES."""
+    """Write arrays, by name, to folder/file and return the chunk's entry for the manifest.
+
+    Among the arrays have to be `x`, with the chunk's rows, and `fits`. Each type has to be in TYPES.
+    """
     header: dict[str, Any] = {}
     place = 0
     for name, array in arrays.items():
@@ -57,9 +60,9 @@ def write_chunk(folder: Path, file: str, arrays: Mapping[str, np.ndarray]) -> Ch
         }
         place = end
     text = json.dumps(header).encode()
-    text += b" " * (-len(text) % 8)
-    head = np.frombuffer(len(text).to_bytes(8, "little") + text, np.uint8)
-    parts = [_bytes(part) for part in (head, *map(np.ascontiguousarray, arrays.values()))]
+    text += b" " * (-len(text) % 8)  # so that the arrays begin at a multiple of 8 bytes
+    start = np.frombuffer(len(text).to_bytes(LENGTH, "little") + text, np.uint8)
+    parts = [_bytes(part) for part in (start, *map(np.ascontiguousarray, arrays.values()))]
     path = folder / file
     path.parent.mkdir(parents=True, exist_ok=True)
     with open(path, "wb") as out:
@@ -71,15 +74,16 @@ def write_chunk(folder: Path, file: str, arrays: Mapping[str, np.ndarray]) -> Ch
 
 
 def read_chunk(folder: Path, chunk: Chunk, arrays: Mapping[str, np.ndarray], verify: bool = True) -> None:
-    """Read a chunk directly into `arrays`, which have the names, order, shapes and types that were written.
+    """Read a chunk directly into `arrays`.
 
-    Each array has to be contiguous. Raises InputError with the file's name if the file is missing, if its
-    length or its arrays differ from the manifest or, with `verify`, if its checksum is wrong.
+    They need the names, order, shapes and types of the arrays that were written, and have to be contiguous.
+    verify: whether to check the checksum. Raises InputError with the file's name if the file is missing, if
+    its length or its arrays differ from the manifest, or if the checksum is wrong.
     """
     path = folder / chunk.file
-    other_bytes = chunk.bytes - sum(array.nbytes for array in arrays.values())
-    header = np.empty(max(other_bytes, LENGTH), np.uint8)
-    parts = [_bytes(array) for array in (header, *arrays.values())]
+    start_bytes = chunk.bytes - sum(array.nbytes for array in arrays.values())
+    start = np.empty(max(start_bytes, LENGTH), np.uint8)  # the header and its length
+    parts = [_bytes(array) for array in (start, *arrays.values())]
     try:
         with open(path, "rb", buffering=0) as file:
             size = os.fstat(file.fileno()).st_size
@@ -91,7 +95,7 @@ def read_chunk(folder: Path, chunk: Chunk, arrays: Mapping[str, np.ndarray], ver
         raise InputError(path, f"cannot be read ({error.strerror})", fix=HINT) from error
     if verify and _checksum(parts) != chunk.crc32:
         raise InputError(path, "damaged: its checksum differs from the manifest", fix=HINT)
-    if LENGTH + int.from_bytes(header[:LENGTH].tobytes(), "little") != other_bytes:
+    if LENGTH + int.from_bytes(start[:LENGTH].tobytes(), "little") != start_bytes:
         raise InputError(path, "its arrays differ from the manifest", fix=HINT)
 
 
@@ -101,7 +105,7 @@ def _bytes(array: np.ndarray) -> memoryview:
 
 
 def _fill(descriptor: int, parts: Sequence[memoryview]) -> None:
-    """Fill the buffers `parts`, one after another, from the file, with as few system calls as possible."""
+    """Fill the buffers `parts`, one after another, from the start of an open file, with few system calls."""
     unfilled, place = [part for part in parts if len(part)], 0
     while unfilled:
         count = os.preadv(descriptor, unfilled[:MOST_PARTS], place)

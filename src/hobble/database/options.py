@@ -1,4 +1,4 @@
-"""The keys of the section `database` of the configuration."""
+"""The keys of the section `database` of a data set's configuration."""
 
 from __future__ import annotations
 
@@ -10,10 +10,10 @@ from hobble.core.section import Positive, PositiveFloat, Section
 
 
 class RowOptions(Section):
-    """The content of a row; read by the rule `database_clips`."""
+    """What a row (the network's input and output for a frame) contains. Read by the rule `database_clips`."""
 
     window: Annotated[int, Field(gt=0, le=3600)] = Field(
-        60, description="frames before and after the present one"
+        60, description="frames that the trajectory spans before and after the present one"
     )
     step: Positive = Field(10, description="frames between trajectory samples")
     facing_sigma: PositiveFloat = Field(20.0, description="smoothing of the facing direction, frames")
@@ -26,9 +26,11 @@ class RowOptions(Section):
 
 
 class Merging(Section):
-    """How rows are standardised and stored; read by the rule `database_merge`."""
+    """How rows are standardised and stored. Read by the rules `database_shard` and `database_merge`."""
 
-    joint_weight: PositiveFloat = Field(0.1, description="weight of the joints in the network's input")
+    joint_weight: PositiveFloat = Field(
+        0.1, description="factor of the standardised joints in the network's input"
+    )
     dtype: Literal["float32", "float16", "bfloat16"] = Field(
         "float32", description="type of the rows on disk; float16 and bfloat16 take half the bytes"
     )
@@ -36,12 +38,14 @@ class Merging(Section):
 
 
 class DatabaseOptions(RowOptions, Merging):
-    """The content of rows, their storage, and the number of shards."""
+    """The whole section: the content of rows, their storage, and the number of shards (parts)."""
 
     shards: Annotated[int, Field(gt=0, le=1000)] = Field(
         1,
-        description="shards of the database, each made by a job from the rows of some clips; a new clip "
-        "changes only one of them. The order in which training sees the rows depends on the number of shards",
+        description="number of shards of the database. Each is made by a job from the rows of some clips, so "
+        "a new clip changes only one. The order in which training sees the rows depends on this number",
     )
 
-    terrain_side: PositiveFloat = Field(25.0, description="cm from the path to the ground heights beside it")
+    terrain_side: PositiveFloat = Field(
+        25.0, description="distance from the path to the ground heights on its left and right, cm"
+    )

@@ -1,4 +1,8 @@
-"""The plan of a shard, made before any row is written: layout, clips, sizes of chunks and buckets."""
+"""The plan of a shard, made before any row is written: layout, clips, sizes of chunks and buckets.
+
+A shard is a part of a database, with the rows of some clips in files called chunks. Buckets are temporary
+files in which the rows are sorted before chunks are written.
+"""
 
 from __future__ import annotations
 
@@ -16,9 +20,9 @@ from hobble.rows.layout import RowLayout
 
 # Size of a bucket (`hobble.database.buckets`). Sorting a bucket needs a few times as much memory.
 BUCKET_BYTES = 64 << 20
-INDEX_BYTES = 16  # of a row: its number of fits, clip, frame and phase
+INDEX_BYTES = 16  # in a chunk, for each row: its number of terrain fits, clip, frame and phase
 
-# The rows of a clip, or the file with them.
+# The rows of a clip, or the path of the file with them.
 RowSource = ClipRows | str | Path
 
 
@@ -26,11 +30,11 @@ RowSource = ClipRows | str | Path
 class Plan:
     """What a shard will contain.
 
-    layout: the columns of its rows. skeleton: as plain data. visits: how often a pass over the data uses each
-    row. clips: one entry for each clip: `clip` (its name), `split`, number of used `rows` and of `pairs` (of
-    a row and a terrain fit), and for a hurt version `source`, the healthy clip it was made from. An entry
-    with `every` and `first_row` uses only each `every`-th row from row `first_row` on. chunk_rows,
-    bucket_rows: number of rows of a chunk and of a bucket.
+    layout: the columns of its rows. skeleton: see `Skeleton.to_dict`. visits: how often a pass over the data
+    uses each row. clips: one entry for each clip: `clip` (its name), `split`, number of used `rows` and of
+    `pairs` (of a used row and one of its terrain fits), and for a hurt version `source`, the name of the
+    healthy clip from which it was computed. If an entry has `every` and `first_row`, only each `every`-th row
+    from row `first_row` on is used. chunk_rows, bucket_rows: number of rows of a chunk and of a bucket.
     """
 
     layout: RowLayout
@@ -41,12 +45,12 @@ class Plan:
     bucket_rows: int
 
     def rows(self, split: str) -> int:
-        """Number of rows of a split."""
+        """Number of used rows in a split ("train" or "held_out")."""
         return sum(clip["rows"] for clip in self.clips if clip["split"] == split)
 
     def to_dict(self) -> dict[str, Any]:
         """Plain data for a file."""
-        # The skeleton as text: write_json sorts keys, but the joints have to keep their order.
+        # The skeleton is stored as text, because write_json sorts keys, but joints have to keep their order.
         skeleton = json.dumps(self.skeleton)
         return {**vars(self), "layout": self.layout.to_dict(), "skeleton": skeleton}
 
@@ -61,24 +65,27 @@ def make_plan(
     clips: Mapping[str, RowSource],
     splits: Mapping[str, str],
     channels: Sequence[str],
-    item: int,
+    number_bytes: int,
     chunk_bytes: int,
     sources: Mapping[str, str],
     every: int = 1,
 ) -> Plan | None:
     """The plan of a shard with the rows of `clips`; None if there are no clips.
 
-    item: bytes of a number on disk. The other arguments are those of `hobble.database.merge.write_database`.
-    Raises InputError if the rows of a clip have other columns or joints than those of the first clip.
+    number_bytes: bytes of a number on disk. For the other arguments see
+    `hobble.database.merge.write_database`. Raises InputError if the rows of a clip have other columns or
+    joints than those of the first clip.
     """
     entries: list[dict[str, Any]] = []
     first: Outline | None = None
     visits, pairs, rows = 1, 0, 0
-    versions: Counter[str] = Counter()  # healthy clip -> number of its hurt versions so far
+    # Healthy clip -> number of its hurt versions so far. Each version begins at another row, so that the
+    # versions of a clip use different frames.
+    versions: Counter[str] = Counter()
     for name in sorted(clips):
         current = outline(clips[name])
         first = first or current
-        if not fit_together(current, first):
+        if not have_same_columns(current, first):
             source = clips[name]
             where = name if isinstance(source, ClipRows) else source
             raise InputError(where, f"the layout of its rows differs from that of {min(clips)}")
@@ -95,18 +102,18 @@ def make_plan(
     if first is None:
         return None
     layout = first.layout.with_channels(channels)
-    # how many numbers a row has, with the mean number of fits
-    values = x_columns(layout) + layout.y_size + fit_columns(layout) * pairs / max(rows, 1)
-    chunk_rows = max(1, int(chunk_bytes / (item * values + INDEX_BYTES)))
-    bucket_chunks = max(1, int(BUCKET_BYTES / (chunk_rows * 4 * values)))
+    # How many numbers a row has on average, with its fits.
+    row_numbers = x_columns(layout) + layout.y_size + fit_columns(layout) * pairs / max(rows, 1)
+    chunk_rows = max(1, int(chunk_bytes / (number_bytes * row_numbers + INDEX_BYTES)))
+    bucket_chunks = max(1, int(BUCKET_BYTES / (chunk_rows * 4 * row_numbers)))
     return Plan(layout, first.skeleton, visits, entries, chunk_rows, chunk_rows * bucket_chunks)
 
 
 def used_rows(entry: Mapping[str, Any]) -> slice:
-    """Which rows of a clip are used. entry: the clip's entry in `Plan.clips`."""
+    """The rows of a clip that are used, as a slice. entry: the clip's entry in `Plan.clips`."""
     return slice(entry.get("first_row", 0), None, entry.get("every", 1))
 
 
-def fit_together(one: Outline | Plan, other: Outline | Plan) -> bool:
+def have_same_columns(one: Outline | Plan, other: Outline | Plan) -> bool:
     """Whether the rows of `one` and `other` have the same columns and joints."""
     return one.layout == other.layout and list(one.skeleton["joints"]) == list(other.skeleton["joints"])

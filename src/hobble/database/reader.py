@@ -170,7 +170,7 @@ class Database:
         total = self.section_samples(split, section, sections)
         stretch = stretch or SampleRange(0, total, total, 0, total)
         cut = stretch.start, stretch.stop
-        spans = order.spans(self.rows(split), self.manifest.visits, section, sections, cut)
+        spans = order.layer_parts(self.rows(split), self.manifest.visits, section, sections, cut)
         window = window or self.window(split, block_rows)
         buffers = self._buffers(split, window)
         parts = chain.from_iterable(
@@ -232,7 +232,7 @@ class Database:
         """
         rows = [chunk.rows for chunk in self.manifest.chunks[split]]
         done = 0
-        for group, some in enumerate(order.groups(self._shards.of_chunks[split], window, *of)):
+        for group, some in enumerate(order.chunk_groups(self._shards.of_chunks[split], window, *of)):
             n = sum(rows[i] for i in some)
             low, high = max(start - done, 0), min(stop - done, n)
             if low < high:

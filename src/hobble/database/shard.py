@@ -19,7 +19,7 @@ from hobble.channels.speed_limits import LimitLearner
 from hobble.core.errors import InputError
 from hobble.core.files import load_npz, read_json, save_npz, write_error, write_json
 from hobble.database.chunks import HINT, Chunk
-from hobble.database.learn_limits import add_rows, limit_learners
+from hobble.database.learn_limits import add_rows, make_limit_learners
 from hobble.database.manifest import SPLITS
 from hobble.database.plan import Plan, RowSource, make_plan
 from hobble.database.precision import STORED
@@ -62,7 +62,7 @@ def write_shard(
         buckets = make_buckets(folder, plan)
         nothing = Moments.nothing(plan.layout.x_size), Moments.nothing(plan.layout.y_size)
         sums: dict[str, Sums] = dict.fromkeys(SPLITS, nothing)
-        learners = limit_learners(plan.layout, plan.skeleton)
+        learners = make_limit_learners(plan.layout, plan.skeleton)
         for entry, clip, used in scatter(buckets, clips, plan, seed):
             sums[entry["split"]] = add(sums[entry["split"]], clip_moments(used, plan.layout))
             if entry["split"] == "train":  # also rows left out of training: speeds are means of cycles

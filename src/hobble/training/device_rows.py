@@ -50,7 +50,7 @@ class DeviceRows(TrainingRows):
         self.phase = torch.empty(rows, device=device)
         self.count, self.clip, self.frame = (np.empty(rows, np.int32) for _ in range(3))
         self._upload()
-        self.first = order.starts(self.count)
+        self.first = order.first_fits(self.count)
         s = database.statistics
         self.x_std, self.y_std = (torch.from_numpy(std).to(device) for std in (s.x_std, s.y_std))
 
@@ -121,7 +121,7 @@ class DeviceRows(TrainingRows):
         chunks, chunk_rows = range(len(self.chunks)), [chunk.rows for chunk in self.chunks]
         nothing = np.empty(0, np.int64)
         yield nothing, nothing  # so that even an empty stretch has arrays to join
-        for layer, start, stop in order.spans(len(self.count), visits, section, sections, part):
+        for layer, start, stop in order.layer_parts(len(self.count), visits, section, sections, part):
             layer_key = (seed, pass_index, layer, 0)
             yield order.rows_and_fits(
                 chunks, chunk_rows, self.count, self.first, visits, layer_key, slice(start, stop)

@@ -12,7 +12,7 @@ import torch
 
 from hobble.core.errors import HobbleError, InputError
 from hobble.core.files import Arrays, load_npz
-from hobble.core.processors import cores, multiplies_bfloat16
+from hobble.core.processors import count_cores, multiplies_bfloat16
 from hobble.core.skeleton import Skeleton
 from hobble.database.manifest import FILE
 from hobble.database.reader import Database
@@ -49,7 +49,7 @@ def use_threads(threads: int, batch: int | None = None) -> None:
 
     batch: rows of a batch. If it is given, a trial decides whether one thread is faster.
     """
-    threads = max(1, min(threads, cores(), numba.config.NUMBA_NUM_THREADS))  # type: ignore[attr-defined]
+    threads = max(1, min(threads, count_cores(), numba.config.NUMBA_NUM_THREADS))  # type: ignore[attr-defined]
     if batch is not None:
         threads = threads_for(batch, threads)
     torch.set_num_threads(threads)
