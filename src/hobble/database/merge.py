@@ -25,7 +25,7 @@ from hobble.database.chunks import Chunk
 from hobble.database.learn_limits import limit_learners
 from hobble.database.manifest import FILE, SCALES, SPLITS, STATISTICS, Manifest, ShardCounts
 from hobble.database.plan import RowSource, fit_together
-from hobble.database.shard import CHUNK_BYTES, Shard, add, statistics_of, write_shard
+from hobble.database.shard import CHUNK_BYTES, Shard, add_moments, row_statistics, write_shard
 
 
 def write_database(
@@ -103,11 +103,13 @@ def _merged(path: Path, work: Path, folders: Sequence[Path], joint_weight: float
     shards = [shard for folder in folders if (shard := Shard.load(folder)) is not None]
     _check(shards)
     plan, clips = shards[0].plan, [entry for shard in shards for entry in shard.plan.clips]
-    statistics = statistics_of(plan, reduce(add, (shard.sums() for shard in shards)), joint_weight)
+    statistics = row_statistics(
+        plan, reduce(add_moments, (shard.moments() for shard in shards)), joint_weight
+    )
     rows = work / "rows"
     chunks = _linked(shards, rows)
     save_npz(rows / STATISTICS, **vars(statistics))
-    scales = [shard.scale() for shard in shards]
+    scales = [shard.statistics() for shard in shards]
     save_npz(
         rows / SCALES,
         **{name: np.stack([vars(scale)[name] for scale in scales]) for name in vars(statistics)},
