@@ -54,7 +54,7 @@ class SeveritySweep:
         figure: index of the figure. Distances are means over the joints, between poses of the same phase.
         """
         walks = self.walks
-        spans = [walks.measured(1 + step, figure) for step in range(len(self.steps))]
+        spans = [walks.measured_frames(1 + step, figure) for step in range(len(self.steps))]
         cycles = [mean_cycle(walks.local[s, figure], walks.phase[s, figure]) for s in spans]
         worst = len(SEVERITIES) - 1
         rows = []
@@ -121,7 +121,7 @@ class SeveritySweep:
         """`settle_seconds` and `heal_seconds` of `response`."""
         walks: Walks = self.at_once
         local, phase = walks.local[:, figure], walks.phase[:, figure]
-        healthy = walks.measured(1, figure)
+        healthy = walks.measured_frames(1, figure)
         cycle = mean_cycle(local[healthy], phase[healthy])
         distance = distance_to_cycle(local, phase, cycle)
         normal = float(np.mean(distance[healthy]))
