@@ -52,8 +52,8 @@ class Block(NamedTuple):
     frame: np.ndarray
 
 
-class RawRows(NamedTuple):
-    """n rows with all their terrain fits, which are not yet composed. Standardised float32.
+class UncomposedRows(NamedTuple):
+    """n standardised rows, float32, with all their terrain fits. Rows and fits are not yet composed.
 
     x: (n, X without terrain). y: (n, Y). p: (n,) phase. fits: (m, columns) the fits, row after row: ground
     heights, then the lift in cm. The lift says how far the fit's mean height is above the average of these
@@ -170,9 +170,10 @@ class Database:
         times. The blocks depend only on the arguments, and on memory_mb if the database does not fit in
         memory. They do not depend on what was read before. A thread makes the next block.
 
-        section: number of the section, from 0. seed: of the random order. stretch: the part of the section to
-        read; None: all of it. window: number of chunks in memory at a time; None: as the method `window`
-        says. Raises InputError, which names the file, if a chunk is damaged.
+        pass_index, section: number of the pass and of the section, from 0. seed: of the random order.
+        stretch: the part of the section to read; None: all of it. window: number of chunks in memory at a
+        time; None: as the method `window` says. Raises InputError, which names the file, if a chunk is
+        damaged.
         """
         if not 0 <= section < sections:
             raise HobbleError(f"there is no section {section}: a pass of {sections} has 0 to {sections - 1}")
@@ -190,7 +191,7 @@ class Database:
         )
         return read_ahead(self._compose_blocks(_own_samples(picked, stretch), stretch.rows, block_rows))
 
-    def each_row(self, split: str) -> Iterator[RawRows]:
+    def each_row(self, split: str) -> Iterator[UncomposedRows]:
         """Each row of a split once, with its fits, in the order of the chunks, BLOCK_ROWS at a time."""
         chunks = len(self.manifest.chunks[split])
         window = self.window(split, BLOCK_ROWS)
@@ -206,7 +207,7 @@ class Database:
                 first, count = loaded.first[part], loaded.count[part]
                 fits = widen(loaded.fits[first[0] : first[-1] + count[-1]]).astype(np.float32)
                 x, y = (widen(table[part]).astype(np.float32) for table in (loaded.x, loaded.y))
-                yield RawRows(x, y, loaded.phase[part], fits, first - first[0])
+                yield UncomposedRows(x, y, loaded.phase[part], fits, first - first[0])
 
     def _pick_rows(
         self,

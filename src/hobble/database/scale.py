@@ -39,7 +39,7 @@ class Conversion:
     fits: FactorsAndSummands = field(repr=False)
 
     def apply(self, x: np.ndarray, y: np.ndarray, fits: np.ndarray, dtype: str) -> None:
-        """Convert the arrays of a chunk in place. dtype: type of the numbers on disk, a key of STORED."""
+        """Convert the arrays of a chunk in place. dtype: type of the numbers on disk."""
         for values, factors_and_summands in ((x, self.x), (y, self.y), (fits, self.fits)):
             _convert(values, factors_and_summands, dtype)
 

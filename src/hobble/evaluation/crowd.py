@@ -79,7 +79,7 @@ class Walks:
 
 
 def run(network: Network, script: Sequence[CrowdTarget], runtime: Runtime) -> Walks:
-    """The motion of C figures that follow `script`. They stand at first and walk straight ahead on flat ground.
+    """The motion of C figures that follow `script`. They begin standing and walk ahead on flat ground.
 
     script: one `CrowdTarget` for each stretch, in order. Figures with the same targets move in the same way,
     to the last bit, until their targets first differ. So, to save time, a single character of the animation

@@ -1,4 +1,4 @@
-"""Describes a stretch of walking with fifty numbers. Recognisers of injuries, moods and diagnoses use them."""
+"""Describes a stretch of walking with fifty numbers, so that injuries, moods and diagnoses are recognised."""
 
 from __future__ import annotations
 
