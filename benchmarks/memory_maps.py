@@ -73,7 +73,7 @@ class Mapped:
             for layer, start, stop in order.layer_parts(rows, visits, section, SECTIONS)
         )
         return read_ahead(
-            self.db._composed(parts, self.db.section_samples("train", section, SECTIONS), block_rows)
+            self.db._compose_blocks(parts, self.db.section_samples("train", section, SECTIONS), block_rows)
         )
 
     def parts(self, of: tuple[int, int, int], start: int, stop: int, window: int) -> Iterator[tuple]:

@@ -93,7 +93,7 @@ def test_rows_are_shuffled_globally(rows_of, tmp_path):
     rows = {name: rows_of(name, 300, 1, seed=i) for i, name in enumerate("abcd")}
     write_database(tmp_path / "db", rows, dict.fromkeys("abcd", "train"), **OPTIONS)
     db = Database.open(tmp_path / "db")
-    window = db._whole("train")
+    window = db._load_split("train")
     clip = window.clip
     assert abs(np.corrcoef(clip[1:], clip[:-1])[0, 1]) < 0.1
     assert abs(np.corrcoef(clip, np.arange(len(clip)))[0, 1]) < 0.1

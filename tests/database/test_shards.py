@@ -181,7 +181,7 @@ def test_scales_of_other_shards_are_refused(clips, tmp_path):
     db = in_shards(tmp_path, clips, SPLITS, ["abc", "defg"])
     (scales,) = db.rglob("scales.npz")
     np.savez(scales, **{name: values[:1] for name, values in np.load(scales).items()})
-    with pytest.raises(InputError, match=r"scales\.npz: not the scales of 2 shards"):
+    with pytest.raises(InputError, match=r"scales\.npz: not the statistics of 2 shards"):
         Database.open(db)
 
 

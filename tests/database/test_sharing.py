@@ -13,12 +13,12 @@ from hobble.database.sharing import PassSharing, SampleRange
 def read(sharing: PassSharing) -> list[list[int]]:
     """The numbers of the samples in the section that a process reads for each batch."""
     pieces = []
-    for stretch in sharing.read():
-        numbers = np.arange(stretch.start, stretch.stop)[stretch.kept(0, stretch.stop - stretch.start)]
+    for stretch in sharing.own_stretches():
+        numbers = np.arange(stretch.start, stretch.stop)[stretch.own_samples(0, stretch.stop - stretch.start)]
         assert len(numbers) == stretch.rows
         size = stretch.high - stretch.low
         pieces.append([numbers[at : at + size].tolist() for at in range(0, len(numbers), size)])
-    sizes = list(sharing.sizes())
+    sizes = list(sharing.batch_sizes())
     batches = [list(chain(*(piece[i] for piece in pieces if i < len(piece)))) for i in range(len(sizes))]
     assert [len(batch) for batch in batches] == [own for _, own in sizes]
     return batches
@@ -40,7 +40,7 @@ def test_with_one_range_samples_keep_the_order_of_the_section():
 
 
 def test_with_as_many_ranges_as_processes_each_reads_its_own_range():
-    found = [PassSharing.of(1000, 32, 4, rank, 4).read() for rank in range(4)]
+    found = [PassSharing.of(1000, 32, 4, rank, 4).own_stretches() for rank in range(4)]
     assert all(len(stretches) == 1 for stretches in found)
     assert [s.high - s.low for (s,) in found] == [s.share for (s,) in found] == [8] * 4
     edges = [(s.start, s.stop) for (s,) in found]
@@ -49,8 +49,8 @@ def test_with_as_many_ranges_as_processes_each_reads_its_own_range():
 
 def test_the_samples_of_a_range_do_not_depend_on_the_blocks_that_are_read():
     stretch = SampleRange(10, 33, 5, 1, 4)
-    whole = np.arange(23)[stretch.kept(0, 23)]
+    whole = np.arange(23)[stretch.own_samples(0, 23)]
     cuts = list(accumulate([0, 3, 9, 1, 10]))
-    parts = [np.arange(a, b)[stretch.kept(a, b - a)] for a, b in pairwise(cuts)]
+    parts = [np.arange(a, b)[stretch.own_samples(a, b - a)] for a, b in pairwise(cuts)]
     np.testing.assert_array_equal(np.concatenate(parts), whole)
     assert len(whole) == stretch.rows == 14

@@ -15,7 +15,7 @@ from hobble.database.statistics import (
     UNSEEN,
     Moments,
     clip_moments,
-    grouped,
+    share_in_groups,
     statistics_of_moments,
     x_groups,
 )
@@ -106,7 +106,7 @@ def test_nothing_is_ever_divided_by_zero(rows_of, layout):
 def test_a_gait_without_rows_has_the_deviation_of_its_group(layout):
     std = np.ones(layout.x_size)
     std[layout.x_gait] = np.repeat([0.6, 0.6, 0, 0, 0, 0], layout.samples)
-    np.testing.assert_allclose(grouped(std, x_groups(layout), SILENT)[layout.x_gait], 0.2)
+    np.testing.assert_allclose(share_in_groups(std, x_groups(layout), SILENT)[layout.x_gait], 0.2)
 
 
 def test_severities_share_one_deviation_and_unused_ones_are_scaled_to_0():

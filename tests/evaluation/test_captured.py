@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from hobble.evaluation.captured import captured, root_path, unbroken
+from hobble.evaluation.captured import captured, root_path, unbroken_stretches
 from hobble.evaluation.motion_measures import acceleration, in_root_coordinates
 from hobble.measures.clip_parts import captured_motion
 from hobble.measures.stratified_sample import Sample, Stratum
@@ -87,5 +87,5 @@ def test_a_gap_in_the_frames_separates_two_stretches(rows, tmp_path) -> None:
 
 
 def test_no_rows_give_no_motion() -> None:
-    assert unbroken(np.zeros(0, int)) == []
+    assert unbroken_stretches(np.zeros(0, int)) == []
     assert root_path(np.zeros((1, 2)), np.zeros(1)).tolist() == [[0, 0, 0]]

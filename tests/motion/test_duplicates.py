@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from hobble.core.errors import HobbleError
-from hobble.database.split_check import refuse_both_sides
+from hobble.database.split_check import refuse_split_pairs
 from hobble.motion.axes import turned
 from hobble.motion.duplicates import digest, load_digests, same_pairs, save_digests
 from hobble.motion.mirror import mirror_clip
@@ -75,11 +75,13 @@ def test_a_motion_in_both_splits_is_refused_with_both_names():
     pairs = [("a", "b", "the same file"), ("c", "d", "the same motion"), ("e", "f", "the same motion")]
     splits = {"a": "held_out", "b": "train", "c": "train", "d": "train", "e": "held_out", "f": "held_out"}
     with pytest.raises(HobbleError) as caught:
-        refuse_both_sides("data set mine", pairs, splits)
-    assert "data set mine: a and b are the same file: the first of each pair is held out" in str(caught.value)
-    assert 'Add to held_out: ["b"]' in str(caught.value)
+        refuse_split_pairs("data set mine", pairs, splits)
+    assert "data set mine: a and b are the same file. The first clip of each pair is held out" in str(
+        caught.value
+    )
+    assert 'Add the second ones to held_out: ["b"]' in str(caught.value)
     assert "c and d" not in str(caught.value)
-    refuse_both_sides("data set mine", pairs, dict.fromkeys("abcdef", "train"))
+    refuse_split_pairs("data set mine", pairs, dict.fromkeys("abcdef", "train"))
 
 
 @pytest.mark.shared

@@ -118,7 +118,7 @@ def test_wrong_names_in_clip_entries_are_reported_before_anything_runs(
 def test_a_file_in_both_splits_is_refused_before_anything_runs(complete: Path) -> None:
     for name, text in (("a", "one motion"), ("b", "one motion"), ("c", "one m0tion")):
         (complete / f"data/mine/{name}.bvh").write_text(text)
-    message = r'data set mine: b and a are the same file: the first .* Add to held_out: \["a"\]'
+    message = r'data set mine: b and a are the same file\. The first .* to held_out: \["a"\]'
     with pytest.raises(HobbleError, match=message):
         check(Project(complete, {}), ["results/one/report.html"])
     check(Project(complete, {}), ["results/datasets/mine/look.html"])

@@ -6,7 +6,7 @@ from hobble.core.clip import load_clip
 from hobble.core.files import read_json
 from hobble.database.merge import merge_shards, write_database
 from hobble.database.options import Merging
-from hobble.database.split_check import refuse_both_sides
+from hobble.database.split_check import refuse_split_pairs
 from hobble.motion.duplicates import digest, load_digests, same_pairs
 from hobble.workflow.job import job
 
@@ -16,7 +16,7 @@ with job(snakemake) as log:
     files = zip(snakemake.input.compared, snakemake.input.reports, strict=True)
     digests = [digest(load_clip(clip), read_json(report)["sha256"]) for clip, report in files]
     digests += [one for shard in shards for one in load_digests(shard / "likenesses.npz")]
-    refuse_both_sides(f"data set {snakemake.params.dataset}", same_pairs(digests), snakemake.params.splits)
+    refuse_split_pairs(f"data set {snakemake.params.dataset}", same_pairs(digests), snakemake.params.splits)
     if shards:
         manifest = merge_shards(database, shards, joint_weight=options.joint_weight, dtype=options.dtype)
     else:

@@ -13,7 +13,7 @@ from hobble.database import order
 from hobble.database.chunks import read_chunk
 from hobble.database.manifest import Manifest
 from hobble.database.precision import STORED
-from hobble.database.scale import Shards
+from hobble.database.scale import ShardConversions
 from hobble.rows.compose import fit_columns, x_columns
 
 Buffers = Mapping[str, np.ndarray]
@@ -69,7 +69,7 @@ def load_chunks(
     split: str,
     numbers: Sequence[int],
     into: Buffers,
-    shards: Shards,
+    shards: ShardConversions,
     verified: set[str],
 ) -> ChunkWindow:
     """Read some chunks of a split, one after another, directly into the arrays `into` (`empty_buffers`).

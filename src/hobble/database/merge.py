@@ -25,7 +25,7 @@ from hobble.database.chunks import Chunk
 from hobble.database.learn_limits import make_limit_learners
 from hobble.database.manifest import FILE, SCALES, SPLITS, STATISTICS, Manifest, ShardCounts
 from hobble.database.plan import RowSource, have_same_columns
-from hobble.database.shard import CHUNK_BYTES, Shard, add, statistics_of, write_shard
+from hobble.database.shard import CHUNK_BYTES, Shard, add_moments, row_statistics, write_shard
 
 
 def write_database(
@@ -104,11 +104,13 @@ def _merge(path: Path, work: Path, folders: Sequence[Path], joint_weight: float,
     shards = [shard for folder in folders if (shard := Shard.load(folder)) is not None]
     _check_shards(shards)
     plan, clips = shards[0].plan, [entry for shard in shards for entry in shard.plan.clips]
-    statistics = statistics_of(plan, reduce(add, (shard.sums() for shard in shards)), joint_weight)
+    statistics = row_statistics(
+        plan, reduce(add_moments, (shard.moments() for shard in shards)), joint_weight
+    )
     build = work / "rows"
     chunks = _link_chunks(shards, build)
     save_npz(build / STATISTICS, **vars(statistics))
-    scales = [shard.scale() for shard in shards]
+    scales = [shard.statistics() for shard in shards]
     save_npz(
         build / SCALES,
         **{name: np.stack([vars(scale)[name] for scale in scales]) for name in vars(statistics)},

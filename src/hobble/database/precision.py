@@ -1,7 +1,8 @@
-"""Types of numbers on disk: float32, or float16 or bfloat16 with half the bytes.
+"""Types of numbers on disk: float32, or one of two types with half the bytes, float16 and bfloat16.
 
-float16 has 11 significant bits and a largest value of 65,504; bfloat16 has 8 significant bits
-and the range of float32. NumPy has no bfloat16, so a bfloat16 is the upper 16 bits of a float32, in uint16.
+float16 has 11 significant bits and a largest value of 65,504. bfloat16 has 8 significant bits and the range
+of float32: its bits are the upper 16 bits of a float32. NumPy has no bfloat16. So these bits are held as a
+uint16 number.
 """
 
 from __future__ import annotations
@@ -13,6 +14,7 @@ import numpy as np
 from hobble.core.errors import HobbleError
 from hobble.core.quat import Array
 
+# Name of a precision -> NumPy's type of the stored numbers.
 STORED: dict[str, np.dtype[Any]] = {
     "float32": np.dtype("<f4"),
     "float16": np.dtype("<f2"),
@@ -21,9 +23,10 @@ STORED: dict[str, np.dtype[Any]] = {
 
 
 def narrow(values: Array, precision: str) -> np.ndarray:
-    """The values in the type that is stored for `precision` (STORED), rounded to nearest even.
+    """Convert float values to the type that is stored for `precision`, a key of STORED.
 
-    Raises HobbleError if a value is too large for float16.
+    Rounds to the nearest number, and a value halfway between two numbers to the one whose last bit is 0.
+    Raises HobbleError if a value is too large for the type.
     """
     if precision != "bfloat16":
         with np.errstate(over="ignore"):
@@ -35,12 +38,13 @@ def narrow(values: Array, precision: str) -> np.ndarray:
                 "Set database.dtype to bfloat16 or float32."
             )
         return out
+    # The lower 16 bits are cut off. To round, add 0x7FFF first, and 1 more if the last bit that stays is 1.
     bits = np.asarray(values, "<f4").view("<u4")
     return ((bits + np.uint32(0x7FFF) + ((bits >> 16) & 1)) >> 16).astype("<u2")
 
 
 def widen(values: np.ndarray) -> Array:
-    """Convert stored bfloat16 to float32. Other types are returned unchanged."""
+    """Convert stored bfloat16 (uint16) to float32. Other types are returned unchanged."""
     if values.dtype != STORED["bfloat16"]:
         return values
     return (values.astype("<u4") << 16).view("<f4")

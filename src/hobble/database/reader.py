@@ -1,4 +1,11 @@
-"""Reads a database as shuffled, standardised blocks of rows, ahead of their use and within a memory limit."""
+"""Reads a database as shuffled, standardised blocks of rows. It reads ahead, within a memory limit.
+
+A row belongs to a frame of a clip. It has one or more terrain fits: ground heights that suit the motion. A
+chunk is a file with some of the rows. A pass over a split uses each row `visits` times, with its fits in
+turn. So it consists of `visits` layers, and a layer has each row once (`hobble.database.order`). Callers read
+a pass in `sections`, which are parts of nearly equal length. A `ChunkWindow` holds the chunks that are in
+memory together. A parameter `window` is the number of these chunks.
+"""
 
 from __future__ import annotations
 
@@ -18,24 +25,24 @@ from hobble.database import order
 from hobble.database.chunk_window import Buffers, ChunkWindow, empty_buffers, load_chunks
 from hobble.database.manifest import STATISTICS, Manifest
 from hobble.database.precision import widen
-from hobble.database.scale import Shards
+from hobble.database.scale import ShardConversions
 from hobble.database.sharing import SampleRange
 from hobble.database.statistics import Statistics
 from hobble.rows.compose import compose
 from hobble.rows.layout import RowLayout
 
 Item = TypeVar("Item")
-# A window, (n,) indices of rows in it, and (n,) the index of each row's fit.
-Part = tuple[ChunkWindow, np.ndarray, np.ndarray]
+# n rows to compose: a window, (n,) indices of rows in it, and (n,) for each row the index of one of its fits.
+PickedRows = tuple[ChunkWindow, np.ndarray, np.ndarray]
 BLOCK_ROWS = 4096  # rows of a block, unless the caller asks for another number
 BLOCKS = 3  # blocks in memory at a time: one being made, one waiting, one in use
 
 
 class Block(NamedTuple):
-    """n rows as a network gets them: x (n, X) and y (n, Y), standardised float32; p (n,) phase 0 to 1.
+    """n rows as a network gets them. Each is composed of a frame's columns and one of its terrain fits.
 
-    A row is composed of a frame, the channels and a terrain fit. clip: (n,) index into `Database.clips`;
-    frame: (n,) frame of the clip at 60 Hz.
+    x: (n, X) and y: (n, Y), standardised float32. p: (n,) phase, from 0 to 1. clip: (n,) index into
+    `Database.clips`. frame: (n,) frame of the clip at 60 Hz.
     """
 
     x: Array
@@ -45,11 +52,12 @@ class Block(NamedTuple):
     frame: np.ndarray
 
 
-class RawRows(NamedTuple):
-    """n rows without terrain, standardised float32: x (n, X without terrain), y (n, Y), p (n,) phase.
+class UncomposedRows(NamedTuple):
+    """n standardised rows, float32, with all their terrain fits. Rows and fits are not yet composed.
 
-    fits: (m, columns) all terrain fits of these rows: heights, then the lift in cm (by how much the mean
-    height of this fit is above the mean of all fits of the row). first: (n,) index of each row's first fit.
+    x: (n, X without terrain). y: (n, Y). p: (n,) phase. fits: (m, columns) the fits, row after row: ground
+    heights, then the lift in cm. The lift says how far the fit's mean height is above the average of these
+    means over all fits of the row. first: (n,) index of each row's first fit in `fits`.
     """
 
     x: Array
@@ -61,17 +69,17 @@ class RawRows(NamedTuple):
 
 @dataclass(frozen=True)
 class Database:
-    """A database opened for reading with the method `open`.
+    """A database that the method `open` opened for reading.
 
-    path: its folder. memory_mb: MiB of memory for rows. phase_weight: by how much the standardised change of
-    phase is multiplied.
+    path: its folder. memory_mb: MiB of memory for rows. phase_weight: factor by which the standardised change
+    of phase, a column of Y, is multiplied.
     """
 
     path: Path
     manifest: Manifest
     statistics: Statistics
     memory_mb: int
-    _shards: Shards = field(repr=False)
+    _conversions: ShardConversions = field(repr=False)
     _loaded: dict[str, ChunkWindow] = field(default_factory=dict, repr=False)
     _verified: set[str] = field(default_factory=set, repr=False)
     phase_weight: float = 1.0
@@ -80,32 +88,32 @@ class Database:
     def open(cls, path: str | Path, memory_mb: int = 512) -> Database:
         """Open the database folder `path`.
 
-        memory_mb: MiB of memory for rows, for each section that is being read. A database that fits is loaded
-        once; a larger one is read again and again, chunk by chunk. Raises InputError if the database is not
-        complete.
+        memory_mb: MiB of memory for rows, for each section that is being read. A database that fits is read
+        once. The chunks of a larger one are read again for every layer. Raises InputError if the database is
+        not complete.
         """
         path = Path(path)
         manifest = Manifest.load(path)
         statistics = Statistics(**load_npz(path / manifest.folder / STATISTICS))
-        return cls(path, manifest, statistics, memory_mb, Shards(path, manifest, statistics))
+        return cls(path, manifest, statistics, memory_mb, ShardConversions(path, manifest, statistics))
 
     def with_phase_weight(self, weight: float) -> Database:
-        """The same rows, with the standardised change of phase multiplied by `weight`.
+        """The same database, with the standardised change of phase (a column of Y) multiplied by `weight`.
 
-        Its squared error then counts `weight`^2 times in a mean over the standardised columns.
+        The squared error of this column then counts `weight`^2 times in a mean over the columns of Y.
         """
         if weight == 1.0:
             return self
         y_std = self.statistics.y_std.copy()
         y_std[self.layout.y_phase_change] /= weight
         statistics = replace(self.statistics, y_std=y_std)
-        shards = Shards(self.path, self.manifest, statistics)
+        conversions = ShardConversions(self.path, self.manifest, statistics)
         return Database(
             self.path,
             self.manifest,
             statistics,
             self.memory_mb,
-            shards,
+            conversions,
             phase_weight=self.phase_weight * weight,
         )
 
@@ -116,17 +124,17 @@ class Database:
 
     @property
     def skeleton(self) -> dict[str, Any]:
-        """The skeleton as plain data."""
+        """The skeleton as plain data, for `Skeleton.from_dict`."""
         return dict(self.manifest.skeleton)
 
     @property
     def clips(self) -> tuple[str, ...]:
-        """Names of the clips, of both splits; `Block.clip` is an index into them."""
+        """Names of the clips of both splits. `Block.clip` is an index into them."""
         return tuple(clip["clip"] for clip in self.manifest.clips)
 
     @property
     def sources(self) -> dict[str, str]:
-        """Hurt version -> the healthy clip it is made from."""
+        """Name of each hurt version of a clip -> name of the healthy clip from which it was made."""
         return {clip["clip"]: clip["source"] for clip in self.manifest.clips if "source" in clip}
 
     def rows(self, split: str) -> int:
@@ -134,11 +142,14 @@ class Database:
         return self.manifest.rows(split)
 
     def samples(self, split: str) -> int:
-        """Number of samples of a pass: (frame, fit) pairs. A flat row's one fit counts `visits` times."""
+        """Number of samples of a pass. A sample is a pair of a row and one of its terrain fits.
+
+        A row on flat ground has a single fit, which a pass uses `visits` times.
+        """
         return self.rows(split) * self.manifest.visits
 
     def section_samples(self, split: str, section: int, sections: int) -> int:
-        """Number of samples of one section of a pass."""
+        """Number of samples of section number `section`, from 0, of a pass in `sections` sections."""
         total = self.samples(split)
         return total * (section + 1) // sections - total * section // sections
 
@@ -153,18 +164,19 @@ class Database:
         stretch: SampleRange | None = None,
         window: int | None = None,
     ) -> Iterator[Block]:
-        """One section of one pass, shuffled, as blocks of `block_rows` rows; the last may be shorter.
+        """One section of one pass, shuffled, as blocks of `block_rows` rows. The last block may be shorter.
 
-        Over the `sections` sections of a pass, every (frame, fit) pair comes once (the one fit of a flat row:
-        `visits` times). The blocks depend only on the arguments (and on memory_mb, if the split does not fit
-        in memory), not on what was read before. The next block is made in a thread.
+        All sections of a pass together give every sample once, but the single fit of a flat row `visits`
+        times. The blocks depend only on the arguments, and on memory_mb if the database does not fit in
+        memory. They do not depend on what was read before. A thread makes the next block.
 
-        section: number of the section, from 0. stretch: the part of the section to read; None: all. window:
-        number of chunks in memory at a time; None: as the method `window` says. Raises InputError, which
-        names the file, if a chunk is damaged.
+        pass_index, section: number of the pass and of the section, from 0. seed: of the random order.
+        stretch: the part of the section to read; None: all of it. window: number of chunks in memory at a
+        time; None: as the method `window` says. Raises InputError, which names the file, if a chunk is
+        damaged.
         """
         if not 0 <= section < sections:
-            raise HobbleError(f"there is no section {section} in a pass of {sections}")
+            raise HobbleError(f"there is no section {section}: a pass of {sections} has 0 to {sections - 1}")
         if self.rows(split) == 0:
             return iter(())
         total = self.section_samples(split, section, sections)
@@ -172,157 +184,171 @@ class Database:
         cut = stretch.start, stretch.stop
         spans = order.layer_parts(self.rows(split), self.manifest.visits, section, sections, cut)
         window = window or self.window(split, block_rows)
-        buffers = self._buffers(split, window)
-        parts = chain.from_iterable(
-            self._parts(split, (seed, pass_index, layer), start, stop, window, buffers)
+        buffers = self._two_buffer_sets(split, window)
+        picked = chain.from_iterable(
+            self._pick_rows(split, (seed, pass_index, layer), start, stop, window, buffers)
             for layer, start, stop in spans
         )
-        return read_ahead(self._composed(_for_this_process(parts, stretch), stretch.rows, block_rows))
+        return read_ahead(self._compose_blocks(_own_samples(picked, stretch), stretch.rows, block_rows))
 
-    def each_row(self, split: str) -> Iterator[RawRows]:
-        """Every row of a split once, with all its fits, in the order of the chunks."""
+    def each_row(self, split: str) -> Iterator[UncomposedRows]:
+        """Each row of a split once, with its fits, in the order of the chunks, BLOCK_ROWS at a time."""
         chunks = len(self.manifest.chunks[split])
         window = self.window(split, BLOCK_ROWS)
         if window < chunks:
-            numbers, buffers = range(chunks), self._buffers(split, window)
+            numbers, buffers = range(chunks), self._two_buffer_sets(split, window)
             groups = (numbers[start : start + window] for start in range(0, chunks, window))
-            windows = read_ahead(self.load(split, some, next(buffers)) for some in groups)
+            windows = read_ahead(self.load(split, group, next(buffers)) for group in groups)
         else:
-            windows = iter([self._whole(split)] if chunks else [])
-        for read in windows:
-            for start in range(0, len(read.count), BLOCK_ROWS):
+            windows = iter([self._load_split(split)] if chunks else [])
+        for loaded in windows:
+            for start in range(0, len(loaded.count), BLOCK_ROWS):
                 part = slice(start, start + BLOCK_ROWS)
-                first, count = read.first[part], read.count[part]
-                fits = widen(read.fits[first[0] : first[-1] + count[-1]]).astype(np.float32)
-                x, y = (widen(table[part]).astype(np.float32) for table in (read.x, read.y))
-                yield RawRows(x, y, read.phase[part], fits, first - first[0])
+                first, count = loaded.first[part], loaded.count[part]
+                fits = widen(loaded.fits[first[0] : first[-1] + count[-1]]).astype(np.float32)
+                x, y = (widen(table[part]).astype(np.float32) for table in (loaded.x, loaded.y))
+                yield UncomposedRows(x, y, loaded.phase[part], fits, first - first[0])
 
-    def _parts(
+    def _pick_rows(
         self,
         split: str,
-        of: tuple[int, int, int],
+        layer_key: tuple[int, int, int],
         start: int,
         stop: int,
         window: int,
         buffers: Iterator[Buffers],
-    ) -> Iterator[Part]:
-        """The rows at places `start` to `stop` - 1 of a layer.
+    ) -> Iterator[PickedRows]:
+        """The rows at places `start` to `stop` - 1 of a layer, each with a fit.
 
-        of: seed, pass and layer. window: number of chunks in memory at a time. buffers: two sets of buffers
-        in turn. The next window is loaded into one set while the present one, in the other set, is in use. So
-        do not use a window after requesting the next part.
+        layer_key: seed, number of the pass and number of the layer. window: number of chunks in memory at a
+        time. buffers: two sets of buffers in turn. While a window in one set is in use, the next window is
+        loaded into the other set. So a caller must not use a window after it requested the next rows.
         """
         all_chunks = range(len(self.manifest.chunks[split]))
         if window >= len(all_chunks):
-            wanted: list[tuple[int, Sequence[int], int, int]] = [(0, all_chunks, start, stop)]
-            windows = iter([self._whole(split)])
+            groups: list[tuple[int, Sequence[int], int, int]] = [(0, all_chunks, start, stop)]
+            windows = iter([self._load_split(split)])
         else:
-            wanted = list(self._wanted(split, of, start, stop, window))
-            windows = read_ahead(self.load(split, some, next(buffers)) for _, some, _, _ in wanted)
-        for group, _, low, high in wanted:
-            w, part, visits = next(windows), slice(low, high), self.manifest.visits
-            yield w, *order.rows_and_fits(w.chunks, w.rows, w.count, w.first, visits, (*of, group), part)
+            groups = list(self._chunk_groups(split, layer_key, start, stop, window))
+            windows = read_ahead(self.load(split, chunks, next(buffers)) for _, chunks, _, _ in groups)
+        for group, _, low, high in groups:
+            w, visits, key = next(windows), self.manifest.visits, (*layer_key, group)
+            part = slice(low, high)
+            yield w, *order.rows_and_fits(w.chunks, w.rows, w.count, w.first, visits, key, part)
 
-    def _wanted(
-        self, split: str, of: tuple[int, int, int], start: int, stop: int, window: int
+    def _chunk_groups(
+        self, split: str, layer_key: tuple[int, int, int], start: int, stop: int, window: int
     ) -> Iterator[tuple[int, Sequence[int], int, int]]:
         """The groups of chunks with the rows at places `start` to `stop` - 1 of a layer.
 
-        Yields (number of the group, chunks, first place in the group, last place + 1).
+        Yields (number of the group, numbers of its chunks, first place in the group, last place + 1).
         """
         rows = [chunk.rows for chunk in self.manifest.chunks[split]]
+        shards = self._conversions.shard_of_chunk[split]
         done = 0
-        for group, some in enumerate(order.chunk_groups(self._shards.of_chunks[split], window, *of)):
-            n = sum(rows[i] for i in some)
-            low, high = max(start - done, 0), min(stop - done, n)
+        for group, chunks in enumerate(order.chunk_groups(shards, window, *layer_key)):
+            group_rows = sum(rows[i] for i in chunks)
+            low, high = max(start - done, 0), min(stop - done, group_rows)
             if low < high:
-                yield group, some.tolist(), low, high
-            done += n
+                yield group, chunks.tolist(), low, high
+            done += group_rows
 
     def block_rows(self, batch: int = 1) -> int:
-        """A good number of rows for a block: a multiple of `batch`, about 4,096.
+        """A good number of rows for a block: a multiple of `batch`, usually close to BLOCK_ROWS.
 
         It is lower if the blocks would otherwise take more than a quarter of the memory.
         """
-        row = 4 * (self.layout.x_size + self.layout.y_size)
-        limit = min(BLOCK_ROWS, (self.memory_mb << 20) // (4 * BLOCKS * row))
+        row_bytes = 4 * (self.layout.x_size + self.layout.y_size)
+        limit = min(BLOCK_ROWS, (self.memory_mb << 20) // (4 * BLOCKS * row_bytes))
         return batch * max(1, limit // batch)
 
     def window(self, split: str, block_rows: int) -> int:
-        """How many chunks are in memory at a time: all if both splits fit, else as many as fit twice.
+        """The number of chunks that may be in memory together: all chunks of the split if both splits fit.
 
-        Twice, because the next chunks are read while the present ones are in use. At least one. Memory
-        for the blocks is subtracted first.
+        Otherwise, memory for two such groups is needed, because the next group is read while the present one
+        is in use. At least 1. Memory for the blocks, of `block_rows` rows, is subtracted first.
         """
         memory = self.memory_mb << 20
         memory -= BLOCKS * block_rows * 4 * (self.layout.x_size + self.layout.y_size)
         sizes = [chunk.bytes for chunk in self.manifest.chunks[split]]
         return len(sizes) if self.manifest.bytes <= memory else max(1, memory // (2 * max(sizes)))
 
-    def _buffers(self, split: str, window: int) -> Iterator[Buffers]:
-        """Two sets of buffers for windows, in turn. All windows of a section reuse them."""
+    def _two_buffer_sets(self, split: str, window: int) -> Iterator[Buffers]:
+        """Two sets of buffers for `window` chunks each, in turn. All windows of a section reuse them.
+
+        Nothing if all chunks fit in memory, because these are loaded once and stay.
+        """
         if window >= len(self.manifest.chunks[split]):
             return iter(())
         return cycle([empty_buffers(self.manifest, split, window) for _ in range(2)])
 
-    def _whole(self, split: str) -> ChunkWindow:
-        """All chunks of a split, which are read once."""
+    def _load_split(self, split: str) -> ChunkWindow:
+        """All chunks of a split. They are read at the first call and stay in memory."""
         if split not in self._loaded:
             numbers = range(len(self.manifest.chunks[split]))
             self._loaded[split] = self.load(split, numbers, empty_buffers(self.manifest, split, len(numbers)))
         return self._loaded[split]
 
     def load(self, split: str, numbers: Sequence[int], into: Buffers) -> ChunkWindow:
-        """Read the chunks with these numbers of a split into buffers from `empty_buffers`."""
+        """Read some chunks of a split into buffers from `empty_buffers`. numbers: which chunks."""
         folder = self.path / self.manifest.folder
-        return load_chunks(folder, self.manifest, split, numbers, into, self._shards, self._verified)
+        return load_chunks(folder, self.manifest, split, numbers, into, self._conversions, self._verified)
 
-    def _composed(self, parts: Iterator[Part], total: int, block_rows: int) -> Iterator[Block]:
-        """Blocks of `block_rows` rows from parts of any length."""
-        block, filled = self._empty(min(block_rows, total)), 0
-        for window, rows, fit in parts:
+    def _compose_blocks(self, picked: Iterator[PickedRows], total: int, block_rows: int) -> Iterator[Block]:
+        """Blocks of `block_rows` rows. picked: `total` rows, in portions of any length."""
+        block, filled = self._empty_block(min(block_rows, total)), 0
+        for window, rows, fits in picked:
             while len(rows):
                 n = min(len(rows), len(block.p) - filled)
-                here, some = slice(filled, filled + n), rows[:n]
-                self._compose(window, some, fit[:n], block.x[here], block.y[here])
-                block.p[here] = window.phase[some]
-                block.clip[here], block.frame[here] = window.clip[some], window.frame[some]
-                rows, fit, filled = rows[n:], fit[n:], filled + n
+                here, next_rows = slice(filled, filled + n), rows[:n]
+                self._compose_rows(window, next_rows, fits[:n], block.x[here], block.y[here])
+                block.p[here] = window.phase[next_rows]
+                block.clip[here], block.frame[here] = window.clip[next_rows], window.frame[next_rows]
+                rows, fits, filled = rows[n:], fits[n:], filled + n
                 if filled == len(block.p):
                     yield block
                     total -= filled
-                    block, filled = self._empty(min(block_rows, total)), 0
+                    block, filled = self._empty_block(min(block_rows, total)), 0
 
-    def _compose(self, window: ChunkWindow, rows: np.ndarray, fit: np.ndarray, x: Array, y: Array) -> None:
-        """Fill x and y with `rows`, each with its `fit`; 2 million rows (31 joints) a second on one core."""
-        frames, ground = widen(window.x[rows]), widen(window.fits[fit])
+    def _compose_rows(
+        self, window: ChunkWindow, rows: np.ndarray, fits: np.ndarray, x: Array, y: Array
+    ) -> None:
+        """Fill x (n, X) and y (n, Y) with n rows of a window, each with one fit.
+
+        rows: (n,) indices of the rows. fits: (n,) indices of their fits. One core composes 2 million rows (31
+        joints) a second.
+        """
+        frames, ground = widen(window.x[rows]), widen(window.fits[fits])
         if window.y.dtype == y.dtype:
-            np.take(window.y, rows, axis=0, out=y, mode="clip")  # the default mode makes another copy
+            np.take(
+                window.y, rows, axis=0, out=y, mode="clip"
+            )  # mode "raise", the default, makes another copy
         else:
             y[...] = widen(window.y[rows])
         lift = ground[:, -1:].astype(np.float32)
-        lift_or_none = lift if lift.any() else None
+        lift_or_none = lift if lift.any() else None  # None skips the subtraction
         stds = self.statistics.x_std, self.statistics.y_std
         compose(self.layout, frames, ground[:, :-1], lift_or_none, x, y, *stds)
 
-    def _empty(self, rows: int) -> Block:
+    def _empty_block(self, rows: int) -> Block:
+        """A block for `rows` rows, not yet filled."""
         x = np.empty((rows, self.layout.x_size), np.float32)
         y = np.empty((rows, self.layout.y_size), np.float32)
         return Block(x, y, np.empty(rows, np.float32), np.empty(rows, np.int32), np.empty(rows, np.int32))
 
 
-def _for_this_process(parts: Iterator[Part], stretch: SampleRange) -> Iterator[Part]:
-    """Only the samples of a stretch that this process reads."""
+def _own_samples(picked: Iterator[PickedRows], stretch: SampleRange) -> Iterator[PickedRows]:
+    """Only those of the picked rows that this process reads. picked: all rows of the stretch, in order."""
     done = 0
-    for window, rows, fits in parts:
-        some = stretch.kept(done, len(rows))
+    for window, rows, fits in picked:
+        own = stretch.own_samples(done, len(rows))
         done += len(rows)
-        yield window, rows[some], fits[some]
+        yield window, rows[own], fits[own]
 
 
 def read_ahead(items: Iterator[Item]) -> Iterator[Item]:
-    """Yield the items. A thread makes the next item while one is in use."""
-    nothing = object()
+    """Yield the items. A thread makes the next item while the caller uses the present one."""
+    nothing = object()  # what `next` returns after the last item
     with ThreadPoolExecutor(1, "ahead") as pool:
         future = pool.submit(next, items, nothing)
         while (item := future.result()) is not nothing:

@@ -1,4 +1,9 @@
-"""Converts rows that are standardised by their shard's statistics to the statistics of the whole database."""
+"""Converts rows from the statistics of their shard to those of the whole database.
+
+A shard holds the rows of some clips, standardised by the means and standard deviations of these rows alone. A
+reader needs all rows standardised by the same means and deviations, those of the database. Each column is
+converted by a multiplication and an addition.
+"""
 
 from __future__ import annotations
 
@@ -16,30 +21,31 @@ from hobble.database.manifest import SCALES, SPLITS, Manifest
 from hobble.database.precision import narrow, widen
 from hobble.database.statistics import Statistics
 
-PART_ROWS = 256  # so many rows of half precision are converted at a time
+PART_ROWS = 256  # 16-bit rows are converted so many at a time, so that their float32 copy is small
 
-Line = tuple[Array, Array]  # factor and summand of each column, float32: v becomes v * factor + summand
+# (C,) factors and (C,) summands of C columns, float32. A value v becomes v * factor + summand.
+FactorsAndSummands = tuple[Array, Array]
 
 
 @dataclass(frozen=True)
-class Scale:
-    """The conversion of a shard's rows to the statistics of the whole database.
+class Conversion:
+    """How to convert a shard's rows to the statistics of the whole database.
 
-    x, y, fits: factors and summands of the columns of X without terrain, of Y and of the terrain fits.
+    x: for the columns of X without terrain. y: for the columns of Y. fits: for the columns of a terrain fit.
     """
 
-    x: Line = field(repr=False)
-    y: Line = field(repr=False)
-    fits: Line = field(repr=False)
+    x: FactorsAndSummands = field(repr=False)
+    y: FactorsAndSummands = field(repr=False)
+    fits: FactorsAndSummands = field(repr=False)
 
     def apply(self, x: np.ndarray, y: np.ndarray, fits: np.ndarray, dtype: str) -> None:
         """Convert the arrays of a chunk in place. dtype: type of the numbers on disk."""
-        for values, line in ((x, self.x), (y, self.y), (fits, self.fits)):
-            _apply(values, line, dtype)
+        for values, factors_and_summands in ((x, self.x), (y, self.y), (fits, self.fits)):
+            _convert(values, factors_and_summands, dtype)
 
 
-def _apply(values: np.ndarray, line: Line, dtype: str) -> None:
-    factor, summand = line
+def _convert(values: np.ndarray, factors_and_summands: FactorsAndSummands, dtype: str) -> None:
+    factor, summand = factors_and_summands
     if values.dtype == np.float32:
         np.multiply(values, factor, out=values)
         np.add(values, summand, out=values)
@@ -49,49 +55,63 @@ def _apply(values: np.ndarray, line: Line, dtype: str) -> None:
         part[...] = narrow(widen(part).astype(np.float32) * factor + summand, dtype)
 
 
-def _line(mean: Array, std: Array, to_mean: Array, to_std: Array) -> Line:
-    """The conversion of values standardised by mean and std to values standardised by to_mean and to_std."""
+def _factors_and_summands(mean: Array, std: Array, to_mean: Array, to_std: Array) -> FactorsAndSummands:
+    """How to convert values standardised by (C,) mean and std to values standardised by to_mean and to_std.
+
+    v becomes (v * std + mean - to_mean) / to_std.
+    """
     factor, summand = np.float64(std) / to_std, (np.float64(mean) - to_mean) / to_std
     return factor.astype(np.float32), summand.astype(np.float32)
 
 
-def scale_to(whole: Statistics, own: Statistics, terrain: slice) -> Scale | None:
-    """The conversion from a shard's statistics (`own`) to those of the database (`whole`); None if equal.
+def make_conversion(whole: Statistics, own: Statistics, terrain: slice) -> Conversion | None:
+    """The conversion from a shard's statistics (`own`) to those of the database (`whole`).
 
-    terrain: the terrain columns of X.
+    None if the statistics are equal. terrain: the terrain columns of X.
     """
     if all(np.array_equal(vars(own)[name], values) for name, values in vars(whole).items()):
         return None
-    factor, summand = _line(own.x_mean, own.x_std, whole.x_mean, whole.x_std)
-    rows = np.delete(factor, terrain), np.delete(summand, terrain)
-    # The last column of the fits is a height in cm, which is not standardised.
+    factor, summand = _factors_and_summands(own.x_mean, own.x_std, whole.x_mean, whole.x_std)
+    x = np.delete(factor, terrain), np.delete(summand, terrain)
+    y = _factors_and_summands(own.y_mean, own.y_std, whole.y_mean, whole.y_std)
+    # The last column of a fit is a height in cm. It is not standardised, so it stays as it is.
     fits = np.append(factor[terrain], np.float32(1)), np.append(summand[terrain], np.float32(0))
-    return Scale(rows, _line(own.y_mean, own.y_std, whole.y_mean, whole.y_std), fits)
+    return Conversion(x, y, fits)
 
 
-class Shards:
+class ShardConversions:
     """The conversions of all shards of a database.
 
-    dtype: type of the numbers on disk. scale: the conversion of each shard, or None if it needs none. first:
-    (shards,) number of each shard's first clip. of_chunks: split -> (chunks,) the shard of each chunk.
+    dtype: type of the numbers on disk. conversions: one for each shard, None if a shard needs none.
+    first_clip: (shards,) number of each shard's first clip in the database. shard_of_chunk: split ->
+    (chunks,) index of each chunk's shard.
     """
 
     def __init__(self, path: Path, manifest: Manifest, whole: Statistics) -> None:
-        """Read the scales of the database `path`. Raises InputError if their shapes do not fit its shards."""
+        """Read the statistics of all shards of the database folder `path`.
+
+        whole: the statistics of the whole database. Raises InputError if the shapes of the arrays in the file
+        do not fit the number of shards or of columns.
+        """
         data = load_npz(path / manifest.folder / SCALES)
         count, terrain = len(manifest.shards), manifest.layout.x_terrain
         if any(data[name].shape != (count, *values.shape) for name, values in vars(whole).items()):
-            raise InputError(path / manifest.folder / SCALES, f"not the scales of {count} shards", fix=HINT)
+            raise InputError(
+                path / manifest.folder / SCALES, f"not the statistics of {count} shards", fix=HINT
+            )
         of_shards = [Statistics(**{name: data[name][n] for name in vars(whole)}) for n in range(count)]
-        self.dtype, self.scale = manifest.dtype, [scale_to(whole, own, terrain) for own in of_shards]
-        self.first = manifest.first_clip()
-        self.of_chunks = {split: manifest.shard_of_chunk(split) for split in SPLITS}
+        self.dtype = manifest.dtype
+        self.conversions = [make_conversion(whole, own, terrain) for own in of_shards]
+        self.first_clip = manifest.first_clip()
+        self.shard_of_chunk = {split: manifest.shard_of_chunk(split) for split in SPLITS}
 
     def convert(self, split: str, chunk: int, tables: Mapping[str, np.ndarray]) -> None:
-        """Convert the arrays of a chunk in place: its rows to the statistics of the whole database, its clip
-        numbers from those of its shard to those of the database.
+        """Convert a chunk in place, from its shard's statistics and clip numbers to those of the database.
+
+        chunk: number of the chunk in the split. tables: the arrays of its file, by name. A shard numbers its
+        own clips from 0.
         """
-        shard = self.of_chunks[split][chunk]
-        if (scale := self.scale[shard]) is not None:
-            scale.apply(tables["x"], tables["y"], tables["fits"], self.dtype)
-        tables["clip"][...] += np.int32(self.first[shard])
+        shard = self.shard_of_chunk[split][chunk]
+        if (conversion := self.conversions[shard]) is not None:
+            conversion.apply(tables["x"], tables["y"], tables["fits"], self.dtype)
+        tables["clip"][...] += np.int32(self.first_clip[shard])

@@ -1,4 +1,9 @@
-"""First step of the shuffle: scatter the rows of clips over buckets, by their places in the final order."""
+"""First step of the shuffle: scatter the rows of clips over buckets.
+
+Each row has a random place in the final order of its split. A bucket collects, on disk, the rows of one
+stretch of this order. The second step (`hobble.database.write_in_order`) sorts one bucket at a time, because
+all rows together may not fit in memory.
+"""
 
 from __future__ import annotations
 
@@ -16,7 +21,7 @@ from hobble.rows.clip_rows import ClipRows, load_clip_rows
 from hobble.rows.compose import fit_columns, frame_inputs, x_columns
 from hobble.rows.layout import RowLayout
 
-PART_ROWS = 8192  # so many rows of a clip are scattered at a time
+PART_ROWS = 8192  # rows of a clip are scattered so many at a time, to use little memory
 
 
 def make_buckets(folder: Path, plan: Plan) -> dict[str, Buckets]:
@@ -31,38 +36,38 @@ def make_buckets(folder: Path, plan: Plan) -> dict[str, Buckets]:
 def scatter(
     buckets: Mapping[str, Buckets], clips: Mapping[str, RowSource], plan: Plan, seed: int
 ) -> Iterator[tuple[dict[str, Any], ClipRows, ClipRows]]:
-    """Put the used rows of each clip into the buckets of its split.
+    """Put the rows of each clip that the plan uses into the buckets of the clip's split.
 
-    A permutation of all rows of a split gives each row its place in the final order. Yields for each clip its
-    entry in the plan, all its rows, and its used rows.
+    clips: name -> rows or their file. seed: of the random places. Yields (the clip's entry in `Plan.clips`,
+    all its rows, its used rows) for each clip.
     """
     places = {
         split: np.random.default_rng([seed, number]).permutation(plan.rows(split))
         for number, split in enumerate(SPLITS)
     }
-    done = dict.fromkeys(SPLITS, 0)
+    done = dict.fromkeys(SPLITS, 0)  # rows of each split that already have a place
     for number, entry in enumerate(plan.clips):
         split, start = entry["split"], done[entry["split"]]
         done[split] += entry["rows"]
         source = clips[entry["clip"]]
         whole = source if isinstance(source, ClipRows) else load_clip_rows(source)
         used = used_rows(entry)
-        clip = whole if used.step == 1 else whole.every(used.step, used.start)
-        index = np.zeros(len(clip), INDEX)
+        rows = whole if used.step == 1 else whole.every(used.step, used.start)
+        index = np.zeros(len(rows), INDEX)
         index["place"] = places[split][start : done[split]]
-        index["count"], index["clip"] = clip.fits, number
-        index["frame"], index["phase"] = clip.frame, clip.p
-        for first in range(0, len(clip), PART_ROWS):
+        index["count"], index["clip"] = rows.fits, number
+        index["frame"], index["phase"] = rows.frame, rows.p
+        for first in range(0, len(rows), PART_ROWS):
             part = slice(first, first + PART_ROWS)
-            buckets[split].add(*_tables(clip, part, plan.layout), index[part])
-        yield entry, whole, clip
+            buckets[split].add(*_frames_and_fits(rows, part, plan.layout), index[part])
+        yield entry, whole, rows
 
 
-def _tables(clip: ClipRows, part: slice, layout: RowLayout) -> tuple[Array, Array]:
-    """Arrays of some rows for `Buckets.add`, not standardised.
+def _frames_and_fits(clip: ClipRows, part: slice, layout: RowLayout) -> tuple[Array, Array]:
+    """Some rows of a clip, not standardised, as two arrays for `Buckets.add`: frames and fits.
 
-    The frames (n, columns) have the columns of X without terrain, then those of Y. The fits have the ground
-    heights, then their mean.
+    part: which n rows. Frames (n, columns): the columns of X without terrain, then those of Y. Fits (m,
+    columns): a line for each terrain fit of these rows, with the ground heights, then their mean on the path.
     """
     values = {name: clip.channels[name][part] for name, _ in layout.channels}
     frames = np.concatenate([frame_inputs(layout, clip.x[part], values), clip.y[part]], axis=1)

@@ -1,9 +1,9 @@
-"""A shard: the rows of some clips of a database, shuffled and in chunks.
+"""A shard: the shuffled rows of some clips of a database, in files of a few MB, the chunks.
 
-The job that makes a shard reads only its clips. The rows are standardised by the shard's own statistics, so
-that half precision stores them well. The reader converts them to the statistics of the whole database
-(`hobble.database.scale`). A shard numbers its own clips from 0. So it stays the same to the byte when another
-shard changes.
+The job that makes a shard reads only the shard's clips. The rows are standardised by the shard's own means
+and standard deviations, so that 16-bit numbers store them well. The reader converts them to the statistics of
+the whole database (`hobble.database.scale`). A shard numbers its own clips from 0. So a change of another
+shard does not change any of its bytes.
 """
 
 from __future__ import annotations
@@ -27,10 +27,10 @@ from hobble.database.scatter import make_buckets, scatter
 from hobble.database.statistics import Moments, Statistics, clip_moments, statistics_of_moments, unseen_joints
 from hobble.database.write_in_order import write_chunks
 
-# Size of a chunk, which is read in one go: fast on any disk, and small enough for any memory.
+# Bytes of a chunk. A chunk is read in one go, so it is large enough for slow disks and small for any memory.
 CHUNK_BYTES = 4 << 20
 INDEX, MOMENTS, SCALE = "shard.json", "moments.npz", "scale.npz"  # names of a shard's files
-Sums = tuple[Moments, Moments]  # of the columns of X, and of Y
+MomentsXY = tuple[Moments, Moments]  # moments of the columns of X, and of the columns of Y
 
 
 def write_shard(
@@ -48,8 +48,8 @@ def write_shard(
 ) -> None:
     """Write the shard of `clips` to `folder`. Arguments as in `hobble.database.merge.write_database`.
 
-    There may be no clips, or none with rows. Raises InputError if the rows of the clips differ in columns or
-    joints, HobbleError if the disk is full.
+    `clips` may be empty, and clips may have no rows. Raises InputError if the rows of the clips differ in
+    columns or joints, HobbleError if the disk is full.
     """
     plan = make_plan(clips, splits, channels, STORED[dtype].itemsize, chunk_bytes, sources or {}, every)
     try:
@@ -60,49 +60,59 @@ def write_shard(
             write_json(folder / INDEX, {"plan": None, "chunks": {}})
             return
         buckets = make_buckets(folder, plan)
-        nothing = Moments.nothing(plan.layout.x_size), Moments.nothing(plan.layout.y_size)
-        sums: dict[str, Sums] = dict.fromkeys(SPLITS, nothing)
+        no_rows = Moments.nothing(plan.layout.x_size), Moments.nothing(plan.layout.y_size)
+        moments: dict[str, MomentsXY] = dict.fromkeys(SPLITS, no_rows)
         learners = make_limit_learners(plan.layout, plan.skeleton)
-        for entry, clip, used in scatter(buckets, clips, plan, seed):
-            sums[entry["split"]] = add(sums[entry["split"]], clip_moments(used, plan.layout))
-            if entry["split"] == "train":  # also rows left out of training: speeds are means of cycles
-                add_rows(learners, clip, (sources or {}).get(entry["clip"]))
-        # A shard with held-out rows only is standardised by these.
-        of_rows = sums["train"] if sums["train"][0].weight else sums["held_out"]
-        scale = statistics_of(plan, of_rows, joint_weight)
+        for entry, rows, used in scatter(buckets, clips, plan, seed):
+            moments[entry["split"]] = add_moments(moments[entry["split"]], clip_moments(used, plan.layout))
+            if entry["split"] == "train":
+                # Also rows left out of training, because a speed is the mean over all rows of a gait cycle.
+                add_rows(learners, rows, (sources or {}).get(entry["clip"]))
+        # The training rows define the statistics. A shard without training rows uses its held-out rows.
+        of_rows = moments["train"] if moments["train"][0].weight else moments["held_out"]
+        statistics = row_statistics(plan, of_rows, joint_weight)
         chunks = {
-            split: list(write_chunks(folder, split, buckets[split], plan, scale, dtype)) for split in SPLITS
+            split: list(write_chunks(folder, split, buckets[split], plan, statistics, dtype))
+            for split in SPLITS
         }
         for split in SPLITS:
             buckets[split].folder.rmdir()
-        _save(folder, plan, sums["train"], scale, learners)
-        of_split = {split: [asdict(chunk) for chunk in some] for split, some in chunks.items()}
-        write_json(folder / INDEX, {"plan": plan.to_dict(), "chunks": of_split})
+        _save(folder, plan, moments["train"], statistics, learners)
+        chunk_entries = {split: [asdict(chunk) for chunk in chunks[split]] for split in SPLITS}
+        write_json(folder / INDEX, {"plan": plan.to_dict(), "chunks": chunk_entries})
     except OSError as error:
         raise write_error(error, folder) from error
 
 
-def add(one: Sums, other: Sums) -> Sums:
+def add_moments(one: MomentsXY, other: MomentsXY) -> MomentsXY:
     """The moments of two sets of rows together."""
     return one[0] + other[0], one[1] + other[1]
 
 
-def statistics_of(plan: Plan, sums: Sums, joint_weight: float) -> Statistics:
-    """The statistics of rows with these moments."""
-    return statistics_of_moments(plan.layout, *sums, joint_weight, unseen_joints(plan.skeleton))
+def row_statistics(plan: Plan, moments: MomentsXY, joint_weight: float) -> Statistics:
+    """The statistics by which rows with these moments are standardised.
+
+    joint_weight: weight of the joints in the network's input.
+    """
+    return statistics_of_moments(plan.layout, *moments, joint_weight, unseen_joints(plan.skeleton))
 
 
 def _save(
-    folder: Path, plan: Plan, sums: Sums, scale: Statistics, learners: Mapping[str, LimitLearner]
+    folder: Path,
+    plan: Plan,
+    moments: MomentsXY,
+    statistics: Statistics,
+    learners: Mapping[str, LimitLearner],
 ) -> None:
-    """Save the moments of the training rows, the statistics, and the speeds of the training clips.
+    """Save the moments of the training rows, the shard's statistics, and the speeds of the training clips.
 
-    Arrays of the moments: weight (2,) of X and of Y; x (2, X) and y (2, Y), first the mean,
-    then the sum of squared deviations from it.
+    The file of moments has the arrays weight (2,), of X and of Y, and x (2, X) and y (2, Y), with the mean in
+    the first row and the sum of squared differences from the mean in the second. learners: by channel.
     """
-    x, y = ((one.mean, one.squares) for one in sums)
-    save_npz(folder / MOMENTS, weight=np.array([one.weight for one in sums]), x=np.array(x), y=np.array(y))
-    save_npz(folder / SCALE, **vars(scale))
+    x, y = ((block.mean, block.squares) for block in moments)
+    weight = np.array([block.weight for block in moments])
+    save_npz(folder / MOMENTS, weight=weight, x=np.array(x), y=np.array(y))
+    save_npz(folder / SCALE, **vars(statistics))
     for channel, learner in learners.items():
         cycles = {
             f"{number}.{key}": values
@@ -114,7 +124,7 @@ def _save(
 
 @dataclass(frozen=True)
 class Shard:
-    """A shard: its folder, its plan, and for each split its chunks."""
+    """A finished shard. folder: its folder. plan: what it contains. chunks: split -> its chunks."""
 
     folder: Path
     plan: Plan
@@ -132,23 +142,23 @@ class Shard:
         except (KeyError, TypeError, ValueError) as error:
             raise InputError(folder / INDEX, f"not a shard of a database ({error})", fix=HINT) from error
 
-    def sums(self) -> Sums:
+    def moments(self) -> MomentsXY:
         """The moments of the shard's training rows."""
         data = load_npz(self.folder / MOMENTS)
         x, y = (Moments(float(w), *data[name]) for w, name in zip(data["weight"], "xy", strict=True))
         return x, y
 
-    def scale(self) -> Statistics:
+    def statistics(self) -> Statistics:
         """The statistics by which the shard's rows are standardised."""
         return Statistics(**load_npz(self.folder / SCALE))
 
     def add_speeds(self, learners: Mapping[str, LimitLearner]) -> None:
-        """Add the speeds of the shard's training clips to the learners of the channels."""
+        """Add the speeds of the shard's training clips to the learners. learners: channel -> its learner."""
         for channel, learner in learners.items():
             data = load_npz(self.folder / f"pace-{channel}.npz")
-            cycles: dict[int, dict[str, np.ndarray]] = {}
+            cycles: dict[int, dict[str, np.ndarray]] = {}  # index of a clip -> name of an array -> values
             for key, values in data.items():
                 number, _, name = key.partition(".")
                 cycles.setdefault(int(number), {})[name] = values
-            for place, arrays in sorted(cycles.items()):
-                learner.add_arrays(self.plan.clips[place]["clip"], arrays)
+            for clip_index, arrays in sorted(cycles.items()):
+                learner.add_arrays(self.plan.clips[clip_index]["clip"], arrays)

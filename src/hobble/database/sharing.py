@@ -1,9 +1,10 @@
-"""How processes share a section of a pass: which samples each one reads, batch by batch.
+"""How training processes share the samples of a section: which samples each process reads for each batch.
 
-The samples of a section have a fixed order, which is cut into consecutive stretches. Each batch takes an
-equal share of every stretch. With one stretch, batches are consecutive samples. Each process fills certain
-places of a batch, the same in all batches, and reads only the stretches that fill them. So the content of a
-batch depends on the number of stretches, but not on the number of processes.
+A section is a part of a pass over the data. Its samples have a fixed order, which is cut into consecutive
+stretches. A batch takes samples from every stretch, about as many from each. With one stretch, a batch is a
+run of consecutive samples. Each process fills certain places of a batch, the same in all batches, and reads
+only the stretches whose samples go to these places. So the content of a batch depends on the number of
+stretches, but not on the number of processes.
 """
 
 from __future__ import annotations
@@ -17,10 +18,10 @@ import numpy as np
 
 @dataclass(frozen=True)
 class SampleRange:
-    """A stretch: samples `start` to `stop` - 1 of a section; each batch gets `share` of them.
+    """A stretch: samples `start` to `stop` - 1 of a section, and which of them this process reads.
 
-    low, high: of the `share` samples of a batch, numbered from 0, this process reads low to high - 1; other
-    processes read the rest.
+    share: number of samples that each batch takes from the stretch. low, high: of these samples, numbered
+    from 0, this process reads low to high - 1. Other processes read the others.
     """
 
     start: int
@@ -31,26 +32,27 @@ class SampleRange:
 
     @property
     def rows(self) -> int:
-        """How many of its samples this process reads."""
+        """Number of samples of the stretch that this process reads."""
         full, rest = divmod(self.stop - self.start, self.share)
         return full * (self.high - self.low) + max(0, min(rest, self.high) - self.low)
 
-    def kept(self, at: int, count: int) -> np.ndarray | slice:
-        """Which samples this process reads, of the `count` samples from number `at` of the stretch on.
+    def own_samples(self, first: int, count: int) -> np.ndarray | slice:
+        """Which of `count` consecutive samples this process reads: a mask (count,), or slice(None) for all.
 
-        A mask (count,), or slice(None) for all.
+        first: number of the first of these samples in the stretch, from 0.
         """
         if self.high - self.low == self.share:
             return slice(None)
-        place = (at + np.arange(count)) % self.share
+        place = (first + np.arange(count)) % self.share
         return (place >= self.low) & (place < self.high)
 
 
 @dataclass(frozen=True)
 class PassSharing:
-    """A section of `total` samples in batches of `batch`, as one process sees it.
+    """A section of `total` samples in batches of `batch` samples, as one process sees it.
 
-    stretches: number of stretches, at most `batch`. own: the places in a batch, from 0, that it fills.
+    stretches: number of stretches, at most `batch`. own: the places in a batch, from 0, that this process
+    fills.
     """
 
     total: int
@@ -60,21 +62,22 @@ class PassSharing:
 
     @classmethod
     def of(cls, total: int, batch: int, stretches: int = 1, rank: int = 0, processes: int = 1) -> PassSharing:
-        """The sharing as process `rank` (from 0) of `processes` sees it.
+        """A section as process `rank` (from 0) of `processes` processes sees it.
 
-        The processes read equal parts of a batch, to within one sample.
+        The numbers of samples that the processes read of a batch differ by at most one.
         """
         return cls(total, batch, stretches, own_places(batch, rank, processes))
 
-    def sizes(self) -> Iterator[tuple[int, int]]:
-        """For each batch, the number of its samples, and of those that this process reads."""
+    def batch_sizes(self) -> Iterator[tuple[int, int]]:
+        """For each batch: (number of its samples, number of those that this process reads)."""
         for start in range(0, self.total, self.batch):
-            whole = min(self.batch, self.total - start)
-            yield whole, max(0, min(whole, self.own.stop) - self.own.start)
+            size = min(self.batch, self.total - start)
+            yield size, max(0, min(size, self.own.stop) - self.own.start)
 
-    def read(self) -> list[SampleRange]:
-        """The stretches that fill the process's places, in the order of the places."""
-        full, rest = divmod(self.total, self.batch)
+    def own_stretches(self) -> list[SampleRange]:
+        """The stretches that fill this process's places, in the order of the places."""
+        full, rest = divmod(self.total, self.batch)  # full batches, and samples of a shorter last batch
+        # Stretch s fills places edges[s] to edges[s + 1] - 1 of each batch.
         edges = [self.batch * s // self.stretches for s in range(self.stretches + 1)]
         ranges = []
         for first, end in pairwise(edges):

@@ -14,18 +14,19 @@ from hobble.rows.compose import fit_columns, x_columns
 
 # Number of frames at 60 Hz, mirrored ones included, in the clips released with Holden, Komura, Saito (2017).
 RELEASED_FRAMES = 465_990
-RELEASED_FLAT = 0.479  # share of these frames on flat ground: they have one terrain fit, the others ten
+# Share of these frames that are on flat ground. Such a frame has one terrain fit, another frame has ten.
+RELEASED_FLAT = 0.479
 
 
 class Sizes(TypedDict):
-    """Sizes of a database.
+    """Sizes of a database. A terrain fit of a frame is a set of ground heights that suit its motion.
 
     joints: number of joints. dtype: type of the numbers on disk. frames: number of frames in both splits
-    together. pairs: number of (frame, terrain fit) pairs of a pass over these frames; a frame on flat ground
-    has its only fit several times. bytes: size of all chunks. original_bytes: size of the pairs as rows of X,
-    Y and P in float32. share: bytes / original_bytes. bytes_a_frame: bytes of a frame with its terrain fits.
-    released_frames, released_bytes: number of frames of the released clips, and their size with this layout
-    and type.
+    together. pairs: number of pairs of a frame and a terrain fit that one pass over the data uses. It counts
+    the single fit of a frame on flat ground as often as the pass uses it. bytes: size of all chunks.
+    original_bytes: size of all pairs as rows of X, Y and P in float32. share: bytes / original_bytes.
+    bytes_a_frame: bytes / frames, with the terrain fits. released_frames: number of frames of the released
+    clips. released_bytes: their estimated size with the columns and number type of this database.
     """
 
     joints: int
@@ -43,10 +44,10 @@ class Sizes(TypedDict):
 def sizes(manifest: Manifest) -> Sizes:
     """The sizes of a database."""
     frames = sum(manifest.rows(split) for split in manifest.chunks)
-    layout, item = manifest.layout, STORED[manifest.dtype].itemsize
-    frame_bytes = item * (x_columns(layout) + layout.y_size) + INDEX_BYTES
-    fits = RELEASED_FLAT + (1 - RELEASED_FLAT) * manifest.visits
-    released = RELEASED_FRAMES * (frame_bytes + fits * item * fit_columns(layout))
+    layout, number_bytes = manifest.layout, STORED[manifest.dtype].itemsize
+    frame_bytes = number_bytes * (x_columns(layout) + layout.y_size) + INDEX_BYTES
+    fits_a_frame = RELEASED_FLAT + (1 - RELEASED_FLAT) * manifest.visits
+    released = RELEASED_FRAMES * (frame_bytes + fits_a_frame * number_bytes * fit_columns(layout))
     return {
         "joints": layout.joints,
         "dtype": manifest.dtype,

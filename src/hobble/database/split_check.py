@@ -1,4 +1,7 @@
-"""Refuses a split that trains on a motion and also holds it out: the held-out error would mean nothing."""
+"""Refuses a split that trains on a motion and also holds it out for tests.
+
+The error on a motion that the network was trained on says nothing about new motion.
+"""
 
 from __future__ import annotations
 
@@ -9,24 +12,24 @@ from hobble.core.errors import HobbleError
 MOST_NAMED = 10  # a message names at most this many pairs of clips
 
 
-def refuse_both_sides(where: str, pairs: Iterable[tuple[str, str, str]], splits: Mapping[str, str]) -> None:
-    """Raise HobbleError with every pair of clips where one is in training and the other is held out.
+def refuse_split_pairs(where: str, pairs: Iterable[tuple[str, str, str]], splits: Mapping[str, str]) -> None:
+    """Raise HobbleError if, of two clips with the same motion, one is trained on and the other held out.
 
-    where: the data set's name for messages. pairs: (clip, clip, how they are alike, such as "the same file").
-    splits: clip -> "train" or "held_out"; other clips are ignored.
+    where: the data set's name for messages. pairs: (clip, clip, in what they are alike, such as "the same
+    file"). splits: clip -> "train" or "held_out". Pairs with a clip that is not in `splits` are ignored.
     """
-    alike, not_held_out = [], []
-    for a, b, what in pairs:
+    split_pairs, trained_clips = [], []
+    for a, b, likeness in pairs:
         if {splits.get(a), splits.get(b)} == {"train", "held_out"}:
-            held, trained = (a, b) if splits[a] == "held_out" else (b, a)
-            alike.append(f"{held} and {trained} are {what}")
-            not_held_out.append(trained)
-    if not alike:
+            held_out, trained = (a, b) if splits[a] == "held_out" else (b, a)
+            split_pairs.append(f"{held_out} and {trained} are {likeness}")
+            trained_clips.append(trained)
+    if not split_pairs:
         return
-    more = f" and {len(alike) - MOST_NAMED} more pairs" if len(alike) > MOST_NAMED else ""
-    names = ", ".join(f'"{name}"' for name in dict.fromkeys(not_held_out))
+    more = f" and {len(split_pairs) - MOST_NAMED} more pairs" if len(split_pairs) > MOST_NAMED else ""
+    names = ", ".join(f'"{name}"' for name in dict.fromkeys(trained_clips))
     raise HobbleError(
-        f"{where}: {'; '.join(alike[:MOST_NAMED])}{more}: the first of each pair is held out and the second "
-        f"is trained on, so the network would learn what is held out. Add to held_out: [{names}], or take "
-        "one of each pair out of the data set."
+        f"{where}: {'; '.join(split_pairs[:MOST_NAMED])}{more}. The first clip of each pair is held out and "
+        "the second is trained on, so the network would learn a motion that is held out. Add the second ones "
+        f"to held_out: [{names}], or take one clip of each pair out of the data set."
     )

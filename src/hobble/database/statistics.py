@@ -1,6 +1,6 @@
-"""Means and standard deviations over all pairs of a frame and a terrain fit, without storing the pairs.
+"""Means and standard deviations of the columns of X and Y, over all pairs of a row and a terrain fit.
 
-Below, a deviation is a standard deviation.
+The pairs are not stored. Below, a deviation is a standard deviation.
 """
 
 from __future__ import annotations
@@ -19,12 +19,12 @@ from hobble.rows.compose import TERRAIN, body_layout
 from hobble.rows.layout import RowLayout
 
 UNSEEN = 1e-10  # input weight of a joint that the network shall not see, as in Holden et al. (2017)
-BATCH = 2048  # so many rows of a clip are converted to float64 at a time
+BATCH = 2048  # rows of a clip are converted to float64 so many at a time, to use little memory
 
 
 @dataclass(frozen=True)
 class Moments:
-    """Moments of rows with C columns.
+    """Weight, mean and spread of rows with C columns, from which means and deviations are computed.
 
     weight: sum of the rows' weights. mean: (C,) weighted mean. squares: (C,) weighted sum of squared
     differences from the mean.
@@ -35,7 +35,7 @@ class Moments:
     squares: Array = field(repr=False)
 
     def __add__(self, other: Moments) -> Moments:
-        """The moments of two sets of rows together (Chan, Golub, LeVeque, Updating formulae, 1979)."""
+        """The moments of two sets of rows together (Chan, Golub and LeVeque, "Updating formulae", 1979)."""
         weight = self.weight + other.weight
         if weight == 0:
             return self
@@ -44,27 +44,27 @@ class Moments:
         squares = self.squares + other.squares + delta**2 * (self.weight * other.weight / weight)
         return Moments(weight, mean, squares)
 
-    def __mul__(self, times: float) -> Moments:
-        """The moments of the same values with weights multiplied by `times`."""
-        return Moments(self.weight * times, self.mean, self.squares * times)
+    def __mul__(self, factor: float) -> Moments:
+        """The moments of the same rows, with their weights multiplied by `factor`."""
+        return Moments(self.weight * factor, self.mean, self.squares * factor)
 
     def columns(self, block: slice) -> Moments:
-        """The moments of some of the columns."""
+        """The moments of the columns `block`."""
         return Moments(self.weight, self.mean[block], self.squares[block])
 
     @property
     def std(self) -> Array:
-        """Population standard deviation (C,), as numpy's."""
+        """(C,) population standard deviation, as `np.std` computes it. 0 if there are no rows."""
         return np.sqrt(self.squares / max(self.weight, 1e-300))
 
     @classmethod
     def nothing(cls, columns: int) -> Moments:
-        """The moments of no values."""
+        """The moments of no rows."""
         return cls(0.0, np.zeros(columns), np.zeros(columns))
 
     @classmethod
     def of(cls, values: Array, weights: Array | None = None) -> Moments:
-        """The moments of values (N, C). Each row has weight 1, or its entry in `weights` (N,)."""
+        """The moments of rows `values` (N, C). weights: (N,) the rows' weights; None: each has weight 1."""
         values = np.asarray(values, np.float64, order="C")
         if not len(values):
             return cls.nothing(values.shape[1])
@@ -89,10 +89,10 @@ class Statistics:
 
 
 def clip_moments(rows: ClipRows, layout: RowLayout) -> tuple[Moments, Moments]:
-    """Moments of X and of Y over the clip's (frame, fit) pairs, with columns as in `layout`.
+    """(Moments of X, moments of Y) over all pairs of a row of a clip and one of its terrain fits.
 
-    Each row has weight 1, shared equally by its fits. So the one fit of a flat row counts as much as the ten
-    fits of another row together.
+    layout: the columns of X and Y. Each row has weight 1, which its fits share equally. So the one fit of a
+    row on flat ground counts as much as the ten fits of another row together.
     """
     body = body_layout(layout)
     x, y = Moments.nothing(layout.x_size), Moments.nothing(layout.y_size)
@@ -100,28 +100,29 @@ def clip_moments(rows: ClipRows, layout: RowLayout) -> tuple[Moments, Moments]:
     for start in range(0, len(rows), BATCH):
         part = slice(start, min(start + BATCH, len(rows)))
         fits = rows.fits[part]
-        span = slice(int(first[start]), int(first[part.stop - 1] + fits[-1]))
-        of_row = np.repeat(np.arange(len(fits)), fits)
-        share = 1.0 / fits[of_row]
-        mean = rows.mean[span].astype(np.float64)
-        row_mean: Array = np.bincount(of_row, share * mean, len(fits)).astype(np.float64)
-        spread = float(np.sum(share * (mean - row_mean[of_row]) ** 2))
-        heights = Moments.of(rows.heights[span], share)
-        x_frame = _lowered(rows.x[part], body.x_joint_position, row_mean, spread)
+        part_fits = slice(int(first[start]), int(first[part.stop - 1] + fits[-1]))
+        fit_row = np.repeat(np.arange(len(fits)), fits)  # index of each fit's row
+        weight = 1.0 / fits[fit_row]
+        mean = rows.mean[part_fits].astype(np.float64)
+        row_mean: Array = np.bincount(fit_row, weight * mean, len(fits)).astype(np.float64)
+        spread = float(np.sum(weight * (mean - row_mean[fit_row]) ** 2))
+        heights = Moments.of(rows.heights[part_fits], weight)
+        x_frame = _moments_of_lowered(rows.x[part], body.x_joint_position, row_mean, spread)
         parts = {name: x_frame.columns(block) for name, block in body.blocks("x").items() if name != TERRAIN}
         parts |= {name: Moments.of(rows.channels[name][part]) for name, _ in layout.channels}
-        x = x + _joined(*[({TERRAIN: heights} | parts)[name] for name in layout.blocks("x")])
-        y = y + _lowered(rows.y[part], layout.y_joint_position, row_mean, spread)
+        parts[TERRAIN] = heights
+        x = x + _join_columns(*[parts[name] for name in layout.blocks("x")])
+        y = y + _moments_of_lowered(rows.y[part], layout.y_joint_position, row_mean, spread)
     return x, y
 
 
-def _lowered(values: Array, joints: slice, row_mean: Array, spread: float) -> Moments:
-    """Moments of the pairs of R rows and their fits, with a fit's mean height subtracted from joint heights.
+def _moments_of_lowered(values: Array, joints: slice, row_mean: Array, spread: float) -> Moments:
+    """Moments of all pairs of a row and a fit. In a pair, joint heights are above the fit's mean height.
 
-    values: (R, C) the rows without this subtraction. joints: columns of joint positions. row_mean: (R,) for
-    each row, the average over its fits of their mean heights. spread: weighted sum of the squared differences
-    between the mean heights of fits and the `row_mean` of their rows. By the law of total variance, `spread`
-    is added to the squares of the rows after `row_mean` is subtracted.
+    values: (R, C) the rows, with joint heights above 0. joints: columns of joint positions. row_mean: (R,)
+    the average of the mean heights of a row's fits. spread: weighted sum over all fits of (mean height of the
+    fit - row_mean of its row)^2. By the law of total variance, the squares of the pairs are those of the rows
+    lowered by row_mean, plus `spread`.
     """
     values = values.astype(np.float64)
     heights = slice(joints.start + 1, joints.stop, 3)
@@ -131,15 +132,18 @@ def _lowered(values: Array, joints: slice, row_mean: Array, spread: float) -> Mo
     return moments
 
 
-def _joined(*parts: Moments) -> Moments:
-    """Moments of the same rows with the columns of all parts, side by side."""
+def _join_columns(*parts: Moments) -> Moments:
+    """The moments of rows whose columns are those of all parts, side by side. Each part has the same rows."""
     mean = np.concatenate([part.mean for part in parts])
     return Moments(parts[0].weight, mean, np.concatenate([part.squares for part in parts]))
 
 
 def x_groups(layout: RowLayout) -> list[slice]:
-    """Groups of columns of X without channels. A group shares one deviation, as in Holden et al. (2017)."""
-    half = layout.samples  # a trajectory block has so many columns of x, then as many of z
+    """Groups of columns of X. The columns of a group share one deviation, as in Holden et al. (2017).
+
+    The columns of channels are in no group.
+    """
+    half = layout.samples  # a trajectory block has this number of columns of x, then the same number of z
     split = [
         slice(start, start + half)
         for block in (layout.x_position, layout.x_direction)
@@ -149,12 +153,16 @@ def x_groups(layout: RowLayout) -> list[slice]:
 
 
 def y_groups(layout: RowLayout) -> list[slice]:
-    """Groups of columns of Y: the layout's blocks. The columns of a group share one deviation."""
+    """Groups of columns of Y, one for each block. The columns of a group share one deviation."""
     return list(layout.blocks("y").values())
 
 
-def grouped(std: Array, groups: Iterable[slice], constant: float) -> Array:
-    """(C,) for each column the mean of `std` (C,) over its group, or `constant` if the group never varies."""
+def share_in_groups(std: Array, groups: Iterable[slice], constant: float) -> Array:
+    """(C,) deviations that are equal in each group: the mean of the group's deviations.
+
+    std: (C,) deviation of each column. A column that is in no group keeps its own. constant: the deviation of
+    a group whose columns do not vary.
+    """
     out = np.array(std, np.float64)
     for group in groups:
         mean = float(np.mean(std[group]))
@@ -165,26 +173,29 @@ def grouped(std: Array, groups: Iterable[slice], constant: float) -> Array:
 def statistics_of_moments(
     layout: RowLayout, x: Moments, y: Moments, joint_weight: float, unseen: Sequence[int]
 ) -> Statistics:
-    """Means, and deviations that are shared within groups of columns (`x_groups`, `y_groups`).
+    """The statistics of rows with moments `x` and `y`. Groups of columns share a deviation (`x_groups`).
 
-    The deviation of a joint's inputs is divided by w * joint_weight, where w is 1e-10 if the joint is one of
-    `unseen`, which the network shall not see, else 1. Each channel defines the deviations of its own columns.
+    unseen: indices of the joints that the network shall not see in its input. The deviation of a joint's
+    columns of X is divided by w * joint_weight, so that the standardised values are multiplied by it. w is
+    UNSEEN for the joints in `unseen`, and 1 for others. Each channel defines the deviations of its columns.
     """
-    x_std = grouped(x.std, x_groups(layout), SILENT)
+    x_std = share_in_groups(x.std, x_groups(layout), SILENT)
     w = np.ones(layout.joints)
     w[list(unseen)] = UNSEEN
     for block in (layout.x_joint_position, layout.x_joint_velocity):
-        # at most 1e30, to stay finite in float32
+        # At most 1e30, so that the value stays finite in float32.
         x_std[block] = np.minimum(x_std[block] / np.repeat(w * joint_weight, 3), 1e30)
     for name, _ in layout.channels:
         block = layout.x_channel(name)
         x_std[block] = channel(name).deviation(x.std[block])
-    y_std = grouped(y.std, y_groups(layout), 1.0)
-    f32 = [np.asarray(v, np.float32) for v in (x.mean, x_std, y.mean, y_std)]
-    return Statistics(*f32)
+    y_std = share_in_groups(y.std, y_groups(layout), 1.0)
+    return Statistics(*(np.asarray(v, np.float32) for v in (x.mean, x_std, y.mean, y_std)))
 
 
 def unseen_joints(skeleton: Mapping[str, Any]) -> list[int]:
-    """Indices of the skeleton's joints that the network shall not see in its input."""
+    """Indices of the skeleton's joints that the network shall not see in its input.
+
+    skeleton: plain data. Its key `unseen`, if it is there, lists the names of these joints.
+    """
     joints = list(skeleton["joints"])
     return [joints.index(name) for name in skeleton.get("unseen", ())]

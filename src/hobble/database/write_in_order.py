@@ -1,4 +1,8 @@
-"""Second step of the shuffle: bring each bucket's rows into random order, standardise them, write chunks."""
+"""Second step of the shuffle: sort the rows of each bucket, standardise them and write them as chunks.
+
+The rows of a bucket are sorted by their places in the final order, which the first step
+(`hobble.database.scatter`) has drawn at random.
+"""
 
 from __future__ import annotations
 
@@ -17,15 +21,15 @@ from hobble.rows.compose import x_columns
 
 
 def write_chunks(
-    work: Path, split: str, buckets: Buckets, plan: Plan, statistics: Statistics, dtype: str
+    folder: Path, split: str, buckets: Buckets, plan: Plan, statistics: Statistics, dtype: str
 ) -> Iterator[Chunk]:
-    """Write the standardised rows to folder `work`. A chunk has up to `plan.chunk_rows` rows of one bucket.
+    """Write the rows of one split, standardised, to chunk files in the subfolder `split` of `folder`.
 
-    split: "train" or "held_out", the folder of the chunks. dtype: type of the stored numbers. Yields a
-    description of each chunk.
+    A chunk has up to `plan.chunk_rows` rows of one bucket. split: "train" or "held_out". buckets: the rows.
+    They are deleted. dtype: type of the stored numbers. Yields a description of each chunk.
     """
     columns, number = x_columns(plan.layout), 0
-    for frames, fits, index in buckets.drain():  # already in the final, random order
+    for frames, fits, index in buckets.drain():  # one bucket at a time, sorted
         ends = np.cumsum(index["count"])
         for start in range(0, len(index), plan.chunk_rows):
             part = slice(start, min(start + plan.chunk_rows, len(index)))
@@ -42,5 +46,5 @@ def write_chunks(
                 "frame": index["frame"][part],
                 "phase": index["phase"][part],
             }
-            yield write_chunk(work, f"{split}/{number:05d}.safetensors", arrays)
+            yield write_chunk(folder, f"{split}/{number:05d}.safetensors", arrays)
             number += 1

@@ -1,4 +1,4 @@
-"""Captured motion for the measurements: unbroken stretches of a clip's rows, in root coordinates."""
+"""Captured motion for the measurements: stretches of consecutive frames of a clip, in root coordinates."""
 
 from __future__ import annotations
 
@@ -17,11 +17,12 @@ from hobble.rows.layout import GAITS
 class Captured:
     """F consecutive frames of a clip.
 
-    local: (F, J, 3) joint positions in root coordinates, heights above the ground, cm. contacts: (F, 4) of
-    left heel, left toe, right heel, right toe. phase: (F,). channels: name -> (F, columns). gait: (F, 6)
-    share of each of the GAITS. velocity: (F, 2) of the root in root coordinates, cm per frame. root: (F, 3)
-    position on the ground in cm; the first is the origin. acceleration: (F,) the largest of any joint, cm per
-    frame squared, 0 in the first frame. rows: (F,) index of each frame's row among the rows of the clip.
+    clip: its name. local: (F, J, 3) joint positions in root coordinates, heights above the ground, cm.
+    contacts: (F, 4) 1 for contact with the ground, else 0, of left heel, left toe, right heel, right toe.
+    phase: (F,) from 0 to 1. channels: name -> values (F, columns). gait: (F, 6) share of each of the GAITS.
+    velocity: (F, 2) of the root in root coordinates, cm per frame. root: (F, 3) position of the root on the
+    ground, cm. The first is the origin. acceleration: (F,) the largest of any joint, cm per frame squared, 0
+    in the first frame. rows: (F,) index of each frame's row among the rows of the clip.
     """
 
     clip: str
@@ -39,12 +40,12 @@ class Captured:
         return len(self.phase)
 
 
-def unbroken(frame: np.ndarray) -> list[np.ndarray]:
-    """Row indices of each stretch of consecutive frames. frame: (R,) frame of each row.
+def unbroken_stretches(frame: np.ndarray) -> list[np.ndarray]:
+    """For each stretch of consecutive frames, the indices of its rows. frame: (R,) frame of each row.
 
-    The frame between two cycles has a row in each of them; only the first of these rows counts.
+    A frame on the border of two gait cycles has two rows, one in each cycle. Only the first of them is taken.
 
-    >>> [run.tolist() for run in unbroken(np.array([3, 4, 7, 8, 8, 9]))]
+    >>> [stretch.tolist() for stretch in unbroken_stretches(np.array([3, 4, 7, 8, 8, 9]))]
     [[0, 1], [2, 3, 5]]
     """
     if not len(frame):
@@ -54,9 +55,13 @@ def unbroken(frame: np.ndarray) -> list[np.ndarray]:
 
 
 def captured(rows: ClipRows) -> Iterator[Captured]:
-    """The unbroken stretches of a clip's rows. Heights are above the first terrain fit of each row."""
+    """Each stretch of consecutive frames in a clip's rows.
+
+    A row has several terrain fits (ground heights that suit the motion). Joint heights are measured from the
+    mean ground height of its first fit.
+    """
     layout = rows.layout
-    for chosen in unbroken(rows.frame):  # indices of rows
+    for chosen in unbroken_stretches(rows.frame):  # indices of rows
         y = rows.y[chosen].astype(float)
         lower_joints(y, layout.y_joint_position, rows.mean[rows.first_fit[chosen]][:, None])
         local = y[:, layout.y_joint_position].reshape(len(chosen), -1, 3)
@@ -77,12 +82,19 @@ def captured(rows: ClipRows) -> Iterator[Captured]:
 
 
 def headings(turn: Array) -> Array:
-    """(F,) yaw of a root, starting at 0, radians. turn: (F,) change of yaw in each frame, negated."""
+    """(F,) yaw of a root in radians. It starts at 0.
+
+    turn: (F,) column `y_turn` of Y, radians a frame: by how much the world turns, seen from the root. The
+    root itself turns by the negative.
+    """
     return np.concatenate([[0.0], -np.cumsum(turn)[:-1]])
 
 
 def root_path(velocity: Array, turn: Array) -> Array:
-    """(F, 3) path of a root. velocity: (F, 2) in root coordinates. turn: (F,) as for `headings`."""
+    """(F, 3) positions of a root, cm. The path starts at the origin, and its height is 0.
+
+    velocity: (F, 2) of the root in root coordinates, cm per frame. turn: (F,) as for `headings`.
+    """
     world_velocity = rotate_by_yaw(velocity, headings(turn))
     out = np.zeros((len(turn), 3))
     out[1:, ::2] = np.cumsum(world_velocity, axis=0)[:-1]
@@ -90,7 +102,7 @@ def root_path(velocity: Array, turn: Array) -> Array:
 
 
 def rotate_by_yaw(vectors: Array, yaw: Array) -> Array:
-    """Rotate ground vectors x, z (..., 2) from the coordinates of a root with this yaw (...) to the world."""
+    """Rotate horizontal vectors x, z (..., 2) from root coordinates to the world. yaw: (...) of the root."""
     sin, cos = np.sin(yaw), np.cos(yaw)
     x, z = vectors[..., 0], vectors[..., 1]
     return np.stack([x * cos + z * sin, z * cos - x * sin], axis=-1)
@@ -101,7 +113,7 @@ def _accelerations(velocity: Array, turn: Array) -> Array:
 
     velocity: (F, J, 3) in the root coordinates of each frame. turn: (F,) as for `headings`.
     """
-    before = velocity[:-1].copy()  # in the root coordinates of the next frame
+    before = velocity[:-1].copy()  # becomes each frame's velocity in the root coordinates of the next frame
     before[..., ::2] = rotate_by_yaw(velocity[:-1, :, ::2], turn[:-1, None])
     change = np.linalg.norm(velocity[1:] - before, axis=-1)
     return np.concatenate([[0.0], change.max(axis=1)]) if len(velocity) else np.zeros(0)

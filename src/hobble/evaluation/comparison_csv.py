@@ -10,14 +10,14 @@ from hobble.measures.inputs import Json, Row
 
 def tables(compared: Json) -> dict[str, Sequence[Row]]:
     """Table name -> rows, from the content of compare.json. The rows of a table have the same keys."""
-    of_measures = {
+    measure_tables = {
         name: rows
-        for _, measure_tables in comparison_functions("tables")
-        for name, rows in measure_tables(compared).items()
+        for _, make_tables in comparison_functions("tables")
+        for name, rows in make_tables(compared).items()
     }
     return {
-        "configurations": [flat(row) for row in compared["configurations"]],
-        **of_measures,
+        "configurations": [flatten(row) for row in compared["configurations"]],
+        **measure_tables,
         "training": _training(compared),
         "stages": list(compared["stages"]),
         "difference": [
@@ -32,8 +32,8 @@ def tables(compared: Json) -> dict[str, Sequence[Row]]:
     }
 
 
-def flat(row: Row) -> Row:
-    """A row without inner mappings: the entry `b` of a mapping at the key `a` gets the key `a_b`."""
+def flatten(row: Row) -> Row:
+    """The row without mappings as values: the entry `b` of a mapping under the key `a` gets the key `a_b`."""
     out: dict[str, object] = {}
     for key, value in row.items():
         if isinstance(value, Mapping):
@@ -46,13 +46,15 @@ def flat(row: Row) -> Row:
 def _training(compared: Json) -> list[Row]:
     """A row for each pass of each training. A value that the training did not record is None."""
     rows: list[Row] = []
-    names = list(dict.fromkeys(key for entry in compared["training"] for key in entry))
+    columns = list(dict.fromkeys(key for entry in compared["training"] for key in entry))
     for entry in compared["training"]:
         for i in range(len(entry.get("pass", ()))):
             rows.append(
                 {
-                    name: entry[name] if name == "configuration" else entry.get(name, [None] * (i + 1))[i]
-                    for name in names
+                    column: entry[column]
+                    if column == "configuration"
+                    else entry.get(column, [None] * (i + 1))[i]
+                    for column in columns
                 }
             )
     return rows

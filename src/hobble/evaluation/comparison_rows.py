@@ -1,4 +1,4 @@
-"""What a measurement adds to the comparison of configurations, and the types of its rows."""
+"""What a measurement adds to compare.json, the comparison of configurations, and the types of its rows."""
 
 from __future__ import annotations
 
@@ -16,9 +16,10 @@ from hobble.measures.inputs import Json, Row
 class SideBySide:
     """What one measurement adds to compare.json.
 
-    entries: the list under the measurement's name. about: configuration -> what to add to its description.
-    differences: rows such as `DifferenceOf`. against_published: rows from `published_row`. milliseconds: rows
-    of what was measured with a clock, under the keys `difference`, `against_published` and others.
+    entries: the results of each configuration, under the measurement's name. about: configuration -> entries
+    to add to its description. differences: rows such as `DifferenceOf`. against_published: rows from
+    `published_row`. milliseconds: what was measured with a clock, key -> rows. `difference` and
+    `against_published` are such keys, and a measurement may have others.
     """
 
     entries: Sequence[Json] = field(default=(), repr=False)
@@ -29,9 +30,10 @@ class SideBySide:
 
 
 class Difference(TypedDict):
-    """Means and standard deviations (sd) of two series a and b, and their difference. See `pair`.
+    """Means and standard deviations (sd) of two series a and b, and their difference. See `compare_series`.
 
-    sd_of_means: deviation of the means of single clips or laps.
+    mean_a, sd_a, mean_b, sd_b: over single frames. sd_of_means_a, sd_of_means_b: standard deviation of the
+    means of single clips or laps.
     """
 
     mean_a: float
@@ -45,7 +47,10 @@ class Difference(TypedDict):
 
 
 class DifferenceOf(Difference):
-    """The difference of configurations `a` and `b`. over: the split, clip or phase mode that was compared."""
+    """The difference of two configurations, named `a` and `b`.
+
+    over: what was compared: a split, a clip or a phase mode (how the network looks up the phase).
+    """
 
     a: str
     b: str
@@ -62,22 +67,22 @@ class PublishedRow(TypedDict):
     ours: float | None
     source: str
     table: str | None
-    other_figure: float | None
+    other_figure: str | None
 
 
-def pair(a: Json, b: Json) -> Difference:
+def compare_series(a: Json, b: Json) -> Difference:
     """Means and standard deviations of two series, and their difference by eq. 3.2 of Segerstedt 2021.
 
-    a, b: `mean` and `sd` over single frames, and possibly `means`, the mean of each clip or lap. `difference`
-    divides by the deviations over single frames. `difference_of_means` divides by the deviations of `means`,
-    as the published difference does. It is None if a or b has fewer than two means.
+    a, b: have `mean` and `sd` over single frames, and may have `means`, the mean of each clip or lap.
+    `difference` is |mean_a - mean_b| in units of the average sd. `difference_of_means` is the same for the
+    means and the sd of `means`, as in the publication. It is None if a or b has fewer than two means.
     """
-    means = [np.asarray(series.get("means", ()), float) for series in (a, b)]
-    sds = [float(values.std()) if len(values) > 1 else None for values in means]
-    of_means = None
+    means_of_both = [np.asarray(series.get("means", ()), float) for series in (a, b)]
+    sds = [float(values.std()) if len(values) > 1 else None for values in means_of_both]
+    difference_of_means = None
     if sds[0] is not None and sds[1] is not None:
-        mean_a, mean_b = (float(values.mean()) for values in means)
-        of_means = difference(mean_a, sds[0], mean_b, sds[1])
+        mean_a, mean_b = (float(values.mean()) for values in means_of_both)
+        difference_of_means = difference(mean_a, sds[0], mean_b, sds[1])
     return {
         "mean_a": a["mean"],
         "sd_a": a["sd"],
@@ -86,15 +91,16 @@ def pair(a: Json, b: Json) -> Difference:
         "difference": difference(a["mean"], a["sd"], b["mean"], b["sd"]),
         "sd_of_means_a": sds[0],
         "sd_of_means_b": sds[1],
-        "difference_of_means": of_means,
+        "difference_of_means": difference_of_means,
     }
 
 
 def published_row(measure: str, row: Json, theirs: float, ours: float | None, unit: str = "") -> PublishedRow:
     """A published number (`theirs`) next to ours, which is None if it was not measured.
 
-    row: the entry of published.yaml. It has `configuration` and `source`. It may have `table`, the number of
-    the table that printed the value, and `other_figure`, a different value in the same publication.
+    measure: what was measured, in words. row: the entry of published.yaml. It has `configuration` and
+    `source`. It may have `table`, the number of the table that printed the value, and `other_figure`, a text
+    with a different value from the same publication.
     """
     return {
         "measure": measure,

@@ -1,4 +1,4 @@
-"""The results of one configuration, which are compared with those of other configurations."""
+"""The results of one configuration, as the comparison with other configurations reads them."""
 
 from __future__ import annotations
 
@@ -19,9 +19,11 @@ from hobble.measures.inputs import Json
 class ConfigurationResults:
     """The results of one configuration.
 
-    resolved: the content of configuration.yaml. measured: name of a measurement -> the content of its JSON
-    file. pipeline: the content of pipeline.json. history: column -> values of history.csv, None for empty
-    fields.
+    name: the configuration's name. resolved: the content of its configuration.yaml: all keys of the
+    configuration and of its data set, also those with default values. measured: name of a measurement -> the
+    content of its JSON file. pipeline: the content of pipeline.json: time, memory and size of each stage of
+    the workflow. history: the content of history.csv, column -> a value for each pass of the training, None
+    for an empty field.
     """
 
     name: str
@@ -39,7 +41,7 @@ class ConfigurationResults:
         """The name of the configuration's data set."""
         return self.resolved["configuration"]["dataset"]
 
-    def of_stage(self, stage: str, key: Literal["seconds", "bytes"]) -> float | None:
+    def stage_value(self, stage: str, key: Literal["seconds", "bytes"]) -> float | None:
         """The value `key` of a stage in pipeline.json; None if it does not list the stage."""
         return next((s[key] for s in self.pipeline["stages"] if s["stage"] == stage), None)
 
@@ -47,10 +49,10 @@ class ConfigurationResults:
 def read_results(name: str, files: Mapping[str, str | Path]) -> ConfigurationResults:
     """Read one configuration's results.
 
-    files: paths of the files `configuration`, `pipeline`, `history`, and of one for each measurement. Raises
-    InputError, which names the file, if a JSON file or the history cannot be read.
+    files: key -> path, with the keys `configuration`, `pipeline`, `history` and the names of the
+    measurements. Raises InputError, which names the file, if a JSON file or the history cannot be read.
     """
-    paths = dict(files)
+    paths = dict(files)  # after the three `pop` calls, only the files of the measurements are left
     resolved = yaml.safe_load(Path(paths.pop("configuration")).read_text(encoding="utf-8"))
     history, pipeline = read_numbers(paths.pop("history")), read_json(paths.pop("pipeline"))
     return ConfigurationResults(

@@ -1,4 +1,4 @@
-"""Many figures walk at once. Each follows its own script of speeds, gaits and channel values."""
+"""Generates the walks of many figures at once. Each figure has its own speeds, gaits and channel values."""
 
 from __future__ import annotations
 
@@ -16,15 +16,16 @@ from hobble.runtime.options import Runtime
 FPS = 60
 SPEEDS = {"walk": 2.5, "jog": 7.0}  # target speeds, cm a frame
 VELOCITY, GAIT = "target_velocity", "gait"  # the names of the targets that are not channels
-# Share of the frames of a `CrowdTarget` that pass before it is measured, as channels and gait still change.
+# This share of a stretch, at its start, is not measured, because the motion still changes to the new target.
 SETTLING_SHARE = 0.25
 
 
 @dataclass(frozen=True)
 class CrowdTarget:
-    """A stretch of `frames` frames in which each of C figures has a constant target.
+    """The targets of C figures for a stretch of `frames` frames. They are constant in the stretch.
 
-    gait: (C,) names. channels: name -> (C, columns). speed: (C,) cm a frame; None: the SPEEDS of the gaits.
+    gait: (C,) names of gaits. channels: name -> values (C, columns). speed: (C,) cm a frame; None: the SPEEDS
+    of the gaits, which then have to be keys of SPEEDS.
     """
 
     frames: int
@@ -35,11 +36,12 @@ class CrowdTarget:
 
 @dataclass(frozen=True)
 class Walks:
-    """The motion of C figures over F frames and S stretches (one for each `CrowdTarget`).
+    """The motion of C figures over F frames, which consist of S stretches, one for each `CrowdTarget`.
 
-    local: (F, C, J, 3) joint positions in root coordinates, cm, float32. contacts: (F, C, 4). phase: (F, C).
-    root: (F, C, 3) positions of the root in the world, cm. acceleration: (F, C) the largest of any joint, cm
-    per frame squared, 0 in the first and last frame. starts: (S + 1,) first frame of each stretch, then F.
+    local: (F, C, J, 3) joint positions in root coordinates, cm, float32. contacts: (F, C, 4) predicted
+    contacts of left heel, left toe, right heel, right toe. phase: (F, C) from 0 to 1. root: (F, C, 3)
+    positions of the root in the world, cm. acceleration: (F, C) the largest of any joint, cm per frame
+    squared, 0 in the first and last frame. starts: (S + 1,) first frame of each stretch, then F.
     """
 
     local: Array = field(repr=False)
@@ -50,7 +52,7 @@ class Walks:
     starts: np.ndarray
 
     def of(self, figures: slice) -> Walks:
-        """The motion of some of the figures."""
+        """The motion of the figures in the slice `figures`."""
         return Walks(
             self.local[:, figures],
             self.contacts[:, figures],
@@ -60,14 +62,15 @@ class Walks:
             self.starts,
         )
 
-    def measured(self, stretch: int, figure: int) -> slice:
-        """The frames of a stretch in which a figure is measured.
+    def measured_frames(self, stretch: int, figure: int) -> slice:
+        """The frames of stretch number `stretch` in which figure number `figure` is measured.
 
-        The first SETTLING_SHARE of the stretch is left out. Of the rest, the figure's last whole cycles are
-        measured, or all frames if there is no whole cycle.
+        The first SETTLING_SHARE of the stretch is left out. After it, as many whole gait cycles as fit are
+        measured, up to the end of the stretch. If not even one fits, all frames after the first share are.
         """
         start, stop = int(self.starts[stretch]), int(self.starts[stretch + 1])
         start += round(SETTLING_SHARE * (stop - start))
+        # Cycles that the figure has walked since frame `start`, with fractions.
         cycles = np.concatenate([[0.0], np.cumsum(np.mod(np.diff(self.phase[start:stop, figure]), 1.0))])
         whole = np.floor(cycles[-1])
         if whole < 1:
@@ -76,10 +79,11 @@ class Walks:
 
 
 def run(network: Network, script: Sequence[CrowdTarget], runtime: Runtime) -> Walks:
-    """The motion of figures that follow `script`. They begin standing and walk straight ahead on flat ground.
+    """The motion of C figures that follow `script`. They begin standing and walk ahead on flat ground.
 
-    Figures with the same targets move in the same way, to the last bit, until their targets first differ. So
-    until then, one character of the animation walks for all of them.
+    script: one `CrowdTarget` for each stretch, in order. Figures with the same targets move in the same way,
+    to the last bit, until their targets first differ. So, to save time, a single character of the animation
+    walks for all of them until then.
     """
     assert network.skeleton is not None
     count, frames = len(script[0].gait), sum(s.frames for s in script)
@@ -88,62 +92,67 @@ def run(network: Network, script: Sequence[CrowdTarget], runtime: Runtime) -> Wa
     local = np.zeros((frames, count, len(network.skeleton.joints), 3), np.float32)
     contacts, root = np.zeros((frames, count, 4)), np.zeros((frames, count, 3))
     phase, acceleration = np.zeros((frames, count)), np.zeros((frames, count))
-    before: list[Array] = []  # joint positions of up to three frames
-    f = 0
+    recent: list[Array] = []  # joint positions in the world, of the last three frames or fewer
+    frame = 0
     for stretch in script:
         target = _targets(network, stretch)
-        first, new_walker = _grouped_by_target(walker, *target.values())
+        first, new_walker = _group_by_target(walker, *target.values())
         if len(first) > animation.characters:
-            came_from = walker[first]
-            animation, before = animation.copies(came_from), [p[came_from] for p in before]
+            # Figures with one character now have different targets. Each target gets a copy of the character.
+            copied = walker[first]  # (new characters,) the character from which each new one is copied
+            animation, recent = animation.copies(copied), [p[copied] for p in recent]
             walker = new_walker
-        target_now = {name: values[_first_of(walker)] for name, values in target.items()}
+        target_now = {name: values[_first_figures(walker)] for name, values in target.items()}
         velocity, shares = target_now.pop(VELOCITY), target_now.pop(GAIT)
         for _ in range(stretch.frames):
             pose = animation.next_pose(velocity, gait=shares, **target_now)
-            # A single character has no leading axis.
+            # The arrays of a single character have no axis for characters. It is added here.
             positions, roots = pose.positions.reshape(len(shares), -1, 3), np.atleast_2d(pose.root)
-            root[f], phase[f] = roots[walker], np.atleast_1d(pose.phase)[walker]
-            contacts[f] = np.atleast_2d(pose.contacts)[walker]
-            local[f] = in_root_coordinates(positions, roots, np.atleast_1d(pose.yaw))[walker]
-            before = [*before[-2:], positions]
-            if len(before) == 3:
-                second = before[2] - 2 * before[1] + before[0]  # second difference
-                squared = np.einsum("cjk,cjk->cj", second, second)
-                acceleration[f - 1] = np.sqrt(np.max(squared, axis=1))[walker]
-            f += 1
+            root[frame], phase[frame] = roots[walker], np.atleast_1d(pose.phase)[walker]
+            contacts[frame] = np.atleast_2d(pose.contacts)[walker]
+            local[frame] = in_root_coordinates(positions, roots, np.atleast_1d(pose.yaw))[walker]
+            recent = [*recent[-2:], positions]
+            if len(recent) == 3:
+                second_difference = recent[2] - 2 * recent[1] + recent[0]
+                squared = np.einsum("cjk,cjk->cj", second_difference, second_difference)
+                acceleration[frame - 1] = np.sqrt(np.max(squared, axis=1))[walker]
+            frame += 1
     starts = np.cumsum([0, *(s.frames for s in script)])
     return Walks(local, contacts, phase, root, acceleration, starts)
 
 
 def _targets(network: Network, stretch: CrowdTarget) -> dict[str, Array]:
-    """The targets of C figures in a stretch: VELOCITY (C, 2), GAIT (C, 6) shares, channel -> (C, columns)."""
+    """The targets of C figures in a stretch, by name.
+
+    VELOCITY: (C, 2) to the side and forward, cm a frame. GAIT: (C, 6) shares of the gaits. Name of each
+    channel: (C, columns) its values.
+    """
     velocity = np.zeros((len(stretch.gait), 2))
     velocity[:, 1] = [SPEEDS[name] for name in stretch.gait] if stretch.speed is None else stretch.speed
     shares = np.array([[float(name == gait) for name in network.gaits] for gait in stretch.gait])
     return {VELOCITY: velocity, GAIT: shares, **stretch.channels}
 
 
-def _grouped_by_target(walker: np.ndarray, *targets: Array) -> tuple[np.ndarray, np.ndarray]:
-    """Groups figures that one character can walk for: those with the same character and the same targets.
+def _group_by_target(walker: np.ndarray, *targets: Array) -> tuple[np.ndarray, np.ndarray]:
+    """Group the figures that had the same character so far and have the same targets from now on.
 
-    walker: (C,) the character that has walked for each figure. targets: (C, n) arrays. Returns the first
-    figure of each group (groups,), and the group of each figure (C,).
+    walker: (C,) the character that walked for each figure so far. targets: arrays (C, n). Returns (groups,)
+    the first figure of each group, and (C,) the group of each figure.
     """
     alike = np.column_stack([walker, *targets])
     _, first, group = np.unique(alike, axis=0, return_index=True, return_inverse=True)
     return first, group.reshape(-1)
 
 
-def _first_of(walker: np.ndarray) -> np.ndarray:
-    """The first figure of each character. walker: (C,) the character that walks for each figure."""
+def _first_figures(walker: np.ndarray) -> np.ndarray:
+    """(characters,) the first figure of each character. walker: (C,) the character of each figure."""
     return np.unique(walker, return_index=True)[1]
 
 
 def channel_values(network: Network, name: str, figures: Sequence[Mapping[str, float]]) -> dict[str, Array]:
-    """{name: (C, columns) values} for `CrowdTarget.channels`, or {} if the network lacks the channel `name`.
+    """{name: values (C, columns)} for `CrowdTarget.channels`, or {} if the network lacks the channel `name`.
 
-    figures: for each figure, name of a column -> value; the other columns are 0.
+    figures: for each of C figures, name of a column -> value. Columns that are not named are 0.
     """
     columns = network.channels.get(name)
     if columns is None:

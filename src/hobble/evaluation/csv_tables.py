@@ -15,12 +15,12 @@ if TYPE_CHECKING:
     import pandas
 
 
-def frame(rows: Sequence[Mapping[str, Any]]) -> pandas.DataFrame:
-    """A data frame with a row for each mapping. Columns are in the order in which they first occur.
+def data_frame(rows: Sequence[Mapping[str, Any]]) -> pandas.DataFrame:
+    """A data frame with a row for each mapping of `rows`. Columns are in the order in which they first occur.
 
-    Values keep their types: an integer stays one even if the column has no value in another row.
+    Values keep their types. An integer does not become a float if its column has no value in another row.
     """
-    import pandas  # here, because the import takes .3 s and most jobs have no table
+    import pandas  # here, because the import takes 0.3 s and most jobs write no table
 
     columns = list(dict.fromkeys(key for row in rows for key in row))
     return pandas.DataFrame(
@@ -29,21 +29,25 @@ def frame(rows: Sequence[Mapping[str, Any]]) -> pandas.DataFrame:
 
 
 def write_csv(path: str | Path, rows: Sequence[Mapping[str, Any]]) -> None:
-    """Write rows. A field is empty if its value is missing, None or NaN. Without rows, the file is empty."""
-    write_text(path, frame(rows).to_csv(index=False, lineterminator="\n") if rows else "")
+    """Write a CSV file with a header and a line for each row. Without rows, the file is empty.
+
+    A field is empty if its value is missing, None or NaN.
+    """
+    write_text(path, data_frame(rows).to_csv(index=False, lineterminator="\n") if rows else "")
 
 
 def write_tables(folder: str | Path, tables: Mapping[str, Sequence[Mapping[str, Any]]]) -> None:
-    """Write each table to <folder>/<name>.csv. Creates the folder."""
+    """Write each table to <folder>/<name>.csv. Creates the folder. tables: name -> rows."""
     Path(folder).mkdir(parents=True, exist_ok=True)
     for name, rows in tables.items():
         write_csv(Path(folder) / f"{name}.csv", rows)
 
 
 def read_numbers(path: str | Path) -> dict[str, list[float | None]]:
-    """Column -> values of a CSV of numbers, such as history.csv; None for an empty, NaN or infinite cell.
+    """Read a CSV file of numbers, such as history.csv, as column -> values.
 
-    Raises InputError, which names the column and the cell, if a cell is not a number.
+    The value of an empty, NaN or infinite cell is None. Raises InputError, which names the column and quotes
+    the cell, if a cell is not a number.
     """
     import pandas
 
@@ -59,6 +63,7 @@ def read_numbers(path: str | Path) -> dict[str, list[float | None]]:
 
 
 def _number(path: str | Path, column: str, text: Any) -> float | None:
+    """The number in a cell; None if it is empty, NaN or infinite. text: NaN if the line has too few cells."""
     if not isinstance(text, str) or not text.strip():
         return None
     try:

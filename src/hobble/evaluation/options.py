@@ -1,4 +1,4 @@
-"""The keys of a configuration's `evaluation` section, collected from all measurements."""
+"""The section `evaluation` of a configuration. Each measurement defines some of its keys."""
 
 from __future__ import annotations
 
@@ -11,24 +11,26 @@ from hobble.measures.registry import MEASURES
 
 
 def joined_sections(sections: list[type[Section]]) -> type[Section]:
-    """A section that has the keys of all `sections`.
+    """A new section class that has the keys of all `sections`.
 
-    Raises TypeError if two of them define the same key, unless they inherit it from the same base.
+    Raises TypeError if two of the classes define the same key, unless they inherit it from the same base.
     """
-    owner: dict[str, type] = {}
+    defined_in: dict[str, type] = {}  # key -> the class that defines it
     for section in sections:
         for key in section.model_fields:
+            # The last class in the order of inheritance: an inherited key counts as the base's.
             definer = [c for c in section.__mro__ if key in getattr(c, "model_fields", {})][-1]
-            if owner.setdefault(key, definer) is not definer:
-                raise TypeError(f"{key} is a key of {owner[key].__module__} and of {definer.__module__}")
+            if defined_in.setdefault(key, definer) is not definer:
+                first, second = defined_in[key].__module__, definer.__module__
+                raise TypeError(f"{key} is a key of {first} and of {second}: rename one of them")
     unique = list(dict.fromkeys(sections))
-    # Python refuses a base that another base inherits from.
-    bases = [s for s in unique if not any(o is not s and issubclass(o, s) for o in unique)]
-    # The bases are reversed, because pydantic puts the fields of the last base first.
+    # Leave out a class from which another inherits. Python refuses it as a base in front of that other class.
+    bases = [s for s in unique if not any(other is not s and issubclass(other, s) for other in unique)]
+    # Reversed, because pydantic puts the fields of the last base first.
     return create_model("Evaluation", __base__=tuple(bases[::-1]) or Section, __doc__="The measurements.")
 
 
-if TYPE_CHECKING:
+if TYPE_CHECKING:  # a type checker cannot follow the class that is made below
     Evaluation = Section
 else:
     Evaluation = joined_sections([measure.options for measure in MEASURES])

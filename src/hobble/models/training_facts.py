@@ -56,8 +56,8 @@ class TrainingFacts:
     def of(cls, layout: RowLayout, parts: Iterable[Any], statistics: Any) -> TrainingFacts:
         """The facts of all rows.
 
-        parts: the rows, in blocks (`RawRows` in `hobble.database.reader`). statistics: means and standard
-        deviations of their columns (x_mean, x_std, y_mean, y_std).
+        parts: the rows, in blocks (`UncomposedRows` in `hobble.database.reader`). statistics: means and
+        standard deviations of their columns (x_mean, x_std, y_mean, y_std).
 
         Only the ground differs between the terrain fits of a row. So a row is composed with its highest and
         with its lowest ground instead of with each fit. The start row is composed with its first fit.

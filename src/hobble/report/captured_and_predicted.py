@@ -11,7 +11,7 @@ import numpy as np
 from hobble.core import quat
 from hobble.core.array_parts import ArrayParts
 from hobble.core.quat import Array
-from hobble.evaluation.captured import headings, root_path, rotate_by_yaw, unbroken
+from hobble.evaluation.captured import headings, root_path, rotate_by_yaw, unbroken_stretches
 from hobble.figure.mesh import body
 from hobble.figure.mesh import key as mesh_key
 from hobble.models.network import Network
@@ -50,7 +50,7 @@ def comparisons(network: Network, paths: Iterable[str | Path], splits: Mapping[s
 
 def longest_stretch(path: str | Path) -> tuple[int, int]:
     """(start, stop): the rows of a clip's longest unbroken stretch, cut to LONGEST frames."""
-    stretches = unbroken(ArrayParts(path).whole("frame"))
+    stretches = unbroken_stretches(ArrayParts(path).whole("frame"))
     if not stretches:
         return 0, 0
     longest = max(stretches, key=len)[:LONGEST]
@@ -58,7 +58,7 @@ def longest_stretch(path: str | Path) -> tuple[int, int]:
 
 
 def _compared(network: Network, rows: ClipRows, split: str, keep: list[int]) -> dict[str, Any]:
-    (chosen,) = unbroken(rows.frame)
+    (chosen,) = unbroken_stretches(rows.frame)
     layout, figure = network.layout, network.skeleton
     assert figure is not None
     pose = slice(layout.y_joint_position.start, layout.y_joint_rotation.stop)

@@ -77,8 +77,8 @@ class HostRows(TrainingRows):
         # the window follows from the size of the whole batch, not of this process's part.
         window = self.database.window(TRAIN, self.database.block_rows(size))
         sharing = self.sharing(section, sections, size)
-        stretches = [self._pieces(order_key, stretch, window) for stretch in sharing.read()]
-        for total, _ in sharing.sizes():
+        stretches = [self._pieces(order_key, stretch, window) for stretch in sharing.own_stretches()]
+        for total, _ in sharing.batch_sizes():
             # The last batch may be so short that some stretches have no samples for it.
             pieces = [piece for stretch in stretches if (piece := next(stretch, None)) is not None]
             piece = pieces[0] if len(pieces) == 1 else _joined(pieces, self._nothing)

@@ -79,7 +79,7 @@ class DeviceRows(TrainingRows):
         device_rows, device_fits = (torch.from_numpy(part).to(self.device) for part in (rows, fits))
         batch_rows = len(sharing.own)  # rows of this process in a batch
         step = batch_rows * max(1, ROWS_AT_ONCE // batch_rows)
-        sizes = sharing.sizes()
+        sizes = sharing.batch_sizes()
         for at in range(0, max(len(rows), 1), step):
             x, y, p = self._composed(device_rows[at : at + step], device_fits[at : at + step])
             composed = rows[at : at + step]
@@ -98,10 +98,10 @@ class DeviceRows(TrainingRows):
         order_key: pass, section, number of sections and seed.
         """
         read, batches = [], []
-        for stretch in sharing.read():
+        for stretch in sharing.own_stretches():
             layers = list(self._of_stretch(*order_key, stretch))
             rows, fits = (np.concatenate(part) for part in zip(*layers, strict=True))
-            kept = stretch.kept(0, len(rows))
+            kept = stretch.own_samples(0, len(rows))
             read.append((rows[kept], fits[kept]))
             batches.append(np.arange(len(read[-1][0])) // (stretch.high - stretch.low))
         rows, fits = (np.concatenate(part) for part in zip(*read, strict=True))

@@ -6,7 +6,7 @@ from collections import defaultdict
 from itertools import combinations
 from pathlib import Path
 
-from hobble.database.split_check import refuse_both_sides
+from hobble.database.split_check import refuse_split_pairs
 from hobble.workflow.checksums import file_sha256
 from hobble.workflow.clips import Clips, original
 from hobble.workflow.datasets import Datasets
@@ -32,4 +32,4 @@ def refuse_copies(clips: Clips, datasets: Datasets, dataset: str, channels: tupl
     model = datasets.catalogue.dataset(dataset)
     if model.synthetic is None and model.held_out:
         splits = {original(name): split for name, split in datasets.selected(dataset, channels).items()}
-        refuse_both_sides(f"data set {dataset}", same_files(clips, dataset), splits)
+        refuse_split_pairs(f"data set {dataset}", same_files(clips, dataset), splits)

@@ -206,13 +206,13 @@ def test_whole_cycles_are_measured(hurtable) -> None:
     phase = np.zeros((430, 1))
     phase[:, 0] = np.mod(0.013 * np.arange(430), 1)
     known = replace(walks, phase=phase)
-    span = known.measured(1, 0)
+    span = known.measured_frames(1, 0)
     assert span.stop == 420
     assert span.start >= 120
     turned = 0.013 * (span.stop - 1 - span.start)
     assert turned == pytest.approx(np.round(turned), abs=0.014)
     assert np.round(turned) == 3  # of the three quarters that are measured, 3.9 cycles
-    assert known.measured(2, 0) == slice(422, 430)  # less than a cycle: all but its beginning
+    assert known.measured_frames(2, 0) == slice(422, 430)  # less than a cycle: all but its beginning
 
 
 def test_largest_accelerations_are_of_the_gait_and_the_hurt_link(hurtable) -> None:

@@ -7,7 +7,13 @@ from itertools import combinations
 
 import numpy as np
 
-from hobble.evaluation.comparison_rows import DifferenceOf, PublishedRow, SideBySide, pair, published_row
+from hobble.evaluation.comparison_rows import (
+    DifferenceOf,
+    PublishedRow,
+    SideBySide,
+    compare_series,
+    published_row,
+)
 from hobble.evaluation.configuration_results import ConfigurationResults
 from hobble.measures.accuracy.run import SPLITS, clip_rows
 from hobble.measures.inputs import Json, Row
@@ -49,7 +55,7 @@ def accuracy_differences(all_measured: Sequence[ConfigurationResults]) -> list[D
         of_a, of_b = ({**_of_splits(m), **_clips(m)} for m in (a, b))
         for over in of_a:
             if over in of_b and of_a[over]["frames"] and of_b[over]["frames"]:
-                out.append({"a": a.name, "b": b.name, "over": over, **pair(of_a[over], of_b[over])})
+                out.append({"a": a.name, "b": b.name, "over": over, **compare_series(of_a[over], of_b[over])})
     return out
 
 

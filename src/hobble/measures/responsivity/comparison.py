@@ -8,8 +8,14 @@ from typing import TypedDict
 
 import numpy as np
 
-from hobble.evaluation.comparison_csv import flat
-from hobble.evaluation.comparison_rows import DifferenceOf, PublishedRow, SideBySide, pair, published_row
+from hobble.evaluation.comparison_csv import flatten
+from hobble.evaluation.comparison_rows import (
+    DifferenceOf,
+    PublishedRow,
+    SideBySide,
+    compare_series,
+    published_row,
+)
 from hobble.evaluation.configuration_results import ConfigurationResults
 from hobble.evaluation.series import StraightLine, line
 from hobble.measures.inputs import Json, Row
@@ -107,7 +113,7 @@ def time_differences(all_measured: Sequence[ConfigurationResults]) -> list[Diffe
                     }
                     for e in (entry, theirs[entry["mode"]])
                 ]
-                out.append({"a": a.name, "b": b.name, "over": entry["mode"], **pair(*times)})
+                out.append({"a": a.name, "b": b.name, "over": entry["mode"], **compare_series(*times)})
     return out
 
 
@@ -212,5 +218,5 @@ def _laps(entry: Json) -> list[Row]:
         row = {key: value for key, value in lap.items() if key != "milliseconds"}
         row |= {f"milliseconds_{step}": times[step] for step in STEPS}
         row |= {f"milliseconds_{step}_sd": sd for step, sd in times["sd"].items()}
-        rows.append({**head, **row, **{f"milliseconds_{k}": v for k, v in flat(times["spread"]).items()}})
+        rows.append({**head, **row, **{f"milliseconds_{k}": v for k, v in flatten(times["spread"]).items()}})
     return rows

@@ -17,7 +17,7 @@ import numpy as np
 
 from hobble.core.quat import Array
 from hobble.database.statistics import Moments
-from hobble.evaluation.captured import unbroken
+from hobble.evaluation.captured import unbroken_stretches
 from hobble.measures.accuracy.run import (
     check_layout,
     chosen_joints,
@@ -100,7 +100,7 @@ def _groups(read: LoadedPart, layout: RowLayout, lengths: Sequence[int]) -> list
     they last only one frame.
     """
     out = []
-    for stretch in unbroken(read.rows.frame):
+    for stretch in unbroken_stretches(read.rows.frame):
         first, stop = np.searchsorted(stretch, (read.first, read.stop))
         inputs = inputs_of_clip(read.rows, stretch, layout)
         for length in lengths:

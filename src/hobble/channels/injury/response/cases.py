@@ -42,20 +42,20 @@ def _frame_count(share: float, seconds: float) -> int:
 
 def _mean_cycle(walks: Walks, stretch: int, figure: int) -> Array:
     """The mean pose of a figure in each phase bin of its gait cycle, measured in a stretch."""
-    span = walks.measured(stretch, figure)
+    span = walks.measured_frames(stretch, figure)
     return mean_cycle(walks.local[span, figure], walks.phase[span, figure])
 
 
 def _distance_from_cycle(walks: Walks, stretch: int, figure: int, cycle: Array) -> float:
     """Mean distance of a figure's poses in a stretch from `cycle`, cm."""
-    span = walks.measured(stretch, figure)
+    span = walks.measured_frames(stretch, figure)
     return float(np.mean(distance_to_cycle(walks.local[span, figure], walks.phase[span, figure], cycle)))
 
 
 def _mean_speed(network: Network, walks: Walks, stretch: int, figure: int) -> float:
     """A figure's mean speed in a stretch, cm/s."""
     assert network.skeleton is not None
-    span = walks.measured(stretch, figure)
+    span = walks.measured_frames(stretch, figure)
     local, contacts, root = (a[span, figure] for a in (walks.local, walks.contacts, walks.root))
     return float(gait_measures(network.skeleton, local, contacts, root)["speed"] or 0.0)
 

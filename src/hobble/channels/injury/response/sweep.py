@@ -56,7 +56,7 @@ class SeveritySweep:
         """
         walks = self.walks
         # The frames to measure in each stretch of `steps`, and the mean gait cycle of these frames.
-        spans = [walks.measured(1 + step, figure) for step in range(len(self.steps))]
+        spans = [walks.measured_frames(1 + step, figure) for step in range(len(self.steps))]
         cycles = [mean_cycle(walks.local[s, figure], walks.phase[s, figure]) for s in spans]
         rows = []
         for step, (span, severity) in enumerate(zip(spans, self.steps, strict=True)):
@@ -122,7 +122,7 @@ class SeveritySweep:
         """`settle_seconds` and `heal_seconds` of `response`. figure: index of the figure."""
         walks: Walks = self.at_once
         local, phase = walks.local[:, figure], walks.phase[:, figure]
-        healthy = walks.measured(1, figure)
+        healthy = walks.measured_frames(1, figure)
         cycle = mean_cycle(local[healthy], phase[healthy])
         distance = distance_to_cycle(local, phase, cycle)
         healthy_cm = float(np.mean(distance[healthy]))
