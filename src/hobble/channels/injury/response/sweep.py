@@ -18,7 +18,7 @@ from hobble.channels.injury.response.results import Response, SweepRow
 from hobble.core.skeleton import Skeleton
 from hobble.evaluation.crowd import FPS, CrowdTarget, Walks, run
 from hobble.evaluation.motion_measures import gait_measures
-from hobble.evaluation.pose_distance import distance_to_cycle, mean_cycle, period, settling
+from hobble.evaluation.pose_distance import cycle_frames, distance_to_cycle, mean_cycle, settling_seconds
 from hobble.evaluation.spearman import spearman
 from hobble.models.network import Network
 from hobble.runtime.options import Runtime
@@ -127,8 +127,10 @@ class SeveritySweep:
         normal = float(np.mean(distance[healthy]))
         (a, b), (c, d) = (walks.starts[2:4], walks.starts[3:5])
         late = slice((a + b) // 2, b)
-        hurt = settling(distance[a:b], normal, period(phase[late]))
-        healed = settling(distance[c:d], float(np.mean(distance[late])), period(phase[(c + d) // 2 : d]))
+        hurt = settling_seconds(distance[a:b], normal, cycle_frames(phase[late]))
+        healed = settling_seconds(
+            distance[c:d], float(np.mean(distance[late])), cycle_frames(phase[(c + d) // 2 : d])
+        )
         return hurt, healed
 
 
