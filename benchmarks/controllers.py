@@ -20,7 +20,7 @@ import numpy as np
 
 from hobble.core.processors import processor
 from hobble.database.manifest import Manifest
-from hobble.evaluation.stability import stability, stretches
+from hobble.evaluation.stability import random_targets, stability
 from hobble.measures.responsivity.run import responsivity
 from hobble.measures.rollouts.run import measure_roll_outs
 from hobble.models.load import load_network
@@ -36,7 +36,7 @@ LENGTHS = (1, 60, 300)
 def frame_ratios(networks: dict[str, Network], characters: int, turns: int) -> dict[str, tuple[float, float]]:
     """Name -> microseconds a frame (median of the stretches), and how many times those of the first."""
     made = {name: ProceduralAnimation(n, characters=characters) for name, n in networks.items()}
-    targets = [s for s in stretches(10.0) for _ in range(s.frames)]
+    targets = [s for s in random_targets(10.0) for _ in range(s.frames)]
     for animation in made.values():
         for target in targets[:: len(targets) // 20]:
             animation.next_pose(target.velocity, target.facing, target.gait)

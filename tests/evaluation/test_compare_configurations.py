@@ -18,7 +18,7 @@ from hobble.evaluation.compare_configurations import compare
 from hobble.evaluation.comparison_csv import tables
 from hobble.evaluation.configuration_results import read_results
 from hobble.evaluation.csv_tables import write_csv
-from hobble.evaluation.series import difference, line
+from hobble.evaluation.series import difference, fit_line
 from hobble.measures.responsivity.run import parameter_counts
 
 SIZES = {
@@ -297,6 +297,6 @@ def test_a_difference_depends_neither_on_the_unit_nor_on_the_order(
 
 
 def test_a_line_is_fitted_to_points() -> None:
-    assert line([1, 1], [2, 3]) is None
-    assert line([1, 2, 3], [2, 2, 2])["r2"] is None
-    assert line([0, 1, 2], [1, 3, 5]) == pytest.approx({"slope": 2, "intercept": 1, "r2": 1, "points": 3})
+    assert fit_line([1, 1], [2, 3]) is None
+    assert fit_line([1, 2, 3], [2, 2, 2])["r2"] is None
+    assert fit_line([0, 1, 2], [1, 3, 5]) == pytest.approx({"slope": 2, "intercept": 1, "r2": 1, "points": 3})

@@ -9,12 +9,12 @@ import numpy as np
 import pytest
 
 from hobble.evaluation import stability as module
-from hobble.evaluation.stability import KINDS, LIMITS, stability, stretches
+from hobble.evaluation.stability import KINDS, LIMITS, random_targets, stability
 from hobble.models.load import load_network
 
 
 def test_the_script_has_every_kind_of_target() -> None:
-    script = list(stretches(10.0))
+    script = list(random_targets(10.0))
     assert sum(s.frames for s in script) == 10 * 3600
     assert {s.kind for s in script} == set(KINDS)
     for s in script:
@@ -22,7 +22,7 @@ def test_the_script_has_every_kind_of_target() -> None:
         assert np.hypot(*s.velocity) == pytest.approx(speed)
         assert (s.facing is not None) == aside
         assert s.gait == gait
-    assert [s.frames for s in stretches(10.0, 2)] != [s.frames for s in script]
+    assert [s.frames for s in random_targets(10.0, 2)] != [s.frames for s in script]
 
 
 @pytest.mark.shared

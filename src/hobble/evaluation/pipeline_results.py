@@ -1,4 +1,4 @@
-"""The types of pipeline.json. The report and the comparison read this file."""
+"""The types of pipeline.json: time and disk space of each stage. The report and the comparison read it."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ class JobTotal(TypedDict):
     """Totals over some jobs of the workflow.
 
     jobs: number of jobs. seconds, cpu_seconds: sums over the jobs. longest: seconds of the longest job.
-    max_rss_mb: memory of the job that used most, MB; None if not measured.
+    max_rss_mb: memory (MB) of the job that used the most memory; None if not measured.
     """
 
     jobs: int
@@ -22,13 +22,13 @@ class JobTotal(TypedDict):
 
 
 class RuleTotal(JobTotal):
-    """All jobs of a rule."""
+    """Totals over all jobs of one Snakemake rule."""
 
     rule: str
 
 
 class StageTotal(JobTotal):
-    """All jobs of a stage of the workflow, and number and total size of the files that they wrote."""
+    """Totals over all jobs of a stage (a group of rules), and number and size of the files they wrote."""
 
     stage: str
     files: int
@@ -37,7 +37,7 @@ class StageTotal(JobTotal):
 
 
 class Machine(TypedDict):
-    """The machine on which pipeline.json was written."""
+    """The machine on which pipeline.json was written. An unknown number is None."""
 
     system: str
     processor: str
@@ -48,7 +48,9 @@ class Machine(TypedDict):
 class Pipeline(TypedDict):
     """The content of pipeline.json.
 
-    database: None without a database. missing: files of the stages that do not exist. versions: of packages.
+    configuration: name of the configuration. total_bytes: size of all files of the stages. database: None
+    without a database. missing: paths of benchmarks and of files that should exist but do not. versions: name
+    of a package -> its version.
     """
 
     configuration: str

@@ -1,4 +1,4 @@
-"""The difference of two series, and a straight line through points."""
+"""How much two series of numbers differ, and a straight line through points."""
 
 from __future__ import annotations
 
@@ -9,7 +9,10 @@ import numpy as np
 
 
 def difference(mean_a: float, sd_a: float, mean_b: float, sd_b: float) -> float | None:
-    """2 |mean_a - mean_b| / (sd_a + sd_b), eq. 3.2 of Segerstedt 2021; None if both deviations are 0.
+    """The difference of two means, in units of the mean of both standard deviations.
+
+    This is 2 |mean_a - mean_b| / (sd_a + sd_b), equation 3.2 of Segerstedt 2021. None if both standard
+    deviations are 0.
 
     >>> difference(3.0, 0.5, 1.0, 1.5)
     2.0
@@ -19,7 +22,10 @@ def difference(mean_a: float, sd_a: float, mean_b: float, sd_b: float) -> float 
 
 
 class StraightLine(TypedDict):
-    """The line y = intercept + slope x through `points` points, and its r2. Unknown values are None."""
+    """The line y = intercept + slope x. points: number of points. r2: coefficient of determination.
+
+    Unknown values are None.
+    """
 
     slope: float | None
     intercept: float | None
@@ -27,10 +33,10 @@ class StraightLine(TypedDict):
     points: int
 
 
-def line(x: Sequence[float], y: Sequence[float]) -> StraightLine | None:
-    """The least-squares line y = intercept + slope x and its r2; None for fewer than two different x.
+def fit_line(x: Sequence[float], y: Sequence[float]) -> StraightLine | None:
+    """The least-squares line through the points (x, y); None if x has fewer than two different values.
 
-    r2 is None if all y are equal.
+    `r2` is None if all y are equal.
     """
     if len(set(x)) < 2:
         return None

@@ -1,4 +1,4 @@
-"""Does the motion stay plausible? The worst values in minutes of walking, jogging, crouching, turning."""
+"""Checks whether a network's motion stays plausible during minutes of random targets on flat ground."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from hobble.runtime.feet import leg_joints, sole_heights
 from hobble.runtime.options import Runtime
 
 FPS = 60
-# kind of target -> speed in cm a frame, whether to face a random direction, gait
+# kind of target -> (speed in cm a frame, whether to face a random direction, gait)
 KINDS: dict[str, tuple[float, bool, str]] = {
     "walk": (2.5, False, "walk"),
     "jog": (7.0, False, "jog"),
@@ -25,7 +25,7 @@ KINDS: dict[str, tuple[float, bool, str]] = {
     "stop": (0.0, False, "walk"),
     "turn": (0.0, True, "walk"),
 }
-# The motion is stable if all values are within these limits. For the names see `stability`.
+# The motion is stable if all values are within these limits. `stability` explains the names.
 LIMITS = {
     "hips_lowest_cm": 60.0,
     "hips_highest_cm": 110.0,
@@ -36,7 +36,7 @@ LIMITS = {
 
 @dataclass(frozen=True)
 class SteadyTarget:
-    """A constant target for `frames` frames. kind: one of KINDS.
+    """A target that stays the same for `frames` frames. kind: a key of KINDS.
 
     velocity: (2,) cm a frame. facing: (2,) direction, or None for no target of the facing.
     """
@@ -49,7 +49,7 @@ class SteadyTarget:
 
 
 class WorstMotion(TypedDict):
-    """The worst or mean values of some frames; None if there was nothing to measure. See `stability`."""
+    """The worst or mean values of some frames. `stability` explains the keys. None: nothing to measure."""
 
     frames: int
     finite: bool
@@ -64,14 +64,14 @@ class WorstMotion(TypedDict):
 
 
 class Stability(WorstMotion):
-    """The values of all frames together, and of the frames with each kind of target."""
+    """The values of all frames together. kinds: kind of target -> values of the frames with this kind."""
 
     minutes: float
     kinds: dict[str, WorstMotion]
 
 
-def stretches(minutes: float, seed: int = 1) -> Iterator[SteadyTarget]:
-    """Random targets in random directions, each for 2 to 8 seconds, `minutes` in total."""
+def random_targets(minutes: float, seed: int = 1) -> Iterator[SteadyTarget]:
+    """Targets of random kinds in random directions, each for 2 to 8 seconds, `minutes` in total."""
     rng = np.random.default_rng(seed)
     left = int(minutes * 60 * FPS)
     while left > 0:
@@ -87,53 +87,55 @@ def stretches(minutes: float, seed: int = 1) -> Iterator[SteadyTarget]:
 def stability(
     network: Network, minutes: float = 10.0, seed: int = 1, runtime: Runtime | None = None
 ) -> Stability:
-    """The worst values in `minutes` of random targets on flat ground: of all frames, and of each of KINDS.
+    """Let a character follow random targets for `minutes`. Returns the values of all frames and of each kind.
 
-    `finite`: whether all numbers are finite. `hips_lowest_cm`, `hips_highest_cm`: hips above the ground.
-    `largest_turn_degrees`: largest turn of a joint in one frame, in the world. `foot_slide_cm`: mean slide of
-    a toe in a stance. `steps`: number of stances. `foot_down_share`: share of the frames in which a foot
-    stands. `skating_cm`: how far a toe skates in a frame, mean over feet and frames. `stable`: whether all
-    values are within LIMITS.
+    `frames`: number of frames. `finite`: whether all numbers are finite. `hips_lowest_cm`, `hips_highest_cm`:
+    smallest and largest height of the hips above the ground. `largest_turn_degrees`: largest turn of a joint
+    in one frame, in the world. `foot_slide_cm`: mean slide of a toe in a stance. `steps`: number of stances.
+    `foot_down_share`: share of the frames in which at least one foot stands. `skating_cm`: how far a toe
+    skates in a frame (`motion_measures.skating`), mean over feet and frames. `stable`: whether all values are
+    within LIMITS.
     """
     animation = ProceduralAnimation(network, **dict(runtime or Runtime()))
     assert network.skeleton is not None
     role = network.skeleton.role
     toes = [role("left_toe"), role("right_toe")]
     toe_height = float(sole_heights(network, leg_joints(network.skeleton))[1])
-    parts: dict[str, list[dict[str, Array]]] = {kind: [] for kind in KINDS}
-    last = None  # rotations of the frame before the stretch
-    for stretch in stretches(minutes, seed):
+    # For each kind: the measurements during each of its targets, as name -> array.
+    measured: dict[str, list[dict[str, Array]]] = {kind: [] for kind in KINDS}
+    last = None  # rotations (1, J, 4) in the last frame of the target before
+    for target in random_targets(minutes, seed):
         poses = [
-            animation.next_pose(stretch.velocity, stretch.facing, stretch.gait) for _ in range(stretch.frames)
+            animation.next_pose(target.velocity, target.facing, target.gait) for _ in range(target.frames)
         ]
         rotations = np.array([p.rotations for p in poses])
         contacts = np.array([p.contacts for p in poses])
-        feet = np.array([p.positions[toes] for p in poses])
-        above = feet - np.array([[0.0, p.root[1], 0.0] for p in poses])[:, None]
-        parts[stretch.kind].append(
+        toe_positions = np.array([p.positions[toes] for p in poses])
+        above_ground = toe_positions - np.array([[0.0, p.root[1], 0.0] for p in poses])[:, None]
+        measured[target.kind].append(
             {
                 "finite": np.array([np.isfinite(p.positions).all() for p in poses]),
                 "hips": np.array([p.positions[role("hips"), 1] - p.root[1] for p in poses]),
                 "turn": np.array(
                     [largest_turn(rotations if last is None else np.concatenate([last, rotations]))]
                 ),
-                "slide": foot_slide(feet, contacts),
+                "slide": foot_slide(toe_positions, contacts),
                 "down": np.asarray(stance(contacts).any(axis=1)),
-                "skating": skating(above, toe_height).ravel(),
+                "skating": skating(above_ground, toe_height).ravel(),
             }
         )
         last = rotations[-1:]
-    worst = _worst([part for of_kind in parts.values() for part in of_kind])
+    worst = _worst([of_target for of_kind in measured.values() for of_target in of_kind])
     return {
         "minutes": minutes,
         **worst,
-        "kinds": {kind: _worst(of_kind) for kind, of_kind in parts.items() if of_kind},
+        "kinds": {kind: _worst(of_kind) for kind, of_kind in measured.items() if of_kind},
     }
 
 
-def _worst(parts: list[dict[str, Array]]) -> WorstMotion:
-    """The values of some stretches. parts: name -> values, for each stretch."""
-    joined = {key: np.concatenate([part[key] for part in parts]) for key in parts[0]}
+def _worst(measured: list[dict[str, Array]]) -> WorstMotion:
+    """The worst or mean values over some targets. measured: for each target, name -> measured values."""
+    joined = {key: np.concatenate([of_target[key] for of_target in measured]) for key in measured[0]}
     out: WorstMotion = {
         "frames": len(joined["hips"]),
         "finite": bool(joined["finite"].all() and np.isfinite(joined["turn"]).all()),

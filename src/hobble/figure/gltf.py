@@ -16,21 +16,22 @@ from hobble.core import quat
 from hobble.core.files import atomic_path
 from hobble.core.quat import Array
 from hobble.core.skeleton import Skeleton, local_rotations
-from hobble.figure.bind import bind
+from hobble.figure.bind import bind_pose
 from hobble.figure.mesh import NEEDED, Mesh, body
 from hobble.figure.pack import whole_weights
 
 METRES = 0.01  # metres per centimetre
 LEAST_MOVEMENT = 1e-5  # a joint counts as still if each component of its rotation varies by less than this
-COLOUR = (0.72, 0.72, 0.69, 1.0)
-# Codes of glTF: component types (float, unsigned byte, short, int), then buffer targets.
+COLOUR = (0.72, 0.72, 0.69, 1.0)  # of the body: red, green, blue, opacity
+# Codes of glTF for the type of the numbers (float; unsigned byte, short, int) and for the use of an array
+# (data of vertices, indices of triangles).
 FLOAT, BYTE, SHORT, INT = 5126, 5121, 5123, 5125
 ARRAY, ELEMENTS = 34962, 34963
 
 
 @dataclass(frozen=True)
 class BodyMotion:
-    """A motion of the body. root: (F, 3) positions, cm. local: (F, J, 4) local rotations of the joints."""
+    """A motion of the body. root: (F, 3) positions of the root, cm. local: (F, J, 4) local rotations."""
 
     name: str
     root: Array = field(repr=False)
@@ -39,7 +40,10 @@ class BodyMotion:
 
 
 class _Buffer:
-    """The buffer of the .glb file, with the views and accessors of its arrays."""
+    """The binary data of the .glb file. glTF describes each array in it by a view and an accessor.
+
+    A view says which bytes belong to the array. An accessor says what they mean.
+    """
 
     def __init__(self) -> None:
         self.bytes = bytearray()
@@ -58,12 +62,12 @@ class _Buffer:
     ) -> int:
         """Append an array. Returns the index of its accessor.
 
-        kind: the array's type in glTF, such as "VEC3". component: code of the type of its numbers. target:
-        code of its use. normalized: whether the integers stand for 0 to 1. bounds: whether the accessor
-        states the least and greatest values.
+        kind: the type of an element in glTF, such as "VEC3". component: code of the type of the numbers, such
+        as FLOAT. target: code of the array's use, such as ARRAY. normalized: whether the integers stand for
+        numbers from 0 to 1. bounds: whether the accessor states the smallest and largest values.
         """
         data = np.ascontiguousarray(array)
-        self.bytes += b"\0" * (-len(self.bytes) % 4)
+        self.bytes += b"\0" * (-len(self.bytes) % 4)  # each array starts at a multiple of 4 bytes
         view: dict[str, object] = {"buffer": 0, "byteOffset": len(self.bytes), "byteLength": data.nbytes}
         if target:
             view["target"] = target
@@ -95,6 +99,7 @@ def write_glb(path: str | Path, skeleton: Skeleton, motions: Iterable[BodyMotion
     document: dict[str, object] = {
         "asset": {"version": "2.0", "generator": "Hobble"},
         "scene": 0,
+        # The first node is the root joint. The node of the body comes after those of the joints.
         "scenes": [{"name": skeleton.name or "character", "nodes": [0, len(nodes)]}],
         "nodes": [*nodes, {"name": "body", "mesh": 0, "skin": 0}],
         "meshes": [{"name": "body", "primitives": [_primitive(mesh, buffer)]}],
@@ -128,9 +133,9 @@ def write_glb(path: str | Path, skeleton: Skeleton, motions: Iterable[BodyMotion
 
 
 def _nodes(skeleton: Skeleton, mesh: Mesh) -> list[dict[str, object]]:
-    """A node for each joint in the bind pose. The body stands on the ground."""
+    """A glTF node for each joint, in the bind pose. The lowest corner of the body is at height 0."""
     is_person = all(skeleton.roles.get(role) in skeleton.joints for role in NEEDED)
-    world = bind(skeleton).rotations if is_person else np.tile(quat.IDENTITY, (len(skeleton.joints), 1))
+    world = bind_pose(skeleton).rotations if is_person else np.tile(quat.IDENTITY, (len(skeleton.joints), 1))
     local = local_rotations(skeleton, world)
     offsets = np.array(skeleton.offsets, float)
     offsets[0] = [0.0, -mesh.corners[:, 1].min(), 0.0]
@@ -148,7 +153,9 @@ def _nodes(skeleton: Skeleton, mesh: Mesh) -> list[dict[str, object]]:
 
 
 def _primitive(mesh: Mesh, buffer: _Buffer) -> dict[str, object]:
+    """The glTF description of the mesh. Its arrays are appended to the buffer."""
     weights = whole_weights(mesh.weights)
+    # glTF wants bone 0 where the weight is 0.
     bone = np.where(weights > 0, mesh.bones_of_corner, 0).astype(np.uint8)
     normals = mesh.normals.astype(np.float32)
     normals /= np.linalg.norm(normals, axis=1, keepdims=True)
@@ -168,7 +175,10 @@ def _primitive(mesh: Mesh, buffer: _Buffer) -> dict[str, object]:
 
 
 def _inverse_bind_matrices(mesh: Mesh) -> NDArray[np.float32]:
-    """Inverse bind matrices (B, 16) of the bones, each column by column."""
+    """Matrices (B, 16) from the coordinates of the body in the bind pose to those of each bone.
+
+    Each matrix is stored column by column.
+    """
     turn = quat.to_matrix(quat.inv(mesh.rotations))
     out = np.tile(np.eye(4), (len(mesh.bones), 1, 1))
     out[:, :3, :3] = turn
@@ -177,16 +187,18 @@ def _inverse_bind_matrices(mesh: Mesh) -> NDArray[np.float32]:
 
 
 def _animation(motion: BodyMotion, buffer: _Buffer) -> dict[str, object]:
-    """The animation of a motion. A joint that does not move has only the first and the last frame."""
+    """The glTF animation of a motion. A joint that does not turn has only the first and the last frame."""
     times = (np.arange(len(motion.root)) / motion.fps).astype(np.float32)
+    # Accessors of the times of all frames, and of the first and the last frame.
     all_times = buffer.add(times, "SCALAR", FLOAT, bounds=True)
     end_times = buffer.add(times[[0, -1]], "SCALAR", FLOAT, bounds=True) if len(times) > 2 else all_times
     samplers: list[dict[str, object]] = []
     channels: list[dict[str, object]] = []
 
-    def add_channel(node: int, path: str, times: int, values: Array, kind: str) -> None:
+    def add_channel(node: int, path: str, times_accessor: int, values: Array, kind: str) -> None:
+        """Animate a property (`path`: "translation" or "rotation") of a node. values: for each time."""
         output = buffer.add(values.astype(np.float32), kind, FLOAT)
-        samplers.append({"input": times, "output": output, "interpolation": "LINEAR"})
+        samplers.append({"input": times_accessor, "output": output, "interpolation": "LINEAR"})
         channels.append({"sampler": len(samplers) - 1, "target": {"node": node, "path": path}})
 
     add_channel(0, "translation", all_times, METRES * motion.root, "VEC3")
@@ -199,16 +211,16 @@ def _animation(motion: BodyMotion, buffer: _Buffer) -> dict[str, object]:
 
 
 def _xyzw(rotation: Array) -> Array:
-    """Quaternions in the order of glTF."""
+    """Quaternions (..., 4) in the order x, y, z, w of glTF, from the order w, x, y, z."""
     return rotation[..., [1, 2, 3, 0]]
 
 
 def _write(path: str | Path, document: dict[str, object], data: bytes) -> None:
-    """Write the .glb container: header, JSON padded with spaces, buffer padded with zeros."""
+    """Write the .glb file: a header, the document as JSON, and the data. Sizes are multiples of 4 bytes."""
     text = json.dumps(document, separators=(",", ":")).encode()
     text += b" " * (-len(text) % 4)
     data += b"\0" * (-len(data) % 4)
-    length = 12 + 8 + len(text) + 8 + len(data)
+    length = 12 + 8 + len(text) + 8 + len(data)  # 12 bytes of file header, 8 bytes before each chunk
     header = struct.pack("<4sII", b"glTF", 2, length)
     chunks = [
         struct.pack("<I4s", len(part), kind) + part for part, kind in ((text, b"JSON"), (data, b"BIN\0"))

@@ -1,4 +1,4 @@
-"""The body of a skeleton as a mesh: corners (vertices), triangles, skin weights, and posing."""
+"""The body of a skeleton as a mesh: corners (vertices), triangles and skin weights. Also poses the mesh."""
 
 from __future__ import annotations
 
@@ -16,21 +16,23 @@ from hobble.core import quat
 from hobble.core.compiled import njit
 from hobble.core.quat import Array
 from hobble.core.skeleton import Skeleton
-from hobble.figure.bind import SIDES, BindPose, bind
-from hobble.figure.shape import person, scale
-from hobble.figure.skin import owners, spread
+from hobble.figure.bind import SIDES, BindPose, bind_pose
+from hobble.figure.shape import body_scale, person
+from hobble.figure.skin import nearest_joints, skin_weights
 from hobble.figure.solids import Rod, Solid
-from hobble.figure.surface import LARGEST_DISTANCE, Fine, distances, slopes, surface
+from hobble.figure.surface import LARGEST_DISTANCE, FineBox, distances, slopes, surface_mesh
 
+# For a body in the shape of a person, these lengths are multiplied by `body_scale`.
 CORNER_SPACING = 1.9  # cm between corners of the mesh on trunk and limbs
-FINE_SPACING = {"hand": 0.64, "face": 0.85, "foot": 1.2}  # cm between corners on finer parts
+FINE_SPACING = {"hand": 0.64, "face": 0.85, "foot": 1.2}  # cm between corners on these finer parts
 # cm over which the weights of two bones blend, for each part of the body. "": all other parts.
 BLEND_WIDTH = {"": 3.6, "hand": 0.8, "head": 2.6, "foot": 1.8}
-# For shading: distances from the body (cm) at which its surroundings are sampled, each with a weight.
+# For shading: (distance from a corner at which it is tested whether the body is near, cm; weight).
 OCCLUSION_SAMPLES = ((1.5, 0.30), (4.0, 0.30), (9.0, 0.25))
 # The roles that a skeleton must have for a body in the shape of a person.
 NEEDED = ("hips", "head", *(f"{s}_{r}" for s in SIDES for r in ("shoulder", "hip", "knee", "heel", "toe")))
-STICK = (2.6, 1.9)  # cm, half widths of a rod at its upper and lower end, if a role of NEEDED is missing
+# If a role of NEEDED is missing, the body consists of rods: half widths at their upper and lower end, cm.
+STICK = (2.6, 1.9)
 
 
 @dataclass(frozen=True)
@@ -38,10 +40,10 @@ class Mesh:
     """A body in its bind pose, centimetres.
 
     corners, normals: (V, 3). faces: (T, 3) indices of corners, counter-clockwise seen from outside. shade:
-    (V,) the share of a corner's surroundings that is open: 0 (dark) if the body covers all, 1 (light) if it
-    covers nothing. bones: (B,) joints of the skeleton that move the body. bones_of_corner: (V, 4) the bones
-    that move each corner, as indices into `bones`. weights: (V, 4) their weights, which sum to 1. positions
-    (B, 3), rotations (B, 4): the bones in the bind pose.
+    (V,) brightness of each corner: 1 if the body covers none of the corner's surroundings, 0.15 if the body
+    covers them all. bones: (B,) joints of the skeleton that move the body. bones_of_corner: (V, 4) the bones
+    that move each corner, as indices into `bones`. weights: (V, 4) weights of these bones, which sum to 1.
+    positions (B, 3), rotations (B, 4): the bones in the bind pose.
     """
 
     corners: Array = field(repr=False)
@@ -84,42 +86,44 @@ def body(skeleton: Skeleton) -> Mesh:
     The mesh depends only on the joints (with their parents and offsets) and the roles. Skeletons that agree
     in these share one mesh.
     """
-    return _mesh_of(_mesh_key_text(skeleton))
+    return _build_mesh(_joints_and_roles(skeleton))
 
 
-def key(skeleton: Skeleton) -> str:
+def mesh_key(skeleton: Skeleton) -> str:
     """A hash that names the body of a skeleton. Skeletons with the same body get the same name."""
-    return hashlib.sha256(_mesh_key_text(skeleton).encode()).hexdigest()[:12]
+    return hashlib.sha256(_joints_and_roles(skeleton).encode()).hexdigest()[:12]
 
 
-def _mesh_key_text(skeleton: Skeleton) -> str:
+def _joints_and_roles(skeleton: Skeleton) -> str:
+    """The parts of a skeleton on which its mesh depends, as JSON."""
     data = skeleton.to_dict()
     return json.dumps({key: data[key] for key in ("joints", "roles")})
 
 
 @functools.lru_cache(maxsize=8)
-def _mesh_of(text: str) -> Mesh:
-    skeleton = Skeleton.from_dict({"name": "body", **json.loads(text)})
+def _build_mesh(joints_and_roles: str) -> Mesh:
+    """The mesh of the skeleton with these joints and roles (JSON)."""
+    skeleton = Skeleton.from_dict({"name": "body", **json.loads(joints_and_roles)})
     is_person = all(skeleton.roles.get(role) in skeleton.joints for role in NEEDED)
     if is_person:
-        pose = bind(skeleton)
-        solids, size, fine = list(person(pose)), scale(pose), _fine(pose)
-        bones = pose.bones
+        pose = bind_pose(skeleton)
+        solids, scale, fine = list(person(pose)), body_scale(pose), _fine_boxes(pose)
+        bone_of = pose.bone_of
     else:
-        pose, solids, bones = _sticks(skeleton)
-        size, fine = 1.0, []
-    corners, faces = surface(solids, CORNER_SPACING * size, fine)
+        pose, solids, bone_of = _sticks(skeleton)
+        scale, fine = 1.0, []
+    corners, faces = surface_mesh(solids, CORNER_SPACING * scale, fine)
     slope, _ = slopes(solids, corners)
     normals = slope / np.maximum(np.linalg.norm(slope, axis=1, keepdims=True), 1e-9)
-    owner = owners(solids, corners, bones)
-    blend_width = _blend_widths(owner, pose, size) if is_person else 2.0
-    bones_of_corner, weights = spread(corners, faces, owner, blend_width)
+    owner = nearest_joints(solids, corners, bone_of)
+    blend_width = _blend_widths(owner, pose, scale) if is_person else 2.0
+    bones_of_corner, weights = skin_weights(corners, faces, owner, blend_width)
     used = np.unique(bones_of_corner)
     return Mesh(
         corners,
         normals,
         faces,
-        _shade(solids, corners, normals, size),
+        _shade(solids, corners, normals, scale),
         used,
         np.searchsorted(used, bones_of_corner),
         weights,
@@ -128,58 +132,62 @@ def _mesh_of(text: str) -> Mesh:
     )
 
 
-def _fine(pose: BindPose) -> list[Fine]:
-    """The boxes in which the mesh is finer: hands, face, feet."""
-    size, at = scale(pose), pose.at
-    out: list[Fine] = []
-    head = at["head"]
+def _fine_boxes(pose: BindPose) -> list[FineBox]:
+    """The boxes around hands, face and feet, in which the mesh is finer."""
+    scale, position_of = body_scale(pose), pose.position_of
+    out: list[FineBox] = []
+    head = position_of["head"]
     low, high = np.array([-8.0, -6.0, -1.0]), np.array([8.0, 12.0, 13.0])
-    out.append((head + size * low, head + size * high, FINE_SPACING["face"] * size))
+    out.append((head + scale * low, head + scale * high, FINE_SPACING["face"] * scale))
     for side in SIDES:
-        wrist = at[f"{side}_wrist"]
-        ahead = wrist - at[f"{side}_elbow"]
-        tip = wrist + 18 * size * ahead / max(float(np.linalg.norm(ahead)), 1e-9)
-        low, high = np.minimum(wrist, tip) - 4 * size, np.maximum(wrist, tip) + 4 * size
-        out.append((low, high, FINE_SPACING["hand"] * size))
-        ankle, ball = at[f"{side}_heel"], at[f"{side}_toe"]
+        wrist = position_of[f"{side}_wrist"]
+        ahead = wrist - position_of[f"{side}_elbow"]
+        tip = wrist + 18 * scale * ahead / max(float(np.linalg.norm(ahead)), 1e-9)
+        low, high = np.minimum(wrist, tip) - 4 * scale, np.maximum(wrist, tip) + 4 * scale
+        out.append((low, high, FINE_SPACING["hand"] * scale))
+        ankle, ball = position_of[f"{side}_heel"], position_of[f"{side}_toe"]
         low, high = np.minimum(ankle, ball), np.maximum(ankle, ball)
-        low = low - size * np.array([5.0, 3.5, 6.0])
-        high = high + size * np.array([5.0, 0.0, 9.0])
-        out.append((low, high, FINE_SPACING["foot"] * size))
+        low = low - scale * np.array([5.0, 3.5, 6.0])
+        high = high + scale * np.array([5.0, 0.0, 9.0])
+        out.append((low, high, FINE_SPACING["foot"] * scale))
     return out
 
 
-def _blend_widths(owner: NDArray[np.int64], pose: BindPose, size: float) -> Array:
-    """(V,) cm over which the weights of two bones blend at each corner. owner: (V,) nearest bone."""
+def _blend_widths(owner: NDArray[np.int64], pose: BindPose, scale: float) -> Array:
+    """(V,) cm over which the weights of two bones blend at each corner.
+
+    owner: (V,) result of `nearest_joints`. scale: `body_scale`.
+    """
     wide = np.full(len(owner), BLEND_WIDTH[""])
     for part, roles in (
         ("hand", ("left_wrist", "right_wrist")),
         ("head", ("head", "neck")),
         ("foot", ("left_toe", "right_toe", "left_heel", "right_heel")),
     ):
-        wide[np.isin(owner, [pose.bones[role] for role in roles])] = BLEND_WIDTH[part]
-    return wide * size
+        wide[np.isin(owner, [pose.bone_of[role] for role in roles])] = BLEND_WIDTH[part]
+    return wide * scale
 
 
-def _shade(solids: Sequence[Solid], corners: Array, normals: Array, size: float) -> Array:
-    """`Mesh.shade` (V,). A corner is dark if the body is near to points on its normal (OCCLUSION_SAMPLES)."""
+def _shade(solids: Sequence[Solid], corners: Array, normals: Array, scale: float) -> Array:
+    """`Mesh.shade` (V,). A corner is dark if points above it, on its normal, are near to the body."""
     shade = np.ones(len(corners))
     for away, weight in OCCLUSION_SAMPLES:
-        height = size * away
+        height = scale * away
+        # If nothing else is near, the distance of the point from the body is its height above the corner.
         free = np.clip(distances(solids, corners + height * normals), 0, min(height, LARGEST_DISTANCE))
         shade -= weight * (1 - free / height)
     return np.clip(shade, 0, 1)
 
 
 def _sticks(skeleton: Skeleton) -> tuple[BindPose, list[Solid], dict[str, int]]:
-    """A body of rods: the rest pose, a rod for every bone, and the index of each joint by its name."""
+    """A body of rods. Returns the rest pose, a rod for every bone, and joint name -> index."""
     count = len(skeleton.joints)
     positions = np.zeros((count, 3))
     for j, p in enumerate(skeleton.parents):
         if p >= 0:
             positions[j] = positions[p] + skeleton.offsets[j]
-    bones = {name: j for j, name in enumerate(skeleton.joints)}
-    pose = BindPose(positions, np.tile(quat.IDENTITY, (count, 1)), bones, {})
+    bone_of = {name: j for j, name in enumerate(skeleton.joints)}
+    pose = BindPose(positions, np.tile(quat.IDENTITY, (count, 1)), bone_of, {})
 
     def rods() -> Iterator[Solid]:
         for j, p in enumerate(skeleton.parents):
@@ -189,5 +197,5 @@ def _sticks(skeleton: Skeleton) -> tuple[BindPose, list[Solid], dict[str, int]]:
     return (
         pose,
         list(rods()) or [Rod(1.0, ((-np.inf, skeleton.joints[0]),), positions[0], positions[0], *STICK)],
-        bones,
+        bone_of,
     )

@@ -1,4 +1,4 @@
-"""Packs a body for a web page: its arrays as integers in base64.
+"""Packs a body for a web page: its arrays become integers in base64.
 
 Also finds the links that move with each bone. A link is a pair of joints between which a body can be hurt.
 """
@@ -18,15 +18,17 @@ from hobble.figure.mesh import Mesh, body
 from hobble.models.packing import packed
 
 UNIT = 0.01  # cm; positions of corners are stored as multiples of this
-TURN = 32767  # integer that stands for 1 in the components of a rotation
+TURN = 32767  # the integer that stands for 1 in packed rotations
 
 
 def packed_body(skeleton: Skeleton) -> dict[str, Any]:
     """The mesh of a skeleton's body, and the data with which a page moves it.
 
-    `unit`: UNIT. `wide`: whether `faces` are 32-bit. `bone`, `share`: the `bones_of_corner` and `weights` of
-    `Mesh`. `keep`: the joints that are bones of the mesh. `places`, `turns`: positions and rotations of these
-    joints in the bind pose. `balls`: result of `part_spheres`. Other keys: fields of `Mesh`.
+    Most keys are fields of `Mesh`. `corners` are in multiples of `unit` (cm), `normals` of 1/127, `shade` of
+    1/255. `wide`: whether `faces` are 32-bit instead of 16-bit. `bone`, `share`: the `bones_of_corner` and
+    `weights` of `Mesh`, weights in multiples of 1/255. `keep`: the joints that are bones of the mesh.
+    `places`, `turns`: positions and rotations of these joints in the bind pose. `balls`: result of
+    `part_spheres`.
     """
     mesh = body(skeleton)
     index_type = np.uint16 if len(mesh.corners) < 1 << 16 else np.uint32
@@ -49,8 +51,9 @@ def packed_body(skeleton: Skeleton) -> dict[str, Any]:
 def part_spheres(mesh: Mesh) -> Array:
     """(B, 4) a sphere for the part of the body that each bone moves.
 
-    Columns: centre in the coordinates of the bone, and radius, cm. All are 0 if no corner is moved mainly by
-    the bone. The spheres replace the body where a rough shape is enough, as for its shadow on the ground.
+    Columns: centre (x, y, z) in the coordinates of the bone, and radius, cm. All are 0 if the bone is the
+    main bone of no corner. The spheres stand for the body where a rough shape is enough, for example for its
+    shadow on the ground.
     """
     out = np.zeros((len(mesh.bones), 4))
     main_bone = np.take_along_axis(mesh.bones_of_corner, mesh.weights.argmax(axis=1)[:, None], axis=1)[:, 0]
@@ -59,28 +62,33 @@ def part_spheres(mesh: Mesh) -> Array:
             continue
         local = quat.rotate(quat.inv(mesh.rotations[b]), mesh.corners[moved] - mesh.positions[b])
         low, high = local.min(axis=0), local.max(axis=0)
+        # The radius is the geometric mean of the half edges of the box around these corners.
         out[b] = [*(low + high) / 2, float(np.prod((high - low) / 2) ** (1 / 3))]
     return out
 
 
 def whole_weights(weights: Array) -> NDArray[np.uint8]:
-    """Weights (V, 4) as integers (V, 4) with the sum 255. The largest weight takes the rounding error."""
+    """Weights (V, 4), which sum to 1, as integers (V, 4), which sum to 255.
+
+    The weights are rounded down. The largest one of each corner gets what is missing.
+    """
     whole = np.floor(weights * 255).astype(np.int64)
     whole[np.arange(len(whole)), weights.argmax(axis=1)] += 255 - whole.sum(axis=1)
     return whole.astype(np.uint8)
 
 
 def regions(skeleton: Skeleton, links: Sequence[str]) -> list[list[int]]:
-    """For each bone of the body, the indices of the links that move with it.
+    """For each bone of the body, the indices of the `links` that move with it.
 
-    A link belongs to the bone that moves its upper joint. But a link that starts at the hips or the chest,
-    where the body branches, belongs to the bone of the limb, or of the part of the back, to which it leads.
+    links: names such as "LeftUpLeg-LeftLeg", upper joint first. A link belongs to the bone that moves its
+    upper joint. But the body branches at the hips and the chest. A link that starts there belongs to the bone
+    to which it leads, such as that of a thigh.
     """
     bones = body(skeleton).bones.tolist()
     branching = {
         skeleton.role(role) for role in ("hips", "chest") if skeleton.roles.get(role) in skeleton.joints
     }
-    of_bones: list[list[int]] = [[] for _ in bones]
+    links_of_bones: list[list[int]] = [[] for _ in bones]
     for index, ends in enumerate(link_ends(skeleton.joints, links)):
         if ends is None:
             continue
@@ -91,8 +99,8 @@ def regions(skeleton: Skeleton, links: Sequence[str]) -> list[list[int]]:
         if bone in branching:
             bone = next((j for j in _below(skeleton, lower) if j in bones), bone)
         if bone in bones:
-            of_bones[bones.index(bone)].append(index)
-    return of_bones
+            links_of_bones[bones.index(bone)].append(index)
+    return links_of_bones
 
 
 def _below(skeleton: Skeleton, joint: int) -> list[int]:
@@ -104,9 +112,10 @@ def _below(skeleton: Skeleton, joint: int) -> list[int]:
 
 
 def link_ends(joints: Sequence[str], links: Sequence[str]) -> list[tuple[int, int] | None]:
-    """Joint indices of both ends of each link "upper-lower"; None if the skeleton lacks one of them.
+    """(upper, lower) joint index of each link, None if one of its joints is unknown.
 
-    Joint names may contain hyphens, so the name of a link is split at each of its hyphens in turn.
+    joints: all joint names. links: names of the form "upper-lower". Joint names may contain hyphens, so the
+    name of a link is split at each of its hyphens in turn, until both parts are joints.
     """
     pairs: list[tuple[int, int] | None] = []
     for link in links:
@@ -118,5 +127,5 @@ def link_ends(joints: Sequence[str], links: Sequence[str]) -> list[tuple[int, in
 
 
 def packed_turns(rotations: Array) -> str:
-    """Rotations (F, B, 4) as 16-bit integers in base64; TURN stands for 1."""
+    """Rotations (F, B, 4) as 16-bit integers in base64. The integer TURN stands for 1."""
     return packed(np.round(np.clip(rotations, -1, 1) * TURN).astype(np.int16))

@@ -1,7 +1,8 @@
 """The shape of a person around the joints of a skeleton.
 
-The tables of proportions are in centimetres for a body whose legs are LEG_LENGTH long. They are scaled to the
-skeleton.
+The tables of proportions are in centimetres for a body whose legs are LEG_LENGTH long. They are multiplied by
+`scale` (see `body_scale`). `position_of` is that of `BindPose`: role -> position of its joint. `sign` is 1
+for the left side, which is at +X, and -1 for the right side.
 """
 
 from __future__ import annotations
@@ -16,11 +17,11 @@ from hobble.figure.solids import Ball, Floor, Owner, Rod, Solid, SweptSolid
 
 LEG_LENGTH = 81.0  # cm from hip to ankle of the body that the tables describe
 TOE_HEIGHT = 2.5  # cm, height of the ball of the foot above the sole
-# Heights (cm) of hip joints, chest, neck and head in TRUNK, where 0 is 8 cm above the hip joints. TRUNK is
-# stretched so that these heights become the heights of the joints in the skeleton.
+# Heights (cm) of hip joints, chest, neck and head in the table TRUNK. Height 0 is 8 cm above the hip joints.
+# TRUNK is stretched until these heights are the heights of the joints in the skeleton.
 JOINT_HEIGHTS = (-8.0, 23.0, 38.0, 48.0)
 
-# Each row of TRUNK, LEG, ARM, PALM and FOOT is one section of a solid. Its numbers in TRUNK:
+# Each row of TRUNK, LEG, ARM, PALM and FOOT is one section across a solid (see `SweptSolid`). In TRUNK:
 # height; half width; half depth; how far the centre is to the front; exponent of the superellipse
 TRUNK = (
     (-18.5, 3.5, 4.5, 0.2, 2.0),
@@ -86,9 +87,9 @@ PALM = (
 )
 # each finger, cm: how far its root is towards the thumb; how far it is from the wrist; length; half width
 FINGERS = ((3.1, 8.7, 7.0, 0.84), (1.0, 9.2, 7.8, 0.86), (-1.1, 8.9, 7.2, 0.83), (-3.05, 8.1, 5.6, 0.74))
-CURL = (0.16, 0.30, 0.26)  # radians, bend of each finger joint
-# The place along the foot is the sum of the first two numbers: share of the way from ankle to ball; cm. Then:
-# half width; height; how far the centre is towards the other foot
+CURL = (0.16, 0.30, 0.26)  # radians, bend of each finger joint, from the knuckle on
+# Place along the foot as the sum of two numbers, a share of the way from ankle to ball and cm; half width;
+# height; how far the centre is towards the other foot
 FOOT = (
     (0.0, -6.0, 2.4, 4.6, 0.0),
     (0.0, -5.0, 3.2, 6.8, 0.0),
@@ -104,74 +105,84 @@ FOOT = (
 )
 
 
-def person(bind: BindPose) -> Iterator[Solid]:
+def person(pose: BindPose) -> Iterator[Solid]:
     """The solids of a person, in the order in which they are added to the body or cut from it."""
-    at = bind.at
-    legs = [np.linalg.norm(at[f"{s}_heel"] - at[f"{s}_knee"]) for s in SIDES]
-    legs += [np.linalg.norm(at[f"{s}_knee"] - at[f"{s}_hip"]) for s in SIDES]
-    size = float(max(sum(legs) / 2 / LEG_LENGTH, 0.05))
-    yield from _trunk(at, size)
+    position_of = pose.position_of
+    legs = [np.linalg.norm(position_of[f"{s}_heel"] - position_of[f"{s}_knee"]) for s in SIDES]
+    legs += [np.linalg.norm(position_of[f"{s}_knee"] - position_of[f"{s}_hip"]) for s in SIDES]
+    scale = float(max(sum(legs) / 2 / LEG_LENGTH, 0.05))
+    yield from _trunk(position_of, scale)
     for side, sign in zip(SIDES, (1.0, -1.0), strict=True):
-        yield from _leg(at, side, size)
-        yield from _arm(at, side, sign, size)
+        yield from _leg(position_of, side, scale)
+        yield from _arm(position_of, side, sign, scale)
     for side, sign in zip(SIDES, (1.0, -1.0), strict=True):
-        yield from _foot(at, side, sign, size)
-        yield from _hand(at, side, sign, size)
-    yield from _head(at, size)
+        yield from _foot(position_of, side, sign, scale)
+        yield from _hand(position_of, side, sign, scale)
+    yield from _head(position_of, scale)
 
 
-def scale(bind: BindPose) -> float:
-    """Leg length of the body, divided by LEG_LENGTH: the factor by which the tables are scaled."""
-    legs = [np.linalg.norm(bind.at[f"{s}_{a}"] - bind.at[f"{s}_{b}"]) for s in SIDES for a, b in
+def body_scale(pose: BindPose) -> float:
+    """The factor by which the tables are multiplied: leg length of the body, divided by LEG_LENGTH."""
+    position_of = pose.position_of
+    legs = [np.linalg.norm(position_of[f"{s}_{a}"] - position_of[f"{s}_{b}"]) for s in SIDES for a, b in
             (("heel", "knee"), ("knee", "hip"))]  # fmt: skip
     return float(max(sum(legs) / 2 / LEG_LENGTH, 0.05))
 
 
-def _levels(at: dict[str, Array], size: float) -> Array:
-    """Heights of hip joints, chest, neck and head, each at least a little above the one before."""
-    hips = (at["left_hip"][1] + at["right_hip"][1]) / 2
-    heights = [hips, at["chest"][1], at["neck"][1], at["head"][1]]
+def _levels(position_of: dict[str, Array], scale: float) -> Array:
+    """Heights (4,) of hip joints, chest, neck and head, cm. Each is at least a little above the last one."""
+    hips = (position_of["left_hip"][1] + position_of["right_hip"][1]) / 2
+    heights = [hips, position_of["chest"][1], position_of["neck"][1], position_of["head"][1]]
     for i in range(1, 4):
-        usual = size * (JOINT_HEIGHTS[i] - JOINT_HEIGHTS[i - 1])
+        usual = scale * (JOINT_HEIGHTS[i] - JOINT_HEIGHTS[i - 1])
         heights[i] = max(heights[i], heights[i - 1] + 0.4 * usual)
     return np.array(heights)
 
 
-def _trunk(at: dict[str, Array], size: float) -> Iterator[Solid]:
-    heights = _levels(at, size)
+def _trunk(position_of: dict[str, Array], scale: float) -> Iterator[Solid]:
+    heights = _levels(position_of, scale)
 
     def level(y: float) -> float:
-        """Height in the skeleton of the height `y` in TRUNK."""
+        """The height in the skeleton, cm, that corresponds to the height `y` in TRUNK."""
         if y < JOINT_HEIGHTS[0] or y > JOINT_HEIGHTS[-1]:
             end = 0 if y < JOINT_HEIGHTS[0] else -1
-            return float(heights[end] + size * (y - JOINT_HEIGHTS[end]))
+            return float(heights[end] + scale * (y - JOINT_HEIGHTS[end]))
         return float(np.interp(y, JOINT_HEIGHTS, heights))
 
-    hip = (at["left_hip"] + at["right_hip"]) / 2
+    hip = (position_of["left_hip"] + position_of["right_hip"]) / 2
     start = np.array([hip[0], 0.0, hip[2]])
-    # Height and depth (z) of the joints of the back, from which the centre of each section follows.
-    joint_depths = [hip[2], at["spine"][2], at["chest"][2], at["neck"][2], at["head"][2]]
-    joint_heights = [heights[0], at["spine"][1], *heights[1:]]
+    # The centres of the sections follow the line through the joints of the back.
+    joint_depths = [
+        hip[2],
+        position_of["spine"][2],
+        position_of["chest"][2],
+        position_of["neck"][2],
+        position_of["head"][2],
+    ]
+    joint_heights = [heights[0], position_of["spine"][1], *heights[1:]]
 
     def middle_depth(y: float) -> float:
+        """Depth (z) of the line through the joints of the back at the height `y` in TRUNK, cm."""
         return float(np.interp(level(y), joint_heights, joint_depths))
 
     rows = [
-        (level(y), size * w, size * d, 0.0, middle_depth(y) - hip[2] + size * f, n) for y, w, d, f, n in TRUNK
+        (level(y), scale * w, scale * d, 0.0, middle_depth(y) - hip[2] + scale * f, n)
+        for y, w, d, f, n in TRUNK
     ]
     up, right = np.array([0.0, 1.0, 0.0]), np.array([-1.0, 0.0, 0.0])
+    # (height at which the part of the trunk that a bone moves begins, role of the bone), from below
     owners: tuple[Owner, ...] = (
         (-np.inf, "hips"),
-        (0.5 * (at["hips"][1] + at["spine"][1]) + 2.0 * size, "spine"),
-        (0.5 * (at["spine"][1] + heights[1]) + 3.0 * size, "chest"),
-        (heights[2] + 2.0 * size, "neck"),
-        (heights[3] + 1.0 * size, "head"),
+        (0.5 * (position_of["hips"][1] + position_of["spine"][1]) + 2.0 * scale, "spine"),
+        (0.5 * (position_of["spine"][1] + heights[1]) + 3.0 * scale, "chest"),
+        (heights[2] + 2.0 * scale, "neck"),
+        (heights[3] + 1.0 * scale, "head"),
     )
     yield SweptSolid(0.0, owners, start, up, right, rows)
 
     def place(x: float, y: float, z: float) -> Array:
-        """The point at the height `y` in TRUNK that is (x, z) away from the middle of the trunk."""
-        return np.array([hip[0] + size * x, level(y), middle_depth(y) + size * z])
+        """The point at the height `y` in TRUNK, `x` to the left and `z` in front of the trunk's middle."""
+        return np.array([hip[0] + scale * x, level(y), middle_depth(y) + scale * z])
 
     for sign in (1.0, -1.0):
         for role, blend, centre, radii in (
@@ -180,11 +191,12 @@ def _trunk(at: dict[str, Array], size: float) -> Iterator[Solid]:
             ("hips", 6.0, (6.8, -9.0, -4.6), (7.0, 7.6, 6.6)),  # seat
         ):
             x, y, z = centre
-            yield Ball(blend * size, ((-np.inf, role),), place(sign * x, y, z), size * np.array(radii))
-        shoulder = at["left_shoulder" if sign > 0 else "right_shoulder"]
+            yield Ball(blend * scale, ((-np.inf, role),), place(sign * x, y, z), scale * np.array(radii))
+        shoulder = position_of["left_shoulder" if sign > 0 else "right_shoulder"]
+        # A rod from the neck to the shoulder.
         inner = place(sign * 3.6, 42.0, -1.8)
-        outer = shoulder + size * np.array([-sign * 2.5, 2.4, -0.4])
-        yield Rod(4.5 * size, ((-np.inf, "chest"),), inner, outer, 2.6 * size, 3.0 * size)
+        outer = shoulder + scale * np.array([-sign * 2.5, 2.4, -0.4])
+        yield Rod(4.5 * scale, ((-np.inf, "chest"),), inner, outer, 2.6 * scale, 3.0 * scale)
 
 
 def _unit(v: Array) -> Array:
@@ -192,116 +204,123 @@ def _unit(v: Array) -> Array:
 
 
 def _limb(
-    places: tuple[Array, Array, Array], forward: Array, table: tuple, size: float, roles: tuple[str, str]
+    places: tuple[Array, Array, Array], forward: Array, table: tuple, scale: float, roles: tuple[str, str]
 ) -> SweptSolid:
     """A solid along two bones, which are in one line in the bind pose.
 
-    places: positions of the three joints. forward: direction in which the depth is measured. table: rows
-    with the columns of LEG. roles: the role of each of the two bones.
+    places: positions of the three joints. forward: direction in which the depth of a section is measured.
+    table: rows with the columns of LEG. roles: the role of each of the two bones.
     """
     a, b, c = places
     axis = _unit(c - a)
-    first, second = float((b - a) @ axis), float((c - b) @ axis)
+    first, second = float((b - a) @ axis), float((c - b) @ axis)  # lengths of the two bones
     across = _unit(np.cross(axis, forward))
-    # The third direction, axis x across, has to point to `forward`.
+    # The depth is measured along the cross product of `axis` and `across`. It has to point to `forward`.
     across = -across if np.cross(axis, across) @ forward < 0 else across
     rows = []
     for t, wide, deep, front in table:
         s = t * first if t < 1 else first + (t - 1) * second
-        rows.append((s, size * wide, size * deep, 0.0, size * front, 2.0))
+        rows.append((s, scale * wide, scale * deep, 0.0, scale * front, 2.0))
     return SweptSolid(0.0, ((-np.inf, roles[0]), (first, roles[1])), a, axis, across, rows)
 
 
-def _leg(at: dict[str, Array], side: str, size: float) -> Iterator[Solid]:
-    hip, knee, heel = (at[f"{side}_{role}"] for role in ("hip", "knee", "heel"))
+def _leg(position_of: dict[str, Array], side: str, scale: float) -> Iterator[Solid]:
+    hip, knee, heel = (position_of[f"{side}_{role}"] for role in ("hip", "knee", "heel"))
     front = np.array([0.0, 0.0, 1.0])
-    leg = _limb((hip, knee, heel), front, LEG, size, (f"{side}_hip", f"{side}_knee"))
-    yield _with_blend(leg, 3.5 * size)
-    kneecap = knee + size * np.array([0.0, 0.4, 4.3])
-    yield Ball(3.0 * size, ((-np.inf, f"{side}_knee"),), kneecap, size * np.array([2.7, 3.4, 1.9]))
+    leg = _limb((hip, knee, heel), front, LEG, scale, (f"{side}_hip", f"{side}_knee"))
+    yield _with_blend(leg, 3.5 * scale)
+    kneecap = knee + scale * np.array([0.0, 0.4, 4.3])
+    yield Ball(3.0 * scale, ((-np.inf, f"{side}_knee"),), kneecap, scale * np.array([2.7, 3.4, 1.9]))
 
 
 def _with_blend(sweep: SweptSolid, blend: float) -> SweptSolid:
+    """The same solid with another width of the blend, cm."""
     return SweptSolid(blend, sweep.owners, sweep.start, sweep.axis, sweep.across, sweep.sections)
 
 
-def _arm(at: dict[str, Array], side: str, sign: float, size: float) -> Iterator[Solid]:
-    shoulder, elbow, wrist = (at[f"{side}_{role}"] for role in ("shoulder", "elbow", "wrist"))
+def _arm(position_of: dict[str, Array], side: str, sign: float, scale: float) -> Iterator[Solid]:
+    shoulder, elbow, wrist = (position_of[f"{side}_{role}"] for role in ("shoulder", "elbow", "wrist"))
     # The depth of an arm is measured outward, towards the back of the hand, and the width from front to back.
     out = np.array([sign, 0.6, 0.0])
     table = [(t, wide, deep, 0.0) for t, wide, deep in ARM]
-    arm = _limb((shoulder, elbow, wrist), out, tuple(table), size, (f"{side}_shoulder", f"{side}_elbow"))
-    yield _with_blend(arm, 3.5 * size)
-    deltoid = shoulder + size * np.array([sign * 1.2, -2.2, 0.3])
-    yield Ball(4.0 * size, ((-np.inf, f"{side}_shoulder"),), deltoid, size * np.array([4.5, 6.2, 5.2]))
+    arm = _limb((shoulder, elbow, wrist), out, tuple(table), scale, (f"{side}_shoulder", f"{side}_elbow"))
+    yield _with_blend(arm, 3.5 * scale)
+    deltoid = shoulder + scale * np.array([sign * 1.2, -2.2, 0.3])
+    yield Ball(4.0 * scale, ((-np.inf, f"{side}_shoulder"),), deltoid, scale * np.array([4.5, 6.2, 5.2]))
 
 
-def _foot(at: dict[str, Array], side: str, sign: float, size: float) -> Iterator[Solid]:
-    ankle, ball = at[f"{side}_heel"], at[f"{side}_toe"]
-    sole = ball[1] - TOE_HEIGHT * size
+def _foot(position_of: dict[str, Array], side: str, sign: float, scale: float) -> Iterator[Solid]:
+    ankle, ball = position_of[f"{side}_heel"], position_of[f"{side}_toe"]
+    sole = ball[1] - TOE_HEIGHT * scale
     way = (ball - ankle) * [1.0, 0.0, 1.0]
     length = float(np.linalg.norm(way))
-    ahead = way / length if length > 1.0 * size else np.array([0.0, 0.0, 1.0])
+    ahead = way / length if length > 1.0 * scale else np.array([0.0, 0.0, 1.0])
     up = np.array([0.0, 1.0, 0.0])
     inward = np.cross(up, ahead) * -sign
-    # The height of the foot at the ankle depends on the height of the ankle above the sole.
-    tall = max((ankle[1] - sole) / 7.0, 0.5 * size)
+    # The heights in FOOT are for an ankle 7 cm above the sole. This factor fits them to the skeleton's ankle.
+    # Towards the ball, the factor changes to `scale`.
+    ankle_factor = max((ankle[1] - sole) / 7.0, 0.5 * scale)
     rows = []
     for t, cm, wide, height, aside in FOOT:
-        high = height * (tall + (size - tall) * min(1.0, t + max(cm, 0.0) / 8))
-        s = t * length + size * cm
-        rows.append((s, size * wide, 0.64 * high, size * aside, 0.36 * high, 2.3))
+        high = height * (ankle_factor + (scale - ankle_factor) * min(1.0, t + max(cm, 0.0) / 8))
+        # The section reaches from 0.28 `high` below the sole to `high` above it.
+        s = t * length + scale * cm
+        rows.append((s, scale * wide, 0.64 * high, scale * aside, 0.36 * high, 2.3))
     start = np.array([ankle[0], sole, ankle[2]])
     across = inward if np.cross(ahead, inward) @ up > 0 else -inward
     if across is not inward:
-        rows = [(s, w, d, -cu, cv, n) for s, w, d, cu, cv, n in rows]
-    owners = ((-np.inf, f"{side}_heel"), (length - 0.5 * size, f"{side}_toe"))
-    yield SweptSolid(2.5 * size, owners, start, ahead, across, rows)
+        rows = [(s, wide, deep, -aside, middle, n) for s, wide, deep, aside, middle, n in rows]
+    owners = ((-np.inf, f"{side}_heel"), (length - 0.5 * scale, f"{side}_toe"))
+    yield SweptSolid(2.5 * scale, owners, start, ahead, across, rows)
     # Cut off what is below the sole.
-    heel_only = ((-np.inf, f"{side}_heel"),)
-    middle = start + ahead * (0.6 * length)
-    yield Floor(1.0 * size, heel_only, middle, up, (length + 12.0) * size, cut=True)
+    owner = ((-np.inf, f"{side}_heel"),)
+    middle_of_sole = start + ahead * (0.6 * length)
+    yield Floor(1.0 * scale, owner, middle_of_sole, up, (length + 12.0) * scale, cut=True)
 
 
-def _hand(at: dict[str, Array], side: str, sign: float, size: float) -> Iterator[Solid]:
-    wrist, elbow = at[f"{side}_wrist"], at[f"{side}_elbow"]
+def _hand(position_of: dict[str, Array], side: str, sign: float, scale: float) -> Iterator[Solid]:
+    wrist, elbow = position_of[f"{side}_wrist"], position_of[f"{side}_elbow"]
     ahead = _unit(wrist - elbow)
     thumb = _unit(np.array([0.0, 0.0, 1.0]) - ahead * ahead[2])
     palm = np.cross(ahead, thumb) * sign  # out of the palm
     owner = ((-np.inf, f"{side}_wrist"),)
 
     def place(out: float, aside: float, deep: float) -> Array:
-        """The point `out` from the wrist along the hand, `aside` to the thumb, `deep` out of the palm."""
-        return wrist + size * (out * ahead + aside * thumb + deep * palm)
+        """The point `out` along the hand from the wrist, `aside` to the thumb and `deep` out of the palm."""
+        return wrist + scale * (out * ahead + aside * thumb + deep * palm)
 
-    rows = [(size * s, size * w, size * d, size * u, 0.0, 2.5) for s, w, d, u in PALM]
-    yield SweptSolid(1.6 * size, owner, wrist, ahead, thumb, rows)
+    rows = [
+        (scale * out, scale * wide, scale * deep, scale * aside, 0.0, 2.5) for out, wide, deep, aside in PALM
+    ]
+    yield SweptSolid(1.6 * scale, owner, wrist, ahead, thumb, rows)
     for aside, begin, length, thick in FINGERS:
-        knuckle, bend = place(begin, aside, 0.0), 0.0
-        for part, (share, more) in enumerate(zip((0.42, 0.32, 0.26), CURL, strict=True)):
-            bend += more
-            fan = 0.045 * aside
+        joint, bend = place(begin, aside, 0.0), 0.0
+        # Each finger has three segments with these shares of its length.
+        for segment, (share, joint_bend) in enumerate(zip((0.42, 0.32, 0.26), CURL, strict=True)):
+            bend += joint_bend
+            fan = 0.045 * aside  # the fingers are spread a little
             way = _unit(np.cos(bend) * ahead + np.sin(bend) * palm + fan * thumb)
-            tip = knuckle + size * share * length * way
-            a, b = thick * (1 - 0.08 * part), thick * (1 - 0.08 * (part + 1))
-            yield Rod(0.5 * size, owner, knuckle, tip, a * size, b * size)
-            knuckle = tip
+            tip = joint + scale * share * length * way
+            a, b = thick * (1 - 0.08 * segment), thick * (1 - 0.08 * (segment + 1))
+            yield Rod(0.5 * scale, owner, joint, tip, a * scale, b * scale)
+            joint = tip
     # The thumb.
     root, joint, tip = place(2.4, 2.4, 0.5), place(5.8, 4.7, 1.3), place(9.3, 5.9, 1.9)
-    yield Rod(1.4 * size, owner, root, joint, 1.5 * size, 1.12 * size)
-    yield Rod(0.5 * size, owner, joint, tip, 1.12 * size, 0.86 * size)
+    yield Rod(1.4 * scale, owner, root, joint, 1.5 * scale, 1.12 * scale)
+    yield Rod(0.5 * scale, owner, joint, tip, 1.12 * scale, 0.86 * scale)
 
 
-def _head(at: dict[str, Array], size: float) -> Iterator[Solid]:
-    base, owner = at["head"], ((-np.inf, "head"),)
+def _head(position_of: dict[str, Array], scale: float) -> Iterator[Solid]:
+    """The solids of the head. Their places are (x, y, z) from the head joint, cm before scaling."""
+    base, owner = position_of["head"], ((-np.inf, "head"),)
 
     def ball(blend: float, centre: tuple, radii: tuple, cut: bool = False) -> Ball:
-        return Ball(size * blend, owner, base + size * np.array(centre), size * np.array(radii), cut=cut)
+        return Ball(scale * blend, owner, base + scale * np.array(centre), scale * np.array(radii), cut=cut)
 
     def rod(blend: float, a: tuple, b: tuple, thick: float, thin: float) -> Rod:
         return Rod(
-            size * blend, owner, base + size * np.array(a), base + size * np.array(b),
-            size * thick, size * thin,
+            scale * blend, owner, base + scale * np.array(a), base + scale * np.array(b),
+            scale * thick, scale * thin,
         )  # fmt: skip
 
     yield ball(2.0, (0, 9.4, 0.4), (7.1, 8.6, 8.9))  # skull

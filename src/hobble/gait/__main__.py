@@ -1,4 +1,7 @@
-"""Recognises a limp and measures its effects: python -m hobble.gait CLIP.bvh --healthy CLIP.bvh."""
+"""The command that recognises a limp and measures its effects.
+
+python -m hobble.gait CLIP.bvh --healthy HEALTHY.bvh
+"""
 
 from __future__ import annotations
 
@@ -16,36 +19,46 @@ from hobble.gait.profile import NO_CYCLE, Profile
 from hobble.gait.read_clip import SKELETONS, read_clip
 from hobble.gait.recogniser import RIGHT
 
-FIX_NO_CYCLE = "Name a clip that walks straight ahead for three steps or more."
+FIX_NO_CYCLE = "Choose a clip with at least three steps straight ahead."
 NO_HEALTHY = (
     "No healthy walk was given, so the clips were compared with the mean of ten healthy people. "
-    "A different build can then look like a limp. Name healthy walks of the same person after --healthy."
+    "An unusual build can then look like a limp. Name healthy walks of the same person after --healthy."
 )
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Run the command. Returns the exit status."""
+    """Run the command. Returns the exit status: 0, or 1 after an error."""
     parser = argparse.ArgumentParser(
         prog="python -m hobble.gait",
         description="Recognises the limp of a walk and measures how it differs from a healthy walk.",
     )
-    parser.add_argument("clips", nargs="+", metavar="CLIP.bvh", help="walks to measure")
     parser.add_argument(
-        "--healthy", nargs="+", default=[], metavar="CLIP.bvh", help="healthy walks of the same person"
+        "clips", nargs="+", metavar="CLIP.bvh", help="clips of walks to recognise and measure"
     )
-    parser.add_argument("--side", choices=("right", "left"), help="the hurt side; by default as recognised")
+    parser.add_argument(
+        "--healthy",
+        nargs="+",
+        default=[],
+        metavar="CLIP.bvh",
+        help="clips of healthy walks of the same person",
+    )
+    parser.add_argument(
+        "--side",
+        choices=("right", "left"),
+        help="the hurt side; default: the side that is recognised, else right",
+    )
     parser.add_argument(
         "--window",
         type=_seconds,
         default=4.0,
-        help="seconds; besides the whole clip, each window of this length is recognised on its own",
+        help="length of a window in seconds. The whole clip is recognised, and also each window on its own",
     )
     parser.add_argument("--skeletons", default=SKELETONS, help="folder of the skeleton files")
     options = parser.parse_args(arguments)
     try:
-        healthy = _healthy(options.healthy, options.skeletons)
+        healthy = _healthy_profile(options.healthy, options.skeletons)
         for path in options.clips:
-            print(describe(Path(path).stem, _compared(path, options, healthy), options.side))
+            print(describe(Path(path).stem, _compare_clip(path, options, healthy), options.side))
         if not options.healthy:
             print(NO_HEALTHY)
     except HobbleError as error:
@@ -55,14 +68,15 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 
 def _seconds(text: str) -> float:
-    """A window's length from the command line, 1 to 3600 seconds."""
+    """The value of --window as a number of seconds from 1 to 3600."""
     with contextlib.suppress(ValueError):
         if 1.0 <= float(text) <= 3600.0:
             return float(text)
-    raise argparse.ArgumentTypeError(f"{text!r} should be a number of seconds from 1 to 3600")
+    raise argparse.ArgumentTypeError(f"{text!r} is not a number of seconds from 1 to 3600")
 
 
-def _healthy(paths: Sequence[str], skeletons: str) -> Profile:
+def _healthy_profile(paths: Sequence[str], skeletons: str) -> Profile:
+    """The profile of the healthy clips, or of healthy people if there are no clips."""
     clips = [read_clip(path, skeletons) for path in paths]
     for path, clip in zip(paths, clips, strict=True):
         if not len(measure_clip(clip)):
@@ -70,7 +84,8 @@ def _healthy(paths: Sequence[str], skeletons: str) -> Profile:
     return healthy_profile(clips)
 
 
-def _compared(path: str, options: argparse.Namespace, healthy: Profile) -> WalkComparison:
+def _compare_clip(path: str, options: argparse.Namespace, healthy: Profile) -> WalkComparison:
+    """Compare a clip with the profile of a healthy walk."""
     clip = read_clip(path, options.skeletons)
     if not len(measure_clip(clip)):
         raise InputError(path, NO_CYCLE, fix=FIX_NO_CYCLE)
@@ -78,26 +93,32 @@ def _compared(path: str, options: argparse.Namespace, healthy: Profile) -> WalkC
 
 
 def describe(name: str, compared: WalkComparison, side: str | None = None) -> str:
-    """The recognisers' answers as text, and the effects of the limp next to the effects in people."""
+    """What both recognisers say of a clip, and the effects of its limp next to those of limps of people.
+
+    name: the name of the clip. side: the side that counts as hurt; None for the recognised side, or
+    the right one if no side is recognised.
+    """
     answer, grade = compared.answer, compared.grade
     side = side or answer.side or grade.side or RIGHT
     likely = ", ".join(f"{gait} {answer.probabilities[gait]:.2f}" for gait in GAITS)
     lines = [
         f"{name}: {answer.label} {answer.side or ''} ({len(compared.walk)} cycles)",
         f"  probabilities: {likely}",
-        f"  share of the {len(compared.windows)} windows with each answer: {_listed(compared.named())}",
+        f"  share of the {len(compared.windows)} windows with each answer: {_list_shares(compared.named())}",
         f"  graded recogniser, also for mild limps: {grade.label} {grade.side or ''}, "
-        f"strength {grade.strength:.2f} (mean of people: 1), "
+        f"strength {grade.strength:.2f} (mean of people with this limp: 1), "
         f"{grade.distance:.1f} standard deviations from the likeliest known walk",
         f"  what may hurt: {', '.join(grade.parts) or 'nothing'}",
-        f"  share of the windows with each answer of the graded recogniser: {_listed(compared.graded())}",
+        "  share of the windows with each answer of the graded recogniser: "
+        f"{_list_shares(compared.graded())}",
         f"  effects if the {side} side is hurt. "
-        f"At the right: mean ± standard deviation over people ({SOURCE})",
+        f"The last columns show limps of people: mean ± standard deviation ({SOURCE})",
     ]
-    return "\n".join([*lines, *_effects(compared.effects[side])])
+    return "\n".join([*lines, *_effect_lines(compared.effects[side])])
 
 
-def _effects(sizes: Mapping[str, float]) -> list[str]:
+def _effect_lines(sizes: Mapping[str, float]) -> list[str]:
+    """A table with a line for each effect. sizes: name of EFFECTS -> size of the effect in the clip."""
     of_people = effects_of_people(people())
     lines = [" " * 60 + "".join(f"{gait[:13]:>15}" for gait in of_people)]
     for key, text in EFFECTS.items():
@@ -106,7 +127,8 @@ def _effects(sizes: Mapping[str, float]) -> list[str]:
     return lines
 
 
-def _listed(shares: Mapping[str, float]) -> str:
+def _list_shares(shares: Mapping[str, float]) -> str:
+    """shares: an answer, such as "antalgic right" -> share of the windows with this answer."""
     return (
         ", ".join(f"{name} {share:.2f}" for name, share in shares.items())
         or "none, because no window has enough cycles"

@@ -12,8 +12,7 @@ from hobble.core import quat
 from hobble.core.array_parts import ArrayParts
 from hobble.core.quat import Array
 from hobble.evaluation.captured import headings, root_path, rotate_by_yaw, unbroken_stretches
-from hobble.figure.mesh import body
-from hobble.figure.mesh import key as mesh_key
+from hobble.figure.mesh import body, mesh_key
 from hobble.models.network import Network
 from hobble.report.scenes import FPS, UNIT, packed_motion
 from hobble.rows.clip_rows import ClipRows, load_clip_rows, pairs

@@ -12,8 +12,7 @@ from hobble.core.array_parts import ArrayParts
 from hobble.core.quat import Array
 from hobble.core.skeleton import Skeleton
 from hobble.figure.fit_rotations import fitted_rotations
-from hobble.figure.mesh import body
-from hobble.figure.mesh import key as mesh_key
+from hobble.figure.mesh import body, mesh_key
 from hobble.figure.pack import packed_turns
 from hobble.models.packing import packed
 

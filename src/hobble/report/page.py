@@ -9,7 +9,7 @@ import yaml
 
 from hobble.channels.shown import shown_names
 from hobble.core.skeleton import Skeleton
-from hobble.figure.mesh import key as mesh_key
+from hobble.figure.mesh import mesh_key
 from hobble.figure.pack import packed_body
 from hobble.report import (
     cost_section,

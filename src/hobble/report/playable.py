@@ -11,8 +11,7 @@ from numpy.typing import NDArray
 from hobble.channels import channel
 from hobble.channels.shown import shown, words
 from hobble.core.skeleton import Skeleton
-from hobble.figure.mesh import body
-from hobble.figure.mesh import key as mesh_key
+from hobble.figure.mesh import body, mesh_key
 from hobble.models.network import Network, inverse
 from hobble.models.packing import packed
 from hobble.rows.layout import RowLayout

@@ -18,7 +18,7 @@ from hobble.channels.injury.response.run import GAITS, injury_response, largest_
 from hobble.channels.injury.response.sweep import SEVERITIES, sweeps
 from hobble.evaluation.captured import Captured
 from hobble.evaluation.crowd import SPEEDS, CrowdTarget, run
-from hobble.evaluation.pose_distance import mean_cycle, settling
+from hobble.evaluation.pose_distance import mean_cycle, settling_seconds
 from hobble.evaluation.spearman import spearman
 from hobble.runtime.options import Runtime
 
@@ -251,9 +251,9 @@ def test_largest_accelerations_are_of_the_gait_and_the_hurt_link(hurtable) -> No
 def test_the_settling_time_of_an_exponential_is_exact() -> None:
     distance = 5 * (1 - np.exp(-np.arange(600) / 60))
     # A mean over w frames lags by half of them; within a tenth after ln 10 seconds.
-    assert settling(distance, 0.0, 1) == pytest.approx(np.log(10), abs=0.05)
-    assert settling(distance, 0.0, 60) == pytest.approx(np.log(10) + 0.5, abs=0.1)
-    assert settling(0 * distance, 0.05, 30) is None
+    assert settling_seconds(distance, 0.0, 1) == pytest.approx(np.log(10), abs=0.05)
+    assert settling_seconds(distance, 0.0, 60) == pytest.approx(np.log(10) + 0.5, abs=0.1)
+    assert settling_seconds(0 * distance, 0.05, 30) is None
 
 
 def test_a_mean_cycle_fills_phases_without_frames() -> None:

@@ -17,7 +17,7 @@ from hobble.evaluation.comparison_rows import (
     published_row,
 )
 from hobble.evaluation.configuration_results import ConfigurationResults
-from hobble.evaluation.series import StraightLine, line
+from hobble.evaluation.series import StraightLine, fit_line
 from hobble.measures.inputs import Json, Row
 
 NAME = "responsivity"
@@ -155,7 +155,7 @@ def _time(milliseconds: Json, step: str) -> float:
 
 def _fit(whose: str, mode: str | None, step: str, counts: str, points: list[tuple[int, float]]) -> TimeLine:
     unfitted: StraightLine = {"slope": None, "intercept": None, "r2": None, "points": len(points)}
-    fitted = line([x for x, _ in points], [y for _, y in points])
+    fitted = fit_line([x for x, _ in points], [y for _, y in points])
     return {
         "whose": whose,
         "mode": mode,

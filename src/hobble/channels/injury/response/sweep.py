@@ -19,7 +19,7 @@ from hobble.channels.injury.response.results import Response, SweepRow
 from hobble.core.skeleton import Skeleton
 from hobble.evaluation.crowd import FPS, CrowdTarget, Walks, run
 from hobble.evaluation.motion_measures import gait_measures
-from hobble.evaluation.pose_distance import distance_to_cycle, mean_cycle, period, settling
+from hobble.evaluation.pose_distance import cycle_frames, distance_to_cycle, mean_cycle, settling_seconds
 from hobble.evaluation.spearman import spearman
 from hobble.models.network import Network
 from hobble.runtime.options import Runtime
@@ -132,8 +132,8 @@ class SeveritySweep:
         late_healed = slice((heal_start + end) // 2, end)
         hurt_cm = float(np.mean(distance[late_hurt]))
         return (
-            settling(distance[hurt_start:heal_start], healthy_cm, period(phase[late_hurt])),
-            settling(distance[heal_start:end], hurt_cm, period(phase[late_healed])),
+            settling_seconds(distance[hurt_start:heal_start], healthy_cm, cycle_frames(phase[late_hurt])),
+            settling_seconds(distance[heal_start:end], hurt_cm, cycle_frames(phase[late_healed])),
         )
 
 
