@@ -85,12 +85,14 @@ def describe(name: str, compared: WalkComparison, side: str | None = None) -> st
     lines = [
         f"{name}: {answer.label} {answer.side or ''} ({len(compared.walk)} cycles)",
         f"  probabilities: {likely}",
-        f"  share of the {len(compared.windows)} windows with each answer: {_listed(compared.named())}",
+        f"  share of the {len(compared.windows)} windows with each answer: "
+        f"{_listed(compared.answer_shares())}",
         f"  graded recogniser, also for mild limps: {grade.label} {grade.side or ''}, "
         f"strength {grade.strength:.2f} (mean of people: 1), "
         f"{grade.distance:.1f} standard deviations from the likeliest known walk",
         f"  what may hurt: {', '.join(grade.parts) or 'nothing'}",
-        f"  share of the windows with each answer of the graded recogniser: {_listed(compared.graded())}",
+        "  share of the windows with each answer of the graded recogniser: "
+        f"{_listed(compared.grade_shares())}",
         f"  effects if the {side} side is hurt. "
         f"At the right: mean ± standard deviation over people ({SOURCE})",
     ]
