@@ -62,7 +62,7 @@ class WalkCycles:
     """The cycles of a stretch of walking.
 
     right: cycles that begin as the right foot lands. left: cycles that begin as the left foot lands. The left
-    cycles are mirrored, so in every cycle the names with R mean the foot that lands at the start.
+    cycles are mirrored, so in every cycle the names with R mean the leg that lands at the start.
     """
 
     fps: float

@@ -1,10 +1,10 @@
 """Recognises limps, also mild ones: what hurts, on which side, and how strong the limp is.
 
 The limps that the people of people.py imitated have the strength 1 on average. Strength 0.5 is half way from
-the normal walk to this limp. The features (features.py) of a limp of strength s are modelled by a
-Gaussian distribution. Its mean is s times the mean over people. Its covariance is s^2 times the covariance
-over people, plus the covariance of healthy walks. Parts of the body whose pain the data cannot distinguish
-share a label (PARTS).
+the normal walk to this limp. The features (features.py) of a limp of strength s are modelled by a Gaussian
+distribution. Its mean is s times the mean over people. Its covariance is s^2 times the covariance over
+people, plus the covariance of healthy walks. Parts of the body whose pain the data cannot distinguish share a
+label (PARTS).
 """
 
 from __future__ import annotations
@@ -91,7 +91,7 @@ class Grader:
         """n Gaussian distributions: one of healthy walks, then one for each of `kinds` and each of STRENGTHS.
 
         Returns their means (n, D), whitening matrices (n, D, D), and the logarithm (n,) of peak density times
-        prior probability, up to a term that all share.
+        prior probability, up to a term that all n share.
         """
         limps = [(s * mean, s**2 * spread) for mean, spread in self.kinds.values() for s in STRENGTHS]
         means, spreads = zip((np.zeros(len(self.healthy)), 0 * self.healthy), *limps, strict=True)

@@ -1,8 +1,8 @@
 """Statistics of ten people who walked normally and imitated five impairments of the right leg.
 
-They were recorded with a Kinect. Source: Jun et al. (2020), "Pathological
-gait classification using Kinect v2 and gated recurrent neural networks", IEEE Access 8. The statistics are in
-`people.npz`, which `derive_people.py` writes.
+They were recorded with a Kinect. Source: Jun et al. (2020), "Pathological gait classification using Kinect v2
+and gated recurrent neural networks", IEEE Access 8. The statistics are in `people.npz`, which
+`derive_people.py` writes.
 """
 
 from __future__ import annotations

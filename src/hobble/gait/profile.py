@@ -21,8 +21,8 @@ def profile(walk: WalkCycles) -> dict[str, float]:
 
     Scalars and curves are medians over the cycles. The cycles that begin as the right foot lands have the
     same weight as those that begin as the left foot lands. So the mirrored walk has exactly the mirrored
-    profile. Units: degrees, leg lengths, seconds. Raises HobbleError if the walk has no cycle of one of these
-    kinds.
+    profile. Units: degrees, leg lengths, seconds. Raises HobbleError if the walk has no right
+    cycle or no left cycle.
     """
     if not len(walk):
         raise HobbleError(NO_CYCLE)
