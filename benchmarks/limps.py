@@ -22,7 +22,7 @@ from hobble.core.clip import Clip
 from hobble.core.errors import HobbleError
 from hobble.core.files import load_npz
 from hobble.gait.comparison import compare, healthy_profile
-from hobble.gait.cycles import joined, measure
+from hobble.gait.cycles import join_walks, measure
 from hobble.gait.derive_healthy import REFERENCE, healthy_windows
 from hobble.gait.limp_grade import HEALTHY, Grader, grade, healthy_covariance, learn_grader
 from hobble.gait.people import GAITS, NORMAL, people
@@ -128,8 +128,9 @@ def captured(folder: Path, clips: list[str]) -> None:
             continue
         a, g = compared.answer, compared.grade
         print(f"  {path.stem}")
-        print(f"    linear {a.label} {a.side or ''}; windows: {rounded(compared.named())}")
-        print(f"    graded {g.label} {g.side or ''} {g.strength:.1f}; windows: {rounded(compared.graded())}")
+        print(f"    linear {a.label} {a.side or ''}; windows: {rounded(compared.answer_shares())}")
+        shares = rounded(compared.grade_shares())
+        print(f"    graded {g.label} {g.side or ''} {g.strength:.1f}; windows: {shares}")
 
 
 def made(folder: Path) -> None:
@@ -142,7 +143,7 @@ def made(folder: Path) -> None:
         return clip, label_clip(clip, [], source, "walk", "flat", LabelOptions())[0]
 
     def walks(clips: list[Clip]) -> Profile:
-        return profile(joined(measure(clip.skeleton, clip.positions, clip.fps) for clip in clips))
+        return profile(join_walks(measure(clip.skeleton, clip.positions, clip.fps) for clip in clips))
 
     sources = [read(name) for name in HEALTHY_WALKS]
     healthy = walks([clip for clip, _ in sources])

@@ -49,7 +49,7 @@ def at_the_checkout(monkeypatch, root):
 def test_the_procedural_walker_is_healthy_at_any_speed(walker, speed):
     seen = compare(walker(speed), healthy_profile([walker(125)]))
     assert seen.windows
-    assert seen.named() == {"normal": 1.0}
+    assert seen.answer_shares() == {"normal": 1.0}
     assert seen.effects["right"]["speed"] == pytest.approx(speed / 125, abs=0.03)
 
 

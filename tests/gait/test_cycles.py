@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from hobble.gait.cycles import SAMPLES, joined, landings, measure
+from hobble.gait.cycles import SAMPLES, join_walks, landings, measure
 from hobble.gait.signals import CURVES
 
 CYCLE, LEG = 60, 81.0
@@ -153,4 +153,4 @@ def test_windows_hold_whole_cycles_and_walks_join(holden31, stepper):
     part = walk.within(60, 185)
     assert [cycle.start for cycle in part.right] == [60, 120]
     assert [cycle.start for cycle in part.left] == [90]
-    assert len(joined([walk, part]).right) == len(walk.right) + 2
+    assert len(join_walks([walk, part]).right) == len(walk.right) + 2

@@ -219,7 +219,7 @@ def test_a_leg_that_is_dragged_is_antalgic_on_its_side(cmu, healthy_105):
     seen = compare(cmu("105_25"), healthy_105())
     for said in (seen.answer, seen.grade):
         assert (said.label, said.side) == ("antalgic", "right")
-    assert seen.named() == seen.graded() == {"antalgic right": 1.0}
+    assert seen.answer_shares() == seen.grade_shares() == {"antalgic right": 1.0}
     sizes = seen.effects["right"]
     assert sizes["stance"] > 0.2
     assert sizes["step_hurt"] < 0.3
@@ -233,7 +233,7 @@ def test_a_mirrored_limp_of_the_right_leg_is_one_of_the_left(cmu):
         return mirror_clip(cmu(name), f"{name}_mirror")
 
     seen = compare(seen_in_it("105_25"), healthy_profile([seen_in_it(name) for name in NORMAL_WALKS]))
-    assert seen.named() == seen.graded() == {"antalgic left": 1.0}
+    assert seen.answer_shares() == seen.grade_shares() == {"antalgic left": 1.0}
 
 
 @pytest.mark.shared

@@ -104,13 +104,14 @@ def describe(name: str, compared: WalkComparison, side: str | None = None) -> st
     lines = [
         f"{name}: {answer.label} {answer.side or ''} ({len(compared.walk)} cycles)",
         f"  probabilities: {likely}",
-        f"  share of the {len(compared.windows)} windows with each answer: {_list_shares(compared.named())}",
+        f"  share of the {len(compared.windows)} windows with each answer: "
+        f"{_list_shares(compared.answer_shares())}",
         f"  graded recogniser, also for mild limps: {grade.label} {grade.side or ''}, "
         f"strength {grade.strength:.2f} (mean of people with this limp: 1), "
         f"{grade.distance:.1f} standard deviations from the likeliest known walk",
         f"  what may hurt: {', '.join(grade.parts) or 'nothing'}",
         "  share of the windows with each answer of the graded recogniser: "
-        f"{_list_shares(compared.graded())}",
+        f"{_list_shares(compared.grade_shares())}",
         f"  effects if the {side} side is hurt. "
         f"The last columns show limps of people: mean ± standard deviation ({SOURCE})",
     ]

@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
 from hobble.core.clip import Clip
-from hobble.gait.cycles import WalkCycles, joined, measure
+from hobble.gait.cycles import WalkCycles, join_walks, measure
 from hobble.gait.effect_sizes import effects
 from hobble.gait.limp_grade import Grade, grade
 from hobble.gait.people import people
@@ -20,8 +20,9 @@ class WalkComparison:
 
     walk: the clip's cycles. profile: medians over these cycles. answer: what the linear classifier
     (recogniser.py) says of the whole clip. grade: what the graded recogniser (limp_grade.py) says of the
-    whole clip; it also recognises mild limps. windows: (first frame, answer) of each window. grades: (first
-    frame, grade) of each window. effects: side -> sizes of the effects if this side is hurt.
+    whole clip; it also recognises mild limps. windows: (first frame, answer) of each window, a stretch of a
+    few seconds. grades: (first frame, grade) of each window. effects: "right" or "left" -> the result of
+    `effect_sizes.effects` if this side is hurt.
     """
 
     walk: WalkCycles = field(repr=False)
@@ -37,12 +38,12 @@ class WalkComparison:
         """The side that counts as hurt; right if the walk is recognised as normal."""
         return self.answer.side or RIGHT
 
-    def named(self) -> dict[str, float]:
-        """Label and side by the linear classifier, as in "antalgic right" -> share of the windows."""
+    def answer_shares(self) -> dict[str, float]:
+        """Answer of the linear classifier, such as "antalgic right" -> share of the windows."""
         return _shares([answer for _, answer in self.windows])
 
-    def graded(self) -> dict[str, float]:
-        """Label and side by the graded recogniser -> share of the windows."""
+    def grade_shares(self) -> dict[str, float]:
+        """Answer of the graded recogniser, such as "antalgic right" -> share of the windows."""
         return _shares([answer for _, answer in self.grades])
 
 
@@ -52,20 +53,21 @@ def _shares(answers: Sequence[Impairment | Grade]) -> dict[str, float]:
 
 
 def measure_clip(clip: Clip) -> WalkCycles:
-    """The cycles of a clip on any skeleton with roles."""
+    """Measure the cycles of a clip. Its skeleton may be any rig whose joints have roles."""
     return measure(clip.skeleton, clip.positions, clip.fps)
 
 
 def healthy_profile(clips: Sequence[Clip]) -> Profile:
     """The profile of all cycles of a figure's healthy clips.
 
-    Without clips, the mean profile of people's normal walks. Raises HobbleError if no clip has a cycle.
+    If no clips are given, it is the mean profile of people's normal walks (people.py). Raises HobbleError if
+    no clip has a cycle.
     """
-    return profile(joined(measure_clip(clip) for clip in clips)) if clips else people().normal()
+    return profile(join_walks(measure_clip(clip) for clip in clips)) if clips else people().normal()
 
 
 def compare(clip: Clip, healthy: Profile, seconds: float = 4.0) -> WalkComparison:
-    """Compare a clip with a healthy profile: the whole clip, and each window of `seconds`.
+    """Compare a clip with a healthy profile: the whole clip, and each window of `seconds` seconds.
 
     Raises HobbleError if the clip has no cycle.
     """
@@ -75,13 +77,13 @@ def compare(clip: Clip, healthy: Profile, seconds: float = 4.0) -> WalkCompariso
 def compare_walk(walk: WalkCycles, frames: int, healthy: Profile, seconds: float = 4.0) -> WalkComparison:
     """Compare the cycles of a motion of `frames` frames with a healthy profile. See `compare`."""
     whole = profile(walk)
-    parts = [(start, profile(part)) for start, part in windows(walk, frames, seconds)]
+    window_profiles = [(start, profile(part)) for start, part in windows(walk, frames, seconds)]
     return WalkComparison(
         walk,
         whole,
         recognise(whole, healthy),
         grade(whole, healthy),
-        [(start, recognise(part, healthy)) for start, part in parts],
-        [(start, grade(part, healthy)) for start, part in parts],
+        [(start, recognise(part, healthy)) for start, part in window_profiles],
+        [(start, grade(part, healthy)) for start, part in window_profiles],
         {side: effects(whole, healthy, side) for side in SIDES},
     )

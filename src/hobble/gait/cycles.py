@@ -1,8 +1,8 @@
-"""Finds the cycles of a walk, each from one landing of a foot to its next, and measures them.
+"""Finds the cycles of a walk and measures them. A cycle lasts from one landing of a foot to its next landing.
 
-A foot lands where its ankle is furthest ahead of the hips. This rule also finds the landings of a foot that
-drags or is set down beside the other foot. Contacts, or zero crossings of the distance between the ankles,
-would miss them.
+A foot counts as landing when its ankle is furthest ahead of the hips. This rule also finds the landings of a
+foot that drags or is set down beside the other foot. Foot contacts would miss these landings, and so would
+zero crossings of the distance between the ankles.
 """
 
 from __future__ import annotations
@@ -22,28 +22,33 @@ SCALARS = (
     "stride_seconds",
     "speed_per_leg",  # leg lengths a second
     "left_strike_phase",  # share of the cycle that has passed as the left foot lands
-    "stance_share_R",  # share of the cycle in which the right ankle stands
+    "stance_share_R",  # share of the cycle in which the right ankle stands still (see STANDING_SPEED)
     "stance_share_L",
     "step_R",  # how far the right ankle is ahead of the left one as the right foot lands, leg lengths
     "step_L",
     "step_width",  # sideways distance between the ankles at the landings, leg lengths
 )
-STANDING_SPEED = 0.35  # an ankle that is slower than this share of the walking speed stands
+STANDING_SPEED = 0.35  # an ankle that is slower than this share of the walking speed stands still
 SHORTEST_CYCLE, LONGEST_CYCLE = 0.4, 3.5  # seconds
 LEAST_TRAVEL = 0.2  # leg lengths: if the hips travel less than this in a cycle, the body stands
-# In a step, the ankle moves forward and then back relative to the hips, each time by at least both of these
-# limits. A smaller movement is no step.
+# In a step, the ankle moves forward and then back relative to the hips. A movement in either direction that
+# is smaller than one of these two limits is no step.
 LEAST_SWING = 0.12  # leg lengths
 LEAST_SWING_SHARE = 0.4  # share of the ankle's range
-MOST_TURN = 25.0  # degrees that the path may turn in a cycle; recorded people walked straight (people.py)
-LEAST_AHEAD = 0.7  # mean cosine between facing and travel; with less, the walk is backward or sideways
+# Degrees that the path may turn in a cycle. The people with whom a walk is compared (people.py) walked
+# straight.
+MOST_TURN = 25.0
+# Mean cosine of the angle between the facing and the direction of travel. A cycle with less is walked
+# backward or sideways.
+LEAST_AHEAD = 0.7
 
 
 @dataclass(frozen=True)
 class Cycle:
     """A cycle of the right leg, from a landing in frame `start` to the next landing in frame `end`.
 
-    scalars: name of SCALARS -> value. curves: (22, 50) signals.CURVES at 50 equal steps from `start`.
+    scalars: name of SCALARS -> value. curves: (22, 50) the curves signals.CURVES at 50 evenly spaced times,
+    of which the first is `start`.
     """
 
     start: int
@@ -56,8 +61,8 @@ class Cycle:
 class WalkCycles:
     """The cycles of a stretch of walking.
 
-    right: cycles that begin as the right foot lands. left: cycles that begin as the left foot lands. They
-    are mirrored, so that R is the leg that lands first in both.
+    right: cycles that begin as the right foot lands. left: cycles that begin as the left foot lands. The left
+    cycles are mirrored, so in every cycle the names with R mean the leg that lands at the start.
     """
 
     fps: float
@@ -65,7 +70,7 @@ class WalkCycles:
     left: tuple[Cycle, ...] = field(repr=False)
 
     def __len__(self) -> int:
-        """The number of cycles of the side that has fewer."""
+        """The number of right cycles or of left cycles, whichever is smaller."""
         return min(len(self.right), len(self.left))
 
     def within(self, start: float, end: float) -> WalkCycles:
@@ -91,8 +96,8 @@ def measure(skeleton: Skeleton, positions: Array, fps: float = 60.0) -> WalkCycl
     return WalkCycles(fps, tuple(_cycles(walk)), tuple(_cycles(mirrored(walk))))
 
 
-def joined(walks: Iterable[WalkCycles]) -> WalkCycles:
-    """The cycles of several clips of one person as one walk. Their frame numbers have no meaning any more."""
+def join_walks(walks: Iterable[WalkCycles]) -> WalkCycles:
+    """The cycles of several clips of one person as one walk, in which the frame numbers have no meaning."""
     walks = tuple(walks)
     right, left = (
         tuple(itertools.chain(*side)) for side in zip(*((w.right, w.left) for w in walks), strict=True)
@@ -103,63 +108,68 @@ def joined(walks: Iterable[WalkCycles]) -> WalkCycles:
 def landings(forward: Array, fps: float) -> list[int]:
     """Frames in which an ankle is furthest ahead of the hips.
 
-    forward: (F,) how far the ankle is ahead of the hips, leg lengths. After a landing the ankle must go back
-    by at least LEAST_SWING, and by at least LEAST_SWING_SHARE of its range. The range is taken over
-    LONGEST_CYCLE seconds, half of them before the landing and half after it.
+    forward: (F,) how far the ankle is ahead of the hips, leg lengths. After a landing the ankle must go back,
+    and before the next landing it must come forward again. Both movements must be at least LEAST_SWING and at
+    least LEAST_SWING_SHARE of the ankle's range. The range is taken over LONGEST_CYCLE seconds around the
+    frame.
     """
     reach = int(LONGEST_CYCLE * fps / 2)
-    least = np.maximum(LEAST_SWING, LEAST_SWING_SHARE * _ranges(forward, reach))
+    least_swing = np.maximum(LEAST_SWING, LEAST_SWING_SHARE * _ranges(forward, reach))
     landed: list[int] = []
-    high = low = 0
+    high = low = 0  # frames of the highest and the lowest value since the movement last changed direction
     rising = True
     for i, value in enumerate(forward):
         if rising:
             high = i if value > forward[high] else high
-            if forward[high] - value >= least[high]:
+            if forward[high] - value >= least_swing[high]:
                 landed.append(high)
                 rising, low = False, i
         else:
             low = i if value < forward[low] else low
-            if value - forward[low] >= least[low]:
+            if value - forward[low] >= least_swing[low]:
                 rising, high = True, i
-    return [i for i in landed if i > 0]
+    return [i for i in landed if i > 0]  # in frame 0 the ankle may have gone back for some time already
 
 
 def _ranges(values: Array, reach: int) -> Array:
-    """(F,) largest minus smallest value within `reach` frames on each side."""
+    """(F,) largest minus smallest value within `reach` frames before and after each frame."""
     padded = np.pad(values, reach, mode="edge")
     return np.ptp(np.lib.stride_tricks.sliding_window_view(padded, 2 * reach + 1), axis=1)
 
 
 def _cycles(walk: Signals) -> Iterable[Cycle]:
+    """The cycles of the right leg that pass all limits above."""
     right, left = (landings(walk.curves[f"ankle_forward_{side}"], walk.fps) for side in "RL")
-    for a, b in itertools.pairwise(right):
-        between = [i for i in left if a < i < b]
-        if len(between) == 1 and SHORTEST_CYCLE * walk.fps <= b - a <= LONGEST_CYCLE * walk.fps:
-            travel = np.linalg.norm(np.diff(walk.hips[a : b + 1], axis=0), axis=1).sum()
-            straight = abs(walk.heading[b] - walk.heading[a]) <= MOST_TURN
-            if travel >= LEAST_TRAVEL and straight and walk.ahead[a:b].mean() >= LEAST_AHEAD:
-                yield _cycle(walk, a, between[0], b)
+    for start, end in itertools.pairwise(right):
+        left_landings = [i for i in left if start < i < end]
+        plausible_length = SHORTEST_CYCLE * walk.fps <= end - start <= LONGEST_CYCLE * walk.fps
+        if len(left_landings) == 1 and plausible_length:
+            travel = np.linalg.norm(np.diff(walk.hips[start : end + 1], axis=0), axis=1).sum()
+            straight = abs(walk.heading[end] - walk.heading[start]) <= MOST_TURN
+            if travel >= LEAST_TRAVEL and straight and walk.ahead[start:end].mean() >= LEAST_AHEAD:
+                yield _cycle(walk, start, left_landings[0], end)
 
 
-def _cycle(walk: Signals, a: int, other: int, b: int) -> Cycle:
-    """The cycle from frame `a` to frame `b`. other: the frame in which the other foot lands."""
-    seconds = (b - a) / walk.fps
-    speed = float(np.linalg.norm(walk.hips[b] - walk.hips[a])) / seconds
-    apart = walk.curves["ankle_forward_R"] - walk.curves["ankle_forward_L"]
-    standing = {side: float(np.mean(walk.ankle_speed[side][a:b] < STANDING_SPEED * speed)) for side in "LR"}
-    width = [walk.across["L"][i] - walk.across["R"][i] for i in (a, other)]
-    values = (
+def _cycle(walk: Signals, start: int, left_landing: int, end: int) -> Cycle:
+    """The cycle from frame `start` to frame `end`. left_landing: the frame in which the left foot lands."""
+    seconds = (end - start) / walk.fps
+    speed = float(np.linalg.norm(walk.hips[end] - walk.hips[start])) / seconds
+    right_ahead = walk.curves["ankle_forward_R"] - walk.curves["ankle_forward_L"]
+    standing = {
+        side: float(np.mean(walk.ankle_speed[side][start:end] < STANDING_SPEED * speed)) for side in "LR"
+    }
+    width = [walk.across["L"][i] - walk.across["R"][i] for i in (start, left_landing)]
+    values = (  # in the order of SCALARS
         seconds,
         speed,
-        (other - a) / (b - a),
+        (left_landing - start) / (end - start),
         standing["R"],
         standing["L"],
-        float(apart[a]),
-        float(-apart[other]),
+        float(right_ahead[start]),
+        float(-right_ahead[left_landing]),
         float(np.mean(width)),
     )
-    at = a + (b - a) * np.arange(SAMPLES) / SAMPLES
-    frames = np.arange(a, b + 1)
-    curves = np.stack([np.interp(at, frames, walk.curves[name][a : b + 1]) for name in CURVES])
-    return Cycle(a, b, dict(zip(SCALARS, values, strict=True)), curves)
+    times = start + (end - start) * np.arange(SAMPLES) / SAMPLES
+    frames = np.arange(start, end + 1)
+    curves = np.stack([np.interp(times, frames, walk.curves[name][start : end + 1]) for name in CURVES])
+    return Cycle(start, end, dict(zip(SCALARS, values, strict=True)), curves)

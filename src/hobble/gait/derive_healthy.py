@@ -2,8 +2,9 @@
 
 python -m hobble.gait.derive_healthy CMU_FOLDER [HEALTHY.npz]
 
-The file says how much the features of healthy walks vary within one person: with the speed, on slight curves,
-and from window to window. The motion was obtained from mocap.cs.cmu.edu, which was funded by NSF EIA-0196217.
+The file says how much the features (features.py) of healthy walks vary within one person: with the speed, on
+slight curves, and from one window of 4 seconds to another. The motion was obtained from mocap.cs.cmu.edu,
+which was funded by NSF EIA-0196217.
 """
 
 from __future__ import annotations
@@ -48,8 +49,8 @@ def healthy_windows(
 ) -> Iterator[tuple[str, Profile, Profile]]:
     """Yield (name of the clip, profile, profile of the reference) for each window of a performer's walks.
 
-    The reference is the performer's walks in REFERENCE without the clip itself. folder: BVH files of CMU.
-    skeletons: folder of the skeleton files.
+    The reference is the performer's walks in REFERENCE without the clip itself. folder: the folder with the
+    BVH files of CMU. skeletons: folder of the skeleton files.
     """
     names = REFERENCE[performer] + OTHERS[performer]
     clips = {name: read_clip(Path(folder, f"{name}.bvh"), skeletons) for name in names}
@@ -60,19 +61,23 @@ def healthy_windows(
 
 
 def _parts(clip: Clip) -> list[WalkCycles]:
-    """The cycles in each window of a clip, or all cycles as one part if no window has enough."""
+    """The cycles in each window of a clip. If no window has enough cycles, all cycles are one part.
+
+    The list is empty if the clip has no cycle.
+    """
     walk = measure_clip(clip)
     parts = [part for _, part in windows(walk, len(clip), SECONDS)]
     return parts or [walk] * bool(len(walk))
 
 
-def covariance(seen: Iterable[tuple[str, Profile, Profile]]) -> tuple[Array, int]:
-    """The mean of x x^T, (D, D), over the features x (D,) of windows, and the number of clips.
+def covariance(compared_windows: Iterable[tuple[str, Profile, Profile]]) -> tuple[Array, int]:
+    """The covariance (D, D) of the D features of windows, and the number of clips.
 
-    Left and right count equally, and so do all clips. seen: what `healthy_windows` yields.
+    It is the mean of x x^T over the features x (D,), because features of a walk that equals its reference are
+    0. Left and right count equally, and so do all clips. compared_windows: what `healthy_windows` yields.
     """
     by_clip: dict[str, list[Array]] = {}
-    for name, walk, healthy in seen:
+    for name, walk, healthy in compared_windows:
         for pair in ((walk, healthy), (mirrored(walk), mirrored(healthy))):
             by_clip.setdefault(name, []).append(np.array(list(features(*pair).values())))
     squares = [np.einsum("ni,nj->ij", x, x) / len(x) for x in map(np.array, by_clip.values())]
@@ -80,24 +85,27 @@ def covariance(seen: Iterable[tuple[str, Profile, Profile]]) -> tuple[Array, int
 
 
 def derive(folder: str | Path, out: str | Path = HEALTHY) -> None:
-    """Write each performer's covariance and its number of clips. folder: BVH files of CMU. out: the file."""
-    each = [covariance(healthy_windows(folder, performer)) for performer in REFERENCE]
+    """Write each performer's covariance and number of clips to the file `out`.
+
+    folder: the folder with the BVH files of CMU.
+    """
+    of_performers = [covariance(healthy_windows(folder, performer)) for performer in REFERENCE]
     save_npz(
         out,
         performers=np.array(list(REFERENCE)),
-        covariances=np.array([square for square, _ in each]),
-        clips=np.array([clips for _, clips in each]),
+        covariances=np.array([square for square, _ in of_performers]),
+        clips=np.array([clips for _, clips in of_performers]),
     )
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run the command. Returns the exit status."""
-    given = sys.argv[1:] if arguments is None else list(arguments)
-    if len(given) not in (1, 2):
+    paths = sys.argv[1:] if arguments is None else list(arguments)
+    if len(paths) not in (1, 2):
         print("Usage: python -m hobble.gait.derive_healthy CMU_FOLDER [HEALTHY.npz]", file=sys.stderr)
         return 2
     try:
-        derive(*given)
+        derive(*paths)
     except HobbleError as error:
         print(error, file=sys.stderr)
         return 1

@@ -1,4 +1,7 @@
-"""Linear discriminant analysis: finds the class with the nearest mean, in units of the spread in classes."""
+"""Linear discriminant analysis: finds the class whose mean is nearest.
+
+Distances are measured in units of the spread of the examples within their classes.
+"""
 
 from __future__ import annotations
 
@@ -9,8 +12,8 @@ import numpy as np
 
 from hobble.core.quat import Array
 
-# Shrinkage of the covariance towards its diagonal, because there are few examples for so many features. Of
-# the values 0.02 to 0.8, this one recognises left-out captured motion best.
+# The covariance is shrunk towards its diagonal by this share, because there are few examples for so many
+# features. Of the values 0.02 to 0.8, this one recognises left-out captured motion best.
 SHRINKAGE = 0.02
 CONSTANT_SPREAD = 1e-9  # features with a smaller spread, relative to their size, are constant and ignored
 # The spread of a feature within classes counts as at least this share of its spread over all examples.
@@ -22,8 +25,8 @@ LEAST_SPREAD_SHARE = 0.02
 class Discriminant:
     """A linear classifier of K classes.
 
-    classes: names. weights: (D, K) and offset: (K,) give the scores of the classes as values @ weights +
-    offset, for values (n, D) of D features.
+    classes: their K names. weights: (D, K). offset: (K,). For n examples with values (n, D) of D features,
+    the scores of the classes are values @ weights + offset.
     """
 
     classes: tuple[str, ...]
@@ -31,7 +34,10 @@ class Discriminant:
     offset: Array = field(repr=False)
 
     def scores(self, values: Array) -> Array:
-        """(n, K) log likelihood of each class up to a common term. All classes have the same prior."""
+        """(n, K) log likelihood of each class, up to a term that all classes share.
+
+        All classes have the same prior probability.
+        """
         return values @ self.weights + self.offset
 
     def names(self, values: Array) -> list[str]:
@@ -43,22 +49,24 @@ def learn(values: Array, labels: Sequence[str], shrinkage: float = SHRINKAGE) ->
     """Learn from values (n, D) and their labels. Raises ValueError for fewer than two classes.
 
     The result is Fisher's linear discriminant with the pooled covariance of standardised values. Each class
-    has the same weight, however many examples it has. shrinkage: of the covariance towards its diagonal, 0 to
-    1.
+    has the same weight, however many examples it has. shrinkage: the share, 0 to 1, by which the covariance
+    is shrunk towards its diagonal.
     """
     classes = tuple(sorted(set(labels)))
     if len(classes) < 2:
-        raise ValueError("there must be two classes or more")
+        raise ValueError(f"there must be two classes or more, but the labels name {len(classes)}")
     class_index = np.array([classes.index(label) for label in labels])
-    count = np.bincount(class_index)
+    examples_of_class = np.bincount(class_index)
     means = np.stack([values[class_index == k].mean(axis=0) for k in range(len(classes))])
     deviations = values - means[class_index]
-    share = 1 / (len(classes) * count[class_index])
-    overall = values.std(axis=0)
-    spread = np.maximum(np.sqrt(share @ deviations**2), LEAST_SPREAD_SHARE * overall)
-    varies = overall > CONSTANT_SPREAD * (1 + np.abs(values).max(axis=0))
+    example_weight = 1 / (len(classes) * examples_of_class[class_index])
+    overall_spread = values.std(axis=0)
+    spread = np.maximum(np.sqrt(example_weight @ deviations**2), LEAST_SPREAD_SHARE * overall_spread)
+    varies = overall_spread > CONSTANT_SPREAD * (1 + np.abs(values).max(axis=0))
     scaled = deviations[:, varies] / spread[varies]
-    covariance = (1 - shrinkage) * (scaled * share[:, None]).T @ scaled + shrinkage * np.eye(varies.sum())
+    weighted = scaled * example_weight[:, None]
+    covariance = (1 - shrinkage) * weighted.T @ scaled + shrinkage * np.eye(varies.sum())
+    # For each class, weights = inverse covariance @ mean, and offset = -mean @ weights / 2.
     weights = np.zeros((values.shape[1], len(classes)))
     weights[varies] = (
         np.linalg.solve(covariance, (means[:, varies] / spread[varies]).T) / spread[varies, None]

@@ -1,4 +1,4 @@
-"""Sizes of the differences between a hurt walk and the same figure's healthy walk."""
+"""Measures how a hurt walk differs from the same figure's healthy walk."""
 
 from __future__ import annotations
 
@@ -10,7 +10,8 @@ from hobble.gait.people import GAITS, NORMAL, People
 from hobble.gait.profile import Profile, mirrored
 from hobble.gait.recogniser import LEFT, RIGHT
 
-# name -> meaning. "hurt" and "sound" are the two sides of the body; "healthy" is the healthy walk.
+# Name of an effect -> its meaning. "hurt" and "sound" are the two sides of the body. "share of healthy" is
+# the value of the hurt walk divided by the value of the healthy walk.
 EFFECTS: dict[str, str] = {
     "speed": "speed, share of healthy",
     "stride": "stride time, share of healthy",
@@ -34,8 +35,11 @@ EFFECTS: dict[str, str] = {
 
 
 def effects(walk: Profile, healthy: Profile, side: str = RIGHT) -> dict[str, float]:
-    """The EFFECTS of a walk whose `side` is hurt, relative to the healthy walk of the same figure."""
-    if side == LEFT:
+    """Name of EFFECTS -> its size in a walk, relative to the healthy walk of the same figure.
+
+    side: the hurt side, "right" or "left".
+    """
+    if side == LEFT:  # mirror, so that from here on the right side is the hurt one
         walk, healthy = mirrored(walk), mirrored(healthy)
 
     def change(name: str) -> float:
@@ -67,15 +71,15 @@ def effects(walk: Profile, healthy: Profile, side: str = RIGHT) -> dict[str, flo
 
 
 def effects_of_people(recorded: People) -> Mapping[str, Mapping[str, tuple[float, float]]]:
-    """Impairment -> name of EFFECTS -> mean and standard deviation over the recorded people."""
+    """Impairment -> name of EFFECTS -> (mean, standard deviation) over the recorded people."""
     out = {}
     for gait in GAITS:  # the normal walk and five impaired ones, see people.py
         if gait == NORMAL:
             continue
-        each = [
+        of_people = [
             effects(recorded.profile(gait, person), recorded.profile(NORMAL, person))
             for person in range(recorded.count)
         ]
-        values = {name: [of_person[name] for of_person in each] for name in EFFECTS}
+        values = {name: [of_person[name] for of_person in of_people] for name in EFFECTS}
         out[gait] = {name: (float(np.mean(v)), float(np.std(v))) for name, v in values.items()}
     return out

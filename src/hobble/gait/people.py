@@ -1,8 +1,8 @@
-"""Statistics of ten people who walked normally and imitated impairments of the right leg.
+"""Statistics of ten people who walked normally and imitated five impairments of the right leg.
 
-They were recorded with a Kinect. Each imitated five impairments. Source: Jun et al. (2020), "Pathological
-gait classification using Kinect v2 and gated recurrent neural networks", IEEE Access 8. The statistics are in
-`people.npz`, which `derive_people.py` writes.
+They were recorded with a Kinect. Source: Jun et al. (2020), "Pathological gait classification using Kinect v2
+and gated recurrent neural networks", IEEE Access 8. The statistics are in `people.npz`, which
+`derive_people.py` writes.
 """
 
 from __future__ import annotations
@@ -50,7 +50,7 @@ class People:
         return dict(zip(NAMES, map(float, row), strict=True))
 
     def normal(self) -> Profile:
-        """The mean of the people's normal walks: the reference for a figure without a healthy walk."""
+        """The mean of the people's normal walks. A figure without a healthy walk is compared with it."""
         return dict(zip(NAMES, map(float, self.profiles[0].mean(axis=0)), strict=True))
 
     def curve(self, gait: str, name: str) -> tuple[Array, Array]:

@@ -1,4 +1,4 @@
-"""A profile: a walk as some fifty numbers, which are medians over its cycles."""
+"""Describes a walk by a profile: 52 numbers, computed from medians over its cycles."""
 
 from __future__ import annotations
 
@@ -19,17 +19,19 @@ NAMES = (*SCALARS, *(f"{statistic} {curve}" for curve in CURVES for statistic in
 def profile(walk: WalkCycles) -> dict[str, float]:
     """The numbers of NAMES: each scalar, and the range and mean of each curve over a cycle.
 
-    Scalars and curves are medians over the cycles. Cycles of the right leg and mirrored cycles of the left
-    leg count equally, so the mirrored walk has exactly the mirrored profile. Units: degrees, leg lengths,
-    seconds. Raises HobbleError if the walk has no cycle.
+    Scalars and curves are medians over the cycles. The cycles that begin as the right foot lands have the
+    same weight as those that begin as the left foot lands. So the mirrored walk has exactly the mirrored
+    profile. Units: degrees, leg lengths, seconds. Raises HobbleError if the walk has no right
+    cycle or no left cycle.
     """
     if not len(walk):
         raise HobbleError(NO_CYCLE)
-    right, left = _of_cycles(walk.right), mirrored(_of_cycles(walk.left))
+    # `walk.left` holds mirrored cycles. Mirroring their profile undoes this.
+    right, left = _profile_of_cycles(walk.right), mirrored(_profile_of_cycles(walk.left))
     return {name: (right[name] + left[name]) / 2 for name in NAMES}
 
 
-def of_curves(curves: Array, scalars: Array) -> dict[str, float]:
+def profile_of_curves(curves: Array, scalars: Array) -> dict[str, float]:
     """The profile of curves (22, 50) in the order of CURVES, and scalars (8,) in the order of SCALARS."""
     out = {name: float(value) for name, value in zip(SCALARS, scalars, strict=True)}
     for name, curve in zip(CURVES, curves, strict=True):
@@ -53,12 +55,13 @@ def mirrored(values: Profile) -> dict[str, float]:
 
 
 def _other_side(name: str) -> str:
+    """The name with _R for _L and the reverse. Other names stay as they are."""
     if name.endswith("_R"):
         return f"{name[:-1]}L"
     return f"{name[:-1]}R" if name.endswith("_L") else name
 
 
-def _of_cycles(cycles: Sequence[Cycle]) -> dict[str, float]:
+def _profile_of_cycles(cycles: Sequence[Cycle]) -> dict[str, float]:
     curves = np.median([cycle.curves for cycle in cycles], axis=0)
     scalars = np.median([[cycle.scalars[name] for name in SCALARS] for cycle in cycles], axis=0)
-    return of_curves(curves, scalars)
+    return profile_of_curves(curves, scalars)

@@ -14,10 +14,12 @@ SKELETONS = "config/skeletons"  # folder of the skeleton files
 
 
 def read_clip(path: str | Path, skeletons: str | Path = SKELETONS) -> Clip:
-    """Read a BVH file and resample it to 60 Hz. Its rig must have a skeleton file in the folder `skeletons`.
+    """Read a BVH file and resample it to 60 Hz.
 
-    Raises InputError for a file that cannot be read or an unknown rig.
+    skeletons: folder of the skeleton files, which name the joints of known rigs. On other rigs the parts of
+    the body are found. Raises InputError for a file that cannot be read, and if the parts cannot be found.
     """
     options = ClipMotion()
+    # The motion stays on its own rig. `load_source` uses the target only to recognise the rig and its joints.
     target = load_skeleton(Path(skeletons) / "holden31.yaml")
     return resample(load_source(read_bvh(path), target, skeletons, options).clip, options.fps)

@@ -1,9 +1,8 @@
-"""Recognises which of five impairments a walk resembles, and the side.
+"""Recognises which of five impairments a walk resembles, and which leg is impaired.
 
 The recogniser is a linear classifier that learnt from people's walks, each relative to the same person's
-normal walk. Walks with an impaired left leg are mirrored walks with an impaired right leg. Speed and stride
-time are not used, and most features compare the two sides, because a healthy walk changes with its speed but
-stays symmetric.
+normal walk. The people imitated impairments of the right leg. Their mirrored walks are the examples with an
+impaired left leg.
 """
 
 from __future__ import annotations
@@ -21,7 +20,8 @@ from hobble.gait.features import features
 from hobble.gait.people import GAITS, NORMAL, People, people
 from hobble.gait.profile import Profile, mirrored
 
-SHRINKAGE = 0.2  # of the covariance towards its diagonal; there are 120 examples for some twenty features
+# Share by which the covariance is shrunk towards its diagonal: there are only 120 examples for 21 features.
+SHRINKAGE = 0.2
 LEAST_CYCLES = 3  # a window must have this many cycles of both legs together, and at least one of each leg
 RIGHT, LEFT = "right", "left"
 SIDES = (RIGHT, LEFT)
@@ -31,9 +31,9 @@ SIDES = (RIGHT, LEFT)
 class Impairment:
     """The impairment of a walk.
 
-    label: one of people.GAITS. side: of the impaired leg, None if the label is normal. probabilities: label
-    -> probability, both sides together; their sum is 1. sides: (impairment, side), such as ("antalgic",
-    "right") -> probability.
+    label: one of people.GAITS. side: "right" or "left", the impaired leg; None if the label is "normal".
+    probabilities: label -> probability, both sides together; their sum is 1. sides: (impairment, side), such
+    as ("antalgic", "right") -> probability.
     """
 
     label: str
@@ -43,12 +43,12 @@ class Impairment:
 
     @property
     def impaired(self) -> bool:
-        """Whether an impairment is more likely than none."""
+        """Whether the walk is more likely impaired than normal."""
         return self.probabilities[NORMAL] < 0.5
 
 
 def examples(recorded: People, numbers: Iterable[int]) -> tuple[Array, list[str]]:
-    """Features (n, D) and classes of the walks of some people, each walk as it is and mirrored.
+    """Features (n, D) and classes of the n walks of some people: each walk as it is, and mirrored.
 
     numbers: which people of `recorded`, from 0. A class is "normal", or "antalgic right" and so on.
     """
@@ -70,17 +70,20 @@ def classifier() -> Discriminant:
 
 
 def recognise(walk: Profile, healthy: Profile, discriminant: Discriminant | None = None) -> Impairment:
-    """The impairment of a walk, relative to the figure's healthy walk."""
+    """The impairment of a walk, relative to the figure's healthy walk.
+
+    discriminant: a classifier of the classes in `examples`; None: the one that learnt from all people.
+    """
     discriminant = discriminant or classifier()
     scores = discriminant.scores(np.array([list(features(walk, healthy).values())]))[0]
-    likely = np.exp(scores - scores.max())
-    likely /= likely.sum()
+    probabilities = np.exp(scores - scores.max())
+    probabilities /= probabilities.sum()
     sides, labels = {}, dict.fromkeys(GAITS, 0.0)
-    for name, p in zip(discriminant.classes, map(float, likely), strict=True):
-        gait, _, which = name.partition(" ")
+    for name, p in zip(discriminant.classes, map(float, probabilities), strict=True):
+        gait, _, impaired_side = name.partition(" ")
         labels[gait] += p
-        if which:
-            sides[gait, which] = p
+        if impaired_side:
+            sides[gait, impaired_side] = p
     label = max(labels, key=labels.__getitem__)
     side = None if label == NORMAL else max(SIDES, key=lambda s: sides[label, s])
     return Impairment(label, side, labels, sides)
@@ -89,11 +92,15 @@ def recognise(walk: Profile, healthy: Profile, discriminant: Discriminant | None
 def windows(
     walk: WalkCycles, frames: int, seconds: float = 4.0, step: float = 1.0
 ) -> list[tuple[int, WalkCycles]]:
-    """(first frame, cycles) of each window that has LEAST_CYCLES or more.
+    """(first frame, cycles) of each window of a clip that has LEAST_CYCLES or more cycles.
 
-    A window begins every `step` seconds and lasts `seconds`. frames: number of frames of the clip.
+    A window begins every `step` seconds and lasts `seconds` seconds. frames: number of frames of the clip.
     """
     length = round(seconds * walk.fps)
     starts = range(0, max(frames - length, 0) + 1, max(1, round(step * walk.fps)))
     parts = ((start, walk.within(start, start + length)) for start in starts)
-    return [(a, p) for a, p in parts if len(p) and len(p.right) + len(p.left) >= LEAST_CYCLES]
+    return [
+        (start, part)
+        for start, part in parts
+        if len(part) and len(part.right) + len(part.left) >= LEAST_CYCLES
+    ]

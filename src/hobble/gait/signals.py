@@ -1,7 +1,7 @@
-"""A walking body as 22 curves over time, the same curves as in the data of people.py.
+"""Describes a walking body by 22 curves over time, the same curves as in the data of people.py.
 
-Joints are found by role, so any rig of config/skeletons/ works. Angles are relative to the vertical and the
-direction of travel.
+Joints are found by role, such as "left_knee", so any rig whose joints have roles works. Angles are relative
+to the vertical and the direction of travel.
 """
 
 from __future__ import annotations
@@ -39,7 +39,7 @@ MIDDLE = (
 CURVES = (*(f"{limb}_{side}" for side in SIDES for limb in LIMBS), *MIDDLE)
 # Curves whose sign changes if the body is mirrored.
 SIGN_CHANGES = ("trunk_left", "pelvis_left_up", "pelvis_turn_left", "shoulders_turn_left")
-TRAVEL_SECONDS = 0.5  # sigma of the Gaussian that smooths the direction of travel and the facing
+TRAVEL_SECONDS = 0.5  # sigma of the Gaussian that smooths the direction of travel and that of the facing
 
 
 @dataclass(frozen=True)
@@ -47,9 +47,9 @@ class Signals:
     """F frames of a moving body. All lengths are in leg lengths; `leg` is the leg length in cm.
 
     curves: name of CURVES -> (F,), degrees or leg lengths. heading: (F,) direction of travel, degrees from
-    +Z towards +X, unwrapped. ahead: (F,) cosine of the angle between facing and travel. hips: (F, 2) path
-    over the ground. ankle_speed: side -> (F,) over the ground, leg lengths a second. across: side -> (F,)
-    how far the ankle is to the left of the hips.
+    +Z towards +X, unwrapped (without jumps at 360). ahead: (F,) cosine of the angle between facing and
+    direction of travel. hips: (F, 2) path over the ground. ankle_speed: "L" or "R" -> (F,) speed over the
+    ground, leg lengths a second. across: "L" or "R" -> (F,) how far the ankle is to the left of the hips.
     """
 
     fps: float
@@ -80,15 +80,17 @@ def mirrored(signals: Signals) -> Signals:
 def signals(skeleton: Skeleton, positions: Array, fps: float) -> Signals:
     """The curves of joint positions (F, J, 3), cm, Y up, at `fps` frames a second. F is 2 or more.
 
-    Hip flexion is the forward angle of the thigh from the vertical, hip abduction its outward angle. The
-    arm's angle is the forward angle of the line from shoulder to elbow, or to the wrist on a rig without
-    elbows. Knee and elbow flexion are 0 if straight. Foot pitch is the angle of the line from ankle to toe
-    above the horizontal. The trunk is the line from hips to neck. On a rig without elbows or without wrists,
-    elbow flexion is 0; on a rig with neither, the arm's angle is 0, too.
+    hip_flexion is the forward angle of the thigh from the vertical, hip_abduction its outward angle.
+    knee_flexion and elbow_flexion are 0 if the joint is straight. foot_pitch is the angle of the line from
+    ankle to toe above the horizontal. arm_forward is the forward angle of the line from shoulder to elbow, or
+    to the wrist on a rig without elbows. On a rig without elbows or without wrists, elbow_flexion is 0. On a
+    rig without both, arm_forward is 0, too. The trunk is the line from the hips to the neck, or to the chest
+    or head on a rig without a neck.
     """
+    # Role -> positions (F, 3).
     at = {role: positions[:, skeleton.role(role)].astype(float) for role in skeleton.roles}
     ahead, left = _travel(at["hips"], fps)
-    leg = _leg(at)
+    leg = _leg_length(at)
     outward = {"L": left, "R": -left}
     side_curves = {side: _limb(at, SIDE_NAMES[side], ahead, outward[side], leg) for side in SIDES}
     curves = {f"{limb}_{side}": side_curves[side][limb] for side in SIDES for limb in LIMBS}
@@ -102,6 +104,7 @@ def signals(skeleton: Skeleton, positions: Array, fps: float) -> Signals:
         "shoulders_turn_left": _angle(-_dot(shoulders, ahead), _dot(shoulders, left)),
         "hips_height": at["hips"][:, 1] / leg,
     }
+    # The body faces at a right angle to the lines through its hips and its shoulders.
     to_left = pelvis / np.maximum(np.linalg.norm(pelvis, axis=1, keepdims=True), 1e-9)
     to_left = to_left + shoulders / np.maximum(np.linalg.norm(shoulders, axis=1, keepdims=True), 1e-9)
     facing = gaussian(np.cross(to_left, [0.0, 1.0, 0.0]), TRAVEL_SECONDS * fps)
@@ -126,8 +129,8 @@ def _travel(hips: Array, fps: float) -> tuple[Array, Array]:
     return ahead, np.cross([0.0, 1.0, 0.0], ahead)
 
 
-def _leg(at: dict[str, Array]) -> float:
-    """Length of thigh and shank together, cm, as the mean of both legs."""
+def _leg_length(at: dict[str, Array]) -> float:
+    """Length of thigh and shank together, cm: the mean of the two legs. at: role -> positions (F, 3)."""
     bones = [("hip", "knee"), ("knee", "heel")]
     return float(
         sum(
@@ -140,11 +143,16 @@ def _leg(at: dict[str, Array]) -> float:
 
 
 def _trunk_top(skeleton: Skeleton) -> str:
-    """The highest role of the trunk that the rig has."""
+    """The role of the trunk's upper end: the neck, or the chest or head on a rig without a neck."""
     return next(role for role in ("neck", "chest", "head") if role in skeleton.roles)
 
 
 def _limb(at: dict[str, Array], side: str, ahead: Array, outward: Array, leg: float) -> dict[str, Array]:
+    """The curves LIMBS of one side.
+
+    at: role -> positions (F, 3). side: "left" or "right". ahead, outward: (F, 3) unit vectors of the
+    direction of travel and of the direction away from the other leg. leg: leg length, cm.
+    """
     hip, knee, ankle, toe, shoulder = (at[f"{side}_{p}"] for p in ("hip", "knee", "heel", "toe", "shoulder"))
     zero = np.zeros(len(hip))
     elbow, wrist = (at.get(f"{side}_{part}") for part in ("elbow", "wrist"))
@@ -169,12 +177,12 @@ def _dot(a: Array, b: Array) -> Array:
 
 
 def _angle(opposite: Array, adjacent: Array) -> Array:
-    """Degrees, from the two sides of a right triangle."""
+    """Degrees of an angle in a right triangle, from the sides opposite and adjacent to it."""
     return np.degrees(np.arctan2(opposite, adjacent))
 
 
 def _bend(a: Array, b: Array, c: Array) -> Array:
-    """Degrees by which the joint at b is bent between a and c, all (F, 3). 0 is straight."""
+    """Degrees by which the joint at b bends the line from a to c, all (F, 3). 0 is straight."""
     u, v = b - a, c - b
     return _angle(np.linalg.norm(np.cross(u, v), axis=-1), _dot(u, v))
 

@@ -1,4 +1,4 @@
-"""Derives people.json (means of impaired walks): python -m hobble.hurt IMPAIRED_WALKS.npz"""
+"""Derives people.json (how impaired and normal walks differ): python -m hobble.hurt IMPAIRED_WALKS.npz"""
 
 import sys
 

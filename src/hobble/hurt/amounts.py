@@ -1,10 +1,10 @@
 """How much a hurt part of the body changes the motion at severity 10.
 
-Two tables decide this: MIXES mixes impairment profiles, which were derived from recordings of people, and
-ADDED_CHANGES has what the recordings do not show. In the recordings, feet and toes are inaccurate, and arms,
-shoulders, neck and back were not hurt. With a hurt back, the body leans and bends its knees (`forward`,
-`crouch`) about as in clip 105_26 of CMU, which counts as severity 7. Values of one side are for a hurt right
-side; names that end with `_sound` are for the side that is not hurt.
+Two tables decide this. MIXES mixes impairment profiles, which were derived from recordings of people.
+ADDED_CHANGES has the changes that the recordings do not show, because their feet and toes are inaccurate, and
+arms, shoulders, neck and back were not hurt. With a hurt back, the body leans and bends its knees (`forward`,
+`crouch`) about as in clip 105_26 of CMU, which counts as severity 7. Values of one side are
+for a part that is hurt on the right. Names that end with `_sound` are changes of the other side.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ import numpy as np
 from hobble.core.quat import Array
 from hobble.hurt.impairment_profiles import CURVES, HARMONICS, profiles
 
-# part -> impairment profiles and their weights. Parts that are not here have only ADDED_CHANGES.
+# Part -> impairment profiles and their weights. Parts that are not here have only ADDED_CHANGES.
 MIXES: dict[str, dict[str, float]] = {
     "pelvis": {"trendelenburg": 0.55, "lurch": 0.25, "antalgic": 0.2},
     "hip": {"trendelenburg": 0.75, "antalgic": 0.25},
@@ -92,8 +92,9 @@ RATIOS = (
     "back",
     "head",
 )
-# Factor on the changes of timing in the recordings. There a slow ankle counts as stance, so the recordings
-# show only half of an early landing. Besides, a network that is trained on hurt clips smooths the effect.
+# Factor on the changes of timing in the recordings. The recordings show only half of an early landing,
+# because in them a slow ankle counts as stance. Besides, a network that is trained on hurt clips smooths the
+# effect.
 TIMING_FACTOR = 1.85
 # Part -> length of the step onto the hurt foot, as a ratio to the healthy clip. It replaces the ratio of the
 # profiles.
@@ -105,39 +106,43 @@ def amounts(part: str) -> dict[str, float | Array]:
     """Name -> change, for a part that is hurt on the right at severity 10.
 
     A ratio is given as its difference from 1. The names are those of ADDED_CHANGES and these: `arm`,
-    `arm_sound`: ratios of the arms' swing. `off`, `off_sound`, `land_sound`: cycles by which a foot leaves or
-    lands later. `step`: ratio of the step onto the hurt foot, minus the ratio in a body that is only slower.
-    `width`: leg lengths by which steps are wider. `curves`: (5, 5) factors of CURVES, as described in
-    `Profile` of `hobble.hurt.impairment_profiles`.
+    `arm_sound`: ratios of each arm's swing. `off`, `off_sound`, `land_sound`: cycles by which a foot leaves
+    or lands later. `step`: ratio of the length of the step onto the hurt foot, minus the ratio that speed and
+    stride time alone would give. `width`: leg lengths by which steps are wider. `curves`: (5, 5) factors of
+    CURVES, as described in `Profile` of `hobble.hurt.impairment_profiles`.
     """
     changes = dict(ADDED_CHANGES[part])
     out: dict[str, float | Array] = {"curves": np.zeros((len(CURVES), 1 + 2 * HARMONICS))}
     if mix := MIXES.get(part):
-        changes, out = _of_people(part, mix, changes)
+        changes, out = _add_mix(part, mix, changes)
     for name, value in changes.items():
         out[name] = value - 1.0 if name in RATIOS else value
     return out
 
 
-def _of_people(
+def _add_mix(
     part: str, mix: dict[str, float], changes: dict[str, float]
 ) -> tuple[dict[str, float], dict[str, float | Array]]:
-    """Add a mix of profiles to `changes`. Returns the values of the mix that are no ratios separately."""
+    """Mix the profiles of a part, with weights `mix`.
+
+    Returns `changes` with the ratios of the mix added (those in `changes` have priority), and the other
+    changes of the mix, which are differences from the healthy clip.
+    """
     profile_of = profiles()
 
-    def mean(name: str) -> float:
+    def mixed(name: str) -> float:
         return float(sum(share * getattr(profile_of[p], name) for p, share in mix.items()))
 
     curves = sum(share * profile_of[p].harmonics() for p, share in mix.items()) * CURVE_FACTOR.get(part, 1.0)
-    ratios = {"stride": mean("stride"), "arm": mean("arm_hurt"), "arm_sound": min(mean("arm_sound"), 1.0)}
-    speed = changes["speed"]
-    slower = speed * changes.get("stride", mean("stride"))  # ratio of the stride length
-    step = STEP_RATIO.get(part, mean("step_hurt"))
+    ratios = {"stride": mixed("stride"), "arm": mixed("arm_hurt"), "arm_sound": min(mixed("arm_sound"), 1.0)}
+    # The ratio of the stride's length is the product of the ratios of speed and stride time.
+    stride_length = changes["speed"] * changes.get("stride", mixed("stride"))
+    step = STEP_RATIO.get(part, mixed("step_hurt"))
     return {**ratios, **changes}, {
         "curves": curves,
-        "land_sound": TIMING_FACTOR * mean("strike"),
-        "off": TIMING_FACTOR * mean("stance_hurt"),
-        "off_sound": TIMING_FACTOR * (mean("strike") + mean("stance_sound")),
-        "step": min(step - slower, 0.25),
-        "width": mean("width"),
+        "land_sound": TIMING_FACTOR * mixed("strike"),
+        "off": TIMING_FACTOR * mixed("stance_hurt"),
+        "off_sound": TIMING_FACTOR * (mixed("strike") + mixed("stance_sound")),
+        "step": min(step - stride_length, 0.25),
+        "width": mixed("width"),
     }

@@ -1,4 +1,4 @@
-"""Finds the part of the body that a link belongs to, by the roles of its joints."""
+"""Finds the part of the body that a link (a bone that can be hurt) belongs to, by the roles of joints."""
 
 from __future__ import annotations
 
@@ -8,8 +8,8 @@ from hobble.core.skeleton import Skeleton
 
 LEFT, RIGHT = 0, 1
 SIDES = ("left", "right")
-# (role, part): the part's links end at the joint with this role. They begin at the joint with the previous
-# role; those of the first part begin at the hips (LEG) or the chest (ARM).
+# (role, part): the part reaches down to the joint with this role. It begins at the joint with the previous
+# role; the first part begins at the hips (LEG) or the chest (ARM).
 LEG = (("hip", "hip"), ("knee", "thigh"), ("heel", "shank"))
 ARM = (("shoulder", "shoulder"), ("elbow", "upper arm"), ("wrist", "forearm"))
 
@@ -29,16 +29,17 @@ def part_of_link(skeleton: Skeleton, link: tuple[str, str]) -> BodyPart:
     """The part of the body that a link (parent joint, child joint) belongs to."""
     child = skeleton.index(link[1])
     for side, word in enumerate(SIDES):
-        for first, table, last in (("hip", LEG, "foot"), ("shoulder", ARM, "hand")):
-            root = skeleton.role("hips" if first == "hip" else "chest")
-            for role, name in table:
-                joint = skeleton.role(f"{word}_{role}")
-                if child in _chain(skeleton, joint, root):
-                    above_hip = role == "hip" and child != joint
+        for top, limb, last_part in (("hips", LEG, "foot"), ("chest", ARM, "hand")):
+            upper = skeleton.role(top)
+            for role, name in limb:
+                lower = skeleton.role(f"{word}_{role}")
+                if child in _chain(skeleton, lower, upper):
+                    # Joints between the hips and the hip joint belong to the pelvis.
+                    above_hip = role == "hip" and child != lower
                     return BodyPart("pelvis" if above_hip else name, side)
-                root = joint
-            if root in ancestors(skeleton, child):
-                return BodyPart(last, side)
+                upper = lower
+            if upper in ancestors(skeleton, child):  # below the ankle or the wrist
+                return BodyPart(last_part, side)
     if child in _chain(skeleton, skeleton.role("chest"), skeleton.role("hips")):
         return BodyPart("back", None)
     if skeleton.role("chest") in ancestors(skeleton, child):
@@ -47,7 +48,7 @@ def part_of_link(skeleton: Skeleton, link: tuple[str, str]) -> BodyPart:
 
 
 def ancestors(skeleton: Skeleton, joint: int) -> list[int]:
-    """The joint, its parent, and so on to the root."""
+    """Indices of the joint itself, its parent, and so on to the root."""
     out = [joint]
     while skeleton.parents[out[-1]] >= 0:
         out.append(skeleton.parents[out[-1]])

@@ -14,13 +14,13 @@ from hobble.hurt.body_parts import LEFT, RIGHT, part_of_link
 
 HIGHEST = 10.0  # highest severity
 POWER = 0.82  # strength = (severity / 10) ** POWER: .37 at 3, .57 at 5, .75 at 7
-# Changes of when a foot lands and leaves (`land`, `off`) grow with strength ** TIMING_POWER. With 1, the
-# stances of a network's character are nearly as uneven at severity 5 as at 10.
+# Changes of the times at which a foot lands and leaves (`land`, `off`) grow with strength ** TIMING_POWER.
+# With the power 1, a character driven by a network limps nearly as unevenly at severity 5 as at 10.
 TIMING_POWER = 1.3
 LEAST_RATIO = 0.02  # smaller ratios to the healthy clip are raised to this
 SETTLING_SECONDS = 0.3  # sigma of the Gaussian that smooths changes of severity
 LEAST_SEVERITY = 0.05  # smaller severities count as 0
-SUM_NORM = 3.0  # effects of several injuries add like a p-norm with this p (1: sum, infinity: maximum)
+SUM_NORM = 3.0  # effects of several hurt parts add like a p-norm with this p (1: sum, infinity: maximum)
 WHOLE_BODY = ("speed", "stride", "back", "head", "forward", "nod")  # changes of the whole body
 # Changes of one side. The last three say how much an arm is held in each way (HELD_ARM_OF_PART).
 SIDED = (
@@ -43,10 +43,11 @@ SIDED = (
     *("upper", "fore", "carry"),
 )
 SOUND_SUFFIX = "_sound"  # names of changes of the side that is not hurt end with this
-# Signs of the CURVES (see `hobble.hurt.impairment_profiles`) in a mirrored body.
-FLIPPED = np.array([1.0, -1.0, -1.0, -1.0, -1.0])
-# Signs of a curve's factors (mean, then cosine and sine of both harmonics) when it is shifted by half a
-# cycle.
+# Factors on the CURVES (see `hobble.hurt.impairment_profiles`) that mirror the body. All curves but the first
+# are measured to the left or on the left, so their sign changes.
+MIRROR_SIGNS = np.array([1.0, -1.0, -1.0, -1.0, -1.0])
+# Signs of a curve's factors (mean, then cosine and sine of each of the two harmonics) when the curve is
+# shifted by half a cycle.
 HALF_CYCLE_SIGNS = np.array([1.0, -1.0, -1.0, 1.0, 1.0])
 # Hurt part of an arm -> how a person holds this arm: a key of HELD_ARMS in `hobble.hurt.upper_body`.
 HELD_ARM_OF_PART = {"shoulder": "upper", "upper arm": "upper", "forearm": "fore", "hand": "carry"}
@@ -57,9 +58,9 @@ class Effects:
     """The changes of each of F frames of a clip, named as in `hobble.hurt.amounts`.
 
     body: name -> (F,). sided: name -> (F, 2), left and right. curves: (F, 5, 5) factors of CURVES, as in
-    `Profile` of `hobble.hurt.impairment_profiles`. strength: (F,) of the worst link, 0 to 1. shown_severity:
-    (F, L) severities of the L links, as the motion shows them: after a change of the requested severity they
-    follow over about a second.
+    `Profile` of `hobble.hurt.impairment_profiles`. strength: (F,) of the worst link, 0 to 1 (see POWER).
+    shown_severity: (F, L) severities of the L links, as the motion shows them: after a change of the
+    requested severity they follow over about a second.
     """
 
     body: dict[str, Array] = field(repr=False)
@@ -74,7 +75,7 @@ class Effects:
 
 
 def effects(skeleton: Skeleton, severity: Array, fps: float) -> Effects:
-    """The effects of severities (F, L), 0 to 10, of the skeleton's links.
+    """The effects of severities (F, L), 0 to 10, of the skeleton's links (the bones that can be hurt).
 
     If several links hurt, the result is at least the effect of the worst link and less than the sum of all.
     """
@@ -94,12 +95,13 @@ def effects(skeleton: Skeleton, severity: Array, fps: float) -> Effects:
             continue
         for name, amount in amounts(part).items():
             if name == "curves":
-                curves.add(part_strength[:, None, None] * _of_side(np.asarray(amount), side))
+                curves.add(part_strength[:, None, None] * _curves_of_side(np.asarray(amount), side))
             elif name in WHOLE_BODY:
                 body[name].add(part_strength * amount)
             else:
-                size = part_strength**TIMING_POWER if name.startswith(("land", "off")) else part_strength
-                _add_sided(sided, name, size * amount, side)
+                is_timing = name.startswith(("land", "off"))
+                growth = part_strength**TIMING_POWER if is_timing else part_strength
+                _add_sided(sided, name, growth * amount, side)
         if part in HELD_ARM_OF_PART and side is not None:
             _add_sided(sided, HELD_ARM_OF_PART[part], part_strength, side)
     return Effects(
@@ -112,35 +114,41 @@ def effects(skeleton: Skeleton, severity: Array, fps: float) -> Effects:
 
 
 def _shown_severity(strength: Array) -> Array:
-    """The severities (F, L) of strengths. Very small ones are 0."""
+    """The severities (F, L) of strengths (F, L). Severities below LEAST_SEVERITY become 0."""
     severity = np.round(HIGHEST * np.clip(strength, 0.0, 1.0) ** (1 / POWER), 3)
     return np.where(severity < LEAST_SEVERITY, 0.0, severity)
 
 
 def _add_sided(sided: dict[str, _Sum], name: str, values: Array, side: int | None) -> None:
+    """Add values (F,) of a change to the sum of the side that it changes. side: the hurt side."""
     if name == "arms":  # the change "arm" of both sides
         sided["arm"].add(np.stack([values, values], axis=1))
         return
-    hurt = RIGHT if side is None else side
-    at = 1 - hurt if name.endswith(SOUND_SUFFIX) else hurt
+    hurt = RIGHT if side is None else side  # a part on the midline has the same changes for both sides
+    changed_side = 1 - hurt if name.endswith(SOUND_SUFFIX) else hurt
     both = np.zeros((len(values), 2))
-    both[:, at] = values
+    both[:, changed_side] = values
     sided[name.removesuffix(SOUND_SUFFIX)].add(both)
 
 
-def _of_side(curves: Array, side: int | None) -> Array:
-    return curves * FLIPPED[:, None] * HALF_CYCLE_SIGNS if side == LEFT else curves
+def _curves_of_side(curves: Array, side: int | None) -> Array:
+    """The factors (5, 5) for a part hurt on `side`, from those for the right side.
+
+    For the left side the body is mirrored. The curves are also shifted by half a cycle, because phase 0 stays
+    the landing of the right foot.
+    """
+    return curves * MIRROR_SIGNS[:, None] * HALF_CYCLE_SIGNS if side == LEFT else curves
 
 
 class _Sum:
-    """A sum in which the largest term counts most, separately for positive and negative terms."""
+    """A sum in which large terms count most: p-norm of the positive minus p-norm of the negative terms."""
 
     def __init__(self, zero: Array) -> None:
-        self.more, self.less = zero.copy(), zero.copy()
+        self.positive, self.negative = zero.copy(), zero.copy()
 
     def add(self, term: Array) -> None:
-        self.more += np.maximum(term, 0.0) ** SUM_NORM
-        self.less += np.maximum(-term, 0.0) ** SUM_NORM
+        self.positive += np.maximum(term, 0.0) ** SUM_NORM
+        self.negative += np.maximum(-term, 0.0) ** SUM_NORM
 
     def value(self) -> Array:
-        return self.more ** (1 / SUM_NORM) - self.less ** (1 / SUM_NORM)
+        return self.positive ** (1 / SUM_NORM) - self.negative ** (1 / SUM_NORM)

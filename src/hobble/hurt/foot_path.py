@@ -1,6 +1,6 @@
-"""Moves the feet: shorter steps, less roll over the toe, a lower or wider swing.
+"""Moves the feet: makes steps shorter, the roll over the toe smaller, and swings lower or wider.
 
-All arrays have the frames of the healthy clip (the source).
+All arrays over frames have the F frames of the healthy clip (the source).
 """
 
 from __future__ import annotations
@@ -24,14 +24,14 @@ SIGN = (1.0, -1.0)  # sign of X on the left and on the right side of the figure
 # The foot's pitch is multiplied by the effect `strike` while its toe is up, by `push` while its heel is up.
 # The factor changes from `strike` to `push` as the heel rises by this angle, radians.
 BLEND_PITCH = np.radians(8.0)
-# The progress of a swing is measured mainly by time if its distance is shorter than this, else mainly by the
-# distance that is covered.
+# The progress of a swing is measured mainly by time if the swing is shorter than this, else mainly by the
+# distance that the foot has covered.
 SHORT_SWING_CM = 12.0
-# In mid-swing the toe joint stays at least this much above its height in stance, or at its height in the
-# source if this is lower.
+# In mid-swing the toe joint stays at least this much above its height in stance. If it is lower in the
+# source, it stays at least at its height there.
 CLEARANCE_CM = 1.3
-# A swing is lowered less if the stances before and after it differ in height: at this difference, 1 / e times
-# as much as on flat ground.
+# A swing is lowered less if the stances before and after it differ in height. At this difference, it is
+# lowered 1 / e times as much as on flat ground.
 UNEVEN_CM = 4.0
 JOGGING = 0.65  # in a jog, the change of a step's length is smaller by this share
 # The lower height of a swing is blended in over this share of its frames, and out over as many at its end.
@@ -42,101 +42,114 @@ BLEND_SHARE = 0.22
 class HurtFoot:
     """One foot over F source frames.
 
-    ankle, ball: (F, 3) positions of the joints with the roles heel and toe, cm. turn: (F, 4) rotation of the
-    foot in the world. toes: (F, 4) local rotation of the toe joint.
+    ankle, ball: (F, 3) positions of the joints with the roles heel and toe, cm. rotation: (F, 4) of the foot
+    in the world. toe_rotation: (F, 4) of the toe joint, local.
     """
 
     ankle: Array = field(repr=False)
     ball: Array = field(repr=False)
-    turn: Array = field(repr=False)
-    toes: Array = field(repr=False)
+    rotation: Array = field(repr=False)
+    toe_rotation: Array = field(repr=False)
 
 
-def rolled_foot(source: HealthyClip, effects: Effects, side: int) -> HurtFoot:
+def reduce_pitch(source: HealthyClip, effects: Effects, side: int) -> HurtFoot:
     """The source's foot with less pitch: turned about its ball while the heel is up, else about its ankle."""
     clip, skeleton = source.clip, source.clip.skeleton
     heel, toe = (skeleton.role(f"{SIDES[side]}_{role}") for role in ("heel", "toe"))
-    ankle, ball, turn = clip.positions[:, heel], clip.positions[:, toe], clip.global_rotations[:, heel]
+    ankle, ball, rotation = clip.positions[:, heel], clip.positions[:, toe], clip.global_rotations[:, heel]
     along = ball - ankle
-    axis = _hinge(turn, along, ~source.swinging[:, side])
+    axis = _pitch_axis(rotation, along, ~source.swinging[:, side])
     ahead = np.cross(UP, axis)
     pitch = np.arctan2(np.sum(along * np.cross(axis, ahead), axis=1), np.sum(along * ahead, axis=1))
-    middles = np.array([s.middle for s in source.stances[side]])
-    flat = np.interp(np.arange(len(clip)), middles, [_middle(pitch, s) for s in source.stances[side]])
-    raised = pitch - flat
-    heel_up = smoothstep(-raised / BLEND_PITCH)
+    stances = source.stances[side]
+    middles = np.array([stance.middle for stance in stances])
+    flat_pitch = np.interp(
+        np.arange(len(clip)), middles, [_median_in_stance(pitch, stance) for stance in stances]
+    )
+    toe_up = pitch - flat_pitch  # radians; negative while the heel is up
+    heel_up = smoothstep(-toe_up / BLEND_PITCH)  # 0..1
     push, strike = (effects.ratio(name)[:, side] for name in ("push", "strike"))
     # Toes also point down before landing, when they reach for the ground. This is reduced like a push-off.
     pitch_ratio = strike + (push - strike) * heel_up
-    tilt = quat.from_axis_angle(axis, raised * (pitch_ratio - 1))
+    tilt = quat.from_axis_angle(axis, toe_up * (pitch_ratio - 1))
     new_along = quat.rotate(tilt, along)
-    ankle = ankle + np.where(raised < 0, 1.0, 0.0)[:, None] * (along - new_along)
-    ankle = ankle - UP * _lowered_push_off(source, ball[:, 1], push, side)[:, None]
-    rest = quat.normalize(gaussian(quat.continuous(clip.rotations[:, toe]), 0.5 * clip.fps))
-    toes = quat.slerp(rest, clip.rotations[:, toe], pitch_ratio)
-    return HurtFoot(ankle, ankle + new_along, quat.mul(tilt, turn), toes)
+    # While the heel is up, the ankle moves so that the ball stays in its place.
+    ankle = ankle + np.where(toe_up < 0, 1.0, 0.0)[:, None] * (along - new_along)
+    ankle = ankle - UP * _push_off_lowering(source, ball[:, 1], push, side)[:, None]
+    # The toe joint bends less, too: its rotation is closer to its mean over about a second.
+    mean_rotation = quat.normalize(gaussian(quat.continuous(clip.rotations[:, toe]), 0.5 * clip.fps))
+    toe_rotation = quat.slerp(mean_rotation, clip.rotations[:, toe], pitch_ratio)
+    return HurtFoot(ankle, ankle + new_along, quat.mul(tilt, rotation), toe_rotation)
 
 
-def _lowered_push_off(source: HealthyClip, ball: Array, push: Array, side: int) -> Array:
+def _push_off_lowering(source: HealthyClip, ball: Array, push: Array, side: int) -> Array:
     """(F,) cm by which a foot with less push-off is lower.
 
-    A healthy foot rolls over its toes, so its ball rises before the foot leaves the ground. ball: (F,) height
-    of the ball. push: (F,) ratio of the push-off. The difference fades over the swing.
+    A healthy foot rolls over its toes, so its ball rises before the foot leaves the ground. With less
+    push-off, the ball rises less. Over the swing, the foot returns to its old height. ball: (F,) height of
+    the ball, cm. push: (F,) ratio of the push-off.
     """
-    lower, stances = np.zeros(len(ball)), source.stances[side]
+    lowering, stances = np.zeros(len(ball)), source.stances[side]
     for stance, following in itertools.zip_longest(stances, stances[1:]):
         middle, off = int(stance.middle), int(stance.off)
-        part = slice(middle, off + 1)
-        rise = np.maximum.accumulate(np.maximum(ball[part] - _middle(ball, stance), 0.0))
-        lower[part] = (1 - push[part]) * rise
+        frames = slice(middle, off + 1)
+        rise = np.maximum.accumulate(np.maximum(ball[frames] - _median_in_stance(ball, stance), 0.0))
+        lowering[frames] = (1 - push[frames]) * rise
         if following and following.land > off:
             land = int(following.land)
-            lower[off : land + 1] = lower[off] * smoothstep(np.linspace(1.0, 0.0, land + 1 - off))
-    return lower
+            lowering[off : land + 1] = lowering[off] * smoothstep(np.linspace(1.0, 0.0, land + 1 - off))
+    return lowering
 
 
-def _hinge(turn: Array, along: Array, stands: np.ndarray) -> Array:
-    """(F, 3) axis of the foot's pitch, positive for toe up: horizontal and across a standing foot.
+def _pitch_axis(rotation: Array, along: Array, stands: np.ndarray) -> Array:
+    """(F, 3) unit axis about which the foot pitches. Positive angles raise the toe.
 
-    turn: (F, 4) rotation of the foot. along: (F, 3) from ankle to ball. stands: (F,) bool.
+    The axis is fixed in the foot: on average over the standing foot, it is horizontal and across the foot.
+    rotation: (F, 4) of the foot. along: (F, 3) from ankle to ball. stands: (F,) bool.
     """
     across = np.cross(along, UP)
     size = np.linalg.norm(across, axis=1)
-    in_foot = quat.rotate(quat.inv(turn), across)[stands & (size > 0.3 * np.linalg.norm(along, axis=1))]
-    usual = in_foot.sum(axis=0) if len(in_foot) else np.array([-1.0, 0.0, 0.0])
-    return quat.rotate(turn, usual / max(float(np.linalg.norm(usual)), 1e-9))
+    not_steep = size > 0.3 * np.linalg.norm(along, axis=1)  # a steep foot tells little about its axis
+    across_in_foot = quat.rotate(quat.inv(rotation), across)[stands & not_steep]
+    mean_axis = across_in_foot.sum(axis=0) if len(across_in_foot) else np.array([-1.0, 0.0, 0.0])
+    return quat.rotate(rotation, mean_axis / max(float(np.linalg.norm(mean_axis)), 1e-9))
 
 
-def _middle(values: Array, stance: SourceStance) -> Array:
+def _median_in_stance(values: Array, stance: SourceStance) -> Array:
     """Median of values (F, ...) over the middle half of a stance."""
-    a, b = stance.land + 0.25 * (stance.off - stance.land), stance.land + 0.75 * (stance.off - stance.land)
-    return np.median(values[int(a) : int(np.ceil(b)) + 1], axis=0)
+    first = stance.land + 0.25 * (stance.off - stance.land)
+    last = stance.land + 0.75 * (stance.off - stance.land)
+    return np.median(values[int(first) : int(np.ceil(last)) + 1], axis=0)
 
 
-def ankle_places(foot: HurtFoot, stances: list[SourceStance]) -> list[Array]:
-    """For each stance, where the ankle is, (3,)."""
-    return [_middle(foot.ankle, stance) for stance in stances]
+def footprints_of(foot: HurtFoot, stances: list[SourceStance]) -> list[Array]:
+    """The footprint of each stance: the position (3,) of the ankle, cm."""
+    return [_median_in_stance(foot.ankle, stance) for stance in stances]
 
 
 def move_foot(
     source: HealthyClip, effects: Effects, path: ShortenedPath, foot: HurtFoot, side: int
 ) -> HurtFoot:
-    """The foot that `rolled_foot` returned, moved so that it follows the body's new path."""
+    """The foot that `reduce_pitch` returned, moved so that it follows the body's new path."""
     stances = source.stances[side]
-    old = ankle_places(foot, stances)
-    new = [
-        _moved(place, s.middle, source, effects, path, side) for place, s in zip(old, stances, strict=True)
+    old_footprints = footprints_of(foot, stances)
+    new_footprints = [
+        _new_footprint(old, stance.middle, source, effects, path, side)
+        for old, stance in zip(old_footprints, stances, strict=True)
     ]
     yaw = quat.yaw(np.radians(SIGN[side] * effects.sided["toe_out"][:, side]))
     ankle, least_ball = np.empty_like(foot.ankle), np.empty(len(source))
     ball = source.clip.positions[:, source.clip.skeleton.role(f"{SIDES[side]}_toe"), 1]
-    soles = [float(_middle(ball, stance)) for stance in stances]
-    rises = [float(b[1] - a[1]) for a, b in zip(old, new, strict=True)]
-    spans = [(int(s.land), int(s.off)) for s in stances]
-    for (first, last), place, new_place, sole, rise in zip(spans, old, new, soles, rises, strict=True):
-        part = slice(first, last + 1)
-        least_ball[part] = sole + rise + np.minimum(ball[part] - sole, 0.0)
-        ankle[part] = new_place + quat.rotate(yaw[part], foot.ankle[part] - place)
+    # Of each stance: height of the ball in the source, cm by which the footprint rises, first and last frame.
+    soles = [float(_median_in_stance(ball, stance)) for stance in stances]
+    rises = [float(new[1] - old[1]) for old, new in zip(old_footprints, new_footprints, strict=True)]
+    spans = [(int(stance.land), int(stance.off)) for stance in stances]
+    for (first, last), old, new, sole, rise in zip(
+        spans, old_footprints, new_footprints, soles, rises, strict=True
+    ):
+        frames = slice(first, last + 1)
+        least_ball[frames] = sole + rise + np.minimum(ball[frames] - sole, 0.0)
+        ankle[frames] = new + quat.rotate(yaw[frames], foot.ankle[frames] - old)
     along = quat.rotate(yaw, foot.ball - foot.ankle)
     lift = effects.ratio("lift")[:, side]
     out = effects.sided["out"][:, side] * source.leg * SIGN[side]
@@ -144,51 +157,59 @@ def move_foot(
     for i, ((_, off), (land, _)) in enumerate(itertools.pairwise(spans)):
         if land - off < 2:
             continue
-        part = slice(off, land + 1)
-        progress = _progress(foot.ankle[part])
+        frames = slice(off, land + 1)
+        progress = _progress(foot.ankle[frames])
+        # The ankle keeps its distance from the straight line between two footprints, but the line moves.
         line = foot.ankle[off] + (foot.ankle[land] - foot.ankle[off]) * progress
-        moved = ankle[off] + (ankle[land] - ankle[off]) * progress + foot.ankle[part] - line
-        u = np.linspace(0.0, 1.0, land - off + 1)
-        edge = smoothstep(u / BLEND_SHARE) * smoothstep((1 - u) / BLEND_SHARE)
-        even = np.exp(-abs(foot.ankle[land, 1] - foot.ankle[off, 1]) / UNEVEN_CM)
-        moved[:, 1] -= (1 - lift[part]) * even * edge * (foot.ankle[part, 1] - line[:, 1])
-        moved += outward[part] * (np.sin(np.pi * u) ** 2)[:, None]
+        swing = ankle[off] + (ankle[land] - ankle[off]) * progress + foot.ankle[frames] - line
+        u = np.linspace(0.0, 1.0, land - off + 1)  # share of the swing's time
+        blend = smoothstep(u / BLEND_SHARE) * smoothstep((1 - u) / BLEND_SHARE)
+        evenness = np.exp(-abs(foot.ankle[land, 1] - foot.ankle[off, 1]) / UNEVEN_CM)
+        swing[:, 1] -= (1 - lift[frames]) * evenness * blend * (foot.ankle[frames, 1] - line[:, 1])
+        swing += outward[frames] * (np.sin(np.pi * u) ** 2)[:, None]
         ground = soles[i] + (soles[i + 1] - soles[i]) * progress[:, 0]
-        up = rises[i] + (rises[i + 1] - rises[i]) * progress[:, 0]
-        above = ball[part] - ground
-        least_ball[part] = ground + up + np.minimum(above, CLEARANCE_CM * np.sin(np.pi * u))
-        ankle[part] = moved
+        rise_in_swing = rises[i] + (rises[i + 1] - rises[i]) * progress[:, 0]
+        above = ball[frames] - ground
+        clearance = np.minimum(above, CLEARANCE_CM * np.sin(np.pi * u))
+        least_ball[frames] = ground + rise_in_swing + clearance
+        ankle[frames] = swing
+    # Raise the foot where its ball would be too low.
     ankle[:, 1] += smooth_above(np.maximum(least_ball - ankle[:, 1] - along[:, 1], 0.0), 1)
-    return HurtFoot(ankle, ankle + along, quat.mul(yaw, foot.turn), foot.toes)
+    return HurtFoot(ankle, ankle + along, quat.mul(yaw, foot.rotation), foot.toe_rotation)
 
 
 def _progress(ankle: Array) -> Array:
     """(n, 1) progress of a swing in each frame, from 0 to 1.
 
-    It is the covered share of the horizontal distance, and in short swings mainly that of the time.
+    In long swings it is mainly the share of the horizontal distance that the ankle has covered. In short
+    swings it is mainly the share of the time that has passed. ankle: (n, 3).
     """
     over_ground = ankle * [1, 0, 1]
     whole = over_ground[-1] - over_ground[0]
     time = smoothstep(np.linspace(0.0, 1.0, len(ankle)))
-    by_time = SHORT_SWING_CM**2
-    return ((((over_ground - over_ground[0]) @ whole) + by_time * time) / (whole @ whole + by_time))[:, None]
+    time_weight = SHORT_SWING_CM**2  # the share of the distance has the weight whole @ whole
+    covered = (over_ground - over_ground[0]) @ whole
+    return ((covered + time_weight * time) / (whole @ whole + time_weight))[:, None]
 
 
-def _moved(
-    place: Array, when: float, source: HealthyClip, effects: Effects, path: ShortenedPath, side: int
+def _new_footprint(
+    old: Array, when: float, source: HealthyClip, effects: Effects, path: ShortenedPath, side: int
 ) -> Array:
-    """The new place (3,) of a footprint at `place` in source frame `when`.
+    """The new position (3,) of a footprint that is at `old` (3,) in source frame `when`, cm.
 
-    Footprints move with the body. Besides, the hurt foot lands less far ahead, and both feet land wider
-    apart.
+    Footprints move with the body. Besides, the hurt foot lands less far ahead, and the feet land further
+    apart sideways.
     """
-    at = min(round(when), len(source) - 1)
+    nearest = min(round(when), len(source) - 1)
     # Only the frames around `when` are read, because a long clip has thousands of footprints.
-    near = slice(max(at - 1, 0), at + 2)
-    speed = np.gradient(source.path[near], axis=0)[at - near.start] if len(source) > 1 else np.zeros(2)
+    near = slice(max(nearest - 1, 0), nearest + 2)
+    velocity = (
+        np.gradient(source.path[near], axis=0)[nearest - near.start] if len(source) > 1 else np.zeros(2)
+    )
     step = effects.sided["step"][near] * (1 - JOGGING * source.jog[near])[:, None]
-    ahead = value_at(step[:, side] - step[:, 1 - side], when - near.start)
-    ahead = ahead / 2 * speed * source.cycle[at] / 2
+    change = value_at(step[:, side] - step[:, 1 - side], when - near.start)
+    # A step lasts half a cycle. Half of its change is made by this foot, the other half by the other foot.
+    ahead = change / 2 * velocity * source.cycle[nearest] / 2
     width = value_at(effects.sided["width"][near].max(axis=1), when - near.start) * source.leg / 2
-    outward = quat.rotate(source.heading[at], np.array([SIGN[side] * width, 0.0, 0.0]))
-    return path.moved(place, when) + np.array([ahead[0], 0.0, ahead[1]]) + outward
+    outward = quat.rotate(source.heading[nearest], np.array([SIGN[side] * width, 0.0, 0.0]))
+    return path.moved(old, when) + np.array([ahead[0], 0.0, ahead[1]]) + outward

@@ -23,6 +23,8 @@ LONGEST_CYCLE_SECONDS = 2.5  # a longer time between two landings of a foot is n
 LEAST_SWING = 6  # frames: contacts in the labels shorten a swing, but not below this length
 PATH_SECONDS = 0.25  # sigma of the Gaussian that smooths the hips' positions to a path
 FACING_SECONDS = 0.2  # sigma of the Gaussian that smooths the heading
+WALKING_SECONDS = 0.2  # sigma of the Gaussian that smooths where the clip walks
+JOG_SECONDS = 0.1  # sigma of the Gaussian that smooths the share of jogging
 
 
 @dataclass(frozen=True)
@@ -34,7 +36,7 @@ class SourceStance:
 
     @property
     def middle(self) -> float:
-        """The source frame in the middle."""
+        """The source frame in the middle of the stance."""
         return (self.land + self.off) / 2
 
 
@@ -42,12 +44,12 @@ class SourceStance:
 class HealthyClip:
     """A healthy clip of F frames and its measurements. Pairs are left and right.
 
-    stances: of each foot, in order, at least one. swinging: (F, 2) whether a foot swings. swing: (F, 2) 0 in
-    stance; it rises to 1 and falls back to 0 over a swing. phase: (F,) cycles, unwrapped; whole numbers as
-    the right foot lands. walking: (F,) from 0 to 1, where 1 means that the phase is known. jog: (F,) share of
-    jogging in the gait. cycle: (F,) length in frames of the cycle around each frame. path: (F, 2) horizontal
-    path of the hips, x and z, cm. heading: (F, 4) rotation of the pelvis about Y. leg: cm from hip to ankle
-    of a straight leg.
+    stances: those of each foot, in order, at least one. swinging: (F, 2) bool, whether a foot swings. swing:
+    (F, 2) 0 in stance; it rises to 1 and falls back to 0 over a swing. phase: (F,) cycles, unwrapped; a whole
+    number as the right foot lands. walking: (F,) from 0 to 1, where 1 means that the phase is known. jog:
+    (F,) share of jogging in the gait, 0 to 1. cycle: (F,) length in frames of the cycle around each frame.
+    path: (F, 2) horizontal path of the hips, x and z, cm. heading: (F, 4) rotation of the pelvis about Y.
+    leg: cm from hip to ankle of a straight leg.
     """
 
     clip: Clip
@@ -68,7 +70,7 @@ class HealthyClip:
 
 
 def measure_healthy_clip(clip: Clip, labels: Labels) -> HealthyClip:
-    """Measure a healthy clip with its labels."""
+    """Measure a healthy clip. labels: its contacts, footsteps and gait."""
     frames, skeleton = len(clip), clip.skeleton
     options = LabelOptions()
     all_swings = find_swings(clip, options)
@@ -77,19 +79,23 @@ def measure_healthy_clip(clip: Clip, labels: Labels) -> HealthyClip:
         # `find_swings` numbers the right foot 0, the left one 1.
         swings = [(s.start, min(s.end, frames - 1)) for s in all_swings if s.foot == 1 - side]
         touches = np.asarray(labels.contacts[:, 2 * side : 2 * side + 2].any(axis=1))
-        swings = [_in_the_air(start, end, touches) for start, end in swings]
+        swings = [_without_contacts(start, end, touches) for start, end in swings]
         for start, end in swings:
             swinging[start:end, side] = True
-            u = (np.arange(start, end) - start + 0.5) / max(end - start, 1)
-            swing[start:end, side] = np.sin(np.pi * u) ** 2
-        ends = [0, *(x for pair in swings for x in pair), frames - 1]
+            share = (np.arange(start, end) - start + 0.5) / max(end - start, 1)  # of the swing's time
+            swing[start:end, side] = np.sin(np.pi * share) ** 2
+        # Stances fill the time before, between and after the swings.
+        ends = [0, *(frame for swing_ends in swings for frame in swing_ends), frames - 1]
         stances.append(
-            [SourceStance(float(a), float(max(a, b))) for a, b in zip(ends[::2], ends[1::2], strict=True)]
+            [
+                SourceStance(float(land), float(max(land, off)))
+                for land, off in zip(ends[::2], ends[1::2], strict=True)
+            ]
         )
     phase, known = phase_of_footsteps(labels.footsteps, frames)
-    step = np.diff(phase, prepend=phase[:1])
-    phase = phase[0] + np.cumsum(np.where(step < -0.5, step + 1.0, step)) if frames else phase
-    legs = [_length(clip, side) for side in SIDES]
+    change = np.diff(phase, prepend=phase[:1])
+    phase = phase[0] + np.cumsum(np.where(change < -0.5, change + 1.0, change)) if frames else phase
+    legs = [_leg_length(clip, side) for side in SIDES]
     return HealthyClip(
         clip,
         labels,
@@ -97,17 +103,20 @@ def measure_healthy_clip(clip: Clip, labels: Labels) -> HealthyClip:
         swinging,
         swing,
         phase,
-        gaussian(known.astype(float), 0.2 * clip.fps),
-        gaussian(labels.gait[:, GAITS.index("jog")], 0.1 * clip.fps),
-        _cycles((stances[LEFT], stances[RIGHT]), frames, clip.fps),
+        gaussian(known.astype(float), WALKING_SECONDS * clip.fps),
+        gaussian(labels.gait[:, GAITS.index("jog")], JOG_SECONDS * clip.fps),
+        _cycle_lengths((stances[LEFT], stances[RIGHT]), frames, clip.fps),
         gaussian(clip.positions[:, skeleton.role("hips")][:, [0, 2]], PATH_SECONDS * clip.fps),
         _heading(clip),
         float(np.mean(legs)),
     )
 
 
-def _in_the_air(start: int, end: int, touches: np.ndarray) -> tuple[int, int]:
-    """The swing without the frames at its ends in which the labels have a contact. touches: (F,) bool."""
+def _without_contacts(start: int, end: int, touches: np.ndarray) -> tuple[int, int]:
+    """The swing without the frames at its ends in which the foot touches the ground.
+
+    touches: (F,) bool, whether the labels have a contact of the foot.
+    """
     while end - start > LEAST_SWING and touches[start]:
         start += 1
     while end - start > LEAST_SWING and touches[end - 1]:
@@ -115,15 +124,18 @@ def _in_the_air(start: int, end: int, touches: np.ndarray) -> tuple[int, int]:
     return start, end
 
 
-def _length(clip: Clip, side: str) -> float:
+def _leg_length(clip: Clip, side: str) -> float:
+    """Length of thigh and shank together, cm."""
     offsets = clip.skeleton.offsets
-    return float(sum(np.linalg.norm(offsets[clip.skeleton.role(f"{side}_{b}")]) for b in ("knee", "heel")))
+    joints = [clip.skeleton.role(f"{side}_{role}") for role in ("knee", "heel")]
+    return float(sum(np.linalg.norm(offsets[joint]) for joint in joints))
 
 
-def _cycles(stances: tuple[list[SourceStance], list[SourceStance]], frames: int, fps: float) -> Array:
+def _cycle_lengths(stances: tuple[list[SourceStance], list[SourceStance]], frames: int, fps: float) -> Array:
     """(frames,) length of the cycle around each frame: frames from a foot's landing to its next landing.
 
-    The cycles of both feet count; the lengths are interpolated between the middles of the cycles.
+    The cycles of both feet count. The lengths are interpolated between the middles of the cycles. The first
+    stance of a foot is left out, because it begins with the clip and not with a landing.
     """
     middles, lengths = [], []
     for of_foot in stances:
@@ -138,6 +150,7 @@ def _cycles(stances: tuple[list[SourceStance], list[SourceStance]], frames: int,
 
 
 def _heading(clip: Clip) -> Array:
+    """(F, 4) rotation about Y from +Z to the direction in which the pelvis faces."""
     left, right = (clip.positions[:, clip.skeleton.role(f"{side}_hip")] for side in SIDES)
     forward = gaussian(np.cross(left - right, UP), FACING_SECONDS * clip.fps)
     return quat.yaw(np.arctan2(forward[:, 0], forward[:, 2]))

@@ -1,4 +1,4 @@
-"""Makes the hurt version of a healthy clip."""
+"""Makes the hurt version of a healthy clip: the motion of a person with hurt parts of the body."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from hobble.core.skeleton import local_rotations
 from hobble.core.smooth import gaussian
 from hobble.hurt.body_parts import LEFT, RIGHT, SIDES
 from hobble.hurt.effects import HIGHEST, Effects, effects
-from hobble.hurt.foot_path import HurtFoot, ankle_places, move_foot, rolled_foot
+from hobble.hurt.foot_path import HurtFoot, footprints_of, move_foot, reduce_pitch
 from hobble.hurt.healthy_clip import HealthyClip, measure_healthy_clip
 from hobble.hurt.interpolate import at_frames, turns_at
 from hobble.hurt.legs import Leg, hips_height, knee_flexion, place_leg, reach_of, read_leg
@@ -24,7 +24,7 @@ from hobble.hurt.timing import Timing, retime
 from hobble.hurt.upper_body import change_body
 from hobble.labels.clip_labels import Labels
 
-# Radians of knee flexion: a knee that lifts the hips straightens at most to this. In the recordings of
+# Radians of knee flexion: a knee that straightens to lift the hips stops here. In the recordings of
 # impaired walks, the sound knee is bent by 8 to 10 degrees while a stiff leg swings.
 STRAIGHT = np.radians(9.0)
 
@@ -33,9 +33,9 @@ STRAIGHT = np.radians(9.0)
 class HurtClip:
     """A hurt clip of N frames.
 
-    severity: (N, L) severities of the L links, as the motion shows them: after a change of the requested
-    severity they follow over about a second. labels: of the hurt clip. when: (N,) the frame of the healthy
-    clip, with fractions, that the body shows in each frame.
+    severity: (N, L) severities of the L links (the bones that can be hurt), as the motion shows them: after a
+    change of the requested severity they follow over about a second. labels: those of the hurt clip. when:
+    (N,) the frame of the healthy clip, with fractions, that the body shows in each frame.
     """
 
     clip: Clip
@@ -55,9 +55,10 @@ def hurt_clip(
 ) -> HurtClip:
     """The clip as a person with these severities would walk it.
 
-    labels: of the clip. severity: (F, L), 0 to 10, of the skeleton's L links. name: of the result; None: the
-    clip's name. flat: whether the ground is flat; on other ground, climbs get lower as steps get shorter.
-    zero, margins: the options `phase_zero` and `margins` of a data set's section `labels`.
+    labels: those of the clip. severity: (F, L), 0 to 10, of the skeleton's L links. name: name of the result;
+    None: the clip's name. flat: whether the ground is flat; on other ground, climbs get lower as steps get
+    shorter. zero: the foot that lands at phase 0. margins: which gait cycles near the ends of the clip are
+    labelled, see `MARGINS` in `hobble.labels.phase`.
 
     The clip gets longer if the cadence falls. The path keeps its shape, but gets shorter with the steps. If
     all severities are 0, or the clip has fewer than 3 frames, the motion is not changed. Raises HobbleError
@@ -66,40 +67,46 @@ def hurt_clip(
     severity = np.asarray(severity, float)
     if severity.shape != (len(clip), len(clip.skeleton.links)):
         raise HobbleError(
-            f"clip {clip.name}: the severities have shape {severity.shape}, but there are {len(clip)} frames "
-            f"and {len(clip.skeleton.links)} links"
+            f"clip {clip.name}: the severities have shape {severity.shape}, but should have shape "
+            f"({len(clip)}, {len(clip.skeleton.links)}): frames, links"
         )
     if not np.isfinite(severity).all() or severity.min(initial=0) < 0 or severity.max(initial=0) > HIGHEST:
-        raise HobbleError(f"clip {clip.name}: a severity is not in 0..10")
+        raise HobbleError(f"clip {clip.name}: every severity should be a number from 0 to 10")
     name = clip.name if name is None else name
     if not severity.any() or len(clip) < 3:
-        same = Clip(name, clip.skeleton, clip.fps, clip.rotations, clip.root, clip.translations)
-        return HurtClip(same, severity, labels, np.arange(len(clip), dtype=float))
+        unchanged = Clip(name, clip.skeleton, clip.fps, clip.rotations, clip.root, clip.translations)
+        return HurtClip(unchanged, severity, labels, np.arange(len(clip), dtype=float))
     if clip.translations is not None:
         raise HobbleError(f"clip {clip.name} has bones that change their length, so it cannot be hurt")
     source = measure_healthy_clip(clip, labels)
     changes = effects(clip.skeleton, severity, clip.fps)
     timing = retime(source, changes)
-    feet = [rolled_foot(source, changes, side) for side in (LEFT, RIGHT)]
-    path = shorten(source, changes, timing.slower, None if flat else _ground(source, feet))
+    feet = [reduce_pitch(source, changes, side) for side in (LEFT, RIGHT)]
+    path = shorten(source, changes, timing.slower, None if flat else _ground_heights(source, feet))
     feet = [move_foot(source, changes, path, feet[side], side) for side in (LEFT, RIGHT)]
-    out = _assembled(source, changes, timing, path, feet, name)
-    shown = np.clip(np.floor(timing.body + 1e-6).astype(int), 0, len(clip) - 1)
-    return HurtClip(out, changes.shown_severity[shown], relabel(labels, timing, zero, margins), timing.body)
+    out = _assemble(source, changes, timing, path, feet, name)
+    source_frame = np.clip(np.floor(timing.body + 1e-6).astype(int), 0, len(clip) - 1)
+    return HurtClip(
+        out, changes.shown_severity[source_frame], relabel(labels, timing, zero, margins), timing.body
+    )
 
 
-def _ground(source: HealthyClip, feet: list[HurtFoot]) -> Array:
+def _ground_heights(source: HealthyClip, feet: list[HurtFoot]) -> Array:
     """(F,) height of the ground below the body, cm, from the footprints."""
     heights = []
     for side in (LEFT, RIGHT):
         stances = source.stances[side]
+        footprints = footprints_of(feet[side], stances)
         heights.append(
-            [(s.middle, float(p[1])) for s, p in zip(stances, ankle_places(feet[side], stances), strict=True)]
+            [
+                (stance.middle, float(footprint[1]))
+                for stance, footprint in zip(stances, footprints, strict=True)
+            ]
         )
     return ground_below(source, heights)
 
 
-def _assembled(
+def _assemble(
     source: HealthyClip,
     changes: Effects,
     timing: Timing,
@@ -107,7 +114,10 @@ def _assembled(
     feet: list[HurtFoot],
     name: str,
 ) -> Clip:
-    """The hurt clip, put together from body, height of the hips, and legs, each at its times in `timing`."""
+    """The hurt clip, put together from the upper body, the height of the hips, and the legs.
+
+    Body and legs are sampled at their own times in `timing`.
+    """
     clip, skeleton = source.clip, source.clip.skeleton
     world = turns_at(change_body(source, changes), timing.body)
     shift = np.stack(
@@ -117,13 +127,13 @@ def _assembled(
     root = at_frames(clip.root + shift, timing.body)
     legs = [read_leg(clip, side) for side in (LEFT, RIGHT)]
     pelvis = world[:, skeleton.role("hips")]
-    hips = [_from_root(source, world, side) for side in (LEFT, RIGHT)]
+    hips = [_hip_from_root(source, world, side) for side in (LEFT, RIGHT)]
     ankles = [at_frames(feet[side].ankle, timing.legs[:, side]) for side in (LEFT, RIGHT)]
     stands = [
         at_frames(gaussian(1.0 - source.swinging[:, side], 2.0), timing.legs[:, side])
         for side in (LEFT, RIGHT)
     ]
-    reaches = [_reach(legs[side], changes, source, timing, side) for side in (LEFT, RIGHT)]
+    reaches = [_desired_reach(legs[side], changes, source, timing, side) for side in (LEFT, RIGHT)]
     root[:, 1] = hips_height(root, hips, ankles, reaches, stands, [leg.longest for leg in legs])
     for side in (LEFT, RIGHT):
         thigh, knee, heel, toe = (skeleton.role(f"{SIDES[side]}_{r}") for r in ("hip", "knee", "heel", "toe"))
@@ -131,13 +141,13 @@ def _assembled(
         world[:, thigh], world[:, knee] = place_leg(
             skeleton, side, legs[side], when, pelvis, root + hips[side], ankles[side]
         )
-        world[:, heel] = turns_at(feet[side].turn, when)
-        world[:, toe] = quat.mul(world[:, heel], turns_at(feet[side].toes, when))
+        world[:, heel] = turns_at(feet[side].rotation, when)
+        world[:, toe] = quat.mul(world[:, heel], turns_at(feet[side].toe_rotation, when))
     return Clip(name, skeleton, clip.fps, local_rotations(skeleton, world), root)
 
 
-def _from_root(source: HealthyClip, world: Array, side: int) -> Array:
-    """(N, 3) position of a hip joint relative to the root joint."""
+def _hip_from_root(source: HealthyClip, world: Array, side: int) -> Array:
+    """(N, 3) position of a hip joint relative to the root joint. world: (N, J, 4) world rotations."""
     skeleton = source.clip.skeleton
     joint, out = skeleton.role(f"{SIDES[side]}_hip"), np.zeros((len(world), 3))
     while (parent := skeleton.parents[joint]) >= 0:
@@ -146,7 +156,7 @@ def _from_root(source: HealthyClip, world: Array, side: int) -> Array:
     return out
 
 
-def _reach(leg: Leg, changes: Effects, source: HealthyClip, timing: Timing, side: int) -> Array:
+def _desired_reach(leg: Leg, changes: Effects, source: HealthyClip, timing: Timing, side: int) -> Array:
     """(N,) desired distance from hip to ankle of a standing leg, cm.
 
     The knee bends more if the leg is spared (`crouch`). It bends less while the other leg swings stiffly
@@ -155,8 +165,8 @@ def _reach(leg: Leg, changes: Effects, source: HealthyClip, timing: Timing, side
     when, other_when = timing.legs[:, side], timing.legs[:, 1 - side]
     crouch = np.radians(changes.sided["crouch"][:, side]) * (1 - source.swing[:, side])
     bend = at_frames(knee_flexion(leg.reach, leg.upper, leg.lower) + crouch, when)
-    lifts = np.clip(changes.sided["vault"][:, side], 0.0, 1.0) * source.swing[:, 1 - side]
-    vault = at_frames(lifts, other_when)
+    source_vault = np.clip(changes.sided["vault"][:, side], 0.0, 1.0) * source.swing[:, 1 - side]
+    vault = at_frames(source_vault, other_when)
     bend = bend - vault * np.maximum(bend - STRAIGHT, 0.0)
     changed = (at_frames(crouch, when) > 0) | (vault > 0)
     return np.where(changed, reach_of(bend, leg.upper, leg.lower), at_frames(leg.reach, when))

@@ -17,7 +17,7 @@ from hobble.core.quat import Array
 from hobble.core.skeleton import Skeleton
 from hobble.evaluation.captured import captured, rotate_by_yaw
 from hobble.evaluation.crowd import FPS
-from hobble.gait.cycles import WalkCycles, joined, measure
+from hobble.gait.cycles import WalkCycles, join_walks, measure
 from hobble.gait.people import people
 from hobble.gait.profile import Profile, profile
 from hobble.measures.clip_parts import ClipPart
@@ -112,7 +112,7 @@ def healthy_reference(captured_walk: CapturedWalk, walks: Sequence[CapturedWalk]
     of_performer = [other for other in healthy if other.performer == captured_walk.performer]
     for chosen, whose in ((of_performer, "performer"), (healthy, "data set")):
         if chosen:
-            return profile(joined(other.walk for other in chosen)), whose
+            return profile(join_walks(other.walk for other in chosen)), whose
     return people().normal(), "people"
 
 
@@ -142,7 +142,7 @@ def _walk_of_clip(
             yaw = np.concatenate([[0.0], -np.cumsum(turn[stretch.rows])[:-1]])
             walks.append(measure(skeleton, _in_world(stretch.local, stretch.root, yaw), FPS))
             speeds.append(np.hypot(stretch.velocity[:, 0], stretch.velocity[:, 1]).mean())
-    walk = joined(walks) if walks else WalkCycles(FPS, (), ())
+    walk = join_walks(walks) if walks else WalkCycles(FPS, (), ())
     if not len(walk):
         return []
     hurt = {link: float(value) for link, value in zip(links, severity[0], strict=True) if value > 0}
