@@ -14,7 +14,7 @@ import functools
 import numpy as np
 
 from hobble.core.quat import Array
-from hobble.hurt.impairment_profiles import CURVES, HARMONICS, profiles
+from hobble.hurt.impairment_profiles import CURVES, HARMONICS, read_profiles
 
 # part -> impairment profiles and their weights. Parts that are not here have only ADDED_CHANGES.
 MIXES: dict[str, dict[str, float]] = {
@@ -123,7 +123,7 @@ def _of_people(
     part: str, mix: dict[str, float], changes: dict[str, float]
 ) -> tuple[dict[str, float], dict[str, float | Array]]:
     """Add a mix of profiles to `changes`. Returns the values of the mix that are no ratios separately."""
-    profile_of = profiles()
+    profile_of = read_profiles()
 
     def mean(name: str) -> float:
         return float(sum(share * getattr(profile_of[p], name) for p, share in mix.items()))

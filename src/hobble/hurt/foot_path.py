@@ -191,4 +191,4 @@ def _moved(
     ahead = ahead / 2 * speed * source.cycle[at] / 2
     width = value_at(effects.sided["width"][near].max(axis=1), when - near.start) * source.leg / 2
     outward = quat.rotate(source.heading[at], np.array([SIGN[side] * width, 0.0, 0.0]))
-    return path.moved(place, when) + np.array([ahead[0], 0.0, ahead[1]]) + outward
+    return path.move_point(place, when) + np.array([ahead[0], 0.0, ahead[1]]) + outward

@@ -16,7 +16,7 @@ from hobble.hurt.body_parts import LEFT, RIGHT, SIDES
 from hobble.hurt.effects import HIGHEST, Effects, effects
 from hobble.hurt.foot_path import HurtFoot, ankle_places, move_foot, rolled_foot
 from hobble.hurt.healthy_clip import HealthyClip, measure_healthy_clip
-from hobble.hurt.interpolate import at_frames, turns_at
+from hobble.hurt.interpolate import at_frames, rotations_at_frames
 from hobble.hurt.legs import Leg, hips_height, knee_flexion, place_leg, reach_of, read_leg
 from hobble.hurt.relabel import relabel
 from hobble.hurt.shortened_path import ShortenedPath, ground_below, shorten
@@ -81,7 +81,7 @@ def hurt_clip(
     changes = effects(clip.skeleton, severity, clip.fps)
     timing = retime(source, changes)
     feet = [rolled_foot(source, changes, side) for side in (LEFT, RIGHT)]
-    path = shorten(source, changes, timing.slower, None if flat else _ground(source, feet))
+    path = shorten(source, changes, timing.stride_ratio, None if flat else _ground(source, feet))
     feet = [move_foot(source, changes, path, feet[side], side) for side in (LEFT, RIGHT)]
     out = _assembled(source, changes, timing, path, feet, name)
     shown = np.clip(np.floor(timing.body + 1e-6).astype(int), 0, len(clip) - 1)
@@ -109,7 +109,7 @@ def _assembled(
 ) -> Clip:
     """The hurt clip, put together from body, height of the hips, and legs, each at its times in `timing`."""
     clip, skeleton = source.clip, source.clip.skeleton
-    world = turns_at(change_body(source, changes), timing.body)
+    world = rotations_at_frames(change_body(source, changes), timing.body)
     shift = np.stack(
         [path.new[:, 0] - path.old[:, 0], path.new_ground - path.old_ground, path.new[:, 1] - path.old[:, 1]],
         axis=1,
@@ -131,8 +131,8 @@ def _assembled(
         world[:, thigh], world[:, knee] = place_leg(
             skeleton, side, legs[side], when, pelvis, root + hips[side], ankles[side]
         )
-        world[:, heel] = turns_at(feet[side].turn, when)
-        world[:, toe] = quat.mul(world[:, heel], turns_at(feet[side].toes, when))
+        world[:, heel] = rotations_at_frames(feet[side].turn, when)
+        world[:, toe] = quat.mul(world[:, heel], rotations_at_frames(feet[side].toes, when))
     return Clip(name, skeleton, clip.fps, local_rotations(skeleton, world), root)
 
 
