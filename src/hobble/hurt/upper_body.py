@@ -16,9 +16,7 @@ from hobble.hurt.impairment_profiles import HARMONICS
 
 X, Y, Z = np.eye(3)
 PELVIS_LEAN = 0.35  # the pelvis tilts forward by this share of the trunk's lean
-PELVIS_STIFFNESS = (
-    0.7  # the pelvis loses this times as much of its movement as a stiff back loses
-)
+PELVIS_STIFFNESS = 0.7  # the pelvis loses this times as much of its movement as a stiff back loses
 POSTURE_SECONDS = 0.5  # sigma of the Gaussian over time that gives a joint's mean posture
 LOOK_AHEAD = 0.85  # share of the trunk's lean that the head undoes, to look ahead
 ARM_STILL = 0.93  # a held arm loses up to this share of its movement
