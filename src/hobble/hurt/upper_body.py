@@ -168,7 +168,7 @@ def _hold_arm(source: HealthyClip, effects: Effects, world: Array, side: int) ->
     mirror = np.array([1.0 if side == LEFT else -1.0, 1.0, 1.0])
     shoulder, elbow, wrist = (skeleton.role(f"{SIDES[side]}_{r}") for r in ("shoulder", "elbow", "wrist"))
     for bone, (joint, end) in enumerate(((shoulder, elbow), (elbow, wrist))):
-        direction = np.zeros((len(source), 3))  # x is left, y is up, z is forward
+        direction: Array = np.zeros((len(source), 3))  # x is left, y is up, z is forward
         for name, directions in HELD_ARMS.items():
             forward, left, up = directions[bone]
             direction += (weights[name] / total)[:, None] * np.array([left, up, forward]) * mirror
