@@ -18,7 +18,7 @@ from hobble.config.sections import LabelOptions, Synthetic
 from hobble.core.clip import Clip, load_clip
 from hobble.core.processors import processor
 from hobble.labels.contacts import contacts, stance
-from hobble.labels.footfall import find_swings, landings
+from hobble.labels.footfall import find_landings, find_swings
 from hobble.labels.gait import automatic_gait
 from hobble.labels.label import label_clip
 from hobble.motion.make import make_clip
@@ -68,7 +68,7 @@ def main() -> None:
         "world positions, once": kinematics,
         "contacts": best_of(3, lambda: [contacts(c, options) for c in clips]),
         "swings and landings": best_of(
-            3, lambda: [landings(find_swings(c, options), len(c), options.shortest_step) for c in clips]
+            3, lambda: [find_landings(find_swings(c, options), len(c), options.shortest_step) for c in clips]
         ),
         "gait": best_of(3, lambda: [automatic_gait(c, stance(c, options), None) for c in clips]),
     }

@@ -12,7 +12,7 @@ import yaml
 from hobble.core.errors import HobbleError
 from hobble.hurt.body_parts import part_of_link
 from hobble.hurt.options import Hurt
-from hobble.hurt.schedule import ARMS, severities
+from hobble.hurt.schedule import ARMS, schedule_severities
 from hobble.hurt.version import UNCUT_SECONDS
 from hobble.workflow.project import Project
 
@@ -22,7 +22,7 @@ def seconds_hurt(skeleton, versions, frames, options):
     out = np.zeros(len(skeleton.links))
     for name, turn in versions.items():
         clip = name.rpartition("_hurt")[0]
-        severity = severities(skeleton, frames[clip], 60.0, options(clip), name, turn)
+        severity = schedule_severities(skeleton, frames[clip], 60.0, options(clip), name, turn)
         if len(severity) >= UNCUT_SECONDS * 60:
             severity = severity[: round(options(clip).longest * len(severity))]
         out += (severity > 0).sum(axis=0) / 60
@@ -66,7 +66,7 @@ def test_hurt_versions_of_the_captured_clips_hurt_all_thirty_links(root, shared,
 
 def test_an_injury_has_the_highest_severity_for_half_of_its_time(holden31) -> None:
     options = Hurt(links=("LeftUpLeg-LeftLeg",), at_once=1)
-    out = severities(holden31, 360 * 40, 60.0, options, "a", 0)
+    out = schedule_severities(holden31, 360 * 40, 60.0, options, "a", 0)
     column = out[:, holden31.link_names.index("LeftUpLeg-LeftLeg")].reshape(40, 2, 180)
     assert np.ptp(column, axis=2).max() == 0  # two halves of three seconds
     halves = column[:, :, 0]
@@ -77,20 +77,21 @@ def test_an_injury_has_the_highest_severity_for_half_of_its_time(holden31) -> No
 
 def test_arms_are_often_hurt_beside_another_part_but_never_too_many_at_once(holden31) -> None:
     arms = [part_of_link(holden31, link).name in ARMS for link in holden31.links]
-    out = severities(holden31, 360 * 400, 60.0, Hurt(), "a", 0)[::180] > 0  # each half of each stretch
+    # Every 180th frame: each half of each stretch.
+    out = schedule_severities(holden31, 360 * 400, 60.0, Hurt(), "a", 0)[::180] > 0
     assert 0.3 < (out[:, arms].any(axis=1) & (out.sum(axis=1) == 2)).mean() < 0.7
     assert out.sum(axis=1).max() == 2
-    alone = severities(holden31, 360 * 400, 60.0, Hurt(at_once=1), "a", 0)[::180] > 0
+    alone = schedule_severities(holden31, 360 * 400, 60.0, Hurt(at_once=1), "a", 0)[::180] > 0
     assert alone.sum(axis=1).max() == 1
-    legs = severities(holden31, 360 * 400, 60.0, Hurt(links=("LeftUpLeg-LeftLeg",)), "a", 0)
+    legs = schedule_severities(holden31, 360 * 400, 60.0, Hurt(links=("LeftUpLeg-LeftLeg",)), "a", 0)
     assert not legs[:, arms].any()
 
 
 def test_a_clip_s_severities_are_its_own_and_always_the_same(holden31) -> None:
     options = Hurt()
-    one = severities(holden31, 900, 60.0, options, "a_hurt1", 3)
-    assert one.tobytes() == severities(holden31, 900, 60.0, options, "a_hurt1", 3).tobytes()
-    assert not np.array_equal(one, severities(holden31, 900, 60.0, options, "a_hurt1", 4))
+    one = schedule_severities(holden31, 900, 60.0, options, "a_hurt1", 3)
+    assert one.tobytes() == schedule_severities(holden31, 900, 60.0, options, "a_hurt1", 3).tobytes()
+    assert not np.array_equal(one, schedule_severities(holden31, 900, 60.0, options, "a_hurt1", 4))
     assert set(np.unique(one)) <= {0.0, *options.severities}
     assert (one > 0).any(axis=1).all()
     assert (one > 0).sum(axis=1).max() <= options.at_once
@@ -98,12 +99,12 @@ def test_a_clip_s_severities_are_its_own_and_always_the_same(holden31) -> None:
 
 def test_only_the_configured_links_are_hurt(holden31) -> None:
     links = ("LeftUpLeg-LeftLeg", "Neck-Neck1")
-    out = severities(holden31, 6000, 60.0, Hurt(links=links, severities=(4.0,), at_once=1), "a", 0)
+    out = schedule_severities(holden31, 6000, 60.0, Hurt(links=links, severities=(4.0,), at_once=1), "a", 0)
     hurt = {holden31.link_names[i] for i in np.flatnonzero(out.any(axis=0))}
     assert hurt == set(links)
     assert set(np.unique(out)) == {0.0, 4.0}
     with pytest.raises(HobbleError, match="holden31 has no link LeftKnee-LeftShin"):
-        severities(holden31, 600, 60.0, Hurt(links=("LeftKnee-LeftShin",)), "a", 0)
+        schedule_severities(holden31, 600, 60.0, Hurt(links=("LeftKnee-LeftShin",)), "a", 0)
 
 
 def test_every_link_belongs_to_a_part_and_its_mirror_image_to_the_same(holden31) -> None:

@@ -67,7 +67,9 @@ def test_frames_with_a_severity_are_as_fast_as_a_clip_with_it_throughout(changin
 def test_without_in_between_no_cycle_has_a_severity_in_between(made, mirrored) -> None:
     clip, labels, _ = made("straight")
     options = Hurt(severities=(10.0,), seconds=5, at_once=1, in_between=False, longest=1)
-    hurt, report = hurt_version(clip, labels, REPORT, options, name="a_hurt1", turn=0, ground="flat")
+    hurt, report = hurt_version(
+        clip, labels, REPORT, options, name="a_hurt1", version_number=0, ground="flat"
+    )
     severity, own = hurt.severity, hurt.labels
     if mirrored:
         own, _ = mirror_labels(own, report, mirror_clip(hurt.clip, "image"))
@@ -77,8 +79,8 @@ def test_without_in_between_no_cycle_has_a_severity_in_between(made, mirrored) -
     assert (np.minimum(shown, np.abs(shown - 10)) <= SEVERITY_TOLERANCE).all()
     assert (shown > 9).any(axis=1).mean() > 0.9
     kept, _ = hurt_version(
-        clip, labels, REPORT, options.model_copy(update={"in_between": True}), name="a_hurt1", turn=0,
-        ground="flat",
+        clip, labels, REPORT, options.model_copy(update={"in_between": True}), name="a_hurt1",
+        version_number=0, ground="flat",
     )  # fmt: skip
     everything = np.concatenate([np.arange(a, b + 1) for a, b in kept.labels.cycles])
     assert (np.abs(kept.severity[everything] - 5) < 3).any()

@@ -7,14 +7,14 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from hobble.labels.footfall import SETTLING_CM, find_swings, foot_speeds, landings
+from hobble.labels.footfall import SETTLING_CM, find_landings, find_swings, foot_speeds
 from hobble.labels.options import LabelOptions
 from hobble.labels.phase import find_cycles, phase_of_footsteps, rows_of_landings
 
 
 def found(clip):
     swings = find_swings(clip, LabelOptions())
-    return swings, landings(swings, len(clip), 5)
+    return swings, find_landings(swings, len(clip), 5)
 
 
 @pytest.mark.parametrize("limp", [0.5, 0.3, 0.7])

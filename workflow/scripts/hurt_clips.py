@@ -22,7 +22,7 @@ def make(piece, log):
         LabelReport.from_dict(read_json(piece.input["label_report"])),
         Hurt.model_validate(piece.params["options"]),
         name=piece.name,
-        turn=piece.params["turn"],
+        version_number=piece.params["turn"],
         ground=piece.params["ground"],
     )
     motion = {**read_json(piece.input["report"]), "clip": hurt.clip.name, "hurt_of": clip.name}

@@ -2,10 +2,10 @@
 
 import sys
 
-from hobble.hurt.impairment_profiles import FILE, derive
+from hobble.hurt.impairment_profiles import PROFILES_FILE, derive_profiles
 
 if __name__ == "__main__":
     if len(sys.argv) != 2 or sys.argv[1].startswith("-"):
         sys.exit(__doc__)
-    derive(sys.argv[1])
-    print(FILE)
+    derive_profiles(sys.argv[1])
+    print(PROFILES_FILE)

@@ -14,7 +14,7 @@ import functools
 import numpy as np
 
 from hobble.core.quat import Array
-from hobble.hurt.impairment_profiles import CURVES, HARMONICS, profiles
+from hobble.hurt.impairment_profiles import CURVES, HARMONICS, read_profiles
 
 # Part -> impairment profiles and their weights. Parts that are not here have only ADDED_CHANGES.
 MIXES: dict[str, dict[str, float]] = {
@@ -128,7 +128,7 @@ def _add_mix(
     Returns `changes` with the ratios of the mix added (those in `changes` have priority), and the other
     changes of the mix, which are differences from the healthy clip.
     """
-    profile_of = profiles()
+    profile_of = read_profiles()
 
     def mixed(name: str) -> float:
         return float(sum(share * getattr(profile_of[p], name) for p, share in mix.items()))

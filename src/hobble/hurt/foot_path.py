@@ -212,4 +212,4 @@ def _new_footprint(
     ahead = change / 2 * velocity * source.cycle[nearest] / 2
     width = value_at(effects.sided["width"][near].max(axis=1), when - near.start) * source.leg / 2
     outward = quat.rotate(source.heading[nearest], np.array([SIGN[side] * width, 0.0, 0.0]))
-    return path.moved(old, when) + np.array([ahead[0], 0.0, ahead[1]]) + outward
+    return path.move_point(old, when) + np.array([ahead[0], 0.0, ahead[1]]) + outward

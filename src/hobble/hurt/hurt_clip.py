@@ -16,7 +16,7 @@ from hobble.hurt.body_parts import LEFT, RIGHT, SIDES
 from hobble.hurt.effects import HIGHEST, Effects, effects
 from hobble.hurt.foot_path import HurtFoot, footprints_of, move_foot, reduce_pitch
 from hobble.hurt.healthy_clip import HealthyClip, measure_healthy_clip
-from hobble.hurt.interpolate import at_frames, turns_at
+from hobble.hurt.interpolate import at_frames, rotations_at_frames
 from hobble.hurt.legs import Leg, hips_height, knee_flexion, place_leg, reach_of, read_leg
 from hobble.hurt.relabel import relabel
 from hobble.hurt.shortened_path import ShortenedPath, ground_below, shorten
@@ -82,7 +82,7 @@ def hurt_clip(
     changes = effects(clip.skeleton, severity, clip.fps)
     timing = retime(source, changes)
     feet = [reduce_pitch(source, changes, side) for side in (LEFT, RIGHT)]
-    path = shorten(source, changes, timing.slower, None if flat else _ground_heights(source, feet))
+    path = shorten(source, changes, timing.stride_ratio, None if flat else _ground_heights(source, feet))
     feet = [move_foot(source, changes, path, feet[side], side) for side in (LEFT, RIGHT)]
     out = _assemble(source, changes, timing, path, feet, name)
     source_frame = np.clip(np.floor(timing.body + 1e-6).astype(int), 0, len(clip) - 1)
@@ -119,7 +119,7 @@ def _assemble(
     Body and legs are sampled at their own times in `timing`.
     """
     clip, skeleton = source.clip, source.clip.skeleton
-    world = turns_at(change_body(source, changes), timing.body)
+    world = rotations_at_frames(change_body(source, changes), timing.body)
     shift = np.stack(
         [path.new[:, 0] - path.old[:, 0], path.new_ground - path.old_ground, path.new[:, 1] - path.old[:, 1]],
         axis=1,
@@ -141,8 +141,8 @@ def _assemble(
         world[:, thigh], world[:, knee] = place_leg(
             skeleton, side, legs[side], when, pelvis, root + hips[side], ankles[side]
         )
-        world[:, heel] = turns_at(feet[side].rotation, when)
-        world[:, toe] = quat.mul(world[:, heel], turns_at(feet[side].toe_rotation, when))
+        world[:, heel] = rotations_at_frames(feet[side].rotation, when)
+        world[:, toe] = quat.mul(world[:, heel], rotations_at_frames(feet[side].toe_rotation, when))
     return Clip(name, skeleton, clip.fps, local_rotations(skeleton, world), root)
 
 

@@ -2,8 +2,8 @@
 
 `people.json` was derived with `python -m hobble.hurt IMPAIRED_WALKS.npz` from the recordings of Jun et al.
 2020 ("Pathological gait classification using Kinect v2 and gated recurrent neural networks", IEEE Access 8).
-Ten people each walked normally and imitated five impairments of the right leg. Only means over people are
-kept.
+Ten people each walked normally and imitated five impairments of the right leg. The file holds only means over
+these people.
 """
 
 from __future__ import annotations
@@ -18,24 +18,28 @@ import numpy as np
 from hobble.core.files import load_npz, read_json, write_json
 from hobble.core.quat import Array
 
-FILE = Path(__file__).with_name("people.json")
-# Curves over a cycle, in degrees, whose changes a profile holds; named as in `hobble.gait.signals`.
+PROFILES_FILE = Path(__file__).with_name("people.json")
+# Angles over a gait cycle, in degrees. A profile says how each of them changes. The names are those of
+# `hobble.gait.signals`.
 CURVES = ("trunk_forward", "trunk_left", "pelvis_left_up", "pelvis_turn_left", "shoulders_turn_left")
-HARMONICS = 2  # a profile keeps the mean and this many harmonics of each curve
-NORMAL = "normal"
+HARMONICS = 2  # a profile has the mean and this many harmonics of each curve
+NORMAL = "normal"  # name of the walk without an impairment
 SOURCE = "Jun et al. 2020, IEEE Access 8: means over ten people who imitated impairments of the right leg"
 
 
 @dataclass(frozen=True)
 class Profile:
-    """An impairment of the right leg, relative to the same people's normal walk.
+    """A walk with an impairment of the right leg, compared with the same people's normal walk.
 
-    Ratios: speed, stride (time), step_hurt, step_sound (length of the step onto the hurt or the sound foot),
-    knee (range of the hurt knee), arm_hurt, arm_sound (swing). strike: cycles by which the sound foot lands
-    later. stance_hurt, stance_sound: cycles by which a stance is longer. width: leg lengths by which steps
-    are wider. curves: for each of CURVES its change in degrees: the mean, then the factors of cosine and sine
-    of each harmonic. A cycle starts as the hurt foot lands; its time is warped so that the sound foot lands
-    half a cycle later.
+    Ratios of the impaired walk to the normal walk: speed; stride (time of a cycle); step_hurt, step_sound
+    (length of the step onto the hurt and onto the sound foot); knee (range of the hurt knee's flexion);
+    arm_hurt, arm_sound (how far the arm of the hurt and of the sound side swings).
+
+    Differences: strike: cycles by which the sound foot lands later. stance_hurt, stance_sound: cycles by
+    which a stance is longer. width: leg lengths by which steps are wider. curves: name of CURVES -> 5 numbers
+    in degrees: the change of the curve's mean, then the changes of the factors of cosine and sine of each
+    harmonic. The curve begins when the hurt foot lands. Its time is warped so that the sound foot lands half
+    a cycle later.
     """
 
     speed: float
@@ -52,80 +56,90 @@ class Profile:
     curves: dict[str, list[float]]
 
     def harmonics(self) -> Array:
-        """(5, 1 + 2 * HARMONICS) factors of CURVES."""
+        """(5, 1 + 2 * HARMONICS) the values of `curves`: one row for each of CURVES."""
         return np.array([self.curves[name] for name in CURVES])
 
 
 @functools.cache
-def profiles() -> dict[str, Profile]:
-    """The profiles of the package by name: antalgic, stiff_legged, steppage, trendelenburg, lurch."""
-    return {name: Profile(**values) for name, values in read_json(FILE)["profiles"].items()}
+def read_profiles() -> dict[str, Profile]:
+    """The profiles in PROFILES_FILE by name: antalgic, stiff_legged, steppage, trendelenburg, lurch."""
+    return {name: Profile(**values) for name, values in read_json(PROFILES_FILE)["profiles"].items()}
 
 
-def derive(walks: str | Path, path: str | Path = FILE) -> None:
-    """Write the profiles of a file of impaired walks.
+def derive_profiles(walks: str | Path, path: str | Path = PROFILES_FILE) -> None:
+    """Derive the profiles from a file of recorded walks, and write them to `path`.
 
-    walks: npz with `gaits`, `curves` and `scalars` (names), `curve` (gaits, people, curves, 50) over a cycle
-    from the right landing, and `scalar` (gaits, people, scalars). Raises InputError if an array is missing.
+    walks: npz file. Its arrays `gaits`, `curves` and `scalars` hold names: of the kinds of walk (NORMAL and
+    the impairments), of the curves, and of the measures that are one number for a person's walk. `curve` is
+    (gaits, people, curves, 50): 50 samples over a cycle that begins when the right foot lands. `scalar` is
+    (gaits, people, scalars). Raises InputError if an array is missing.
     """
     data = load_npz(walks)
     gaits = [str(name) for name in data["gaits"]]
     derived = {
-        gait: asdict(_profile(data, i, gaits.index(NORMAL))) for i, gait in enumerate(gaits) if gait != NORMAL
+        gait: asdict(_derive_profile(data, i, gaits.index(NORMAL)))
+        for i, gait in enumerate(gaits)
+        if gait != NORMAL
     }
     for profile in derived.values():
         for name, value in profile.items():
-            profile[name] = _rounded(value)
+            profile[name] = _round(value)
     write_json(path, {"source": SOURCE, "profiles": derived})
 
 
-def _profile(data: Any, gait: int, normal: int) -> Profile:
+def _derive_profile(data: Any, gait: int, normal: int) -> Profile:
+    """Compare two kinds of walk. gait, normal: their indices in the arrays of `data`.
+
+    In the recordings the right side (R) is hurt and the left side (L) is sound.
+    """
     scalars = {str(n): data["scalar"][:, :, i] for i, n in enumerate(data["scalars"])}
     curves = {str(n): data["curve"][:, :, i] for i, n in enumerate(data["curves"])}
 
     def ratio(values: Array) -> float:
         return float(values[gait].mean() / values[normal].mean())
 
-    def more(name: str) -> float:
+    def difference(name: str) -> float:
         return float(np.mean(scalars[name][gait] - scalars[name][normal]))
 
-    def swing(name: str) -> float:
+    def ratio_of_ranges(name: str) -> float:
         return ratio(np.ptp(curves[name].astype(float), axis=-1))
 
     strike = scalars["left_strike_phase"]
     return Profile(
         speed=ratio(scalars["speed_per_leg"]),
         stride=ratio(scalars["stride_seconds"]),
-        strike=more("left_strike_phase"),
-        stance_hurt=more("stance_share_R"),
-        stance_sound=more("stance_share_L"),
+        strike=difference("left_strike_phase"),
+        stance_hurt=difference("stance_share_R"),
+        stance_sound=difference("stance_share_L"),
         step_hurt=ratio(scalars["step_R"]),
         step_sound=ratio(scalars["step_L"]),
-        width=more("step_width"),
-        knee=swing("knee_flexion_R"),
-        arm_hurt=swing("arm_forward_R"),
-        arm_sound=swing("arm_forward_L"),
+        width=difference("step_width"),
+        knee=ratio_of_ranges("knee_flexion_R"),
+        arm_hurt=ratio_of_ranges("arm_forward_R"),
+        arm_sound=ratio_of_ranges("arm_forward_L"),
         curves={
             name: list(
-                _harmonics(curves[name][gait], strike[gait])
-                - _harmonics(curves[name][normal], strike[normal])
+                _fit_harmonics(curves[name][gait], strike[gait])
+                - _fit_harmonics(curves[name][normal], strike[normal])
             )
             for name in CURVES
         },
     )
 
 
-def _harmonics(curve: Array, strike: Array) -> Array:
-    """(5,) factors of a curve (people, 50), mean over people.
+def _fit_harmonics(curve: Array, strike: Array) -> Array:
+    """(5,) mean of a curve, then the factors of cosine and sine of each harmonic, averaged over people.
 
-    Each person's time is warped so that the left foot lands at .5 and not at `strike` (people,).
+    curve: (people, 50). strike: (people,) phase at which the left foot lands. Before the fit, the time of
+    each person's cycle is warped so that this foot lands at phase .5.
     """
-    steps = curve.shape[-1]
-    phase = np.arange(steps) / steps
-    rows = [np.ones(steps)]
+    samples = curve.shape[-1]
+    phase = np.arange(samples) / samples
+    waves = [np.ones(samples)]
     for h in range(1, HARMONICS + 1):
-        rows += [np.cos(2 * np.pi * h * phase), np.sin(2 * np.pi * h * phase)]
-    weights = np.stack(rows, axis=1) * np.array([1.0] + [2.0] * 2 * HARMONICS) / steps
+        waves += [np.cos(2 * np.pi * h * phase), np.sin(2 * np.pi * h * phase)]
+    # Fourier coefficients: a curve (50,) times these weights (50, 5) gives its mean and factors.
+    weights = np.stack(waves, axis=1) * np.array([1.0] + [2.0] * 2 * HARMONICS) / samples
     out = []
     for values, landing in zip(curve, strike, strict=True):
         warped = np.interp(phase, [0.0, 0.5, 1.0], [0.0, landing, 1.0])
@@ -133,7 +147,8 @@ def _harmonics(curve: Array, strike: Array) -> Array:
     return np.mean(out, axis=0)
 
 
-def _rounded(value: Any) -> Any:
+def _round(value: Any) -> Any:
+    """Round a value of a profile, a number or the curves, so that the file stays short."""
     if isinstance(value, dict):
         return {name: [round(float(x), 2) for x in row] for name, row in value.items()}
     return round(float(value), 3)

@@ -1,4 +1,4 @@
-"""Samples arrays over frames at fractional frames."""
+"""Interpolates arrays that have a value for each frame, at times between frames. Also an easing curve."""
 
 from __future__ import annotations
 
@@ -9,21 +9,26 @@ from hobble.core.quat import Array
 
 
 def at_frames(values: Array, when: Array) -> Array:
-    """(N, ...): values (F, ...) interpolated at the frames `when` (N,)."""
-    before, share = _between(len(values), when)
+    """Interpolate values (F, ...) linearly at the times `when` (N,), in frames. Returns (N, ...)."""
+    before, share = _split_times(len(values), when)
     share = share.reshape(-1, *[1] * (values.ndim - 1))
     return values[before] * (1 - share) + values[np.minimum(before + 1, len(values) - 1)] * share
 
 
-def turns_at(rotations: Array, when: Array) -> Array:
-    """(N, ..., 4): rotations (F, ..., 4) interpolated at the frames `when` (N,)."""
-    before, share = _between(len(rotations), when)
+def rotations_at_frames(rotations: Array, when: Array) -> Array:
+    """Interpolate quaternions (F, ..., 4) at the times `when` (N,), in frames. Returns (N, ..., 4)."""
+    before, share = _split_times(len(rotations), when)
     share = share.reshape(-1, *[1] * (rotations.ndim - 2))
     return quat.slerp(rotations[before], rotations[np.minimum(before + 1, len(rotations) - 1)], share)
 
 
-def _between(frames: int, when: Array) -> tuple[np.ndarray, Array]:
+def _split_times(frames: int, when: Array) -> tuple[np.ndarray, Array]:
+    """Split each time (N,) into the frame before it, int (N,), and the share of a frame after that, (N,).
+
+    Times outside the clip of `frames` frames are moved to its first or last frame.
+    """
     when = np.clip(when, 0.0, frames - 1.0)
+    # A time that misses a whole frame only by a rounding error counts as this frame.
     nearest = np.round(when)
     when = np.where(np.abs(when - nearest) < 1e-9, nearest, when)
     before = np.floor(when).astype(int)

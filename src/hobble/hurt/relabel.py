@@ -1,4 +1,4 @@
-"""Moves the labels of the healthy clip to the times of the hurt clip."""
+"""Moves the labels of the healthy clip to the times of the hurt clip, whose steps are slower and uneven."""
 
 from __future__ import annotations
 
@@ -12,16 +12,18 @@ from hobble.labels.phase import dropped_frames, find_cycles, phase_of_footsteps
 
 
 def relabel(labels: Labels, timing: Timing, zero: str, margins: str) -> Labels:
-    """The labels at the new frames. A limping walk still has the gait "walk".
+    """The labels of the hurt clip. A limping walk still has the gait "walk".
 
-    zero: the foot that lands at phase 0. margins: which cycles are kept, a key of MARGINS in
+    labels: of the healthy clip. timing: which of its frames the hurt clip shows, and when. zero: the foot
+    that lands at phase 0, "left" or "right". margins: which cycles are used, a key of MARGINS in
     `hobble.labels.phase`.
     """
     frames = len(timing)
     last = len(labels) - 1
     nearest = [np.clip(np.round(timing.legs[:, side]).astype(int), 0, last) for side in (LEFT, RIGHT)]
+    # Columns of contacts: left heel, left toe, right heel, right toe. So `column // 2` is the side.
     contacts = np.stack([labels.contacts[nearest[column // 2], column] for column in range(4)], axis=1)
-    footsteps = labels.footsteps.copy()
+    footsteps = labels.footsteps.copy()  # a row holds a right landing, a left landing and a mark
     for column, side in ((0, RIGHT), (1, LEFT)):
         footsteps[:, column] = timing.new_frames(footsteps[:, column], side)
     phase, known = phase_of_footsteps(footsteps, frames)

@@ -1,5 +1,7 @@
-"""Decides what hurts, and when, in the hurt versions of a data set. All links take turns, those
-with large effects more often.
+"""Decides which links hurt, when, and at which severities, in the hurt versions of a data set.
+
+A link is the bone between two joints. The links are dealt like cards: a card is a link with two severities,
+and the deck holds the cards of all links. Links with large effects have several cards.
 """
 
 from __future__ import annotations
@@ -15,42 +17,46 @@ from hobble.core.skeleton import Skeleton
 from hobble.hurt.body_parts import part_of_link
 from hobble.hurt.options import Hurt
 
-# Part -> how often each of its links is in the deck (see `severities`). Links of other parts are in it once.
-OFTEN = {"hip": 3, "thigh": 3, "shank": 3, "foot": 3, "back": 2, "upper arm": 2, "forearm": 2}
-GOLDEN = (math.sqrt(5) - 1) / 2  # its multiples, modulo 1, spread evenly
+# Part of the body -> number of cards of each of its links. Links of other parts have one card.
+CARDS_OF_PART = {"hip": 3, "thigh": 3, "shank": 3, "foot": 3, "back": 2, "upper arm": 2, "forearm": 2}
+GOLDEN = (math.sqrt(5) - 1) / 2  # its multiples, modulo 1, spread evenly over 0..1
 FURTHER_LINKS = 0.25  # share of the stretches in which further links hurt as well, if `at_once` allows it
-# Share of the stretches in which an arm hurts as well, if `at_once` leaves room. People swing their arms in
-# very different ways. If few of them have a hurt arm, a network takes the swing of these few for an effect of
-# the injury. An injury of an arm hardly changes the legs, so both can be learnt from the same stretch.
+# Share of the stretches in which an arm hurts as well, if `at_once` allows it. People swing their arms in
+# very different ways. If few people in the data have a hurt arm, a network takes the way in which these few
+# swing their arms for an effect of the injury. An injury of an arm hardly changes the legs. So a network can
+# learn an injury of an arm and another injury from the same stretch.
 ARM_TOO = 0.6
 ARMS = ("upper arm", "forearm")
-# A clip is divided into equal stretches of about `seconds`. If whole stretches leave a rest of at least this
-# share of `seconds`, there is one stretch more.
+# A clip is divided into equal stretches of about the option `seconds`. If the frames left after whole
+# stretches of `seconds` last at least this share of `seconds`, there is one stretch more.
 LEAST_REST = 0.4
 
 
-def severities(skeleton: Skeleton, frames: int, fps: float, options: Hurt, clip: str, turn: int) -> Array:
-    """(frames, L) severities of a hurt version.
+def schedule_severities(
+    skeleton: Skeleton, frames: int, fps: float, options: Hurt, clip: str, version_number: int
+) -> Array:
+    """(frames, L) severities, 0 to 10, of the L links in a hurt version of `frames` frames.
 
-    clip: name of the version. turn: number of the version among all versions of the data set, from 0.
+    clip: name of the hurt version. version_number: its number among all versions of the data set, from 0.
 
-    In each stretch of about `seconds`, one link hurts, at one severity in the first half and another in the
-    second half. All versions draw from one deck of links and severities. `turn` decides where a version
-    starts in the deck, so that the deck is used evenly for any number and length of versions. `clip` and the
-    option `seed` decide what else hurts. Raises HobbleError for an unknown link.
+    The version is divided into stretches. In each stretch the link of the next card hurts, at one severity in
+    the first half and at another in the second half. All versions of a data set use the same deck.
+    `version_number` decides with which card a version begins, so that all cards are used about equally often.
+    `clip` and the option `seed` decide which links hurt besides. Raises HobbleError for an unknown link.
     """
     rng = np.random.default_rng([options.seed, zlib.crc32(clip.encode())])
-    deck = _deck(skeleton, options)
+    deck = _make_deck(skeleton, options)
     arms = [card for card in deck if part_of_link(skeleton, skeleton.links[card[0]]).name in ARMS]
     out = np.zeros((frames, len(skeleton.links)), np.float32)
-    first = int(math.modf((turn + 1) * GOLDEN)[0] * len(deck))
+    first = int(math.modf((version_number + 1) * GOLDEN)[0] * len(deck))
     begin = 0
-    for i, length in enumerate(_stretches(frames, options.seconds * fps)):
+    for i, length in enumerate(_stretch_lengths(frames, options.seconds * fps)):
         hurt = [deck[(first + i) % len(deck)]]
         if options.at_once > 1 and rng.random() < FURTHER_LINKS:
             hurt += [deck[j] for j in rng.permutation(len(deck))[: rng.integers(1, options.at_once)]]
         if arms and len(hurt) < options.at_once and rng.random() < ARM_TOO:
             hurt += [arms[rng.integers(len(arms))]]
+        # Backwards: if two cards have the same link, the first card counts.
         for link, first_half, second_half in hurt[::-1]:
             half = begin + length // 2
             out[begin:half, link] = first_half
@@ -59,32 +65,36 @@ def severities(skeleton: Skeleton, frames: int, fps: float, options: Hurt, clip:
     return out
 
 
-def _deck(skeleton: Skeleton, options: Hurt) -> list[tuple[int, float, float]]:
-    """The deck of the data set: (column of a link, severity in the first half, severity in the second).
+def _make_deck(skeleton: Skeleton, options: Hurt) -> list[tuple[int, float, float]]:
+    """The cards of the data set: (index of a link, severity in the first half, severity in the second half).
 
-    Links with large effects occur more often. One of the two severities is the highest, from which a network
-    learns most. The other alternates between the rest.
+    One of the two severities is the highest, because a network learns most from it. For the other severity,
+    the cards of a link take turns with the remaining severities.
     """
     names = list(skeleton.link_names)
     if unknown := [link for link in options.links if link not in names]:
-        raise HobbleError(f"hurt.links: skeleton {skeleton.name} has no link {', '.join(unknown)}")
+        raise HobbleError(
+            f"hurt.links: skeleton {skeleton.name} has no link {', '.join(unknown)}. "
+            f"Its links are {', '.join(names)}."
+        )
     links = [names.index(link) for link in options.links] if options.links else list(range(len(names)))
     rng = np.random.default_rng(options.seed)
-    entries: list[tuple[float, int, tuple[float, float]]] = []
+    # (place in the deck, 0 to 1; index of the link; severities in the first and in the second half)
+    cards: list[tuple[float, int, tuple[float, float]]] = []
     for i in links:
-        often = OFTEN.get(part_of_link(skeleton, skeleton.links[i]).name, 1)
+        count = CARDS_OF_PART.get(part_of_link(skeleton, skeleton.links[i]).name, 1)
         values = sorted(options.severities, reverse=True)
         others = [values[j] for j in 1 + rng.permutation(len(values) - 1)] or values
         start = rng.random()
-        for n in range(often):
-            both = (values[0], others[n % len(others)])
-            # Entries of one link are far apart, so that no clip has only that link.
-            entries.append((math.modf(start + n / often)[0], i, both if n % 2 == 0 else both[::-1]))
-    return [(i, *both) for _, i, both in sorted(entries)]
+        for n in range(count):
+            pair = (values[0], others[n % len(others)])
+            # The cards of a link are spread over the deck, so that a clip does not get only this link.
+            cards.append((math.modf(start + n / count)[0], i, pair if n % 2 == 0 else pair[::-1]))
+    return [(i, *pair) for _, i, pair in sorted(cards)]
 
 
-def _stretches(frames: int, length: float) -> list[int]:
-    """Lengths of stretches, about `length` frames each. Their sum is `frames`."""
+def _stretch_lengths(frames: int, length: float) -> list[int]:
+    """Divide `frames` frames into stretches of about `length` frames. Returns the length of each stretch."""
     count = max(1, math.floor(frames / length + 1 - LEAST_REST))
     edges = np.round(np.linspace(0, frames, count + 1)).astype(int)
     return [int(n) for n in np.diff(edges)]

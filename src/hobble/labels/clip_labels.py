@@ -12,6 +12,7 @@ import numpy as np
 from hobble.core.files import load_npz, save_npz
 from hobble.core.quat import Array
 
+# "bump" is what the label files of Holden et al. (2017) call "unknown"; nobody has published what it means.
 GAITS = ("stand", "walk", "jog", "crouch", "jump", "bump")
 CONTACT_ROLES = ("left_heel", "left_toe", "right_heel", "right_toe")
 
@@ -20,9 +21,10 @@ CONTACT_ROLES = ("left_heel", "left_toe", "right_heel", "right_toe")
 class Labels:
     """Labels of F frames at 60 Hz.
 
-    contacts: (F, 4) bool, in the order of CONTACT_ROLES. phase: (F,) in 0..1. phase_known: (F,) bool. gait:
-    (F, 6) shares in the order of GAITS. footsteps: (N, 3) landings, see `hobble.labels.phase`. cycles: (C, 2)
-    int, first and last frame, inclusive, of each cycle that is used.
+    contacts: (F, 4) bool, whether each joint of CONTACT_ROLES is on the ground. phase: (F,) position in the
+    gait cycle, 0 to 1. phase_known: (F,) bool, False where the phase is only a guess, such as in standing.
+    gait: (F, 6) shares of GAITS. footsteps: (N, 3) landings, see `hobble.labels.phase`. cycles: (C, 2) int,
+    first and last frame (both included) of each gait cycle that is used.
     """
 
     contacts: np.ndarray = field(repr=False)
@@ -38,10 +40,11 @@ class Labels:
 
 @dataclass(frozen=True)
 class LabelReport:
-    """Where the labels of a clip come from, and warnings.
+    """Says where the labels of a clip come from, and holds warnings.
 
-    clip: its name. phase_source, gait_source: "file" or "automatic". phase_zero, margins: the options of the
-    section `labels` with these names. cycles_dropped: number of cycles that are not used.
+    clip: its name. phase_source, gait_source: "file" (made by hand) or "automatic" (found from the motion).
+    phase_zero, margins: the values of these options in the section `labels`. cycles_dropped: number of cycles
+    that are not used.
     """
 
     clip: str
@@ -54,13 +57,13 @@ class LabelReport:
 
     @classmethod
     def from_dict(cls, data: Mapping[str, Any]) -> LabelReport:
-        """Read the report from the JSON beside the labels. The other keys of this JSON are ignored."""
+        """Make the report from the content of the JSON file beside the labels. Further keys are ignored."""
         values = {f.name: data[f.name] for f in fields(cls)}
         return cls(**{**values, "warnings": tuple(values["warnings"])})
 
 
 def save_labels(path: str | Path, labels: Labels) -> None:
-    """Write labels as one npz file."""
+    """Write the labels of a clip as an npz file, with an array for each field of `Labels`."""
     save_npz(path, **{f.name: getattr(labels, f.name) for f in fields(labels)})
 
 

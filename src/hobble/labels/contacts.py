@@ -14,37 +14,39 @@ from hobble.labels.options import LabelOptions
 
 FEET = ((0, 1), (2, 3))  # heel and toe of the left and of the right foot, in the order of CONTACT_ROLES
 
-# A joint comes into contact below the first limit of a pair and stays in contact below the second. Heights
-# are above the height of the joint's stance, in leg lengths. A limit of speed is the larger of two values:
-# SPEEDS, in leg lengths a frame, and SWING_SHARES times the joint's speed in the slower adjacent swing.
-# Without SWING_SHARES, the stance of a dragged leg would not be found. All limits were set on the walks and
-# runs of the data set `cmu`: there a foot is down for 55 to 65 % of a walking cycle and for less than half of
-# a jogging cycle.
+# Each pair holds two limits: a joint comes into contact below the first limit, and stays in contact below the
+# second. Heights are in leg lengths above the height of the joint's stance. A limit of speed is the larger of
+# two values. One is SPEEDS, in leg lengths a frame. The other is SWING_SHARES times the joint's speed in the
+# middle of a swing: of the slower of the two swings before and after the stance. Without SWING_SHARES, the
+# stance of a dragged leg would not be found. All limits were set on the walks and runs of the data set `cmu`.
+# With these limits, a foot is down there for 55 to 65 % of a walking cycle and for less than half of a
+# jogging cycle.
 HEEL_HEIGHTS, TOE_HEIGHTS = (0.015, 0.02), (0.02, 0.035)
 SPEEDS, SWING_SHARES = (0.010, 0.020), (0.18, 0.30)
-# A captured toe that pushes off may dip some centimetres below its stance. So the height of a stance is at
-# least the median height of its slow frames, minus this share of the first height limit.
+# A captured toe that pushes off may dip some centimetres below the ground. Such a dip must not count as the
+# height of the stance. So this height is at least the median height of the joint's slow frames, minus this
+# share of the first limit of height.
 DIP_SHARE = 0.8
-# Leg lengths: a heel is in the air if it is this much higher above its toe than in the clip's flattest
-# stances.
+# Leg lengths. A person stands on tiptoe if the heel is this much higher above the toe than in the stances in
+# which the foot is flattest. Then the heel is not in contact.
 ON_TIPTOE = 0.03
-# Heights of a hip above its heel, leg lengths. A foot is held up if this height is below the first
-# value for its leg and above the second value for the other leg.
+# Leg lengths. A person on one leg holds the other foot up: the hip is less than the first value above the
+# heel of the raised foot, and more than the second value above the other heel.
 DRAWN_UP, STRETCHED = 0.55, 0.8
 
 
 def contacts(clip: Clip, options: LabelOptions) -> np.ndarray:
-    """(F, 4) bool in the order of CONTACT_ROLES, by the rule that the section `labels` selects."""
+    """(F, 4) bool: whether each joint of CONTACT_ROLES is on the ground, by the rule that `options` name."""
     if options.contacts == "original":
         return still_joints(clip, options.contact_threshold)
     return stance(clip, options)
 
 
 def still_joints(clip: Clip, threshold: float) -> np.ndarray:
-    """(F, 4) bool: whether a joint moves less than the root of `threshold` (cm2) to the next frame.
+    """(F, 4) bool: whether a joint moves less than the square root of `threshold` (cm2) to the next frame.
 
     This is the rule of Holden et al. (2017). It ignores height, and depends on the size of the body and on
-    the noise of the capture. The last frame repeats the one before it.
+    the noise of the capture. The last frame has no next frame, so it repeats the value before it.
     """
     feet = foot_positions(clip)
     still = np.sum(np.diff(feet, axis=0) ** 2, axis=-1) < threshold
@@ -56,10 +58,10 @@ def still_joints(clip: Clip, threshold: float) -> np.ndarray:
 def stance(clip: Clip, options: LabelOptions) -> np.ndarray:
     """(F, 4) bool: whether a joint is slow and near the height of its stance.
 
-    Between two swings a joint has one stance. The height of the stance is the joint's lowest height in slow
-    frames there, so the rule needs no floor and works on slopes and stairs. Two limits each for height and
-    speed (hysteresis) keep a stance in one piece from landing to toe-off. All limits are relative to leg
-    length.
+    Between two swings a joint has one stance. The height of the stance is the lowest height of the joint in
+    the slow frames between these swings (but see DIP_SHARE). So the rule needs no floor, and works on slopes
+    and stairs. Height and speed have two limits each (hysteresis): otherwise, a short movement would divide a
+    stance into two. All limits are relative to leg length.
     """
     leg = clip.skeleton.leg_length
     height, speed = foot_positions(clip)[..., 1] / leg, _centred_speeds(clip) / leg
@@ -68,16 +70,17 @@ def stance(clip: Clip, options: LabelOptions) -> np.ndarray:
         edges = np.unique([0, *swing_peaks(relative), len(clip)])
         heel_level = _find_stances(height[:, heel], speed[:, heel], edges, HEEL_HEIGHTS, out[:, heel])
         toe_level = _find_stances(height[:, toe], speed[:, toe], edges, TOE_HEIGHTS, out[:, toe])
-        lift = heel_level - toe_level
-        whole = lift[1:-1] if len(lift) > 3 else lift  # the first and the last stance may be incomplete
-        flat = np.percentile(whole, 10)
-        for number in np.flatnonzero(lift > flat + ON_TIPTOE):
+        heel_above_toe = heel_level - toe_level
+        # The first and the last stance may be incomplete.
+        complete = heel_above_toe[1:-1] if len(heel_above_toe) > 3 else heel_above_toe
+        flat_foot = np.percentile(complete, 10)
+        for number in np.flatnonzero(heel_above_toe > flat_foot + ON_TIPTOE):
             out[edges[number] : edges[number + 1], heel] = False
-    return out & ~_lifted(clip)
+    return out & ~_joints_of_raised_foot(clip)
 
 
-def _lifted(clip: Clip) -> np.ndarray:
-    """(F, 4) bool: whether the joint's foot is held up: its leg drawn up, the other leg stretched."""
+def _joints_of_raised_foot(clip: Clip) -> np.ndarray:
+    """(F, 4) bool: whether a joint's leg is drawn up while the other leg is stretched."""
     sides = ("left", "right")
     hips, heels = (
         clip.positions[:, [clip.skeleton.role(f"{s}_{r}") for s in sides], 1] for r in ("hip", "heel")
@@ -89,34 +92,43 @@ def _lifted(clip: Clip) -> np.ndarray:
 def _find_stances(
     height: Array, speed: Array, edges: np.ndarray, heights: tuple[float, float], down: np.ndarray
 ) -> Array:
-    """Find the S stances of a joint and mark their frames in `down` (F,). Returns their heights (S,).
+    """Find the S stances of a joint, and set `down` (F,) to True in their frames. Returns their heights (S,).
 
     height, speed: (F,) of the joint, in leg lengths and leg lengths a frame. edges: (S + 1,) the clip's ends
-    and the fastest frame of each swing; there is one stance between each edge and the next. heights: limits
-    of the height above a stance, for landing and for staying.
+    and the fastest frame of each swing. Between each edge and the next there is one stance. heights: two
+    limits of the height above the stance, HEEL_HEIGHTS or TOE_HEIGHTS.
     """
     lands, stays = np.zeros(len(speed), bool), np.zeros(len(speed), bool)
     levels = []
     for a, b in itertools.pairwise(edges):
-        swing = min((speed[p] for p in (a, b) if 0 < p < len(speed)), default=0.0)
-        slow, leaves = (max(limit, share * swing) for limit, share in zip(SPEEDS, SWING_SHARES, strict=True))
+        swing_speed = min((speed[p] for p in (a, b) if 0 < p < len(speed)), default=0.0)
+        landing_speed, leaving_speed = (
+            max(limit, share * swing_speed) for limit, share in zip(SPEEDS, SWING_SHARES, strict=True)
+        )
         h, v = height[a:b], speed[a:b]
-        still = h[v <= max(slow, 1.2 * v.min())]
-        levels.append(max(still.min(), np.median(still) - DIP_SHARE * heights[0]))
-        lands[a:b] = (h < levels[-1] + heights[0]) & (v < slow)
-        stays[a:b] = (h < levels[-1] + heights[1]) & (v < leaves)
+        slow = h[v <= max(landing_speed, 1.2 * v.min())]  # never empty: it has at least the slowest frame
+        levels.append(max(slow.min(), np.median(slow) - DIP_SHARE * heights[0]))
+        lands[a:b] = (h < levels[-1] + heights[0]) & (v < landing_speed)
+        stays[a:b] = (h < levels[-1] + heights[1]) & (v < leaving_speed)
     down[:] = _stretches_with(stays | lands, lands)
     return np.array(levels)
 
 
 def _stretches_with(stays: np.ndarray, lands: np.ndarray) -> np.ndarray:
-    """The stretches of `stays` (F,) in which `lands` (F,) is true at least once."""
+    """(F,) bool: those stretches of successive True frames of `stays` in which `lands` is True at least once.
+
+    stays, lands: (F,) bool.
+    """
     number = np.cumsum(np.diff(stays, prepend=False) & stays)
     return stays & np.isin(number, number[lands & stays])
 
 
 def _centred_speeds(clip: Clip) -> Array:
-    """(F, 4) speeds, cm a frame: mean of the speeds to and from a frame, so that no stance is shifted."""
+    """(F, 4) speed of each joint of CONTACT_ROLES, cm a frame.
+
+    It is the mean of the speeds before and after a frame. A speed from one side only would shift all stances
+    by half a frame.
+    """
     feet = foot_positions(clip)
     if len(feet) < 2:
         return np.zeros(feet.shape[:2])

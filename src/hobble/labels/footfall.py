@@ -1,8 +1,8 @@
-"""Finds when each foot lands, from the motion alone: a landing is the end of a swing.
+"""Finds when each foot lands, from the motion alone. A foot lands at the end of a swing.
 
 A foot is down while its heel or its toe is slower than a limit. The limit depends on the options `heel_speed`
-and `toe_speed` and on the swings of the foot. So it suits a slow shuffle, a jog in which the feet never quite
-rest, and a dragged leg.
+and `toe_speed`, and on how fast the foot swings. So it suits a slow shuffle, a jog in which the feet never
+quite rest, and a dragged leg.
 """
 
 from __future__ import annotations
@@ -19,27 +19,33 @@ from hobble.labels.clip_labels import CONTACT_ROLES
 from hobble.labels.options import LabelOptions
 
 RIGHT, LEFT = 0, 1
-END_OF_BOUT = (np.nan, -1)  # stands between the landings (frame, foot) of two bouts of walking
+# A bout of walking is a time in which the feet land in turn, without a long rest. In a list of landings
+# (frame, foot), this entry stands between two bouts.
+END_OF_BOUT = (np.nan, -1)
 
 # These limits were set on the hand-made labels of Holden et al. (2017) and on generated walks with exact
 # landings. REST_SPEED is in units of the options `heel_speed` and `toe_speed`. Frames are at 60 Hz.
 REST_SPEED = 0.35  # a foot slower than this always rests
-# A foot also rests if its speed is below this share of the lower of two peaks: those of the swings before
-# and after the rest.
+# A foot also rests if its speed is below this share of its top speed in a swing: in the slower of the two
+# swings before and after the rest.
 REST_OF_SWING = 0.12
-# A dip in the speed separates two swings if it is at most this share of the lower of their peaks.
+# A dip in the speed separates two swings if it is at most REST_SPEED, or at most this share of the top speed
+# in the slower of the two swings.
 DIP_OF_SWING = 0.35
 LEAST_PATH = 6.0  # cm: a swing in which the toe moves less than this is dropped
 SAME_SWING = 12  # frames: a rest of at most this length does not separate two swings of a foot
-LESSER_SWING = 0.4  # of two successive swings of a foot, one shorter than this share of the other is no step
+# If a foot swings twice, with no swing of the other foot between, and the path of one swing is shorter than
+# this share of the other path, this swing is no step.
+LESSER_SWING = 0.4
 LONGEST_REST = 60  # frames: a longer rest of both feet ends a bout of walking
-SETTLING_CM = 8.0  # cm that the toe moves between first contact and landing, see `landings`
-LAST_FRAMES = 2  # a foot whose swing ends in this many last frames of the clip may not have landed
+SETTLING_CM = 8.0  # how far the toe may move between first contact and landing, see `find_landings`
+SLOWEST_PEAK = 1.5  # cm a frame: a swing with a lower peak is given this peak in `find_landings`
+LAST_FRAMES = 2  # if a swing ends in this many last frames of the clip, the foot may not have landed
 
 
 @dataclass(frozen=True)
 class Swing:
-    """A foot in the air from frame `start` until it is down at frame `end`.
+    """A foot that is in the air from frame `start` on. At frame `end` it is down again.
 
     foot: RIGHT or LEFT. path: length of the toe's path, cm. peak: the toe's highest speed, cm a frame.
     """
@@ -57,7 +63,7 @@ def foot_positions(clip: Clip) -> Array:
 
 
 def foot_speeds(clip: Clip) -> Array:
-    """(F, 4) speed of each joint from a frame to the next, cm a frame, in the order of CONTACT_ROLES."""
+    """(F, 4) speed of each joint of CONTACT_ROLES from a frame to the next, cm a frame."""
     feet = foot_positions(clip)
     if len(feet) < 2:
         return np.zeros(feet.shape[:2])
@@ -68,37 +74,41 @@ def foot_speeds(clip: Clip) -> Array:
 def find_swings(clip: Clip, options: LabelOptions) -> list[Swing]:
     """The swings of both feet, in the order of their ends.
 
-    options: `heel_speed` and `toe_speed` are the unit speeds. A foot that never rests between two swings is
-    down while its speed is at most `valley_factor` times its lowest speed between these swings.
+    options: `heel_speed`, `toe_speed` and `valley_factor` are used.
     """
     speed, relative = foot_speeds(clip), relative_speeds(clip, options)
     swings = []
-    for foot, side, toe in ((RIGHT, 1, 3), (LEFT, 0, 1)):
-        for start, end in _swing_frames(relative[:, side], options.valley_factor):
-            path, peak = speed[start:end, toe].sum(), speed[start:end, toe].max()
-            swings.append(Swing(foot, start, end, float(path), float(peak)))
+    # Columns of the foot in `relative` (left, right) and of its toe in `speed` (CONTACT_ROLES).
+    for foot, foot_column, toe_column in ((RIGHT, 1, 3), (LEFT, 0, 1)):
+        for start, end in _swing_frames(relative[:, foot_column], options.valley_factor):
+            toe_speed = speed[start:end, toe_column]
+            swings.append(Swing(foot, start, end, float(toe_speed.sum()), float(toe_speed.max())))
     real = sorted((s for s in swings if s.path >= LEAST_PATH), key=lambda s: (s.end, s.foot))
-    return _one_swing_a_step(real)
+    return _one_swing_per_step(real)
 
 
 def relative_speeds(clip: Clip, options: LabelOptions) -> Array:
-    """(F, 2) speed of the left and the right foot: that of its heel or of its toe, whichever is lower.
+    """(F, 2) speed of the left and of the right foot, without a unit, smoothed by a median of three frames.
 
-    The units are the options `heel_speed` and `toe_speed`.
+    The speed of a heel is divided by the option `heel_speed`, the speed of a toe by `toe_speed`. The speed of
+    a foot is the lower of these two values.
     """
     speed = foot_speeds(clip)
-    units = 2 * np.array([options.heel_speed, options.toe_speed] * 2)  # cm a frame at 60 Hz
+    # The options are in cm per frame at 120 Hz. A frame at 60 Hz is twice as long.
+    units = 2 * np.array([options.heel_speed, options.toe_speed] * 2)
     relative = (speed / units).reshape(-1, 2, 2).min(axis=2)
     return np.stack([median_of_three(side) for side in relative.T], axis=1)
 
 
-def landings(swings: list[Swing], frames: int, shortest_step: float) -> list[tuple[float, int]]:
+def find_landings(swings: list[Swing], frames: int, shortest_step: float) -> list[tuple[float, int]]:
     """Landings (frame, foot) in the order of the swings. END_OF_BOUT separates bouts of walking.
 
-    The frame of a landing is that of first contact, plus the time in which the toe would move SETTLING_CM at
-    the top speed of the swing. So the landing is later after a slow swing, as in hand-made labels: people
-    mark when the weight comes down. frames: length of the clip. shortest_step: a landing at most this many
-    frames (at 120 Hz) after a landing of the other foot is left out.
+    A landing is later than the end of its swing, which is the first contact. The delay is the time in which
+    the toe would move SETTLING_CM at the top speed of the swing. So it is longer after a slow swing. This
+    agrees with hand-made labels, because people mark the frame in which the weight comes down.
+
+    swings: of both feet, from `find_swings`. frames: length of the clip. shortest_step: a landing at most
+    this many frames (at 120 Hz) after a landing of the other foot is left out.
     """
     out: list[tuple[float, int]] = []
     resting_since = -1
@@ -107,7 +117,7 @@ def landings(swings: list[Swing], frames: int, shortest_step: float) -> list[tup
             continue
         if out and swing.start - resting_since > LONGEST_REST:
             out.append(END_OF_BOUT)
-        when = swing.end + SETTLING_CM / max(swing.peak, 1.5)
+        when = swing.end + SETTLING_CM / max(swing.peak, SLOWEST_PEAK)
         resting_since = max(resting_since, swing.end)
         if out and out[-1][1] == 1 - swing.foot and when - out[-1][0] <= shortest_step / 2:
             continue
@@ -116,9 +126,9 @@ def landings(swings: list[Swing], frames: int, shortest_step: float) -> list[tup
 
 
 def _swing_frames(relative: Array, valley_factor: float) -> np.ndarray:
-    """(n, 2) first frame in the air, and first frame down again, of each swing of a foot.
+    """(n, 2) the first frame in the air and the first frame down again, for each of n swings of a foot.
 
-    relative: (F,) speed of the foot, a column of `relative_speeds`.
+    relative: (F,) speed of the foot, a column of `relative_speeds`. valley_factor: the option.
     """
     peaks = swing_peaks(relative)
     up = relative >= _rest_limit(relative, peaks, valley_factor)
@@ -128,39 +138,42 @@ def _swing_frames(relative: Array, valley_factor: float) -> np.ndarray:
 
 
 def swing_peaks(relative: Array) -> np.ndarray:
-    """The fastest frame of each swing of a foot: peaks of its speed, with a clear dip between any two.
+    """The frame of the highest speed in each swing of a foot, in order.
 
-    relative: (F,) speed of the foot, a column of `relative_speeds`.
+    Between two of these frames, the speed has a clear dip (see DIP_OF_SWING). relative: (F,) speed of the
+    foot, a column of `relative_speeds`.
     """
-    kept: list[int] = []
-    for peak in _local_highs(relative, 2 * REST_SPEED):
-        while kept:
-            lower = min(relative[kept[-1]], relative[peak])
-            if relative[kept[-1] : peak + 1].min() <= max(REST_SPEED, DIP_OF_SWING * lower):
-                kept.append(peak)
+    peaks: list[int] = []
+    for peak in _local_maxima(relative, 2 * REST_SPEED):
+        # Without a clear dip after the last peak, both belong to one swing, and only the higher one stays.
+        while peaks:
+            lower = min(relative[peaks[-1]], relative[peak])
+            if relative[peaks[-1] : peak + 1].min() <= max(REST_SPEED, DIP_OF_SWING * lower):
+                peaks.append(peak)
                 break
-            if relative[kept[-1]] >= relative[peak]:
+            if relative[peaks[-1]] >= relative[peak]:
                 break
-            kept.pop()
+            peaks.pop()
         else:
-            kept.append(peak)
-    return np.array(kept, int)
+            peaks.append(peak)
+    return np.array(peaks, int)
 
 
-def _local_highs(values: Array, least: float) -> np.ndarray:
-    """Frames of the local highs in `values` (F,) of at least `least`; for a plateau, its middle frame."""
+def _local_maxima(values: Array, least: float) -> np.ndarray:
+    """Frames of the local maxima of `values` (F,) that are at least `least`. A plateau gives its middle."""
     steps = np.diff(np.concatenate([[0.0], values, [0.0]]))
-    moves = np.flatnonzero(steps)
-    tops = np.flatnonzero((steps[moves[:-1]] > 0) & (steps[moves[1:]] < 0))
-    frames = (moves[tops] + moves[tops + 1] - 1) // 2
+    changes = np.flatnonzero(steps)  # places where the values rise or fall
+    tops = np.flatnonzero((steps[changes[:-1]] > 0) & (steps[changes[1:]] < 0))
+    frames = (changes[tops] + changes[tops + 1] - 1) // 2
     return frames[values[frames] >= least]
 
 
 def _rest_limit(relative: Array, peaks: np.ndarray, valley_factor: float) -> Array:
     """(F,) speed below which the foot is down, in the units of `relative`.
 
-    Between two swings it depends on the peak of the slower swing. relative: (F,) speed of the foot. peaks:
-    frames of the peaks, from `swing_peaks`.
+    Between two swings it depends on the peak of the slower swing. A foot that never rests between two swings
+    is down while its speed is below `valley_factor` times its lowest speed between them, but always below 0.6
+    times that peak. relative: (F,) speed of the foot. peaks: frames of the peaks, from `swing_peaks`.
     """
     frames = len(relative)
     limit = np.full(frames, REST_SPEED)
@@ -175,22 +188,25 @@ def _rest_limit(relative: Array, peaks: np.ndarray, valley_factor: float) -> Arr
     return limit
 
 
-def _one_swing_a_step(swings: list[Swing]) -> list[Swing]:
-    """Join swings of a foot that are separated by a short rest, and drop small moves between steps."""
+def _one_swing_per_step(swings: list[Swing]) -> list[Swing]:
+    """Join swings of a foot that are separated by a short rest, and drop small movements that are no steps.
+
+    swings: of both feet, in the order of their ends.
+    """
     out: list[Swing] = []
     for swing in swings:
         last = out[-1] if out else None
         if last is None or last.foot != swing.foot:
             out.append(swing)
             continue
-        main = max(last, swing, key=lambda s: s.path)
-        lesser = min(last.path, swing.path) < LESSER_SWING * main.path
+        longer = max(last, swing, key=lambda s: s.path)
+        one_is_small = min(last.path, swing.path) < LESSER_SWING * longer.path
         if swing.start - last.end <= SAME_SWING:
-            end = last.end if lesser and main is last else swing.end
+            end = last.end if one_is_small and longer is last else swing.end
             peak = max(last.peak, swing.peak)
             out[-1] = Swing(swing.foot, last.start, end, last.path + swing.path, peak)
-        elif lesser:
-            out[-1] = main
+        elif one_is_small:
+            out[-1] = longer
         else:
             out.append(swing)
     return out

@@ -1,4 +1,4 @@
-"""Gait of each frame: the crouch rule for clips on flat ground, and automatic gaits of unlabelled clips."""
+"""Finds the gait of each frame from the motion, for clips without gait files. Also a rule for crouching."""
 
 from __future__ import annotations
 
@@ -15,49 +15,55 @@ STAND, WALK, JOG, CROUCH = range(4)
 GRAVITY = 981.0 / 3600.0  # cm per frame squared, at 60 frames per second
 
 STANDING_SPEED = 0.0019  # leg lengths a frame; a person slower than this stands
-# A person crouches if head and hips are both below these heights. The unit of each height is the length of
-# the bones between that joint and the ground.
+# A person crouches if head and hips are both below these heights. The head's height is in lengths of leg and
+# trunk together, the hips' height is in leg lengths.
 CROUCHED_HEAD = 0.8
 CROUCHED_HIPS = 0.85
+CERTAIN_DEPTH = 0.08  # if head and hips are lower than these limits by this, the crouch is certain
 
-# Weights of measures in the log odds of jog against walk. They were fitted to the hand-made labels of Holden
-# et al. (2017) and of Ferre (2019), and to the clip descriptions of the data set `cmu`. No measure
-# depends on the size of the body, so the weights hold for all bodies.
+# The log odds of jog against walk are a weighted sum of measures. The comment of each weight says what its
+# measure is. The weights were fitted to the hand-made labels of Holden et al. (2017) and of Ferre (2019), and
+# to the clip descriptions of the data set `cmu`. No measure depends on the size of the body, so the weights
+# hold for all bodies.
 JOG_SPRING = 3.7  # `_spring`: 1 if the hips are lowest over the standing foot, -1 if they are highest there
 JOG_FLIGHT = 9.0  # share of the time without a foot down
-JOG_DOUBLE_SUPPORT = -9.0  # share of the time with both feet down
+JOG_DOUBLE_SUPPORT = -9.0  # share of the time with both feet down (double support)
 JOG_BOUNCE = 12.5  # vertical acceleration of the hips, g
-MOST_BOUNCE = 0.5  # g: a larger acceleration counts as this, because happy walks bounce
-JOG_FROUDE = 6.0  # Froude number minus FASTEST_WALK, limited to 0..1
+MOST_BOUNCE = 0.5  # g: a larger acceleration counts as this, because people also bounce in happy walks
+JOG_FROUDE = 6.0  # Froude number (speed squared / (gravity * leg length)) minus FASTEST_WALK, limited to 0..1
 FASTEST_WALK = 0.5  # Froude number of the fastest walk that people keep up for long
-JOG_CONSTANT = -3.2
-# A jog has a flight phase or no double support. So a person walks, however much they bounce, if double
-# support is at least LEAST_DOUBLE_SUPPORT, flight at most NO_FLIGHT, and spring below CLEAR_SPRING.
+JOG_CONSTANT = -3.2  # added to the sum
+# A jog has a flight phase or no double support. So a person walks if double support is at least
+# LEAST_DOUBLE_SUPPORT, flight is at most NO_FLIGHT, and `_spring` is below CLEAR_SPRING, even if the person
+# bounces much.
 LEAST_DOUBLE_SUPPORT = 0.1
 NO_FLIGHT = 0.01
 CLEAR_SPRING = 0.5
-# Some people hop a little in a slow, happy walk. So a person also walks if they are slow (SLOW_FROUDE), there
-# is little flight (SOME_FLIGHT), and the hips do not clearly sink over the standing foot (SOME_SPRING). In
-# the data set `styles` (walks in many moods), the mean flight of each happy walk is .06 or less, that of the
-# slowest run is .16. If SOME_SPRING were .25, slow jogs of Holden et al. (2017) would count as walks.
+# Some people hop a little in a slow, happy walk. So a person also walks if the Froude number is below
+# SLOW_FROUDE, flight is at most SOME_FLIGHT, and `_spring` is below SOME_SPRING (the hips do not clearly sink
+# over the standing foot). In the data set `styles` (walks in many moods), the mean flight is .06 or less in
+# each happy walk, and .16 in the slowest run. If SOME_SPRING were .25, slow jogs of Holden et al. (2017)
+# would count as walks.
 SLOW_FROUDE, SOME_FLIGHT, SOME_SPRING = 0.35, 0.1, 0.2
 WALK_ODDS = -1.0  # where one of these two rules finds a walk, the log odds of jogging are at most this
 CERTAIN_ODDS = 2.0  # log odds that count as full evidence
 DATA_SET_ODDS = 1.0  # log odds added if the data set says that a clip is mainly a jog; subtracted for a walk
 SWITCH_COST = 18.0  # a change of gait costs as much as this many frames of full evidence
-FADE_FRAMES = 31  # frames: length of the fade from one gait to the next
-LONGEST_START = 180  # frames: a doubtful walk from standing to jogging counts as jog if at most this long
-CLEARLY_WALKING = -4.0  # such a walk is doubtful if the median log odds of its second half are above this
-# Frames. Any other walk between standing and jogging is split if it is at most this long: the half beside
-# the standing counts as standing, the half beside the jog as jogging.
+FADE_FRAMES = 31  # length of the fade from one gait to the next
+# What seems to be a walk from standing to jogging may be the first steps of the jog. It counts as jog if it
+# has at most LONGEST_START frames and the median log odds of its second half are above CLEARLY_WALKING.
+LONGEST_START = 180
+CLEARLY_WALKING = -4.0
+# Any other walk between standing and jogging, in either order, is divided if it has at most this many frames.
+# The half beside the standing counts as standing, the half beside the jog as jogging.
 LONGEST_SHORT_WALK = 75
 
 
 def overwrite_crouch(gait: Array, clip: Clip) -> Array:
-    """Gait (F, 6) of a clip on flat ground, with crouch = 1 - clip((head height - 80) / 50, 0, 1).
+    """Replace the share of crouch in the gait (F, 6) of a clip on flat ground. Returns the new gait (F, 6).
 
-    Heights are in cm. As in the code of Holden et al. (2017), the other columns do not change, so the sum may
-    differ from 1.
+    The new share depends on the height of the head only: it is 1 at 80 cm or less, and 0 at 130 cm or more.
+    As in the code of Holden et al. (2017), the other shares stay, so the sum may differ from 1.
     """
     head = clip.positions[:, clip.skeleton.role("head"), 1]
     out = gait.copy()
@@ -66,11 +72,11 @@ def overwrite_crouch(gait: Array, clip: Clip) -> Array:
 
 
 def automatic_gait(clip: Clip, down: np.ndarray, dominant: str | None) -> Array:
-    """Gait shares (F, 6) with the sum 1.
+    """Find the gait from the motion. Returns shares (F, 6) of GAITS, whose sum is 1.
 
-    down: (F, 4) contacts by `contacts.stance`. dominant: the clip's main gait, or None. It decides between
-    walk and jog if both are about equally likely. Jumps and bumps are not recognised: if `dominant` is one of
-    them, all frames get it, except those in which the person stands.
+    down: (F, 4) contacts from `hobble.labels.contacts.stance`. dominant: the clip's main gait, or None if it
+    is not known. It decides between walk and jog if both are about equally likely. "jump" and "bump" are not
+    recognised: if `dominant` is one of them, all frames get it, except those in which the person stands.
     """
     odds = jog_odds(clip, down) + {"jog": DATA_SET_ODDS, "walk": -DATA_SET_ODDS}.get(dominant or "", 0.0)
     gait = _likeliest_path(_evidence(clip, odds), SWITCH_COST)
@@ -86,7 +92,6 @@ def jog_odds(clip: Clip, down: np.ndarray) -> Array:
     left, right = down[:, :2].any(axis=1), down[:, 2:].any(axis=1)
     flight = gaussian((~left & ~right).astype(float), 20.0)
     double_support = gaussian((left & right).astype(float), 20.0)
-    # Froude number: speed squared / (gravity * leg length).
     froude = _speed(clip) ** 2 / (GRAVITY * clip.skeleton.leg_length)
     spring = _spring(clip)
     odds = (
@@ -107,10 +112,10 @@ def _evidence(clip: Clip, odds: Array) -> Array:
     speed = _speed(clip) / clip.skeleton.leg_length
     stand = np.clip((STANDING_SPEED - speed) / STANDING_SPEED, -1.0, 1.0)
     head, hips = _relative_heights(clip)
-    low = np.clip(np.minimum(CROUCHED_HEAD - head, CROUCHED_HIPS - hips) / 0.08, -1.0, 1.0)
-    stand = np.where(low > 0, -1.0, stand)
+    crouch = np.clip(np.minimum(CROUCHED_HEAD - head, CROUCHED_HIPS - hips) / CERTAIN_DEPTH, -1.0, 1.0)
+    stand = np.where(crouch > 0, -1.0, stand)
     jog = np.clip(odds / CERTAIN_ODDS, -1.0, 1.0)
-    return np.stack([stand, np.zeros(len(clip)), jog, low], axis=1)
+    return np.stack([stand, np.zeros(len(clip)), jog, crouch], axis=1)
 
 
 def _speed(clip: Clip) -> Array:
@@ -122,7 +127,7 @@ def _speed(clip: Clip) -> Array:
 
 
 def _bounce(clip: Clip) -> Array:
-    """(F,) root mean square of the hips' vertical acceleration over half a second, in units of gravity."""
+    """(F,) root mean square of the hips' vertical acceleration over about half a second, in g."""
     if len(clip) < 3:
         return np.zeros(len(clip))
     height = gaussian(clip.positions[:, clip.skeleton.role("hips"), 1], 2.0)
@@ -133,8 +138,10 @@ def _bounce(clip: Clip) -> Array:
 def _spring(clip: Clip) -> Array:
     """(F,) correlation of the hips' height with the distance between the heel joints, over about a cycle.
 
-    A walking leg is an inverted pendulum: the hips are highest over the standing foot, while the other
-    foot swings past it. A jogging leg is a spring: the hips are lowest there (Cavagna et al. 1977).
+    The heels are close together while one foot stands and the other foot swings past it. At this moment, the
+    hips of a walking person are highest, because the leg works as an inverted pendulum. The hips of a jogging
+    person are lowest, because the leg works as a spring (Cavagna et al. 1977). So the correlation is negative
+    for a walk and positive for a jog.
     """
     skeleton, positions = clip.skeleton, clip.positions
     height = gaussian(positions[:, skeleton.role("hips"), 1], 1.5)
@@ -146,9 +153,9 @@ def _spring(clip: Clip) -> Array:
 
 
 def _relative_heights(clip: Clip) -> tuple[Array, Array]:
-    """(F,) heights of head and hips above the floor, each divided by the length of the bones below.
+    """Heights of head and hips above the floor, (F,) each, divided by the length of the bones below them.
 
-    The floor is the mean of the lowest heights of both toes in the 61 frames around each frame.
+    The floor is the mean of two heights: the lowest height of each toe in the 61 frames around a frame.
     """
     skeleton, y = clip.skeleton, clip.positions[..., 1]
     toes = y[:, [skeleton.role("left_toe"), skeleton.role("right_toe")]]
@@ -163,21 +170,23 @@ def _relative_heights(clip: Clip) -> tuple[Array, Array]:
     return head, (y[:, skeleton.role("hips")] - floor) / leg
 
 
-def _likeliest_path(evidence: Array, switch: float) -> Array:
-    """(F,) the sequence of gaits with the highest sum of evidence, less `switch` for each change (Viterbi).
+def _likeliest_path(evidence: Array, switch_cost: float) -> Array:
+    """(F,) the most likely gait of each frame: an index of the G gaits.
 
-    evidence: (F, G) of G gaits.
+    Of all sequences of gaits, this one has the highest sum of `evidence` (F, G), minus `switch_cost` for each
+    change of gait (Viterbi algorithm).
     """
     frames, gaits = evidence.shape
     if not frames:
         return np.zeros(0, int)
+    # best: for each gait, the sum of the best sequence that ends with it. came_from: its gait a frame before.
     best, came_from = evidence[0].copy(), np.zeros((frames, gaits), int)
     unchanged = np.arange(gaits)
     for i in range(1, frames):
         top = int(np.argmax(best))
-        stay = best >= best[top] - switch
+        stay = best >= best[top] - switch_cost
         came_from[i] = np.where(stay, unchanged, top)
-        best = np.where(stay, best, best[top] - switch) + evidence[i]
+        best = np.where(stay, best, best[top] - switch_cost) + evidence[i]
     path = np.empty(frames, int)
     path[-1] = np.argmax(best)
     for i in range(frames - 1, 0, -1):
@@ -186,9 +195,9 @@ def _likeliest_path(evidence: Array, switch: float) -> Array:
 
 
 def _without_short_walks(gait: Array, odds: Array) -> Array:
-    """Gaits (F,) without short walks between standing and jogging (LONGEST_START, LONGEST_SHORT_WALK).
+    """Replace short walks between standing and jogging, as LONGEST_START and LONGEST_SHORT_WALK say.
 
-    odds: (F,) of `jog_odds`.
+    gait: (F,) indices of GAITS. odds: (F,) from `jog_odds`. Returns the new gaits (F,).
     """
     out = gait.copy()
     edges = np.concatenate([[0], np.flatnonzero(np.diff(gait)) + 1, [len(gait)]])
@@ -205,5 +214,8 @@ def _without_short_walks(gait: Array, odds: Array) -> Array:
 
 
 def _fade(gait: Array, count: int) -> Array:
-    """(F, count) shares of gaits (F,), with a linear fade of FADE_FRAMES at every change."""
+    """(F, count) shares of `count` gaits, which fade linearly over FADE_FRAMES at every change.
+
+    gait: (F,) index of each frame's gait.
+    """
     return np.clip(mean(np.eye(count)[gait], FADE_FRAMES), 0.0, 1.0)

@@ -12,12 +12,12 @@ import numpy as np
 from hobble.core.clip import Clip
 from hobble.core.files import write_json
 from hobble.core.quat import Array
-from hobble.labels import read_files as label_files
+from hobble.labels import read_files
 from hobble.labels.clip_labels import GAITS, LabelReport, Labels
 from hobble.labels.contacts import contacts, stance
-from hobble.labels.footfall import Swing, find_swings, landings
+from hobble.labels.footfall import Swing, find_landings, find_swings
 from hobble.labels.gait import automatic_gait, overwrite_crouch
-from hobble.labels.label_picture import label_picture
+from hobble.labels.label_picture import make_label_picture
 from hobble.labels.options import LabelOptions as Options
 from hobble.labels.phase import (
     MARGINS,
@@ -39,29 +39,31 @@ def label_clip(
     ground: str,
     options: Options,
 ) -> tuple[Labels, LabelReport]:
-    """Label a clip.
+    """Label a clip. Returns its labels, and a report that says where they come from.
 
-    files: hand-made files beside the clip's BVH file. `.phase` has priority over `_footsteps.txt`, `.gait`
-    over `_gait.txt`. motion: the report of the motion stage, of which `source_fps`, `source_frames`,
-    `source_start` and `loops` are read. gait: the clip's main gait, if known. ground: "flat", or another kind
-    of ground. options: the section `labels` of the data set. Raises InputError for an invalid file.
+    files: hand-made label files beside the clip's BVH file. `.phase` has priority over `_footsteps.txt`,
+    `.gait` has priority over `_gait.txt`. motion: the report beside the clip's motion, with `source_frames`
+    (number of frames of the BVH file), `source_fps` (its frame rate), `source_start` (its frame that is frame
+    0 of the clip) and `loops` (how often the clip repeats it). gait: the clip's main gait, if known. ground:
+    "flat", or another kind of ground. options: the section `labels` of the data set. Raises InputError for an
+    invalid file.
     """
-    given = _by_kind(files) if options.files else {}
+    label_files = _files_by_kind(files) if options.files else {}
     warnings: list[str] = []
-    if given and motion.get("loops", 1) > 1:
-        warnings.append(_not_used(given))
-        given = {}
+    if label_files and motion.get("loops", 1) > 1:
+        warnings.append(_unused_files_warning(label_files))
+        label_files = {}
     time = SourceTime(motion["source_frames"], motion["source_fps"], motion.get("source_start", 0))
     swings = find_swings(clip, options)
-    phase, known, footsteps = _phase(clip, given, time, swings, options.shortest_step)
-    shares = _gait(clip, given, time, options, gait)
+    phase, known, footsteps = _find_phase(clip, label_files, time, swings, options.shortest_step)
+    shares = _find_gait(clip, label_files, time, options, gait)
     if ground == "flat":
         shares = overwrite_crouch(shares, clip)
     known &= ~dropped_frames(footsteps, len(clip))
     zero = options.phase_zero
     cycles, dropped = find_cycles(footsteps, len(clip), zero, options.margins)
     if not len(cycles):
-        warnings.append(_no_cycle(options.margins))
+        warnings.append(_no_cycle_warning(options.margins))
     labels = Labels(
         contacts=contacts(clip, options),
         phase=phase if zero == "right" else (phase + 0.5) % 1.0,
@@ -72,8 +74,8 @@ def label_clip(
     )
     report = LabelReport(
         clip=clip.name,
-        phase_source="file" if {"phase", "footsteps"} & given.keys() else "automatic",
-        gait_source="file" if {"gait", "gait_keys"} & given.keys() else "automatic",
+        phase_source="file" if {"phase", "footsteps"} & label_files.keys() else "automatic",
+        gait_source="file" if {"gait", "gait_keys"} & label_files.keys() else "automatic",
         phase_zero=zero,
         margins=options.margins,
         cycles_dropped=dropped,
@@ -82,21 +84,22 @@ def label_clip(
     return labels, report
 
 
-def _not_used(given: Mapping[str, Path]) -> str:
-    names = ", ".join(path.name for path in given.values())
+def _unused_files_warning(label_files: Mapping[str, Path]) -> str:
+    names = ", ".join(path.name for path in label_files.values())
     return f"{names} not used: their frame numbers are those of one cycle, but the clip repeats this cycle"
 
 
-def _no_cycle(margins: str) -> str:
+def _no_cycle_warning(margins: str) -> str:
     where = f" with {MARGINS[margins]} frames of the clip before and {MARGINS[margins] + 1} after it"
     return f"no whole gait cycle{where if margins == 'drop' else ''}, so no frame of the clip is trained on"
 
 
 def mirror_labels(labels: Labels, report: LabelReport, clip: Clip) -> tuple[Labels, LabelReport]:
-    """Labels of the mirrored clip: left and right contacts are swapped, and the phase is half a cycle later.
+    """The labels of a mirrored clip, and their report.
 
-    labels, report: of the clip that is mirrored. clip: the mirrored clip. Its cycles begin where the other
-    foot lands in the clip that is mirrored.
+    labels, report: of the original clip. clip: the mirrored clip. Left and right contacts are swapped, and
+    the phase is half a cycle later. A cycle of the mirrored clip begins where the other foot lands in the
+    original.
     """
     footsteps = mirrored_footsteps(labels.footsteps)
     cycles, dropped = find_cycles(footsteps, len(labels), report.phase_zero, report.margins)
@@ -113,22 +116,26 @@ def mirror_labels(labels: Labels, report: LabelReport, clip: Clip) -> tuple[Labe
 
 
 def write_report(path: str | Path, report: LabelReport, labels: Labels, clip: Clip) -> None:
-    """Write the JSON beside the labels: the report, seconds of each gait and data of the label picture."""
-    main = np.argmax(labels.gait, axis=1)
-    seconds = {name: float(np.sum(main == i) / clip.fps) for i, name in enumerate(GAITS)}
+    """Write the JSON file beside the labels.
+
+    It holds the report; the seconds of each gait; the number of cycles; and the curves of a picture of the
+    labels (see `make_label_picture`).
+    """
+    main_gait = np.argmax(labels.gait, axis=1)
+    seconds = {name: float(np.sum(main_gait == i) / clip.fps) for i, name in enumerate(GAITS)}
     write_json(
         path,
         {
             **asdict(report),
             "seconds": seconds,
             "cycles": len(labels.cycles),
-            "curves": label_picture(labels, clip),
+            "curves": make_label_picture(labels, clip),
         },
     )
 
 
-def _by_kind(files: Iterable[str | Path]) -> dict[str, Path]:
-    """Kind of a label file (phase, gait, footsteps, gait_keys) -> file."""
+def _files_by_kind(files: Iterable[str | Path]) -> dict[str, Path]:
+    """Kind of a label file (phase, gait, footsteps, gait_keys) -> file. Other files are ignored."""
     suffixes = {
         ".phase": "phase",
         ".gait": "gait",
@@ -143,28 +150,33 @@ def _by_kind(files: Iterable[str | Path]) -> dict[str, Path]:
     return out
 
 
-def _phase(
-    clip: Clip, given: Mapping[str, Path], time: SourceTime, swings: list[Swing], shortest_step: int
+def _find_phase(
+    clip: Clip, files: Mapping[str, Path], time: SourceTime, swings: list[Swing], shortest_step: int
 ) -> tuple[Array, np.ndarray, Array]:
-    """Phase (F,), 0 as the right foot lands; bool (F,), whether it is known; and footsteps (N, 3)."""
+    """Find the phase from files or, without files, from the swings.
+
+    Returns the phase (F,), which is 0 when the right foot lands; for each frame whether the phase is known,
+    bool (F,); and the footsteps (N, 3), see `hobble.labels.phase`. files: from `_files_by_kind`.
+    """
     frames = len(clip)
-    if "footsteps" in given:
-        footsteps = label_files.read_footsteps(given["footsteps"], time)
-    if "phase" in given:
-        phase = label_files.read_phase(given["phase"], time, frames)
+    if "footsteps" in files:
+        footsteps = read_files.read_footsteps(files["footsteps"], time)
+    if "phase" in files:
+        phase = read_files.read_phase(files["phase"], time, frames)
         from_phase, known = footsteps_of_phase(phase)
-        return phase, known, footsteps if "footsteps" in given else from_phase
-    if "footsteps" not in given:
-        footsteps = rows_of_landings(landings(swings, frames, shortest_step))
+        return phase, known, footsteps if "footsteps" in files else from_phase
+    if "footsteps" not in files:
+        footsteps = rows_of_landings(find_landings(swings, frames, shortest_step))
     phase, known = phase_of_footsteps(footsteps, frames)
     return phase, known, footsteps
 
 
-def _gait(
-    clip: Clip, given: Mapping[str, Path], time: SourceTime, options: Options, dominant: str | None
+def _find_gait(
+    clip: Clip, files: Mapping[str, Path], time: SourceTime, options: Options, dominant: str | None
 ) -> Array:
-    if "gait" in given:
-        return label_files.read_gait(given["gait"], time, len(clip))
-    if "gait_keys" in given:
-        return label_files.read_gait_keys(given["gait_keys"], time, len(clip))
+    """(F, 6) gait shares from files or, without files, from the motion. dominant: main gait, if known."""
+    if "gait" in files:
+        return read_files.read_gait(files["gait"], time, len(clip))
+    if "gait_keys" in files:
+        return read_files.read_gait_keys(files["gait_keys"], time, len(clip))
     return automatic_gait(clip, stance(clip, options), dominant)

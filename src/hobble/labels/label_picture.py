@@ -1,4 +1,4 @@
-"""The data of a picture of a clip's labels, as small arrays for the report."""
+"""Prepares the data of a picture of a clip's labels, as short lists for a page."""
 
 from __future__ import annotations
 
@@ -14,33 +14,36 @@ from hobble.labels.clip_labels import CONTACT_ROLES, GAITS, Labels
 POINTS = 400  # a curve has at most this many values by default
 
 
-def label_picture(labels: Labels, clip: Clip, points: int = POINTS) -> dict[str, Any]:
-    """Contacts, landings, phase, gait and speed over time. Curves have at most `points` values.
+def make_label_picture(labels: Labels, clip: Clip, points: int = POINTS) -> dict[str, Any]:
+    """Contacts, landings, phase, gait and speed over time, under these keys.
 
-    `contacts`: for each joint a list of [from, to) in seconds. `landings`: for each foot the times in seconds
-    at which it lands. `seconds`: the times of the curves. The curves are `phase` (None where unknown), `gait`
-    (one for each gait) and `speed` (m/s).
+    `contacts`: for each joint of CONTACT_ROLES a list of intervals [from, to), in seconds, in which it is on
+    the ground. `landings`: for "right" and "left" the times in seconds at which this foot lands. `phase`
+    (None where unknown), `gait` (for each gait that occurs) and `speed` (m/s) are curves, lists of at most
+    `points` values. `seconds`: the times of these values.
     """
     frames = len(labels)
-    at = np.unique(np.linspace(0, max(frames - 1, 0), min(frames, points)).round().astype(int))
+    chosen = np.unique(np.linspace(0, max(frames - 1, 0), min(frames, points)).round().astype(int))
     phase = [
         round(float(value), 3) if known else None
-        for value, known in zip(labels.phase[at], labels.phase_known[at], strict=True)
+        for value, known in zip(labels.phase[chosen], labels.phase_known[chosen], strict=True)
     ]
     return {
-        "seconds": _rounded(at / clip.fps),
+        "seconds": _round_to_list(chosen / clip.fps),
         "contacts": {
             role: _intervals(labels.contacts[:, i], clip.fps) for i, role in enumerate(CONTACT_ROLES)
         },
         "landings": {
-            side: _rounded(labels.footsteps[np.isfinite(labels.footsteps[:, i]), i] / clip.fps)
+            side: _round_to_list(labels.footsteps[np.isfinite(labels.footsteps[:, i]), i] / clip.fps)
             for i, side in enumerate(("right", "left"))
         },
         "phase": phase,
         "gait": {
-            name: _rounded(labels.gait[at, i]) for i, name in enumerate(GAITS) if labels.gait[:, i].any()
+            name: _round_to_list(labels.gait[chosen, i])
+            for i, name in enumerate(GAITS)
+            if labels.gait[:, i].any()
         },
-        "speed": _rounded(_speed(clip)[at]),
+        "speed": _round_to_list(_speed(clip)[chosen]),
     }
 
 
@@ -56,8 +59,8 @@ def _speed(clip: Clip) -> Array:
 def _intervals(flags: Array, fps: float) -> list[list[float]]:
     """[from, to) in seconds of each stretch of frames in which `flags` is true."""
     edges = np.flatnonzero(np.diff(np.concatenate([[False], flags, [False]])))
-    return [_rounded(pair / fps) for pair in edges.reshape(-1, 2)]
+    return [_round_to_list(pair / fps) for pair in edges.reshape(-1, 2)]
 
 
-def _rounded(values: Array) -> list[float]:
+def _round_to_list(values: Array) -> list[float]:
     return [round(float(v), 3) for v in values]

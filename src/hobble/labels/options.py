@@ -10,7 +10,7 @@ from hobble.core.section import Positive, PositiveFloat, Section
 
 
 class LabelOptions(Section):
-    """Options for contacts, phase and gait. Speeds are in centimetres a frame at 120 Hz."""
+    """Options for contacts, phase and gait. Speeds are in centimetres per frame at 120 Hz."""
 
     files: bool = Field(True, description="use hand-made label files beside the clip")
     contacts: Literal["stance", "original"] = Field(
@@ -22,17 +22,23 @@ class LabelOptions(Section):
         0.02, description="for `contacts: original`: limit of the squared displacement, cm2 per 60 Hz frame"
     )
     phase_zero: Literal["right", "left"] = Field("right", description="the foot that lands at phase 0")
-    heel_speed: PositiveFloat = Field(0.375, description="unit of the speeds below which a heel rests")
-    toe_speed: PositiveFloat = Field(0.0875, description="unit of the speeds below which a toe rests")
+    heel_speed: PositiveFloat = Field(
+        0.375, description="unit for the speed of a heel: a heel slower than 0.35 of this rests"
+    )
+    toe_speed: PositiveFloat = Field(
+        0.0875, description="unit for the speed of a toe: a toe slower than 0.35 of this rests"
+    )
     valley_factor: PositiveFloat = Field(
         2.875,
-        description="a foot that never rests between two swings is down while its speed is at most this many "
-        "times its lowest speed between them",
+        description="a foot that never rests between two swings is down while its speed is less than this "
+        "many times its lowest speed between these swings",
     )
     margins: Literal["extend", "drop"] = Field(
         "extend",
-        description="cycles with less than a second of clip before or after them. extend: they are used, "
-        "and the path is continued straight past the clip's end. drop: they are left out, as in Holden et "
-        "al. (2017)",
+        description="what happens to gait cycles that begin less than a second after the clip's first frame "
+        "or end less than a second before its last frame. extend: they are used, and the path is continued "
+        "straight past the clip's end. drop: they are left out, as in Holden et al. (2017)",
     )
-    shortest_step: Positive = Field(5, description="steps of this many 120 Hz frames or fewer are dropped")
+    shortest_step: Positive = Field(
+        5, description="a landing at most this many frames (at 120 Hz) after the other foot's is left out"
+    )

@@ -1,11 +1,12 @@
 """Converts footsteps to phase and back, and finds locomotion cycles.
 
-The right foot lands at phase 0 and the left one at .5, as in Holden et al. (2017). (`hobble.labels.label`
-shifts the phase by half a cycle if the option `phase_zero` is `left`.)
+The right foot lands at phase 0 and the left foot at phase .5, as in Holden et al. (2017). (If the option
+`phase_zero` is `left`, `hobble.labels.label` shifts the phase by half a cycle.)
 
-Footsteps are an array (N, 3). Each row holds the frame in which the right foot lands, the next frame in which
-the left foot lands, and a mark: 1 if the frames from this row's right landing to the next row's must not be
-used, else 0. An unknown landing is nan. A row without landings ends a bout of walking.
+Footsteps are an array (N, 3). A row holds the frame in which the right foot lands, the next frame in which
+the left foot lands, and a mark. The mark is 1 if the frames from the right landing of this row to the right
+landing of the next row must not be used, else 0. An unknown landing is nan. A row without landings ends a
+bout of walking. In a bout, the feet land in turn, without a long rest.
 """
 
 from __future__ import annotations
@@ -18,40 +19,41 @@ from hobble.core.quat import Array
 from hobble.labels.read_files import whole_frame
 
 BREAK = (np.nan, np.nan, 1.0)  # the row that ends a bout of walking
-IDLE_RATE = 0.0017  # cycles a frame: a tenth of the usual rate, as for a standing character at run time
+# Cycles a frame. At this rate the phase advances where nobody walks: a tenth of the usual rate, as for a
+# standing character at run time.
+IDLE_RATE = 0.0017
 FASTEST = 0.25  # cycles a frame: a larger change of a hand-made phase is a jump, not movement
-# Option `margins` -> least number of frames that a clip must have before a cycle. After the cycle it must
-# have this number plus one.
-# With "extend", cycles near an end of the clip are used too, because the path can be extended past the end.
-# With "drop" they are left out.
+# Value of the option `margins` -> the least number of frames that a clip must have before a cycle. After the
+# cycle it must have one frame more. With "extend", cycles near an end of the clip are used, because the path
+# can be continued past the end. With "drop", they are left out.
 MARGINS = {"extend": 1, "drop": 60}
 
 
 def phase_of_footsteps(footsteps: Array, frames: int) -> tuple[Array, np.ndarray]:
-    """Phase (frames,) in 0..1, 0 as the right foot lands, and (frames,) bool, whether it is known.
+    """The phase (frames,), 0 to 1, and for each frame whether the phase is known, bool (frames,).
 
-    The phase is known and linear between the landings of a bout of walking. Elsewhere it advances at
-    IDLE_RATE; between two bouts this rate is adjusted, so that the phase has the right value at the next
+    Between the landings of a bout of walking, the phase is known and linear. Elsewhere it advances at
+    IDLE_RATE. Between two bouts this rate is adjusted, so that the phase has the right value at the next
     landing.
     """
-    when, value, joined = _landings(footsteps)
+    when, phases, joined = _list_landings(footsteps)
     frame = np.arange(frames)
     if not len(when):
         return (frame * IDLE_RATE) % 1.0, np.zeros(frames, bool)
-    unwrapped = _unwrapped(when, value, joined)
+    unwrapped = _unwrap(when, phases, joined)
     phase = np.interp(frame, when, unwrapped)
     phase = np.where(frame < when[0], unwrapped[0] - (when[0] - frame) * IDLE_RATE, phase)
     phase = np.where(frame > when[-1], unwrapped[-1] + (frame - when[-1]) * IDLE_RATE, phase)
-    after = np.searchsorted(when, frame, side="right") - 1
-    known = (after >= 0) & (frame <= when[-1])
-    gap = np.append(~joined, True)[after]
-    known &= ~gap | (frame == when[after])
+    last_landing = np.searchsorted(when, frame, side="right") - 1  # index of the last landing before a frame
+    known = (last_landing >= 0) & (frame <= when[-1])
+    between_bouts = np.append(~joined, True)[last_landing]
+    known &= ~between_bouts | (frame == when[last_landing])
     phase %= 1.0
     return np.where(phase > 1 - 1e-9, 0.0, phase), known
 
 
 def dropped_frames(footsteps: Array, frames: int) -> np.ndarray:
-    """(frames,) bool: frames that must not be used, because their row of footsteps is marked."""
+    """(frames,) bool: True for the frames that must not be used, because their row of footsteps is marked."""
     out = np.zeros(frames, bool)
     for row, following in itertools.pairwise(footsteps):
         if row[2] and np.isfinite(row[0]) and np.isfinite(following[0]):
@@ -60,9 +62,10 @@ def dropped_frames(footsteps: Array, frames: int) -> np.ndarray:
 
 
 def footsteps_of_phase(phase: Array) -> tuple[Array, np.ndarray]:
-    """The footsteps (N, 3) of a hand-made phase (F,), and (F,) bool, whether the phase changes in each frame.
+    """The footsteps (N, 3) of a hand-made phase (F,), and whether the phase is known, bool (F,).
 
-    A foot lands where the phase passes 0 or .5.
+    A foot lands where the phase passes 0 or .5. The phase is known in the frames in which it moves on. It is
+    not known where it stands still or jumps.
     """
     step = np.diff(phase) % 1.0
     moving = np.concatenate([[False], (step > 0) & (step < FASTEST), [False]])
@@ -80,9 +83,10 @@ def footsteps_of_phase(phase: Array) -> tuple[Array, np.ndarray]:
 
 
 def rows_of_landings(events: list[tuple[float, int]]) -> Array:
-    """Footsteps (N, 3) of landings (frame, foot) in order of time. Foot 0 is right, 1 left.
+    """The footsteps (N, 3) of events (frame, foot) in order of time. foot: 0 right, 1 left, -1 neither.
 
-    A bout of walking ends at an event with the foot -1, and between two successive landings of the same foot.
+    A bout of walking ends at an event with the foot -1. It also ends between two successive landings of the
+    same foot.
     """
     rows: list[list[float]] = []
     last = -1
@@ -104,42 +108,43 @@ def rows_of_landings(events: list[tuple[float, int]]) -> Array:
 
 
 def find_cycles(footsteps: Array, frames: int, zero: str, margins: str) -> tuple[np.ndarray, int]:
-    """First and last frame (C, 2) of each cycle that is used, and the number of cycles left out.
+    """First and last frame (C, 2) of each of the C cycles that are used, and the number of cycles left out.
 
-    A cycle is the time between two landings of the foot `zero`. A marked row leaves out its cycle and the one
-    before, as in Holden et al. (2017). A cycle that is too near an end of the clip is left out, too. With
-    `margins` "drop", the clip must have 60 frames before the cycle and 61 after it, as in Holden et al.
-    (2017). With "extend", one before and two after are enough.
+    A cycle is the time between two successive landings of the foot `zero` ("right" or "left"), with a landing
+    of the other foot between them. If the row of its first or of its last landing is marked, the cycle is
+    left out, as in Holden et al. (2017). A cycle that is too near an end of the clip is left out, too.
+    margins: a key of MARGINS. With "drop", the clip must have 60 frames before the cycle and 61 frames after
+    it, as in Holden et al. (2017). With "extend", one frame before and two frames after are enough.
     """
     margin = MARGINS[margins]
     column = 0 if zero == "right" else 1
-    kept, dropped = [], 0
+    used, left_out = [], 0
     for row, following in itertools.pairwise(footsteps):
         between = row[1] if zero == "right" else following[0]
         if not row[column] < between < following[column]:
             continue
         first, last = whole_frame(row[column]), whole_frame(following[column])
         if row[2] or following[2] or first < margin or frames - last <= margin + 1:
-            dropped += 1
+            left_out += 1
         else:
-            kept.append((first, last))
-    return np.array(kept, int).reshape(-1, 2), dropped
+            used.append((first, last))
+    return np.array(used, int).reshape(-1, 2), left_out
 
 
 def mirrored_footsteps(footsteps: Array) -> Array:
-    """The footsteps (M, 3) of the mirrored clip, with left and right exchanged.
+    """The footsteps (M, 3) of the mirrored clip. footsteps: (N, 3) of the original clip.
 
-    A row of the mirrored clip starts with a right landing, which is a left landing of the clip before
-    mirroring. The new row takes its mark from the old row with that left landing.
+    A right landing of the mirrored clip is a left landing of the original. So a new row, which begins with a
+    right landing, gets the mark of the original row with this left landing.
     """
     landings: list[tuple[float, int]] = []
     marks: list[float] = []
-    for right, left, dropped in footsteps:
-        for when, foot in ((right, 1), (left, 0)):
+    for right, left, mark in footsteps:
+        for when, foot in ((right, 1), (left, 0)):  # foot in the mirrored clip: 0 right, 1 left
             if np.isfinite(when):
                 landings.append((when, foot))
                 if foot == 0:
-                    marks.append(dropped)
+                    marks.append(mark)
         if np.isnan(right) and np.isnan(left):
             landings.append((np.nan, -1))
     rows = rows_of_landings(landings)
@@ -148,39 +153,42 @@ def mirrored_footsteps(footsteps: Array) -> Array:
     return rows
 
 
-def _landings(footsteps: Array) -> tuple[Array, Array, np.ndarray]:
-    """Frame (n,) and phase (n,), 0 or .5, of each of the n landings, and which of them are joined.
+def _list_landings(footsteps: Array) -> tuple[Array, Array, np.ndarray]:
+    """The n landings in order: their frames (n,), their phases (n,), and which are joined, bool (n - 1,).
 
-    That is bool (n - 1,): whether a landing and the next one are in the same bout of walking.
+    A phase is 0 (right) or .5 (left). Two successive landings are joined if they are in the same bout of
+    walking.
     """
     when: list[float] = []
-    value: list[float] = []
+    phases: list[float] = []
     joined: list[bool] = []
-    apart = True
+    bout_ended = True
     for right, left, _ in footsteps:
         if np.isnan(right) and np.isnan(left):
-            apart = True
+            bout_ended = True
         for landing, phase in ((right, 0.0), (left, 0.5)):
             if np.isfinite(landing):
                 if when:
-                    joined.append(not apart and value[-1] != phase)
+                    joined.append(not bout_ended and phases[-1] != phase)
                 when.append(landing)
-                value.append(phase)
-                apart = False
-    return np.array(when, float), np.array(value, float), np.array(joined, bool)
+                phases.append(phase)
+                bout_ended = False
+    return np.array(when, float), np.array(phases, float), np.array(joined, bool)
 
 
-def _unwrapped(when: Array, value: Array, joined: np.ndarray) -> Array:
-    """(n,) phase of each landing, not wrapped to 0..1: it only rises.
+def _unwrap(when: Array, phases: Array, joined: np.ndarray) -> Array:
+    """(n,) phase of each landing, not wrapped to 0..1, so that it never falls.
 
-    It rises by half a cycle in each step of a bout, and by about IDLE_RATE per frame between two bouts.
+    The phase rises by half a cycle in each step of a bout, and by about IDLE_RATE per frame between two
+    bouts. when, phases, joined: from `_list_landings`.
     """
-    unwrapped = [value[0]]
-    for i, together in enumerate(joined):
-        if together:
+    unwrapped = [phases[0]]
+    for i, in_one_bout in enumerate(joined):
+        if in_one_bout:
             unwrapped.append(unwrapped[-1] + 0.5)
             continue
-        least = (value[i + 1] - unwrapped[-1]) % 1.0
+        # The smallest rise to the phase of the next landing, plus whole cycles if the time allows them.
+        least = (phases[i + 1] - unwrapped[-1]) % 1.0
         spare = (when[i + 1] - when[i]) * IDLE_RATE - least
         unwrapped.append(unwrapped[-1] + least + max(0, round(spare)))
     return np.array(unwrapped)

@@ -1,6 +1,7 @@
 """Reads hand-made label files beside clips: `.phase`, `.gait`, `_footsteps.txt`, `_gait.txt`.
 
-Frames in them are counted from 1 at the frame rate of the clip's BVH file. Errors name the file and the line.
+In these files, frames are counted from 1, at the frame rate of the clip's BVH file (the source file). A clip
+has 60 frames a second, and its frames are counted from 0. Errors name the label file and the line.
 """
 
 from __future__ import annotations
@@ -18,15 +19,15 @@ from hobble.core.untrusted import read_text
 from hobble.labels.clip_labels import GAITS
 
 FILE_GAITS = ("stand", "walk", "jog", "run", "crouch", "jump", "crawl", "unknown")  # columns of `.gait`
-TO_GAIT = {"run": "jog", "crawl": "crouch", "unknown": "bump"}  # gait that only files have -> gait of GAITS
+TO_GAIT = {"run": "jog", "crawl": "crouch", "unknown": "bump"}  # gait that only files name -> gait of GAITS
 
 
 @dataclass(frozen=True)
 class SourceTime:
-    """How frames of the clip's source file relate to frames of the clip.
+    """Converts frames of the clip's source file to frames of the clip, and back.
 
-    frames: number of frames of the source file. fps: its frame rate. first: the frame of the source file,
-    counted from 0, that is frame 0 of the clip.
+    frames: number of frames of the source file. fps: its frame rate. first: the source frame, counted from 0,
+    at which the clip begins.
     """
 
     frames: int
@@ -35,122 +36,151 @@ class SourceTime:
 
     @property
     def ratio(self) -> float:
-        """Source frames per frame of the clip (60 Hz)."""
+        """Number of source frames in the time of one frame of the clip."""
         return self.fps / 60.0
 
     def to_clip(self, number: float) -> float:
-        """Frame of the clip, not rounded, of a source frame that is counted from 1."""
+        """The frame of the clip, not rounded, at the source frame `number`, which is counted from 1."""
         return (number - 1 - self.first) / self.ratio
 
     def at_clip_frames(self, frames: int) -> Array:
-        """(frames,) the source frame, from 0 and not rounded, of each frame of the clip."""
+        """(frames,) the source frame, counted from 0 and not rounded, at each frame of the clip."""
         return np.arange(frames) * self.ratio + self.first
 
 
 def whole_frame(frame: float) -> int:
-    """The first whole frame at or after `frame`.
+    """The first whole frame at or after `frame`. Rounding errors are ignored.
 
-    So frame a of a 120 Hz file, counted from 1, becomes frame a // 2 of the clip, counted from 0.
+    So frame n of a 120 Hz file, counted from 1, becomes frame n // 2 of the clip, counted from 0.
     """
     return math.ceil(frame - 1e-6)
 
 
 def read_phase(path: Path, time: SourceTime, frames: int) -> Array:
-    """(frames,) phase at 60 Hz from a file with one value for each source frame.
+    """(frames,) the phase in each frame of the clip, from a file with one value for each source frame.
 
-    Between two values the phase is interpolated the shorter way round. Raises InputError for a value that is
-    not a number in 0..1, or for a wrong number of rows.
+    Between two values the phase is interpolated the shorter way round the cycle. Raises InputError for a
+    value that is not a number in 0..1, and for a wrong number of rows.
     """
-    rows = _matrix(path, time, 1)[:, 0]
-    before, after, share = _between(rows, time, frames)
+    rows = _read_matrix(path, time, 1)[:, 0]
+    before, after, share = _neighbouring_rows(rows, time, frames)
     step = (after - before + 0.5) % 1.0 - 0.5
     return np.where(share > 0, (before + share * step) % 1.0, before)
 
 
 def read_gait(path: Path, time: SourceTime, frames: int) -> Array:
     """(frames, 6) gait shares from a file with the 8 columns FILE_GAITS. Raises like `read_phase`."""
-    rows = _matrix(path, time, len(FILE_GAITS))
-    before, after, share = _between(rows, time, frames)
-    return _six(before + share[:, None] * (after - before))
+    rows = _read_matrix(path, time, len(FILE_GAITS))
+    before, after, share = _neighbouring_rows(rows, time, frames)
+    return _shares_of_gaits(before + share[:, None] * (after - before))
 
 
 def read_footsteps(path: Path, time: SourceTime) -> Array:
     """(N, 3) footsteps (see `hobble.labels.phase`) from a file with lines `right left` or `right left *`.
 
-    `right` and `left` are the frames in which the feet land; `*` marks a row. The last line may hold only
-    `right`. Then it counts as marked with `*`, because the code of Holden et al. does not use the cycle that
-    ends there. The phase before this landing is known all the same. Raises InputError, which names the line,
-    if frames are not numbers, do not rise, or are past the clip's end.
+    `right` and `left` are the frames in which the feet land. `*` marks a row whose cycle must not be used.
+    The last line may hold only `right`. Then it counts as marked with `*`, because the code of Holden et al.
+    (2017) does not use the cycle that ends with this landing. The phase before the landing is known
+    nevertheless. Raises InputError, which names the line, if frames are not numbers, do not rise, or are past
+    the clip's end.
     """
     steps: list[tuple[float, float, float]] = []
-    last, short_line = 0.0, 0  # the line that holds one frame; 0: none yet
-    for number, words in _lines(path):
+    last = 0.0  # the frame of the landing before
+    short_line = 0  # number of the line that holds only one frame; 0: none yet
+    for number, words in _read_lines(path):
         if short_line:
-            raise InputError(path, "only the last line may hold one frame instead of two", line=short_line)
-        dropped = words[-1] == "*"
-        landings = [_number(path, number, w) for w in (words[:-1] if dropped else words)]
+            raise InputError(
+                path,
+                "only the last line may hold one frame instead of two",
+                line=short_line,
+                fix="Write `right left`: the frames in which the right and the left foot land.",
+            )
+        marked = words[-1] == "*"
+        landings = [_parse_number(path, number, w) for w in (words[:-1] if marked else words)]
         if not 1 <= len(landings) <= 2:
-            raise InputError(path, "a line holds `right left` or `right left *`", line=number)
+            raise InputError(
+                path,
+                f"has {len(landings)} frame numbers, but a line holds `right left` or `right left *`",
+                line=number,
+                fix="Write the frames in which the right and the left foot land, such as `120 151`.",
+            )
         if len(landings) == 1:
             short_line = number
         for landing in landings:
             if landing <= last:
-                raise InputError(path, f"frame {landing:g} does not come after {last:g}", line=number)
+                raise InputError(
+                    path,
+                    f"frame {landing:g} does not come after {last:g}",
+                    line=number,
+                    fix="Write the frames in rising order, beginning with 1 or more.",
+                )
             if landing > time.frames + 1:
                 raise InputError(
                     path, f"frame {landing:g} lies past the clip's last frame, {time.frames}", line=number
                 )
             last = landing
         right, left = (time.to_clip(x) for x in (*landings, math.nan)[:2])
-        steps.append((right, left, float(dropped or short_line > 0)))
+        steps.append((right, left, float(marked or short_line > 0)))
     return np.array(steps, float).reshape(-1, 3)
 
 
 def read_gait_keys(path: Path, time: SourceTime, frames: int) -> Array:
-    """(frames, 6) gait shares from a file with keys: lines `frame gait`.
+    """(frames, 6) gait shares from a file with keys. A key is a line `frame gait`.
 
-    Between two keys with different gaits the shares fade linearly. A fade ends one frame before the second
-    key, as in the `.gait` files of Holden et al. Raises InputError, which names the line, if frames are not
-    numbers or do not rise, or for an unknown gait.
+    Between two keys with different gaits, the shares fade linearly. A fade ends one frame before the second
+    key, as in the `.gait` files of Holden et al. (2017). Raises InputError, which names the line, if frames
+    are not numbers, do not rise, or are past the clip's end, and for an unknown gait.
     """
     names = (*FILE_GAITS, "bump")
     keys: list[tuple[float, int]] = []
-    for number, words in _lines(path):
+    for number, words in _read_lines(path):
         if len(words) != 2:
-            raise InputError(path, "a line holds `frame gait`", line=number)
-        frame = _number(path, number, words[0])
+            raise InputError(
+                path,
+                f"has {len(words)} words, but a line holds `frame gait`, such as `120 walk`",
+                line=number,
+            )
+        frame = _parse_number(path, number, words[0])
         if words[1] not in names:
             raise InputError(
                 path, f"no such gait: {words[1]!r}", line=number, fix=f"There are {', '.join(names)}."
             )
         if keys and frame <= keys[-1][0]:
-            raise InputError(path, f"frame {frame:g} does not come after {keys[-1][0]:g}", line=number)
+            raise InputError(
+                path,
+                f"frame {frame:g} does not come after {keys[-1][0]:g}",
+                line=number,
+                fix="Write the lines in the order of their frames.",
+            )
         if frame > time.frames + 1:
             raise InputError(
                 path, f"frame {frame:g} lies past the clip's last frame, {time.frames}", line=number
             )
         keys.append((frame, GAITS.index(TO_GAIT.get(words[1], words[1]))))
     if not keys:
-        raise InputError(path, "holds no keys", fix="Write lines of `frame gait`, or remove the file.")
-    at, gait = np.array(keys).T
+        raise InputError(
+            path, "holds no keys", fix="Write lines of `frame gait`, such as `1 walk`, or remove the file."
+        )
+    key_frames, gait = np.array(keys).T
     when = time.at_clip_frames(frames) + 1
-    following = np.clip(np.searchsorted(at, when, side="right"), 1, max(len(at) - 1, 1))
+    following = np.clip(np.searchsorted(key_frames, when, side="right"), 1, max(len(key_frames) - 1, 1))
     shares = np.eye(len(GAITS))[gait.astype(int)]
-    if len(at) == 1:
+    if len(key_frames) == 1:
         return np.repeat(shares, frames, axis=0)
-    start, end = at[following - 1], at[following] - 1
+    start, end = key_frames[following - 1], key_frames[following] - 1
     fade = np.clip((when - start) / np.maximum(end - start, 1e-9), 0.0, 1.0)[:, None]
     return (1 - fade) * shares[following - 1] + fade * shares[following]
 
 
-def _lines(path: Path) -> Iterator[tuple[int, list[str]]]:
-    """Number (from 1) and words of each line that is not empty."""
+def _read_lines(path: Path) -> Iterator[tuple[int, list[str]]]:
+    """Read a file. Yields the number (from 1) and the words of each line that is not empty."""
     for number, line in enumerate(read_text(path).splitlines(), 1):
         if words := line.split():
             yield number, words
 
 
-def _number(path: Path, line: int, word: str) -> float:
+def _parse_number(path: Path, line: int, word: str) -> float:
+    """The number that a word stands for. Raises InputError if it is none, or is not finite."""
     try:
         value = float(word)
     except ValueError:
@@ -160,13 +190,16 @@ def _number(path: Path, line: int, word: str) -> float:
     return value
 
 
-def _matrix(path: Path, time: SourceTime, columns: int) -> Array:
-    """Rows of `columns` numbers in 0..1, one for each source frame. One row more or less is accepted."""
+def _read_matrix(path: Path, time: SourceTime, columns: int) -> Array:
+    """(rows, columns) numbers in 0..1 from a file with a row for each source frame.
+
+    The file may have one row more or less than the source has frames.
+    """
     rows = []
-    for number, words in _lines(path):
+    for number, words in _read_lines(path):
         if len(words) != columns:
             raise InputError(path, f"has {len(words)} values instead of {columns}", line=number)
-        values = [_number(path, number, w) for w in words]
+        values = [_parse_number(path, number, w) for w in words]
         if not all(-1e-6 <= v <= 1 + 1e-6 for v in values):
             raise InputError(path, "has a value outside 0..1", line=number)
         rows.append(values)
@@ -179,18 +212,22 @@ def _matrix(path: Path, time: SourceTime, columns: int) -> Array:
     return np.array(rows, float)
 
 
-def _between(rows: Array, time: SourceTime, frames: int) -> tuple[Array, Array, Array]:
-    """For each frame of the clip the rows before and after it, and its position between the two (0..1)."""
-    at = np.clip(time.at_clip_frames(frames), 0, len(rows) - 1)
-    nearest = np.round(at)
-    at = np.where(np.abs(at - nearest) < 1e-6, nearest, at)
-    before = np.floor(at).astype(int)
-    return rows[before], rows[np.minimum(before + 1, len(rows) - 1)], at - before
+def _neighbouring_rows(rows: Array, time: SourceTime, frames: int) -> tuple[Array, Array, Array]:
+    """For each frame of the clip: the row before it, the row after it, and its place between them (0..1).
+
+    rows: (R, ...) a row for each source frame. The results are (frames, ...), (frames, ...) and (frames,).
+    """
+    when = np.clip(time.at_clip_frames(frames), 0, len(rows) - 1)
+    # A time that misses a whole source frame only by a rounding error counts as this frame.
+    nearest = np.round(when)
+    when = np.where(np.abs(when - nearest) < 1e-6, nearest, when)
+    before = np.floor(when).astype(int)
+    return rows[before], rows[np.minimum(before + 1, len(rows) - 1)], when - before
 
 
-def _six(eight: Array) -> Array:
+def _shares_of_gaits(file_shares: Array) -> Array:
     """(n, 6) shares of GAITS, added up from (n, 8) shares of FILE_GAITS."""
-    out = np.zeros((len(eight), len(GAITS)))
+    out = np.zeros((len(file_shares), len(GAITS)))
     for column, name in enumerate(FILE_GAITS):
-        out[:, GAITS.index(TO_GAIT.get(name, name))] += eight[:, column]
+        out[:, GAITS.index(TO_GAIT.get(name, name))] += file_shares[:, column]
     return out
