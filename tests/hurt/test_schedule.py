@@ -87,6 +87,18 @@ def test_arms_are_often_hurt_beside_another_part_but_never_too_many_at_once(hold
     assert not legs[:, arms].any()
 
 
+def test_every_arm_is_hurt_at_every_severity(holden31) -> None:
+    out = schedule_severities(holden31, 360 * 400, 60.0, Hurt(), "a", 0)[::180]
+    arms = [part_of_link(holden31, link).name in ARMS for link in holden31.links]
+    for column in out[:, arms].T:
+        counts = {severity: int((column == severity).sum()) for severity in Hurt().severities}
+        lower = [counts[severity] for severity in (3.0, 5.0, 7.0)]
+        assert min(lower) > 0.5 * max(lower)
+        assert 0.7 < sum(lower) / counts[10.0] < 1.4
+    only = schedule_severities(holden31, 360 * 40, 60.0, Hurt(severities=(6.0,)), "a", 0)
+    assert set(np.unique(only)) == {0.0, 6.0}
+
+
 def test_a_clip_s_severities_are_its_own_and_always_the_same(holden31) -> None:
     options = Hurt()
     one = schedule_severities(holden31, 900, 60.0, options, "a_hurt1", 3)

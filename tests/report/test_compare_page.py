@@ -164,16 +164,26 @@ def test_frame_times_are_medians_and_measures_have_names(
     first = material.measured["responsivity"]["laps"][0]["milliseconds"]["spread"]["median"]
     assert next(iter(laps.options.values()))[0]["y"][0] == first
     assert fit.traces[0]["y"] == [median, median]
-    summary = {"walk": {"speed_share": 0.8, "after_healing_cm": 0.1}}
-    named = injury_table(
-        {"injury": [{"configuration": "a", "applies": True, "summary": summary}], "recognition": []}
+
+
+def test_the_table_of_injuries_has_a_column_for_each_gait() -> None:
+    summary = {"walk": {"speed_share": 0.8, "after_healing_cm": 0.1}, "jog": {"speed_share": 0.7}}
+    recognition = [{"configuration": "a", "applies": True, "generated": {"right": 0.9}}]
+    table = injury_table(
+        {
+            "injury": [{"configuration": "a", "applies": True, "summary": summary}],
+            "recognition": recognition,
+        }
     )
-    assert named is not None
-    assert [column.label for column in named.columns] == ["measure", "a, walk"]
-    assert named.rows == [
-        ["share of the healthy speed at severity 10", 0.8],
-        ["remaining distance after healing, cm per joint", 0.1],
+    assert table is not None
+    assert [column.label for column in table.columns] == ["measure", "a, walk", "a, jog"]
+    assert [row[1:] for row in table.rows] == [[0.8, 0.7], [0.1, None], [0.9, None]]
+    labels = [row[0] for row in table.rows]
+    assert labels[:2] == [
+        "share of the healthy speed at severity 10",
+        "remaining distance after healing, cm per joint",
     ]
+    assert "classifier" in labels[2]
 
 
 def test_networks_too_large_for_one_page_are_left_out(

@@ -228,11 +228,11 @@ class LimitLearner:
             fall = float(value @ (1 - shares) / (value @ value)) if len(value) else 0.0
             line = np.maximum(1 - fall * levels, SLOWEST)
             curve = _fit_shares(levels, value, shares, line)
-            for g in np.flatnonzero(top < UNLIMITED):
-                in_gait = _fit_shares(levels, value[gaits == g], shares[gaits == g], curve)
+            for row in np.flatnonzero(top < UNLIMITED):
+                in_gait = _fit_shares(levels, value[gaits == row], shares[gaits == row], curve)
                 # How much the body can hurry: 0 not at all, 1 as much as a healthy one.
                 hurry = np.maximum(in_gait - CANNOT_HURRY, 0.0) / (1 - CANNOT_HURRY)
-                speeds[g, label] = usual[g] * in_gait + (top[g] - usual[g]) * hurry
+                speeds[row, label] = usual[row] * in_gait + (top[row] - usual[row]) * hurry
         return Limits(levels, speeds, usual)
 
     def _healthy(self) -> Array:

@@ -80,4 +80,4 @@ def convert_file(name: str, file: Path, options: argparse.Namespace) -> tuple[Cl
     clip = resample(source.clip, options.fps)
     if options.loops > 1:
         clip = loop_clip(clip, options.loops, None)  # None: keep the heading
-    return replace(clip, name=name), source.repairs + source.notes
+    return replace(clip, name=name), source.repairs + source.unsure + source.notes

@@ -48,6 +48,8 @@ def schedule_severities(
     deck = _make_deck(skeleton, options)
     arms = [card for card in deck if part_of_link(skeleton, skeleton.links[card[0]]).name in ARMS]
     out = np.zeros((frames, len(skeleton.links)), np.float32)
+    highest = max(options.severities)
+    lower_severities = sorted(set(options.severities) - {highest}) or [highest]
     first = int(math.modf((version_number + 1) * GOLDEN)[0] * len(deck))
     begin = 0
     for i, length in enumerate(_stretch_lengths(frames, options.seconds * fps)):
@@ -55,7 +57,11 @@ def schedule_severities(
         if options.at_once > 1 and rng.random() < FURTHER_LINKS:
             hurt += [deck[j] for j in rng.permutation(len(deck))[: rng.integers(1, options.at_once)]]
         if arms and len(hurt) < options.at_once and rng.random() < ARM_TOO:
-            hurt += [arms[rng.integers(len(arms))]]
+            # The lower severity is drawn anew each time, because the cards of an arm do not have all of them.
+            # A network that never saw an arm at 5 held it there almost as still as at 10.
+            link, first_half, _ = arms[rng.integers(len(arms))]
+            lower = float(rng.choice(lower_severities))
+            hurt += [(link, highest, lower) if first_half == highest else (link, lower, highest)]
         # Backwards: if two cards have the same link, the first card counts.
         for link, first_half, second_half in hurt[::-1]:
             half = begin + length // 2

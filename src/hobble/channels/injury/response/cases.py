@@ -208,7 +208,8 @@ def divided_severities(
     ]
     out: list[Divided] = []
     for divisor in DIVISORS:
-        walks = run(network, script, runtime.model_copy(update={"scales": {"injury": divisor}}))
+        scales = {**runtime.scales, "injury": divisor}
+        walks = run(network, script, runtime.model_copy(update={"scales": scales}))
         for i, link in enumerate(links):
             healthy = _mean_cycle(walks, 1, i)
             spread, speed = _distance_from_cycle(walks, 1, i, healthy), _mean_speed(network, walks, 1, i)

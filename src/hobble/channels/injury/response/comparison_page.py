@@ -73,7 +73,7 @@ def injury_table(compared: Compared) -> Table | None:
     if recognised:
         row = [
             "share of walks of 1 s in which a classifier recognises what hurts",
-            *(recognised.get(name) for name, *_ in summaries),
+            *(recognised.get(name) if gait == "walk" else None for name, gait, _ in summaries),
         ]
         rows.append(row)
     return Table("compare-injury", columns, rows, "Means over the links that were hurt in training")
