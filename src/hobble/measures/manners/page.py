@@ -6,7 +6,7 @@ from collections.abc import Callable
 from typing import Literal
 
 from hobble.channels.shown import shown_names
-from hobble.measures.clip_parts import captured_sampled
+from hobble.measures.clip_parts import sample_sentence
 from hobble.measures.inputs import Json
 from hobble.measures.manners.results import ChannelResult
 from hobble.measures.manners.windows import EFFECTS, NONE
@@ -40,7 +40,7 @@ def section(found: Json, material: ReportMaterial) -> PageSection:
     for i, one in enumerate(found["channels"]):
         charts = [together_chart(one, shown_name), *(effect_chart(one, effect) for effect in EFFECTS)]
         parts += [
-            SectionPart(10 * i, Paragraph(summary(one) + captured_sampled(found))),
+            SectionPart(10 * i, Paragraph(summary(one) + sample_sentence(found))),
             *(SectionPart(10 * i + 1 + k, c) for k, c in enumerate(charts)),
         ]
     title = " and ".join(one["title"] for one in found["channels"])
