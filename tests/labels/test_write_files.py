@@ -41,3 +41,15 @@ def test_a_pause_ends_a_bout(walker):
     rows = np.insert(labels.footsteps, 4, [np.nan, np.nan, 1.0], axis=0)
     lines = footsteps_text(replace(labels, footsteps=rows), SourceTime(700, 60.0)).splitlines()
     assert [number for number, line in enumerate(lines) if line.endswith("*")] == [3]
+
+
+def test_a_bout_that_ends_with_the_right_foot_is_not_joined_to_the_next(walker):
+    clip = walker(frames=700, start=150)
+    time = SourceTime(700, 60.0)
+    labels, _ = label_clip(
+        clip, [], {"source_frames": 700, "source_fps": 60.0, "source_start": 0}, None, "rocky", LabelOptions()
+    )
+    nan = np.nan
+    rows = np.array([[10, 40, 0], [70, nan, 0], [nan, nan, 1], [300, 330, 0], [360, nan, 0]], float)
+    text = footsteps_text(replace(labels, footsteps=rows), time)
+    assert text.splitlines() == ["11 41 *", "301 331", "361"]

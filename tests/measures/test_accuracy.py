@@ -17,12 +17,12 @@ from hobble.measures.accuracy.run import (
     QUANTILES,
     Errors,
     clip_errors,
-    clip_rows,
+    clips_table,
     equivalent_joints,
     joint_errors,
     joint_indices,
     measure,
-    prediction,
+    predict_function,
 )
 from hobble.models.checks import NEEDED_ROLES
 from hobble.models.load import load_network
@@ -164,7 +164,7 @@ def test_the_errors_of_the_fast_prediction_are_those_of_the_reference(weights):
     network = load_network(weights)
     rows = make_rows("a", 70, 10, 5)  # several batches, the last one not full
     reference = clip_errors(network, rows, [0, 1, 2]).to_dict()
-    fast = clip_errors(network, rows, [0, 1, 2], prediction(network)).to_dict()
+    fast = clip_errors(network, rows, [0, 1, 2], predict_function(network)).to_dict()
     assert fast == pytest.approx(reference, rel=1e-4)
     assert fast != reference  # it is another way to compute them
 
@@ -198,7 +198,7 @@ def test_accuracy_per_clip_and_split(weights, tmp_path):
     }
     assert by_name["none"]["mean"] is None
     json.dumps(result, allow_nan=False)
-    write_csv(tmp_path / "clips.csv", clip_rows(result))
+    write_csv(tmp_path / "clips.csv", clips_table(result))
     with open(tmp_path / "clips.csv", newline="") as file:
         table = list(csv.DictReader(file))
     assert [row["clip"] for row in table] == ["a", "b", "c", "none"]

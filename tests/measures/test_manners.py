@@ -14,7 +14,7 @@ from hobble.channels import channel
 from hobble.evaluation.captured import Captured
 from hobble.measures.manners import left_out as module
 from hobble.measures.manners import page, run
-from hobble.measures.manners.left_out import SHRINKAGES, left_out
+from hobble.measures.manners.left_out import SHRINKAGES, recognise_left_out
 from hobble.measures.manners.windows import (
     EFFECTS,
     NONE,
@@ -73,7 +73,7 @@ def motion(both: Network) -> list[Captured]:
 def measured(network: Network, motion: Sequence[Captured], people: Mapping[str, str] | None = None) -> Any:
     splits = {one.clip: "train" for one in motion}
     who = people or {one.clip: one.clip for one in motion}
-    return run.manners(network, motion, splits, who, Runtime())
+    return run.measure_manners(network, motion, splits, who, Runtime())
 
 
 def test_windows_with_an_injury_or_half_a_mood_are_left_out(both: Network) -> None:
@@ -99,8 +99,8 @@ def test_whole_people_are_left_out() -> None:
             name = f"{person}-{take}"
             people[name] = str(person)
             windows += [window(name, manner, *(own + rng.normal(0, 0.02, 6))) for _ in range(20)]
-    by_clip = left_out(windows, {name: name for name in people}, [0.6])
-    by_person = left_out(windows, people, [0.6])
+    by_clip = recognise_left_out(windows, {name: name for name in people}, [0.6])
+    by_person = recognise_left_out(windows, people, [0.6])
     assert by_clip["people"] == 24
     assert by_person["people"] == 12
     assert by_person["people_of"] == {NONE: 6, "sad": 6}
@@ -113,11 +113,11 @@ def test_features_are_tabled_once_and_the_best_shrinkage_is_chosen(monkeypatch: 
     windows = [window(f"{k}", "sad" if k % 2 else NONE, *rng.normal(k % 2, 1, 4)) for k in range(30)]
     people = {w.clip: w.clip for w in windows}
     counted: list[int] = []
-    plain = module.table
-    monkeypatch.setattr(module, "table", lambda some: counted.append(len(some)) or plain(some))
-    best = left_out(windows, people)
+    plain = module.feature_table
+    monkeypatch.setattr(module, "feature_table", lambda some: counted.append(len(some)) or plain(some))
+    best = recognise_left_out(windows, people)
     assert counted == [30]
-    alone = [left_out(windows, people, [shrinkage]) for shrinkage in SHRINKAGES]
+    alone = [recognise_left_out(windows, people, [shrinkage]) for shrinkage in SHRINKAGES]
     assert best in alone
     assert best["right"] == max(one["right"] for one in alone)
     assert min(one["right"] for one in alone) < best["right"]
@@ -131,7 +131,7 @@ def test_a_manner_of_a_single_person_is_never_named_when_that_person_is_left_out
         for n in range(1 if m == "sad" else 3)
         for _ in range(10)
     ]
-    found = left_out(windows, {w.clip: w.clip for w in windows}, [0.02])
+    found = recognise_left_out(windows, {w.clip: w.clip for w in windows}, [0.02])
     assert found["by_manner"] == {NONE: 1.0, "old": 1.0, "sad": 0.0}
     assert found["right"] == round(60 / 70, 5)
     assert found["presence_right"] == 1.0, "but that it is not the neutral walk is seen"
@@ -147,13 +147,13 @@ def test_each_manner_is_tried_with_each_column_of_another_channel(
     walked: list[WalkerInputs] = []
     broken = both.channels["injury"][3]
 
-    def generated(network: Network, figures: Sequence[WalkerInputs], name: str, runtime: Runtime):
+    def generated_windows(network: Network, figures: Sequence[WalkerInputs], name: str, runtime: Runtime):
         walked.extend(figures)
         moods = [next(iter(f.channels["mood"]), None) for f in figures]
         lost = [broken in f.channels.get("injury", {}) for f in figures]
         return [real[None if gone else mood] for mood, gone in zip(moods, lost, strict=True)]
 
-    monkeypatch.setattr(run, "generated", generated)
+    monkeypatch.setattr(run, "generated_windows", generated_windows)
     [found] = measured(both, motion)["channels"]
     assert found["manners"] == ["old", "sad"]
     assert found["captured"]["right"] == 1.0

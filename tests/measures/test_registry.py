@@ -10,7 +10,7 @@ import pytest
 
 from hobble.core.section import Positive, Section
 from hobble.evaluation.options import joined_sections
-from hobble.measures.joints import Joints
+from hobble.measures.joints import JointOptions
 from hobble.measures.measure import INPUTS, Measure
 from hobble.measures.registry import MEASURES, measure, modules, of_channels
 
@@ -32,7 +32,7 @@ class Rounds(Section):
     laps: Positive = 3
 
 
-class Far(Joints):
+class Far(JointOptions):
     far: Positive = 4
 
 
@@ -71,7 +71,7 @@ def test_the_registry_imports_nothing_slow() -> None:
 
 
 def test_the_options_of_all_measurements_form_one_section() -> None:
-    both = joined_sections([Joints, Section, Far, Laps, Joints])
+    both = joined_sections([JointOptions, Section, Far, Laps, JointOptions])
     assert both().model_dump() == {"joints": "all", "far": 4, "laps": 2}
     assert list(both.model_fields) == ["joints", "far", "laps"]
     with pytest.raises(ValueError, match="greater than 0"):

@@ -195,8 +195,8 @@ def test_accuracy_and_roll_outs_count_each_clip_for_its_kind(tmp_path, clips):
     assert found["train"]["mean_of_clips"] == pytest.approx(by_clips)
     assert found["sample"] == {"excerpts": 5, "of_excerpts": 8, "clips": 5, "of": 8, "strata": 2}
     assert "sample" not in everything
-    assert "5 of 8 excerpts" in page.sampled(found)
-    assert page.sampled(everything) == ""
+    assert "5 of 8 excerpts" in page.describe_sample(found)
+    assert page.describe_sample(everything) == ""
 
     rolled = measure_roll_outs(weights, clips, splits, "holden", lengths=(1, 4), sample=sample)
     every_roll_out = measure_roll_outs(weights, clips, splits, "holden", lengths=(1, 4))

@@ -1,4 +1,7 @@
-"""The parts of clips that a measurement reads: whole clips, or the excerpts of a sample."""
+"""The parts of clips that a measurement reads: all clips, or only a sample of a large data set.
+
+A sample consists of excerpts, which are stretches of clips (`hobble.measures.stratified_sample`).
+"""
 
 from __future__ import annotations
 
@@ -18,7 +21,11 @@ from hobble.rows.summary import load_summary
 
 @dataclass(frozen=True)
 class ClipPart:
-    """Rows of a clip: all of them, or those of `excerpt`. Each row stands for `weight` rows."""
+    """Rows of a clip that are measured.
+
+    clip: its name. path: its file of rows. weight: number of rows of the data set that each measured row
+    represents. excerpt: the rows to measure; None for all rows of the clip.
+    """
 
     clip: str
     path: Path
@@ -26,7 +33,7 @@ class ClipPart:
     excerpt: Excerpt | None = None
 
     def load(self, before: int = 0, after: int = 0) -> LoadedPart:
-        """Read the rows, with up to `before` rows of the clip before an excerpt and `after` behind it."""
+        """Read the rows, and up to `before` rows before an excerpt and `after` rows after it."""
         if self.excerpt is None:
             rows = load_clip_rows(self.path)
             return LoadedPart(rows, 0, len(rows))
@@ -37,7 +44,10 @@ class ClipPart:
 
 @dataclass(frozen=True)
 class LoadedPart:
-    """Rows read from a clip's file. Those to measure are rows[first:stop]; the others lie around them."""
+    """Rows read from a clip's file.
+
+    The rows from `first` up to `stop`, which is not included, are measured. The others lie around them.
+    """
 
     rows: ClipRows = field(repr=False)
     first: int
@@ -45,7 +55,7 @@ class LoadedPart:
 
     @property
     def frames(self) -> list[int]:
-        """The frames of the first and the last row to measure, of which there must be at least one."""
+        """The first and the last frame to measure, as frames of the clip. There must be a row to measure."""
         return [int(self.rows.frame[at]) for at in (self.first, self.stop - 1)]
 
 
@@ -63,13 +73,16 @@ def clip_parts(clips: Mapping[str, str | Path], sample: Sample | None) -> Iterat
 
 
 def captured_motion(clips: Mapping[str, str | Path], sample: Sample | None) -> Iterator[Captured]:
-    """The unbroken stretches of all clips, or of a sample's excerpts. They are loaded one after another."""
+    """Stretches of consecutive frames of all clips, or of a sample's excerpts, loaded one after another.
+
+    clips: name -> file of rows. sample: the excerpts to read; None for all clips.
+    """
     for part in clip_parts(clips, sample):
         yield from captured(part.load().rows)
 
 
 def sample_of(inputs: MeasureInputs, options: SampleOptions) -> Sample | None:
-    """The excerpts to measure; None for all clips."""
+    """Draw the sample to measure; None if the data set is so small that all clips are measured."""
     return draw_sample(map(load_summary, inputs.summaries), inputs.splits, options.sample_frames)
 
 
@@ -78,17 +91,17 @@ def with_sample(result: Json, sample: Sample | None) -> Json:
     return result if sample is None else {**result, "sample": sample.to_dict()}
 
 
-def captured_sampled(found: Mapping[str, Any]) -> str:
-    """A sentence on which part of the captured motion was read; empty if all of it was.
+def sample_sentence(found: Mapping[str, Any]) -> str:
+    """A sentence that says which part of the clips was read; empty if all clips were read.
 
     found: a measurement's JSON.
     """
-    words = sampled_words(found)
+    words = sample_in_words(found)
     return f" Only a part of the clips was read: {words}." if words else ""
 
 
-def sampled_words(found: Mapping[str, Any]) -> str:
-    """Which part of the clips was measured, in words; empty if all of them were.
+def sample_in_words(found: Mapping[str, Any]) -> str:
+    """The size of the sample in words, as a part of a sentence; empty if all clips were measured.
 
     found: a measurement's JSON.
     """

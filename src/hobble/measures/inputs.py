@@ -20,13 +20,14 @@ Row = Mapping[str, object]  # a row of a CSV table: column -> number, text or No
 
 @dataclass(frozen=True)
 class MeasureInputs:
-    """The inputs of a measurement of one configuration. It gets only those that its `Measure` asks for.
+    """The inputs of a measurement of one configuration. Those that its `Measure` does not ask for are empty.
 
-    clips: clip -> its file of rows. summaries: a `hobble.rows.summary` file for each clip. splits: clip ->
-    "train" or "held_out". people: clip -> the person who walks in it; a clip whose person is not known
-    counts, with its mirror and its hurt versions, as one more person. runtime: the values of the keys in
-    `Measure.runtime`; the other keys have defaults. pieces: name of a piece -> its JSON file, if the pieces
-    ran as separate jobs. files: name -> file of each other input, such as the JSON of another measurement.
+    configuration: its name. files: name of an input -> its file, such as the network or the JSON of another
+    measurement. clips: clip -> its file of rows. splits: clip -> "train" or "held_out". people: clip -> the
+    person who walks in it. If the person is not known, the clip, its mirror and the hurt clips made from it
+    count as one more person. summaries: the `hobble.rows.summary` file of each clip. runtime: the values of
+    the keys in `Measure.runtime`; the other keys have defaults. pieces: if the measurement was split into
+    pieces that ran as jobs of their own, name of a piece -> its JSON file.
     """
 
     configuration: str
@@ -39,9 +40,12 @@ class MeasureInputs:
     pieces: Mapping[str, Path] = field(default_factory=dict, repr=False)
 
     def file(self, name: str) -> Path:
-        """The file of the input `name`. Raises HobbleError if it is not among the measurement's `inputs`."""
+        """The file of the input `name`. Raises HobbleError if the measurement's `inputs` do not list it."""
         if name not in self.files:
-            raise HobbleError(f"a measurement reads {name!r}: list it in the `inputs` of its `Measure`")
+            raise HobbleError(
+                f"A measurement reads the input {name!r}, which its `Measure` does not list. "
+                "Add it to `inputs`."
+            )
         return self.files[name]
 
     @property
@@ -51,28 +55,29 @@ class MeasureInputs:
 
     @property
     def skeleton(self) -> Json:
-        """The data set's skeleton, as config/skeletons/<name>.yaml holds it."""
+        """The data set's skeleton: the content of config/skeletons/<name>.yaml."""
         return read_yaml(self.file("skeleton")) or {}
 
     @property
     def published(self) -> Json:
-        """The published results with which ours are compared."""
+        """The content of published.yaml: published results with which ours are compared."""
         return yaml.safe_load(self.file("published").read_text(encoding="utf-8"))
 
     def measured_pieces(self) -> dict[str, Json]:
-        """Name -> result of each piece that ran as a job of its own."""
+        """Name of a piece -> its result, for each piece that ran as a job of its own."""
         return {name: read_json(path) for name, path in self.pieces.items()}
 
     def measured(self, name: str) -> Json:
-        """The JSON of another measurement."""
+        """The content of the JSON file of another measurement."""
         return read_json(self.file(name))
 
 
 @dataclass(frozen=True)
 class Outcome:
-    """The output of a measurement. `result` becomes <measure>.json, each of `tables` <measure>/<table>.csv.
+    """The output of a measurement.
 
-    says: a line for the log.
+    result: the content of <measure>.json. tables: name -> rows of <measure>/<name>.csv. says: a line for the
+    log.
     """
 
     result: Json = field(repr=False)

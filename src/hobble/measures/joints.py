@@ -9,9 +9,10 @@ from pydantic import Field
 from hobble.core.section import Section
 
 
-class Joints(Section):
+class JointOptions(Section):
     """The option `joints`, which all measurements of joint positions have."""
 
     joints: Literal["all", "equivalent"] = Field(
-        "all", description="`equivalent`: only the joints that the skeleton holden31 has too"
+        "all",
+        description="`equivalent`: only the joints that have a counterpart on the skeleton holden31",
     )

@@ -1,16 +1,16 @@
-"""How a measurement is described to the workflow, which reads the description at planning.
+"""The description of a measurement, which the workflow reads when it plans its jobs.
 
-A measurement is a package. Its `__init__` holds `MEASURE`, a `Measure`, and must not import anything slow.
-The other modules of the package are found by name:
+A measurement is a package. Its `__init__` holds `MEASURE`, a `Measure`. It must not import anything slow,
+because planning imports it. The other modules of the package are found by name:
 
 - `run.py`: its function `run(inputs, options)` measures and returns an `Outcome` (see
   `hobble.measures.inputs`). A long measurement may be split into pieces, which run as jobs of their own:
-  `run_piece(inputs, options, piece) -> Json` measures one piece, and `run` puts them together;
-- `page.py`: what the report shows of the measurement (see `hobble.report.measure_sections`), if anything;
-- `comparison.py`: what it adds to the comparison of several configurations
-  (see `hobble.evaluation.compare_configurations`), if anything;
-- `comparison_page.py`: what the page of this comparison shows of it
-  (see `hobble.report.measure_sections`), if anything.
+  `run_piece(inputs, options, piece) -> Json` measures one piece, and `run` puts their results together;
+- `page.py`, if the report shows the measurement: how it shows it (see `hobble.report.measure_sections`);
+- `comparison.py`, if the measurement is part of the comparison of several configurations: what it adds to
+  compare.json (see `hobble.evaluation.compare_configurations`);
+- `comparison_page.py`, if the page of this comparison shows the measurement: how it shows it (see
+  `hobble.report.measure_sections`).
 """
 
 from __future__ import annotations
@@ -25,18 +25,19 @@ from typing import Any, Protocol
 from hobble.core.section import Section
 from hobble.runtime.options import Runtime
 
-# Inputs of a measurement: the network, the rows of the clips, summaries of these rows, the skeleton,
-# published results. Any other name is that of another measurement, whose JSON is the input.
+# Names of inputs: the network, the rows of the clips, summaries of these rows, the skeleton, and published
+# results. A measurement may also read the JSON of another measurement. This input has the name of the other.
 INPUTS = ("weights", "clips", "summaries", "skeleton", "published")
 
 
 @dataclass(frozen=True)
 class Cost:
-    """Memory and time that a job requests on a cluster.
+    """Memory and time that the job of a measurement requests on a cluster.
 
-    memory_mb: MB that it needs however little data there is. memory_each: MB added for each thousand frames
-    of the longest clip. seconds_each: seconds for each thousand frames of all clips together. memory_each and
-    seconds_each are for 31 joints and grow in proportion to the number of joints. minutes: the least time.
+    memory_mb: MB that it needs in any case. memory_each: MB that it needs in addition for each thousand
+    frames of the longest clip. seconds_each: seconds for each thousand frames of all clips together.
+    memory_each and seconds_each are for 31 joints and grow in proportion to the number of joints. minutes:
+    the least time that is requested.
     """
 
     memory_mb: float = 0.0
@@ -46,20 +47,25 @@ class Cost:
 
 
 class Pieces(Protocol):
-    """A function that returns the names of a measurement's pieces. A name consists of letters only."""
+    """The type of a function that returns the names of a measurement's pieces (letters only).
+
+    A piece is a part of a long measurement that runs as a job of its own.
+    """
 
     def __call__(self, options: Any, runtime: Runtime, modes: Sequence[str]) -> tuple[str, ...]:
-        """options: of the type `Measure.options`. modes: names of the ways to evaluate
-        the network that is measured, such as constant, linear and cubic (`Network.modes`).
+        """The names of the pieces.
+
+        options: of the type `Measure.options`. modes: names of the ways to evaluate the measured network,
+        such as constant, linear and cubic (`Network.modes`).
         """
 
 
 @dataclass(frozen=True)
 class Measure:
-    """A measurement. Its `name` is also the name of its JSON file and of its folder of tables.
+    """A measurement. Its JSON file and its folder of tables have its `name`, too.
 
-    package: full name of its package (`__name__`). inputs: names of INPUTS or of other
-    measurements. options: the class of its keys in a configuration's section `evaluation`. runtime: the keys
+    package: full name of its package (`__name__`). inputs: what it reads, as names of INPUTS or of other
+    measurements. options: the model of its keys in a configuration's section `evaluation`. runtime: the keys
     of the section `runtime` that it depends on. pieces: for a measurement that is split, the function that
     returns the names of its pieces. people: whether it has to know who walks in which clip. cost: what its
     job requests on a cluster.

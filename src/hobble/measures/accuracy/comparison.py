@@ -1,4 +1,4 @@
-"""Compares the errors of one-step predictions of several configurations."""
+"""Compares the errors of several configurations in predicting the frame after a captured frame."""
 
 from __future__ import annotations
 
@@ -15,15 +15,19 @@ from hobble.evaluation.comparison_rows import (
     published_row,
 )
 from hobble.evaluation.configuration_results import ConfigurationResults
-from hobble.measures.accuracy.run import SPLITS, clip_rows
+from hobble.measures.accuracy.run import SPLITS, clips_table
 from hobble.measures.inputs import Json, Row
 
-NAME = "accuracy"  # of the measurement
+NAME = "accuracy"  # name of the measurement
+# split -> its name in texts for users
 SPLIT_NAMES = {"train": "training", "held_out": "held-out"}
 
 
 def compared(all_measured: Sequence[ConfigurationResults], published: Json) -> SideBySide:
-    """Errors of each configuration, the difference of each pair, and the published errors beside ours."""
+    """The errors of each configuration, the difference of each pair, and the published errors beside ours.
+
+    all_measured: the results of each configuration. published: the content of published.yaml.
+    """
     return SideBySide(
         entries=[{"dataset": m.dataset, **m.found(NAME), "configuration": m.name} for m in all_measured],
         about={m.name: {"joints": m.found(NAME)["joints"]} for m in all_measured},
@@ -36,37 +40,42 @@ def compared(all_measured: Sequence[ConfigurationResults], published: Json) -> S
 
 
 def tables(compared: Json) -> dict[str, list[Row]]:
-    """A table with the errors of every clip in every configuration."""
+    """Name -> rows of a CSV table: the errors of every clip in every configuration.
+
+    compared: the content of compare.json.
+    """
     rows: list[Row] = [
         {"configuration": entry["configuration"], **row}
         for entry in compared[NAME]
-        for row in clip_rows(entry)
+        for row in clips_table(entry)
     ]
     return {NAME: rows}
 
 
 def accuracy_differences(all_measured: Sequence[ConfigurationResults]) -> list[DifferenceOf]:
-    """The difference of each pair of configurations (eq. 3.2 of Segerstedt 2021).
+    """The difference between the errors of each two configurations, by eq. 3.2 of Segerstedt 2021.
 
-    It is given for each split, and for each clip on which both configurations were measured.
+    There is a row for each split and each clip on which both configurations were measured. `over` is the name
+    of this split or clip.
     """
     out: list[DifferenceOf] = []
     for a, b in combinations(all_measured, 2):
-        of_a, of_b = ({**_of_splits(m), **_clips(m)} for m in (a, b))
-        for over in of_a:
-            if over in of_b and of_a[over]["frames"] and of_b[over]["frames"]:
-                out.append({"a": a.name, "b": b.name, "over": over, **compare_series(of_a[over], of_b[over])})
+        errors_a, errors_b = ({**_errors_of_splits(m), **_errors_of_clips(m)} for m in (a, b))
+        for over in errors_a:
+            if over in errors_b and errors_a[over]["frames"] and errors_b[over]["frames"]:
+                differences = compare_series(errors_a[over], errors_b[over])
+                out.append({"a": a.name, "b": b.name, "over": over, **differences})
     return out
 
 
-def _of_splits(measured: ConfigurationResults) -> dict[str, Json]:
+def _errors_of_splits(measured: ConfigurationResults) -> dict[str, Json]:
     """Split -> its errors over all frames, with the mean errors of its clips under `means`."""
     found = measured.found(NAME)
     return {split: {**found[split], "means": clip_means(found, split)} for split in SPLITS}
 
 
 def clip_means(found: Json, split: str) -> list[float]:
-    """The mean error of each clip of a split."""
+    """The mean error of each clip of a split that has one. found: the content of accuracy.json."""
     return [c["mean"] for c in found["clips"] if c["split"] == split and c["mean"] is not None]
 
 
@@ -75,13 +84,14 @@ def _published_splits(all_measured: Sequence[ConfigurationResults], published: J
     by_name = {m.name: m for m in all_measured}
     out = []
     for row in published["accuracy"]:
-        m = by_name.get(row["configuration"])
+        measured = by_name.get(row["configuration"])
         for split in SPLITS:
-            ours = m.found(NAME)[split]["mean_of_clips"] if m else None
+            ours = measured.found(NAME)[split]["mean_of_clips"] if measured else None
             out.append(published_row(f"relative error, {SPLIT_NAMES[split]} clips", row, row["mean"], ours))
             if "sd" in row:
-                in_text = {**row, "table": None}  # sd is published in the text, not in the table
-                means = clip_means(m.found(NAME), split) if m else []
+                # The standard deviation (sd) was printed in the text of the publication, not in its table.
+                in_text = {**row, "table": None}
+                means = clip_means(measured.found(NAME), split) if measured else []
                 sd = float(np.std(means)) if len(means) > 1 else None
                 what = f"standard deviation of the means of {SPLIT_NAMES[split]} clips"
                 out.append(published_row(what, in_text, row["sd"], sd))
@@ -89,23 +99,24 @@ def _published_splits(all_measured: Sequence[ConfigurationResults], published: J
 
 
 def _published_clips(all_measured: Sequence[ConfigurationResults], published: Json) -> list[PublishedRow]:
-    """Published errors of single clips, beside our errors on the clips with the same names.
+    """Published errors of single clips, beside the errors of each configuration on the same clips.
 
-    The names of the clips that Holden et al. (2017) released end in _000; the published names do not.
-    Segerstedt (2021) published the errors of two networks: "segerstedt" is his own, "release" is the network
-    that Holden et al. released.
+    The files of the clips that Holden et al. (2017) released have names that end in _000; the published names
+    do not. Segerstedt (2021) published the errors of two networks: "segerstedt" is his own, "release" is the
+    network that Holden et al. released.
     """
     out = []
     for row in published["clips"]:
-        for m in all_measured:
-            for clip in m.found(NAME)["clips"]:
+        for measured in all_measured:
+            for clip in measured.found(NAME)["clips"]:
                 if clip["clip"].removesuffix("_000") == row["clip"]:
                     for source in ("segerstedt", "release"):
-                        named = {"configuration": m.name, "source": source}
+                        entry = {"configuration": measured.name, "source": source}
                         what = f"relative error, {clip['clip']}"
-                        out.append(published_row(what, named, row[source], clip["mean"]))
+                        out.append(published_row(what, entry, row[source], clip["mean"]))
     return out
 
 
-def _clips(measured: ConfigurationResults) -> dict[str, Json]:
+def _errors_of_clips(measured: ConfigurationResults) -> dict[str, Json]:
+    """Clip -> its errors over all frames."""
     return {entry["clip"]: entry for entry in measured.found(NAME)["clips"]}

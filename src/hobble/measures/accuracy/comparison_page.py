@@ -1,4 +1,9 @@
-"""Shows the errors of several configurations side by side."""
+"""Shows the errors of several configurations side by side.
+
+The error of a joint is its relative error (eq. 3.1 of Segerstedt 2021): the distance between its predicted
+and its captured position, divided by its distance from the root. compare.json has it as a fraction, the page
+shows it in %.
+"""
 
 from __future__ import annotations
 
@@ -14,13 +19,15 @@ from hobble.report.measure_sections import OverviewColumn
 from hobble.report.page_parts import PageSection, SectionPart
 from hobble.report.tables import Column
 
-# The difference between two configurations is a difference of means, divided by standard deviations (eq. 3.2
-# of Segerstedt 2021). compare.json has it twice, with two kinds of standard deviation (sd): key -> kind.
+# The difference between two configurations is the difference of their mean errors, divided by standard
+# deviations (sd; eq. 3.2 of Segerstedt 2021). compare.json has it twice, with different standard deviations.
+# Key of the difference -> what it is divided by, for the menu of the chart.
 DEVIATIONS = {"difference_of_means": "sd of the means of clips", "difference": "sd of single frames"}
 
 
 def section(compared: Compared) -> PageSection:
     """The spread of the errors, differences between configurations, and errors of single clips."""
+    # The first argument of each part is its place in the section, from 0 (top) to 100 (end).
     return PageSection(
         "accuracy",
         [
@@ -36,7 +43,7 @@ def section(compared: Compared) -> PageSection:
 
 
 def columns(compared: Compared) -> Iterator[OverviewColumn]:
-    """Columns of the overview: the error on each split, and the number of joints that were measured."""
+    """Columns for the table of configurations: the error on each split, and the number of measured joints."""
     entries = {entry["configuration"]: entry for entry in compared["accuracy"]}
     for at, split, label in ((10, "held_out", "held-out error"), (20, "train", "training error")):
         values = {name: entry[split]["mean"] for name, entry in entries.items()}
@@ -47,7 +54,7 @@ def columns(compared: Compared) -> Iterator[OverviewColumn]:
 
 
 def error_boxes(compared: Compared) -> Chart | None:
-    """The spread of the relative error of each configuration, over all frames of a split."""
+    """A box for each configuration: the spread of its error over all frames of a split. A menu selects it."""
     options: dict[str, list[Trace]] = {}
     for split, label in SPLITS.items():
         traces: list[Trace] = []
@@ -55,6 +62,7 @@ def error_boxes(compared: Compared) -> Chart | None:
             percentiles = quantiles(entry[split])
             if percentiles is None:
                 continue
+            # In %. Each is a list, because plotly draws a box for each entry.
             low, q1, median, q3, high = ([100 * value] for value in percentiles)
             colour = colours(compared)[entry["configuration"]]
             traces.append(
@@ -107,6 +115,7 @@ def error_boxes(compared: Compared) -> Chart | None:
 def clip_dots(compared: Compared) -> Chart | None:
     """The mean error of every clip, a dot for each configuration."""
     clips = {(row["split"], row["clip"]) for entry in compared["accuracy"] for row in entry["clips"]}
+    # Plotly puts the first clip at the bottom, so held-out clips come last.
     order = [clip for _, clip in sorted(clips, key=lambda pair: (pair[0] == "held_out", pair[1]))]
     if not order:
         return None
@@ -131,18 +140,19 @@ def clip_dots(compared: Compared) -> Chart | None:
 
 
 def difference_map(compared: Compared) -> Chart | None:
-    """Eq. 3.2 of Segerstedt for every pair, with both kinds of standard deviation."""
-    order, options = names(compared), {}
+    """The difference of each two configurations. A menu selects the split and the kind of deviation."""
+    configurations, options = names(compared), {}
     for (split, label), (key, kind) in product(SPLITS.items(), DEVIATIONS.items()):
         values = {(r["a"], r["b"]): r[key] for r in compared["difference"] if r["over"] == split}
         if all(value is None for value in values.values()):
             continue
-        cells = [[values.get((a, b), values.get((b, a))) for b in order] for a in order]
+        # compare.json has each pair in one order only, (a, b) or (b, a).
+        cells = [[values.get((a, b), values.get((b, a))) for b in configurations] for a in configurations]
         options[f"{label}, {kind}"] = [
             {
                 "type": "heatmap",
-                "x": order,
-                "y": order,
+                "x": configurations,
+                "y": configurations,
                 "z": cells,
                 "colorscale": [[0, "@sunken"], [1, "@accent"]],
                 "zmin": 0,
@@ -167,7 +177,7 @@ def difference_map(compared: Compared) -> Chart | None:
         "deviation of single frames is several times as large. A value of 1 says that the means are one "
         "standard deviation apart. Our rule of thumb: differences under 0.2 are too small to matter.",
         layout=layout,
-        height=max(240, 90 + 42 * len(order)),
+        height=max(240, 90 + 42 * len(configurations)),
         choose="Clips and deviation",
         options=options,
     )

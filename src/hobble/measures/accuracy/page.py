@@ -1,4 +1,7 @@
-"""Shows in the report how well the next pose is predicted, clip by clip."""
+"""Shows in the report how well the next pose is predicted, clip by clip.
+
+In all functions, `found` is the content of accuracy.json, or {} if accuracy was not measured.
+"""
 
 from __future__ import annotations
 
@@ -7,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from hobble.measures.clip_parts import sampled_words
+from hobble.measures.clip_parts import sample_in_words
 from hobble.measures.inputs import Json
 from hobble.report.charts import Chart, axis, mark
 from hobble.report.formats import duration, number
@@ -21,30 +24,36 @@ INTRODUCTION = (
     "The network gets the captured input of a frame and predicts the next frame. The error is measured on "
     "every frame that belongs to a gait cycle."
 )
-# What the endings of clip names say. Without this, readers may take the number in _hurt1 for a severity.
+# Ending of a clip's name -> a sentence that explains it. Otherwise readers may take the number in _hurt1 for
+# a severity. Another ending may follow, as in walk_hurt1_mirror.
 ENDINGS = {
     "_hurt1": " A clip whose name ends in _hurt1 is the first hurt version of a healthy clip; the number is "
     "not its severity.",
     "_mirror": " A clip whose name ends in _mirror is mirrored.",
 }
-COLOURS = {"train": "@muted", "held_out": "@accent"}
-NAMES = {"train": "training", "held_out": "held out"}
+COLOURS = {"train": "@muted", "held_out": "@accent"}  # split -> its colour in the charts
+NAMES = {"train": "training", "held_out": "held out"}  # split -> its name on the page
+# The keys of the 5th to 95th percentile of the error in accuracy.json.
 QUANTILES = ("p05", "p25", "p50", "p75", "p95")
 
 
 def _rows(found: Json) -> list[dict[str, Any]]:
-    """The measured clips: held-out ones first, then by rising error."""
+    """The entries of the clips that were measured: held-out clips first, each split by rising error."""
     rows = [row for row in found.get("clips", ()) if row.get("mean") is not None]
     return sorted(rows, key=lambda row: (row["split"] != "held_out", row["mean"]))
 
 
 def _height(count: int) -> int:
+    """The height in pixels of a chart with a row for each of `count` clips."""
     return max(260, 110 + 21 * count)
 
 
 def clip_bars(found: Json, material: ReportMaterial) -> Chart | None:
-    """Mean relative error of each clip, its standard deviation as whiskers, a line at the published mean."""
-    rows = _rows(found)[::-1]
+    """A bar with the mean relative error of each clip, and a line at the published mean.
+
+    A whisker on each bar shows the standard deviation. None if no clip was measured.
+    """
+    rows = _rows(found)[::-1]  # plotly puts the first clip at the bottom
     if not rows:
         return None
     traces = []
@@ -79,9 +88,9 @@ def clip_bars(found: Json, material: ReportMaterial) -> Chart | None:
     return Chart(
         "accuracy-clips",
         "Error of each clip",
-        "The distance between the predicted and the captured position of a joint, divided by the joint's "
-        "distance from the root, averaged over frames and joints (eq. 3.1 of Segerstedt). Whiskers are one "
-        "standard deviation long."
+        "The error of a joint is the distance between its predicted and its captured position, divided by "
+        "its distance from the root (eq. 3.1 of Segerstedt). Bars are means over frames and joints. Whiskers "
+        "are one standard deviation long."
         + (
             " Held-out clips come first: the network was not trained on them."
             if any(row["split"] == "held_out" for row in rows)
@@ -101,8 +110,8 @@ def clip_bars(found: Json, material: ReportMaterial) -> Chart | None:
 
 
 def clip_boxes(found: Json) -> Chart | None:
-    """Quantiles of the error within each clip; None if no clip has them."""
-    rows = [row for row in _rows(found)[::-1] if quantiles(row)]
+    """A box for each clip: quantiles of its error over frames and joints. None if no clip has quantiles."""
+    rows = [row for row in _rows(found)[::-1] if quantiles(row)]  # plotly puts the first clip at the bottom
     if not rows:
         return None
     traces = []
@@ -150,16 +159,16 @@ def clip_boxes(found: Json) -> Chart | None:
 
 
 def quantiles(row: dict[str, Any]) -> list[float] | None:
-    """The 5th, 25th, 50th, 75th and 95th percentile of the error in `row`; None if one is missing.
+    """The 5th, 25th, 50th, 75th and 95th percentile of the relative error; None if one is missing.
 
-    row: the errors of a clip or a split.
+    row: the errors of a clip or a split, as in accuracy.json.
     """
     values = [row[key] for key in QUANTILES if row.get(key) is not None]
     return values if len(values) == len(QUANTILES) else None
 
 
 def accuracy_table(found: Json, name: str) -> Table:
-    """A row per clip. name: name of the configuration."""
+    """A row for each clip that was measured: its number of frames and its errors. name: the configuration."""
     columns = [
         Column("clip"),
         Column("split", lambda value: NAMES.get(value, value)),
@@ -197,13 +206,14 @@ def published_table(found: Json, material: ReportMaterial) -> Table:
 
 
 def section(found: Json, material: ReportMaterial) -> PageSection:
-    """Charts, tables, and a view of captured next to predicted motion. Empty without measured clips."""
+    """Charts, tables, and a view of captured and predicted motion. Empty without measured clips."""
     if not found.get("clips"):
         return PageSection("accuracy", [])
+    # The first argument of each part is its place in the section, from 0 (top) to 100 (end).
     return PageSection(
         "accuracy",
         [
-            SectionPart(0, Paragraph(INTRODUCTION + endings(found) + sampled(found))),
+            SectionPart(0, Paragraph(INTRODUCTION + explain_endings(found) + describe_sample(found))),
             SectionPart(9, Paragraph(caveat(found, material))),
             SectionPart(10, published_table(found, material), open=True, short=True),
             SectionPart(20, clip_bars(found, material), tall=True),
@@ -217,15 +227,15 @@ def section(found: Json, material: ReportMaterial) -> PageSection:
     )
 
 
-def endings(found: Json) -> str:
-    """Sentences on the endings of clip names; empty if no clip has one."""
+def explain_endings(found: Json) -> str:
+    """A sentence for each of the ENDINGS that a measured clip has; empty if there is none."""
     clips = [row["clip"] for row in _rows(found)]
     return "".join(text for ending, text in ENDINGS.items() if any(ending in clip for clip in clips))
 
 
 def caveat(found: Json, material: ReportMaterial) -> str:
     """A paragraph: why these errors must not be compared with the published ones."""
-    # Only frames of gait cycles are measured, so this is less than the length of the clips.
+    # The number of measured frames, at 60 a second. Only gait cycles are measured, so the clips are longer.
     frames = sum((found.get(split) or {}).get("frames") or 0 for split in ("held_out", "train"))
     return (
         "Do not compare these errors with the published ones as if the clips were the same. Ours are "
@@ -235,23 +245,23 @@ def caveat(found: Json, material: ReportMaterial) -> str:
     )
 
 
-def sampled(found: Json) -> str:
-    """A sentence on which part of the clips was measured; empty if all clips were measured."""
+def describe_sample(found: Json) -> str:
+    """Which part of the clips was measured, with confidence intervals; empty if all clips were measured."""
     if not found.get("sample"):
         return ""
-    widths = [
+    means = [
         f"{NAMES[split]} {100 * found[split]['mean']:.2f} ± {100 * found[split]['interval']['mean']:.2f} %"
         for split in ("held_out", "train")
         if (found.get(split) or {}).get("interval")
     ]
     return (
-        f" Measured on {sampled_words(found)}, and weighted to represent all clips. 95 % confidence "
-        f"intervals of the means over all frames of all clips: {', '.join(widths)}."
+        f" Measured on {sample_in_words(found)}, and weighted to represent all clips. 95 % confidence "
+        f"intervals of the means over all frames of all clips: {', '.join(means)}."
     )
 
 
 def figures(found: Json, material: ReportMaterial) -> Iterator[KeyFigure]:
-    """The key figures: the error on each split."""
+    """The key figures: the error on each split that was measured."""
     for at, split, label in (
         (10, "held_out", "Error on held-out clips"),
         (11, "train", "Error on training clips"),
@@ -269,7 +279,13 @@ def figures(found: Json, material: ReportMaterial) -> Iterator[KeyFigure]:
 
 
 def _centimetres(error: float, split: str, material: ReportMaterial) -> str:
-    """The mean position error as predicted, and as drawn if the measurement `rollouts` has it."""
+    """The mean position error in words: of the predicted joints, and of the joints as the runtime draws them.
+
+    The runtime draws a joint halfway between its predicted position and its old position plus the predicted
+    velocity. This error is left out if the measurement `rollouts` has no roll-outs of one frame.
+
+    error: the error of the predicted joints, cm.
+    """
     lengths = {entry["length"]: entry for entry in material.found("rollouts").get("lengths", ())}
     drawn = (lengths.get(1, {}).get(split) or {}).get("position_error_cm")
     if drawn is None:
@@ -281,12 +297,14 @@ def _centimetres(error: float, split: str, material: ReportMaterial) -> str:
 
 def hints(found: Json, material: ReportMaterial) -> Iterator[Hint]:
     """How well the network generalises, and which clip has the largest error."""
+    # Places of hints (`Hint.at`): under 20 for advice on the data, 30 for advice on the network.
     held_out = (found.get("held_out") or {}).get("mean")
     yield from placed(10 if held_out is None else 30, _generalisation(found))
-    yield from placed(12, _worst_clips(found))
+    yield from placed(12, _worst_clip(found))
 
 
 def _generalisation(found: Json) -> Iterator[Hint]:
+    """A hint that compares the errors on held-out and training clips."""
     train, held_out = (found.get(split) or {} for split in ("train", "held_out"))
     if held_out.get("mean") is None:
         yield Hint(
@@ -319,7 +337,8 @@ def _generalisation(found: Json) -> Iterator[Hint]:
         )
 
 
-def _worst_clips(found: Json) -> Iterator[Hint]:
+def _worst_clip(found: Json) -> Iterator[Hint]:
+    """A hint on the clip with the largest error, if that is far above the median of all clips."""
     rows = [row for row in found.get("clips", ()) if row.get("mean") is not None]
     if len(rows) < 4:
         return

@@ -8,10 +8,12 @@ from hobble.measures.results import SampleSize
 
 
 class ErrorNumbers(TypedDict):
-    """Errors over `frames` frames. mean, sd, p05 to p95 (percentiles): of the relative error.
+    """Errors over `frames` frames.
 
-    position_error_cm: mean distance between the predicted and the captured position of a joint. If `frames`
-    is 0, then the means and sd are None and the percentiles are missing.
+    mean, sd, p05 to p95: mean, standard deviation and percentiles of the relative error of a joint, which is
+    a fraction (see `hobble.measures.accuracy.run`). position_error_cm: mean distance between the predicted
+    and the captured position of a joint. If `frames` is 0, the means and sd are None, and there are no
+    percentiles.
     """
 
     frames: int
@@ -33,17 +35,18 @@ class ErrorsOfClip(ErrorNumbers):
 
 
 class ErrorsOfExcerpt(ErrorsOfClip):
-    """The errors of an excerpt of a clip. first_frame, last_frame: frames of the clip."""
+    """The errors of an excerpt of a clip. first_frame, last_frame: its first and last frame in the clip."""
 
     first_frame: int
     last_frame: int
 
 
 class ErrorsOfSplit(ErrorNumbers):
-    """The errors of all clips of a split.
+    """The errors over all clips of a split.
 
-    clips: their number. mean_of_clips: the mean of their mean relative errors. interval: half widths of the
-    95 % confidence intervals of `mean` and `position_error_cm`, if only a sample was measured.
+    clips: number of clips with measured frames. mean_of_clips: the mean of the mean relative errors of these
+    clips. interval: "mean" or "position_error_cm" -> half the width of its 95 % confidence interval, if only
+    a sample was measured.
     """
 
     clips: int
@@ -52,9 +55,10 @@ class ErrorsOfSplit(ErrorNumbers):
 
 
 class Accuracy(TypedDict):
-    """The content of accuracy.json, and `excerpts`, which go to a table. joints: how many were measured.
+    """The content of accuracy.json, and `excerpts`, which are written to a table instead.
 
-    sample, excerpts: only if a sample was measured.
+    joints: number of measured joints. sample, excerpts: the size of the sample and the errors of each of its
+    excerpts; missing if all clips were measured as a whole.
     """
 
     configuration: str

@@ -28,7 +28,7 @@ from hobble.measures.accuracy.results import (
 )
 from hobble.measures.clip_parts import clip_parts, sample_of
 from hobble.measures.inputs import Json, MeasureInputs, Outcome, Row
-from hobble.measures.joints import Joints
+from hobble.measures.joints import JointOptions
 from hobble.measures.results import SPLITS
 from hobble.measures.stratified_sample import Sample
 from hobble.models.load import load_network
@@ -37,15 +37,18 @@ from hobble.rows.clip_rows import ClipRows, expanded
 from hobble.rows.excerpts import Excerpt
 from hobble.rows.layout import RowLayout
 
-Predict = Callable[[Array, Array], Array]  # inputs (n, X) and phases (n,) -> outputs (n, Y), not standardised
+# A prediction of n frames: inputs (n, X) and phases (n,) -> outputs (n, Y), not standardised. X and Y are the
+# numbers of input and output columns of the network.
+Predict = Callable[[Array, Array], Array]
 
-BATCH = 256  # predictions at once; with more, their inputs do not fit the cache
+BATCH = 256  # frames predicted in one call; the inputs of more frames do not fit in the processor's cache
 LEAST_DISTANCE = 1e-3  # cm: a joint nearer to the root counts as this far from it
-# With `joints: equivalent`, only joints with a counterpart on this skeleton are measured.
+# With the option `joints: equivalent`, only joints with a counterpart on this skeleton are measured.
 REFERENCE = "holden31"
-# The values that have a confidence interval.
+# Keys of the errors that have a confidence interval, if only a sample was measured.
 WITH_INTERVAL: tuple[Literal["mean"], Literal["position_error_cm"]] = ("mean", "position_error_cm")
 QUANTILES = {"p05": 0.05, "p25": 0.25, "p50": 0.5, "p75": 0.75, "p95": 0.95}
+# Columns of the table of clips.
 COLUMNS = ("clip", "split", "frames", "mean", "sd", "position_error_cm", *QUANTILES)
 # Edges of the bins of the relative error, each 2 % above the one before. Quantiles are read from the bins, so
 # that the errors of single frames need not be stored.
@@ -56,10 +59,10 @@ log = logging.getLogger("hobble")
 
 @dataclass(frozen=True)
 class Errors:
-    """The relative errors and the position errors (cm) in `frames` frames.
+    """The relative errors and the position errors (cm) of the joints in `frames` frames.
 
-    moments: of both errors, weighted. histogram: (bins,) total weight of the relative errors in each bin
-    between two EDGES.
+    moments: weighted mean and variance of two columns, the relative error and the position error. histogram:
+    (bins,) total weight of the relative errors in each bin between two EDGES.
     """
 
     frames: int = 0
@@ -72,16 +75,16 @@ class Errors:
         )
 
     def weighing(self, weight: float) -> Errors:
-        """The same errors with each frame counted `weight` times."""
+        """The same errors with `weight` times their weights. `frames` stays the number of measured frames."""
         return self if weight == 1 else Errors(self.frames, self.moments * weight, self.histogram * weight)
 
     def quantile(self, share: float) -> float:
         """The relative error below which `share` of all errors lie, accurate to about 1 % of its value."""
-        below = np.concatenate([[0.0], np.cumsum(self.histogram)])
+        below = np.concatenate([[0.0], np.cumsum(self.histogram)])  # weight of the errors below each of EDGES
         return float(np.interp(share * below[-1], below, EDGES))
 
     def to_dict(self) -> ErrorNumbers:
-        """Plain data, with quantiles of the relative error; None values if there was no frame."""
+        """Plain data for accuracy.json, with quantiles of the relative error; None if there was no frame."""
         if not self.frames:
             return {"frames": 0, "mean": None, "sd": None, "position_error_cm": None}
         mean, sd = self.moments.mean, self.moments.std
@@ -101,7 +104,7 @@ class Errors:
 def joint_errors(layout: RowLayout, truth: Array, predicted: Array, joints: Sequence[int]) -> Array:
     """(n, len(joints), 2): relative error, and distance in cm, of the joints with the indices `joints`.
 
-    truth, predicted: (n, Y) outputs, not standardised.
+    truth, predicted: (n, Y) captured and predicted outputs, not standardised.
     """
     block = layout.y_joint_position
     t = truth[:, block].reshape(len(truth), -1, 3)[:, joints].astype(np.float64)
@@ -109,24 +112,27 @@ def joint_errors(layout: RowLayout, truth: Array, predicted: Array, joints: Sequ
 
 
 def relative_and_distance(truth: Array, predicted: Array) -> Array:
-    """(..., 2): relative error, and distance in cm. truth, predicted: (..., 3) cm, relative to the root."""
+    """(..., 2): relative error, and distance in cm, of predicted joint positions.
+
+    truth, predicted: (..., 3) captured and predicted positions relative to the root, cm.
+    """
     distance = np.linalg.norm(truth - predicted, axis=-1)
     from_root = np.maximum(np.linalg.norm(truth, axis=-1), LEAST_DISTANCE)
     return np.stack([distance / from_root, distance], axis=-1)
 
 
-def prediction(network: Network) -> Predict:
+def predict_function(network: Network) -> Predict:
     """The runtime's exact prediction, which takes two thirds of the time of `Network.predict`.
 
-    For a network that remembers what a character did before (`Network.memory`), it is `Network.predict`,
-    because each frame is predicted on its own.
+    For a network that remembers the earlier frames of a character (`Network.memory`), the result is
+    `Network.predict`, which needs no memory. Here each frame is predicted on its own.
     """
     if network.memory:
         return network.predict
     predictor = network.predictor(storage="float32")
 
     def predict(x: Array, phase: Array) -> Array:
-        phase = phase.astype(float)  # as at run time; compiled code is made once for each type
+        phase = phase.astype(float)  # the type at run time; another type would be compiled anew
         starts = range(0, len(x), BATCH)
         return np.concatenate([predictor.predict(x[n : n + BATCH], phase[n : n + BATCH]) for n in starts])
 
@@ -136,15 +142,17 @@ def prediction(network: Network) -> Predict:
 def clip_errors(
     network: Network, rows: ClipRows, joints: Sequence[int], predict: Predict | None = None
 ) -> Errors:
-    """The errors in all frames of a clip. A frame with several terrain fits counts once, with its mean error.
+    """The errors in all frames of a clip.
 
-    predict: how to evaluate the network; by default `Network.predict`.
+    A frame may have several terrain fits (ground heights that suit the motion). It is predicted on each of
+    them and counts once, with its mean error. joints: indices of the joints to measure. predict: how to
+    evaluate the network; by default `Network.predict`.
     """
     layout, predict = network.layout, predict or network.predict
     total, histogram = Moments.nothing(2), np.zeros(len(EDGES) - 1)
     for pairs in expanded(rows, layout):
         errors = joint_errors(layout, pairs.y, predict(pairs.x, pairs.p), joints)
-        weights = np.repeat(pairs.weight / len(joints), len(joints))
+        weights = np.repeat(pairs.weight / len(joints), len(joints))  # all weights of a frame add up to 1
         errors = errors.reshape(-1, 2)
         total = total + Moments.of(errors, weights)
         histogram += np.histogram(np.minimum(errors[:, 0], EDGES[-1]), EDGES, weights=weights)[0]
@@ -156,39 +164,39 @@ def measure(
     clips: Mapping[str, str | Path],
     splits: Mapping[str, str],
     configuration: str,
-    equivalents: Sequence[str] | None = None,
+    joint_names: Sequence[str] | None = None,
     sample: Sample | None = None,
 ) -> Accuracy:
-    """accuracy.json: errors over the frames of each split, and of each clip, sorted by name.
+    """The content of accuracy.json: errors over the frames of each split, and of each clip, sorted by name.
 
-    clips: name -> file of rows. splits: name -> "train" or "held_out". equivalents: names of the joints to
-    measure; all by default. sample: the excerpts to measure in place of all clips; then the result also has
-    the size of the sample, confidence intervals, and the errors of each excerpt. In the result,
-    `mean_of_clips` is the mean of the mean errors of clips, as in the published tables. Raises InputError if
-    rows and network have different layouts.
+    weights: the network's file. clips: name -> file of rows. splits: name -> "train" or "held_out".
+    joint_names: the joints to measure; all by default. sample: the excerpts to measure in place of all clips;
+    then the result also has the size of the sample, confidence intervals, and the errors of each excerpt. In
+    the result, `mean_of_clips` is the mean of the mean errors of clips, as in the published tables. Raises
+    InputError if rows and network have different layouts.
     """
     network = load_network(weights)
-    joints, predict = joint_indices(network, equivalents), prediction(network)
+    joints, predict = joint_indices(network, joint_names), predict_function(network)
     of_clip: dict[str, Errors] = {}
     excerpts: dict[Excerpt, ErrorsOfExcerpt] = {}
     totals: dict[str, Errors] = dict.fromkeys(SPLITS, Errors())
     for part in clip_parts(clips, sample):
-        read = part.load()
-        check_layout(part.path, read.rows, network)
-        errors = clip_errors(network, read.rows, joints, predict)
+        loaded = part.load()
+        check_layout(part.path, loaded.rows, network)
+        errors = clip_errors(network, loaded.rows, joints, predict)
         split = splits[part.clip]
         totals[split] += errors.weighing(part.weight)
         of_clip[part.clip] = of_clip.get(part.clip, Errors()) + errors.weighing(part.weight)
         values = errors.to_dict()
         if part.excerpt is not None:
-            first, last = read.frames
+            first, last = loaded.frames
             place = {"clip": part.clip, "split": split, "first_frame": first, "last_frame": last}
             excerpts[part.excerpt] = ErrorsOfExcerpt(**place, **values)  # type: ignore[typeddict-item]
         log.info("%s: %s", part.excerpt or part.clip, values)
     entries: list[ErrorsOfClip] = [
         {"clip": name, "split": splits[name], **errors.to_dict()} for name, errors in of_clip.items()
     ]
-    train, held_out = (_of_split(split, totals[split], entries) for split in SPLITS)
+    train, held_out = (_errors_of_split(split, totals[split], entries) for split in SPLITS)
     result: Accuracy = {
         "configuration": configuration,
         "joints": len(joints),
@@ -199,7 +207,8 @@ def measure(
     return result if sample is None else _with_intervals(result, sample, excerpts)
 
 
-def _of_split(split: str, errors: Errors, entries: Sequence[ErrorsOfClip]) -> ErrorsOfSplit:
+def _errors_of_split(split: str, errors: Errors, entries: Sequence[ErrorsOfClip]) -> ErrorsOfSplit:
+    """The entry of a split. errors: over all its frames. entries: the entries of the clips of both splits."""
     means = [e["mean"] for e in entries if e["split"] == split and e["mean"] is not None]
     mean = float(np.mean(means)) if means else None
     return {**errors.to_dict(), "clips": len(means), "mean_of_clips": mean}
@@ -210,10 +219,11 @@ def _with_intervals(
 ) -> Accuracy:
     """The result with the size of the sample, the excerpts, and 95 % confidence intervals for each split.
 
-    `mean_of_clips` is then weighted to represent all clips. excerpts: the errors of each excerpt that was
-    measured.
+    `mean_of_clips` becomes a mean over the excerpts, weighted to represent all clips. excerpts: the errors of
+    each excerpt that was measured.
     """
     for split in SPLITS:
+        # Excerpt of this split -> its errors.
         of_split = {excerpt: entry for excerpt, entry in excerpts.items() if entry["split"] == split}
         weights = [sample.clip_weights[excerpt] for excerpt in of_split]
         # Every excerpt of a sample has rows, so no value is None. (`or 0.0` tells the type checker.)
@@ -228,17 +238,17 @@ def _with_intervals(
     return {**result, "sample": sample.to_dict(), "excerpts": list(excerpts.values())}
 
 
-def equivalent_joints(skeleton: Json, of: str = REFERENCE) -> list[str] | None:
-    """Names of the joints of a skeleton that have a counterpart on the skeleton named `of`.
+def equivalent_joints(skeleton: Json, reference: str = REFERENCE) -> list[str] | None:
+    """Names of the joints of a skeleton that have a counterpart on the skeleton named `reference`.
 
-    skeleton: as config/skeletons/<name>.yaml holds it. If it has no map to `of`, the result is None, which
-    stands for all joints.
+    skeleton: the content of config/skeletons/<name>.yaml. If its `maps` do not list `reference`, the result
+    is None, which stands for all joints.
     """
-    counterparts = skeleton.get("maps", {}).get(of)
+    counterparts = skeleton.get("maps", {}).get(reference)
     return None if counterparts is None else list(counterparts)
 
 
-def chosen_joints(inputs: MeasureInputs, options: Joints) -> list[str] | None:
+def chosen_joints(inputs: MeasureInputs, options: JointOptions) -> list[str] | None:
     """Names of the joints that the options select; None for all."""
     return equivalent_joints(inputs.skeleton) if options.joints == "equivalent" else None
 
@@ -248,31 +258,41 @@ def joint_indices(network: Network, names: Sequence[str] | None = None) -> list[
     if names is None:
         return list(range(network.layout.joints))
     if network.skeleton is None:
-        raise HobbleError("The network's file has no joint names, so only `joints: all` can be measured.")
+        raise HobbleError(
+            "The network's file has no joint names, so `joints: equivalent` is not possible. Write "
+            "`joints: all` in the section `evaluation` of the configuration."
+        )
     indices = [i for i, name in enumerate(network.skeleton.joints) if name in names]
     if not indices:
-        raise HobbleError(f"None of {', '.join(names)} is a joint of {network.skeleton.name}.")
+        raise HobbleError(
+            f"None of {', '.join(names)} is a joint of the network's skeleton, {network.skeleton.name}. "
+            "Write `joints: all` in the section `evaluation` of the configuration."
+        )
     return indices
 
 
 def check_layout(where: str | Path, rows: ClipRows, network: Network) -> None:
-    """Raise InputError, which names the file `where`, unless `rows` fit the network.
+    """Raise InputError if the rows do not have the columns that the network has learnt.
 
-    Rows may have more channels than the network.
+    Rows may have more channels than the network. where: the file of the rows, for the message.
     """
     layout = network.layout
     same_without_channels = rows.layout.with_channels(()) == replace(layout, channels=(), order=())
     if not same_without_channels or not set(layout.channels) <= set(rows.layout.channels):
-        raise InputError(where, f"its rows ({rows.layout}) are not those the network has learnt ({layout})")
+        raise InputError(
+            where,
+            f"its rows ({rows.layout}) are not those the network has learnt ({layout})",
+            fix="Use a data set with the network's skeleton and all its channels.",
+        )
 
 
-def clip_rows(result: Accuracy) -> list[Row]:
-    """The entries of the clips as rows of a table. Each row has all COLUMNS."""
+def clips_table(result: Accuracy) -> list[Row]:
+    """The entries of the clips as rows of a table. Each row has all COLUMNS; a missing value is None."""
     return [{key: clip.get(key) for key in COLUMNS} for clip in result["clips"]]
 
 
 def run(inputs: MeasureInputs, options: Options) -> Outcome:
-    """accuracy.json, and the errors of its clips and excerpts as tables."""
+    """accuracy.json, and the tables `clips` and, if a sample was measured, `excerpts`, with their errors."""
     sample = sample_of(inputs, options)
     result = measure(
         inputs.weights,
@@ -283,4 +303,4 @@ def run(inputs: MeasureInputs, options: Options) -> Outcome:
         sample,
     )
     excerpts = {"excerpts": result.pop("excerpts")} if sample else {}
-    return Outcome(result, {"clips": clip_rows(result), **excerpts})
+    return Outcome(result, {"clips": clips_table(result), **excerpts})

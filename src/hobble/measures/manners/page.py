@@ -1,4 +1,7 @@
-"""Shows whether moods and diagnoses can be recognised in generated walks."""
+"""Shows whether moods and diagnoses can be recognised in generated walks.
+
+A mood or diagnosis is called a manner.
+"""
 
 from __future__ import annotations
 
@@ -6,7 +9,7 @@ from collections.abc import Callable
 from typing import Literal
 
 from hobble.channels.shown import shown_names
-from hobble.measures.clip_parts import captured_sampled
+from hobble.measures.clip_parts import sample_sentence
 from hobble.measures.inputs import Json
 from hobble.measures.manners.results import ChannelResult
 from hobble.measures.manners.windows import EFFECTS, NONE
@@ -14,14 +17,14 @@ from hobble.report.charts import Chart
 from hobble.report.gather import ReportMaterial
 from hobble.report.page_parts import PageSection, Paragraph, SectionPart
 
-UNITS = {  # of the EFFECTS of a manner
+UNITS = {  # effect of a manner -> its unit
     "speed": "m/s",
     "stride": "cm",
     "trunk": "° forward",
     "arms": "° of swing",
     "head": "° forward",
 }
-# The bars of each manner: key in `Effect`, label, colour. A generated manner has the value 1 or .5.
+# The bars of each manner: (key in `Effect`, label, colour). Walks are generated with the values 1 and .5.
 BARS: tuple[tuple[Literal["captured", "generated", "generated_at_half"], str, str], ...] = (
     ("captured", "captured", "@muted"),
     ("generated", "generated at 1", "@accent"),
@@ -32,50 +35,54 @@ BARS: tuple[tuple[Literal["captured", "generated", "generated_at_half"], str, st
 def section(found: Json, material: ReportMaterial) -> PageSection:
     """For each channel, how often its manners are recognised, and how much they change the walk.
 
-    Empty for a network without manners.
+    Empty for a network without manners. found: the content of manners.json.
     """
     if not found.get("applies"):
         return PageSection("manners", [])
     parts, shown_name = [], shown_names(material.network["skeleton"])
-    for i, one in enumerate(found["channels"]):
-        charts = [together_chart(one, shown_name), *(effect_chart(one, effect) for effect in EFFECTS)]
+    for i, result in enumerate(found["channels"]):
+        charts = [together_chart(result, shown_name), *(effect_chart(result, effect) for effect in EFFECTS)]
+        # The first argument of each part is its place in the section.
         parts += [
-            SectionPart(10 * i, Paragraph(summary(one) + captured_sampled(found))),
-            *(SectionPart(10 * i + 1 + k, c) for k, c in enumerate(charts)),
+            SectionPart(10 * i, Paragraph(summarise(result) + sample_sentence(found))),
+            *(SectionPart(10 * i + 1 + k, chart) for k, chart in enumerate(charts)),
         ]
-    title = " and ".join(one["title"] for one in found["channels"])
+    title = " and ".join(result["title"] for result in found["channels"])
     return PageSection("manners", parts, title=title, at=21)
 
 
-def summary(found: ChannelResult) -> str:
+def summarise(result: ChannelResult) -> str:
     """A paragraph: how often the recogniser is right on generated walks, and on walks of people left out."""
-    captured = found["captured"]
+    captured = result["captured"]
     text = (
-        f"A recogniser trained on captured clips finds the right {found['title'].lower()} in "
-        f"{_percent(found['right_at_1'])} of one-second windows of generated walks with a value of 1, and in "
-        f"{_percent(captured['right'])} of the windows of captured clips that it was not trained on "
+        f"A recogniser trained on captured clips finds the right {result['title'].lower()} in "
+        f"{_percent(result['right_at_1'])} of one-second windows of generated walks with a value of 1, and "
+        f"in {_percent(captured['right'])} of the windows of captured clips that it was not trained on "
         f"({captured['people']} clips or people, each left out in turn). All generated walks had the same "
-        f"three target speeds around {found['speed_asked']:.2f} m/s."
+        f"three target speeds around {result['speed_asked']:.2f} m/s."
     )
     if alone := [m for m, count in captured["people_of"].items() if count < 2]:
-        text += f" Only one clip or person shows {', '.join(alone)}. "
-        text += "While that one is left out, the recogniser cannot learn it."
+        text += f" Each of these is shown by only one clip or person: {', '.join(alone)}. "
+        text += "While this clip or person is left out, the recogniser has no example to learn from."
     return text
 
 
-def together_chart(found: ChannelResult, shown_name: Callable[[str], str] = str) -> Chart | None:
-    """How often each manner is recognised while a column of another channel is at its highest value."""
-    rows = found["together"]
+def together_chart(result: ChannelResult, shown_name: Callable[[str], str] = str) -> Chart | None:
+    """How often each manner is recognised while a column of another channel is at its highest value.
+
+    shown_name: gives the text that the page shows for a column. None if the network has no other channel.
+    """
+    rows = result["together"]
     if not rows:
         return None
     manners = list(dict.fromkeys(row["manner"] for row in rows))
     columns = list(dict.fromkeys(row["column"] for row in rows))
-    spoken = [shown_name(column) for column in columns]
+    labels = [shown_name(column) for column in columns]
     shares = {(row["manner"], row["column"]): row["share"] for row in rows}
     trace = {
         "type": "heatmap",
         "x": manners,
-        "y": spoken[::-1],
+        "y": labels[::-1],  # plotly puts the first row at the bottom
         "z": [[shares[m, c] for m in manners] for c in columns[::-1]],
         "colorscale": [[0, "@sunken"], [1, "@accent"]],
         "zmin": 0,
@@ -85,25 +92,26 @@ def together_chart(found: ChannelResult, shown_name: Callable[[str], str] = str)
         "ygap": 2,
         "hovertemplate": "%{x} with %{y}: %{z:.0%}<extra></extra>",
     }
+    # Numbers of windows with a manner: those that are named right, and all.
     right = sum((row["share"] or 0.0) * row["windows"] for row in rows if row["manner"] != NONE)
-    whole = sum(row["windows"] for row in rows if row["manner"] != NONE)
+    total = sum(row["windows"] for row in rows if row["manner"] != NONE)
     layout = {
         "xaxis": {"type": "category", "side": "top", "automargin": True, "showgrid": False},
         "yaxis": {"type": "category", "automargin": True, "dtick": 1, "showgrid": False},
     }
     words = (
-        f"The share of windows in which the recogniser names the right {found['title'].lower()} while the "
+        f"The share of windows in which the recogniser names the right {result['title'].lower()} while the "
         "value named at the left is at its highest. The darker a field, the larger the share. "
-        f'The mean of all columns but "{NONE}" is {_percent(right / whole)}.'
+        f'The mean of all columns but "{NONE}" is {_percent(right / total)}.'
     )
     return Chart(
-        f"{found['channel']}-together", "Two at once", words, [trace], layout, 120 + 20 * len(columns)
+        f"{result['channel']}-together", "Two at once", words, [trace], layout, 120 + 20 * len(columns)
     )
 
 
-def effect_chart(found: ChannelResult, effect: str) -> Chart:
-    """One effect, such as the speed, of each manner in captured and in generated walks."""
-    rows = [row for row in found["effects"] if row["effect"] == effect]
+def effect_chart(result: ChannelResult, effect: str) -> Chart:
+    """How much each manner changes one of the EFFECTS, such as speed, in captured and in generated walks."""
+    rows = [row for row in result["effects"] if row["effect"] == effect]
     traces = [
         {
             "type": "bar",
@@ -117,7 +125,7 @@ def effect_chart(found: ChannelResult, effect: str) -> Chart:
     words = f"Change of {effect} ({UNITS[effect]}) from the neutral walk."
     title = effect.capitalize()
     return Chart(
-        f"{found['channel']}-{effect}", title, words, traces, {"yaxis": {"title": UNITS[effect]}}, 260
+        f"{result['channel']}-{effect}", title, words, traces, {"yaxis": {"title": UNITS[effect]}}, 260
     )
 
 

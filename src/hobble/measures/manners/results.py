@@ -1,4 +1,8 @@
-"""The types of manners.json."""
+"""The types of manners.json.
+
+A manner is a mood or diagnosis. A window is one second of walking. The recogniser names the manner that it
+finds in a window, or "none".
+"""
 
 from __future__ import annotations
 
@@ -8,10 +12,10 @@ from typing import NotRequired, TypedDict
 class LeftOut(TypedDict):
     """How well the manner of captured people is recognised after learning from all other people.
 
-    shrinkage: of the recogniser's covariance towards its diagonal. people: number of persons. people_of:
-    number of persons with each manner. windows: number of windows that were named. right: share of them that
-    were named right. by_manner: the same for each manner. presence_right: share of windows in which the
-    recogniser says correctly whether there is any manner.
+    shrinkage: how much the recogniser's covariance is shrunk towards its diagonal, 0 to 1. people: number of
+    people. people_of: manner -> number of people. windows: number of windows that were named. right: share of
+    these windows that were named right. by_manner: manner -> share of its windows that were named right.
+    presence_right: share of windows for which the recogniser says correctly whether there is any manner.
     """
 
     shrinkage: float
@@ -24,12 +28,13 @@ class LeftOut(TypedDict):
 
 
 class NamedWindows(TypedDict):
-    """The names that the recogniser gives to the windows of a walk with no, one or two manners.
+    """The names that the recogniser gives to the windows of a generated walk with no, one or two manners.
 
-    value: value of the manner, 0 if there is none, else .5 or 1; None for two manners. windows: their number.
-    share: share of windows named right. named: manner -> number of windows that got this name. In a walk with
-    two manners, either name is right. between: for two manners, where the walk lies between the walks with
-    the first alone (0) and with the second alone (1).
+    manners: the manners of the walk. value: .5 or 1, the value of the manner; 0 without a manner, None for
+    two manners. windows: number of windows. share: share of windows named right; with two manners, either
+    name is right. named: manner -> number of windows that got this name. between: for two manners, how far
+    the features of the walk are from those with the first manner alone (0) to those with the second alone
+    (1).
     """
 
     manners: list[str]
@@ -41,10 +46,11 @@ class NamedWindows(TypedDict):
 
 
 class CombinedResult(TypedDict):
-    """The names that the recogniser gives to the windows of a walk with values of two channels.
+    """The names that the recogniser gives to the windows of a generated walk with values of two channels.
 
-    A manner is at 1, and `column` of the channel `other` is at its highest value. windows: their number.
-    share: share of windows named right. named: manner -> number of windows that got this name.
+    In the channel `channel`, `manner` has the value 1, or all values are 0 if it is "none". In the channel
+    `other`, `column` has its highest value. windows: number of windows. share: share of windows named right.
+    named: manner -> number of windows that got this name.
     """
 
     channel: str
@@ -59,8 +65,9 @@ class CombinedResult(TypedDict):
 class Effect(TypedDict):
     """How much a manner changes the quantity `effect` from the neutral walk.
 
-    The units are those of `MannerWindow` in `hobble.measures.manners.windows`. captured: None without neutral
-    clips. generated: in generated walks with a value of 1. generated_at_half: the same with a value of .5.
+    effect: one of EFFECTS in `hobble.measures.manners.windows`; `MannerWindow` there has the units. captured:
+    the change in captured walks; None without neutral clips. generated: the change in generated walks in
+    which the manner has the value 1. generated_at_half: the same with the value .5.
     """
 
     channel: str
@@ -74,11 +81,12 @@ class Effect(TypedDict):
 class ChannelResult(TypedDict):
     """The result for one channel.
 
-    speed_asked: middle one of the target speeds of generated walks, m/s. captured: recognition of captured
-    people. generated: for each manner and value, and for each pair of manners, how often a recogniser trained
-    on the training clips is right. right_at_1: share of windows named right in all walks with one manner at
-    1. together: recognition of each manner while a column of another channel is at its highest value.
-    effects: how much each manner changes the walk from neutral.
+    title: the channel's name on the page. manners: those that were learnt. speed_asked: the middle one of the
+    target speeds of generated walks, m/s. captured: recognition of captured people. generated: for walks
+    without a manner, with each manner at .5 and at 1, and with each pair of manners, how often a recogniser
+    trained on the training clips is right. right_at_1: share of windows named right in all walks with one
+    manner at 1. together: recognition of each manner while a column of another channel is at its highest
+    value. effects: how much each manner changes each quantity from the neutral walk.
     """
 
     channel: str
@@ -93,9 +101,10 @@ class ChannelResult(TypedDict):
 
 
 class Manners(TypedDict):
-    """manners.json. applies: whether there are manners to measure. If not, `reason` says why.
+    """The content of manners.json.
 
-    channels: the result for each channel, if `applies` is true.
+    applies: whether there are manners to measure. reason: why not, if `applies` is false. channels: the
+    result for each channel, if `applies` is true.
     """
 
     applies: bool

@@ -1,7 +1,8 @@
 """Measures whether a recogniser that is trained on captured moods or diagnoses recognises the generated ones.
 
-Also compares how much captured and generated manners change the walk, and measures whether a manner is still
-recognised when another channel, such as injuries, has a value too.
+A mood or diagnosis is called a manner. The measurement also compares how much captured and generated manners
+change the walk. And it measures whether a manner is still recognised when another channel, such as injuries,
+has a value too.
 """
 
 from __future__ import annotations
@@ -18,7 +19,7 @@ from hobble.evaluation.crowd import FPS
 from hobble.gait.discriminant import Discriminant, learn
 from hobble.measures.clip_parts import captured_motion, sample_of, with_sample
 from hobble.measures.inputs import MeasureInputs, Outcome, Row
-from hobble.measures.manners.left_out import left_out, share
+from hobble.measures.manners.left_out import recognise_left_out, share
 from hobble.measures.manners.results import ChannelResult, CombinedResult, Effect, Manners, NamedWindows
 from hobble.measures.manners.windows import (
     EFFECTS,
@@ -26,9 +27,9 @@ from hobble.measures.manners.windows import (
     MannerWindow,
     WalkerInputs,
     captured_windows,
-    generated,
+    feature_table,
+    generated_windows,
     mean_effect,
-    table,
 )
 from hobble.measures.sample_options import SampleOptions
 from hobble.models.load import load_network
@@ -38,37 +39,37 @@ from hobble.runtime.options import Runtime
 # Target speeds of generated walks, divided by the median speed of captured neutral walks. They are the same
 # for every manner.
 PACES = (0.85, 1.0, 1.15)
-USUAL_SPEED = 120.0  # cm a second; stands for the median if there are no captured neutral walks
+USUAL_SPEED = 120.0  # cm a second; used instead of this median if there are no captured neutral walks
 HALF, FULL = 0.5, 1.0  # values of a manner
 NO_MANNERS = "none of this network's inputs is a manner of walking"
-TOO_FEW = "there are walking clips of fewer than two manners"
+TOO_FEW = "fewer than two manners are shown by straight walks in training clips"
 
 
-def manners(
+def measure_manners(
     network: Network,
     motion: Iterable[Captured],
     splits: Mapping[str, str],
     people: Mapping[str, str],
     runtime: Runtime,
 ) -> Manners:
-    """The content of manners.json. If it cannot be measured, `applies` is false and `reason` says why.
+    """The content of manners.json. If manners cannot be measured, `applies` is false and `reason` says why.
 
-    motion: the captured stretches of all clips. splits: clip -> "train" or "held_out". people: clip ->
-    person.
+    motion: the captured stretches of all clips. splits: clip -> "train" or "held_out". people: clip -> person
+    who walks in it.
     """
     names = [name for name in network.channels if channel(name).manner]
     if not names or network.skeleton is None:
         return {"applies": False, "reason": NO_MANNERS}
     windows: dict[str, list[MannerWindow]] = {name: [] for name in names}
-    for clip in motion:
+    for stretch in motion:
         for name, channel_windows in windows.items():
-            channel_windows += captured_windows(clip, network, name)
-    results = [of_channel(network, name, windows[name], splits, people, runtime) for name in names]
+            channel_windows += captured_windows(stretch, network, name)
+    results = [measure_channel(network, name, windows[name], splits, people, runtime) for name in names]
     measured = [result for result in results if result]
     return {"applies": True, "channels": measured} if measured else {"applies": False, "reason": TOO_FEW}
 
 
-def of_channel(
+def measure_channel(
     network: Network,
     name: str,
     windows: Sequence[MannerWindow],
@@ -76,30 +77,37 @@ def of_channel(
     people: Mapping[str, str],
     runtime: Runtime,
 ) -> ChannelResult | None:
-    """The result for the channel `name`; None if there are training clips of fewer than two manners.
+    """The result for the channel `name`; None if walks of training clips show fewer than two manners.
 
-    windows: the captured windows of all clips. splits: clip -> "train" or "held_out". people: clip -> person.
+    windows: the captured windows of all clips. splits: clip -> "train" or "held_out". people: clip -> person
+    who walks in it.
     """
     training = [w for w in windows if splits[w.clip] == "train"]
     learnt = sorted({w.manner for w in training} - {NONE})
     if len(learnt) < 2:
         return None
-    captured = left_out(windows, people)
-    recogniser = learn(table(training), [w.manner for w in training], captured["shrinkage"])
+    captured = recognise_left_out(windows, people)
+    recogniser = learn(feature_table(training), [w.manner for w in training], captured["shrinkage"])
+    # The target speed at pace 1, cm a frame.
     speed = float(np.median([w.values["speed"] for w in training if w.manner == NONE] or [USUAL_SPEED])) / FPS
+    # What is generated, as manner -> value: no manner, each manner at HALF, each at FULL, each pair at FULL.
     single = [{}, *({manner: value} for value in (HALF, FULL) for manner in learnt)]
-    combined = [*single, *(dict.fromkeys(pair, FULL) for pair in combinations(learnt, 2))]
-    walkers = [WalkerInputs({name: values}, speed * pace) for values in combined for pace in PACES]
-    walks = generated(network, walkers, name, runtime)
-    per = len(PACES)
-    # The windows for each entry of `combined`, at all PACES.
-    by_entry = [[w for walk in walks[i : i + per] for w in walk] for i in range(0, len(walks), per)]
-    half, full = (dict(zip(learnt, by_entry[1 + k * len(learnt) :], strict=False)) for k in (0, 1))
-    rows = [_named(recogniser, values, some) for values, some in zip(combined, by_entry, strict=True)]
-    for row, values, some in zip(rows, combined, by_entry, strict=True):
+    cases = [*single, *(dict.fromkeys(pair, FULL) for pair in combinations(learnt, 2))]
+    walkers = [WalkerInputs({name: values}, speed * pace) for values in cases for pace in PACES]
+    walks = generated_windows(network, walkers, name, runtime)
+    paces = len(PACES)
+    # The windows of each of the `cases`, at all PACES.
+    by_case = [[w for walk in walks[i : i + paces] for w in walk] for i in range(0, len(walks), paces)]
+    # manner -> its windows at HALF, and at FULL. In `cases`, these follow the case without a manner.
+    half, full = (dict(zip(learnt, by_case[1 + k * len(learnt) :], strict=False)) for k in (0, 1))
+    rows = [
+        _name_windows(recogniser, values, of_case) for values, of_case in zip(cases, by_case, strict=True)
+    ]
+    for row, values, of_case in zip(rows, cases, by_case, strict=True):
         if len(values) == 2:
-            row["between"] = _between(_mean(some), *(_mean(full[manner]) for manner in values))
-    right = [(row["share"], row["windows"]) for row in rows if row["value"] == FULL]
+            alone = (_mean_features(full[manner]) for manner in values)
+            row["between"] = _position_between(_mean_features(of_case), *alone)
+    at_full = [(row["share"], row["windows"]) for row in rows if row["value"] == FULL]
     return {
         "channel": name,
         "title": channel(name).title,
@@ -107,17 +115,17 @@ def of_channel(
         "speed_asked": round(speed * FPS / 100, 5),
         "captured": captured,
         "generated": rows,
-        "right_at_1": _weighted(right),
-        "together": together(network, name, recogniser, learnt, speed, runtime),
+        "right_at_1": _mean_share(at_full),
+        "together": recognise_together(network, name, recogniser, learnt, speed, runtime),
         "effects": [
-            _effect(name, manner, effect, training, by_entry[0], half[manner], full[manner])
+            _measure_effect(name, manner, effect, training, by_case[0], half[manner], full[manner])
             for manner in learnt
             for effect in EFFECTS
         ],
     }
 
 
-def together(
+def recognise_together(
     network: Network,
     name: str,
     recogniser: Discriminant,
@@ -127,8 +135,9 @@ def together(
 ) -> list[CombinedResult]:
     """How often each manner at 1 is recognised while a column of another channel is at its highest value.
 
-    The result has a row for each manner (and NONE) and each such column that was above 0 in training. learnt:
-    the manners that the recogniser knows. speed: target speed, cm a frame.
+    The result has a row for each pair of a manner (or NONE) and a column of another channel that was above 0
+    in training. name: the channel of the manners. learnt: the manners that the recogniser knows. speed:
+    target speed, cm a frame.
     """
     others = [
         (other, column) for other in network.channels if other != name for column in network.trained(other)
@@ -140,10 +149,10 @@ def together(
         WalkerInputs({name: {} if m == NONE else {m: FULL}, other: {column: channel(other).highest}}, speed)
         for m, other, column in cases
     ]
-    walks = generated(network, walkers, name, runtime)
+    walks = generated_windows(network, walkers, name, runtime)
     rows: list[CombinedResult] = []
-    for (manner, other, column), some in zip(cases, walks, strict=True):
-        names = recogniser.names(table(some))
+    for (manner, other, column), windows in zip(cases, walks, strict=True):
+        names = recogniser.names(feature_table(windows))
         rows.append(
             {
                 "channel": name,
@@ -159,26 +168,30 @@ def together(
 
 
 def run(inputs: MeasureInputs, options: SampleOptions) -> Outcome:
-    """manners.json, and two tables: `effects`, and `together` for walks with values of two channels."""
+    """manners.json, and its lists `effects` and `together` as tables."""
     sample = sample_of(inputs, options)
     motion = captured_motion(inputs.clips, sample)
-    result = manners(load_network(inputs.weights), motion, inputs.splits, inputs.people, inputs.runtime)
+    result = measure_manners(
+        load_network(inputs.weights), motion, inputs.splits, inputs.people, inputs.runtime
+    )
     measured = result.get("channels", [])
     tables: dict[str, list[Row]] = {
-        "effects": [row for one in measured for row in one["effects"]],
+        "effects": [row for of_channel in measured for row in of_channel["effects"]],
         "together": [
-            {k: v for k, v in row.items() if k != "named"} for one in measured for row in one["together"]
+            {k: v for k, v in row.items() if k != "named"}
+            for of_channel in measured
+            for row in of_channel["together"]
         ],
     }
-    says = "; ".join(f"{one['channel']} named right: {one['right_at_1']}" for one in measured)
+    says = "; ".join(f"{one['channel']}, share named right: {one['right_at_1']}" for one in measured)
     return Outcome(with_sample(result, sample), tables, says or result.get("reason", ""))
 
 
-def _named(
+def _name_windows(
     recogniser: Discriminant, values: Mapping[str, float], windows: Sequence[MannerWindow]
 ) -> NamedWindows:
-    """The names that the recogniser gives to the windows of a walk. values: manner -> its value."""
-    names = recogniser.names(table(windows))
+    """The names that the recogniser gives to windows of generated walks. values: manner -> its value."""
+    names = recogniser.names(feature_table(windows))
     right_names = set(values) or {NONE}
     return {
         "manners": list(values),
@@ -190,10 +203,11 @@ def _named(
 
 
 def _counts(names: Sequence[str]) -> dict[str, int]:
+    """Name -> how often it occurs."""
     return {name: names.count(name) for name in sorted(set(names))}
 
 
-def _effect(
+def _measure_effect(
     name: str,
     manner: str,
     effect: str,
@@ -202,10 +216,10 @@ def _effect(
     half: Sequence[MannerWindow],
     full: Sequence[MannerWindow],
 ) -> Effect:
-    """One effect of one manner.
+    """How much a manner changes the quantity `effect`.
 
-    name: the channel. training: captured windows of training clips. plain, half, full: generated windows
-    without the manner, with it at .5 and at 1.
+    name: the channel. training: captured windows of training clips. plain, half, full: windows generated
+    without a manner, with this manner at .5, and with it at 1.
     """
     neutral = [w for w in training if w.manner == NONE]
     captured = [w for w in training if w.manner == manner]
@@ -222,16 +236,21 @@ def _effect(
     }
 
 
-def _between(both: Array, first: Array, second: Array) -> float:
-    """Where `both` lies between `first` (0) and `second` (1). All are (D,) mean features of walks."""
-    way = second - first
-    return round(float((both - first) @ way / max(float(way @ way), 1e-9)), 4)
+def _position_between(pair: Array, first: Array, second: Array) -> float:
+    """Where `pair` lies between `first` (0) and `second` (1), projected onto the line through these two.
+
+    All are (D,) mean features of walks.
+    """
+    line = second - first
+    return round(float((pair - first) @ line / max(float(line @ line), 1e-9)), 4)
 
 
-def _mean(windows: Sequence[MannerWindow]) -> Array:
-    return np.asarray(table(windows).mean(axis=0))
+def _mean_features(windows: Sequence[MannerWindow]) -> Array:
+    """(D,) mean of each feature over the windows."""
+    return np.asarray(feature_table(windows).mean(axis=0))
 
 
-def _weighted(shares: Sequence[tuple[float | None, int]]) -> float | None:
-    whole = sum(windows for _, windows in shares)
-    return round(sum((right or 0.0) * windows for right, windows in shares) / whole, 5) if whole else None
+def _mean_share(shares: Sequence[tuple[float | None, int]]) -> float | None:
+    """The mean of shares, weighted by numbers of windows; None without windows. shares: (share, windows)."""
+    total = sum(windows for _, windows in shares)
+    return round(sum((right or 0.0) * windows for right, windows in shares) / total, 5) if total else None

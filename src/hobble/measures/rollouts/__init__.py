@@ -7,7 +7,7 @@ from typing import Annotated
 from pydantic import AfterValidator, Field
 
 from hobble.core.section import Positive
-from hobble.measures.joints import Joints
+from hobble.measures.joints import JointOptions
 from hobble.measures.measure import Cost, Measure
 from hobble.measures.sample_options import SampleOptions
 
@@ -19,7 +19,7 @@ def _at_least_one(lengths: tuple[int, ...]) -> tuple[int, ...]:
     return lengths
 
 
-class Options(Joints, SampleOptions):
+class Options(JointOptions, SampleOptions):
     """The keys of this measurement in the section `evaluation`."""
 
     rollouts: Annotated[tuple[Positive, ...], AfterValidator(_at_least_one)] = Field(

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 from hobble.measures.accuracy.page import COLOURS, NAMES
-from hobble.measures.clip_parts import sampled_words
+from hobble.measures.clip_parts import sample_in_words
 from hobble.measures.inputs import Json
 from hobble.report.charts import Chart, axis, line, log_axis
 from hobble.report.gather import ReportMaterial
@@ -19,7 +19,7 @@ def section(found: Json, material: ReportMaterial) -> PageSection:
 
 def sampled(found: Json) -> str:
     """Sentences on the measured sample and on the error bars; empty if all clips were measured."""
-    words = sampled_words(found)
+    words = sample_in_words(found)
     return f" Measured on {words}. Whiskers are 95 % confidence intervals." if words else ""
 
 

@@ -7,7 +7,7 @@ from typing import Any
 
 from hobble.channels.injury.response.page import in_words
 from hobble.channels.shown import shown_names
-from hobble.measures.clip_parts import captured_sampled
+from hobble.measures.clip_parts import sample_sentence
 from hobble.measures.inputs import Json
 from hobble.report.charts import Chart, Trace, axis, line
 from hobble.report.formats import number
@@ -49,7 +49,7 @@ def section(found: Json, material: ReportMaterial) -> PageSection:
         [
             SectionPart(
                 1,
-                Paragraph(hurt_motion_in_words(found["hurt_seconds"], shown_name) + captured_sampled(found)),
+                Paragraph(hurt_motion_in_words(found["hurt_seconds"], shown_name) + sample_sentence(found)),
             ),
             SectionPart(2, size_chart(found)),
             SectionPart(3, Paragraph(RECOGNISERS)),

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from hobble.measures.clip_parts import captured_sampled
+from hobble.measures.clip_parts import sample_sentence
 from hobble.measures.inputs import Json
 from hobble.report.charts import Chart, Trace
 from hobble.report.gather import ReportMaterial
@@ -71,7 +71,7 @@ def recognition_chart(found: Json) -> Chart | None:
         "Is the hurt part recognised?",
         "A classifier trained on captured clips says which part hurts. Rows: the part that hurts. Columns: "
         "the answer of the classifier. Answers on the diagonal are right. A random guess is right "
-        f"{100 * (found.get('chance') or 0):.0f} % of the time.{note}{captured_sampled(found)}",
+        f"{100 * (found.get('chance') or 0):.0f} % of the time.{note}{sample_sentence(found)}",
         layout={
             "xaxis": {"type": "category", "tickangle": -50, "automargin": True},
             "yaxis": {"type": "category", "autorange": "reversed", "automargin": True},
