@@ -65,7 +65,7 @@ def starts_of(track: Sequence[Waypoint], laps: int) -> Starts:
     places = (
         corners[waypoints] - (distances / np.maximum(lengths[waypoints], 1e-9))[:, None] * ways[waypoints]
     )
-    # A character that starts at its waypoint faces the next one. One that starts before it faces it.
+    # A character faces the waypoint where its lap begins, or the next one if it starts there.
     facing = ways[np.where(distances > 0, waypoints, (waypoints + 1) % count)]
     return Starts(places, facing, waypoints)
 
