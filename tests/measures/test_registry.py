@@ -12,7 +12,7 @@ from hobble.core.section import Positive, Section
 from hobble.evaluation.options import joined_sections
 from hobble.measures.joints import JointOptions
 from hobble.measures.measure import INPUTS, Measure
-from hobble.measures.registry import MEASURES, measure, modules, of_channels
+from hobble.measures.registry import MEASURES, channel_measures, measure, part_modules
 
 NAMES = [one.name for one in MEASURES]
 # Part -> its functions and what they are given.
@@ -53,13 +53,13 @@ def test_each_measurement_has_known_inputs_and_the_called_functions(one: Measure
 
 def test_measurements_of_channels_are_listed() -> None:
     brought = [one.name for one in MEASURES if one.package.startswith("hobble.channels.")]
-    assert brought == ["injury", "limp", "recognition"] == [one.name for one in of_channels()]
+    assert brought == ["injury", "limp", "recognition"] == [one.name for one in channel_measures()]
 
 
 def test_names_of_measurements_are_unique() -> None:
     assert len(set(NAMES)) == len(NAMES)
     assert not set(NAMES) & set(INPUTS)
-    assert len(modules("run")) == len(NAMES)
+    assert len(part_modules("run")) == len(NAMES)
 
 
 def test_the_registry_imports_nothing_slow() -> None:

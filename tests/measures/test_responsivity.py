@@ -15,7 +15,7 @@ from hobble.evaluation.csv_tables import write_csv
 from hobble.measures.inputs import MeasureInputs
 from hobble.measures.responsivity import Options, pieces, times
 from hobble.measures.responsivity import run as module
-from hobble.measures.responsivity.laps import held_back, starts_of, walk_laps
+from hobble.measures.responsivity.laps import starts_of, turn_was_limited, walk_laps
 from hobble.measures.responsivity.run import lap_rows, parameter_counts, responsivity
 from hobble.runtime.controller import STEPS
 from hobble.runtime.options import Runtime
@@ -60,9 +60,9 @@ def test_only_turns_that_were_limited_count_as_held_back() -> None:
     taken = rng.normal(size=(5, 4, 4))
     taken /= np.linalg.norm(taken, axis=-1, keepdims=True)
     predicted = -taken  # the same rotations
-    assert not held_back(predicted, taken).any()
+    assert not turn_was_limited(predicted, taken).any()
     predicted[2, 1] = predicted[2, 2]
-    assert held_back(predicted, taken).tolist() == [False, False, True, False, False]
+    assert turn_was_limited(predicted, taken).tolist() == [False, False, True, False, False]
 
 
 def test_the_turns_of_a_steady_figure_are_not_limited(steady) -> None:

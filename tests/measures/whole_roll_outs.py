@@ -34,5 +34,5 @@ def clip_roll_outs(
 
     No roll-out begins at the first frame of a stretch, because the root's movement before it is unknown.
     """
-    groups = module._groups(LoadedPart(rows, 0, len(rows)), predictor.network.layout, lengths)
-    return module._errors(predictor, [groups], joints, lengths)[0]
+    groups = module._roll_out_groups(LoadedPart(rows, 0, len(rows)), predictor.network.layout, lengths)
+    return module._errors_of_parts(predictor, [groups], joints, lengths)[0]

@@ -1,4 +1,4 @@
-"""The list of measurements, in the order in which they run and are shown."""
+"""The list of all measurements. See `hobble.measures.measure` for what a measurement is."""
 
 from __future__ import annotations
 
@@ -11,8 +11,8 @@ from hobble.measures import accuracy, manners, responsivity, rollouts
 from hobble.measures.measure import Measure
 
 
-def of_channels() -> Iterator[Measure]:
-    """The measurements of each channel that has a module `measures`."""
+def channel_measures() -> Iterator[Measure]:
+    """The measurements that channels add: those listed in `hobble.channels.<name>.measures`, if it exists."""
     for name in channels.NAMES:
         module = f"hobble.channels.{name}.measures"
         if importlib.util.find_spec(module) is not None:
@@ -24,15 +24,18 @@ MEASURES: tuple[Measure, ...] = (
     rollouts.MEASURE,
     responsivity.MEASURE,
     manners.MEASURE,
-    *of_channels(),
+    *channel_measures(),
 )
 
 
 def measure(name: str) -> Measure:
-    """The measurement `name`."""
-    return next(one for one in MEASURES if one.name == name)
+    """The measurement with this name. Raises StopIteration if there is none."""
+    return next(entry for entry in MEASURES if entry.name == name)
 
 
-def modules(part: str) -> list[str]:
-    """Full name of the module `part`, such as `page`, of each measurement that has it."""
-    return [one.module(part) for one in MEASURES if one.has(part)]
+def part_modules(part: str) -> list[str]:
+    """Full names of the modules called `part` in the packages of measurements.
+
+    For "page" they include "hobble.measures.accuracy.page". A package without such a module is left out.
+    """
+    return [entry.module(part) for entry in MEASURES if entry.has(part)]

@@ -9,10 +9,11 @@ SPLITS: tuple[Split, Split] = ("train", "held_out")
 
 
 class SampleSize(TypedDict):
-    """The size of a sample of excerpts of clips, drawn by `hobble.measures.stratified_sample`.
+    """The size of a sample, drawn by `hobble.measures.stratified_sample`. It consists of excerpts of clips.
 
-    excerpts: number of excerpts in the sample. of_excerpts: number of excerpts in all. clips: number of clips
-    with an excerpt in the sample. of: number of clips in all. strata: number of strata.
+    excerpts: number of excerpts in the sample. of_excerpts: number of excerpts of all clips. clips: number of
+    clips with an excerpt in the sample. of: number of all clips. strata: number of groups of similar excerpts
+    from which the sample was drawn.
     """
 
     excerpts: int

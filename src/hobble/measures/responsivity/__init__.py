@@ -1,4 +1,8 @@
-"""Measures laps of a waypoint track in each phase mode: milliseconds a frame, distance from the track."""
+"""Measures laps of a waypoint track: the time of a frame, and how closely the character follows the track.
+
+The laps are repeated in each phase mode. A phase mode is a way to evaluate the network, such as cubic
+interpolation over the phase.
+"""
 
 from __future__ import annotations
 
@@ -15,7 +19,7 @@ from hobble.runtime.options import Runtime
 class Options(Section):
     """The keys of this measurement in a configuration's section `evaluation`."""
 
-    laps: Positive = Field(19, description="laps in the phase mode of the runtime")
+    laps: Positive = Field(19, description="laps in the phase mode of the section `runtime`")
     laps_other_modes: Positive = Field(
         3, description="at most this many laps in each other phase mode; a small number saves time"
     )
@@ -24,12 +28,15 @@ class Options(Section):
     )
     modes: tuple[PhaseMode, ...] = Field(
         ("constant", "linear", "cubic"),
-        description="phase modes to measure in addition to that of the runtime",
+        description="phase modes to measure in addition to the one in the section `runtime`",
     )
 
 
 def pieces(options: Options, runtime: Runtime, modes: Sequence[str]) -> tuple[str, ...]:
-    """The phase modes in which laps are measured, a piece for each. modes: all phase modes of the network."""
+    """The names of this measurement's pieces. Each piece is the laps in one phase mode, named after the mode.
+
+    modes: all phase modes of the network. If there is only one, it is the only piece.
+    """
     return tuple(dict.fromkeys((*options.modes, runtime.mode))) if len(modes) > 1 else tuple(modes)
 
 

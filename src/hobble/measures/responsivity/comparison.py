@@ -1,4 +1,4 @@
-"""Frame times and network sizes of configurations side by side, with straight lines of time over size."""
+"""Compares the frame times and network sizes of configurations, and fits straight lines of time over size."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ from hobble.evaluation.series import StraightLine, fit_line
 from hobble.measures.inputs import Json, Row
 
 NAME = "responsivity"
-# The timed steps of a frame, then all of them together.
+# The timed steps of a frame, and "total", the whole frame.
 STEPS = ("prepare", "input", "insert", "predict", "output", "update", "total")
 # Three ways to count the weights and biases that one frame uses, explained at `parameter_counts` in
 # hobble.measures.responsivity.run. compare.json calls such a count "computations".
@@ -41,10 +41,10 @@ class Sizes(TypedDict):
 
 
 class TimeLine(StraightLine):
-    """A straight line fitted to milliseconds `y` over computations `x`. The slope is None if the fit fails.
+    """A straight line fitted to times `y` (ms) over counts of computations `x`, one point per configuration.
 
-    whose: whose times, "hobble" or "published". mode: phase mode; None for published times. step,
-    computations: which times and which counts, see `fits`.
+    slope, intercept and r2 are None if all x are equal. whose: whose times, "hobble" or "published". mode:
+    phase mode; None for published times. step, computations: which times and which counts, see `fit_lines`.
     """
 
     whose: str
@@ -57,30 +57,30 @@ class TimeLine(StraightLine):
 
 def compared(all_measured: Sequence[ConfigurationResults], published: Json) -> SideBySide:
     """The laps of the track in each phase mode, the networks' sizes, and published sizes and times."""
-    about = {m.name: _sizes(m) for m in all_measured}
+    sizes = {m.name: _sizes(m) for m in all_measured}
     return SideBySide(
-        entries=[entry for m in all_measured for entry in by_mode(m)],
-        about=about,
-        against_published=_published_sizes(about, published),
+        entries=[entry for m in all_measured for entry in mode_entries(m)],
+        about=sizes,
+        against_published=_published_sizes(sizes, published),
         milliseconds={
             "difference": time_differences(all_measured),
-            "fit": fits(all_measured, published),
+            "fit": fit_lines(all_measured, published),
             "against_published": _published_times(all_measured, published),
         },
     )
 
 
 def tables(compared: Json) -> dict[str, Sequence[Row]]:
-    """Two tables: every lap, and the lines of time over size."""
+    """Two tables: every lap; the lines of time over size, without their points."""
     fit = compared["milliseconds"]["fit"]
     return {
-        NAME: [lap for entry in compared[NAME] for lap in _laps(entry)],
+        NAME: [lap for entry in compared[NAME] for lap in _lap_rows(entry)],
         "fit": [{k: v for k, v in row.items() if k not in ("x", "y")} for row in fit],
     }
 
 
-def by_mode(measured: ConfigurationResults) -> list[Json]:
-    """The results of each phase mode that was run, each with the name of the configuration."""
+def mode_entries(measured: ConfigurationResults) -> list[Json]:
+    """A configuration's results in each phase mode that was run. The key `configuration` has its name."""
     found = measured.found(NAME)
     return [{**entry, "configuration": measured.name} for entry in found.get("modes", [found])]
 
@@ -96,38 +96,37 @@ def _sizes(measured: ConfigurationResults) -> Sizes:
 
 
 def time_differences(all_measured: Sequence[ConfigurationResults]) -> list[DifferenceOf]:
-    """How much the frame times of each two configurations differ, in the modes that both have.
+    """How much the frame times of any two configurations differ, in each phase mode that both have run.
 
-    The difference is that of eq. 3.2 of Segerstedt (2021).
+    The difference is computed by eq. 3.2 of Segerstedt (2021), see `pair`.
     """
     out: list[DifferenceOf] = []
     for a, b in combinations(all_measured, 2):
-        theirs = {entry["mode"]: entry for entry in by_mode(b)}
-        for entry in by_mode(a):
-            if entry["mode"] in theirs:
+        entries_of_b = {entry["mode"]: entry for entry in mode_entries(b)}
+        for entry in mode_entries(a):
+            if entry["mode"] in entries_of_b:
                 times = [
                     {
                         "mean": e["milliseconds"]["total"],
                         "sd": e["milliseconds"]["spread"]["sd"],
                         "means": lap_means(e),
                     }
-                    for e in (entry, theirs[entry["mode"]])
+                    for e in (entry, entries_of_b[entry["mode"]])
                 ]
                 out.append({"a": a.name, "b": b.name, "over": entry["mode"], **compare_series(*times)})
     return out
 
 
-def fits(all_measured: Sequence[ConfigurationResults], published: Json) -> list[TimeLine]:
+def fit_lines(all_measured: Sequence[ConfigurationResults], published: Json) -> list[TimeLine]:
     """Straight lines of milliseconds per frame over computations, for our times and for the published times.
 
-    computations: one of COUNTS. step: which time. "total" is the mean time of a whole frame, as published;
-    "predict" is the mean time of the step `predict`; "median" is the median time of a whole frame, which
-    other programs on the machine change least. slope: milliseconds per computation. Each configuration is a
-    point of its own, even if it uses the same network as another, or one of the same size. A network without
-    layers is left out.
+    computations: one of COUNTS. step: which time is fitted. "total" is the mean time of a whole frame; the
+    published times are such means. "predict" is the mean time of the step `predict`. "median" is the median
+    time of a whole frame; other programs on the machine change it least. slope: milliseconds per computation.
+    Configurations with the same network are separate points. Networks without layers are left out.
     """
     out = []
-    entries = [(m, entry) for m in all_measured if m.found(NAME)["parameters"] for entry in by_mode(m)]
+    entries = [(m, entry) for m in all_measured if m.found(NAME)["parameters"] for entry in mode_entries(m)]
     modes = list(dict.fromkeys(entry["mode"] for _, entry in entries))
     for counts in COUNTS:
         for mode in modes:
@@ -150,10 +149,12 @@ def fits(all_measured: Sequence[ConfigurationResults], published: Json) -> list[
 
 
 def _time(milliseconds: Json, step: str) -> float:
+    """The time of a `step` of `fit_lines`, ms. milliseconds: the entry of that name in responsivity.json."""
     return (milliseconds["spread"] if step == "median" else milliseconds)[step]
 
 
 def _fit(whose: str, mode: str | None, step: str, counts: str, points: list[tuple[int, float]]) -> TimeLine:
+    """The line through `points`: (computations, ms) of each configuration. For the rest see `TimeLine`."""
     unfitted: StraightLine = {"slope": None, "intercept": None, "r2": None, "points": len(points)}
     fitted = fit_line([x for x, _ in points], [y for _, y in points])
     return {
@@ -172,45 +173,52 @@ def lap_means(entry: Json) -> list[float]:
     return [lap["milliseconds"]["total"] for lap in entry["laps"]]
 
 
-def _published_sizes(about: Mapping[str, Sizes], published: Json) -> list[PublishedRow]:
+def _published_sizes(sizes_of: Mapping[str, Sizes], published: Json) -> list[PublishedRow]:
+    """Published sizes of networks next to ours. sizes_of: configuration -> sizes of its network."""
     out = []
     for row in published["computations"]:
-        sizes = about.get(row["configuration"])
+        sizes = sizes_of.get(row["configuration"])
         counts = sizes["computations"] if sizes else {}
         in_table = {**row, "table": "6.1"}
         out.append(
-            published_row("computations of Table 6.1", in_table, row["table_6_1"], counts.get(COUNTS[2]))
+            published_row(
+                "computations of Table 6.1", in_table, row["table_6_1"], counts.get("table_6_1_as_printed")
+            )
         )
         out.append(published_row("parameters of a phase", row, row["parameters"], counts.get("true")))
     for row in published["stages"]:
         if row["stage"] == "training" and "bytes" in row:
-            sizes = about.get(row["configuration"])
+            sizes = sizes_of.get(row["configuration"])
+            # The published weights are those of the constant mode, which stores the weights of 50 phases.
             ours = sizes["weights_bytes"].get("constant") if sizes else None
             out.append(published_row("weights of 50 phases", row, row["bytes"], ours, "bytes"))
     return out
 
 
 def _published_times(all_measured: Sequence[ConfigurationResults], published: Json) -> list[PublishedRow]:
+    """Published times next to ours: of a frame, and of a prediction in each phase mode."""
     by_name = {m.name: m for m in all_measured}
     out = []
     for row in published["responsivity"]:
-        m = by_name.get(row["configuration"])
-        ours = m.found(NAME)["milliseconds"]["total"] if m else None
+        measured = by_name.get(row["configuration"])
+        ours = measured.found(NAME)["milliseconds"]["total"] if measured else None
         out.append(published_row("a frame", row, row["milliseconds"], ours, "ms"))
         if "sd" in row:
             in_text = {**row, "table": None}  # the standard deviation is only in the text of the thesis
-            means = lap_means(m.found(NAME)) if m else []
+            means = lap_means(measured.found(NAME)) if measured else []
             sd = float(np.std(means)) if len(means) > 1 else None
             out.append(published_row("standard deviation of the means of laps", in_text, row["sd"], sd, "ms"))
     for row in published["modes"]:
-        m = by_name.get(row["configuration"])
-        times = {e["mode"]: e["milliseconds"]["predict"] for e in by_mode(m)} if m else {}
+        measured = by_name.get(row["configuration"])
+        entries = mode_entries(measured) if measured else []
+        times = {entry["mode"]: entry["milliseconds"]["predict"] for entry in entries}
         what = f"a prediction, {row['mode']}"
         out.append(published_row(what, row, row["milliseconds"], times.get(row["mode"]), "ms"))
     return out
 
 
-def _laps(entry: Json) -> list[Row]:
+def _lap_rows(entry: Json) -> list[Row]:
+    """A row for each lap in one phase mode. entry: from `mode_entries`."""
     head = {"configuration": entry["configuration"], "mode": entry["mode"]}
     rows: list[Row] = []
     for lap in entry["laps"]:

@@ -1,4 +1,4 @@
-"""The time of a frame in several configurations."""
+"""What the page of a comparison shows of frame times, network sizes and laps of the track."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ def section(compared: Compared) -> PageSection:
 
 
 def columns(compared: Compared) -> Iterator[OverviewColumn]:
-    """Median time per frame (in the exact phase mode if it was run), and the size of the network."""
+    """Median time per frame (in the exact phase mode if it was run), and two sizes of the network."""
     exact = in_exact_mode(compared)
     frames = {name: entry["milliseconds"]["spread"]["median"] for name, entry in exact.items()}
     yield OverviewColumn(30, Column.number("ms per frame, median"), frames)
@@ -68,21 +68,26 @@ def verdicts(compared: Compared) -> Iterator[Verdict]:
 
 
 def in_exact_mode(compared: Compared) -> dict[str, Any]:
-    """Configuration -> its laps in the exact phase mode, or in the only mode that was run."""
+    """Configuration -> its results in the exact phase mode, or in another one if the exact mode was not run.
+
+    The exact mode evaluates the network without approximation.
+    """
     exact = {entry["configuration"]: entry["exact"] for entry in compared["configurations"]}
-    # In this order, the exact mode of a configuration replaces its other modes in the mapping below.
+    # The exact mode of a configuration comes last, so that it replaces the other modes in `by_name`.
     ordered = sorted(compared["responsivity"], key=lambda e: e["mode"] == exact[e["configuration"]])
     by_name = {entry["configuration"]: entry for entry in ordered}
     return {name: by_name[name] for name in names(compared) if name in by_name}
 
 
 def _bytes(compared: Compared) -> dict[str, float]:
+    """Configuration -> bytes of its network's weights in memory, in the exact phase mode."""
     return {e["configuration"]: e["weights_bytes"][e["exact"]] for e in compared["configurations"]}
 
 
 def lap_lines(compared: Compared) -> Chart | None:
     """Milliseconds per frame, lap by lap, for each phase mode."""
     options: dict[str, list[Trace]] = {}
+    # The cubic mode comes first, because the chart begins with the first option.
     for entry in sorted(compared["responsivity"], key=lambda entry: entry["mode"] != "cubic"):
         laps = [lap for lap in entry["laps"] if isinstance(lap.get("milliseconds"), dict)]
         x, y = [lap["lap"] for lap in laps], [lap["milliseconds"]["spread"]["median"] for lap in laps]
@@ -94,10 +99,12 @@ def lap_lines(compared: Compared) -> Chart | None:
     for traces in options.values():
         for row in compared["published"]["responsivity"]:
             if row["configuration"] in names(compared):
-                end = max((max(t["x"], default=1) for t in traces), default=1)
+                last_lap = max((max(t["x"], default=1) for t in traces), default=1)
                 colour = colours(compared)[row["configuration"]]
                 label = f"{row['label']}: published mean"
-                traces.append(line(label, [1, end], [row["milliseconds"]] * 2, colour, dash="dot", width=1.2))
+                traces.append(
+                    line(label, [1, last_lap], [row["milliseconds"]] * 2, colour, dash="dot", width=1.2)
+                )
     return Chart(
         "compare-laps",
         "Milliseconds per frame, lap by lap",
@@ -111,16 +118,17 @@ def lap_lines(compared: Compared) -> Chart | None:
 
 def fit_chart(compared: Compared) -> Chart | None:
     """Frame time over the number of parameters: our times and the published ones, each with a fitted line."""
-    shown = [
-        f
-        for f in compared["milliseconds"]["fit"]
-        if f["computations"] == "true"
-        and f["step"] == ("median" if f["whose"] == "hobble" else "total")
-        and f["mode"] in (None, "cubic")
-        and f["x"]
+    # At most two fits: our medians in the cubic mode, and the published means, which have no mode.
+    shown_fits = [
+        fit
+        for fit in compared["milliseconds"]["fit"]
+        if fit["computations"] == "true"
+        and fit["step"] == ("median" if fit["whose"] == "hobble" else "total")
+        and fit["mode"] in (None, "cubic")
+        and fit["x"]
     ]
     traces: list[Trace] = []
-    for fit, colour in zip(shown, ("@accent", "@g2"), strict=False):
+    for fit, colour in zip(shown_fits, ("@accent", "@g2"), strict=False):
         label = "ours (medians, cubic phase)" if fit["whose"] == "hobble" else "published (means)"
         traces.append(dots(label, fit["x"], fit["y"], colour, "%{x:,} parameters: %{y:.3f} ms"))
         if fit["slope"] is not None:
@@ -134,7 +142,7 @@ def fit_chart(compared: Compared) -> Chart | None:
         "yaxis": axis("ms per frame", rangemode="tozero"),
     }
     caption = (
-        "Where the dots lie on a straight line, the time of a frame is a constant plus a time proportional "
-        "to the number of parameters."
+        "If the dots lie on a straight line, the time of a frame is a constant plus a time proportional to "
+        "the number of parameters."
     )
     return Chart("compare-fit", "Frame time over network size", caption, traces, layout, 340)

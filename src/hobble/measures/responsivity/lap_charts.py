@@ -8,7 +8,7 @@ from hobble.measures.inputs import Json
 from hobble.report.charts import Chart, Trace, axis, line, mark
 from hobble.report.gather import ReportMaterial
 
-# The steps of a frame in order, with their colours.
+# The steps of a frame, in order -> their colours. `hobble.runtime.controller` says what each step does.
 STEPS = {
     "prepare": "@g0",
     "input": "@g3",
@@ -22,18 +22,18 @@ OFF_TRACK = 100.0  # cm from the line between two waypoints; places farther away
 
 
 def lap_steps(lap: dict[str, Any]) -> dict[str, float]:
-    """Milliseconds per frame of each step in one lap, without the total.
+    """Step of a frame -> its mean milliseconds per frame in one lap.
 
-    If the lap has only one number, the time of a whole frame, its key is "frame".
+    If the lap only has the time of a whole frame, the key is "frame".
     """
-    value = lap.get("milliseconds")
-    if isinstance(value, dict):
-        return {k: v for k, v in value.items() if k not in ("total", "sd") and isinstance(v, (int, float))}
-    return {"frame": value} if isinstance(value, (int, float)) else {}
+    times = lap.get("milliseconds")
+    if isinstance(times, dict):
+        return {k: v for k, v in times.items() if k not in ("total", "sd") and isinstance(v, (int, float))}
+    return {"frame": times} if isinstance(times, (int, float)) else {}
 
 
-def step_place(step: str) -> int:
-    """A key to sort the steps of a frame: by their order in STEPS, then unknown steps."""
+def step_order(step: str) -> int:
+    """A sort key: steps of a frame have the order of STEPS, and unknown steps come last."""
     return list(STEPS).index(step) if step in STEPS else len(STEPS)
 
 
@@ -46,18 +46,19 @@ def lap_chart(found: Json, material: ReportMaterial) -> Chart | None:
             options[f"{entry.get('mode', 'the')} phase"] = traces
     if not options:
         return None
-    own = f"{found.get('mode', 'the')} phase"
-    options = {name: options[name] for name in sorted(options, key=lambda name: name != own)}
+    # The configured phase mode comes first, because the chart begins with the first option.
+    configured = f"{found.get('mode', 'the')} phase"
+    options = {name: options[name] for name in sorted(options, key=lambda name: name != configured)}
     shapes, notes = [], []
-    theirs = material.published_entry("responsivity")
-    if theirs:
-        shape, note = mark(theirs["milliseconds"], f"{theirs['label']}: published mean", vertical=False)
+    published = material.published_entry("responsivity")
+    if published:
+        shape, note = mark(published["milliseconds"], f"{published['label']}: published mean", vertical=False)
         shapes, notes = [shape], [note]
-    counts = [max(len(trace["x"]) for trace in traces) for traces in options.values()]
-    laps = max(counts)
-    fewer = (
-        f" In the other phase modes there are only {min(counts)} laps, to save time."
-        if min(counts) < laps
+    lap_counts = [max(len(trace["x"]) for trace in traces) for traces in options.values()]
+    laps = max(lap_counts)
+    fewer_laps = (
+        f" In the other phase modes there are only {min(lap_counts)} laps, to save time."
+        if min(lap_counts) < laps
         else ""
     )
     return Chart(
@@ -67,8 +68,8 @@ def lap_chart(found: Json, material: ReportMaterial) -> Chart | None:
         "seconds of the lap. Prepare: the target, the path and the ground; input: write the network's input; "
         "insert: standardise it; predict: evaluate the network; output: turn its output into a pose; update: "
         "move on by a frame. A diamond is the median time of a whole frame. If another program delays a few "
-        "frames, the bar becomes higher, but the diamond does not. At 60 Hz, a frame may take 16.7 ms."
-        + fewer,
+        "frames, the bar becomes higher, but the diamond hardly moves. At 60 Hz, a frame may take 16.7 ms."
+        + fewer_laps,
         layout={
             "barmode": "stack",
             "xaxis": axis("lap", dtick=1 if laps < 25 else None),
@@ -82,19 +83,21 @@ def lap_chart(found: Json, material: ReportMaterial) -> Chart | None:
 
 
 def track_chart(found: Json) -> Chart | None:
-    """The track from above, the paths of the laps, and where they left the track."""
+    """The track from above, the stored paths of laps, and the places where they are far from the track."""
     track, runs = found.get("track") or {}, found.get("runs") or []
     if not runs or not track.get("x"):
         return None
     labels = [f"{i}, {gait}" for i, gait in enumerate(track["gaits"])]
-    along = {"x": [*track["x"], track["x"][0]], "z": [*track["z"], track["z"][0]]}
-    traces = [line("track", along["x"], along["z"], "@faint", dash="dash", width=1.2, hoverinfo="skip")]
+    closed_x, closed_z = [*track["x"], track["x"][0]], [*track["z"], track["z"][0]]
+    traces = [line("track", closed_x, closed_z, "@faint", dash="dash", width=1.2, hoverinfo="skip")]
     for run in runs:
         name = "laps" if run is runs[0] else f"lap {run['lap']}"
         shown = {"legendgroup": "runs", "showlegend": run is runs[0]}
         traces.append(line(name, run["x"], run["z"], "@accent", width=1.5, hoverinfo="skip", **shown))
     places = [
-        (x, z, cm, r["lap"]) for r in runs for x, z, cm in zip(r["x"], r["z"], r["off_cm"], strict=True)
+        (x, z, cm, run["lap"])
+        for run in runs
+        for x, z, cm in zip(run["x"], run["z"], run["off_cm"], strict=True)
     ]
     off_track = [place for place in places if place[2] > OFF_TRACK]
     if off_track:
@@ -118,9 +121,9 @@ def track_chart(found: Json) -> Chart | None:
     return Chart(
         "track",
         "The track, and the path of the character",
-        "From above. Dashed lines join the waypoints. Each waypoint has a number and the gait on the way to "
-        "it. It is reached when the character is within a metre. Solid lines are the paths of the first "
-        "laps. "
+        "From above. Dashed lines join the waypoints. The label of a waypoint is its number and the gait on "
+        "the way to it. A waypoint is reached when the character is within a metre of it. Solid lines are "
+        "the paths of the first laps. "
         f"{where}On these laps, the largest distance from the track was {largest:.0f} cm.",
         traces,
         {
@@ -132,7 +135,7 @@ def track_chart(found: Json) -> Chart | None:
 
 
 def _off_track_markers(places: list[tuple[float, float, float, int]]) -> Trace:
-    """Markers where laps left the track. places: x, z, distance in cm and lap of each."""
+    """Markers at places far from the track. places: (x and z in m, distance from the track in cm, lap)."""
     return {
         "type": "scatter",
         "mode": "markers",
@@ -146,6 +149,10 @@ def _off_track_markers(places: list[tuple[float, float, float, int]]) -> Trace:
 
 
 def _lap_bars(entry: dict[str, Any]) -> list[Trace]:
+    """Stacked bars of the steps' mean times in each lap, and diamonds at the medians.
+
+    entry: the results of one phase mode.
+    """
     laps = entry.get("laps")
     laps = [lap for lap in laps if lap_steps(lap)] if isinstance(laps, list) else []
     if not laps:
@@ -160,7 +167,7 @@ def _lap_bars(entry: dict[str, Any]) -> list[Trace]:
             "marker": {"color": STEPS.get(step, "@g0")},
             "hovertemplate": "lap %{x}: %{y:.3f} ms<extra>%{fullData.name}</extra>",
         }
-        for step in sorted(lap_steps(laps[0]), key=step_place)
+        for step in sorted(lap_steps(laps[0]), key=step_order)
     ]
     medians = [lap_median(lap) for lap in laps]
     if all(value is None for value in medians):
@@ -178,6 +185,6 @@ def _lap_bars(entry: dict[str, Any]) -> list[Trace]:
 
 
 def lap_median(lap: dict[str, Any]) -> float | None:
-    """The median milliseconds per frame of a lap, all steps together."""
-    value = lap.get("milliseconds")
-    return (value.get("spread") or {}).get("median") if isinstance(value, dict) else None
+    """Median time of a whole frame in one lap, ms; None if it is not known."""
+    times = lap.get("milliseconds")
+    return (times.get("spread") or {}).get("median") if isinstance(times, dict) else None

@@ -1,9 +1,9 @@
-"""Laps of the waypoint track, walked by a crowd with one character for each lap.
+"""Laps of the waypoint track. Each lap has a character of its own; all characters walk at the same time.
 
 Lap 1 begins and ends at one waypoint, lap 2 at the next, and so on around the track. If there are more laps
 than waypoints, several laps begin at the same waypoint. Their characters start at different distances before
-it, and reach it at different moments of their gait and by slightly different paths. So no two laps are the
-same.
+this waypoint. So they reach it at different moments of their gait and by slightly different paths, and no two
+laps are the same.
 """
 
 from __future__ import annotations
@@ -22,8 +22,8 @@ from hobble.runtime.options import Runtime
 from hobble.runtime.waypoints import Waypoint
 
 FPS = 60
-PATH_STEP = 15  # frames from one stored place of a path to the next
-AT_ONCE = 60  # the rotations of at most this many frames are in memory together
+PATH_STEP = 15  # of a path, the place in every 15th frame is stored
+AT_ONCE = 60  # frames: the rotations of at most this many are in memory at the same time
 RUN_UP = 1000.0  # cm; a character starts at most this far before the waypoint where its lap begins
 
 
@@ -31,8 +31,8 @@ RUN_UP = 1000.0  # cm; a character starts at most this far before the waypoint w
 class Starts:
     """Where the characters of C laps start.
 
-    places: (C, 2) x and z, cm. facing: (C, 2) direction. waypoints: (C,) index of the waypoint where the lap
-    begins.
+    places: (C, 2) x and z, cm. facing: (C, 2) direction in which the character looks. waypoints: (C,) index
+    of the waypoint where the lap begins.
     """
 
     places: Array
@@ -40,7 +40,10 @@ class Starts:
     waypoints: np.ndarray
 
     def begin(self, animation: ProceduralAnimation, laps: slice) -> None:
-        """Put the characters of `animation`, which follow the track, at the starts of some laps."""
+        """Put the characters of `animation` at the starts of the laps in the slice `laps`, one at each.
+
+        The characters must follow the track.
+        """
         animation.reset(self.places[laps], self.facing[laps])
         assert animation.follower is not None
         animation.follower.reached[:] = self.waypoints[laps]
@@ -57,12 +60,12 @@ def starts_of(track: Sequence[Waypoint], laps: int) -> Starts:
     ways = corners - np.roll(corners, 1, axis=0)  # way n leads to waypoint n
     lengths = np.hypot(ways[:, 0], ways[:, 1])
     # Laps that begin at the same waypoint start at evenly spaced distances before it.
-    rounds = -(-laps // count)
+    rounds = -(-laps // count)  # the largest number of laps that begin at one waypoint
     distances = np.arange(laps) // count / rounds * np.minimum(lengths, RUN_UP)[waypoints]
     places = (
         corners[waypoints] - (distances / np.maximum(lengths[waypoints], 1e-9))[:, None] * ways[waypoints]
     )
-    # A character that starts at its waypoint has already reached it, so it faces the next waypoint.
+    # A character faces the waypoint where its lap begins, or the next one if it starts there.
     facing = ways[np.where(distances > 0, waypoints, (waypoints + 1) % count)]
     return Starts(places, facing, waypoints)
 
@@ -70,53 +73,55 @@ def starts_of(track: Sequence[Waypoint], laps: int) -> Starts:
 def walk_laps(
     network: Network, runtime: Runtime, laps: int, longest: int, track: Sequence[Waypoint]
 ) -> list[tuple[LapWalk, LapPath]]:
-    """Walk `laps` laps, at most `longest` frames each. Returns how each lap went, and its path.
+    """Walk `laps` laps of at most `longest` frames. Returns how each lap went, and its path.
 
-    If a character does not reach the waypoint where its lap begins within `longest` frames, the lap is
-    counted from the character's start, with no waypoint reached.
+    If a character does not reach the waypoint where its lap begins within `longest` frames, its lap begins at
+    the character's start, with no waypoint reached.
     """
     starts = starts_of(track, laps)
     animation = ProceduralAnimation(network, characters=laps, waypoints=track, **dict(runtime))
     starts.begin(animation, slice(None))
     recorded = _record(animation, starts.waypoints + 1, longest)
-    return [_lap(recorded, c, int(starts.waypoints[c]) + 1, len(track), longest) for c in range(laps)]
+    return [_measure_lap(recorded, c, int(starts.waypoints[c]) + 1, len(track), longest) for c in range(laps)]
 
 
 @dataclass(frozen=True)
 class _Recorded:
     """F frames of C characters.
 
-    toes: (F, C, 2, 3) positions of the toe joints, cm. contacts: (F, C, 4) of heels and toes with the ground.
-    places: (F, C, 2) x and z of the root, cm. The other fields are (F, C). off: distance from the track, cm.
-    reached: number of waypoints reached so far, counted from waypoint 0 of the track. drawn, predicted: the
-    largest turn of a joint since the frame before, as drawn and as predicted, degrees (0 in the first frame).
-    held: whether the runtime limited the turn of a joint.
+    toes: (F, C, 2, 3) positions of the toe joints, cm. contacts: (F, C, 4) of left heel, left toe, right
+    heel, right toe. places: (F, C, 2) x and z of the root, cm. The other fields are (F, C). off_track:
+    distance from the track, cm. reached: index of the next waypoint; after the last waypoint of the track it
+    goes on rising. drawn_turn, predicted_turn: the largest turn of a joint since the frame before, as drawn
+    and as predicted, degrees (0 in the first frame). limited: whether the runtime limited the turn of any
+    joint.
     """
 
     toes: Array
     contacts: Array
     places: Array
-    off: Array
+    off_track: Array
     reached: np.ndarray
-    drawn: Array
-    predicted: Array
-    held: np.ndarray
+    drawn_turn: Array
+    predicted_turn: Array
+    limited: np.ndarray
 
 
 def _record(animation: ProceduralAnimation, first: np.ndarray, longest: int) -> _Recorded:
     """Walk until the laps of all characters are over.
 
-    first: (C,) value of `reached` at which a lap begins. longest: a lap lasts at most this many frames.
+    first: (C,) value of `reached` with which each lap begins. longest: a lap lasts at most this many frames.
     """
     follower, skeleton, count = animation.follower, animation.skeleton, animation.characters
     assert follower is not None
-    goal = first + len(follower.track)
+    goal = first + len(follower.track)  # value of `reached` at the end of each lap
     toes = [skeleton.role("left_toe"), skeleton.role("right_toe")]
-    kept: list[list[Array]] = [[], [], [], [], []]
+    recorded: list[list[Array]] = [[], [], [], [], []]  # for each value of `now`, the values of all frames
     turns, lap_frames, frames = _Turns(), np.zeros(count, int), 0
     while True:
         begun = follower.reached >= first
         lap_frames[begun] += 1
+        # A lap is over at its goal or after `longest` frames, or if it has not begun after `longest` frames.
         if np.all((follower.reached >= goal) | (lap_frames >= longest) | (~begun & (frames >= longest))):
             break
         pose = animation.next_pose()
@@ -128,108 +133,113 @@ def _record(animation: ProceduralAnimation, first: np.ndarray, longest: int) -> 
             follower.off_path.copy(),
             follower.reached.copy(),
         )
-        for values, value in zip(kept, now, strict=True):
+        for values, value in zip(recorded, now, strict=True):
             values.append(value)
         turns.add(animation, pose.rotations.reshape(count, -1, 4))
         frames += 1
-    of_toes, contacts, places, off, reached = (np.array(values) for values in kept)
-    return _Recorded(of_toes, contacts, places, off, reached.astype(int), *turns.measured())
+    of_toes, contacts, places, off_track, reached = (np.array(values) for values in recorded)
+    return _Recorded(of_toes, contacts, places, off_track, reached.astype(int), *turns.all_measured())
 
 
 class _Turns:
     """The turns of joints from frame to frame, measured whenever AT_ONCE frames have been added.
 
-    A rotation has three stages: predicted by the network, taken over by the runtime, which limits the turn,
-    and drawn after the feet are placed.
+    A joint has three rotations in a frame. The network predicts the first. The runtime limits the turn, which
+    gives the second. It then places the feet, which gives the third, the drawn one.
     """
 
     def __init__(self) -> None:
         self._drawn: list[Array] = []
-        self._taken: list[Array] = []
+        self._limited: list[Array] = []
         self._predicted: list[tuple[Array, Array]] = []
         self._before: tuple[Array, Array] | None = None
-        self._found: list[tuple[Array, Array, np.ndarray]] = []
+        self._measured: list[tuple[Array, Array, np.ndarray]] = []
 
     def add(self, animation: ProceduralAnimation, drawn: Array) -> None:
         """Add the last frame of C characters. drawn: (C, J, 4) rotations of the drawn pose."""
         self._drawn.append(drawn)
-        self._taken.append(animation.state.joint_rotation.copy())
+        self._limited.append(animation.state.joint_rotation.copy())
         self._predicted.append(animation.predicted_turns)
         if len(self._drawn) == AT_ONCE:
             self._measure()
 
-    def measured(self) -> tuple[Array, Array, np.ndarray]:
-        """The fields `drawn`, `predicted` and `held` of `_Recorded`."""
+    def all_measured(self) -> tuple[Array, Array, np.ndarray]:
+        """The fields `drawn_turn`, `predicted_turn` and `limited` of `_Recorded`, for all added frames."""
         if self._drawn:
             self._measure()
-        drawn, predicted, held = (np.concatenate(parts) for parts in zip(*self._found, strict=True))
-        return drawn, predicted, held
+        drawn, predicted, limited = (np.concatenate(parts) for parts in zip(*self._measured, strict=True))
+        return drawn, predicted, limited
 
     def _measure(self) -> None:
+        """Measure the turns of the frames added since the last call, and forget their rotations."""
         drawn = np.array(self._drawn)
         predicted = world_rotations(*(np.array(part) for part in zip(*self._predicted, strict=True)))
         before = self._before or (drawn[0], predicted[0])
-        self._found.append(
+        self._measured.append(
             (
                 turns_between(np.concatenate([before[0][None], drawn])),
                 turns_between(np.concatenate([before[1][None], predicted])),
-                held_back(predicted, np.array(self._taken)),
+                turn_was_limited(predicted, np.array(self._limited)),
             )
         )
         self._before = drawn[-1], predicted[-1]
-        self._drawn, self._taken, self._predicted = [], [], []
+        self._drawn, self._limited, self._predicted = [], [], []
 
 
-def held_back(predicted: Array, taken: Array) -> np.ndarray:
+def turn_was_limited(predicted: Array, limited: Array) -> np.ndarray:
     """(...) whether the runtime limited the turn of any joint.
 
-    predicted, taken: (..., J, 4) quaternions before and after the limit.
+    predicted, limited: (..., J, 4) quaternions before and after the runtime limits turns.
     """
-    same = np.abs(np.sum(predicted * taken, axis=-1)) > 1 - 1e-6
+    # The dot product of two unit quaternions is 1 or -1 if they are the same rotation.
+    same = np.abs(np.sum(predicted * limited, axis=-1)) > 1 - 1e-6
     return np.asarray((~same).any(axis=-1))
 
 
-def _lap(recorded: _Recorded, c: int, first: int, waypoints: int, longest: int) -> tuple[LapWalk, LapPath]:
-    """How lap c + 1 went, and its path.
+def _measure_lap(
+    recorded: _Recorded, c: int, first: int, waypoints: int, longest: int
+) -> tuple[LapWalk, LapPath]:
+    """How the lap of character c went, and its path.
 
-    first: the value of `reached` at which the lap begins. waypoints: number of waypoints of the track.
+    first: the value of `reached` with which the lap begins. waypoints: number of waypoints of the track.
     longest: the lap lasts at most this many frames.
     """
     reached = recorded.reached[:, c]
     begin = int(np.searchsorted(reached, first))
-    begin = 0 if begin == len(reached) else begin
+    begin = 0 if begin == len(reached) else begin  # 0: the character never reached the lap's first waypoint
     end = min(int(np.searchsorted(reached, first + waypoints)) + 1, begin + longest, len(reached))
-    span, inside = slice(begin, end), slice(begin + 1, end)
-    slide = foot_slide(recorded.toes[span, c], recorded.contacts[span, c])
-    off, count = recorded.off[span, c], max(0, int(reached[end - 1]) - first)
+    # `turned` leaves out the lap's first frame, because its turn is since the frame before the lap.
+    span, turned = slice(begin, end), slice(begin + 1, end)
+    slides = foot_slide(recorded.toes[span, c], recorded.contacts[span, c])
+    off_track, reached_in_lap = recorded.off_track[span, c], max(0, int(reached[end - 1]) - first)
     lap: LapWalk = {
         "lap": c + 1,
-        "finished": count == waypoints,
+        "finished": reached_in_lap == waypoints,
         "frames": end - begin,
         "seconds": round((end - begin) / FPS, 3),
-        "waypoints_reached": count,
-        "path_overshoot_cm": round(float(np.max(off)), 3),
-        "path_distance_cm": round(float(np.mean(off)), 3),
-        "foot_slide_cm": round(float(slide.mean()), 4) if len(slide) else None,
-        "steps": len(slide),
-        "largest_turn_degrees": round(float(recorded.drawn[inside, c].max(initial=0.0)), 3),
-        "predicted_turn_degrees": round(float(recorded.predicted[inside, c].max(initial=0.0)), 3),
-        "turns_held_back": int(recorded.held[span, c].sum()),
+        "waypoints_reached": reached_in_lap,
+        "path_overshoot_cm": round(float(np.max(off_track)), 3),
+        "path_distance_cm": round(float(np.mean(off_track)), 3),
+        "foot_slide_cm": round(float(slides.mean()), 4) if len(slides) else None,
+        "steps": len(slides),
+        "largest_turn_degrees": round(float(recorded.drawn_turn[turned, c].max(initial=0.0)), 3),
+        "predicted_turn_degrees": round(float(recorded.predicted_turn[turned, c].max(initial=0.0)), 3),
+        "turns_held_back": int(recorded.limited[span, c].sum()),
     }
-    return lap, _path(c + 1, recorded.places[span, c], off)
+    return lap, _path(c + 1, recorded.places[span, c], off_track)
 
 
-def _path(number: int, places: Array, off: Array) -> LapPath:
-    """The path of a lap, of which one place in PATH_STEP frames is stored.
+def _path(lap: int, places: Array, off_track: Array) -> LapPath:
+    """The path of a lap. The place in every PATH_STEP-th frame is stored.
 
-    places: (F, 2), cm. off: (F,) distance from the line between waypoints, cm. Each stored place has the
-    largest distance since the stored place before it.
+    lap: its number. places: (F, 2) x and z, cm. off_track: (F,) distance from the track, cm. Each stored
+    place has the largest distance since the stored place before it.
     """
-    kept = range(0, len(places), PATH_STEP)
+    stored = range(0, len(places), PATH_STEP)
     return {
-        "lap": number,
+        "lap": lap,
         "seconds_between": PATH_STEP / FPS,
-        "x": np.round(places[kept, 0] / 100, 2).tolist(),
-        "z": np.round(places[kept, 1] / 100, 2).tolist(),
-        "off_cm": [round(float(off[max(0, f - PATH_STEP + 1) : f + 1].max()), 1) for f in kept],
+        "x": np.round(places[stored, 0] / 100, 2).tolist(),
+        "z": np.round(places[stored, 1] / 100, 2).tolist(),
+        "off_cm": [round(float(off_track[max(0, f - PATH_STEP + 1) : f + 1].max()), 1) for f in stored],
     }

@@ -1,4 +1,4 @@
-"""The time of a frame at run time, and how closely the character follows the track."""
+"""What the report shows of the laps: the time of a frame, and how closely the character follows the track."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from hobble.measures.responsivity.lap_charts import (
     lap_chart,
     lap_median,
     lap_steps,
-    step_place,
+    step_order,
     track_chart,
 )
 from hobble.report.formats import number
@@ -25,7 +25,8 @@ from hobble.report.tables import Column, Table
 from hobble.runtime.network_rows import FASTEST_TURN
 
 FEWEST_STEPS = 10  # if the character takes fewer steps, the mean foot slide is not shown
-FRAME_BUDGET_MS = 1000 / 60
+FRAME_BUDGET_MS = 1000 / 60  # the time that a frame may take at 60 Hz
+FLIP_DEGREES = 60  # if a joint turns by more than this in one frame, it flips visibly
 # Columns of the table of laps, by the keys of `LapWalk` in hobble.measures.responsivity.results.
 LAP_COLUMNS = {
     "lap": Column.count("lap"),
@@ -45,16 +46,16 @@ TRACK = "The character is steered around a track of six waypoints: it walks, sid
 
 
 def section(found: Json, material: ReportMaterial) -> PageSection:
-    """The track, the times of the laps, and the published times."""
-    followed = track_figures(found)
+    """The track, the times of the laps, the published times, and a table of the laps."""
+    figures_of_track = track_figures(found)
     return PageSection(
         "speed",
         [
-            SectionPart(0, Paragraph(TRACK) if followed else None),
-            SectionPart(10, KeyFigures(followed) if followed else None),
+            SectionPart(0, Paragraph(TRACK) if figures_of_track else None),
+            SectionPart(10, KeyFigures(figures_of_track) if figures_of_track else None),
             SectionPart(15, track_chart(found)),
             SectionPart(20, lap_chart(found, material)),
-            SectionPart(30, speed_published(found, material), open=True, short=True),
+            SectionPart(30, speed_table(found, material), open=True, short=True),
             SectionPart(60, lap_table(found, material.name)),
         ],
         title="Steering and time per frame",
@@ -67,17 +68,17 @@ def figures(found: Json, material: ReportMaterial) -> Iterator[KeyFigure]:
     """A key figure for the top of the report: the time of a frame."""
     milliseconds = frame_milliseconds(found)
     if milliseconds is not None:
-        theirs = material.published_entry("responsivity")
+        published = material.published_entry("responsivity")
         note = f"median; one core can run {number(FRAME_BUDGET_MS / milliseconds, 3)} characters at 60 Hz"
-        if theirs:
-            note += f"; mean {number(frame_mean(found), 2)} ms, published mean {theirs['milliseconds']} ms"
+        if published:
+            note += f"; mean {number(frame_mean(found), 2)} ms, published mean {published['milliseconds']} ms"
         yield KeyFigure("Time per frame", number(milliseconds, 2), "ms", note, 20)
 
 
 def hints(found: Json, material: ReportMaterial) -> Iterator[Hint]:
     """Whether a frame fits into 1/60 s, and whether the character followed the track."""
-    yield from placed(60, _speed(found))
-    yield from placed(40, _track(found))
+    yield from placed(60, _speed_hints(found))
+    yield from placed(40, _track_hints(found))
 
 
 def lap_table(found: Json, name: str) -> Table | None:
@@ -85,20 +86,23 @@ def lap_table(found: Json, name: str) -> Table | None:
     laps = found.get("laps")
     if not isinstance(laps, list) or not laps:
         return None
-    known = {key: column for key, column in LAP_COLUMNS.items() if key in laps[0]}
-    of_frame = sorted(lap_steps(laps[0]), key=step_place)
-    columns = [*known.values(), *(Column.number(f"{step}, mean ms") for step in of_frame)]
-    columns.append(Column.number("all, median ms"))
+    lap_columns = {key: column for key, column in LAP_COLUMNS.items() if key in laps[0]}
+    frame_steps = sorted(lap_steps(laps[0]), key=step_order)
+    columns = [*lap_columns.values(), *(Column.number(f"{step}, mean ms") for step in frame_steps)]
+    columns.append(Column.number("whole frame, median ms"))
     rows = [
-        [None if key == "foot_slide_cm" and _few(lap.get("steps")) else lap.get(key) for key in known]
-        + [lap_steps(lap).get(step) for step in of_frame]
+        [
+            None if key == "foot_slide_cm" and _too_few_steps(lap.get("steps")) else lap.get(key)
+            for key in lap_columns
+        ]
+        + [lap_steps(lap).get(step) for step in frame_steps]
         + [lap_median(lap)]
         for lap in laps
     ]
     return Table(f"{name}-responsivity", columns, rows)
 
 
-def _few(steps: int | None) -> bool:
+def _too_few_steps(steps: int | None) -> bool:
     """Whether the character took too few steps for a mean foot slide."""
     return steps is not None and steps < FEWEST_STEPS
 
@@ -110,8 +114,8 @@ def track_figures(found: Json) -> list[KeyFigure]:
     spread = (found.get("milliseconds") or {}).get("spread") or {}
     reached = f"{found.get('waypoints_reached')} of {found.get('waypoints')}"
     steps = sum(lap.get("steps") or 0 for lap in found["laps"])
-    slide = None if _few(steps) else found.get("foot_slide_cm")
-    measured = f"mean slide of the toe during a stance, over {steps:,} steps"
+    slide = None if _too_few_steps(steps) else found.get("foot_slide_cm")
+    measured = f"mean slide of a toe during a stance, averaged over the laps ({steps:,} steps)"
     laps = f"{found.get('laps_finished')} of {len(found['laps'])} laps finished"
     return [
         KeyFigure("Waypoints reached", reached, "", laps),
@@ -122,26 +126,26 @@ def track_figures(found: Json) -> list[KeyFigure]:
             "the largest of all laps",
         ),
         KeyFigure("Foot slide", number(slide), "cm" if slide is not None else "", measured),
-        _turn(found),
+        _turn_figure(found),
         KeyFigure("Slow frames", number(spread.get("p99")), "ms", "1 % of the frames are slower"),
     ]
 
 
-def _turn(found: Json) -> KeyFigure:
+def _turn_figure(found: Json) -> KeyFigure:
     """The largest turn of a joint in one frame: as predicted, and as drawn after the runtime's limit."""
     drawn, predicted = (number(found.get(key)) for key in ("largest_turn_degrees", "predicted_turn_degrees"))
-    allowed = f"the runtime limits it to {np.degrees(FASTEST_TURN):.0f}°"
+    limit = f"the runtime limits it to {np.degrees(FASTEST_TURN):.0f}°"
     if found.get("predicted_turn_degrees") is None:
-        return KeyFigure("Largest turn of a joint", drawn, "°", f"in one frame, as drawn; {allowed}")
+        return KeyFigure("Largest turn of a joint", drawn, "°", f"in one frame, as drawn; {limit}")
     frames = sum(lap.get("frames") or 0 for lap in found["laps"])
-    held = f"{found['turns_held_back']:,} of {frames:,} frames"
-    note = f"of a joint in one frame; {allowed}, and did so in {held}"
+    limited_frames = f"{found['turns_held_back']:,} of {frames:,} frames"
+    note = f"of a joint in one frame; {limit}, and did so in {limited_frames}"
     note += f"; as drawn, with the feet placed, at most {drawn}°"
     return KeyFigure("Largest predicted turn", predicted, "°", note)
 
 
-def speed_published(found: Json, material: ReportMaterial) -> Table | None:
-    """A table of milliseconds per frame: ours, followed by the published means."""
+def speed_table(found: Json, material: ReportMaterial) -> Table | None:
+    """A table of milliseconds per frame: our median and mean, followed by the published means."""
     ours = frame_milliseconds(found)
     if ours is None:
         return None
@@ -178,10 +182,10 @@ def speed_published(found: Json, material: ReportMaterial) -> Table | None:
 def frame_milliseconds(found: Json) -> float | None:
     """Median milliseconds of a whole frame over all laps; the mean if there is no median.
 
-    A few slow frames hardly change the median.
+    The median is shown because a few slow frames hardly change it.
     """
-    value = found.get("milliseconds")
-    median = (value.get("spread") or {}).get("median") if isinstance(value, dict) else None
+    times = found.get("milliseconds")
+    median = (times.get("spread") or {}).get("median") if isinstance(times, dict) else None
     return frame_mean(found) if median is None else float(median)
 
 
@@ -193,7 +197,7 @@ def frame_mean(found: Json) -> float | None:
     return float(value) if isinstance(value, (int, float)) else None
 
 
-def _speed(found: Json) -> Iterator[Hint]:
+def _speed_hints(found: Json) -> Iterator[Hint]:
     milliseconds = frame_milliseconds(found)
     if milliseconds is None:
         return
@@ -205,8 +209,8 @@ def _speed(found: Json) -> Iterator[Hint]:
         )
         return
     share = milliseconds / FRAME_BUDGET_MS
-    value = found.get("milliseconds")
-    slow = (value.get("spread") or {}).get("p99") if isinstance(value, dict) else None
+    times = found.get("milliseconds")
+    slow = (times.get("spread") or {}).get("p99") if isinstance(times, dict) else None
     if slow is not None and slow > FRAME_BUDGET_MS:
         yield Hint(
             "warn",
@@ -224,7 +228,7 @@ def _speed(found: Json) -> Iterator[Hint]:
         yield Hint("good", f"A frame takes {100 * share:.1f} % of the 16.7 ms that 60 Hz allows.", "")
 
 
-def _track(found: Json) -> Iterator[Hint]:
+def _track_hints(found: Json) -> Iterator[Hint]:
     reached, total = (found.get(key) for key in ("waypoints_reached", "waypoints"))
     if total and reached is not None and reached < total:
         yield Hint(
@@ -233,15 +237,16 @@ def _track(found: Json) -> Iterator[Hint]:
             "It circles around a waypoint or stops before it. See the laps in the section on steering.",
         )
     drawn, predicted = (found.get(key) for key in ("largest_turn_degrees", "predicted_turn_degrees"))
-    if drawn is not None and drawn > 60:
+    if drawn is not None and drawn > FLIP_DEGREES:
         yield Hint(
             "warn",
             f"A joint turned by {drawn:.0f} degrees in one frame.",
-            "That is a flip, which is visible on a skinned character.",
+            "It flips, which is visible on a skinned character.",
         )
-    elif predicted is not None and predicted > 60:
+    elif predicted is not None and predicted > FLIP_DEGREES:
         yield Hint(
             "note",
             f"The network predicted a turn of a joint by {predicted:.0f} degrees in one frame.",
-            f"The runtime limited it to {drawn:.0f}. Check whether joint rotations flip in the clips.",
+            f"As drawn, no joint turned by more than {drawn:.0f} degrees. Check whether joint rotations flip "
+            "in the clips.",
         )

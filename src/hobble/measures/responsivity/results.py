@@ -10,10 +10,10 @@ from typing import TypedDict
 
 
 class Spread(TypedDict):
-    """Spread of the time of a frame, ms. The time of a frame is the sum of its `Steps`.
+    """Statistics of the time of a frame, ms. The time of a frame is the sum of its `Steps`.
 
     sd, median, p99: standard deviation, median and 99th percentile. whole_call: mean time of a call of
-    `next_pose`, which includes what is done between the steps.
+    `next_pose`, which also does some work outside the steps.
     """
 
     sd: float
@@ -36,8 +36,8 @@ class Steps(TypedDict):
 class Milliseconds(Steps):
     """Mean time of each step, ms.
 
-    total: mean time of a whole frame, ms. sd: standard deviation of the time of each step, ms. spread: of the
-    time of a whole frame.
+    total: mean time of a whole frame, ms. sd: standard deviation of the time of each step, ms. spread:
+    statistics of the time of a whole frame.
     """
 
     total: float
@@ -48,8 +48,9 @@ class Milliseconds(Steps):
 class LapWalk(TypedDict):
     """How one lap of the track went.
 
-    path_overshoot_cm, path_distance_cm: the largest and the mean distance from the line between waypoints.
-    foot_slide_cm: mean slide of a toe in a stance. steps: number of stances. largest_turn_degrees: largest
+    lap: its number, from 1. finished: whether all waypoints were reached. path_overshoot_cm,
+    path_distance_cm: the largest and the mean distance from the line between waypoints. foot_slide_cm: mean
+    slide of a toe in a stance; None without a stance. steps: number of stances. largest_turn_degrees: largest
     turn of a joint in one frame, as drawn. predicted_turn_degrees: largest turn of a joint in one frame, as
     the network predicts it, before the runtime limits turns. turns_held_back: number of frames in which the
     runtime limited a turn.
@@ -70,18 +71,18 @@ class LapWalk(TypedDict):
 
 
 class Lap(LapWalk):
-    """One lap.
+    """How one lap went, and the time of a frame.
 
-    milliseconds: times of a frame. To measure them, one character alone walks the first frames again.
+    milliseconds: measured while one character alone walks the beginning of the lap again.
     """
 
     milliseconds: Milliseconds
 
 
 class LapPath(TypedDict):
-    """The path of a lap, stored every `seconds_between` seconds.
+    """The path of a lap: a place every `seconds_between` seconds.
 
-    x, z: m. off_cm: largest distance from the line between waypoints since the previous stored place.
+    x, z: places, m. off_cm: largest distance from the line between waypoints since the previous stored place.
     """
 
     lap: int
@@ -94,8 +95,10 @@ class LapPath(TypedDict):
 class ModeResults(TypedDict):
     """All laps of one phase mode: a way to evaluate the network, such as cubic interpolation over the phase.
 
-    waypoints: number of waypoints in all laps together. foot_slide_cm: mean over laps. path_overshoot_cm,
-    largest_turn_degrees, predicted_turn_degrees: the largest values of all laps, see `LapWalk`.
+    waypoints: number of waypoints in all laps together. waypoints_reached, turns_held_back: sums over the
+    laps. mean_lap_seconds: mean over the finished laps; None if there are none. foot_slide_cm: mean over the
+    laps. path_overshoot_cm, largest_turn_degrees, predicted_turn_degrees: the largest values of all laps, see
+    `LapWalk`.
     """
 
     mode: str

@@ -1,7 +1,7 @@
 """Laps of the waypoint track: how closely the character follows it, and the time of each step of a frame.
 
-All laps are walked at the same time by a crowd (`laps`). For the times, one character alone walks the
-beginning of each lap again (`times`).
+All laps are walked at the same time, each by its own character (module `laps`). To measure the times, one
+character alone walks the beginning of each lap again (module `times`).
 """
 
 from __future__ import annotations
@@ -40,44 +40,45 @@ def responsivity(
 ) -> Responsivity:
     """Laps of the track of Segerstedt (2021), in the phase mode of `runtime` and in other modes.
 
-    laps: number of laps in the mode of `runtime`. laps_other_modes: number of laps in each other mode; by
-    default, and at most, `laps`. modes: the phase modes to run; by default all modes of the network. done:
-    mode -> what `laps_of_mode` returned for it, if its laps have already been walked. A lap that takes longer
-    than `lap_seconds` of simulated time ends without its remaining waypoints.
+    laps: number of laps in the mode of `runtime`. lap_seconds: simulated time after which a lap ends, even if
+    waypoints remain. laps_other_modes: number of laps in each other mode, at most `laps`; None: `laps`.
+    modes: the phase modes to run in addition to that of `runtime`; by default all modes of the network. done:
+    mode -> what `laps_of_mode` returned for it, if its laps have already been walked.
 
-    The result is described in docs/artefacts.md. Its key `modes` has the laps and the summary of each mode;
-    those of the mode of `runtime` are also at the top level. Only the values under "milliseconds" depend on
-    the clock. `largest_turn_degrees` is the largest turn of a joint from one frame to the next as drawn, and
-    `predicted_turn_degrees` the largest turn as the network predicts it; in `turns_held_back` frames the
-    runtime let a joint turn less than predicted. `runs` are the paths of the first STORED_PATHS laps in the
-    mode of `runtime`.
+    The result is described in docs/artefacts.md. Its key `modes` has the laps and the summary of each mode.
+    The laps and the summary of the mode of `runtime` are also at the top level. Only the values under
+    "milliseconds" depend on the clock. `largest_turn_degrees` is the largest turn of a joint from one frame
+    to the next as drawn, and `predicted_turn_degrees` is the largest turn as the network predicts it. In
+    `turns_held_back` frames, the runtime let a joint turn less than predicted. `runs` are the paths of the
+    first STORED_PATHS laps in the mode of `runtime`.
     """
     own = network.mode(runtime.mode)
-    fewer = min(laps, laps_other_modes or laps)
-    found = dict(done or {})
+    laps_of_others = min(laps, laps_other_modes or laps)
+    of_mode = dict(done or {})
     for mode in dict.fromkeys((*map(network.mode, network.modes if modes is None else modes), own)):
-        if mode not in found:
+        if mode not in of_mode:
             in_mode = runtime.model_copy(update={"mode": mode})
-            found[mode] = laps_of_mode(network, in_mode, laps if mode == own else fewer, lap_seconds, track)
+            count = laps if mode == own else laps_of_others
+            of_mode[mode] = laps_of_mode(network, in_mode, count, lap_seconds, track)
     return {
         "configuration": configuration,
         "track": {
             "waypoints": len(track),
             "metres": round(
-                sum(np.hypot(*(np.subtract(a.position, b.position))) for a, b in _closed(track)) / 100, 3
+                sum(np.hypot(*(np.subtract(a.position, b.position))) for a, b in _segments(track)) / 100, 3
             ),
             "gaits": [waypoint.gait for waypoint in track],
             "x": [waypoint.position[0] / 100 for waypoint in track],
             "z": [waypoint.position[1] / 100 for waypoint in track],
         },
-        "runs": found[own]["runs"],
+        "runs": of_mode[own]["runs"],
         "parameters": parameter_counts(network.sizes) if network.sizes else None,
         "stored": {mode: network.stored(mode) for mode in network.modes},
         "bytes_each": np.dtype(network.storage).itemsize,
         "exact": network.mode(None),
-        "laps_other_modes": fewer,
-        **found[own]["laps"],
-        "modes": [each["laps"] for each in found.values()],
+        "laps_other_modes": laps_of_others,
+        **of_mode[own]["laps"],
+        "modes": [piece["laps"] for piece in of_mode.values()],
     }
 
 
@@ -117,18 +118,18 @@ def parameter_counts(sizes: Sequence[int]) -> dict[str, int]:
     """Number of weights and biases that one frame uses, actual and as Table 6.1 of Segerstedt counts them.
 
     sizes: units of each layer, from inputs to outputs. true: the actual number. table_6_1: by the formula of
-    the table, the sum of n_l (1 + n_(l+1)) over the layers, plus the number of outputs.
-    table_6_1_as_printed: by the same formula without one of the hidden layers, because the text of the thesis
-    states one hidden layer fewer.
+    the table, the sum of n_l (1 + n_(l+1)) over the layers, plus the number of outputs. table_6_1_as_printed:
+    by the same formula without one of the hidden layers, because the text of the thesis states one hidden
+    layer fewer than the network has.
 
     >>> parameter_counts((342, 512, 512, 311))
     {'true': 597815, 'table_6_1': 598157, 'table_6_1_as_printed': 335501}
     """
-    fewer = [sizes[0], *sizes[2:]]
+    without_a_layer = [sizes[0], *sizes[2:]]
     return {
         "true": sum(a * b + b for a, b in pairwise(sizes)),
         "table_6_1": sum(a * (1 + b) for a, b in pairwise(sizes)) + sizes[-1],
-        "table_6_1_as_printed": sum(a * (1 + b) for a, b in pairwise(fewer)) + sizes[-1],
+        "table_6_1_as_printed": sum(a * (1 + b) for a, b in pairwise(without_a_layer)) + sizes[-1],
     }
 
 
@@ -148,7 +149,7 @@ def lap_rows(result: Responsivity) -> list[Row]:
 
 
 def run_piece(inputs: MeasureInputs, options: Options, piece: str) -> PieceResults:
-    """The laps in one phase mode."""
+    """The laps in one phase mode. piece: the name of the mode."""
     laps = options.laps if piece == inputs.runtime.mode else min(options.laps, options.laps_other_modes)
     runtime = inputs.runtime.model_copy(update={"mode": piece})
     return laps_of_mode(load_network(inputs.weights), runtime, laps, options.lap_seconds)
@@ -167,14 +168,18 @@ def run(inputs: MeasureInputs, options: Options) -> Outcome:
         modes=options.modes,
         done=done,
     )
-    says = [f"{m['mode']}: {m['waypoints_reached']} of {m['waypoints']} waypoints" for m in result["modes"]]
-    return Outcome(result, {"laps": lap_rows(result)}, "; ".join(says))
+    reached = [
+        f"{m['mode']}: {m['waypoints_reached']} of {m['waypoints']} waypoints" for m in result["modes"]
+    ]
+    return Outcome(result, {"laps": lap_rows(result)}, "; ".join(reached))
 
 
-def _closed(track: Sequence[Waypoint]) -> list[tuple[Waypoint, Waypoint]]:
+def _segments(track: Sequence[Waypoint]) -> list[tuple[Waypoint, Waypoint]]:
+    """The two ends of each segment of the closed track. The last segment ends at the first waypoint."""
     return list(zip(track, [*track[1:], track[0]], strict=True))
 
 
 def _mean(values: list[float | None]) -> float | None:
+    """The mean of the values that are not None; None if there are none."""
     known = [v for v in values if v is not None]
     return round(float(np.mean(known)), 4) if known else None

@@ -16,7 +16,7 @@ from hobble.runtime.controller import STEPS
 from hobble.runtime.options import Runtime
 from hobble.runtime.waypoints import Waypoint
 
-# At most this many frames are timed: of each lap, and of all laps together.
+# The largest numbers of frames that are timed: in each lap, and in all laps together.
 TIMED_OF_LAP, TIMED_OF_ALL = 10 * FPS, 100 * FPS
 WARM_UP = 60  # the first frames are not measured, because compiled code is loaded in them
 
@@ -24,11 +24,12 @@ WARM_UP = 60  # the first frames are not measured, because compiled code is load
 def timed_frames(
     network: Network, runtime: Runtime, laps: int, longest: int, track: Sequence[Waypoint]
 ) -> list[Array]:
-    """For each lap, (F, steps + 1) seconds of its first F frames: of each step, then of the whole call.
+    """For each lap, (F, steps + 1) seconds: of each step in its first F frames, then of the whole call.
 
-    The characters of `hobble.measures.responsivity.laps.walk_laps` walk one after another, each alone and
-    from its own start. A character alone does the same as in the crowd, to the last bit. F is the least of
-    three numbers: TIMED_OF_LAP, `longest`, and TIMED_OF_ALL divided by the number of laps.
+    The laps begin as in `hobble.measures.responsivity.laps.walk_laps`, but are walked one after another, with
+    one character at a time. A character alone does the same as among others, to the last bit. longest: the
+    largest number of frames of a lap. F is the least of three numbers: TIMED_OF_LAP, `longest`, and
+    TIMED_OF_ALL divided by the number of laps.
     """
     starts = starts_of(track, laps)
     animation = ProceduralAnimation(network, waypoints=track, **dict(runtime))
@@ -49,13 +50,13 @@ def timed_frames(
 
 
 def milliseconds(seconds: Array) -> Milliseconds:
-    """Means, standard deviations and percentiles. seconds: (F, steps + 1), from `timed_frames`."""
+    """Statistics of frame times. seconds: (F, steps + 1), see `timed_frames`."""
     ms = 1000 * seconds
     total = ms[:, : len(STEPS)].sum(axis=1)
     return {
-        **_of_steps(ms.mean(axis=0)),
+        **_named_steps(ms.mean(axis=0)),
         "total": round(float(total.mean()), 6),
-        "sd": _of_steps(ms.std(axis=0)),
+        "sd": _named_steps(ms.std(axis=0)),
         "spread": {
             "sd": round(float(total.std()), 6),
             "median": round(float(np.median(total)), 6),
@@ -65,8 +66,8 @@ def milliseconds(seconds: Array) -> Milliseconds:
     }
 
 
-def _of_steps(values: Array) -> Steps:
-    """The values of the steps by name. values: in the order of STEPS; any after them are ignored."""
+def _named_steps(values: Array) -> Steps:
+    """Step -> its value. values: in the order of STEPS; further values are ignored."""
     prepare, inputs, insert, predict, output, update = (round(float(v), 6) for v in values[: len(STEPS)])
     return {
         "prepare": prepare,

@@ -1,4 +1,4 @@
-"""Errors of roll-outs, in which the network continues from its own poses."""
+"""Measures the errors of roll-outs. In a roll-out, the network continues from its own poses."""
 
 from __future__ import annotations
 
@@ -12,17 +12,17 @@ from hobble.measures.measure import Cost, Measure
 from hobble.measures.sample_options import SampleOptions
 
 
-def _at_least_one(lengths: tuple[int, ...]) -> tuple[int, ...]:
-    """Returns the lengths. Raises ValueError if there are none."""
+def _require_lengths(lengths: tuple[int, ...]) -> tuple[int, ...]:
+    """Returns `lengths`. Raises ValueError if it is empty."""
     if not lengths:
         raise ValueError("must name at least one number of frames")
     return lengths
 
 
 class Options(JointOptions, SampleOptions):
-    """The keys of this measurement in the section `evaluation`."""
+    """The keys of this measurement in a configuration's section `evaluation`."""
 
-    rollouts: Annotated[tuple[Positive, ...], AfterValidator(_at_least_one)] = Field(
+    rollouts: Annotated[tuple[Positive, ...], AfterValidator(_require_lengths)] = Field(
         (1, 10, 60, 300), description="lengths of roll-outs, in frames"
     )
 

@@ -1,4 +1,4 @@
-"""Roll-outs of configurations side by side."""
+"""Compares the errors of several configurations in roll-outs."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ NAME = "rollouts"
 
 
 def compared(all_measured: Sequence[ConfigurationResults], published: Json) -> SideBySide:
-    """An entry for each configuration and each length of roll-outs, without the errors of single clips."""
+    """A list entry for each configuration and length of roll-outs, without the errors of single clips."""
     return SideBySide(
         entries=[
             {"configuration": m.name, **{k: v for k, v in entry.items() if k != "clips"}}

@@ -1,4 +1,4 @@
-"""Roll-outs of several configurations; part of the section on accuracy."""
+"""What the page of a comparison shows of roll-outs. It is a part of the section on accuracy."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from hobble.report.formats import number
 from hobble.report.page_parts import PageSection, SectionPart
 from hobble.report.verdicts import Verdict, best
 
-SECOND = 60  # frames in a second
+FRAMES_PER_SECOND = 60
 
 
 def section(compared: Compared) -> PageSection:
@@ -24,23 +24,24 @@ def verdicts(compared: Compared) -> Iterator[Verdict]:
 
     The held-out clips are compared, or the training clips if there are no errors of held-out clips.
     """
-    length = min({row["length"] for row in compared["rollouts"]}, key=lambda n: abs(n - SECOND), default=None)
+    lengths = {row["length"] for row in compared["rollouts"]}
+    length = min(lengths, key=lambda n: abs(n - FRAMES_PER_SECOND), default=None)
     rows = [row for row in compared["rollouts"] if row["length"] == length]
     for split, label in SPLITS.items():
-        off = {row["configuration"]: (row[split] or {}).get("position_error_cm") for row in rows}
-        if any(value is not None for value in off.values()):
+        errors = {row["configuration"]: (row[split] or {}).get("position_error_cm") for row in rows}
+        if any(value is not None for value in errors.values()):
             ending = f"cm from the captured joints on average, in roll-outs of {length} frames on {label}"
             yield from best(
                 10,
                 "Closest to captured motion",
-                off,
-                partial(_distance, ending),
+                errors,
+                partial(_distance_words, ending),
             )
             return
 
 
-def _distance(ending: str, name: str, value: float) -> str:
-    """Half of a sentence about a configuration. value: mean distance. ending: its unit and the rest."""
+def _distance_words(ending: str, name: str, value: float) -> str:
+    """Half of a sentence: the mean distance `value` of the configuration `name`, followed by `ending`."""
     return f"the joints of {name} are {number(value, 3)} {ending}"
 
 
@@ -63,10 +64,12 @@ def rollout_chart(compared: Compared) -> Chart | None:
     return Chart(
         "compare-rollouts",
         "Error when a network continues from its own poses",
-        "Mean distance between a joint and its captured position in roll-outs, in which a network continues "
-        "from its own poses. Their length is on the horizontal axis (60 frames are one second).",
+        "Mean distance between a joint and its captured position. In a roll-out, a network continues from "
+        "its own poses. The horizontal axis shows the length of the roll-outs (60 frames are one second).",
         layout={
-            "xaxis": log_axis("frames", [x for t in options.values() for one in t for x in one["x"]]),
+            "xaxis": log_axis(
+                "frames", [x for traces in options.values() for trace in traces for x in trace["x"]]
+            ),
             "yaxis": axis("cm per joint", rangemode="tozero"),
         },
         choose="Clips",

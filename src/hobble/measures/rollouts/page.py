@@ -1,4 +1,4 @@
-"""How the error grows when the network continues from its own poses; part of the section on accuracy."""
+"""What the report shows of roll-outs: a chart of their errors. It is a part of the section on accuracy."""
 
 from __future__ import annotations
 
@@ -17,18 +17,18 @@ def section(found: Json, material: ReportMaterial) -> PageSection:
     return PageSection("accuracy", [SectionPart(50, rollout_chart(found))])
 
 
-def sampled(found: Json) -> str:
-    """Sentences on the measured sample and on the error bars; empty if all clips were measured."""
+def sample_note(found: Json) -> str:
+    """Sentences about the measured sample and the error bars; empty if all clips were measured as a whole."""
     words = sample_in_words(found)
     return f" Measured on {words}. Whiskers are 95 % confidence intervals." if words else ""
 
 
-def _whiskers(found: Json, split: str) -> dict[str, Any]:
-    """Error bars of the mean errors: half the width of each confidence interval."""
+def _error_bars(found: Json, split: str) -> dict[str, Any]:
+    """Plotly error bars of the mean errors of a split: half widths of their 95 % confidence intervals."""
     entries = [entry[split] for entry in found["lengths"]]
     known = [entry for entry in entries if entry.get("position_error_cm") is not None]
-    widths = [(entry.get("interval") or {}).get("position_error_cm", 0.0) for entry in known]
-    return {"type": "data", "array": widths, "color": "@faint", "thickness": 1}
+    half_widths = [(entry.get("interval") or {}).get("position_error_cm", 0.0) for entry in known]
+    return {"type": "data", "array": half_widths, "color": "@faint", "thickness": 1}
 
 
 def rollout_chart(found: Json) -> Chart | None:
@@ -42,20 +42,19 @@ def rollout_chart(found: Json) -> Chart | None:
         ]
         if rows:
             x, y = zip(*rows, strict=True)
-            whiskers = {"error_y": _whiskers(found, split)} if found.get("sample") else {}
-            traces.append(line(NAMES[split], x, y, COLOURS[split], mode="lines+markers", **whiskers))
+            error_bars = {"error_y": _error_bars(found, split)} if found.get("sample") else {}
+            traces.append(line(NAMES[split], x, y, COLOURS[split], mode="lines+markers", **error_bars))
     if not traces:
         return None
     return Chart(
         "rollouts",
         "Error when the network continues from its own poses",
-        "Mean distance between a joint and its captured position in roll-outs, in which the network "
-        "continues from its own poses, as at run time. Their length is on the horizontal axis (60 frames are "
-        "one second). If the line flattens, the "
-        "character stays stable. This chart measures the pose as drawn. A joint is drawn halfway "
-        "between its predicted position and the position to which its predicted velocity takes it. "
-        "The charts above measure only the predicted position, so their error differs from the value at "
-        "1 frame in this chart." + sampled(found),
+        "Mean distance between a joint and its captured position. In a roll-out, the network continues from "
+        "its own poses, as at run time. The horizontal axis shows the length of the roll-outs (60 frames are "
+        "one second). If the line flattens, the character stays stable. This chart measures the pose as "
+        "drawn, before the feet are placed. A joint is drawn halfway between its predicted position and the "
+        "position to which its predicted velocity takes it. The charts above measure only the predicted "
+        "position, so their error differs from the value at 1 frame in this chart." + sample_note(found),
         traces,
         {
             "xaxis": log_axis("frames", [x for trace in traces for x in trace["x"]]),

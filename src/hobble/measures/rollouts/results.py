@@ -10,11 +10,11 @@ from hobble.measures.results import SampleSize
 class RollOutNumbers(TypedDict):
     """Errors over `frames` frames of roll-outs. They are None if there were no frames.
 
-    position_error_cm: mean distance between a joint and its captured position. mean, sd: of the relative
-    error, this distance divided by the captured distance from the root. ended: number of roll-outs that
-    reached their full length. last_cm, last_phase: mean position error, and mean phase error in cycles, in
-    the last frame of these roll-outs. interval: half width of the 95 % confidence interval of
-    `position_error_cm`, if only a sample was measured.
+    position_error_cm: mean distance between a joint and its captured position. mean, sd: mean and standard
+    deviation of the relative error: this distance divided by the distance between the captured joint and the
+    root. ended: number of roll-outs that reached their full length. last_cm: mean position error in the last
+    frame of these roll-outs. last_phase: mean phase error after their last frame, cycles. interval:
+    `position_error_cm` -> half width of its 95 % confidence interval, if only a sample was measured.
     """
 
     frames: int
@@ -46,8 +46,8 @@ class LengthErrors(TypedDict):
 class RollOutsFound(TypedDict):
     """rollouts.json.
 
-    joints: number of joints measured. mode: the network's phase mode. sample: its size, if only a sample was
-    measured.
+    joints: number of joints measured. mode: the network's phase mode. sample: the size of the sample, if only
+    a sample was measured.
     """
 
     configuration: str

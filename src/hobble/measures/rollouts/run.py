@@ -1,9 +1,9 @@
 """Errors of roll-outs: the network continues from its own poses, with the path and other inputs of a clip.
 
-A roll-out starts at a captured frame and continues for n frames like the runtime. Its input has the joints
-that it predicted itself. Each new position is the mean of two: the predicted position, and the old position
-plus the predicted velocity. The phase advances by its predicted change. Trajectory, gait, ground and channels
-come from the clip.
+A roll-out starts at a captured frame and continues for n frames like the runtime. In each later frame, its
+input has the joints that the roll-out predicted in the frame before. Each new position is the mean of two:
+the predicted position, and the old position plus the predicted velocity. The phase advances by its predicted
+change. Trajectory, gait, ground and channels come from the clip.
 """
 
 from __future__ import annotations
@@ -37,11 +37,12 @@ from hobble.rows.excerpts import Excerpt
 from hobble.rows.layout import RowLayout
 
 LENGTHS = (1, 10, 60, 300)  # frames
-# Roll-outs of one length overlap: each frame is in OVERLAP short or in OVERLAP_OF_LONG long ones. With twice
-# as many short ones, the mean error would change by less than .2 % (configuration `limp`, 10 and 60 frames).
+# Roll-outs of the same length overlap: each frame is in OVERLAP short roll-outs, or in OVERLAP_OF_LONG long
+# ones. Twice as many short ones would change the mean error by less than .2 % (configuration `limp`, 10 and
+# 60 frames).
 OVERLAP, OVERLAP_OF_LONG = 2, 4
 LONG = 100  # frames: a roll-out of this length or more is long
-AT_ONCE = 6000  # the roll-outs of about this many frames of clips are computed together, in about 100 MB
+AT_ONCE = 6000  # the roll-outs in about this many rows of clips are computed together, in about 100 MB
 
 log = logging.getLogger("hobble")
 
@@ -77,7 +78,7 @@ class RollOutErrors:
         return RollOutErrors(self.frames, self.starts, self.moments * weight, self.last * weight, self.ended)
 
     def to_dict(self, phase: bool = True) -> RollOutNumbers:
-        """Plain data. A value without frames, or without roll-outs that reached their full length, is None.
+        """Plain data. Values are None if there are no frames, or no roll-outs that reached their full length.
 
         phase: whether the network uses the phase. If not, the phase error has no meaning and is None.
         """
@@ -93,64 +94,71 @@ class RollOutErrors:
         }
 
 
-def _groups(read: LoadedPart, layout: RowLayout, lengths: Sequence[int]) -> list[RollOuts]:
-    """The roll-outs that begin in the chosen rows of `read`. They may end after these rows.
+def _roll_out_groups(loaded: LoadedPart, layout: RowLayout, lengths: Sequence[int]) -> list[RollOuts]:
+    """The roll-outs that begin in the rows to measure. They may end after these rows.
 
-    For each length, a frame is in OVERLAP roll-outs, or in OVERLAP_OF_LONG if they are long, or in one if
-    they last only one frame.
+    There is a group for each length and each stretch of consecutive frames. In a group, a frame is in OVERLAP
+    roll-outs, or in OVERLAP_OF_LONG if they are long, or in one if they last only one frame.
     """
     out = []
-    for stretch in unbroken_stretches(read.rows.frame):
-        first, stop = np.searchsorted(stretch, (read.first, read.stop))
-        inputs = inputs_of_clip(read.rows, stretch, layout)
+    for stretch in unbroken_stretches(loaded.rows.frame):  # indices of rows
+        first, stop = np.searchsorted(stretch, (loaded.first, loaded.stop))
+        inputs = inputs_of_clip(loaded.rows, stretch, layout)
         for length in lengths:
             overlap = OVERLAP if length < LONG else OVERLAP_OF_LONG
+            # No roll-out begins at frame 0 of a stretch, because the root's movement before it is unknown.
             starts = np.arange(max(1, first), stop, max(1, length // overlap))
             if len(starts):
                 out.append(RollOuts(inputs, starts, length))
     return out
 
 
-def _errors(
-    predictor: Predictor, clips: Sequence[list[RollOuts]], joints: Sequence[int], lengths: Sequence[int]
+def _errors_of_parts(
+    predictor: Predictor, parts: Sequence[list[RollOuts]], joints: Sequence[int], lengths: Sequence[int]
 ) -> list[dict[int, RollOutErrors]]:
-    """For each clip: length -> errors. The roll-outs of all clips are computed together."""
-    out = [{length: RollOutErrors() for length in lengths} for _ in clips]
-    owners = [(found, group) for found, groups in zip(out, clips, strict=True) for group in groups]
+    """For each clip or excerpt: length -> errors. The roll-outs of all of them are computed together.
+
+    parts: the groups of roll-outs of each clip or excerpt. joints: indices of the joints to measure.
+    """
+    out = [{length: RollOutErrors() for length in lengths} for _ in parts]
+    # Each group, with the entry of `out` to which its errors are added.
+    owners = [(by_length, group) for by_length, groups in zip(out, parts, strict=True) for group in groups]
     if not owners:
         return out
     crowd = Crowd(predictor, [group for _, group in owners])
     layout = predictor.network.layout
     truth = crowd.y[:, layout.y_joint_position].reshape(len(crowd.y), -1, 3)[:, joints]
     moments = [Moments.nothing(2) for _ in owners]
-    last: list[Array] = [np.zeros((0, len(joints), 2)) for _ in owners]
+    last: list[Array] = [np.zeros((0, len(joints), 2)) for _ in owners]  # errors in the last frame
     for age, (at, joint_positions, members) in enumerate(crowd.frames()):
         errors = relative_and_distance(truth[at].astype(float), joint_positions[:, joints])
         for g, of_group in members.items():
             own = errors[of_group]
-            weights = np.full(own[..., 0].size, 1 / len(joints))
+            weights = np.full(own[..., 0].size, 1 / len(joints))  # a frame has the weight 1
             moments[g] = moments[g] + Moments.of(own.reshape(-1, 2), weights)
             if age == owners[g][1].length - 1:
                 last[g] = own
-    for (found, group), in_all, end, phase in zip(owners, moments, last, crowd.phases(), strict=True):
-        found[group.length] += _of_group(group, in_all, end, phase)
+    for (by_length, group), in_all, end, phase in zip(owners, moments, last, crowd.phases(), strict=True):
+        by_length[group.length] += _errors_of_group(group, in_all, end, phase)
     return out
 
 
-def _of_group(group: RollOuts, moments: Moments, end: Array, phase: Array) -> RollOutErrors:
+def _errors_of_group(group: RollOuts, moments: Moments, end: Array, phase: Array) -> RollOutErrors:
     """The errors of a group of n roll-outs.
 
-    moments: of the errors in all frames. end: (m, joints, 2) errors in the last frame of the first m
-    roll-outs, which reach their full length. phase: (n,) after the last frame of each.
+    moments: of the errors in all frames. end: (m, joints, 2) relative and position errors in the last frame
+    of the first m roll-outs, which reach their full length. phase: (n,) after the last frame of each
+    roll-out.
     """
     frames = int(np.minimum(group.length, len(group.inputs.x) - group.starts).sum())
-    # `phase` is that of the frame after a roll-out, so the stretch must have a captured phase for this frame.
+    # `phase` is that of the frame after a roll-out. Roll-outs that end with the stretch are not counted as
+    # ended, because there is no captured phase for this frame.
     ended = int(np.searchsorted(group.starts, len(group.inputs.x) - group.length))
     if not ended:
         return RollOutErrors(frames, len(group.starts), moments)
     truth = group.inputs.phase[group.starts[:ended] + group.length]
-    off = np.abs(np.mod(phase[:ended] - truth + 0.5, 1.0) - 0.5)
-    last = np.stack([end[:ended, :, 1].mean(axis=1), off], axis=1)
+    phase_error = np.abs(np.mod(phase[:ended] - truth + 0.5, 1.0) - 0.5)  # 0 to half a cycle
+    last = np.stack([end[:ended, :, 1].mean(axis=1), phase_error], axis=1)
     return RollOutErrors(frames, len(group.starts), moments, Moments.of(last), ended)
 
 
@@ -178,17 +186,17 @@ def measure_roll_outs(
     total = {length: dict.fromkeys(SPLITS, RollOutErrors()) for length in lengths}
     of_clip: dict[int, dict[str, RollOutErrors]] = {length: {} for length in lengths}
     excerpts: dict[int, dict[Excerpt, float | None]] = {length: {} for length in lengths}
-    for parts in _together(clip_parts(clips, sample), network, lengths):
-        for part, errors in zip(
-            parts, _errors(predictor, list(parts.values()), joints, lengths), strict=True
+    for parts in _part_batches(clip_parts(clips, sample), network, lengths):
+        for part, by_length in zip(
+            parts, _errors_of_parts(predictor, list(parts.values()), joints, lengths), strict=True
         ):
-            for length, found in errors.items():
-                weighed, by_clip = found.weighing(part.weight), of_clip[length]
+            for length, errors in by_length.items():
+                weighed, clip_errors = errors.weighing(part.weight), of_clip[length]
                 total[length][splits[part.clip]] += weighed
-                by_clip[part.clip] = by_clip.get(part.clip, RollOutErrors()) + weighed
+                clip_errors[part.clip] = clip_errors.get(part.clip, RollOutErrors()) + weighed
                 if part.excerpt is not None:
-                    excerpts[length][part.excerpt] = found.to_dict()["position_error_cm"]
-            log.info("%s: %s", part.excerpt or part.clip, errors[lengths[-1]].to_dict(network.phase))
+                    excerpts[length][part.excerpt] = errors.to_dict()["position_error_cm"]
+            log.info("%s: %s", part.excerpt or part.clip, by_length[lengths[-1]].to_dict(network.phase))
     result: RollOutsFound = {
         "configuration": configuration,
         "joints": len(joints),
@@ -199,8 +207,8 @@ def measure_roll_outs(
                 "train": total[length]["train"].to_dict(network.phase),
                 "held_out": total[length]["held_out"].to_dict(network.phase),
                 "clips": [
-                    {"clip": name, "split": splits[name], **found.to_dict(network.phase)}
-                    for name, found in of_clip[length].items()
+                    {"clip": name, "split": splits[name], **errors.to_dict(network.phase)}
+                    for name, errors in of_clip[length].items()
                 ],
             }
             for length in lengths
@@ -209,23 +217,24 @@ def measure_roll_outs(
     return result if sample is None else _with_intervals(result, sample, excerpts, splits)
 
 
-def _together(
+def _part_batches(
     parts: Iterable[ClipPart], network: Network, lengths: Sequence[int]
 ) -> Iterator[dict[ClipPart, list[RollOuts]]]:
-    """Yield the roll-outs of a few clips or excerpts at a time, which have about AT_ONCE frames together."""
-    together: dict[ClipPart, list[RollOuts]] = {}
-    frames = 0
+    """Yield the roll-outs of a few clips or excerpts at a time, which have about AT_ONCE rows together."""
+    batch: dict[ClipPart, list[RollOuts]] = {}
+    rows = 0
     for part in parts:
-        # Twice as many rows as frames, because a frame that two cycles share has two rows.
-        read = part.load(before=2, after=2 * max(lengths))
-        check_layout(part.path, read.rows, network)
-        together[part] = _groups(read, network.layout, lengths)
-        frames += len(read.rows)
-        if frames >= AT_ONCE:
-            yield together
-            together, frames = {}, 0
-    if together:
-        yield together
+        # A roll-out needs the frame before its start, and max(lengths) frames from its start on. Twice as
+        # many rows are read, because a frame that two cycles share has two rows.
+        loaded = part.load(before=2, after=2 * max(lengths))
+        check_layout(part.path, loaded.rows, network)
+        batch[part] = _roll_out_groups(loaded, network.layout, lengths)
+        rows += len(loaded.rows)
+        if rows >= AT_ONCE:
+            yield batch
+            batch, rows = {}, 0
+    if batch:
+        yield batch
 
 
 def _with_intervals(
@@ -234,10 +243,10 @@ def _with_intervals(
     excerpts: Mapping[int, Mapping[Excerpt, float | None]],
     splits: Mapping[str, str],
 ) -> RollOutsFound:
-    """The result with the size of the sample, and half widths of 95 % intervals of each split and length.
+    """The result with the size of the sample, and the confidence intervals of each split and length.
 
-    excerpts: length -> position error of each excerpt, cm; None for an excerpt that is too short for a
-    roll-out, for which the mean of its split is used.
+    excerpts: length -> position error of each excerpt, cm. It is None for an excerpt that is too short for a
+    roll-out; the mean of the split is then used.
     """
     for entry in result["lengths"]:
         for split in SPLITS:
@@ -253,7 +262,7 @@ def _with_intervals(
 
 
 def roll_out_rows(result: RollOutsFound) -> list[Row]:
-    """The entries of the splits (with an empty `clip`) and of the clips, as rows of a table."""
+    """A table with a row for each length and split (`clip` is None), and for each length and clip."""
     rows: list[Row] = []
     for entry in result["lengths"]:
         for split in SPLITS:
