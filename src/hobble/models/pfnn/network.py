@@ -64,7 +64,7 @@ class Pfnn(Network):
         """Weights and biases of one phase: sum of n_l n_(l+1) + n_(l+1)."""
         return sum(a * b + b for a, b in pairwise(self.sizes))
 
-    def stored(self, mode: str) -> int:
+    def stored_numbers(self, mode: str) -> int:
         """As in `Network`: the weights at the mode's phases, or the control points."""
         return (MODES[mode] or self.control_points) * self.parameters
 
