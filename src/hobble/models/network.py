@@ -122,7 +122,7 @@ class Network(ABC):
     @property
     @abstractmethod
     def parameters(self) -> int:
-        """How many numbers one prediction reads: the weights and biases of one phase."""
+        """How many weights and biases the network has at one phase, or numbers in its tables."""
 
     def stored_numbers(self, mode: str) -> int:
         """How many numbers the network keeps in memory to run in `mode`, one of `modes`."""
