@@ -81,7 +81,7 @@ def main() -> None:
             print(f"{name}: {count} characters, {us:,.0f} us a frame, {ratio:.2f} times", flush=True)
     for name, network in networks.items():
         size, number = paths[name].stat().st_size / 1e6, np.dtype(network.storage).itemsize
-        kept = 1e-6 * number * network.stored(network.mode(None))
+        kept = 1e-6 * number * network.stored_numbers(network.mode(None))
         print(f"{name}: {size:.1f} MB file, {kept:.1f} MB in memory as {network.storage}", flush=True)
         if options.laps:
             lap = responsivity(

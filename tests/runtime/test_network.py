@@ -106,14 +106,14 @@ def test_modes_approach_the_spline(make_network) -> None:
 @given(st.floats(-2, 3))
 @settings(max_examples=50, deadline=None)
 def test_no_phase_reads_outside_the_table(phase: float) -> None:
-    from hobble.models.pfnn.predictor import _share
+    from hobble.models.pfnn.predictor import _write_shares
 
     for blended, points in ((1, 50), (2, 10), (4, 4)):
         for p in (phase, 1.0, np.nextafter(1.0, 0.0), np.float64(np.float32(0.99999999))):
             # A number on each side, since compiled code does not check that an index is within the array.
             around = np.full(points + 2, 7, np.float32)
             around[1:-1] = 0
-            _share(p, blended, points, around[1:-1])
+            _write_shares(p, blended, points, around[1:-1])
             assert around[[0, -1]].tolist() == [7, 7]
             assert around[1:-1].sum() == pytest.approx(1, abs=1e-6)
             assert np.count_nonzero(around[1:-1]) <= blended

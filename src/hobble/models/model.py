@@ -1,4 +1,7 @@
-"""The interface of a kind of network, for training and loading."""
+"""The interface of a kind of network, such as pfnn, for training and loading.
+
+X are the inputs of a network and Y its outputs. A row is the X and Y of one frame.
+"""
 
 from __future__ import annotations
 
@@ -23,14 +26,14 @@ class FinishedNetwork(Protocol):
 
     @property
     def kind(self) -> str:
-        """Its folder in hobble.models."""
+        """Name of its kind, and of the kind's folder in hobble.models."""
 
     def arrays(self) -> dict[str, np.ndarray]:
         """The arrays of its file; `Model.read` builds the network from them."""
 
     @property
     def about(self) -> dict[str, Any]:
-        """Its entries in the file's meta, as JSON."""
+        """Its entries in the file's metadata, as data for JSON."""
 
     @property
     def described(self) -> str:
@@ -38,9 +41,9 @@ class FinishedNetwork(Protocol):
 
 
 class Model(ABC):
-    """One kind of network. `MODEL` in its folder is a `Trained` or a `Built`.
+    """One kind of network. Its folder in hobble.models has an instance `MODEL` of `Trained` or `Built`.
 
-    Its methods import pydantic, PyTorch and numba only when they need them. So a game that runs a network
+    The methods import pydantic, PyTorch and numba only when they need them. So a game that runs a network
     needs no PyTorch, and checking a configuration needs neither PyTorch nor numba.
     """
 
@@ -52,10 +55,12 @@ class Model(ABC):
 
     @abstractmethod
     def read(self, path: str | Path, arrays: Mapping[str, Any], common: Mapping[str, Any]) -> Network:
-        """The network of a file. arrays: as `FinishedNetwork.arrays` returned them.
+        """The network of a file.
 
-        path: the file, for error messages. common: the fields of `hobble.models.network.Network`, already
-        checked. Raises InputError for arrays that cannot run; `hobble.models.checks` has functions for this.
+        path: the file, for error messages. arrays: those of the file, by name, as `FinishedNetwork.arrays`
+        returned them. common: the fields that all kinds share (`hobble.models.network.Network`), by name,
+        already checked. Raises InputError for arrays that make no network; `hobble.models.checks` has
+        functions for these checks.
         """
 
     def read_folder(self, folder: Path) -> Mapping[str, np.ndarray] | None:
@@ -64,7 +69,7 @@ class Model(ABC):
 
 
 class Trained(Model):
-    """A kind of network that is trained in passes over the shuffled rows of a database."""
+    """A kind of network that is trained in passes over the shuffled rows of all training clips."""
 
     @abstractmethod
     def parameters(self, options: Any, inputs: int, outputs: int) -> int:
@@ -79,7 +84,7 @@ class Trained(Model):
 
 
 class Built(Model):
-    """A kind of network without training, built from the rows of the training clips, frame after frame."""
+    """A kind of network without training. It is built from the training clips' rows, in order of time."""
 
     @abstractmethod
     def build(
@@ -87,6 +92,6 @@ class Built(Model):
     ) -> FinishedNetwork:
         """Build a network.
 
-        clips: the files with the clips' rows (`hobble.rows.clip_rows`). layout: of the database, which may
-        have fewer channels than these files. Raises InputError if a file does not fit the layout.
+        clips: the files with the clips' rows (`hobble.rows.clip_rows`). layout: the columns of X and Y, which
+        may have fewer channels than these files. Raises InputError if a file does not fit the layout.
         """

@@ -1,4 +1,4 @@
-"""The interface of trained networks of any kind. The runtime, the measurements and the report use it."""
+"""The interface of networks of any kind that are ready to run, for the runtime, measurements and report."""
 
 from __future__ import annotations
 
@@ -18,8 +18,8 @@ from hobble.core.skeleton import Skeleton
 from hobble.models.training_facts import TrainingFacts
 from hobble.rows.layout import GAITS, RowLayout
 
-# The inputs include the height of the ground on the character's path, and at this distance (cm) to the left
-# and right of it, unless the network's file gives another distance.
+# The inputs include heights of the ground on the character's path and on both sides of it. The sides are at
+# this distance (cm) from the path, unless the network's file gives another distance.
 TERRAIN_SIDE = 25.0
 STORAGES = ("float32", "int16")  # types in which a predictor can keep its weights
 
@@ -32,10 +32,10 @@ class Predictor(Protocol):
     It may keep buffers between calls, so each group of characters that is evaluated together needs its
     own predictor. It keeps no state of a character. If `Network.memory` is above 0, the caller keeps this
     state: an array (C, Network.memory) float64 for C characters, zero before a character's first frame.
-    `evaluate` and `predict` then take it as one more argument `memory`, which the signatures below leave out,
-    and change it in place.
+    `evaluate` and `predict` then have one more argument `memory`, which the signatures below leave out. They
+    change this array in place.
 
-    X are inputs and Y outputs; in shapes, X and Y are the numbers of their columns.
+    X are the inputs and Y the outputs. In shapes, X and Y are the numbers of their columns.
     """
 
     @property
@@ -43,7 +43,7 @@ class Predictor(Protocol):
         """The network that the predictor evaluates."""
 
     def standardise(self, x: Array, z: Array) -> None:
-        """Write the standardised inputs x into z, both (C, X) float32."""
+        """Standardise the inputs x and write them into z, both (C, X) float32."""
 
     def evaluate(self, z: Array, phase: Array, out: Array) -> None:
         """Write Y (C, Y) float32 for standardised inputs z (C, X) at phases (C,), 0 to 1, into `out`."""
@@ -54,20 +54,21 @@ class Predictor(Protocol):
 
 @dataclass(frozen=True, kw_only=True)
 class Network(ABC):
-    """A network with the columns that it reads and writes.
+    """A network, and what the columns of its inputs X and outputs Y mean.
 
-    x_mean, x_std, y_mean, y_std: statistics to standardise X and restore Y.
-    layout: the columns; gaits: the order of the gait blocks; skeleton: None if the file has none.
-    channels: name -> labels of its columns, for each input channel. terrain_side: cm from the path to the
-    side heights. limits: channel -> speed limits.
-    meta: the file's other metadata. training_facts: ranges of the training data, None if the file has none.
+    x_mean, x_std (X,), y_mean, y_std (Y,): statistics to standardise X and restore Y.
+    layout: which columns of X and Y hold what. skeleton: None if the file has none. gaits: names of the gaits
+    in the order of their columns in X.
+    channels: name of each input channel -> labels of its columns. limits: name of a channel -> speed limits.
+    terrain_side: distance in cm from the path to the ground heights at its sides.
+    meta: the metadata of the file. training_facts: ranges of the training data, None if the file has none.
     """
 
-    kind: ClassVar[str] = ""  # its folder in hobble.models
+    kind: ClassVar[str] = ""  # name of its kind, and of the kind's folder in hobble.models
     phase: ClassVar[bool] = True  # whether a prediction depends on the phase
     # Whether the predicted poses are recorded frames, as in motion matching. With other networks, the
     # runtime shortens the predicted movement of the root where the character should stand or go another way.
-    # With recorded frames the feet would slide.
+    # With recorded frames it does not, because the feet would slide.
     recorded_poses: ClassVar[bool] = False
     # Names of the ways to evaluate the network, such as constant, linear and cubic interpolation over the
     # phase. The last one is exact.
@@ -88,7 +89,7 @@ class Network(ABC):
     training_facts: TrainingFacts | None = field(default=None, repr=False)
 
     def trained(self, channel: str) -> tuple[str, ...]:
-        """Labels of a channel's columns that were above 0 in training, judged by `x_mean`.
+        """Labels of a channel's columns that were above 0 in some training row: their `x_mean` is above 0.
 
         All labels if all means are 0; () for a channel that the network does not have.
         """
@@ -121,16 +122,16 @@ class Network(ABC):
     @property
     @abstractmethod
     def parameters(self) -> int:
-        """How many numbers one prediction reads: the weights and biases of one phase."""
+        """How many weights and biases the network has at one phase, or numbers in its tables."""
 
-    def stored(self, mode: str) -> int:
-        """How many numbers the network keeps in memory to run in a mode, one of `modes`."""
+    def stored_numbers(self, mode: str) -> int:
+        """How many numbers the network keeps in memory to run in `mode`, one of `modes`."""
         return self.parameters
 
     @property
     @abstractmethod
     def described(self) -> str:
-        """What the network is, in words to be put after "A" in a sentence."""
+        """What the network is, in words that can follow "A" in a sentence."""
 
     @abstractmethod
     def predict(self, x: Array, phase: Array) -> Array:
@@ -138,7 +139,7 @@ class Network(ABC):
 
     @abstractmethod
     def predictor(self, mode: str | None = None, storage: str | None = None) -> Predictor:
-        """Prepare it for fast evaluation.
+        """The network prepared for fast evaluation.
 
         mode: one of `modes`, by default the exact one. storage: one of STORAGES, by default the kind's own.
         Raises ValueError for an unknown mode or storage.
@@ -146,19 +147,25 @@ class Network(ABC):
 
     @abstractmethod
     def page(self, inputs: NDArray[np.int64], outputs: NDArray[np.int64]) -> dict[str, Any]:
-        """The JSON with which the report's page evaluates the network in a browser.
+        """Data for JSON, with which the report's page evaluates the network in a browser.
 
-        `network.js` in the kind's folder reads it. It predicts the columns `outputs` of Y from the columns
-        `inputs` of X. The weights of other columns are left out.
+        `network.js` in the kind's folder reads the data. The page predicts only the columns `outputs` of Y
+        from the columns `inputs` of X. The weights of other columns are left out.
         """
 
     @property
     def exports(self) -> dict[str, Export]:
-        """Export formats: name -> write(target, mode), which returns a message for the user."""
+        """Name of each export format -> a function that writes the file or folder `target` for a mode.
+
+        The function has the arguments (target, mode) and returns a message for the user.
+        """
         return {}
 
     def export(self, to: str, target: str | Path, mode: str) -> str:
-        """Write the network in format `to`. Raises HobbleError if it does not have this format."""
+        """Write the network in the format `to`, and return a message for the user.
+
+        Raises HobbleError if the network does not have this format.
+        """
         if to not in self.exports:
             known = ", ".join(self.exports) or "none"
             raise HobbleError(f"a {self.kind} network cannot be written as {to}; formats: {known}")
@@ -166,7 +173,7 @@ class Network(ABC):
 
 
 def standardised(network: Network, x: Array) -> Array:
-    """(x - mean) / std in float32, and 0 for a column that never varied."""
+    """Inputs x (n, X) standardised: (x - mean) / std in float32, and 0 for a column that never varied."""
     std = np.where(network.x_std > 0, network.x_std, np.float32(np.inf))
     return (np.asarray(x, np.float32) - network.x_mean) / std
 

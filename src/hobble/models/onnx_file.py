@@ -1,8 +1,9 @@
-"""Write and check a network as one ONNX file, with standardisation inside the graph.
+"""Writes a network as one ONNX file and checks it. The graph contains the standardisation.
 
-The inputs are `x` (batch, X) and `phase` (batch,) in cycles, the output is `y` (batch, Y): float32, raw
-units, any batch size. Networks that ignore the phase have this second input, too, so that all files are
-called in the same way. Only this module needs the onnx packages: pip install "hobble[onnx]".
+The inputs are `x` (batch, X) and `phase` (batch,) in cycles, the output is `y` (batch, Y). All are float32, x
+and y are in raw units, and a batch may have any size. Networks that ignore the phase have this second input,
+too, so that all files are called in the same way. Only this module needs the onnx packages: pip install
+"hobble[onnx]".
 """
 
 from __future__ import annotations
@@ -18,16 +19,16 @@ from hobble.core.errors import HobbleError, InputError
 from hobble.core.files import atomic_path
 from hobble.models.network import Network, inverse
 
-OPSET = 15
+OPSET = 15  # version of the ONNX operators
 # Largest allowed difference from Hobble's runtime, in units of Y; relative for values above 1.
 TOLERANCE = 1e-4
-CHECKED_ROWS = 64  # random rows of X, with which a file is checked
+CHECKED_ROWS = 64  # a file is checked with this many random rows of X
 
 
 class Graph:
-    """Collects nodes and constants and gives each a unique name.
+    """Collects the nodes and constants of an ONNX graph and gives each a unique name.
 
-    helper, numpy_helper: modules of onnx.
+    A call adds a node. helper, numpy_helper: modules of onnx.
     """
 
     def __init__(self, helper: Any, numpy_helper: Any) -> None:
@@ -43,7 +44,10 @@ class Graph:
         return name
 
     def __call__(self, op: str, *inputs: str, output: str = "", **attributes: Any) -> str:
-        """Add a node; returns the name of its output."""
+        """Add a node with the ONNX operator `op`; returns the name of its output.
+
+        inputs: names of other outputs or constants. output: its name, by default a new one.
+        """
         output = output or f"n{len(self.nodes)}"
         self.nodes.append(self.helper.make_node(op, inputs, [output], **attributes))
         return output
@@ -55,27 +59,28 @@ Body = Callable[[Graph, str], str]  # adds the nodes of a network; see `export`
 def export(path: str | Path, network: Network, mode: str, body: Body) -> None:
     """Write the network, with a metadata entry `hobble` that describes columns, skeleton and channels.
 
-    body: adds the nodes of the network to the graph. It gets the name of the standardised inputs and returns
-    the name of the standardised outputs; the phases are named "phase". Raises HobbleError if onnx is not
-    installed.
+    body: adds the nodes of the network to the graph. It gets the graph and the name of the standardised
+    inputs, and returns the name of the standardised outputs. The phases have the name "phase". Raises
+    HobbleError if onnx is not installed.
     """
     try:
         import onnx
         from onnx import TensorProto, helper, numpy_helper
     except ImportError as error:
-        raise HobbleError('ONNX needs its package: pip install "hobble[onnx]"') from error
+        raise HobbleError('onnx is not installed: pip install "hobble[onnx]"') from error
     g = Graph(helper, numpy_helper)
     z = g("Sub", "x", g.constant(network.x_mean))
     z = g("Mul", z, g.constant(inverse(network.x_std)))
     h = body(g, z)
     g("Add", g("Mul", h, g.constant(network.y_std)), g.constant(network.y_mean), output="y")
-    columns: tuple[tuple[str, list[int]], ...] = (
+    columns_of: tuple[tuple[str, list[int]], ...] = (
         ("x", [len(network.x_mean)]),
         ("phase", []),
         ("y", [len(network.y_mean)]),
     )
     inputs_and_output = [
-        helper.make_tensor_value_info(name, TensorProto.FLOAT, ["batch", *sizes]) for name, sizes in columns
+        helper.make_tensor_value_info(name, TensorProto.FLOAT, ["batch", *sizes])
+        for name, sizes in columns_of
     ]
     graph = helper.make_graph(g.nodes, "hobble", inputs_and_output[:2], inputs_and_output[2:], g.constants)
     opset = helper.make_opsetid("", OPSET)
@@ -92,10 +97,10 @@ def export(path: str | Path, network: Network, mode: str, body: Body) -> None:
 
 
 def check(path: str | Path, network: Network, mode: str) -> float:
-    """The largest difference between onnxruntime with the file and Hobble's runtime, over random rows.
+    """Run the file in onnxruntime and the network in Hobble's runtime; return the largest difference of Y.
 
-    In units of Y, relative for values above 1. Raises InputError if it is above TOLERANCE, HobbleError if
-    onnxruntime is not installed.
+    Both get CHECKED_ROWS random rows. The difference is relative for values of Y above 1. Raises InputError
+    if it is above TOLERANCE, HobbleError if onnxruntime is not installed.
     """
     try:
         import onnxruntime
@@ -113,12 +118,13 @@ def check(path: str | Path, network: Network, mode: str) -> float:
     expected = network.predictor(mode, "float32").predict(x, phase.astype(float))
     difference = float((np.abs(y - expected) / np.maximum(1.0, np.abs(expected))).max())
     if not difference <= TOLERANCE:
-        raise InputError(path, f"onnxruntime and Hobble's runtime differ by {difference:.2g}")
+        problem = f"onnxruntime and Hobble's runtime differ by {difference:.2g}, more than {TOLERANCE:g}"
+        raise InputError(path, problem)
     return difference
 
 
 def write(path: str | Path, network: Network, mode: str, body: Body) -> float:
-    """`export` to a temporary file, `check` it, then rename it to `path`. Returns what `check` does."""
+    """`export` to a temporary file, `check` it, then rename it to `path`. Returns what `check` returns."""
     with atomic_path(path) as temporary:
         export(temporary, network, mode, body)
         return check(temporary, network, mode)

@@ -12,10 +12,13 @@ class Options(Section):
 
     @property
     def hidden(self) -> tuple[int, ...]:
-        """Units of each hidden layer; () where there are no layers."""
+        """Units of each hidden layer; () for a kind without layers."""
         return ()
 
     @property
     def why_asymmetric(self) -> str:
-        """Why a network with these options cannot be trained with `training.symmetric`; empty if it can."""
+        """Why a network with these options cannot be trained with `training.symmetric`; "" if it can.
+
+        With this key of a configuration, the network treats left and right alike.
+        """
         return f"a network of kind {self.kind} cannot treat left and right alike"

@@ -20,8 +20,10 @@ def packed(array: NDArray[Any]) -> str:
 def packed_rows(weights: Array, biases: Array) -> dict[str, Any]:
     """Weights (K, out, in) as integers of -32767..32767, with a factor for each row, and biases (K, out).
 
-    In the result, points: K; rows: out; columns: in; scale: (K, out) factors of the integers.
+    In the result, points: K. rows: out. columns: in. scale: (K, out) factors of the integers. weights, scale
+    and biases are text from `packed`.
     """
+    # The factor of a row of zeros must not be 0, because the weights are divided by it.
     scale = np.maximum(np.abs(weights).max(axis=-1) / 32767, 1e-30).astype(np.float32)
     return {
         "points": weights.shape[0],
@@ -34,7 +36,10 @@ def packed_rows(weights: Array, biases: Array) -> dict[str, Any]:
 
 
 def packed_columns(table: Array) -> dict[str, Any]:
-    """A table (R, columns) as integers of -32767..32767 with a factor for each column."""
+    """A table (R, columns) as integers of -32767..32767 with a factor for each column.
+
+    In the result, rows: R. values: the integers, and scale: the factors (columns,), as text from `packed`.
+    """
     scale = np.maximum(np.abs(table).max(axis=0) / 32767, 1e-30).astype(np.float32)
     return {
         "rows": table.shape[0],

@@ -13,7 +13,7 @@ from hobble.core.skeleton import Skeleton
 from hobble.models import model
 from hobble.models.matching.build import in_runs, on_mean_ground
 from hobble.models.matching.options import MatchingOptions
-from hobble.models.matching.search_features import groups
+from hobble.models.matching.search_features import feature_groups
 from hobble.rows.clip_rows import pairs, save_clip_rows
 from hobble.rows.layout import RowLayout
 
@@ -60,12 +60,12 @@ def test_tables_hold_the_clips_in_order(holden31: Skeleton, tmp_path: Path) -> N
     ]
     np.testing.assert_allclose(tables.y, np.concatenate(each), atol=1e-6)
     assert tables.remaining[FRAMES[0] - 1] == tables.remaining[-1] == 0
-    assert set(network.starts) == {*range(1, FRAMES[0] - 20), *range(FRAMES[0] + 1, sum(FRAMES) - 20)}
+    assert set(network.start_rows) == {*range(1, FRAMES[0] - 20), *range(FRAMES[0] + 1, sum(FRAMES) - 20)}
 
 
 def test_features_are_the_columns_that_their_names_say(holden31: Skeleton) -> None:
     layout, options = layout_of(holden31), MatchingOptions()
-    found = {name: columns for name, columns, _ in groups(layout, holden31, options)}
+    found = {name: columns for name, columns, _ in feature_groups(layout, holden31, options)}
     # A third, two thirds and the whole of the window ahead: frames 20, 40 and the last sample, 50.
     assert found["path"] == [7, 9, 11, 19, 21, 23]
     assert found["facing"] == [24 + c for c in found["path"]]

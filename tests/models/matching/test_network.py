@@ -41,7 +41,7 @@ def x_of(network: Matching, row: int) -> np.ndarray:
 
 def test_a_query_from_a_frame_of_the_clips_finds_that_frame(made: Made) -> None:
     _, _, network = made
-    rows = network.starts[::7]
+    rows = network.start_rows[::7]
     x = np.concatenate([x_of(network, row) for row in rows])
     np.testing.assert_array_equal(network.predict(x, np.zeros(len(x))), network.frames[rows])
 
@@ -49,10 +49,10 @@ def test_a_query_from_a_frame_of_the_clips_finds_that_frame(made: Made) -> None:
 def test_the_nearest_frame_equals_a_search_over_all(made: Made) -> None:
     _, _, network = made
     x = network.x_mean + 10 * np.random.default_rng(1).normal(size=(20, len(network.x_mean)))
-    queries = network.queries(standardised(network, x))
+    queries = network.input_features(standardised(network, x))
     np.testing.assert_allclose(queries, x[:, network.columns] * network.weights, rtol=1e-4, atol=1e-3)
-    apart = np.square(queries[:, None] - network.features[network.starts][None]).sum(axis=2)
-    np.testing.assert_array_equal(network.nearest(queries), network.starts[apart.argmin(axis=1)])
+    apart = np.square(queries[:, None] - network.features[network.start_rows][None]).sum(axis=2)
+    np.testing.assert_array_equal(network.nearest_rows(queries), network.start_rows[apart.argmin(axis=1)])
 
 
 def test_channel_values_have_to_match(made: Made) -> None:
@@ -62,7 +62,7 @@ def test_channel_values_have_to_match(made: Made) -> None:
     _, _, network = made
     x = x_of(network, 10)
     x[0, network.layout.x_channel("injury").start + 4] = 7.0
-    assert network.nearest(network.queries(standardised(network, x)))[0] >= FRAMES[0]
+    assert network.nearest_rows(network.input_features(standardised(network, x)))[0] >= FRAMES[0]
 
 
 def test_a_character_plays_on_between_searches(made: Made) -> None:
@@ -109,7 +109,7 @@ def test_an_invalid_memory_is_reset(made: Made, wrong: float) -> None:
 def sequence(network: Matching, frames: int = 80) -> tuple[np.ndarray, np.ndarray]:
     """X (F, X) and phases (F,) of a character that requests one place of the clips after another."""
     rng = np.random.default_rng(4)
-    rows = np.repeat(rng.choice(network.starts, 12), 7)[:frames]
+    rows = np.repeat(rng.choice(network.start_rows, 12), 7)[:frames]
     return np.concatenate([x_of(network, row) for row in rows]), rng.random(frames)
 
 
@@ -188,12 +188,12 @@ def test_javascript_finds_the_same_frames_as_python(made: Made, tmp_path: Path) 
 
 def test_a_page_of_many_rows_has_the_first_part_of_each_run(made: Made) -> None:
     _, _, network = made
-    assert network.shortened(1000) is network
-    short = network.shortened(80)  # of 70 and 90 rows, half
+    assert network.shortened_copy(1000) is network
+    short = network.shortened_copy(80)  # of 70 and 90 rows, half
     np.testing.assert_array_equal(short.remaining, [*range(34, -1, -1), *range(44, -1, -1)])
     np.testing.assert_array_equal(short.frames[35:], network.frames[70:115])
     np.testing.assert_array_equal(short.features[:35], network.features[:35])
-    assert short.starts.max() < 80 - 20
+    assert short.start_rows.max() < 80 - 20
 
 
 def test_a_character_moves(made: Made) -> None:

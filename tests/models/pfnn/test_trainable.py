@@ -11,7 +11,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from hobble.models.pfnn.fused import FusedPfnnStep
-from hobble.models.pfnn.trainable import TrainablePfnn, coefficients, initialise, parameters
+from hobble.models.pfnn.trainable import TrainablePfnn, coefficients, initialise, parameter_count
 
 from .definition import output, spline
 
@@ -50,7 +50,7 @@ def test_compiled_spline_coefficients_equal_the_plain_ones() -> None:
     ],
 )
 def test_parameter_counts_equal_those_of_the_published_networks(sizes: tuple[int, ...], count: int) -> None:
-    assert parameters(sizes, 4) == 4 * count
+    assert parameter_count(sizes, 4) == 4 * count
 
 
 def test_initial_weights_fill_their_bounds_and_biases_are_zero() -> None:

@@ -73,7 +73,7 @@ def responsivity(
         },
         "runs": of_mode[own]["runs"],
         "parameters": parameter_counts(network.sizes) if network.sizes else None,
-        "stored": {mode: network.stored(mode) for mode in network.modes},
+        "stored": {mode: network.stored_numbers(mode) for mode in network.modes},
         "bytes_each": np.dtype(network.storage).itemsize,
         "exact": network.mode(None),
         "laps_other_modes": laps_of_others,

@@ -1,4 +1,4 @@
-"""Motion matching at run time: plays the clips, searches every few frames, smooths the transitions.
+"""Motion matching at run time: plays frames of the clips, searches every few frames, smooths transitions.
 
 After Clavet, Motion Matching and the Road to Next-Gen Animation, GDC 2016.
 """
@@ -18,13 +18,16 @@ from hobble.models.stack import standardise
 if TYPE_CHECKING:
     from hobble.models.matching.network import Matching
 
-# If a search finds a row at most this many rows from the one that follows anyway, there is no transition
+# If a search finds a row at most this many rows from the row that follows in the run, there is no transition
 # (Holden et al. 2020).
 SURROUNDING = 20
 
 
 class MatchingPredictor:
-    """The tables prepared to run. storage: "float32", or "int16" with a factor for each column of frames."""
+    """Motion matching prepared to run; a `hobble.models.network.Predictor`.
+
+    storage: how it keeps the frames: "float32", or "int16" with a factor for each column.
+    """
 
     def __init__(self, network: Matching, storage: str = "float32") -> None:
         if storage not in STORAGES:
@@ -38,9 +41,10 @@ class MatchingPredictor:
         blocks = (
             layout.y_joint_position, layout.y_joint_velocity, layout.y_joint_rotation, layout.y_phase_change
         )  # fmt: skip
-        self._at = np.array([block.start for block in blocks], np.int64)
+        self._first_columns = np.array([block.start for block in blocks], np.int64)
         self._x_mean, self._x_inverse = (
-            np.ascontiguousarray(a, np.float32) for a in (network.x_mean, inverse(network.x_std))
+            np.ascontiguousarray(statistic, np.float32)
+            for statistic in (network.x_mean, inverse(network.x_std))
         )
         _ = network.tree  # build the tree now, not in the first frame
 
@@ -49,8 +53,8 @@ class MatchingPredictor:
         standardise(x, self._x_mean, self._x_inverse, z)
 
     def evaluate(self, z: Array, phase: Array, out: Array, memory: Array | None = None) -> None:
-        """As in `Predictor`. memory: (C, M) float64, see `Network.memory`. With None or zeros, each character
-        shows its nearest frame."""
+        """As in `Predictor`. memory: (C, M) float64 with M = `Network.memory`. With None or zeros, each
+        character shows the frame nearest to its inputs."""
         network, count = self.network, len(z)
         if memory is None:
             memory = np.zeros((count, network.memory))
@@ -60,25 +64,28 @@ class MatchingPredictor:
         shown = following.copy()
         if due.any():
             searching = np.flatnonzero(due)
-            shown[searching] = self._searched(network.queries(z[searching]), following[searching])
+            shown[searching] = self._search(network.input_features(z[searching]), following[searching])
         table, choice = (self._frames, self._scale, network.phases), (before, following, due, shown)
-        show_rows(memory, table, choice, phase, (network.layout.joints, self._at, network.halflife), out)
+        show_rows(
+            memory, table, choice, phase, (network.layout.joints, self._first_columns, network.halflife), out
+        )
 
-    def _searched(self, queries: Array, following: NDArray[np.int64]) -> NDArray[np.int64]:
-        """The rows (C,) to show for queries (C, n).
+    def _search(self, queries: Array, following: NDArray[np.int64]) -> NDArray[np.int64]:
+        """The rows (C,) to show for the features `queries` (C, n) of C characters.
 
-        following: (C,) the next row of each character's run, or -1. It is shown unless a row is nearer to the
-        query and more than SURROUNDING rows away from it.
+        following: (C,) the next row of each character's run, or -1 if the run ends. The search finds the row
+        nearest to the query. The following row is shown instead if it is as near, or if the row found is at
+        most SURROUNDING rows away from it.
         """
         network = self.network
         difference = queries - network.features[following]
         distance = np.where(following >= 0, np.sqrt(np.square(difference).sum(axis=1)), np.inf)
         _, nearest = network.tree.query(queries, distance_upper_bound=float(distance.max()))
-        # The tree returns len(starts) where no row is nearer.
-        rows = network.starts[np.minimum(nearest, len(network.starts) - 1)]
-        nearer = np.square(queries - network.features[rows]).sum(axis=1) < distance**2
-        stay = ~nearer | (np.abs(rows - following) <= SURROUNDING)
-        return np.where(stay & (following >= 0), following, rows)
+        # The tree returns len(start_rows) where it finds no row within the bound.
+        found = network.start_rows[np.minimum(nearest, len(network.start_rows) - 1)]
+        nearer = np.square(queries - network.features[found]).sum(axis=1) < distance**2
+        stay = ~nearer | (np.abs(found - following) <= SURROUNDING)
+        return np.where(stay & (following >= 0), following, found)
 
     def predict(self, x: Array, phase: Array, out: Array | None = None, memory: Array | None = None) -> Any:
         """As in `Predictor`."""

@@ -1,4 +1,7 @@
-"""The phase-functioned network (Holden, Komura, Saito 2017). Start reading at `forward`."""
+"""The phase-functioned network: its weights depend on the phase (Holden, Komura, Saito 2017).
+
+Start reading at `forward`.
+"""
 
 from __future__ import annotations
 
@@ -30,7 +33,7 @@ class _Pfnn(Trained):
 
     def parameters(self, options: PfnnOptions, inputs: int, outputs: int) -> int:
         sizes = options.sizes(inputs, outputs)
-        return options.control_points * sum((a + 1) * b for a, b in pairwise(sizes))
+        return options.control_points * sum((inputs + 1) * outputs for inputs, outputs in pairwise(sizes))
 
     def trainable(
         self, options: PfnnOptions, layout: RowLayout, skeleton: Skeleton, seed: int

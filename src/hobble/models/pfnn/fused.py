@@ -1,4 +1,8 @@
-"""The training step on a CPU: compiled loops over rows between the matrix products."""
+"""The training step on a CPU, with compiled loops over rows between the matrix products.
+
+The letters x, c, e and de are those of `hobble.models.pfnn.step`. d is the gradient by the previous layer's
+outputs before their ELU.
+"""
 
 from __future__ import annotations
 
@@ -14,7 +18,7 @@ from hobble.models.pfnn.step import PfnnStep
 
 
 class FusedPfnnStep(FusedBase, PfnnStep):
-    """Like `PfnnStep`, but several times faster outside the matrix products. The buffers are reused."""
+    """Like `PfnnStep`, but several times faster outside the matrix products. It reuses its buffers."""
 
     def coefficients(self, p: Tensor) -> Tensor:
         """Spline coefficients (B, K) of phases (B,)."""
@@ -23,7 +27,7 @@ class FusedPfnnStep(FusedBase, PfnnStep):
         return c
 
     def expanded(self, number: int, x: Tensor, c: Tensor, mask: Tensor) -> tuple[Tensor, Tensor]:
-        """As in `PfnnStep`, in one sweep."""
+        """As in `PfnnStep`, in one loop over the rows."""
         e = self.buffer(f"e {number}", len(x), c.shape[1] * (x.shape[1] + 1), self.factors.dtype)
         slope = self.buffer(f"slope {number}", *x.shape)
         use_threads(e.numel())
@@ -31,7 +35,7 @@ class FusedPfnnStep(FusedBase, PfnnStep):
         return e, slope
 
     def contracted(self, number: int, de: Tensor, c: Tensor, slope: Tensor) -> Tensor:
-        """As in `PfnnStep`, in one sweep."""
+        """As in `PfnnStep`, in one loop over the rows."""
         d = self.buffer(f"d {number}", *slope.shape)
         use_threads(de.numel())
         _contract(as_numpy(de), c.numpy(), slope.numpy(), d.numpy())
@@ -40,25 +44,25 @@ class FusedPfnnStep(FusedBase, PfnnStep):
 
 @njit
 def _coefficients(p: Any, c: Any) -> None:
-    """Write what `hobble.models.pfnn.trainable.coefficients` returns into c (B, K)."""
+    """Write the spline coefficients at phases p (B,) into c (B, K); see `trainable.coefficients`."""
     points = c.shape[1]
     c[:] = 0
     for row in range(len(p)):
         position = (p[row] % 1.0) * points
-        knot = int(position)
-        t = position - knot
-        c[row, (knot - 1) % points] += ((2 - t) * t - 1) * t / 2
-        c[row, knot % points] += ((3 * t - 5) * t * t + 2) / 2
-        c[row, (knot + 1) % points] += ((4 - 3 * t) * t + 1) * t / 2
-        c[row, (knot + 2) % points] += (t - 1) * t * t / 2
+        before = int(position)
+        t = position - before
+        c[row, (before - 1) % points] += ((2 - t) * t - 1) * t / 2
+        c[row, before % points] += ((3 * t - 5) * t * t + 2) / 2
+        c[row, (before + 1) % points] += ((4 - 3 * t) * t + 1) * t / 2
+        c[row, (before + 2) % points] += (t - 1) * t * t / 2
 
 
 @njit(parallel=True, error_model="numpy")
 def _expand(x: Any, c: Any, mask: Any, e: Any, slope: Any) -> None:
     """Write e (B, K (n + 1)) and slope (B, n) of x (B, n); see `PfnnStep.expanded`."""
     rows, width = x.shape
-    half = e.itemsize == 2
-    one = slope.dtype.type(1)
+    half = e.itemsize == 2  # e holds the bits of bfloat16
+    one = slope.dtype.type(1)  # with a Python 1, numba would compute in float64
     for row in numba.prange(rows):
         for i in range(width):
             slope[row, i] = mask[row, i] * min(x[row, i] + one, one)
@@ -78,7 +82,7 @@ def _expand(x: Any, c: Any, mask: Any, e: Any, slope: Any) -> None:
 def _contract(de: Any, c: Any, slope: Any, d: Any) -> None:
     """Write d (B, n): the sum over the control points of de (B, K (n + 1)) times c (B, K), times slope."""
     rows, width = d.shape
-    half = de.itemsize == 2
+    half = de.itemsize == 2  # de holds the bits of bfloat16
     for row in numba.prange(rows):
         d[row] = 0
         for k in range(c.shape[1]):

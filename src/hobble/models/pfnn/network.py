@@ -1,4 +1,4 @@
-"""The trained phase-functioned network: reading, prediction, page data and export."""
+"""The trained phase-functioned network: reads it from a file, predicts, packs it for the page, exports it."""
 
 from __future__ import annotations
 
@@ -16,18 +16,18 @@ from hobble.core.quat import Array
 from hobble.models.checks import stacked
 from hobble.models.network import Export, Network, standardised
 from hobble.models.packing import packed_rows
-from hobble.models.pfnn.forward import binned, forward
+from hobble.models.pfnn.forward import forward, rounded_to_bins
 from hobble.models.pfnn.predictor import MODES, PfnnPredictor
 
-FEWEST_POINTS, MOST_POINTS = 4, 64  # control points of a network; a cyclic cubic spline needs four
+# How many control points a file may have. A cyclic cubic spline needs four.
+FEWEST_POINTS, MOST_POINTS = 4, 64
 
 
 @dataclass(frozen=True)
 class Pfnn(Network):
-    """Layers whose weights and biases are cyclic cubic splines of the phase.
+    """Layers whose weights and biases are cyclic cubic splines of the phase, with K control points.
 
-    The splines have K control points. weights: (K, out, in) float32 for each layer; biases: (K, out) float32
-    for each layer.
+    weights: (K, out, in) float32 for each layer. biases: (K, out) float32 for each layer.
     """
 
     kind: ClassVar[str] = "pfnn"
@@ -38,7 +38,7 @@ class Pfnn(Network):
 
     @classmethod
     def read(cls, path: str | Path, arrays: Mapping[str, Any], common: Mapping[str, Any]) -> Pfnn:
-        """From the arrays W0 (K, out, in), b0 (K, out), ... of a file; see `hobble.models.load`."""
+        """As in `Model`. arrays: W0 (K, out, in), b0 (K, out), W1, b1, ..."""
         inputs, outputs = len(common["x_mean"]), len(common["y_mean"])
         weights, biases = stacked(path, arrays, ("W", "b"), 3, inputs, outputs)
         points = len(weights[0])
@@ -56,16 +56,16 @@ class Pfnn(Network):
 
     @property
     def sizes(self) -> tuple[int, ...]:
-        """Units of each layer, the input first: (342, 512, 512, 311)."""
+        """Units of each layer, the input first, such as (342, 512, 512, 311)."""
         return (self.weights[0].shape[2], *(w.shape[1] for w in self.weights))
 
     @property
     def parameters(self) -> int:
-        """Weights and biases of one phase: sum of n_l n_(l+1) + n_(l+1)."""
-        return sum(a * b + b for a, b in pairwise(self.sizes))
+        """How many weights and biases the layers have at one phase."""
+        return sum(inputs * outputs + outputs for inputs, outputs in pairwise(self.sizes))
 
-    def stored(self, mode: str) -> int:
-        """As in `Network`: the weights at the mode's phases, or the control points."""
+    def stored_numbers(self, mode: str) -> int:
+        """As in `Network`: weights and biases at each of the mode's phases, or of each control point."""
         return (MODES[mode] or self.control_points) * self.parameters
 
     @property
@@ -78,9 +78,9 @@ class Pfnn(Network):
         )
 
     def predict(self, x: Array, phase: Array, constant: bool = False) -> Array:
-        """As in `Network`. constant: round phases down to a bin, as the mode constant does."""
+        """As in `Network`. constant: round phases down to a multiple of 1 / 50, as the mode constant does."""
         z = standardised(self, x)
-        y = forward(self.weights, self.biases, z, binned(phase) if constant else phase)
+        y = forward(self.weights, self.biases, z, rounded_to_bins(phase) if constant else phase)
         return y * self.y_std + self.y_mean
 
     def predictor(self, mode: str | None = None, storage: str | None = None) -> PfnnPredictor:
@@ -88,7 +88,7 @@ class Pfnn(Network):
         return PfnnPredictor(self, mode or "cubic", storage or self.storage)
 
     def page(self, inputs: NDArray[np.int64], outputs: NDArray[np.int64]) -> dict[str, Any]:
-        """As in `Network`: control points as integers with a factor for each row."""
+        """As in `Network`: weights at the control points, as integers with a factor for each row."""
         weights, biases = list(self.weights), list(self.biases)
         weights[0] = weights[0][:, :, inputs]
         weights[-1], biases[-1] = weights[-1][:, outputs], biases[-1][:, outputs]
@@ -98,23 +98,23 @@ class Pfnn(Network):
     def exports(self) -> dict[str, Export]:
         """The formats "onnx" and "bin", the .bin files of Holden et al. (2017)."""
 
-        def onnx(target: Path, mode: str) -> str:
+        def write_onnx(target: Path, mode: str) -> str:
             from hobble.models.pfnn.onnx_export import write_checked
 
             difference = write_checked(target, self, mode)
             return f"{target}: differs from Hobble's runtime by at most {difference:.1g}"
 
-        def release(target: Path, mode: str) -> str:
+        def write_bin(target: Path, mode: str) -> str:
             from hobble.models.pfnn.release import write_release
 
-            write_release(target, self)
+            write_release(target, self)  # always the weights of the mode constant
             return f"{target}: weights at 50 phases"
 
-        return {"onnx": onnx, "bin": release}
+        return {"onnx": write_onnx, "bin": write_bin}
 
 
 def formula(hidden: int) -> str:
-    """The formula of a network with `hidden` hidden layers, in one line."""
+    """The formula of a network with `hidden` hidden layers, as one line of text."""
     inside = "x"
     for i in range(hidden):
         inside = f"elu(W{i} {inside} + b{i})"

@@ -1,4 +1,7 @@
-"""The phase-functioned network as ONNX, with the phase lookup in the graph; see `hobble.models.onnx_file`."""
+"""Writes the phase-functioned network as an ONNX file, with `hobble.models.onnx_file`.
+
+The graph also finds the weights that belong to a phase.
+"""
 
 from __future__ import annotations
 
@@ -17,32 +20,33 @@ __all__ = ["OPSET", "TOLERANCE", "check_onnx", "export_onnx", "write_checked"]
 
 
 def export_onnx(path: str | Path, network: Pfnn, mode: str = "cubic") -> None:
-    """Write the network in a phase mode, see `onnx_file.export`. Raises ValueError for an unknown mode.
+    """Write the network in a mode of `hobble.models.pfnn.predictor`; see `onnx_file.export`.
 
     The mode cubic blends the outputs of all control points, which is exact. The modes linear and constant use
-    tables of the weights at some phases.
+    tables of the weights at some phases. Raises ValueError for an unknown mode.
     """
     onnx_file.export(path, network, mode, _body(network, mode))
 
 
 def write_checked(path: str | Path, network: Pfnn, mode: str = "cubic") -> float:
-    """Write the network and check the file. Returns the largest difference, see `onnx_file.check`."""
+    """Write the network and check the file. Returns the largest difference of Y, see `onnx_file.check`."""
     return onnx_file.write(path, network, mode, _body(network, mode))
 
 
 def check_onnx(path: str | Path, network: Pfnn, mode: str = "cubic") -> float:
-    """The largest difference between the file and Hobble's runtime, see `onnx_file.check`."""
+    """The largest difference of Y between the file and Hobble's runtime, see `onnx_file.check`."""
     return onnx_file.check(path, network, mode)
 
 
 def _body(network: Pfnn, mode: str) -> onnx_file.Body:
+    """The function that adds the nodes of the network to a graph; see `onnx_file.export`."""
     tables = phase_tables(network, mode)
 
     def body(g: Graph, z: str) -> str:
-        index, share = _lookup(g, mode, len(tables[0][0]))
+        index, share = _add_shares(g, mode, len(tables[0][0]))
         h = z
         for i, (w, b) in enumerate(tables):
-            h = _all_points(g, w, b, share, h) if mode == "cubic" else _gathered(g, w, b, index, share, h)
+            h = _blend_all(g, w, b, share, h) if mode == "cubic" else _blend_some(g, w, b, index, share, h)
             if i < len(tables) - 1:
                 h = g("Elu", h)
         return h
@@ -50,20 +54,22 @@ def _body(network: Pfnn, mode: str) -> onnx_file.Body:
     return body
 
 
-def _lookup(g: Graph, mode: str, points: int) -> tuple[str, str]:
-    """The points (batch, n) to blend, and their shares (batch, n, 1).
+def _add_shares(g: Graph, mode: str, points: int) -> tuple[str, str]:
+    """Add the nodes that find the points around the phase. points: number of stored phases or control points.
 
-    In the mode cubic the shares are (batch, points, 1), and the first result is not needed.
+    Returns the names of two outputs: the indices (batch, n) of the n points to blend, and their shares
+    (batch, n, 1). In the mode cubic the shares are (batch, points, 1), and the indices are not needed.
     """
     one = g.constant(1.0)
-    # A phase of exactly 1 is the end of the cycle, not its start, as in `PfnnPredictor`.
+    # A phase of exactly 1 is the end of the cycle, not its start, as in `PfnnPredictor`. Other phases are
+    # brought to 0..1.
     wrapped = g("Where", g("Equal", "phase", one), "phase", g("Sub", "phase", g("Floor", "phase")))
     scaled = g("Mul", wrapped, g.constant(points))
     last = g.constant(points - 1)
     first = g("Min", g("Floor", scaled), last)
-    column = g.constant([1], np.int64)
-    t = g("Unsqueeze", g("Sub", scaled, first), column)
-    index = g("Unsqueeze", g("Cast", first, to=7), column)  # 7 is int64
+    second_axis = g.constant([1], np.int64)
+    t = g("Unsqueeze", g("Sub", scaled, first), second_axis)
+    index = g("Unsqueeze", g("Cast", first, to=7), second_axis)  # 7 is int64
     if mode == "constant":
         share = g("Add", g("Sub", t, t), one)  # 1 in the shape of t
     elif mode == "linear":
@@ -73,25 +79,28 @@ def _lookup(g: Graph, mode: str, points: int) -> tuple[str, str]:
     else:
         square = g("Mul", t, t)
         powers = g("Concat", g("Add", g("Sub", t, t), one), t, square, g("Mul", square, t), axis=1)
-        # A column for each point. The four coefficients stand in the first columns, zeros in the others; then
-        # the columns are turned to the points around the phase.
+        # The product has a column for each point: the shares of the points index - 1 to index + 2, then
+        # zeros. The share of point k is in column (k + 1 - index) mod points.
         table = np.pad(CATMULL_ROM.T, ((0, 0), (0, points - 4)))
         shares = g("MatMul", powers, g.constant(table))
-        turned = g("Sub", g.constant([[k + 1 + points for k in range(points)]], np.int64), index)
-        share = g("GatherElements", shares, g("Mod", turned, g.constant(points, np.int64)), axis=1)
+        column = g("Sub", g.constant([[k + 1 + points for k in range(points)]], np.int64), index)
+        share = g("GatherElements", shares, g("Mod", column, g.constant(points, np.int64)), axis=1)
     return index, g("Unsqueeze", share, g.constant([2], np.int64))
 
 
-def _all_points(g: Graph, w: Array, b: Array, share: str, h: str) -> str:
-    """sum_k c_k (W_k h + b_k) over all points, as one product."""
+def _blend_all(g: Graph, w: Array, b: Array, share: str, h: str) -> str:
+    """Add the nodes of sum_k c_k (W_k h + b_k) over all points k, as one matrix product.
+
+    w: (points, out, in). b: (points, out). share, h: names of the shares c and of the inputs.
+    """
     points, outputs, inputs = w.shape
     side_by_side = g("MatMul", h, g.constant(w.reshape(points * outputs, inputs).T))
     each = g("Add", g("Reshape", side_by_side, g.constant([-1, points, outputs], np.int64)), g.constant(b))
     return g("ReduceSum", g("Mul", each, share), g.constant([1], np.int64), keepdims=0)
 
 
-def _gathered(g: Graph, w: Array, b: Array, index: str, share: str, h: str) -> str:
-    """Like `_all_points`, but the sum is only over the points in `index` (batch, n)."""
+def _blend_some(g: Graph, w: Array, b: Array, index: str, share: str, h: str) -> str:
+    """Like `_blend_all`, but the sum is only over the points in `index` (batch, n)."""
     weights, biases = g("Gather", g.constant(w), index), g("Gather", g.constant(b), index)
     column = g("Unsqueeze", h, g.constant([1, 3], np.int64))
     each = g("Squeeze", g("MatMul", weights, column), g.constant([3], np.int64))

@@ -10,7 +10,7 @@ from hobble.models.options import Options
 
 
 class PfnnOptions(Options):
-    """The phase-functioned network. The weights of Holden et al. (2017) have two hidden layers."""
+    """The phase-functioned network. The weights released by Holden et al. (2017) have two hidden layers."""
 
     kind: Literal["pfnn"] = "pfnn"
     hidden_layers: Annotated[int, Field(ge=1, le=8)] = 2
@@ -19,9 +19,9 @@ class PfnnOptions(Options):
 
     @property
     def why_asymmetric(self) -> str:
-        """As in `Options`. A symmetric network needs a control point half a cycle after each one."""
-        odd = f"it needs an even number of network.control_points, not {self.control_points}"
-        return odd if self.control_points % 2 else ""
+        """As in `Options`. A symmetric network needs, for each control point, one half a cycle later."""
+        why = f"it needs an even number of network.control_points, not {self.control_points}"
+        return why if self.control_points % 2 else ""
 
     @property
     def hidden(self) -> tuple[int, ...]:

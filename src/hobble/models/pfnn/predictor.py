@@ -1,6 +1,7 @@
-"""Evaluates the network at a phase: three modes, float32 or int16 storage, one character or a crowd.
+"""Evaluates the phase-functioned network, fast, for one character or a crowd.
 
-A mode says at which phases weights are stored, and how the outputs of the stored phases are blended.
+There are three modes. A mode says at which phases weights are stored, and how the outputs of the stored
+phases are blended. The weights are stored as float32 or int16.
 """
 
 from __future__ import annotations
@@ -23,11 +24,13 @@ BLENDED = {"constant": 1, "linear": 2, "cubic": 4}  # mode -> how many of the st
 
 
 class PfnnPredictor(StackPredictor):
-    """A network prepared for one phase mode.
+    """A network prepared for one mode.
 
-    mode: "constant" (50 phases, rounded down), "linear" (10 phases, blended), "cubic" (exact).
-    storage: "float32", or "int16" with a factor for each row: half the memory traffic, joint positions
-    change by less than 0.1 mm.
+    mode: "constant" (50 phases; the phase is rounded down to one), "linear" (10 phases; two are blended) or
+    "cubic" (control points, exact).
+    storage: "float32", or "int16" with a factor for each row. int16 halves the memory traffic and changes
+    joint positions by less than 0.1 mm.
+    points: the number of stored phases or control points.
     """
 
     def __init__(self, network: Pfnn, mode: str = "cubic", storage: str = "float32") -> None:
@@ -65,18 +68,21 @@ def phase_tables(network: Pfnn, mode: str) -> list[tuple[Array, Array]]:
 def _evaluate(
     weights: Any, numbers: Any, plan: Any, blended: int, points: int, z: Any, phase: Any, out: Any
 ) -> None:
+    """Write Y (C, Y) into `out`. weights, numbers, plan: of a `Stack`. blended: 1, 2 or 4, see BLENDED."""
     shares = np.zeros((z.shape[0], points), np.float32)
     for c in range(z.shape[0]):
-        _share(phase[c], blended, points, shares[c])
+        _write_shares(phase[c], blended, points, shares[c])
     blend_layers(weights, numbers, plan, shares, z, out)
 
 
 @njit(forceinline=True, cache=False)
-def _share(phase: float, blended: int, points: int, shares: Any) -> None:
-    """Write the shares of the `blended` (1, 2 or 4) points around `phase` into zeros (points,)."""
-    # A phase of exactly 1 is the end of the cycle, not its start. In constant mode the weights differ there.
+def _write_shares(phase: float, blended: int, points: int, shares: Any) -> None:
+    """Write the shares of the `blended` (1, 2 or 4) points around `phase` into `shares` (points,), all 0."""
+    # A phase of exactly 1 is the end of the cycle, not its start. In the mode constant, the weights at the
+    # end differ from those at the start.
     wrapped = phase if phase == 1.0 else phase - np.floor(phase)
-    # In single precision, as in the program of Holden et al. (2017): .04 * 50 is 2, not just below it.
+    # In single precision, as in the program of Holden et al. (2017). In double precision, 50 times 0.04
+    # stored as float32 would be just below 2.
     scaled = np.float64(np.float32(wrapped) * np.float32(points)) if blended == 1 else wrapped * points
     first = min(int(scaled), points - 1)
     t = scaled - first
@@ -84,7 +90,7 @@ def _share(phase: float, blended: int, points: int, shares: Any) -> None:
         shares[first] = 1.0
     elif blended == 2:
         shares[first], shares[(first + 1) % points] = 1.0 - t, t
-    else:
+    else:  # the rows of `forward.CATMULL_ROM`
         shares[(first - 1 + points) % points] = 0.5 * (-t + 2 * t * t - t * t * t)
         shares[first] = 0.5 * (2 - 5 * t * t + 3 * t * t * t)
         shares[(first + 1) % points] = 0.5 * (t + 4 * t * t - 3 * t * t * t)

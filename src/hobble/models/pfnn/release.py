@@ -1,9 +1,10 @@
 """Reads and writes a folder of .bin files, the format in which Holden et al. (2017) released their weights.
 
-Ports of their program to other languages can read it.
+Ports of their program to other languages can read this format.
 
-W0_000.bin .. W2_049.bin and b0_000.bin .. b2_049.bin hold the weights at phases i / 50. Xmean.bin, Xstd.bin,
-Ymean.bin and Ystd.bin hold the statistics. All are raw little-endian float32, row-major (out, in).
+W0_000.bin .. W2_049.bin and b0_000.bin .. b2_049.bin hold the weights and biases of three layers at phases
+i / 50. Xmean.bin, Xstd.bin, Ymean.bin and Ystd.bin hold means and standard deviations of X and Y. All are raw
+little-endian float32, row-major (out, in).
 """
 
 from __future__ import annotations
@@ -24,17 +25,17 @@ from hobble.models.pfnn.forward import phase_shares, weights_at
 if TYPE_CHECKING:
     from hobble.models.pfnn.network import Pfnn
 
-PHASES = 50  # at which the weights are stored, equally spaced over a cycle
-CONTROL_POINTS = 4  # of the splines on which these weights lie
+PHASES = 50  # number of phases at which weights are stored, equally spaced over a cycle
+CONTROL_POINTS = 4  # of the splines on which the weights lie
 MOST_COLUMNS = 1 << 16  # largest number of columns of X or Y, and of units of a layer
 MOST_WEIGHTS = 1 << 21  # largest number of weights in a file; the released files have at most 262,144
-# Largest difference of a weight from the spline. Rounding weights near 1 to single precision gives less.
-# Weights that do not lie on such a spline differ by far more.
+# Largest difference of a weight from the spline. Rounding weights near 1 to single precision causes smaller
+# differences. Weights that do not lie on a spline with CONTROL_POINTS differ by far more.
 LARGEST_RESIDUAL = 1e-4
 
 
 def write_release(folder: str | Path, network: Pfnn) -> None:
-    """Write the network's weights at 50 phases and its statistics, creating the folder."""
+    """Write the files of the network into `folder`, which is created if it is missing."""
     folder = Path(folder)
     phases = np.arange(PHASES) / PHASES
     for name, key in STATISTICS.items():
@@ -46,8 +47,9 @@ def write_release(folder: str | Path, network: Pfnn) -> None:
 
 
 def read_release(folder: str | Path) -> Mapping[str, Array]:
-    """The folder as arrays W0 (4, out, in), b0 (4, out), ..., Xmean, ...: control points by least squares.
+    """The arrays W0 (4, out, in), b0 (4, out), ..., Xmean, ... of a folder, for `Pfnn.read`.
 
+    W0, b0, ... are the control points of splines, fitted to the weights at the 50 phases by least squares.
     Raises InputError if a file is missing, has a wrong size or numbers that are not finite, or if the weights
     at the 50 phases do not lie on a cyclic cubic spline with 4 control points.
     """
@@ -56,24 +58,28 @@ def read_release(folder: str | Path) -> Mapping[str, Array]:
     layers = sum(1 for _ in folder.glob("b[0-9]*_000.bin"))
     if not 0 < layers <= MOST_LAYERS:
         raise InputError(
-            folder, f"{layers} layers (b0_000.bin, b1_000.bin, ...); 1 to {MOST_LAYERS} are allowed"
+            folder,
+            f"has {layers} layers (files b0_000.bin, b1_000.bin, ...); 1 to {MOST_LAYERS} are allowed",
         )
-    size = len(arrays["Xmean"])
+    inputs = len(arrays["Xmean"])
     for i in range(layers):
-        rows = len(_read(folder / f"b{i}_000.bin"))
-        if rows * size > MOST_WEIGHTS:
-            problem = f"{rows} x {size} weights in a layer; at most {MOST_WEIGHTS} are allowed"
+        outputs = len(_read(folder / f"b{i}_000.bin"))
+        if outputs * inputs > MOST_WEIGHTS:
+            problem = f"{outputs} x {inputs} weights in a layer; at most {MOST_WEIGHTS} are allowed"
             raise InputError(folder / f"b{i}_000.bin", problem)
-        biases = np.stack([_read(folder / f"b{i}_{k:03d}.bin", rows) for k in range(PHASES)])
-        weights = np.stack([_read(folder / f"W{i}_{k:03d}.bin", rows * size) for k in range(PHASES)])
+        biases = np.stack([_read(folder / f"b{i}_{k:03d}.bin", outputs) for k in range(PHASES)])
+        weights = np.stack([_read(folder / f"W{i}_{k:03d}.bin", outputs * inputs) for k in range(PHASES)])
         arrays[f"b{i}"] = _control_points(folder, f"b{i}", biases)
-        arrays[f"W{i}"] = _control_points(folder, f"W{i}", weights).reshape(CONTROL_POINTS, rows, size)
-        size = rows
+        arrays[f"W{i}"] = _control_points(folder, f"W{i}", weights).reshape(CONTROL_POINTS, outputs, inputs)
+        inputs = outputs
     return arrays
 
 
 def _control_points(folder: Path, name: str, values: Array) -> Array:
-    """(4, n) control points of splines with the values (50, n). name: W or b and the number of the layer."""
+    """(4, n) control points of n splines, fitted to their values (50, n) at the phases.
+
+    name: W or b and the number of the layer, for error messages.
+    """
     if beyond := np.flatnonzero(~(np.abs(values) <= LARGEST_WEIGHT).all(axis=1)).tolist():
         raise InputError(
             folder / f"{name}_{beyond[0]:03d}.bin",
@@ -84,7 +90,9 @@ def _control_points(folder: Path, name: str, values: Array) -> Array:
     residual = float(np.abs(shares @ points - values).max())
     if not residual < LARGEST_RESIDUAL:
         raise InputError(
-            folder, f"{name} at 50 phases is not a cyclic cubic of 4 control points (off by {residual:.2g})"
+            folder,
+            f"{name} at 50 phases is not a cyclic cubic spline with 4 control points: it is off by up to "
+            f"{residual:.2g}",
         )
     return points.astype(np.float32)
 
@@ -93,7 +101,8 @@ def _read(path: Path, size: int | None = None) -> Array:
     """The float32 numbers of a file. size: how many it must hold; None: any number up to MOST_COLUMNS."""
     data = read_bytes(path, 4 * (MOST_COLUMNS if size is None else size))
     if len(data) % 4 or not data or (size is not None and len(data) != 4 * size):
-        raise InputError(path, f"{len(data)} bytes" + (f", expected {4 * size}" if size else ""))
+        expected = "a multiple of 4 above 0" if size is None else 4 * size
+        raise InputError(path, f"has {len(data)} bytes, expected {expected}")
     return np.frombuffer(data, "<f4").astype(np.float32)
 
 

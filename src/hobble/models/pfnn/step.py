@@ -1,8 +1,10 @@
-"""Loss and gradient of one batch, written out as three large products for each layer.
+"""Loss and gradient of one batch, computed with three large matrix products for each layer.
 
-e: inputs x of a layer with a 1 appended, times each of the K spline coefficients c, (B, K (in + 1)); W:
-weights and biases, (out, K (in + 1)); a: outputs, (B, out). dX is the gradient of the loss
-by X, and X' is X transposed:
+A batch has B rows. For each layer, x (B, in) are the inputs and a (B, out) the outputs. c (B, K) are the
+coefficients of the K control points. e (B, K (in + 1)) are the inputs with a 1 appended, times each of the K
+coefficients. W (out, K (in + 1)) are weights and biases of all control points. da, dW, de and dx are the
+gradients of the loss by these arrays, de_k is the part of de for control point k without the column of the 1,
+and ' transposes a matrix:
 
     a = e W'        dW = da' e        de = da W        dx = sum_k c_k de_k
 
@@ -24,10 +26,13 @@ class PfnnStep:
     """The gradient of the mean squared error of a network under dropout, in PyTorch, on any device.
 
     network: the network in training, read at every call.
-    dropout: share of units dropped before each layer, inputs included; the units kept are scaled up.
-    half: round the factors of the products to bfloat16; sums and everything else stay float32.
+    dropout: share of units dropped before each layer, inputs included. The other units are scaled up.
+    half: round the factors of the products to bfloat16. Sums and everything else stay float32.
     gradients: of the last call, (out, K (in + 1)) for each layer, in bfloat16 with `half`.
     error: of the last call, (B, Y), prediction minus y.
+
+    keep: 1 - dropout. factors: the parameters as factors of the products, in bfloat16 with `half`. widths:
+    number of inputs of each layer. generator, input_mask: see `hobble.models.trainable.TrainingStep`.
     """
 
     def __init__(self, network: TrainablePfnn, dropout: float, half: bool = False) -> None:
@@ -44,7 +49,7 @@ class PfnnStep:
     def __call__(self, x: Tensor, y: Tensor, p: Tensor, masks: list[Tensor]) -> Tensor:
         """Compute `gradients` for x (B, X), y (B, Y), p (B,). Returns the mean squared error, a scalar.
 
-        masks: one for each layer, from `masks`.
+        p: phases. masks: one for each layer, from the method `masks`.
         """
         if self.half:
             self.factors.copy_(self.network.flat)
@@ -58,8 +63,8 @@ class PfnnStep:
             slopes.append(slope)
             x = self.multiplied(f"outputs {number}", e, weight).to(y.dtype)
         self.error = x.sub_(y)
-        d = self.error * (2.0 / y.numel())
-        self.gradients = [d] * len(weights)
+        d = self.error * (2.0 / y.numel())  # gradient of the mean square by the prediction
+        self.gradients = [d] * len(weights)  # each is replaced below
         for number in range(len(weights) - 1, -1, -1):
             d = d.to(self.factors.dtype)
             self.gradients[number] = self.multiplied(f"gradient {number}", d.T, expanded[number].T)
@@ -73,16 +78,16 @@ class PfnnStep:
         self.generator.manual_seed(seed)
 
     def masks(self, rows: int, own: slice = ALL_ROWS) -> list[Tensor]:
-        """Draw the dropout masks of `rows` rows, and return those of the rows `own`.
+        """Draw the dropout masks of a batch of `rows` rows, and return those of the rows `own`.
 
-        A mask (rows, in) for each layer: 0 where an input is dropped, else 1 / keep.
+        Each layer has a mask (rows, in): 0 where an input is dropped, else 1 / keep.
         """
         flat, widths = self.network.flat, self.widths
         drawn = torch.rand(rows, sum(widths), generator=self.generator, device=flat.device)[own]
         return list((drawn < self.keep).to(flat.dtype).mul_(1.0 / self.keep).split(widths, dim=1))
 
     def multiplied(self, name: str, a: Tensor, b: Tensor) -> Tensor:
-        """a @ b.T. name: of this product, for the buffers of the fused step (`hobble.models.fused_base`)."""
+        """a @ b.T. name: names the result's buffer in the fused step (`hobble.models.fused_base`)."""
         return product(a, b)
 
     def coefficients(self, p: Tensor) -> Tensor:
@@ -90,18 +95,18 @@ class PfnnStep:
         return coefficients(p, self.network.control_points)
 
     def expanded(self, number: int, x: Tensor, c: Tensor, mask: Tensor) -> tuple[Tensor, Tensor]:
-        """Layer `number`'s masked inputs x (B, n), expanded to (B, K (n + 1)), and the slopes (B, n).
+        """For layer `number`: e (B, K (n + 1)) of its inputs x (B, n) times the mask, and slopes (B, n).
 
-        x is the result of an ELU (in layer 0, the slopes are not used). A slope is the derivative of that
-        ELU times the mask. The derivative is x + 1 where x is below 0, else 1.
+        A slope is the mask times the derivative of the ELU that gave x. The derivative is x + 1 where x is
+        below 0, else 1. In layer 0 x comes from no ELU, and the slopes are not used.
         """
         return expand(x * mask, c).to(self.factors.dtype), mask * torch.clamp(x + 1, max=1)
 
     def contracted(self, number: int, de: Tensor, c: Tensor, slope: Tensor) -> Tensor:
-        """The gradient (B, n) by the values before the ELU in front of layer `number`.
+        """The gradient (B, n) by the outputs of the previous layer, before their ELU.
 
-        de: (B, K (n + 1)) the gradient by the layer's expanded inputs. c: (B, K) spline coefficients. slope:
-        (B, n) from `expanded`.
+        number: of the layer whose inputs they are. de: (B, K (n + 1)) the gradient by e of this layer. c:
+        (B, K) spline coefficients. slope: (B, n) from `expanded`.
         """
         parts = de.to(c.dtype).view(len(c), c.shape[1], -1)[:, :, :-1]
         return torch.bmm(c[:, None, :], parts)[:, 0, :] * slope

@@ -1,4 +1,4 @@
-"""The phase-functioned network in training: parameters and spline coefficients."""
+"""The phase-functioned network in training: its parameters, and the spline coefficients that blend them."""
 
 from __future__ import annotations
 
@@ -19,10 +19,10 @@ from hobble.rows.mirror_columns import ColumnMirror
 
 @dataclass(frozen=True)
 class TrainablePfnn(Trainable):
-    """Layers of `sizes` units whose weights and biases are cyclic cubic splines of the phase.
+    """Layers whose weights and biases are cyclic cubic splines of the phase.
 
-    sizes: units from input to output, such as (342, 512, 512, 311). control_points: K, how many knots the
-    splines have, equally spaced over a cycle.
+    sizes: units of each layer, the input first, such as (342, 512, 512, 311). control_points: K, the number
+    of control points of the splines, equally spaced over a cycle.
     """
 
     kind: ClassVar[str] = "pfnn"
@@ -32,7 +32,7 @@ class TrainablePfnn(Trainable):
 
     @property
     def shapes(self) -> list[tuple[int, int, int]]:
-        """(out, K, in + 1) of each layer."""
+        """As in `Trainable`."""
         return [(out, self.control_points, size + 1) for size, out in pairwise(self.sizes)]
 
     @property
@@ -46,7 +46,7 @@ class TrainablePfnn(Trainable):
         return self.sizes[-1]
 
     def __call__(self, x: Tensor, p: Tensor) -> Tensor:
-        """Standardised outputs (B, Y) of standardised inputs (B, X) at phases (B,), without dropout."""
+        """As in `Trainable`."""
         c = coefficients(p, self.control_points)
         for number, layer in enumerate(self.layers):
             if number:
@@ -55,18 +55,18 @@ class TrainablePfnn(Trainable):
         return x
 
     def mirrors(self, inputs: ColumnMirror, outputs: ColumnMirror) -> list[LayerMirror]:
-        """As in `Trainable`. In half a cycle there are half of the control points."""
+        """As in `Trainable`. Half a cycle is half of the control points."""
         return layer_mirrors(inputs, outputs, self.sizes[1:-1], self.control_points // 2)
 
     def step(self, dropout: float, half: bool) -> TrainingStep:
-        """Compiled loops on a CPU, PyTorch elsewhere."""
+        """As in `Trainable`: the step with compiled loops on a CPU, the step in PyTorch elsewhere."""
         from hobble.models.pfnn import fused, step
 
         on_cpu = self.flat.device.type == "cpu"
         return (fused.FusedPfnnStep if on_cpu else step.PfnnStep)(self, dropout, half)
 
     def arrays(self) -> dict[str, np.ndarray]:
-        """`W0` (K, out, in), `b0` (K, out), ..."""
+        """As in `Trainable`: `W0` (K, out, in), `b0` (K, out), `W1`, `b1`, ..."""
         arrays = {}
         for number, layer in enumerate(self.layers):
             values = layer.cpu().numpy()
@@ -82,18 +82,21 @@ class TrainablePfnn(Trainable):
     @property
     def described(self) -> str:
         """As in `Trainable`."""
-        units, count = "-".join(map(str, self.sizes)), parameters(self.sizes, self.control_points)
+        units, count = "-".join(map(str, self.sizes)), parameter_count(self.sizes, self.control_points)
         return f"{units} units and {self.control_points} control points ({count:,} parameters)"
 
 
-def parameters(sizes: tuple[int, ...], control_points: int) -> int:
-    """The number of parameters, which is the length of `flat`."""
+def parameter_count(sizes: tuple[int, ...], control_points: int) -> int:
+    """The number of weights and biases at all control points, which is the length of `Trainable.flat`."""
     return control_points * sum((size + 1) * out for size, out in pairwise(sizes))
 
 
 def initialise(sizes: tuple[int, ...], control_points: int, seed: int) -> TrainablePfnn:
-    """A new network: weights uniform within +-sqrt(6 / (in * out)), biases 0 (code of Holden et al. 2017)."""
-    flat = torch.zeros(parameters(sizes, control_points))
+    """A new network. Its weights are random, uniform within +-sqrt(6 / (in * out)), and its biases are 0.
+
+    The code that Holden et al. (2017) released starts in the same way.
+    """
+    flat = torch.zeros(parameter_count(sizes, control_points))
     network = TrainablePfnn(flat, tuple(sizes), control_points)
     uniform_start(network.layers, np.random.default_rng([seed, 0]))
     return network
@@ -105,9 +108,9 @@ def coefficients(p: Tensor, control_points: int) -> Tensor:
     They sum to 1. At p = k / K only the coefficient of control point k is not 0.
     """
     position = torch.remainder(p, 1.0) * control_points
-    knot = torch.floor(position)
-    t = (position - knot)[:, None]
-    index = knot.long()[:, None] + torch.arange(-1, 3, device=p.device)
+    before = torch.floor(position)  # the control point at or before the phase
+    t = (position - before)[:, None]
+    index = before.long()[:, None] + torch.arange(-1, 3, device=p.device)  # of the four points around it
     cubic = torch.cat(
         [
             ((2 - t) * t - 1) * t / 2,
@@ -117,11 +120,11 @@ def coefficients(p: Tensor, control_points: int) -> Tensor:
         ],
         dim=1,
     )
-    knots = torch.arange(control_points, device=p.device)
-    picked = torch.remainder(index, control_points)[:, :, None] == knots
-    return torch.sum(cubic[:, :, None] * picked, dim=1)
+    points = torch.arange(control_points, device=p.device)
+    is_point = torch.remainder(index, control_points)[:, :, None] == points
+    return torch.sum(cubic[:, :, None] * is_point, dim=1)
 
 
 def expand(x: Tensor, c: Tensor) -> Tensor:
-    """Each row of x (B, n) with a 1 appended, times each of its coefficients c (B, K): (B, K (n + 1))."""
+    """(B, K (n + 1)): each row of x (B, n) with a 1 appended, times each coefficient of the row, c (B, K)."""
     return torch.cat([c[:, :, None] * x[:, None, :], c[:, :, None]], dim=2).flatten(1)

@@ -1,4 +1,4 @@
-"""A feed-forward network with the phase as input: the baseline for the kind `pfnn`."""
+"""A feed-forward network that gets the phase as input. It is the baseline for the kind `pfnn`."""
 
 from __future__ import annotations
 
@@ -24,7 +24,9 @@ class _Plain(Trained):
         return PlainOptions
 
     def parameters(self, options: PlainOptions, inputs: int, outputs: int) -> int:
-        return sum((a + 1) * b for a, b in pairwise(options.sizes(inputs, outputs))) + 2 * options.units
+        weights_of_phase = 2 * options.units  # the first layer also gets sine and cosine of the phase
+        sizes = options.sizes(inputs, outputs)
+        return sum((size + 1) * out for size, out in pairwise(sizes)) + weights_of_phase
 
     def trainable(
         self, options: PlainOptions, layout: RowLayout, skeleton: Skeleton, seed: int

@@ -1,4 +1,7 @@
-"""A feed-forward network with sine and cosine of the phase as extra inputs; see `Plain.predict`."""
+"""A feed-forward network with sine and cosine of the phase as extra inputs.
+
+Start reading at `Plain.predict`.
+"""
 
 from __future__ import annotations
 
@@ -23,9 +26,9 @@ PHASE_COLUMNS = 2  # inputs after the columns of X: sine and cosine of the phase
 
 @dataclass(frozen=True)
 class Plain(Network):
-    """A feed-forward network. weights: (out, in) float32 for each layer; biases: (out,) for each layer.
+    """A feed-forward network. Its first layer gets X, then sine and cosine of the phase.
 
-    The first layer gets X and PHASE_COLUMNS more inputs.
+    weights: (out, in) float32 for each layer. biases: (out,) float32 for each layer.
     """
 
     kind: ClassVar[str] = "plain"
@@ -35,20 +38,21 @@ class Plain(Network):
 
     @classmethod
     def read(cls, path: str | Path, arrays: Mapping[str, Any], common: Mapping[str, Any]) -> Plain:
-        """From the arrays W0 (out, in), b0 (out,), ... of a file; see `hobble.models.load`."""
+        """As in `Model`. arrays: W0 (out, in), b0 (out,), W1, b1, ..."""
         inputs, outputs = len(common["x_mean"]) + PHASE_COLUMNS, len(common["y_mean"])
         weights, biases = stacked(path, arrays, ("W", "b"), 2, inputs, outputs)
         return cls(weights=weights, biases=biases, **common)
 
     @property
     def sizes(self) -> tuple[int, ...]:
-        """Units of each layer, the columns of X first: (342, 512, 512, 311)."""
+        """Units of each layer, the columns of X first, such as (342, 512, 512, 311)."""
         return (len(self.x_mean), *(len(b) for b in self.biases))
 
     @property
     def parameters(self) -> int:
-        """All weights and biases."""
-        return sum(a * b + b for a, b in pairwise(self.sizes)) + PHASE_COLUMNS * self.sizes[1]
+        """As in `Network`: the number of all weights and biases."""
+        without_phase = sum(inputs * outputs + outputs for inputs, outputs in pairwise(self.sizes))
+        return without_phase + PHASE_COLUMNS * self.sizes[1]
 
     @property
     def described(self) -> str:
@@ -61,7 +65,7 @@ class Plain(Network):
         h = np.concatenate([standardised(self, x), phase_columns(phase)], axis=1)
         for number, (weight, bias) in enumerate(zip(self.weights, self.biases, strict=True)):
             h = h @ weight.T + bias
-            if number < len(self.weights) - 1:
+            if number < len(self.weights) - 1:  # the ELU: h above 0, else e^h - 1
                 h = np.where(h > 0, h, np.expm1(np.minimum(h, 0)))
         return h * self.y_std + self.y_mean
 
@@ -73,8 +77,8 @@ class Plain(Network):
     def page(self, inputs: NDArray[np.int64], outputs: NDArray[np.int64]) -> dict[str, Any]:
         """As in `Network`: weights as integers with a factor for each row."""
         weights, biases = list(self.weights), list(self.biases)
-        phase = len(self.x_mean) + np.arange(PHASE_COLUMNS)
-        weights[0] = weights[0][:, np.concatenate([inputs, phase])]
+        phase_inputs = len(self.x_mean) + np.arange(PHASE_COLUMNS)
+        weights[0] = weights[0][:, np.concatenate([inputs, phase_inputs])]
         weights[-1], biases[-1] = weights[-1][outputs], biases[-1][outputs]
         return {"layers": [packed_rows(w[None], b[None]) for w, b in zip(weights, biases, strict=True)]}
 
@@ -82,22 +86,23 @@ class Plain(Network):
     def exports(self) -> dict[str, Export]:
         """The format "onnx"."""
 
-        def onnx(target: Path, mode: str) -> str:
+        def write_onnx(target: Path, mode: str) -> str:
             from hobble.models.plain.onnx_export import write_checked
 
             difference = write_checked(target, self)
             return f"{target}: differs from Hobble's runtime by at most {difference:.1g}"
 
-        return {"onnx": onnx}
+        return {"onnx": write_onnx}
 
 
 class PlainPredictor(StackPredictor):
-    """The plain network prepared to run, with weights stored as float32 or int16."""
+    """The plain network prepared to run. storage: type of the stored weights, "float32" or "int16"."""
 
     network: Plain
 
     def __init__(self, network: Plain, storage: str = "float32") -> None:
         super().__init__(network)
+        # A `Stack` blends sets of weights; here is only one set.
         weights, biases = [w[None] for w in network.weights], [b[None] for b in network.biases]
         self._stack = Stack(weights, biases, storage, network.y_mean, network.y_std)
 
@@ -109,17 +114,22 @@ class PlainPredictor(StackPredictor):
 
 @njit(error_model="numpy")
 def _evaluate(weights: Any, numbers: Any, plan: Any, z: Any, phase: Any, out: Any) -> None:
-    """Write Y (C, Y) into `out`. phase: (C, PHASE_COLUMNS) the inputs after those in z (C, X)."""
+    """Write Y (C, Y) into `out`.
+
+    weights, numbers, plan: of a `Stack`. z: (C, X) standardised inputs. phase: (C, PHASE_COLUMNS), the inputs
+    after these.
+    """
     inputs = np.empty((z.shape[0], z.shape[1] + phase.shape[1]), np.float32)
     for c in range(z.shape[0]):
         for i in range(z.shape[1]):
             inputs[c, i] = z[c, i]
         for i in range(phase.shape[1]):
             inputs[c, z.shape[1] + i] = phase[c, i]
-    blend_layers(weights, numbers, plan, np.ones((z.shape[0], 1), np.float32), inputs, out)
+    shares = np.ones((z.shape[0], 1), np.float32)  # of the only set of weights
+    blend_layers(weights, numbers, plan, shares, inputs, out)
 
 
 def phase_columns(phase: Array) -> Array:
-    """(n, 2) float32: sine and cosine of phases (n,) in cycles."""
+    """(n, PHASE_COLUMNS) float32: sine and cosine of phases (n,) in cycles."""
     angle = 2 * np.pi * np.asarray(phase, float)
     return np.stack([np.sin(angle), np.cos(angle)], axis=1).astype(np.float32)

@@ -1,4 +1,4 @@
-"""The plain network as ONNX."""
+"""Writes the plain network as an ONNX file, with `hobble.models.onnx_file`."""
 
 from __future__ import annotations
 
@@ -11,9 +11,9 @@ from hobble.models.plain.network import Plain
 
 
 def write_checked(path: str | Path, network: Plain) -> float:
-    """Write and check the file. Returns the largest difference, see `hobble.models.onnx_file.check`."""
+    """Write and check the file. Returns the largest difference of Y, see `hobble.models.onnx_file.check`."""
 
-    def body(g: Graph, z: str) -> str:
+    def body(g: Graph, z: str) -> str:  # adds the nodes of the network to the graph
         angle = g("Unsqueeze", g("Mul", "phase", g.constant(2 * np.pi)), g.constant([1], np.int64))
         h = g("Concat", z, g("Sin", angle), g("Cos", angle), axis=1)
         for i, (w, b) in enumerate(zip(network.weights, network.biases, strict=True)):

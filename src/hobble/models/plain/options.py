@@ -10,7 +10,7 @@ from hobble.models.options import Options
 
 
 class PlainOptions(Options):
-    """A feed-forward network with the same layer sizes as the phase-functioned network."""
+    """A feed-forward network. By default its layers have the sizes of the phase-functioned network's."""
 
     kind: Literal["plain"] = "plain"
     hidden_layers: Annotated[int, Field(ge=1, le=8)] = 2
@@ -18,7 +18,7 @@ class PlainOptions(Options):
 
     @property
     def why_asymmetric(self) -> str:
-        """As in `Options`: empty, because it can always be trained symmetrically."""
+        """As in `Options`: always "", because any plain network can be trained with `training.symmetric`."""
         return ""
 
     @property

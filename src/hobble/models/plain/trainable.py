@@ -1,4 +1,4 @@
-"""The plain network in training. Its training step is that of `pfnn` with one control point."""
+"""The plain network in training. Its training step is that of the kind `pfnn` with one control point."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from torch import Tensor
 
 from hobble.models.layer_mirror import LayerMirror, layer_mirrors
 from hobble.models.pfnn.fused import FusedPfnnStep
-from hobble.models.pfnn.step import PfnnStep as BlendedStep
+from hobble.models.pfnn.step import PfnnStep
 from hobble.models.plain.network import PHASE_COLUMNS
 from hobble.models.products import product
 from hobble.models.trainable import ALL_ROWS, Trainable, TrainingStep, uniform_start
@@ -23,23 +23,24 @@ from hobble.rows.mirror_columns import ColumnMirror
 class TrainablePlain(Trainable):
     """A plain network in training.
 
-    units: of each layer, the columns of X first. The first layer has PHASE_COLUMNS more inputs.
+    units: number of units of each layer, the columns of X first. The first layer has PHASE_COLUMNS more
+    inputs: sine and cosine of the phase.
     """
 
     kind: ClassVar[str] = "plain"
-    control_points: ClassVar[int] = 1  # one set of weights; the step of `pfnn` reads this field
+    control_points: ClassVar[int] = 1  # one set of weights; `PfnnStep` reads this field
 
     units: tuple[int, ...]
 
     @property
     def sizes(self) -> tuple[int, ...]:
-        """Number of inputs of each layer, the phase's included, then the number of outputs."""
+        """Number of inputs of each layer, with those for the phase, then the number of outputs."""
         return (self.units[0] + PHASE_COLUMNS, *self.units[1:])
 
     @property
     def shapes(self) -> list[tuple[int, int, int]]:
         """As in `Trainable`."""
-        return shapes(self.units)
+        return layer_shapes(self.units)
 
     @property
     def inputs(self) -> int:
@@ -53,7 +54,7 @@ class TrainablePlain(Trainable):
 
     def __call__(self, x: Tensor, p: Tensor) -> Tensor:
         """As in `Trainable`."""
-        x = with_phase(x, p)
+        x = append_phase(x, p)
         for number, layer in enumerate(self.layers):
             if number:
                 x = torch.nn.functional.elu(x)
@@ -62,21 +63,21 @@ class TrainablePlain(Trainable):
 
     def mirrors(self, inputs: ColumnMirror, outputs: ColumnMirror) -> list[LayerMirror]:
         """As in `Trainable`. Half a cycle later, sine and cosine of the phase have the opposite sign."""
-        phase = np.arange(PHASE_COLUMNS)
+        phase_inputs = len(inputs.source) + np.arange(PHASE_COLUMNS)
         extended = ColumnMirror(
-            np.append(inputs.source, len(inputs.source) + phase),
+            np.append(inputs.source, phase_inputs),
             np.append(inputs.sign, -np.ones(PHASE_COLUMNS)),
             np.append(inputs.shift, np.zeros(PHASE_COLUMNS)),
         )
         return layer_mirrors(extended, outputs, self.units[1:-1], 0)
 
     def step(self, dropout: float, half: bool) -> TrainingStep:
-        """Compiled loops on a CPU, PyTorch elsewhere."""
+        """As in `Trainable`: the step with compiled loops on a CPU, the step in PyTorch elsewhere."""
         step: Any = FusedPlainStep if self.flat.device.type == "cpu" else PlainStep
         return step(self, dropout, half)
 
     def arrays(self) -> dict[str, np.ndarray]:
-        """`W0` (out, in), `b0` (out,), ..."""
+        """As in `Trainable`: `W0` (out, in), `b0` (out,), `W1`, `b1`, ..."""
         arrays = {}
         for number, layer in enumerate(self.layers):
             values = layer[:, 0].cpu().numpy()
@@ -99,14 +100,14 @@ class TrainablePlain(Trainable):
 
 
 class _WithPhase:
-    """A base class that appends sine and cosine of the phase to the inputs of a training step."""
+    """First base class of both training steps: appends sine and cosine of the phase to the inputs."""
 
     def __call__(self, x: Tensor, y: Tensor, p: Tensor, masks: list[Tensor]) -> Tensor:
         """As in `TrainingStep`."""
-        return super().__call__(with_phase(x, p), y, p, masks)  # type: ignore[misc]
+        return super().__call__(append_phase(x, p), y, p, masks)  # type: ignore[misc]
 
     def masks(self, rows: int, own: slice = ALL_ROWS) -> list[Tensor]:
-        """As in `TrainingStep`, but the phase is never dropped. In `pfnn` it is not dropped either."""
+        """As in `TrainingStep`, but the phase is never dropped. The kind `pfnn` never drops it either."""
         masks: list[Tensor] = super().masks(rows, own)  # type: ignore[misc]
         masks[0][:, -PHASE_COLUMNS:] = 1
         return masks
@@ -116,7 +117,7 @@ class _WithPhase:
         return torch.ones_like(p[:, None])
 
 
-class PlainStep(_WithPhase, BlendedStep):  # type: ignore[misc]
+class PlainStep(_WithPhase, PfnnStep):  # type: ignore[misc]
     """The plain network's step in PyTorch, on any device."""
 
 
@@ -124,20 +125,20 @@ class FusedPlainStep(_WithPhase, FusedPfnnStep):  # type: ignore[misc]
     """The plain network's step in compiled loops on a CPU."""
 
 
-def with_phase(x: Tensor, p: Tensor) -> Tensor:
+def append_phase(x: Tensor, p: Tensor) -> Tensor:
     """x (B, X) with sine and cosine of phases (B,) appended."""
     angle = 2 * torch.pi * p[:, None]
     return torch.cat([x, torch.sin(angle), torch.cos(angle)], dim=1)
 
 
-def shapes(units: tuple[int, ...]) -> list[tuple[int, int, int]]:
-    """(out, 1, in + 1) of each layer."""
+def layer_shapes(units: tuple[int, ...]) -> list[tuple[int, int, int]]:
+    """(out, 1, in + 1) of each layer. units: see `TrainablePlain`."""
     inputs = (units[0] + PHASE_COLUMNS, *units[1:-1])
     return [(out, 1, size + 1) for size, out in zip(inputs, units[1:], strict=True)]
 
 
 def initialise(units: tuple[int, ...], seed: int) -> TrainablePlain:
-    """A new network: weights uniform within +-sqrt(6 / (in * out)), biases 0, as in `pfnn`."""
-    network = TrainablePlain(torch.zeros(sum(map(prod, shapes(units)))), units)
+    """A new network. Its weights are random, uniform within +-sqrt(6 / (in * out)), and its biases are 0."""
+    network = TrainablePlain(torch.zeros(sum(map(prod, layer_shapes(units)))), units)
     uniform_start(network.layers, np.random.default_rng([seed, 0]))
     return network
