@@ -17,7 +17,7 @@ from hobble.core.errors import InputError
 from hobble.core.quat import Array
 from hobble.core.skeleton import Skeleton
 
-MOST_LAYERS = 16
+MOST_LAYERS = 16  # in a network
 # At most this many numbers in an array: 256 MB as float32. The largest array of known networks has 3 million.
 MOST_NUMBERS = 1 << 26
 LARGEST_WEIGHT = 1e6  # trained weights are below 10
@@ -26,7 +26,7 @@ LARGEST_STD = 1e20  # so large because the std of a joint that the network shall
 MOST_NAMES = 4096  # in one list
 LONGEST_NAME = 200  # characters
 FARTHEST = 1e5  # cm; largest coordinate of a joint relative to its parent
-# A skeleton's roles say which joint is the left knee and so on. It needs at least these.
+# A skeleton's roles say which joint is the left knee and so on. These roles must have a joint.
 NEEDED_ROLES = (
     "hips",
     *(f"{side}_{part}" for side in ("left", "right") for part in ("hip", "knee", "heel", "toe")),

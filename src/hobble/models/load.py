@@ -118,9 +118,9 @@ def _read_meta(path: str | Path, arrays: Mapping[str, Any]) -> dict[str, Any]:
 def _read_layout(
     path: str | Path, meta: Mapping[str, Any], x_size: int, y_size: int, skeleton: Skeleton | None
 ) -> RowLayout:
-    """The layout of the columns of X and Y. Raises InputError if X or Y does not have its size.
+    """The layout of the columns of X and Y, from `meta` or else guessed by `_guess_layout`.
 
-    x_size, y_size: number of columns of X and Y. skeleton: see `_guess_layout`.
+    x_size, y_size: number of columns of X and Y in the file. Raises InputError if the layout has other sizes.
     """
     if "layout" not in meta:
         layout = _guess_layout(x_size, y_size, skeleton)

@@ -1,6 +1,6 @@
 """The training step on a CPU: what `step` does before and after the matrix products, in compiled loops.
 
-The letters h, c, da and dc are explained in `hobble.models.mann.step`. B is the number of rows of a batch.
+`hobble.models.mann.step` explains the letters c, da, dc and dblend. B is the number of rows of a batch.
 """
 
 from __future__ import annotations
@@ -32,10 +32,10 @@ class FusedMannStep(FusedBase, MannStep):
 
     def blend_experts(self, number: int, outputs: Tensor, c: Tensor) -> Tensor:
         """As in `MannStep`, in one compiled loop."""
-        h = self.buffer(f"h {number}", len(c), outputs.shape[1] // c.shape[1])
+        blend = self.buffer(f"blend {number}", len(c), outputs.shape[1] // c.shape[1])
         use_threads(outputs.numel())
-        _blend_experts(as_numpy(outputs), c.numpy(), h.numpy())
-        return h
+        _blend_experts(as_numpy(outputs), c.numpy(), blend.numpy())
+        return blend
 
     def gradient_by_experts(
         self, number: int, dblend: Tensor, outputs: Tensor, c: Tensor, dc: Tensor
@@ -70,20 +70,20 @@ def _prepare_inputs(x: Any, mask: Any, inputs: Any, slope: Any) -> None:
 
 
 @njit(parallel=True, error_model="numpy")
-def _blend_experts(outputs: Any, c: Any, h: Any) -> None:
-    """Write h (B, out): the sum over the experts of their outputs (B, K out) times their shares c (B, K)."""
-    rows, width = h.shape
+def _blend_experts(outputs: Any, c: Any, blend: Any) -> None:
+    """Write blend (B, out), the sum over the experts of outputs (B, K out) times shares c (B, K)."""
+    rows, width = blend.shape
     is_bfloat16 = outputs.itemsize == 2
     for row in numba.prange(rows):
-        h[row] = 0
+        blend[row] = 0
         for k in range(c.shape[1]):
             start, share = k * width, c[row, k]
             if is_bfloat16:
                 for i in range(width):
-                    h[row, i] += share * to_float32(outputs[row, start + i])
+                    blend[row, i] += share * to_float32(outputs[row, start + i])
             else:
                 for i in range(width):
-                    h[row, i] += share * outputs[row, start + i]
+                    blend[row, i] += share * outputs[row, start + i]
 
 
 # `reassoc` lets the compiler change the order of a sum, so that it can add several terms at a time.

@@ -64,7 +64,7 @@ class MannStep:
             outputs.append(self.multiplied(f"outputs {number}", saved[-1][0], weight))
             x = self.blend_experts(number, outputs[-1], c)
         self.error = x.sub_(y)
-        dblend = self.error * (2.0 / y.numel())
+        dblend = self.error * (2.0 / y.numel())  # of the last layer, whose blend is the prediction
         dc = torch.zeros_like(c)
         gradients = [dblend] * len(weights)
         for number in range(len(weights) - 1, -1, -1):
