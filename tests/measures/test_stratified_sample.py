@@ -14,7 +14,7 @@ from hobble.measures.accuracy import page
 from hobble.measures.accuracy.run import measure
 from hobble.measures.rollouts.page import rollout_chart
 from hobble.measures.rollouts.run import measure_roll_outs
-from hobble.measures.stratified_sample import LEAST, Sample, Stratum, draw_sample
+from hobble.measures.stratified_sample import LEAST_EXCERPTS, Sample, Stratum, draw_sample
 from hobble.rows.clip_rows import save_clip_rows
 from hobble.rows.excerpts import LONGEST, Excerpt, ExcerptKind, excerpts, load_excerpt
 from hobble.rows.layout import GAITS
@@ -71,7 +71,7 @@ def test_the_sample_has_the_requested_size_and_every_kind_of_clip():
     for stratum in sample.strata:
         kinds = {(splits[n.clip], of_excerpt[n].gait, of_excerpt[n].channels) for n in stratum.drawn}
         assert len(kinds) == 1
-        assert len(stratum.drawn) >= min(LEAST, stratum.count)
+        assert len(stratum.drawn) >= min(LEAST_EXCERPTS, stratum.count)
         measured[stratum.split] += sum(one.rows for one in stratum.drawn)
     held_out = sum(one.rows for one in clips if splits[one.clip] == "held_out")
     assert measured["held_out"] == pytest.approx(min(150_000, held_out), rel=0.1)

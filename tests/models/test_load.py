@@ -66,7 +66,7 @@ MALFORMED: dict[str, tuple[Change, str]] = {
     ),
     "a last layer of too few outputs": (
         lambda c: [cut("W2", 1)(c), cut("b2", 1)(c)],
-        "but Y has 311 columns",
+        "expected 311",
     ),
     "seventeen layers": (
         lambda c: c.update({f"W{i}": c["W1"] for i in range(3, 17)}),
@@ -80,7 +80,7 @@ MALFORMED: dict[str, tuple[Change, str]] = {
     "infinity in Ystd": (put("Ystd", 0, np.inf), "not finite"),
     "Xstd below 0": (put("Xstd", 9, -1.0), "cannot be negative"),
     "1e30 in Ymean": (put("Ymean", 4, 1e30), "above the limit"),
-    "Xmean longer than Xstd": (cut("Xstd", 0), "Xstd 371"),
+    "Xmean longer than Xstd": (cut("Xstd", 0), "Xstd has 371"),
     "a window of 6e8 frames": (layout(window=600_000_000), "layout.window"),
     "a window of half a frame": (layout(window=0.5), "layout.window"),
     "step 0": (layout(step=0), "layout.step"),

@@ -8,11 +8,11 @@ from hobble.core.section import Section
 
 
 class SampleOptions(Section):
-    """The option of all measurements of clips."""
+    """The configuration key that all measurements of clips have."""
 
     sample_frames: int = Field(
         500_000,
         gt=0,
-        description="if the clips have more frames, a sample of about this many frames is measured, drawn by "
-        "gait, speed, channel and split",
+        description="about how many frames are measured at most; if the clips have more, a sample of "
+        "excerpts is drawn, so that each split, gait, speed and channel is in it",
     )

@@ -1,12 +1,16 @@
 """A stratified sample of a large data set, with weights and confidence intervals.
 
 The sample consists of excerpts of clips (`hobble.rows.excerpts`), so that no long clip is measured as a
-whole. The excerpts are put into strata by split, gait, speed (the slow, middle and fast third of a gait) and
-channel. Each split gets half of the measured rows, because there are few held-out clips. Within a split, each
-stratum gets a share in proportion to its rows. The excerpts drawn from a stratum represent all of its rows
-(Cochran, Sampling Techniques, 1977, chapters 5 and 6: stratified sampling, ratio estimates).
+whole. An excerpt is a range of consecutive rows; a clip has one row for each frame of its gait cycles.
 
-Each excerpt is drawn on its own, whichever clip it is from. So the confidence interval holds although
+The excerpts are put into groups of similar excerpts, the strata. A stratum has one split (training or
+held-out clips), one gait, one range of speed (the slow, middle or fast third of the gait's excerpts) and one
+set of channels. Half of the measured rows are from each split, because a share in proportion would contain
+few held-out rows. Within a split, each stratum gets a share in proportion to its rows. The excerpts drawn
+from a stratum represent all of its rows (Cochran, Sampling Techniques, 1977, chapters 5 and 6: stratified
+sampling, ratio estimates).
+
+Each excerpt is drawn independently of the clip that it belongs to. So the confidence interval holds although
 excerpts of one clip resemble each other. The interval says how far the mean of the sample may be from the
 mean over all rows of these clips. It does not say how much other clips would differ.
 """
@@ -25,16 +29,17 @@ from hobble.measures.results import SampleSize
 from hobble.rows.excerpts import Excerpt, ExcerptKind
 from hobble.rows.summary import RowsSummary
 
-LEAST = 2  # at least this many excerpts are drawn from a stratum, because its variance needs two
-SPEEDS = 3  # ranges of speed into which each gait is divided
+LEAST_EXCERPTS = 2  # drawn from a stratum, because its variance needs two
+SPEED_RANGES = 3  # ranges of speed into which the excerpts of each gait are divided
 STANDARD_ERRORS = 1.96  # half the width of a 95 % confidence interval, in standard errors
 
 
 @dataclass(frozen=True)
 class Stratum:
-    """Similar excerpts.
+    """Similar excerpts, some of which are drawn for the sample.
 
-    count: number of excerpts. rows: number of rows in all of them. drawn: the excerpts in the sample.
+    split: "train" or "held_out". count: number of all its excerpts. rows: number of rows in all its excerpts.
+    drawn: the excerpts in the sample.
     """
 
     split: str
@@ -45,124 +50,140 @@ class Stratum:
     @property
     def weight(self) -> float:
         """The number of rows that each measured row represents."""
-        return self.rows / max(sum(one.rows for one in self.drawn), 1)
+        return self.rows / max(sum(excerpt.rows for excerpt in self.drawn), 1)
 
 
 @dataclass(frozen=True)
 class Sample:
-    """The excerpts to measure, by stratum. clips: number of all clips."""
+    """The excerpts to measure.
+
+    strata: all strata, each with its drawn excerpts. clips: number of all clips, not only the sampled ones.
+    """
 
     strata: tuple[Stratum, ...]
     clips: int
 
     @property
     def weights(self) -> dict[Excerpt, float]:
-        """Excerpt in the sample -> number of rows that each row represents. Sorted by clip and row."""
-        return dict(sorted((one, stratum.weight) for stratum in self.strata for one in stratum.drawn))
+        """Excerpt in the sample -> number of rows that each of its rows represents.
+
+        The keys are sorted by clip and first row.
+        """
+        return dict(sorted((excerpt, stratum.weight) for stratum in self.strata for excerpt in stratum.drawn))
 
     @property
     def clip_weights(self) -> dict[Excerpt, float]:
-        """Excerpt in the sample -> number of clips that it represents."""
+        """Excerpt in the sample -> number of clips that it represents, which may be below 1."""
         return {
-            one: one.rows / one.clip_rows * stratum.count / len(stratum.drawn)
+            excerpt: excerpt.rows / excerpt.clip_rows * stratum.count / len(stratum.drawn)
             for stratum in self.strata
-            for one in stratum.drawn
+            for excerpt in stratum.drawn
         }
 
     def half_width(self, split: str, values: Mapping[Excerpt, float]) -> float:
-        """Half the width of the 95 % confidence interval of the mean over a split's rows.
+        """Half the width of the 95 % confidence interval of the mean over all rows of a split.
 
         values: excerpt in the sample -> mean of the measured quantity over its rows.
         """
         strata = [stratum for stratum in self.strata if stratum.split == split and stratum.rows]
-        total = sum(stratum.rows for stratum in strata)
-        variance = sum((stratum.rows / total) ** 2 * _variance(stratum, values) for stratum in strata)
+        rows = sum(stratum.rows for stratum in strata)
+        variance = sum((stratum.rows / rows) ** 2 * _variance(stratum, values) for stratum in strata)
         return STANDARD_ERRORS * math.sqrt(variance)
 
     def to_dict(self) -> SampleSize:
         """Plain data for a measurement's JSON."""
-        drawn = [one for stratum in self.strata for one in stratum.drawn]
+        drawn = [excerpt for stratum in self.strata for excerpt in stratum.drawn]
         return {
             "excerpts": len(drawn),
             "of_excerpts": sum(stratum.count for stratum in self.strata),
-            "clips": len({one.clip for one in drawn}),
+            "clips": len({excerpt.clip for excerpt in drawn}),
             "of": self.clips,
             "strata": len(self.strata),
         }
 
 
 def _variance(stratum: Stratum, values: Mapping[Excerpt, float]) -> float:
-    """Variance of the mean over a stratum's rows, for a ratio estimate from the sampled excerpts."""
+    """Variance of the estimated mean over a stratum's rows. values: as in `Sample.half_width`.
+
+    The estimate is the mean of the drawn excerpts, weighted by their rows (a ratio estimate). The variance is
+    0 if all excerpts are drawn.
+    """
     n = len(stratum.drawn)
-    if n == stratum.count or n < LEAST:
+    if n == stratum.count or n < LEAST_EXCERPTS:
         return 0.0
-    rows = np.array([one.rows for one in stratum.drawn], float)
-    mean = np.array([values[one] for one in stratum.drawn])
-    off = rows / rows.mean() * (mean - np.average(mean, weights=rows))
-    return float((1 - n / stratum.count) * (off**2).sum() / (n - 1) / n)
+    rows = np.array([excerpt.rows for excerpt in stratum.drawn], float)
+    means = np.array([values[excerpt] for excerpt in stratum.drawn])
+    deviations = rows / rows.mean() * (means - np.average(means, weights=rows))
+    return float((1 - n / stratum.count) * (deviations**2).sum() / (n - 1) / n)
 
 
 def draw_sample(summaries: Iterable[RowsSummary], splits: Mapping[str, str], frames: int) -> Sample | None:
-    """A sample of about `frames` rows; None if all clips together do not have more rows.
+    """Draw a sample of about `frames` rows. None if all clips together have at most `frames` rows.
 
-    splits: clip -> split. The same clips give the same sample, and one more clip changes it only a little.
+    summaries: one for each clip. splits: clip -> split, "train" or "held_out". The same clips give the same
+    sample, and one more clip changes it only a little.
     """
-    clips = [one for one in summaries if one.rows]
-    if sum(one.rows for one in clips) <= frames:
+    clips = [summary for summary in summaries if summary.rows]
+    if sum(summary.rows for summary in clips) <= frames:
         return None
-    every = {excerpt: kind for one in clips for excerpt, kind in one.excerpts.items()}
-    of_split = dict.fromkeys(splits.values(), 0)
-    for one in clips:
-        of_split[splits[one.clip]] += one.rows
+    kinds = {excerpt: kind for summary in clips for excerpt, kind in summary.excerpts.items()}
+    rows_of_split = dict.fromkeys(splits.values(), 0)
+    for summary in clips:
+        rows_of_split[splits[summary.clip]] += summary.rows
     strata = []
-    for members in _strata(every, splits).values():
+    for members in _group_into_strata(kinds, splits):
         split = splits[members[0].clip]
-        rows = sum(one.rows for one in members)
-        rows_to_draw = frames * _share(of_split, split, frames) * rows / of_split[split]
-        strata.append(Stratum(split, len(members), rows, _drawn(members, rows_to_draw)))
+        rows = sum(excerpt.rows for excerpt in members)
+        rows_to_draw = frames * _share_of_split(rows_of_split, split, frames) * rows / rows_of_split[split]
+        strata.append(Stratum(split, len(members), rows, _draw_excerpts(members, rows_to_draw)))
     return Sample(tuple(strata), len(clips))
 
 
-def _share(of_split: Mapping[str, int], split: str, frames: int) -> float:
-    """Share of the measured rows for one split: half, or more if the other split has too few rows.
+def _share_of_split(rows_of_split: Mapping[str, int], split: str, frames: int) -> float:
+    """Share of the measured rows for one split: half, or more if the other split has less than half.
 
-    of_split: split -> rows.
+    rows_of_split: split -> number of rows. frames: number of rows to measure in both splits.
     """
-    others = sum(rows for name, rows in of_split.items() if name != split)
+    others = sum(rows for name, rows in rows_of_split.items() if name != split)
     return max(0.5, 1 - others / frames) if others else 1.0
 
 
-def _strata(
-    every: Mapping[Excerpt, ExcerptKind], splits: Mapping[str, str]
-) -> dict[tuple[Any, ...], list[Excerpt]]:
-    """Stratum -> its excerpts."""
-    by_gait: dict[str, list[float]] = {}
-    for kind in every.values():
-        by_gait.setdefault(kind.gait, []).append(kind.speed)
-    edges = {g: np.quantile(s, np.arange(1, SPEEDS) / SPEEDS) for g, s in by_gait.items()}
+def _group_into_strata(
+    kinds: Mapping[Excerpt, ExcerptKind], splits: Mapping[str, str]
+) -> list[list[Excerpt]]:
+    """The excerpts of each stratum."""
+    speeds_of_gait: dict[str, list[float]] = {}
+    for kind in kinds.values():
+        speeds_of_gait.setdefault(kind.gait, []).append(kind.speed)
+    quantiles = np.arange(1, SPEED_RANGES) / SPEED_RANGES
+    edges = {gait: np.quantile(speeds, quantiles) for gait, speeds in speeds_of_gait.items()}
     strata: dict[tuple[Any, ...], list[Excerpt]] = {}
-    for one, kind in sorted(every.items(), key=lambda item: item[0]):
-        speed = int(np.searchsorted(edges[kind.gait], kind.speed))
-        strata.setdefault((splits[one.clip], kind.gait, speed, kind.channels), []).append(one)
-    return strata
+    for excerpt, kind in sorted(kinds.items(), key=lambda item: item[0]):
+        speed_range = int(np.searchsorted(edges[kind.gait], kind.speed))
+        key = (splits[excerpt.clip], kind.gait, speed_range, kind.channels)
+        strata.setdefault(key, []).append(excerpt)
+    return list(strata.values())
 
 
 def shuffle_key(name: str) -> bytes:
-    """A key for sorting names. The order looks random, but a new name does not reorder the others."""
+    """A key for sorting names. The order looks random, but a new name does not change that of the others."""
     return hashlib.sha256(name.encode()).digest()
 
 
-def _drawn(members: Sequence[Excerpt], rows: float) -> tuple[Excerpt, ...]:
-    """Excerpts drawn at random from a stratum: at least LEAST, and as many as it takes to get `rows` rows."""
-    out: list[Excerpt] = []
+def _draw_excerpts(members: Sequence[Excerpt], rows: float) -> tuple[Excerpt, ...]:
+    """Draw excerpts of a stratum, in an order that looks random, until they have `rows` rows.
+
+    At least LEAST_EXCERPTS are drawn, or all if there are fewer.
+    """
+    drawn: list[Excerpt] = []
     rows_drawn = 0
-    for one in sorted(members, key=_random_order):
-        if len(out) >= LEAST and rows_drawn >= rows:
+    for excerpt in sorted(members, key=_excerpt_shuffle_key):
+        if len(drawn) >= LEAST_EXCERPTS and rows_drawn >= rows:
             break
-        out.append(one)
-        rows_drawn += one.rows
-    return tuple(out)
+        drawn.append(excerpt)
+        rows_drawn += excerpt.rows
+    return tuple(drawn)
 
 
-def _random_order(one: Excerpt) -> bytes:
-    return shuffle_key(one.clip if one.whole else f"{one.clip} {one.first}")
+def _excerpt_shuffle_key(excerpt: Excerpt) -> bytes:
+    return shuffle_key(excerpt.clip if excerpt.whole else f"{excerpt.clip} {excerpt.first}")

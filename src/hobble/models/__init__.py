@@ -1,7 +1,7 @@
-"""The kinds of network, one folder each; this folder holds what they share.
+"""The kinds of network. Each kind has a folder here; the modules of this folder itself serve all kinds.
 
-Every subfolder with an `__init__.py` is a kind. So a new kind needs no entry in a list, and because no
-existing file changes, Snakemake does not repeat existing jobs.
+Every subfolder with an `__init__.py` is a kind. A new kind needs no entry in a list, so no existing file
+changes, and Snakemake does not repeat the jobs of other kinds.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 
 # The values of `network.kind` in a configuration.
 MODELS = tuple(sorted(path.parent.name for path in Path(__file__).parent.glob("*/__init__.py")))
-DEFAULT = "pfnn"  # the kind if a configuration or a network's file names none
+DEFAULT = "pfnn"  # the kind of network where a configuration or a network's file names no kind
 
 
 def model(kind: str) -> Model:
@@ -27,8 +27,8 @@ def model(kind: str) -> Model:
 
 
 def network_options(section: Mapping[str, Any]) -> Options:
-    """The options of a configuration's section `network`, in the class of options of its kind.
+    """A configuration's section `network`, checked and turned into its kind's subclass of `Options`.
 
-    The function is not called `options`, because a module of this package has this name.
+    The function is not called `options`, because a module of this package has that name.
     """
     return model(section.get("kind", DEFAULT)).options().model_validate(section)

@@ -1,4 +1,4 @@
-"""Compiled loops shared by the fast training steps and the optimiser, and their number of threads."""
+"""Compiled functions for the fused training steps and the optimiser: threads, bfloat16, dropout masks."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from torch import Tensor
 from hobble.core.compiled import njit
 
 NUMBERS_PER_THREAD = 100_000  # a thread gets at least this many numbers, about 20 microseconds of work
-# The state of the random number generator splitmix64 grows by this for each number.
+# The random number generator splitmix64 adds this to its state for each number that it draws.
 SPLITMIX_STEP = np.uint64(0x9E3779B97F4A7C15)
 
 
@@ -26,29 +26,37 @@ def use_threads(values: int) -> None:
 
 
 def as_numpy(array: Tensor) -> np.ndarray:
-    """The tensor as a numpy array. bfloat16 becomes uint16 with the same bits: numpy has no bfloat16."""
+    """The tensor as a numpy array on the same memory.
+
+    A bfloat16 tensor becomes uint16 with the same bits, because numpy has no bfloat16.
+    """
     return array.view(torch.uint16).numpy() if array.dtype == torch.bfloat16 else array.numpy()
 
 
 @njit(inline="always")
 def to_bfloat16(value: Any) -> Any:
-    """The bits of a float32 as bfloat16, rounded to nearest, ties to even."""
-    word = np.float32(value).view(np.uint32)
-    even = np.uint32(np.uint32(word >> np.uint32(16)) & np.uint32(1))
-    return np.uint16(np.uint32(word + even + np.uint32(0x7FFF)) >> np.uint32(16))
+    """The bits (uint16) of a float32 rounded to the nearest bfloat16, ties to even.
+
+    bfloat16 keeps the upper 16 bits. Adding 0x7FFF, or 0x8000 if the last of these bits is 1, carries into
+    them exactly where the number has to be rounded up.
+    """
+    bits = np.float32(value).view(np.uint32)
+    last_bit = np.uint32(np.uint32(bits >> np.uint32(16)) & np.uint32(1))
+    return np.uint16(np.uint32(bits + last_bit + np.uint32(0x7FFF)) >> np.uint32(16))
 
 
 @njit(inline="always")
-def to_float32(half: Any) -> Any:
-    """The float32 of a bfloat16. half: its bits."""
-    return np.uint32(np.uint32(half) << np.uint32(16)).view(np.float32)
+def to_float32(bits: Any) -> Any:
+    """The float32 with the value of a bfloat16, given as its bits (uint16)."""
+    return np.uint32(np.uint32(bits) << np.uint32(16)).view(np.float32)
 
 
 @njit(parallel=True, error_model="numpy")
-def draw(mask: Any, counter: Any, keep: Any) -> None:
-    """Fill a dropout mask (rows, width) with random 0 or 1 / keep, by splitmix64 (Steele et al. 2014).
+def draw_mask(mask: Any, counter: Any, keep: Any) -> None:
+    """Fill a dropout mask (rows, width) at random with 0 and 1 / keep.
 
-    counter: state of the generator before the first number. keep: probability that an entry is 1 / keep.
+    The random numbers are those of splitmix64 (Steele et al. 2014). counter: state of this generator before
+    the first number. keep: probability that an entry is 1 / keep.
     """
     rows, width = mask.shape
     scale = mask.dtype.type(1 / keep)
@@ -62,5 +70,8 @@ def draw(mask: Any, counter: Any, keep: Any) -> None:
 
 
 def counter_after(counter: np.uint64, numbers: int) -> np.uint64:
-    """The counter with which the next `draw` continues, after `numbers` numbers were drawn."""
+    """The state of splitmix64 after `numbers` more numbers, for the next call of `draw_mask`.
+
+    counter: the state before these numbers.
+    """
     return np.uint64((int(counter) + numbers * int(SPLITMIX_STEP)) % 2**64)

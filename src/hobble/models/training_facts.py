@@ -117,7 +117,7 @@ class TrainingFacts:
                 or np.asarray(arrays[name]).dtype.kind != "f"
             ):
                 raise InputError(path, f"{name} is not a number")
-            found[name] = checks.length(path, name, float(arrays[name]), 1e6, -1e-9)
+            found[name] = checks.number_in_range(path, name, float(arrays[name]), 1e6, -1e-9)
         for block in "xy":
             if (found[f"{block}_low"] > found[f"{block}_high"]).any():
                 raise InputError(path, f"{block.upper()}low is above {block.upper()}high in a column")

@@ -11,7 +11,7 @@ import pytest
 from hobble.core.errors import InputError
 from hobble.core.skeleton import Skeleton
 from hobble.models import model
-from hobble.models.matching.build import in_runs, on_mean_ground
+from hobble.models.matching.build import find_runs, on_mean_ground
 from hobble.models.matching.options import MatchingOptions
 from hobble.models.matching.search_features import feature_groups
 from hobble.rows.clip_rows import pairs, save_clip_rows
@@ -22,7 +22,7 @@ from .example import CUT, FRAMES, built, clip, layout_of
 
 def test_a_frame_that_two_cycles_share_is_kept_once(holden31: Skeleton) -> None:
     rows = clip(holden31, 0)
-    kept, remaining = in_runs(rows)
+    kept, remaining = find_runs(rows)
     np.testing.assert_array_equal(rows.frame[kept], 100 + np.arange(FRAMES[0]))
     assert rows.cycle[kept[CUT]] == 1, "the row with which a cycle begins"
     np.testing.assert_array_equal(remaining, np.arange(FRAMES[0])[::-1])
@@ -31,7 +31,7 @@ def test_a_frame_that_two_cycles_share_is_kept_once(holden31: Skeleton) -> None:
 def test_a_gap_between_cycles_ends_a_run(holden31: Skeleton) -> None:
     rows = clip(holden31, 0)
     rows = replace(rows, frame=np.where(rows.cycle > 0, rows.frame + 30, rows.frame))
-    kept, remaining = in_runs(rows)
+    kept, remaining = find_runs(rows)
     assert len(kept) == len(rows)
     np.testing.assert_array_equal(remaining, [*range(CUT, -1, -1), *range(len(rows) - CUT - 2, -1, -1)])
 
@@ -40,7 +40,7 @@ def test_a_clip_without_rows_gives_no_frames(holden31: Skeleton) -> None:
     rows = clip(holden31, 0)
     cut = {n: getattr(rows, n)[:0] for n in ("x", "y", "p", "frame", "cycle", "fits", "heights", "mean")}
     rows = replace(rows, **cut, channels={"injury": rows.channels["injury"][:0]})
-    assert [len(part) for part in in_runs(rows)] == [0, 0]
+    assert [len(part) for part in find_runs(rows)] == [0, 0]
     assert [len(part) for part in on_mean_ground(rows, rows.layout)] == [0, 0]
 
 
@@ -56,7 +56,7 @@ def test_rows_lie_on_the_mean_of_their_fits(holden31: Skeleton) -> None:
 def test_tables_hold_the_clips_in_order(holden31: Skeleton, tmp_path: Path) -> None:
     tables, _, network = built(holden31, tmp_path)
     each = [
-        on_mean_ground(rows, rows.layout)[1][in_runs(rows)[0]] for rows in map(clip, [holden31] * 2, (0, 1))
+        on_mean_ground(rows, rows.layout)[1][find_runs(rows)[0]] for rows in map(clip, [holden31] * 2, (0, 1))
     ]
     np.testing.assert_allclose(tables.y, np.concatenate(each), atol=1e-6)
     assert tables.remaining[FRAMES[0] - 1] == tables.remaining[-1] == 0

@@ -29,6 +29,7 @@ class _Mann(Trained):
     def parameters(self, options: MannOptions, inputs: int, outputs: int) -> int:
         from hobble.models.mann.forward import GATE_INPUTS
 
+        # A layer from a to b units has a * b weights and b biases.
         expert = sum((a + 1) * b for a, b in pairwise(options.sizes(inputs, outputs)))
         gate = sum((a + 1) * b for a, b in pairwise(options.gate_sizes(GATE_INPUTS)))
         return options.experts * expert + gate

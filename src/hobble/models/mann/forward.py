@@ -1,14 +1,15 @@
 """The mode-adaptive network in plain numpy: start reading here (Zhang, Starke, Komura, Saito 2018).
 
-Each layer has K sets of weights, the experts. A small gating network gets some columns x' of the input x:
-velocities of the feet, gait and target velocity. It computes the shares c in which the experts are blended
-(the phase is not used):
+The network consists of K experts: each layer has K sets of weights. A second, small network, the gate, gets
+some columns x' of the input x: velocities of the feet, gait and target velocity. From these it computes K
+shares c, in which the outputs of the experts are blended. The phase is not used.
 
     c = softmax(V2 elu(V1 elu(V0 x' + d0) + d1) + d2)
     h1 = elu(sum_k c_k (W0_k x + b0_k))    ...    y = sum_k c_k (W2_k h2 + b2_k)
 
-Other modules of this folder compute the same: `step` and `fused`, with the gradient, for training;
-`predictor`, fast, for one character or a crowd; `onnx_export` and `network.js`, for other programs.
+W and b are the weights and biases of the experts, V and d those of the gate. Other modules of this folder
+compute the same: `step` and `fused` with the gradient, for training; `predictor` fast, for one character or
+a crowd; `onnx_export` and `network.js` for other programs.
 """
 
 from __future__ import annotations
@@ -22,15 +23,15 @@ from hobble.core.quat import Array
 from hobble.core.skeleton import Skeleton
 from hobble.rows.layout import GAITS, RowLayout
 
-FEET = ("left_heel", "left_toe", "right_heel", "right_toe")
-GATE_INPUTS = 3 * len(FEET) + 2 * len(GAITS) + 2
+FEET = ("left_heel", "left_toe", "right_heel", "right_toe")  # roles of the joints
+GATE_INPUTS = 3 * len(FEET) + 2 * len(GAITS) + 2  # number of the columns that `gate_columns` returns
 
 
 def gate_columns(layout: RowLayout, skeleton: Skeleton) -> tuple[int, ...]:
-    """The columns of X that the gating network gets.
+    """The columns of X that the gate gets.
 
-    These are the velocities of heels and toes, the gait now and at the end of the trajectory, and the end of
-    the trajectory, which depends on the target velocity.
+    These are the velocities of heels and toes, the gait now and at the end of the trajectory, and the
+    position of the end of the trajectory, which depends on the target velocity.
     """
     samples, now, last = layout.samples, layout.samples // 2, layout.samples - 1
     feet = [3 * skeleton.role(role) + axis for role in FEET for axis in range(3)]
@@ -51,10 +52,11 @@ def forward(
     columns: NDArray[np.int64],
     z: Array,
 ) -> Array:
-    """Standardised outputs (n, Y) of standardised inputs z (n, X), the x of the formulas above, float32.
+    """Standardised outputs (n, Y) of standardised inputs z (n, X), both float32.
 
-    weights: per layer (K, out, in); biases: per layer (K, out); gate_weights: per layer (out, in);
-    gate_biases: per layer (out,). columns: (G,) the columns of z that the gate gets.
+    z is the x of the formulas above. weights: (K, out, in) for each layer of the experts; biases: (K, out)
+    for each. gate_weights: (out, in) for each layer of the gate; gate_biases: (out,) for each. columns: (G,)
+    the columns of z that the gate gets.
     """
     h = z[:, columns]
     for layer, (weight, bias) in enumerate(zip(gate_weights, gate_biases, strict=True)):
@@ -74,6 +76,6 @@ def elu(h: Array) -> Array:
 
 
 def softmax(logits: Array) -> Array:
-    """Shares (n, K) that are positive and sum to 1."""
+    """Shares (n, K), which are positive and sum to 1, in proportion to e^logits. logits: (n, K)."""
     powers = np.exp(logits - logits.max(axis=1, keepdims=True))
     return powers / powers.sum(axis=1, keepdims=True)

@@ -1,4 +1,7 @@
-"""The trained mode-adaptive network: reading, prediction, page data and export."""
+"""The trained mode-adaptive network: reading, prediction, data for the report's page, and export.
+
+`hobble.models.mann.forward` explains the experts and the gate.
+"""
 
 from __future__ import annotations
 
@@ -13,7 +16,7 @@ from numpy.typing import NDArray
 
 from hobble.core.errors import InputError
 from hobble.core.quat import Array
-from hobble.models.checks import stacked
+from hobble.models.checks import weights_and_biases
 from hobble.models.mann.forward import forward
 from hobble.models.mann.predictor import MannPredictor
 from hobble.models.network import Export, Network, standardised
@@ -26,14 +29,14 @@ MOST_EXPERTS = 64  # largest number of experts in a file
 class Mann(Network):
     """A mode-adaptive network of K experts.
 
-    weights: (K, out, in) float32 for each layer; biases: (K, out) for each layer. gate_weights: (out, in) for
-    each layer of the gating network; gate_biases: (out,) for each. columns: (G,) the columns of X that the
-    gating network gets.
+    weights: (K, out, in) float32 for each layer of the experts; biases: (K, out) for each. gate_weights:
+    (out, in) for each layer of the gate; gate_biases: (out,) for each. columns: (G,) the columns of X that
+    the gate gets.
     """
 
     kind: ClassVar[str] = "mann"
     phase: ClassVar[bool] = False
-    # Reading the weights of all experts takes most of a prediction's time, and int16 halves them.
+    # Reading the weights of all experts takes most of a prediction's time. As int16 they have half the size.
     storage: ClassVar[str] = "int16"
 
     weights: tuple[Array, ...] = field(repr=False)
@@ -44,18 +47,18 @@ class Mann(Network):
 
     @classmethod
     def read(cls, path: str | Path, arrays: Mapping[str, Any], common: Mapping[str, Any]) -> Mann:
-        """From the arrays of a file.
+        """Check the arrays of a file and build the network.
 
-        W0 (K, out, in), b0 (K, out), ... are the experts' layers. V0 (out, in), d0 (out,), ... are the gating
-        network's. `gate` (G,) holds the columns that it gets.
+        W0 (K, out, in), b0 (K, out), ... are the layers of the experts. V0 (out, in), d0 (out,), ... are
+        those of the gate. `gate` (G,) holds the columns of X that the gate gets.
         """
         inputs, outputs = len(common["x_mean"]), len(common["y_mean"])
-        columns = _columns(path, arrays, inputs)
-        weights, biases = stacked(path, arrays, ("W", "b"), 3, inputs, outputs)
+        columns = _read_gate_columns(path, arrays, inputs)
+        weights, biases = weights_and_biases(path, arrays, ("W", "b"), 3, inputs, outputs)
         experts = len(weights[0])
         if not 2 <= experts <= MOST_EXPERTS:
-            raise InputError(path, f"{experts} experts; 2 to {MOST_EXPERTS} are allowed")
-        gate_weights, gate_biases = stacked(path, arrays, ("V", "d"), 2, len(columns), experts)
+            raise InputError(path, f"has {experts} experts; 2 to {MOST_EXPERTS} are allowed")
+        gate_weights, gate_biases = weights_and_biases(path, arrays, ("V", "d"), 2, len(columns), experts)
         return cls(
             weights=weights,
             biases=biases,
@@ -72,12 +75,12 @@ class Mann(Network):
 
     @property
     def sizes(self) -> tuple[int, ...]:
-        """Units of each layer of an expert, the input first: (342, 512, 512, 311)."""
+        """Units of each layer of an expert, the input first, such as (342, 512, 512, 311)."""
         return (self.weights[0].shape[2], *(w.shape[1] for w in self.weights))
 
     @property
     def parameters(self) -> int:
-        """All weights and biases: each prediction evaluates all experts."""
+        """The number of all weights and biases, because a prediction may need all experts."""
         gate = sum(w.size + b.size for w, b in zip(self.gate_weights, self.gate_biases, strict=True))
         return gate + self.experts * sum(a * b + b for a, b in pairwise(self.sizes))
 
@@ -101,25 +104,28 @@ class Mann(Network):
         return MannPredictor(self, storage or self.storage)
 
     def page(self, inputs: NDArray[np.int64], outputs: NDArray[np.int64]) -> dict[str, Any]:
-        """As in `Network`. Weights are integers with a factor for each row. The entry `gate` holds the
-        positions in `inputs` of the columns that the gating network gets."""
+        """As in `Network`.
+
+        layers: those of the experts, see `packed_rows`. gateLayers: those of the gate. gate: the columns that
+        the gate gets, as positions in `inputs`.
+        """
         weights, biases, gate = list(self.weights), list(self.biases), list(self.gate_weights)
         weights[0] = weights[0][:, :, inputs]
         weights[-1], biases[-1] = weights[-1][:, outputs], biases[-1][:, outputs]
         position = {int(column): i for i, column in enumerate(inputs)}
-        kept = [i for i, column in enumerate(self.columns) if int(column) in position]
-        gate[0] = gate[0][:, kept]
+        present = [i for i, column in enumerate(self.columns) if int(column) in position]
+        gate[0] = gate[0][:, present]
         return {
             "layers": [packed_rows(w, b) for w, b in zip(weights, biases, strict=True)],
             "gateLayers": [
                 packed_rows(w[None], b[None]) for w, b in zip(gate, self.gate_biases, strict=True)
             ],
-            "gate": [position[int(self.columns[i])] for i in kept],
+            "gate": [position[int(self.columns[i])] for i in present],
         }
 
     @property
     def exports(self) -> dict[str, Export]:
-        """The format "onnx"."""
+        """As in `Network`: the only format is "onnx"."""
 
         def onnx(target: Path, mode: str) -> str:
             from hobble.models.mann.onnx_export import write_checked
@@ -130,13 +136,13 @@ class Mann(Network):
         return {"onnx": onnx}
 
 
-def _columns(path: str | Path, arrays: Mapping[str, Any], inputs: int) -> NDArray[np.int64]:
-    """The array `gate`: the columns of X that the gating network gets, each once."""
+def _read_gate_columns(path: str | Path, arrays: Mapping[str, Any], inputs: int) -> NDArray[np.int64]:
+    """The array `gate`: the columns of X that the gate gets. inputs: number of columns of X."""
     if "gate" not in arrays:
         raise InputError(path, "not a network: no gate")
     array = np.asarray(arrays["gate"])
     if array.ndim != 1 or array.dtype.kind not in "iu" or not array.size:
         raise InputError(path, f"gate has shape {array.shape} and type {array.dtype}, not columns of X")
     if array.min() < 0 or array.max() >= inputs or len(np.unique(array)) != array.size:
-        raise InputError(path, f"gate must hold different columns of X, from 0 to {inputs - 1}")
+        raise InputError(path, f"gate must hold columns of X (0 to {inputs - 1}), each at most once")
     return array.astype(np.int64)

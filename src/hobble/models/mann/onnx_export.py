@@ -11,21 +11,26 @@ from hobble.models.onnx_file import Graph, write
 
 
 def write_checked(path: str | Path, network: Mann) -> float:
-    """Write and check the file. Returns the largest difference, see `hobble.models.onnx_file.check`."""
+    """Write the file, and check it against Hobble's runtime.
 
-    def body(g: Graph, z: str) -> str:
-        h = g("Gather", z, g.constant(network.columns, np.int64), axis=1)
+    Returns the largest difference between their outputs, see `hobble.models.onnx_file.check`.
+    """
+
+    # The same computation as in `hobble.models.mann.forward`. h and z are names of nodes.
+    def add_nodes(add: Graph, z: str) -> str:
+        h = add("Gather", z, add.constant(network.columns, np.int64), axis=1)
         for i, (w, b) in enumerate(zip(network.gate_weights, network.gate_biases, strict=True)):
-            h = g("Elu", h) if i else h
-            h = g("Add", g("MatMul", h, g.constant(w.T)), g.constant(b))
-        shares = g("Unsqueeze", g("Softmax", h, axis=1), g.constant([2], np.int64))
+            h = add("Elu", h) if i else h
+            h = add("Add", add("MatMul", h, add.constant(w.T)), add.constant(b))
+        shares = add("Unsqueeze", add("Softmax", h, axis=1), add.constant([2], np.int64))  # (batch, K, 1)
         h = z
         for i, (w, b) in enumerate(zip(network.weights, network.biases, strict=True)):
-            h = g("Elu", h) if i else h
+            h = add("Elu", h) if i else h
             experts, outputs, inputs = w.shape
-            each = g("MatMul", h, g.constant(w.reshape(experts * outputs, inputs).T))
-            each = g("Add", g("Reshape", each, g.constant([-1, experts, outputs], np.int64)), g.constant(b))
-            h = g("ReduceSum", g("Mul", each, shares), g.constant([1], np.int64), keepdims=0)
+            each = add("MatMul", h, add.constant(w.reshape(experts * outputs, inputs).T))
+            each = add("Reshape", each, add.constant([-1, experts, outputs], np.int64))
+            each = add("Add", each, add.constant(b))
+            h = add("ReduceSum", add("Mul", each, shares), add.constant([1], np.int64), keepdims=0)
         return h
 
-    return write(path, network, "exact", body)
+    return write(path, network, "exact", add_nodes)

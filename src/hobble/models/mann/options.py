@@ -10,10 +10,10 @@ from hobble.models.options import Options
 
 
 class MannOptions(Options):
-    """The mode-adaptive network, with the sizes of Zhang et al. 2018.
+    """The mode-adaptive network (`hobble.models.mann.forward`).
 
-    hidden_layers, units: of each expert. gate_layers, gate_units: hidden layers of the gating network, and
-    units of each.
+    experts: number of experts. hidden_layers: number of hidden layers of an expert. units: units of each of
+    these layers. gate_layers, gate_units: the same for the gate. The defaults are those of Zhang et al. 2018.
     """
 
     kind: Literal["mann"] = "mann"
@@ -29,9 +29,9 @@ class MannOptions(Options):
         return (self.units,) * self.hidden_layers
 
     def sizes(self, inputs: int, outputs: int) -> tuple[int, ...]:
-        """Units of each layer of an expert, the input first."""
+        """Units of each layer of an expert, the input first. inputs, outputs: columns of X and Y."""
         return (inputs, *self.hidden, outputs)
 
     def gate_sizes(self, inputs: int) -> tuple[int, ...]:
-        """Units of each layer of the gating network, its input first."""
+        """Units of each layer of the gate, the input first. inputs: number of columns that the gate gets."""
         return (inputs, *[self.gate_units] * self.gate_layers, self.experts)

@@ -1,4 +1,7 @@
-"""The mode-adaptive network prepared to run: gate, shares and experts in one compiled call."""
+"""The mode-adaptive network prepared to run: gate, shares and experts in one compiled call.
+
+`hobble.models.mann.forward` explains the network.
+"""
 
 from __future__ import annotations
 
@@ -13,9 +16,10 @@ from hobble.models.stack import Stack, StackPredictor, blend_layers, exp_below_0
 if TYPE_CHECKING:
     from hobble.models.mann.network import Mann
 
-# The fields `weights`, `numbers` and `plan` of a `Stack`, for compiled functions.
+# The fields `weights`, `numbers` and `plan` of a `Stack`. A compiled function cannot take the `Stack` itself.
 Layers = tuple[Any, Any, Any]
-# An expert with a smaller share is left out. Single precision rounds shares near 1 by about as much.
+# An expert with a smaller share is not evaluated. The rounding error of a share near 1 is about as large in
+# single precision.
 NEGLIGIBLE_SHARE = 1e-7
 
 
@@ -40,17 +44,18 @@ class MannPredictor(StackPredictor):
 
 
 @njit(error_model="numpy")
-def _evaluate(gate: Layers, columns: Any, experts: Layers, count: int, z: Any, out: Any) -> None:
-    """Write Y (C, Y) for standardised inputs z (C, X) into `out`.
+def _evaluate(gate: Layers, columns: Any, experts: Layers, expert_count: int, z: Any, out: Any) -> None:
+    """Write the outputs (C, Y) of C characters, in raw units, into `out`.
 
-    columns: the columns of z that the gate gets. count: the number of experts.
+    columns: the columns of z that the gate gets. z: (C, X) standardised inputs.
     """
     gate_z = np.empty((z.shape[0], len(columns)), np.float32)
     for c in range(z.shape[0]):
         for i in range(len(columns)):
             gate_z[c, i] = z[c, columns[i]]
-    shares = np.empty((z.shape[0], count), np.float32)
+    shares = np.empty((z.shape[0], expert_count), np.float32)
     weights, numbers, plan = gate
+    # The gate has only one set of weights, whose share is 1. Its outputs are the logits of the shares.
     blend_layers(weights, numbers, plan, np.ones((z.shape[0], 1), np.float32), gate_z, shares)
     for c in range(z.shape[0]):
         _softmax(shares[c])

@@ -1,4 +1,7 @@
-"""The mode-adaptive network in training: parameters of the experts and the gate."""
+"""The mode-adaptive network in training: the parameters of the experts and the gate.
+
+`hobble.models.mann.forward` explains the network.
+"""
 
 from __future__ import annotations
 
@@ -17,12 +20,12 @@ from hobble.models.trainable import Trainable, TrainingStep, uniform_start
 
 @dataclass(frozen=True)
 class TrainableMann(Trainable):
-    """The layers of the gate, then those of the experts.
+    """The parameters of the network: the layers of the gate, then those of the experts.
 
-    A layer of experts is stored as (K * out, 1, in + 1), expert after expert. One product gives the outputs
-    of all experts, which are then blended.
+    A layer of the experts is stored as (K * out, 1, in + 1), expert after expert. So one matrix product gives
+    the outputs of all experts, which are then blended.
 
-    sizes: units of an expert, from input to output. gate_sizes: likewise for the gate; the last
+    sizes: units of each layer of an expert, the input first. gate_sizes: the same for the gate; its last
     number is K, the number of experts. columns: the columns of X that the gate gets.
     """
 
@@ -65,7 +68,7 @@ class TrainableMann(Trainable):
         return x
 
     def step(self, dropout: float, half: bool) -> TrainingStep:
-        """Compiled loops on a CPU, PyTorch elsewhere."""
+        """As in `Trainable`: compiled loops on a CPU, PyTorch on other devices."""
         from hobble.models.mann import fused, step
 
         on_cpu = self.flat.device.type == "cpu"
@@ -74,8 +77,8 @@ class TrainableMann(Trainable):
     def arrays(self) -> dict[str, np.ndarray]:
         """As in `Trainable`.
 
-        `V0` (out, in), `d0` (out,), ... are the gate's layers, and `W0` (K, out, in), `b0` (K, out), ... are
-        the experts'. `gate` holds the columns of X that the gate gets.
+        `V0` (out, in), `d0` (out,), ... are the layers of the gate. `W0` (K, out, in), `b0` (K, out), ... are
+        those of the experts. `gate` holds the columns of X that the gate gets.
         """
         arrays, gate_layers = {}, len(self.gate_sizes) - 1
         for number, layer in enumerate(self.layers):
@@ -92,6 +95,7 @@ class TrainableMann(Trainable):
     @property
     def about(self) -> dict[str, Any]:
         """As in `Trainable`."""
+        # For two layers each: gate is "V1 elu(V0 x[gate] + d0) + d1", inside is "elu(W0 x + b0)".
         gate, inside = "x[gate]", "x"
         for i in range(len(self.gate_sizes) - 1):
             gate = f"V{i} {gate} + d{i}" if i == 0 else f"V{i} elu({gate}) + d{i}"
@@ -119,12 +123,16 @@ def shapes(sizes: tuple[int, ...], gate_sizes: tuple[int, ...]) -> list[tuple[in
 def initialise(
     sizes: tuple[int, ...], gate_sizes: tuple[int, ...], columns: tuple[int, ...], seed: int
 ) -> TrainableMann:
-    """A new network: weights of the experts and the gate uniform within +-sqrt(6 / (in * out)), biases 0."""
+    """A new network. Its weights are random, uniform within +-sqrt(6 / (in * out)), its biases 0.
+
+    The arguments are those of `TrainableMann`, and the seed of the random numbers.
+    """
     flat = torch.zeros(sum(map(prod, shapes(sizes, gate_sizes))))
     network = TrainableMann(flat, tuple(sizes), tuple(gate_sizes), tuple(columns))
     gate_layers, generator = len(gate_sizes) - 1, np.random.default_rng([seed, 0])
     uniform_start(network.layers[:gate_layers], generator)
     for layer in network.layers[gate_layers:]:
+        # As (out, K, in + 1), so that `out` is the number of outputs of one expert.
         experts = layer.view(network.experts, -1, layer.shape[-1])
         uniform_start([experts.transpose(0, 1)], generator)
     return network

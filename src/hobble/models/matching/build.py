@@ -1,4 +1,8 @@
-"""Builds the tables that motion matching searches, from the rows of the clips, frame after frame."""
+"""Builds the tables that motion matching searches and plays, from the rows of the clips.
+
+A clip's file has a row for each frame: the inputs x and the outputs y of a network in this frame. Motion
+matching searches for the frame with the nearest x, and shows its y.
+"""
 
 from __future__ import annotations
 
@@ -22,12 +26,13 @@ from hobble.rows.layout import RowLayout
 
 @dataclass(frozen=True)
 class Tables:
-    """R frames of clips, in runs of consecutive frames.
+    """R frames of clips, in runs. A run is a sequence of consecutive frames of one clip.
 
-    features: (R, n) float32, weighted. y: (R, Y) float32, raw units. phase: (R,) in cycles. remaining: (R,)
-    int32, how many frames follow in the run. columns: (n,) the columns of X that are features. weights: (n,)
-    their factors. every: frames between two searches. halflife: frames in which the offset of a transition
-    falls to half.
+    features: (R, n) float32, the columns of X that a search compares, each times its weight. y: (R, Y)
+    float32, raw units. phase: (R,) in cycles. remaining: (R,) int32, how many frames of the run follow.
+    columns: (n,) which columns of X are features. weights: (n,) their weights. every: frames between two
+    searches. halflife: frames in which the offset of a transition falls to about half, see
+    `hobble.models.matching.inertia`.
     """
 
     kind: ClassVar[str] = "matching"
@@ -42,7 +47,7 @@ class Tables:
     halflife: float
 
     def arrays(self) -> dict[str, np.ndarray]:
-        """The arrays of the file."""
+        """As in `FinishedNetwork`."""
         return {
             "features": self.features,
             "frames": self.y,
@@ -54,7 +59,7 @@ class Tables:
 
     @property
     def about(self) -> dict[str, Any]:
-        """Entries in the file's meta, as JSON."""
+        """As in `FinishedNetwork`."""
         return {
             "network": "a search finds the frame of the clips with the features (weighted columns of x) that "
             "are nearest to those of the input; y is this frame, then the frames that follow it until the "
@@ -65,7 +70,7 @@ class Tables:
 
     @property
     def described(self) -> str:
-        """The size in a few words."""
+        """As in `FinishedNetwork`."""
         return f"{len(self.y):,} frames of clips, compared by {len(self.columns)} features"
 
 
@@ -74,9 +79,9 @@ def build(
 ) -> Tables:
     """Build the tables.
 
-    clips: the files with the rows of the clips. layout: the columns of the database; channels that it does
-    not have are left out. skeleton: of the layout. Raises InputError if a file is not a file of rows or has
-    another layout, or if no file has a frame.
+    clips: the files with the rows of the clips. layout: the columns of X and Y in the tables; other channels
+    of the clips are left out. skeleton: the one to which the layout belongs. Raises InputError if a file is
+    not a file of rows or has another layout, or if no file has a frame.
     """
     xs, ys, phases, remainings = [], [], [], []
     for path in clips:
@@ -86,7 +91,7 @@ def build(
         ):
             raise InputError(path, f"its columns ({rows.layout}) do not fit the database ({layout})")
         x, y = on_mean_ground(rows, layout)
-        kept, remaining = in_runs(rows)
+        kept, remaining = find_runs(rows)
         xs.append(x[kept])
         ys.append(y[kept])
         phases.append(rows.p[kept])
@@ -108,13 +113,18 @@ def build(
 
 
 def on_mean_ground(rows: ClipRows, layout: RowLayout) -> tuple[Array, Array]:
-    """x (R, X) and y (R, Y), float32, raw units. Each row is on the mean ground of all its terrain fits."""
+    """x (R, X) and y (R, Y) of the rows, float32, raw units.
+
+    A row has several terrain fits, that is, grounds that suit its motion. In x and y it is on the mean of
+    these grounds.
+    """
     x = np.empty((len(rows), layout.x_size), np.float32)
     y = rows.y.astype(np.float32)
     if not len(rows):
         return x, y
     count = rows.fits[:, None]
-    # Means over each row's fits: of the mean ground height, and of the ground heights relative to it.
+    # Means over the fits of each row. `rows.mean` is a fit's mean ground height, and `rows.heights` are its
+    # ground heights relative to this.
     ground = np.add.reduceat(rows.heights, rows.first_fit, axis=0) / count
     mean_height = np.add.reduceat(rows.mean, rows.first_fit)[:, None] / count
     values = {name: rows.channels[name] for name, _ in layout.channels}
@@ -122,15 +132,16 @@ def on_mean_ground(rows: ClipRows, layout: RowLayout) -> tuple[Array, Array]:
     return x, y
 
 
-def in_runs(rows: ClipRows) -> tuple[NDArray[np.int64], NDArray[np.int32]]:
-    """Indices (R',) of the rows to keep, each frame once, and (R',) how many frames of its run follow each.
+def find_runs(rows: ClipRows) -> tuple[NDArray[np.int64], NDArray[np.int32]]:
+    """The indices (R',) of the rows to keep, and how many frames follow each kept row in its run (R',).
 
-    A run is a sequence of consecutive frames. Adjacent cycles share a frame, which has two rows in the file.
-    The later row is kept, because the next cycle begins with it.
+    A run is a sequence of consecutive frames. Each frame is kept once: adjacent cycles share a frame, which
+    has two rows in the file. The later row is kept, because the next cycle begins with it.
     """
     frame = rows.frame
     kept = np.flatnonzero(np.diff(frame, append=-1) != 0)
     frame = frame[kept]
+    # A run ends where the next frame is not the following one, and at the last row (hence + 2).
     ends = np.flatnonzero(np.diff(frame, append=frame[-1] + 2 if len(frame) else 0) != 1)
-    numbers = np.arange(len(kept))
-    return kept, (ends[np.searchsorted(ends, numbers)] - numbers).astype(np.int32)
+    index = np.arange(len(kept))
+    return kept, (ends[np.searchsorted(ends, index)] - index).astype(np.int32)

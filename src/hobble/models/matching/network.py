@@ -94,8 +94,8 @@ class Matching(Network):
             remaining=remaining,
             columns=columns,
             weights=weights,
-            every=checks.whole(path, "every", meta.get("every"), 1, MOST_FRAMES),
-            halflife=checks.length(path, "halflife", meta.get("halflife"), MOST_FRAMES),
+            every=checks.whole_number(path, "every", meta.get("every"), 1, MOST_FRAMES),
+            halflife=checks.number_in_range(path, "halflife", meta.get("halflife"), MOST_FRAMES),
             **common,
         )
 
