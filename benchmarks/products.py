@@ -66,8 +66,8 @@ def factors(rows: int, sizes: tuple[int, ...], dtype: torch.dtype) -> dict[str, 
 def chosen(a: Tensor, b: Tensor) -> str:
     """The way that `product` takes."""
     shape = (len(a), a.shape[1], len(b))
-    by_rows = (products._by_rows(a), products._by_rows(b))
-    return products._chosen(shape, by_rows, a.dtype, torch.get_num_threads())
+    by_rows = (products._is_by_rows(a), products._is_by_rows(b))
+    return products._chosen_way(shape, by_rows, a.dtype, torch.get_num_threads())
 
 
 def steps(rows: int, sizes: tuple[int, ...], half: bool) -> dict[str, float]:
@@ -78,7 +78,7 @@ def steps(rows: int, sizes: tuple[int, ...], half: bool) -> dict[str, float]:
 
     def with_way(way: str) -> Callable[[], object]:
         def call() -> None:
-            with patch.object(products, "_chosen", lambda *_: way):
+            with patch.object(products, "_chosen_way", lambda *_: way):
                 step(*batch, step.masks(rows))
 
         return call

@@ -10,14 +10,14 @@ import pytest
 import torch
 
 from hobble.models import product_trial, products
-from hobble.models.product_trial import choices_file, fastest, kept_choice
+from hobble.models.product_trial import choices_file, fastest_way, kept_choice
 
 
 @pytest.fixture(autouse=True)
 def cache_folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     """An empty cache folder, and no choice in memory."""
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
-    products._chosen.cache_clear()
+    products._chosen_way.cache_clear()
     product_trial._warn_once.cache_clear()
     return tmp_path
 
@@ -36,7 +36,7 @@ def factors(dtype: torch.dtype, rows: int = 33) -> list[tuple[torch.Tensor, torc
 def test_every_way_of_multiplying_gives_the_product(
     way: str, dtype: torch.dtype, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(products, "_chosen", lambda *_: way)
+    monkeypatch.setattr(products, "_chosen_way", lambda *_: way)
     for a, b in factors(dtype):
         exact = a.double() @ b.double().T
         scale = float(exact.abs().max())
@@ -60,7 +60,7 @@ def test_the_choice_in_the_file_is_used(monkeypatch: pytest.MonkeyPatch) -> None
     assert len(content["ways"]) == len(cases)
     for way in products.WAYS:
         file.write_text(json.dumps({**content, "ways": dict.fromkeys(content["ways"], way)}))
-        products._chosen.cache_clear()
+        products._chosen_way.cache_clear()
         taken.clear()
         for a, b in cases:
             products.product(a, b)
@@ -150,7 +150,7 @@ def test_the_fastest_is_the_one_with_the_shortest_call() -> None:
 
     def found(*names: str) -> str:
         calls.update(dict.fromkeys(cost, 0))
-        return fastest({name: lambda name=name: call(name) for name in names}, lambda: now[0])
+        return fastest_way({name: lambda name=name: call(name) for name in names}, lambda: now[0])
 
     assert found("slow", "steady") == "steady"
     assert found("slow", "late") == "late"
@@ -166,5 +166,5 @@ def test_an_earlier_way_stays_if_a_later_one_gains_little() -> None:
         now[0] += seconds
 
     clock = lambda: now[0]  # noqa: E731
-    assert fastest({"a": lambda: call(1.0), "b": lambda: call(0.98)}, clock) == "a"
-    assert fastest({"a": lambda: call(1.0), "b": lambda: call(0.95)}, clock) == "b"
+    assert fastest_way({"a": lambda: call(1.0), "b": lambda: call(0.98)}, clock) == "a"
+    assert fastest_way({"a": lambda: call(1.0), "b": lambda: call(0.95)}, clock) == "b"

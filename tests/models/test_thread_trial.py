@@ -9,7 +9,7 @@ import pytest
 import torch
 
 from hobble.models import product_trial, thread_trial
-from hobble.models.thread_trial import compare, threads_for
+from hobble.models.thread_trial import faster_thread_count, threads_for
 
 
 class Machine:
@@ -29,7 +29,7 @@ class Machine:
         self.busy += self.seconds[self.threads] * self.shares[self.threads]
 
     def chosen(self) -> str:
-        return compare(self.call, 2, self.use, lambda: self.now, lambda: self.busy)
+        return faster_thread_count(self.call, 2, self.use, lambda: self.now, lambda: self.busy)
 
 
 @pytest.mark.parametrize(
@@ -60,7 +60,7 @@ def test_a_choice_is_kept_and_fits_the_size_of_the_batch(
         asked.append(most)
         return "1"
 
-    monkeypatch.setattr(thread_trial, "compare", slower_with_two)
+    monkeypatch.setattr(thread_trial, "faster_thread_count", slower_with_two)
     before = torch.get_num_threads()
     assert [threads_for(batch, 2) for batch in (32, 30, 17)] == [1, 1, 1]
     assert asked == [2]

@@ -9,14 +9,15 @@ import pytest
 
 from hobble.core.errors import HobbleError
 from hobble.database.split_check import refuse_split_pairs
-from hobble.motion.axes import turned
+from hobble.motion.axes import turned_about_vertical
 from hobble.motion.duplicates import digest, load_digests, same_pairs, save_digests
 from hobble.motion.mirror import mirror_clip
 
 
 def test_turned_shortened_and_mirrored_copies_are_found(walker, holden31):
     clip = walker(holden31, 441, 60.0)
-    elsewhere = replace(turned(clip, 1.0), root=turned(clip, 1.0).root + np.array([200.0, 0.0, 50.0]))
+    turned = turned_about_vertical(clip, 1.0)
+    elsewhere = replace(turned, root=turned.root + np.array([200.0, 0.0, 50.0]))
     short = replace(clip, rotations=clip.rotations[:440], root=clip.root[:440])
     other = walker(holden31, 470, 60.0)
     bent = replace(clip, root=clip.root * [1.0, 0.9, 1.0])

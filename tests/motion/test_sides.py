@@ -48,7 +48,7 @@ def wrists(clip, side):
 
 @pytest.mark.shared
 def test_a_rig_without_sides_is_refused_with_one_question(original, tmp_path, make):
-    with pytest.raises(InputError, match=r"its joint names do not say left.*Set motion.handedness"):
+    with pytest.raises(InputError, match=r"its joint names do not tell left.*Set motion.handedness"):
         make(renamed(original, tmp_path, word))
 
 

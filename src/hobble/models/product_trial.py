@@ -1,9 +1,10 @@
 """A short trial of several ways to compute the same thing, and a file that stores which one was the fastest.
 
-The results of the ways differ in their last bits. So that results do not change, the way chosen in the first
-trial is used in every later run on the same kind of machine. The user's cache folder has one such file for
-each kind of processor, version of PyTorch and setting of the libraries. If the folder is missing or cannot be
-written to, a default is used without a trial.
+A "way" is a function that computes the result, or a number of threads. The ways round differently, so their
+results differ in the last bits. So that results do not change from run to run, the way chosen in the first
+trial is used in every later run on the same kind of machine. The file is in the user's cache folder. It has
+its own name for each combination of processor, version of PyTorch and settings of the libraries. If it cannot
+be written, a default is used without a trial.
 """
 
 from __future__ import annotations
@@ -26,26 +27,27 @@ from hobble.core.errors import HobbleError
 from hobble.core.files import read_json, write_json
 from hobble.core.processors import processor
 
-# Environment variables that limit which instructions the libraries use, and so change speed and rounding.
+# Environment variables that limit which processor instructions the libraries use. They change speed and
+# rounding.
 SETTINGS = ("ATEN_CPU_CAPABILITY", "ONEDNN_MAX_CPU_ISA", "MKL_ENABLE_INSTRUCTIONS", "MKL_CBWR")
-# A trial calls each way once in each turn. It has at least LEAST_TURNS and at most MOST_TURNS turns, and
-# between these numbers it ends as soon as TRIAL_SECONDS are over.
+# In each turn of a trial, each way is called once. A trial ends after MOST_TURNS turns, or as soon as it has
+# had LEAST_TURNS turns and has taken TRIAL_SECONDS.
 LEAST_TURNS, MOST_TURNS = 5, 50
 TRIAL_SECONDS = 0.1
 GIVE_UP_ABOVE = 1.5  # after two turns, a way this many times slower than the fastest is not called again
-# The ways are compared in their order: a later way replaces the one chosen so far only if it takes less than
-# this share of that one's time.
+# The first way is chosen unless a later way is clearly faster. A later way has to take less than this share
+# of the time of the way chosen so far.
 REPLACES_BELOW = 0.97
 
 log = logging.getLogger("hobble")
 
 
 def kept_choice(name: str, trial: Callable[[], str], ways: Collection[str], default: str) -> str:
-    """The way that the file stores under `name`. If there is none, run `trial` and store its choice.
+    """The way that the file stores under `name`. If the file stores none, run `trial` and store its choice.
 
-    name: what is computed, such as a product and its shape. trial: returns the name of a way. ways: the
-    allowed names of ways. default: the way to take if the choice cannot be stored. If several processes ask
-    at the same time, one of them runs the trial and the others wait for its choice.
+    name: what is computed, such as the shape of a matrix product. trial: returns the name of a way. ways: the
+    allowed names of ways. default: the way to take if the choice cannot be stored. If several processes call
+    this function at the same time, one of them runs the trial and the others wait for its choice.
     """
     try:
         path = choices_file()
@@ -64,21 +66,21 @@ def kept_choice(name: str, trial: Callable[[], str], ways: Collection[str], defa
         return default
 
 
-def fastest(ways: Mapping[str, Callable[[], object]], clock: Callable[[], float] = perf_counter) -> str:
-    """The name of the way with the shortest call.
+def fastest_way(ways: Mapping[str, Callable[[], object]], clock: Callable[[], float] = perf_counter) -> str:
+    """The name of the way whose shortest call is the shortest. Of nearly equal ways, it is the first one.
 
-    ways: name -> function to call. They take turns, so that the work of other programs slows down all of them
-    alike. clock: returns seconds. For ways that use one thread, give the processor time of that thread: the
-    work of other programs does not add to it.
+    ways: name -> function to call. They are called in turn, so that the work of other programs slows down all
+    of them alike. clock: returns seconds. For ways that use one thread, pass a clock of this thread's
+    processor time, because the work of other programs does not add to it.
     """
-    best = dict.fromkeys(ways, float("inf"))
-    begun = perf_counter()
+    best = dict.fromkeys(ways, float("inf"))  # seconds of the shortest call
+    start = perf_counter()
     for turn in range(MOST_TURNS):
-        if turn >= LEAST_TURNS and perf_counter() - begun > TRIAL_SECONDS:
+        if turn >= LEAST_TURNS and perf_counter() - start > TRIAL_SECONDS:
             break
-        least = min(best.values())
+        shortest = min(best.values())
         for name, call in ways.items():
-            if turn < 2 or best[name] < GIVE_UP_ABOVE * least:
+            if turn < 2 or best[name] < GIVE_UP_ABOVE * shortest:
                 before = clock()
                 call()
                 best[name] = min(best[name], clock() - before)
@@ -90,7 +92,7 @@ def fastest(ways: Mapping[str, Callable[[], object]], clock: Callable[[], float]
 
 
 def machine() -> dict[str, str]:
-    """The facts about the machine on which a choice depends."""
+    """What a choice depends on: the processor, the version of PyTorch, and those of SETTINGS that are set."""
     settings = {name: os.environ[name] for name in SETTINGS if name in os.environ}
     return {"processor": processor(), "torch": str(torch.__version__), **settings}
 
@@ -103,7 +105,10 @@ def choices_file() -> Path:
 
 
 def _read(path: Path) -> dict[str, Any]:
-    """The choices in the file; none if it is missing or damaged, so that new trials are run."""
+    """The choices in the file, name of what is computed -> name of the way.
+
+    Empty if the file is missing or damaged, so that new trials are run.
+    """
     try:
         ways = read_json(path)["ways"]
         return ways if isinstance(ways, dict) else {}
@@ -113,12 +118,17 @@ def _read(path: Path) -> dict[str, Any]:
 
 @contextlib.contextmanager
 def _locked(path: Path) -> Iterator[None]:
+    """Hold the lock file `path` during the block. Other processes wait until then."""
     path.parent.mkdir(parents=True, exist_ok=True)
     with open(path, "a", encoding="utf-8") as file:
-        fcntl.flock(file, fcntl.LOCK_EX)  # until the file is closed
+        fcntl.flock(file, fcntl.LOCK_EX)  # closing the file releases the lock
         yield
 
 
 @cache
 def _warn_once(problem: str) -> None:
-    log.warning("the fastest way to multiply matrices cannot be saved; the default is used (%s)", problem)
+    log.warning(
+        "the fastest way to multiply matrices cannot be saved, so the default way is used, which may be "
+        "slower (%s)",
+        problem,
+    )

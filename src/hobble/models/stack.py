@@ -1,10 +1,11 @@
-"""Layers prepared to run on a CPU. Each has K sets of weights, whose outputs are blended by given shares.
+"""Layers prepared to run on a CPU. Each layer has K sets of weights; the caller says how to blend them.
 
-The blended outputs sum_k c_k (W_k x + b_k), with shares c_k, equal the output of blended weights, because a
-layer is linear before its activation. So no blended matrix has to be written to memory. For one character,
-the speed is limited by reading weights from memory. In a crowd, each set of weights is read once for all
-characters that use it. A character's prediction has the same bits alone and in any crowd, because its sums
-always have the same order (`hobble.models.tiles`).
+Set k has weights W_k and biases b_k, and the caller gives its share c_k. A layer is linear before its
+activation, so blending the outputs of the sets, sum_k c_k (W_k x + b_k), gives the same result as blending
+the sets. It is faster, because no blended matrix has to be written to memory. For one character, most of the
+time is spent on reading weights from memory. In a crowd, each set is read once for all characters that use
+it. A character's prediction has the same bits alone and in any crowd, because its sums are always added in
+the same order (`hobble.models.tiles`).
 """
 
 from __future__ import annotations
@@ -17,25 +18,27 @@ import numpy as np
 from hobble.core.compiled import njit
 from hobble.core.quat import Array
 from hobble.models.network import STORAGES, Network, inverse
-from hobble.models.tiles import WIDTH, aligned, in_panels, multiply, panels_of
+from hobble.models.tiles import WIDTH, aligned_zeros, in_panels, multiply, panel_count
 
-# Columns of `Stack.plan`, which has a row for each layer: numbers of inputs and outputs, the index in
-# `Stack.weights` where the layer's weights begin, and the indices in `Stack.numbers` where its factors and
-# its biases begin. There are so few arrays because each one costs 0.3 microseconds when it is passed to a
-# compiled function.
+# Columns of the table `Stack.plan`, which has a row for each layer: the number of inputs, the number of
+# outputs, the index in `Stack.weights` where the layer's weights begin, and the indices in `Stack.numbers`
+# where its factors and its biases begin. All layers share these three arrays, because each array that is
+# passed to a compiled function costs 0.3 microseconds.
 INPUTS, OUTPUTS, WEIGHTS, FACTORS, BIASES = range(5)
 
 
 class Stack:
-    """Layers of weights (K, out, in) and biases (K, out), an ELU between them, packed for `blend_layers`.
+    """Layers with an ELU between them, packed into flat arrays for `blend_layers`.
 
-    storage: type of the stored weights: "float32", or "int16" with a factor for each row, to halve the memory
-    traffic. mean, std: (Y,) statistics to bring the last layer's outputs to raw units, by default 0 and 1.
-    Raises ValueError for another storage.
+    weights, biases: (K, out, in) and (K, out) of each layer. storage: type in which the weights are stored.
+    It is "float32", or "int16" to read half as much memory; each row of int16 weights has a factor that
+    restores its scale. mean, std: (Y,) by which the last layer's outputs are brought to raw units, by default
+    0 and 1. Raises ValueError for another storage.
 
-    Its fields: `sets` is K. `weights` is a flat array of all weights in panels (`hobble.models.tiles`), layer
-    by layer and set by set. `numbers` is a flat float32 array of mean and std, then for each layer the
-    factors of all rows and the biases of all sets. `plan`: see INPUTS to BIASES.
+    Fields: `sets` is K. `weights` has the weights of all layers in panels (`hobble.models.tiles`), layer by
+    layer and set by set. `numbers`, float32, has mean and std, then for each layer the factors of the rows of
+    all sets and the biases of all sets. `plan` tells where in these arrays each layer begins: see INPUTS to
+    BIASES.
     """
 
     def __init__(
@@ -51,22 +54,24 @@ class Stack:
         outputs = weights[-1].shape[1]
         mean, std = np.zeros(outputs) if mean is None else mean, np.ones(outputs) if std is None else std
         self.sets = len(weights[0])
-        self.weights = aligned(sum(_panel_numbers(w) for w in weights), storage)
-        numbers, plan, at, size = [mean, std], [], 0, 2 * outputs
-        for table, bias in zip(weights, biases, strict=True):
-            sets, outputs, inputs = table.shape
-            stored, factors = _pack(table, storage)
+        self.weights = aligned_zeros(sum(_size_in_panels(w) for w in weights), storage)
+        numbers, plan = [mean, std], []
+        weights_end, numbers_end = 0, 2 * outputs  # where the next layer's weights and numbers begin
+        for layer, bias in zip(weights, biases, strict=True):
+            sets, outputs, inputs = layer.shape
+            stored, factors = _pack(layer, storage)
             panels = in_panels(stored).ravel()
-            self.weights[at : at + panels.size] = panels
-            plan.append([inputs, outputs, at, size, size + sets * outputs])
+            self.weights[weights_end : weights_end + panels.size] = panels
+            plan.append([inputs, outputs, weights_end, numbers_end, numbers_end + sets * outputs])
             numbers += [factors.ravel(), bias.ravel()]
-            at, size = at + panels.size, size + 2 * sets * outputs
+            weights_end += panels.size
+            numbers_end += 2 * sets * outputs
         self.numbers = np.concatenate([np.asarray(array, np.float32) for array in numbers])
         self.plan = np.array(plan, np.int64)
 
 
 class StackPredictor:
-    """Base of the predictors that run a `Stack`: standardises inputs."""
+    """Base class of predictors that run a `Stack`. It standardises the inputs; a subclass adds `evaluate`."""
 
     def __init__(self, network: Network) -> None:
         self.network = network
@@ -75,7 +80,7 @@ class StackPredictor:
         )
 
     def standardise(self, x: Array, z: Array) -> None:
-        """z = (x - mean) / std, both (C, X) float32."""
+        """Write (x - mean) / std into z. x, z: (C, X) float32, a row for each of C characters."""
         standardise(x, self._x_mean, self._x_inverse, z)
 
     def evaluate(self, z: Array, phase: Array, out: Array) -> None:
@@ -92,15 +97,20 @@ class StackPredictor:
         return out
 
 
-def _panel_numbers(table: Array) -> int:
-    sets, outputs, inputs = table.shape
-    return int(sets * panels_of(outputs) * WIDTH * inputs)
+def _size_in_panels(weights: Array) -> int:
+    """How many numbers the weights (K, out, in) of a layer are in panels, padding included."""
+    sets, outputs, inputs = weights.shape
+    return int(sets * panel_count(outputs) * WIDTH * inputs)
 
 
 def _pack(weights: Array, storage: str) -> tuple[Array, Array]:
-    """Weights (K, out, in) in the storage type, and the factors (K, out) of their rows."""
+    """Weights (K, out, in) in the storage type, and factors (K, out).
+
+    A stored row times its factor is the row of weights, rounded for int16.
+    """
     if storage == "float32":
         return np.asarray(weights, np.float32), np.ones(weights.shape[:2], np.float32)
+    # A row's largest weight becomes 32767, the largest int16. 1e-30 avoids division by 0 in rows of zeros.
     factors = np.maximum(np.abs(weights).max(axis=-1) / 32767, 1e-30)
     return np.round(weights / factors[..., None]).astype(np.int16), factors.astype(np.float32)
 
@@ -113,22 +123,23 @@ def standardise(x: Any, mean: Any, factor: Any, z: Any) -> None:
             z[c, i] = (x[c, i] - mean[i]) * factor[i]
 
 
-# Only functions called from Python are cached on disk; the functions that they call are inlined. If the
-# inner functions had caches of their own, the compiler could optimise across the calls in the first run, but
-# not after loading these functions from the cache. Then the rounding would change.
+# The functions below are inlined in the compiled functions that call them, and have no cache on disk. If they
+# had one, the compiler could optimise across the calls in the first run, but not in a later run that loads
+# them from the cache. Then the rounding would differ between these runs.
 @njit(forceinline=True, cache=False)
 def blend_layers(weights: Any, numbers: Any, plan: Any, shares: Any, z: Any, out: Any) -> None:
-    """Run the layers and write their outputs, in raw units, into out (C, Y).
+    """Run the layers for C characters and write the last layer's outputs, in raw units, into out (C, Y).
 
-    weights, numbers, plan: of a `Stack`. shares: (C, K) float32 of the sets; a set with a share of 0 is not
-    computed. z: (C, X) float32 standardised inputs.
+    weights, numbers, plan: fields of a `Stack`. shares: (C, K) float32, the share of each set for each
+    character; a set with a share of 0 is not computed. z: (C, X) float32 standardised inputs.
     """
     count, sets, layers = z.shape[0], shares.shape[1], plan.shape[0]
     widest = 0
     for layer in range(layers):
         widest = max(widest, plan[layer, INPUTS], -(-plan[layer, OUTPUTS] // WIDTH) * WIDTH)
-    # h, y: inputs and blended outputs of a layer. members_h, sums: inputs and outputs of one set of weights,
-    # for the characters that use it (`members`). slots: where the sums of each of them begin.
+    # h, y: inputs and blended outputs of a layer, for all characters. members: the characters that use a set
+    # of weights, because their share of it is not 0. Below, `rows` is their number. members_h, sums: their
+    # inputs, and the products of these with the set. slots: index in `sums` where each member's sums begin.
     room = np.empty((4, count * widest), np.float32)
     h, y, members_h, sums = room[0], room[1], room[2], room[3]
     members, slots = np.empty(count, np.int64), np.empty(count, np.int64)
@@ -167,11 +178,17 @@ def blend_layers(weights: Any, numbers: Any, plan: Any, shares: Any, z: Any, out
 
 @njit(forceinline=True, cache=False)
 def exp_below_0(x: Any) -> Any:
-    """e^x for x <= 0 in float32, with a relative error of 2e-7, in a form that the compiler can vectorise."""
+    """e^x for x <= 0 in float32, with a relative error of 2e-7, in a form that the compiler can vectorise.
+
+    With n = x / ln 2, rounded, and r = x - n ln 2, the result is 2^n e^r. e^r is the Taylor series up to r^6.
+    2^n is written directly into the exponent bits of a float32.
+    """
     one = np.float32(1)
-    x = max(x, np.float32(-87))
+    x = max(x, np.float32(-87))  # keeps 2^n a normal float32
     n = np.floor(x * np.float32(1.44269504) + np.float32(0.5))
-    r = (x - n * np.float32(0.693359375)) + n * np.float32(2.12194440e-4)  # n ln 2 in two parts
+    r = (x - n * np.float32(0.693359375)) + n * np.float32(
+        2.12194440e-4
+    )  # n ln 2, subtracted in two parts for precision
     p = one + r * np.float32(1 / 6)
     p = one + r * np.float32(1 / 5) * p
     p = one + r * np.float32(1 / 4) * p
@@ -181,8 +198,8 @@ def exp_below_0(x: Any) -> Any:
     return p * np.uint32(np.uint32(np.int32(n) + np.int32(127)) << np.uint32(23)).view(np.float32)
 
 
-# The loops below start at index 0 of their arguments. With an offset in the index, the compiler checks for
-# negative indices at every step and does not vectorise.
+# The loops below start at index 0 of their arguments, so callers pass slices. If an offset were added to the
+# index, the compiler would check for negative indices at every step and would not vectorise.
 
 
 @njit(forceinline=True, cache=False)
@@ -193,12 +210,14 @@ def _copy(x: Any, count: int, to: Any) -> None:
 
 @njit(forceinline=True, cache=False)
 def _add(sums: Any, factors: Any, biases: Any, share: Any, count: int, y: Any) -> None:
+    """Add a set's `count` outputs times its share to y."""
     for r in range(count):
         y[r] += share * (sums[r] * factors[r] + biases[r])
 
 
 @njit(forceinline=True, cache=False)
 def _elu(y: Any, count: int) -> None:
+    """Replace y by its ELU: y where y > 0, else e^y - 1."""
     for r in range(count):
         below = exp_below_0(min(y[r], np.float32(0))) - np.float32(1)
         y[r] = y[r] if y[r] > 0 else below
@@ -206,7 +225,7 @@ def _elu(y: Any, count: int) -> None:
 
 @njit(forceinline=True, cache=False)
 def _restore(h: Any, statistics: Any, count: int, out: Any) -> None:
-    """out = h std + mean; statistics: the means, then the standard deviations."""
+    """Write h std + mean into out. statistics: `count` means, then `count` standard deviations."""
     std = statistics[count:]
     for r in range(count):
         out[r] = h[r] * std[r] + statistics[r]

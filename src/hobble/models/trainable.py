@@ -22,9 +22,9 @@ ALL_ROWS = slice(None)
 class TrainingStep(Protocol):
     """Computes the gradient of the mean squared error on one batch.
 
-    gradients: those of the last call, one for each layer, in the order of the layer's parameters. error: (B,
-    Y) prediction minus y in the last call. generator: random numbers for dropout on CUDA. input_mask: which
-    item of the list of dropout masks is for the network's inputs.
+    gradients: result of the last call, one gradient for each layer, with its numbers in the order of the
+    layer's parameters. error: (B, Y) prediction minus y in the last call. generator: random numbers for
+    dropout on CUDA. input_mask: index of the mask for the network's inputs in the list that `masks` returns.
     """
 
     gradients: list[Tensor]
@@ -33,15 +33,15 @@ class TrainingStep(Protocol):
     input_mask: int
 
     def __call__(self, x: Tensor, y: Tensor, p: Tensor, masks: list[Tensor]) -> Tensor:
-        """Compute `gradients` for x (B, X), y (B, Y) and phases p (B,). Returns the mean squared error.
+        """Compute `gradients` and `error`, and return the mean squared error.
 
-        masks: the dropout masks of this batch, from the method `masks`.
+        x: (B, X). y: (B, Y). p: (B,) phases. masks: the dropout masks of this batch, from the method `masks`.
         """
 
     def masks(self, rows: int, own: slice = ALL_ROWS) -> list[Tensor]:
-        """Draw the dropout masks of a batch of `rows` rows, and return those of the rows `own`.
+        """Draw the dropout masks of a batch of `rows` rows, and return the part for the rows `own`.
 
-        Processes that share a batch each take their own rows of the same masks.
+        If several processes share a batch, each draws the same masks and gets the part for its own rows.
         """
 
     def seed(self, seed: int) -> None:
@@ -52,10 +52,11 @@ class TrainingStep(Protocol):
 class Trainable(ABC):
     """A network in training. Its parameters are in one buffer `flat`, layer by layer.
 
-    A layer is (out, K, in + 1): K sets of weights, with the bias as the last column. The network blends the
-    sets, each with a share. So one loop of the optimiser serves all architectures. A layer is one matrix
-    product: its parameters as (out, K (in + 1)), times its inputs, which are extended by a 1 and repeated K
-    times, each time multiplied by the share of a set.
+    The parameters of a layer are (out, K, in + 1): K sets of weights, with the bias as the last column. The
+    network blends the sets, each with its share. All architectures have this layout, so one loop of the
+    optimiser serves them all. A layer is evaluated as one matrix product. One factor is its parameters as
+    (out, K (in + 1)). The other is its inputs with a 1 appended, repeated K times and multiplied each time by
+    the share of one set.
     """
 
     kind: ClassVar[str] = ""  # name of the kind of network, and of its folder in hobble.models
@@ -70,12 +71,12 @@ class Trainable(ABC):
     @property
     @abstractmethod
     def inputs(self) -> int:
-        """Columns of X."""
+        """Number of columns of X, the network's inputs."""
 
     @property
     @abstractmethod
     def outputs(self) -> int:
-        """Columns of Y."""
+        """Number of columns of Y, the network's outputs."""
 
     @abstractmethod
     def __call__(self, x: Tensor, p: Tensor) -> Tensor:
@@ -83,39 +84,44 @@ class Trainable(ABC):
 
     @abstractmethod
     def step(self, dropout: float, half: bool) -> TrainingStep:
-        """The fastest step on the device of `flat`.
+        """The training step that is fastest on the device of `flat`.
 
-        dropout: share of units dropped. half: round the factors of the matrix products to bfloat16.
+        dropout: share of the units that are dropped. half: whether to round the factors of the matrix
+        products to bfloat16.
         """
 
     @abstractmethod
     def arrays(self) -> dict[str, np.ndarray]:
-        """The arrays of its file, from which `hobble.models.model.Model.read` builds the network."""
+        """Name -> array, for the network's file. `hobble.models.model.Model.read` reads them back."""
 
     @property
     @abstractmethod
     def about(self) -> dict[str, Any]:
-        """Its entries in the metadata of its file. The entry `network` is its formula in one line."""
+        """The network's entries in the metadata of its file. One is `network`, its formula in one line."""
 
     @property
     @abstractmethod
     def described(self) -> str:
-        """Its shape in a few words. A training resumes only with a network of the same shape."""
+        """The shape of the network in words, such as its units and the number of its parameters.
+
+        A training resumes from a checkpoint only if the checkpoint has the same words.
+        """
 
     def mirrors(self, inputs: ColumnMirror, outputs: ColumnMirror) -> list[LayerMirror]:
-        """How each layer changes if standardised X and Y are mirrored by `inputs` and `outputs`.
+        """How each layer changes if standardised X and Y are mirrored.
 
-        Raises TypeError for kinds that cannot be trained with `training.symmetric`.
+        inputs, outputs: how the columns of X and Y are mirrored. Raises TypeError for kinds of networks that
+        cannot be trained with `training.symmetric`.
         """
-        raise TypeError(f"{type(self).__name__} has no mirror")
+        raise TypeError(f"{type(self).__name__} cannot be mirrored, so set training.symmetric: false")
 
     @cached_property
     def layers(self) -> list[Tensor]:
-        """(out, K, in + 1) views of `flat`, one for each layer."""
+        """(out, K, in + 1) views of the parameters, one for each layer."""
         return self.views(self.flat)
 
     def views(self, flat: Tensor) -> list[Tensor]:
-        """The layers of a buffer laid out like `self.flat`, such as a gradient."""
+        """(out, K, in + 1) views of `flat`, one for each layer. flat: a buffer laid out like `self.flat`."""
         parts = flat.split([prod(shape) for shape in self.shapes])
         return [part.view(shape) for part, shape in zip(parts, self.shapes, strict=True)]
 
@@ -125,12 +131,12 @@ class Trainable(ABC):
 
 
 def uniform_start(layers: Sequence[Tensor], generator: np.random.Generator) -> None:
-    """Fill the weights of layers, uniform within +-sqrt(6 / (in * out)).
+    """Fill the weights of layers (out, K, in + 1) with uniform random numbers within +-sqrt(6 / (in * out)).
 
     The code that Holden et al. (2017) released starts in the same way. The biases are not changed; in a new
     buffer they are 0.
     """
     for layer in layers:
-        out, k, size = layer.shape
-        bound = (6.0 / ((size - 1) * out)) ** 0.5
-        layer[:, :, :-1] = torch.from_numpy(generator.uniform(-bound, bound, (out, k, size - 1)))
+        outputs, sets, inputs = layer.shape[0], layer.shape[1], layer.shape[2] - 1
+        bound = (6.0 / (inputs * outputs)) ** 0.5
+        layer[:, :, :-1] = torch.from_numpy(generator.uniform(-bound, bound, (outputs, sets, inputs)))

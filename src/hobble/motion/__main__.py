@@ -1,4 +1,4 @@
-"""Commands for BVH files that are in no data set yet: `python -m hobble.motion rig` and `look`."""
+"""Commands for BVH files that are in no data set yet: `python -m hobble.motion rig` and `... look`."""
 
 from __future__ import annotations
 
@@ -20,66 +20,69 @@ from hobble.motion.retarget_picture import picture_of_file
 SKELETONS = Path("config/skeletons")  # the folder of the skeleton files
 
 
-def rig(file: Path) -> str:
-    """A draft of a skeleton file for the rig of a BVH file. Roles without a joint have `?`."""
+def skeleton_draft(file: Path) -> str:
+    """A draft of a skeleton file for the rig of a BVH file, with `?` for roles whose joint is not known."""
     bvh = read_bvh(file)
     skeleton = rig_of(bvh)
     try:
-        roles = find_body(skeleton.joints, skeleton.parents, raw_clip(bvh).positions).body.roles(
-            skeleton.joints
-        )
+        body = find_body(skeleton.joints, skeleton.parents, raw_clip(bvh).positions).body
+        roles = body.roles(skeleton.joints)
     except Doubt as doubt:
-        print(f"{file}: {doubt}. Its roles are guessed from names", file=sys.stderr)
+        print(f"{file}: {doubt}. The roles are guessed from the names of the joints.", file=sys.stderr)
         roles = guessed(skeleton)
     return draft(skeleton, roles)
 
 
 def main() -> int:
-    """Run the command line. Returns 1 if a file is refused, else 0."""
+    """Run the command line. Returns the exit status: 1 after an error or if a clip is refused, else 0."""
     parser = argparse.ArgumentParser(prog="python -m hobble.motion", description=__doc__)
     commands = parser.add_subparsers(dest="command", required=True)
-    for_rig = commands.add_parser(
-        "rig", help="write a draft of a skeleton file, which says which joint of a BVH file is which"
+    rig_parser = commands.add_parser(
+        "rig", help="draft a skeleton file, which says which joint of a BVH file is which part of the body"
     )
-    for_rig.add_argument("file", type=Path, help="a BVH file")
-    for_rig.add_argument("--to", type=Path, help="the file to write (default: print it)")
-    for_look = commands.add_parser(
-        "look", help="try to read each clip of a folder, or one file; print a line about each"
+    rig_parser.add_argument("file", type=Path, help="a BVH file")
+    rig_parser.add_argument("--to", type=Path, help="the file to write (default: print it)")
+    look_parser = commands.add_parser(
+        "look", help="try to read each clip of a folder, or one file, and print a line about each clip"
     )
-    for_look.add_argument("folder", type=Path, help="a folder of BVH files, or one file")
-    for_look.add_argument(
+    look_parser.add_argument("folder", type=Path, help="a folder of BVH files, or one file")
+    look_parser.add_argument(
         "--skeleton",
         default="holden31",
         help="name of the skeleton to which the clips are retargeted (default holden31)",
     )
-    for_look.add_argument(
+    look_parser.add_argument(
         "--skeletons", type=Path, default=SKELETONS, help="the folder of the skeleton files"
     )
-    for_look.add_argument(
+    look_parser.add_argument(
         "--handedness",
         choices=["auto", "right", "left"],
         default="auto",
-        help="handedness of the files' coordinates, like the setting motion.handedness of a data set",
+        help="handedness of the files' coordinates, as in the setting motion.handedness of a data set "
+        "(default auto: found from the motion)",
     )
-    for_look.add_argument(
+    look_parser.add_argument(
         "--picture",
         type=Path,
         metavar="SVG",
-        help="for one file: draw its motion before and after retargeting, the joint that differs most in red",
+        help="only if one file is given: the picture to write, which shows the motion before and after "
+        "retargeting, and in red the joint or limb that differs most",
     )
-    given = parser.parse_args()
+    arguments = parser.parse_args()
     try:
-        if given.command == "rig":
-            text = rig(given.file)
-            write_text(given.to, text) if given.to else print(text, end="")
+        if arguments.command == "rig":
+            text = skeleton_draft(arguments.file)
+            write_text(arguments.to, text) if arguments.to else print(text, end="")
             return 0
-        options = ClipMotion(handedness=given.handedness)
-        target = given.skeletons / f"{given.skeleton}.yaml"
-        if given.picture:
-            write_text(given.picture, picture_of_file(given.folder, target, given.skeletons, options))
-        seen = look(given.folder, target, given.skeletons, options)
-        print(table(seen))
-        return int(any(clip.refused for clip in seen.clips))
+        options = ClipMotion(handedness=arguments.handedness)
+        target = arguments.skeletons / f"{arguments.skeleton}.yaml"
+        if arguments.picture:
+            write_text(
+                arguments.picture, picture_of_file(arguments.folder, target, arguments.skeletons, options)
+            )
+        summary = look(arguments.folder, target, arguments.skeletons, options)
+        print(table(summary))
+        return int(any(clip.refused for clip in summary.clips))
     except HobbleError as error:
         print(error, file=sys.stderr)
         return 1

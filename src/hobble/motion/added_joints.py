@@ -1,11 +1,12 @@
 """Adds joints that a rig lacks: balls of the feet, and second joints at hips and chest to bend the spine.
 
-In many rigs one joint at the hips carries both legs and spine, and one at the chest both arms and neck. Such
-a joint is taken to be turned as its limbs are, but the bone above it may point in another direction. So a
-second joint is added at the same place. It follows the bone, and the target's spine can then follow it.
+In many rigs, one joint at the hips carries both legs and the spine, and one joint at the chest carries both
+arms and the neck. The rotation of this joint is taken to be that of the limbs, but the bone above the joint
+may point in another direction. So a second joint is added at the same place, which follows the bone. The
+spine of the target, the skeleton to which the clip will be retargeted, can then follow the second joint.
 
-The frame of a joint (not a moment of the clip) is a rotation (4,), the same at all times: from the axes of a
-figure that stands facing +Z with its arms out sideways to the joint's own axes.
+In this module, the frame of a joint is not a moment of the clip. It is a rotation (4,), the same at all
+times: from the axes of a figure that stands facing +Z with its arms out sideways, to the joint's own axes.
 """
 
 from __future__ import annotations
@@ -20,41 +21,45 @@ from hobble.core.clip import Clip
 from hobble.core.quat import Array
 from hobble.motion.body import SIDES, Body
 
-# BALL: offset from an ankle to the ball that is added below it, as a share of the length of thigh and shank,
-# along the axes of a foot that stands and points to +Z. OUTWARD: radians by which feet point outward. Both
-# are means over seven subjects of the CMU database. The standard deviations are .006 (height) and .010
-# (length) for BALL, and 2 degrees for OUTWARD.
+# BALL: offset from an ankle to the ball of its foot, as a share of the length of thigh plus shank, for a foot
+# that stands and points to +Z. OUTWARD: radians by which feet point outward. Both are means over seven
+# subjects of the CMU database. The standard deviations are .006 (height) and .010 (length) for BALL, and 2
+# degrees for OUTWARD.
 BALL, OUTWARD = np.array([0.0, -0.034, 0.136]), np.radians(5.0)
 
 
 def with_balls(clip: Clip, body: Body, frames: dict[int, Array]) -> tuple[Clip, Body]:
-    """The clip and the body with a ball on every foot. Missing balls are put where people have them.
+    """The clip and the body, with a joint at the ball of each foot.
+
+    Missing balls are put where people have them.
 
     frames: joint -> (4,) frame. This argument is changed: the frames of the new joints are added, and the
     frames of the ankles above them are turned outward.
     """
-    without = [side for side in SIDES if body.legs[side][3] is None]
+    sides_without_ball = [side for side in SIDES if body.legs[side][3] is None]
     legs, offsets = dict(body.legs), []
-    p = clip.positions
-    for i, side in enumerate(without):
+    positions = clip.positions
+    for i, side in enumerate(sides_without_ball):
         hip, knee, heel, _ = body.legs[side]
         thigh, shank = (
-            float(np.median(np.linalg.norm(p[:, b] - p[:, a], axis=-1)))
+            float(np.median(np.linalg.norm(positions[:, b] - positions[:, a], axis=-1)))
             for a, b in ((hip, knee), (knee, heel))
         )
-        new = len(clip.skeleton.joints) + i
+        ball = len(clip.skeleton.joints) + i
         outward = quat.yaw(np.array(OUTWARD if side == "left" else -OUTWARD))
-        frames[new] = frames[heel] = quat.mul(frames[heel], outward)
-        legs[side] = (hip, knee, heel, new)
+        frames[ball] = frames[heel] = quat.mul(frames[heel], outward)
+        legs[side] = (hip, knee, heel, ball)
         offsets.append(quat.rotate(frames[heel], BALL * (thigh + shank)))
-    heels = [body.legs[side][2] for side in without]
+    heels = [body.legs[side][2] for side in sides_without_ball]
     return _with_joints(clip, "ball", heels, offsets), replace(body, legs=legs)
 
 
 @dataclass(frozen=True)
 class Bend:
-    """The bone above hips or chest. end: the joint where it ends. bone: (3,) its mean vector, in the
-    coordinates of the joint where it begins. frame: (4,) the frame of a joint that follows the bone.
+    """The bone that leads up from the hips or the chest.
+
+    end: the joint where the bone ends. bone: (3,) mean vector of the bone, in the coordinates of the joint
+    where it begins. frame: (4,) the frame of a joint that follows the bone.
     """
 
     end: int
@@ -65,14 +70,14 @@ class Bend:
 def with_split_joints(
     clip: Clip, body: Body, frames: dict[int, Array], bends: Mapping[int, Bend]
 ) -> tuple[Clip, Body]:
-    """The clip and the body with second joints at the places of hips and chest.
+    """The clip and the body, with second joints at hips and chest.
 
-    frames: joint -> (4,) frame. This argument is changed: the frames of the new joints are added. bends:
-    joint (hips, chest or both) -> the bone above it, which the new joint follows. The new joint turns only if
-    the bone's end moves relative to the old joint.
+    frames: joint -> (4,) frame. This argument is changed: the frames of the new joints are added. bends: the
+    hips, the chest or both -> the bone above this joint, which the new joint follows. The new joint turns
+    only if the bone's end moves relative to the old joint.
     """
     trunk, neck = body.trunk, body.neck
-    turns = [_turns(clip, joint, bend) for joint, bend in bends.items()]
+    turns = [_bone_rotations(clip, joint, bend) for joint, bend in bends.items()]
     for new, (joint, bend) in enumerate(bends.items(), len(clip.skeleton.joints)):
         frames[new] = bend.frame
         if joint == body.chest:
@@ -83,47 +88,50 @@ def with_split_joints(
     return grown, replace(body, trunk=trunk, neck=neck)
 
 
-def _turns(clip: Clip, joint: int, bend: Bend) -> Array:
-    """(F, 4) rotations of a bone relative to the joint where it begins, from its mean direction.
+def _bone_rotations(clip: Clip, joint: int, bend: Bend) -> Array:
+    """(F, 4) rotations from the mean direction of a bone to its direction in each frame of the clip.
 
-    The rotation is zero at times at which the bone is shorter than half of its mean.
+    Directions are relative to `joint`, where the bone begins. Where the bone is shorter than half of its
+    mean, its direction is not reliable, and there is no rotation.
     """
     if clip.translations is None:
-        return _still(clip)
+        return _no_rotations(clip)
     bones = quat.rotate(
         quat.inv(clip.global_rotations[:, joint]), clip.positions[:, bend.end] - clip.positions[:, joint]
     )
-    usual = np.broadcast_to(bend.bone, bones.shape)
+    mean = np.broadcast_to(bend.bone, bones.shape)
     long = np.linalg.norm(bones, axis=-1, keepdims=True) > 0.5 * np.linalg.norm(bend.bone)
-    return quat.between(usual, np.where(long, bones, usual))
+    return quat.between(mean, np.where(long, bones, mean))
 
 
-def _still(clip: Clip) -> Array:
+def _no_rotations(clip: Clip) -> Array:
+    """(F, 4) identity rotations, one for each frame of the clip."""
     return np.broadcast_to(quat.IDENTITY, (len(clip), 4))
 
 
 def _with_joints(
     clip: Clip, word: str, parents: Sequence[int], offsets: Sequence[Array], turns: Sequence[Array] = ()
 ) -> Clip:
-    """The clip with a new joint below each of `parents`, at an offset (3,) from it.
+    """The clip with a new joint below each of `parents`, at an offset (3,) from the parent.
 
-    word: last word of the new joints' names. turns: for each, its rotations (F, 4) relative to its parent; by
-    default it does not turn.
+    word: last word of the new joints' names. turns: for each new joint, its rotations (F, 4) relative to its
+    parent; by default, the new joints do not turn.
     """
     if not parents:
         return clip
     skeleton = clip.skeleton
     names = (*skeleton.joints, *(f"{skeleton.joints[p]}_{word}" for p in parents))
-    tail = np.array(offsets)
-    new = np.stack(turns or [_still(clip)] * len(parents), axis=1)
-    moved = clip.translations
-    if moved is not None:
-        moved = np.concatenate([moved, np.broadcast_to(tail, (len(clip), *tail.shape))], axis=1)
+    new_offsets = np.array(offsets)
+    new_rotations = np.stack(turns or [_no_rotations(clip)] * len(parents), axis=1)
+    translations = clip.translations
+    if translations is not None:
+        new_translations = np.broadcast_to(new_offsets, (len(clip), *new_offsets.shape))
+        translations = np.concatenate([translations, new_translations], axis=1)
     grown = replace(
         skeleton,
         joints=names,
         parents=(*skeleton.parents, *parents),
-        offsets=np.concatenate([skeleton.offsets, tail]),
+        offsets=np.concatenate([skeleton.offsets, new_offsets]),
     )
-    rotations = np.concatenate([clip.rotations, new], axis=1)
-    return replace(clip, skeleton=grown, rotations=rotations, translations=moved)
+    rotations = np.concatenate([clip.rotations, new_rotations], axis=1)
+    return replace(clip, skeleton=grown, rotations=rotations, translations=translations)

@@ -14,11 +14,14 @@ from hobble.core.clip import Clip
 from hobble.core.quat import Array
 from hobble.core.skeleton import Skeleton, rest_positions
 
-# Factors that negate x: FLIP of a position (3,), and MIRROR of a rotation (a quaternion, (4,)).
+# Factors that mirror at the plane x = 0: FLIP for a position (3,), MIRROR for a quaternion (4,).
 FLIP = np.array([-1.0, 1.0, 1.0])
 MIRROR = np.array([1.0, 1.0, -1.0, -1.0])
-CLIMB = 20.0  # cm: a body climbs if its lowest joint rises by more than this during the clip
-# A rest pose whose axes are all within 20 degrees of coordinate axes counts as exactly along these.
+# cm: a figure crawls or climbs along an axis only if its lowest joint moves by more than this along the axis.
+# The movement is measured between the quartiles of the joint's places.
+CLIMB = 20.0
+# Cosine of 20 degrees. If all axes of the body in the rest pose are within this angle of coordinate axes, the
+# rest pose counts as exactly along the coordinate axes.
 UPRIGHT = np.cos(np.radians(20.0))
 DIRECTIONS = {  # name of an axis, such as "-X" -> (3,) unit vector
     sign + axis: np.eye(3)["XYZ".index(axis)] * (1 if sign == "+" else -1) for sign in "+-" for axis in "XYZ"
@@ -27,10 +30,11 @@ DIRECTIONS = {  # name of an axis, such as "-X" -> (3,) unit vector
 
 @dataclass(frozen=True)
 class RigAxes:
-    """The axes of a file's coordinates, found or given.
+    """The axes of a file's coordinates, found from the motion or set by the user.
 
     up: the axis that points up, such as "+Y". handedness: "right" or "left". facing: the axis along which the
-    rest pose faces, or "oblique" if it faces along none.
+    rest pose faces, or "oblique" if it faces along no axis. If the coordinates are left-handed, `up` and
+    `facing` are the axes after x has been negated.
     """
 
     up: str
@@ -48,18 +52,18 @@ def nearest_axis(direction: Array) -> tuple[str, float]:
 def body_axes(skeleton: Skeleton, positions: Array) -> tuple[Array, Array, Array]:
     """Unit vectors (..., 3): from right to left, from hips to head, and forward.
 
-    Forward is where the feet point or, on a rig without toes, the knees. positions: (..., J, 3) of the
-    joints.
+    Forward is the direction of the feet or, on a rig without toes, the direction in which the knees point.
+    positions: (..., J, 3) of the joints.
     """
     at = {role: positions[..., skeleton.role(role), :] for role in skeleton.roles}
     left = at["left_hip"] - at["right_hip"] + at["left_shoulder"] - at["right_shoulder"]
     up = at["head"] - at["hips"]
-    ahead = _foot(at, "left") + _foot(at, "right")
+    ahead = _foot_direction(at, "left") + _foot_direction(at, "right")
     return _unit(left), _unit(up), _unit(ahead)
 
 
-def _foot(at: dict[str, Array], side: str) -> Array:
-    """(..., 3) direction in which a foot points or, on a rig without toes, the knee of that leg.
+def _foot_direction(at: dict[str, Array], side: str) -> Array:
+    """(..., 3) vector from ankle to ball or, on a rig without toes, from the line hip to ankle to the knee.
 
     at: role -> (..., 3) positions.
     """
@@ -71,11 +75,12 @@ def _foot(at: dict[str, Array], side: str) -> Array:
 
 
 def _unit(v: Array) -> Array:
+    """Vectors (..., 3) of length 1."""
     return v / np.maximum(np.linalg.norm(v, axis=-1, keepdims=True), 1e-9)
 
 
 def rest_frame(skeleton: Skeleton) -> Array:
-    """(4,) rotation from the axes left = X, up = Y, forward = Z to the body's own axes in the rest pose."""
+    """(4,) rotation that turns X to the body's left in the rest pose, Y to its up, and Z to its front."""
     left, up, _ = body_axes(skeleton, rest_positions(skeleton))
     up = _unit(up - left * (up @ left))
     axes = np.stack([left, up, np.cross(left, up)], axis=1)
@@ -89,9 +94,9 @@ def rest_frame(skeleton: Skeleton) -> Array:
 class UprightClip:
     """A clip with right-handed coordinates and Y up.
 
-    axes: those of the file. If motion and rest pose disagree on what is up, a sentence says so: in `notes` if
-    the figure crawls or moves far over the ground, which decides it, and else in `unsure`. At least one of
-    the two lists is empty.
+    axes: the axes of the file. notes, unsure: both are empty unless motion and rest pose disagree on which
+    axis is up. Then one sentence says so. It is in `notes` if the motion is clear, because the figure crawls
+    or moves far over the ground. Otherwise it is in `unsure`.
     """
 
     clip: Clip
@@ -103,48 +108,52 @@ class UprightClip:
 def straighten(clip: Clip, up: str, handedness: str, standing: bool = True) -> UprightClip:
     """The clip with right-handed coordinates and Y up.
 
-    A rest pose that faces along an axis is turned to +Z. One that faces obliquely is left as it is.
+    A rest pose that faces along an axis is turned to +Z. An oblique rest pose is left as it is.
 
-    up: "auto", "Y" or "Z". handedness: "auto", "right" or "left". With "auto" the axes come from the motion.
-    Up is then from the feet over the hips to the head, unless the figure crawls: then up is where the rest
-    pose has it. standing: whether a person can stand in the rest pose; if not, it does not show what is up.
+    up: "auto", "Y" or "Z". handedness: "auto", "right" or "left". With "auto", the axes are found from the
+    motion. Up is then the axis nearest to the line from the feet over the hips to the head. If the figure
+    crawls, this line in the rest pose is used. standing: whether a person can stand in the rest pose. If not,
+    the rest pose does not show which axis is up.
 
-    Raises ValueError if the figure crawls and nobody can stand in the rest pose.
+    Raises ValueError with up = "auto" if the figure crawls and nobody can stand in the rest pose.
     """
-    name, notes, unsure = _up_of(clip, standing) if up == "auto" else (f"+{up}", [], [])
+    up_axis, notes, unsure = _up_axis(clip, standing) if up == "auto" else (f"+{up}", [], [])
     if handedness == "auto":
-        handedness = _hand_of(clip)
+        handedness = _handedness_of(clip)
     if handedness == "left":
-        clip = _other_hand(clip)
-        name = {"+X": "-X", "-X": "+X"}.get(name, name)
-    world = quat.between(DIRECTIONS[name], DIRECTIONS["+Y"])
+        clip = _with_x_negated(clip)
+        up_axis = {"+X": "-X", "-X": "+X"}.get(up_axis, up_axis)
+    world = quat.between(DIRECTIONS[up_axis], DIRECTIONS["+Y"])
     rest = rest_frame(clip.skeleton)
-    facing, near = nearest_axis(quat.rotate(rest, np.array([0.0, 0.0, 1.0])))
-    turn = quat.inv(rest) if near > 1 - 1e-9 else quat.IDENTITY
-    axes = RigAxes(name, handedness, facing if near > 1 - 1e-9 else "oblique")
-    return UprightClip(_turned(clip, world, turn), axes, notes, unsure)
+    facing, cosine = nearest_axis(quat.rotate(rest, np.array([0.0, 0.0, 1.0])))
+    along_axis = cosine > 1 - 1e-9
+    turn = quat.inv(rest) if along_axis else quat.IDENTITY
+    axes = RigAxes(up_axis, handedness, facing if along_axis else "oblique")
+    return UprightClip(_with_world_and_rest_turned(clip, world, turn), axes, notes, unsure)
 
 
-def _up_of(clip: Clip, standing: bool) -> tuple[str, list[str], list[str]]:
-    """The axis that is up, and the lists `notes` and `unsure` of `UprightClip`."""
-    body, rest = (
+def _up_axis(clip: Clip, standing: bool) -> tuple[str, list[str], list[str]]:
+    """The axis that points up, and the lists `notes` and `unsure` of `UprightClip`."""
+    # The axes nearest to the line from feet to head, in the motion and in the rest pose.
+    in_motion, in_rest = (
         nearest_axis(_along_body(clip.skeleton, positions).mean(axis=0))[0]
         for positions in (clip.positions, rest_positions(clip.skeleton)[None])
     )
-    crawls = _crawls(clip, body)
+    crawls = _crawls(clip, in_motion)
     if not standing and crawls:
         why = (
-            f"the body moves along {body}, from its feet to its head, and nobody could stand in its zero pose"
+            f"the body moves along the line from its feet to its head ({in_motion}) as if it crawled, and "
+            "nobody could stand in its zero pose"
         )
         raise ValueError(why)
-    if body == rest or not standing:
-        return body, [], []
-    up, why = (rest, "the body crawls") if crawls else (body, "the body moves that way up")
+    if in_motion == in_rest or not standing:
+        return in_motion, [], []
+    up, why = (in_rest, "the body crawls") if crawls else (in_motion, "the motion is more reliable")
     note = (
-        f"The body lies along {body} and its rest pose along {rest}. {up} was taken for up, because {why} "
-        "(motion.up overrides this)."
+        f"From feet to head, the body points along {in_motion} and its rest pose along {in_rest}. {up} was "
+        f"taken for up, because {why} (motion.up overrides this)."
     )
-    return (up, [note], []) if crawls or _travels(clip, body) else (up, [], [note])
+    return (up, [note], []) if crawls or _travels(clip, in_motion) else (up, [], [note])
 
 
 def _along_body(skeleton: Skeleton, positions: Array) -> Array:
@@ -152,37 +161,43 @@ def _along_body(skeleton: Skeleton, positions: Array) -> Array:
 
     positions: (F, J, 3).
     """
-    feet = [f"{side}_{part}" for side in ("left", "right") for part in ("toe", "heel")]
-    feet = [next(role for role in feet[i : i + 2] if role in skeleton.roles) for i in (0, 2)]
+    # The toe of each side, or its heel if the rig has no toe.
+    roles = [f"{side}_{part}" for side in ("left", "right") for part in ("toe", "heel")]
+    feet = [next(role for role in roles[i : i + 2] if role in skeleton.roles) for i in (0, 2)]
     head, hips, left, right = (positions[:, skeleton.role(name)] for name in ("head", "hips", *feet))
     return _unit(head - hips) + _unit(hips - 0.5 * (left + right))
 
 
 def _crawls(clip: Clip, axis: str) -> bool:
-    """Whether the body moves at least about as far along `axis`, from its feet to its head, as across it.
+    """Whether the body crawls: along `axis` it moves at least 0.9 times as far as along any other axis.
 
-    An upright figure that did this would be climbing, but upright figures climb less far than they move over
-    the ground. A jump does not count, because the lowest joint comes down again.
+    axis: the axis from the feet to the head. If an upright figure moved like this, it would climb, but
+    upright figures climb less far than they move over the ground. A jump does not count: its lowest joint is
+    on the ground most of the time, so its quartiles differ by less than CLIMB.
     """
     along = clip.positions @ DIRECTIONS[axis]
-    early, late = np.percentile(along.min(axis=1), [25, 75])
+    low, high = np.percentile(along.min(axis=1), [25, 75])
     travel = np.ptp(clip.root, axis=0)
-    return bool(late - early > CLIMB and travel @ np.abs(DIRECTIONS[axis]) >= 0.9 * travel.max())
+    return bool(high - low > CLIMB and travel @ np.abs(DIRECTIONS[axis]) >= 0.9 * travel.max())
 
 
 def _travels(clip: Clip, axis: str) -> bool:
-    """Whether the figure moves further over the ground than it is tall, if `axis` points up."""
-    along, level = DIRECTIONS[axis], 1 - np.abs(DIRECTIONS[axis])
-    tall = float(np.median(np.ptp(clip.positions @ along, axis=1)))
-    return bool(np.linalg.norm(np.ptp(clip.root * level, axis=0)) > tall)
+    """Whether the figure moves further over the ground than it is tall. axis: the axis that points up."""
+    up, level = DIRECTIONS[axis], 1 - np.abs(DIRECTIONS[axis])
+    height = float(np.median(np.ptp(clip.positions @ up, axis=1)))
+    return bool(np.linalg.norm(np.ptp(clip.root * level, axis=0)) > height)
 
 
-def _hand_of(clip: Clip) -> str:
+def _handedness_of(clip: Clip) -> str:
+    """The handedness of the coordinates, "right" or "left".
+
+    If they are right-handed, the cross product of left and up points forward, like the feet.
+    """
     left, up, feet = body_axes(clip.skeleton, clip.positions)
     return "left" if np.mean(np.sum(np.cross(left, up) * feet, axis=-1)) < -0.2 else "right"
 
 
-def _other_hand(clip: Clip) -> Clip:
+def _with_x_negated(clip: Clip) -> Clip:
     """The clip with x negated, which changes left-handed to right-handed coordinates."""
     ends = {name: (-x, y, z) for name, (x, y, z) in clip.skeleton.end_sites.items()}
     return replace(
@@ -194,10 +209,10 @@ def _other_hand(clip: Clip) -> Clip:
     )
 
 
-def _turned(clip: Clip, world: Array, rest: Array) -> Clip:
+def _with_world_and_rest_turned(clip: Clip, world: Array, rest: Array) -> Clip:
     """The clip with its world turned by `world` (4,), and its rest pose turned by `rest` (4,).
 
-    Turning the rest pose moves no joint of the motion.
+    Turning the rest pose also turns the joints' own axes, so that no joint of the motion moves.
     """
     if np.allclose(world, quat.IDENTITY) and np.allclose(rest, quat.IDENTITY):
         return clip
@@ -218,8 +233,8 @@ def _turned(clip: Clip, world: Array, rest: Array) -> Clip:
     )
 
 
-def turned(clip: Clip, angle: float) -> Clip:
-    """The clip turned about the vertical through its first root position.
+def turned_about_vertical(clip: Clip, angle: float) -> Clip:
+    """The clip turned about the vertical line through its first root position.
 
     angle: radians, positive from +Z towards +X.
     """

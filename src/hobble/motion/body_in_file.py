@@ -20,10 +20,12 @@ from hobble.motion.read import Bvh
 from hobble.motion.retarget import LIMB_BONES
 from hobble.motion.rig import RigMatch
 
-Limb = TypeVar("Limb")
-# The bones of the limbs: roles of their two ends.
+Limb = TypeVar("Limb")  # the tuple of joints of an arm or of a leg, as in `Body`
+# The bones of the limbs, as pairs of roles: the role at the beginning and at the end of each bone.
 BONES = [(f"{side}_{start}", f"{side}_{end}") for side in SIDES for start, end in LIMB_BONES.items()]
-STRETCH = 0.06  # share of its length by which a bone may change; in 172 real clips the change is 0
+# Share of its length by which a bone may vary from the 3rd to the 97th percentile of a clip. In 172 real
+# clips, the lengths do not vary.
+STRETCH = 0.06
 
 
 def body_in_file(
@@ -31,13 +33,17 @@ def body_in_file(
 ) -> FoundBody:
     """The body of a file's rig.
 
-    rig: the file's joints. raw: its motion, in any unit and axes. known: the skeleton file that describes the
-    rig, if there is one. Raises InputError if the parts are in doubt (the message then contains a draft of a
-    skeleton file), if there are two figures, or if nothing tells left from right.
+    rig: the file's joints. raw: the file's motion, in any unit and along any axes. known: the match of the
+    rig to the skeleton file that describes it, or None if there is no such file. options: only `handedness`
+    is used.
+
+    Raises InputError if a bone of a limb changes its length, if the parts of the body are in doubt (the
+    message then contains a draft of a skeleton file), if there are two figures, or if neither the names of
+    joints nor `handedness` tell left from right.
     """
     if known is not None:
         _check_bones(file, raw, known)
-        return FoundBody(body_by_roles(replace(rig, roles=known.roles)), True)
+        return FoundBody(body_by_roles(replace(rig, roles=known.roles)), sided=True)
     try:
         found = find_body(rig.joints, rig.parents, raw.positions)
     except TwoFigures as error:
@@ -47,9 +53,10 @@ def body_in_file(
     if not found.sided and options.handedness == "auto":
         raise InputError(
             file.path,
-            "its joint names do not say left and right, and its mirror image would also move like a person",
-            fix="Set motion.handedness in the data set: right, the standard of BVH files, or left, if the "
-            "program that wrote the file has left-handed coordinates.",
+            "its joint names do not tell left from right. The motion does not either, because its mirror "
+            "image would also move like a person",
+            fix="Set motion.handedness in the data set to right, the standard of BVH files, or to left if "
+            "the program that wrote the file has left-handed coordinates.",
         )
     body = found.body
     if not found.sided and options.handedness == "left":
@@ -58,12 +65,12 @@ def body_in_file(
 
 
 def _check_bones(file: Bvh, raw: Clip, known: RigMatch) -> None:
-    """Raise InputError if a bone of a limb changes its length: then a role has a wrong joint."""
+    """Raise InputError if a bone of a limb changes its length, because then a role has the wrong joint."""
     for start, end in BONES:
         if start in known.roles and end in known.roles:
             a, b = (raw.positions[:, raw.skeleton.index(known.roles[role])] for role in (start, end))
-            low, middle, high = np.percentile(np.linalg.norm(b - a, axis=-1), [3, 50, 97])
-            if high - low > STRETCH * middle:
+            low, median, high = np.percentile(np.linalg.norm(b - a, axis=-1), [3, 50, 97])
+            if high - low > STRETCH * median:
                 raise InputError(
                     file.path,
                     f"{known.roles[end]} ({end}) is {low:.3g} to {high:.3g} units from {known.roles[start]} "
@@ -73,12 +80,18 @@ def _check_bones(file: Bvh, raw: Clip, known: RigMatch) -> None:
 
 
 def _swapped(limbs: Mapping[str, Limb]) -> dict[str, Limb]:
+    """The limbs (side -> joints) with left and right exchanged."""
     return {a: limbs[b] for a, b in (SIDES, SIDES[::-1])}
 
 
 def notes_on_names(found: FoundBody, handedness: str) -> list[str]:
-    """Sentences on how the parts of the rig and its left side were found."""
-    out = ["No skeleton file describes this rig: its parts were found from structure, motion and names."]
+    """Sentences for the report: how the parts of the body, and which side is left, were found."""
+    out = [
+        "No skeleton file describes this rig. The parts of the body were found from the rig's structure, its "
+        "motion and the names of its joints."
+    ]
     if not found.sided:
-        out.append(f"Its joint names do not say left and right, so motion.handedness: {handedness} was used.")
+        out.append(
+            f"The joint names do not tell left from right, so motion.handedness: {handedness} was used."
+        )
     return out

@@ -1,4 +1,4 @@
-"""Measures a body in some frames of its motion: its bones, where its parts face, and its standing feet."""
+"""Measures a body in some moments of its motion: its bones, how its limbs bend, and where its hands point."""
 
 from __future__ import annotations
 
@@ -17,22 +17,26 @@ from hobble.motion.spine import SHORT
 from hobble.motion.target_build import TargetBuild
 
 LEFT = np.array([1.0, 0.0, 0.0])  # the left of a figure that faces +Z
-FLEXED = 0.05  # a knee or elbow shows the axis of its bend if the mean sine of the bend is larger than this
+# A knee or elbow shows the axis about which it bends if the mean sine of its bend is larger than this.
+FLEXED = 0.05
 
 
 class BodySample:
-    """S moments of a clip, chosen to show how a rig's joints are turned on its body.
+    """S moments of a clip, chosen to show how the axes of a rig's joints are turned relative to its body.
 
-    The frame of a joint (not a moment of the clip) is a rotation (4,), the same at all times: from the axes
-    of a figure that stands facing +Z with its arms out sideways to the joint's own axes. The joint's rotation
-    in the world times its frame is how far the body part has turned from that stance.
+    In this class, the frame of a joint is not a moment of the clip. It is a rotation (4,), the same at all
+    times: from the axes of a figure that stands facing +Z with its arms out sideways, to the joint's own
+    axes. The joint's rotation in the world, multiplied by its frame, is the rotation of the body part from
+    this stance.
 
-    body: which joint is which part. positions: (S, J, 3) cm, kept as `at`. rotations: (S, J, 4) in the world,
-    kept as `turned`. speeds: (S, J) cm a second. rest: (J, 3) positions in the zero pose. ends: side -> (3,)
-    offset from the ankle to its end site, or None. target: the build of the skeleton to which the clip will
-    be retargeted. seconds: length of the clip.
+    body: which joint is which part. positions: (S, J, 3) cm, in the field `at`. rotations: (S, J, 4) in the
+    world, in the field `turned`. speeds: (S, J) cm a second. rest: (J, 3) positions in the zero pose, in
+    which all rotations are 0. ends: side -> (3,) offset from the ankle to the end site of its bone, or None
+    if it has none. target: the build of the skeleton to which the clip will be retargeted. seconds: length of
+    the clip.
 
-    hips_left, chest_left: (S, 3) unit vectors from the right hip and shoulder to the left ones.
+    Other fields: hips_left, (S, 3) unit vectors from the right hip to the left hip; chest_left, the same for
+    the shoulders.
     """
 
     def __init__(
@@ -52,14 +56,14 @@ class BodySample:
         self.chest_left = self.line(body.arms["right"][1], body.arms["left"][1])
 
     def part(self, moments: NDArray[np.bool_]) -> BodySample:
-        """The sample with only some of its moments. moments: (S,), whether to keep each."""
+        """The sample with only some of its moments. moments: (S,), True for each moment to keep."""
         out = copy(self)
         out.at, out.turned, out.speeds = self.at[moments], self.turned[moments], self.speeds[moments]
         out.hips_left, out.chest_left = self.hips_left[moments], self.chest_left[moments]
         return out
 
     def in_zero_pose(self) -> BodySample:
-        """The zero pose as a sample of one moment."""
+        """The zero pose as a sample of one moment. `speeds` keeps those of the first moment of the clip."""
         out = self.part(np.arange(len(self.at)) == 0)
         out.at, out.turned = self.rest[None], np.broadcast_to(quat.IDENTITY, out.turned.shape)
         body = self.body
@@ -72,44 +76,51 @@ class BodySample:
         return unit(self.at[:, end] - self.at[:, start])
 
     def local(self, joint: int, vectors: Array) -> Array:
-        """(3,) robust mean, along the joint's own axes, of `vectors` (S, 3) along the axes of the world."""
-        own = quat.rotate(quat.inv(self.turned[:, joint]), vectors)
-        return robust_mean(own)
+        """(3,) mean of `vectors` without outliers, along the joint's own axes.
+
+        vectors: (S, 3) along the axes of the world.
+        """
+        along_own_axes = quat.rotate(quat.inv(self.turned[:, joint]), vectors)
+        return robust_mean(along_own_axes)
 
     def bone(self, start: int, end: int) -> Array:
-        """(3,) mean vector from `start` to `end`, along the own axes of `start`."""
+        """(3,) mean vector from the joint `start` to the joint `end`, along the own axes of `start`."""
         return self.local(start, self.at[:, end] - self.at[:, start])
 
     def length(self, *joints: int) -> float:
-        """Sum of the distances from each of the joints to the next, cm (medians over the sample)."""
-        ways = (self.at[:, b] - self.at[:, a] for a, b in pairwise(joints))
-        return sum(float(np.median(np.linalg.norm(way, axis=-1))) for way in ways)
+        """Length of a chain of joints, cm: the sum of the distances from each joint to the next.
+
+        Each distance is the median over the sample.
+        """
+        vectors = (self.at[:, b] - self.at[:, a] for a, b in pairwise(joints))
+        return sum(float(np.median(np.linalg.norm(vector, axis=-1))) for vector in vectors)
 
     def first_long(self, joint: int, following: Sequence[int], least: float = SHORT) -> tuple[Array, int]:
-        """(3,) `bone` from a joint to the first of `following` that is over `least` cm away, and that joint.
+        """Find the first joint of `following` that is over `least` cm away from `joint`, or else its last.
 
-        If all are nearer, the last of them is taken.
+        Returns the (3,) `bone` from `joint` to the joint found, and the joint found.
         """
         bones = [(self.bone(joint, end), end) for end in following]
         return next((found for found in bones if np.linalg.norm(found[0]) > least), bones[-1])
 
     def hinge(self, start: int, middle: int, end: int, otherwise: Array) -> Array:
-        """(S, 3) axis about which a limb of three joints bends, or `otherwise` (S, 3) if it hardly bends.
+        """(S, 3) axis about which a limb of three joints bends, along the axes of the world.
 
-        The axis is fixed to the joint `start`. For a leg it points to the body's left.
+        The axis turns with the joint `start`. For a leg it points to the body's left. otherwise: (S, 3), is
+        returned if the limb hardly bends.
         """
         axis = np.cross(self.line(start, middle), self.line(middle, end))
-        own = self.local(start, axis)
-        if np.linalg.norm(own) < FLEXED:
+        mean_axis = self.local(start, axis)
+        if np.linalg.norm(mean_axis) < FLEXED:
             return otherwise
-        return quat.rotate(self.turned[:, start], np.broadcast_to(unit(own), axis.shape))
+        return quat.rotate(self.turned[:, start], np.broadcast_to(unit(mean_axis), axis.shape))
 
     def hand(self, side: str, straight: Array, sign: float) -> Array:
-        """(4,) the frame of a hand: `straight`, turned so that the hand points to its finger.
+        """(4,) the frame of a hand, which points to the base of its finger (`Body.fingers`).
 
-        straight: (4,) the frame of the hand if it is in line with its forearm. It is returned unchanged for a
-        hand without a finger. sign: 1 for the left hand, whose arm points to +X in the stance, -1 for the
-        right.
+        straight: (4,) the frame of a hand that is in line with its forearm. It is turned to the finger, or
+        returned unchanged for a hand without a finger. sign: 1 for the left hand, whose arm points to +X in
+        the stance, and -1 for the right hand.
         """
         if side not in self.body.fingers:
             return straight

@@ -12,7 +12,7 @@ from hobble.core.clip import Clip
 from hobble.core.errors import InputError
 from hobble.core.skeleton import Skeleton, rest_positions
 from hobble.motion.axes import RigAxes, straighten
-from hobble.motion.body import Body, body_by_roles, pairs
+from hobble.motion.body import Body, body_by_roles, match_joints
 from hobble.motion.body_in_file import body_in_file, notes_on_names
 from hobble.motion.decode import Decoded, check_angles, decode, frame_rate
 from hobble.motion.defects import Repaired, flips, repair
@@ -155,7 +155,7 @@ def _on_unknown_rig(
         known.rig if known else FOUND,
         standing_clip.clip.skeleton.roles,
         False,
-        named or pairs(standing_clip.clip.skeleton, standing_clip.body, target.skeleton, target_body),
+        named or match_joints(standing_clip.clip.skeleton, standing_clip.body, target.skeleton, target_body),
     )
     notes = decoded.notes + straight.notes + ([] if known else notes_on_names(found, options.handedness))
     source = FileMotion(

@@ -10,7 +10,7 @@ from hobble.core import quat
 from hobble.core.clip import Clip
 from hobble.core.errors import HobbleError
 from hobble.core.quat import Array
-from hobble.motion.axes import turned
+from hobble.motion.axes import turned_about_vertical
 from hobble.motion.root import facing
 
 BLEND = 0.2  # seconds on each side of a seam that are blended; doubled until the seam is smooth
@@ -128,7 +128,7 @@ def _headed(clip: Clip, move: tuple[float, Array], heading: float) -> Clip:
     shift = move[1]
     if np.hypot(shift[0], shift[2]) < 1.0:
         return clip
-    return turned(clip, heading - float(np.arctan2(shift[0], shift[2])))
+    return turned_about_vertical(clip, heading - float(np.arctan2(shift[0], shift[2])))
 
 
 def _top_speed(clip: Clip) -> float:

@@ -12,7 +12,7 @@ from hobble.core.clip import Clip
 from hobble.core.errors import InputError
 from hobble.core.quat import Array
 from hobble.core.skeleton import Skeleton
-from hobble.motion.axes import turned
+from hobble.motion.axes import turned_about_vertical
 from hobble.motion.body import body_by_roles
 from hobble.motion.check_retarget import check, check_knees, compare
 from hobble.motion.file_motion import FOUND, FileMotion, load_source
@@ -69,7 +69,7 @@ def make_clip(
         frames = len(new_clip) // loops
         repairs.append(f"The cycle of {frames} frames was repeated {loops} times, with blended seams.")
     if options.facing is not None:
-        new_clip = turned(new_clip, np.radians(options.facing) - first_facing(new_clip))
+        new_clip = turned_about_vertical(new_clip, np.radians(options.facing) - first_facing(new_clip))
     new_clip = replace(new_clip, name=clip)
     _check_finite(file, new_clip)
     extra: dict[str, Any] = {
