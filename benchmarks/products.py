@@ -86,7 +86,8 @@ def steps(rows: int, sizes: tuple[int, ...], half: bool) -> dict[str, float]:
     def as_chosen() -> None:
         step(*batch, step.masks(rows))
 
-    return least({**{way: with_way(way) for way in products.WAYS}, "chosen": as_chosen})
+    ways = products.working_ways(torch.bfloat16 if half else torch.float32)
+    return least({**{way: with_way(way) for way in ways}, "chosen": as_chosen})
 
 
 def main() -> None:
@@ -99,7 +100,7 @@ def main() -> None:
     use_threads(options.threads)
     sizes = tuple(int(size) for size in options.sizes.split(","))
     dtype = torch.bfloat16 if options.half else torch.float32
-    names = list(products.WAYS)
+    names = products.working_ways(dtype)
     print(f"{processor()}, PyTorch's loops for {torch.backends.cpu.get_cpu_capability()}")
     print(f"{'-'.join(map(str, sizes))}, {options.threads} threads, {str(dtype).removeprefix('torch.')}")
     for rows in map(int, options.batches.split(",")):
@@ -107,7 +108,7 @@ def main() -> None:
         total, own = dict.fromkeys(names, 0.0), 0.0
         for product, (a, b) in factors(rows, sizes, dtype).items():
             out = torch.empty(len(a), len(b), dtype=dtype)
-            found = least({name: partial(way, a, b, out) for name, way in products.WAYS.items()})
+            found = least({name: partial(products.WAYS[name], a, b, out) for name in names})
             taken = chosen(a, b)
             total = {name: total[name] + found[name] for name in names}
             own += found[taken]

@@ -31,8 +31,9 @@ def factors(dtype: torch.dtype, rows: int = 33) -> list[tuple[torch.Tensor, torc
     return [(e, w), (d.T, e.T), (d, w.T)]
 
 
-@pytest.mark.parametrize("dtype", [torch.float32, torch.bfloat16])
-@pytest.mark.parametrize("way", products.WAYS)
+@pytest.mark.parametrize(
+    ("way", "dtype"), [(way, dtype) for dtype in products.TYPES for way in products.working_ways(dtype)]
+)
 def test_every_way_of_multiplying_gives_the_product(
     way: str, dtype: torch.dtype, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -44,6 +45,28 @@ def test_every_way_of_multiplying_gives_the_product(
         for found in (products.product(a, b), products.product(a, b, out)):
             assert found.dtype == dtype
             assert float((found.double() - exact).abs().max()) < scale * (1e-5 if a.itemsize == 4 else 0.01)
+
+
+@pytest.mark.parametrize("dtype", products.TYPES)
+def test_a_way_that_this_cpu_does_not_have_is_never_tried(
+    dtype: torch.dtype, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
+) -> None:
+    """The other ways have their trial, and its result is stored."""
+
+    def refuses(a: torch.Tensor, b: torch.Tensor, out: torch.Tensor) -> torch.Tensor:
+        raise RuntimeError("could not create a primitive descriptor")
+
+    monkeypatch.setitem(products.WAYS, "linear", refuses)
+    products.working_ways.cache_clear()
+    try:
+        for a, b in factors(dtype):
+            products.product(a, b)
+        ways = json.loads(choices_file().read_text())["ways"]
+        assert len(ways) == 3
+        assert set(ways.values()) <= {"plain", "turned"}
+        assert not caplog.records
+    finally:
+        products.working_ways.cache_clear()
 
 
 def test_the_choice_in_the_file_is_used(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from contextlib import suppress
 from functools import cache, partial
 from time import perf_counter, thread_time
 
@@ -56,6 +57,17 @@ if torch.backends.mkldnn.is_available() and hasattr(torch.ops.mkldnn, "_linear_p
 
 
 @cache
+def working_ways(dtype: torch.dtype) -> tuple[str, ...]:
+    """Names of the WAYS that this CPU has for a type. Without AVX-512, oneDNN refuses bfloat16."""
+    names = []
+    for name, way in WAYS.items():
+        with suppress(RuntimeError):
+            way(*(torch.ones(32, 32, dtype=dtype) for _ in range(3)))
+            names.append(name)
+    return tuple(names)
+
+
+@cache
 def _chosen_way(
     shape: tuple[int, int, int], by_rows: tuple[bool, bool], dtype: torch.dtype, threads: int
 ) -> str:
@@ -78,10 +90,11 @@ def _chosen_way(
         a, b = (_constant_matrix(rows, n, each, dtype) for rows, each in zip((m, k), by_rows, strict=True))
         out = torch.empty(m, k, dtype=dtype)
         clock = thread_time if threads == 1 else perf_counter
-        return product_trial.fastest_way({name: partial(way, a, b, out) for name, way in WAYS.items()}, clock)
+        return product_trial.fastest_way({way: partial(WAYS[way], a, b, out) for way in ways}, clock)
 
-    default = "linear" if dtype == torch.float32 and "linear" in WAYS else "plain"
-    return product_trial.kept_choice(name, trial, WAYS, default)
+    ways = working_ways(dtype)
+    default = "linear" if dtype == torch.float32 and "linear" in ways else "plain"
+    return product_trial.kept_choice(name, trial, ways, default)
 
 
 def _is_by_rows(a: Tensor) -> bool:
