@@ -4,7 +4,8 @@
 
 The ways take turns, and the fastest call of each counts, because other work disturbs some calls. "chosen" is
 the way that `hobble.models.products` chooses on this machine. A step is that of `pfnn` with dropout, without
-Adam. Ratios are to the way named "linear", oneDNN's inner product. To see what other processors see, set
+Adam. Ratios are to the way named "linear", oneDNN's inner product, or to "plain" on a CPU for which oneDNN
+refuses bfloat16. To see what other processors see, set
 ATEN_CPU_CAPABILITY=avx2 ONEDNN_MAX_CPU_ISA=AVX2 MKL_ENABLE_INSTRUCTIONS=AVX2 NUMBA_CPU_NAME=znver3.
 """
 
@@ -120,8 +121,9 @@ def main() -> None:
 def show(what: str, found: Mapping[str, float]) -> None:
     """A line of times, and one of ratios."""
     cells = "".join(f"{1e6 * found[name]:12.0f}" for name in found)
-    ratios = "".join(f"{found[name] / found[BASE]:12.2f}" for name in found)
-    print(f"{f'{what}, all in one way; chosen':<34}{cells}\n{f'  over {BASE}':<34}{ratios}")
+    base = BASE if BASE in found else "plain"
+    ratios = "".join(f"{found[name] / found[base]:12.2f}" for name in found)
+    print(f"{f'{what}, all in one way; chosen':<34}{cells}\n{f'  over {base}':<34}{ratios}")
 
 
 if __name__ == "__main__":
