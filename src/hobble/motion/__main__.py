@@ -12,7 +12,7 @@ from hobble.motion.doubt import Doubt
 from hobble.motion.draft import draft, guessed
 from hobble.motion.file_motion import raw_clip, rig_of
 from hobble.motion.find_body import find_body
-from hobble.motion.look import look, table
+from hobble.motion.look import format_table, summarise_clips
 from hobble.motion.options import ClipMotion
 from hobble.motion.read import read_bvh
 from hobble.motion.retarget_picture import picture_of_file
@@ -77,8 +77,8 @@ def main() -> int:
         target = given.skeletons / f"{given.skeleton}.yaml"
         if given.picture:
             write_text(given.picture, picture_of_file(given.folder, target, given.skeletons, options))
-        seen = look(given.folder, target, given.skeletons, options)
-        print(table(seen))
+        seen = summarise_clips(given.folder, target, given.skeletons, options)
+        print(format_table(seen))
         return int(any(clip.refused for clip in seen.clips))
     except HobbleError as error:
         print(error, file=sys.stderr)
