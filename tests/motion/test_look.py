@@ -7,7 +7,7 @@ import sys
 
 import pytest
 
-from hobble.motion.look import ClipSummary, look, shared_warnings, table
+from hobble.motion.look import ClipSummary, format_table, shared_warnings, summarise_clips
 
 
 @pytest.fixture
@@ -17,7 +17,7 @@ def folder(tmp_path, walk, walker, holden31, bvh):
 
 
 def seen(root, folder):
-    return look(folder, root / "config/skeletons/holden31.yaml", root / "config/skeletons")
+    return summarise_clips(folder, root / "config/skeletons/holden31.yaml", root / "config/skeletons")
 
 
 def test_a_normal_walk_has_steps_and_no_warning(root, folder):
@@ -37,7 +37,7 @@ def test_a_wrong_frame_rate_shows_in_the_cadence(root, folder, bvh, walker, hold
 def test_duplicates_and_files_without_a_clip_are_reported(root, folder):
     (folder / "again.bvh").write_bytes((folder / "healthy.bvh").read_bytes())
     (folder / "helthy_injuries.txt").write_text("frames:600\n")
-    text = table(seen(root, folder))
+    text = format_table(seen(root, folder))
     assert "again and healthy are the same file" in text
     assert (
         "helthy_injuries.txt belongs to no clip and is not read. If it belongs to healthy, rename it." in text
@@ -47,7 +47,7 @@ def test_duplicates_and_files_without_a_clip_are_reported(root, folder):
 
 def test_a_refused_file_is_listed_with_its_message(root, folder):
     (folder / "broken.bvh").write_text("HIERARCHY\n")
-    assert "broken  REFUSED" in table(seen(root, folder))
+    assert "broken  REFUSED" in format_table(seen(root, folder))
 
 
 def test_a_warning_of_many_clips_is_printed_once():

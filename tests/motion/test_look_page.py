@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from hobble.motion import look_page as module
-from hobble.motion.look_page import chosen, figure, foot_down, look_page
+from hobble.motion.look_page import choose_clips, foot_down_share, look_page, make_figure
 
 REPORT = {"rig": "<rig>", "source_fps": 120.0, "seconds": 4.0, "sha256": "a", "repairs": [], "retarget": None}
 REPORT |= {"scale": 1.0}
@@ -45,7 +45,7 @@ def test_a_page_has_a_line_and_a_walking_figure_for_each_clip(walker, holden31):
 
 def test_a_figure_walks_on_the_spot_to_its_right(walker, holden31):
     clip = walker(holden31, 240, 60.0)
-    shown = figure(clip)
+    shown = make_figure(clip)
     joints = np.array(shown["p"]).reshape(40, -1, 2)
     assert joints[:, 0, 0] == pytest.approx(40)
     toe, heel = (holden31.role(f"left_{part}") for part in ("toe", "heel"))
@@ -54,7 +54,7 @@ def test_a_figure_walks_on_the_spot_to_its_right(walker, holden31):
 
 
 def test_a_foot_is_down_if_any_of_its_joints_is():
-    assert foot_down(np.array([[0, 0, 0, 1], [0, 0, 0, 0], [1, 1, 0, 0], [0, 0, 0, 0]])) == 0.5
+    assert foot_down_share(np.array([[0, 0, 0, 1], [0, 0, 0, 0], [1, 1, 0, 0], [0, 0, 0, 0]])) == 0.5
 
 
 def test_with_very_many_clips_a_sample_is_drawn_and_every_clip_is_listed(walker, holden31):
@@ -77,19 +77,19 @@ def test_with_very_many_clips_a_sample_is_drawn_and_every_clip_is_listed(walker,
 
 def test_the_sample_is_spread_over_the_clips():
     reports, labels = many(10_000)
-    some = chosen(reports, labels)
+    some = choose_clips(reports, labels)
     assert len(set(some)) == module.MOST_READ
     assert np.diff(np.sort(some)).max() < 3 * 10_000 / module.MOST_READ
 
 
 def test_half_of_the_sample_is_left_for_clips_without_warning():
     warned = {n: ["odd"] for n in range(5_000)}
-    some = np.array(chosen(*many(10_000, warnings=warned)))
+    some = np.array(choose_clips(*many(10_000, warnings=warned)))
     assert (some < 5_000).sum() == module.MOST_READ // 2
-    assert sorted(chosen(*many(8, seconds=dict.fromkeys(range(8), 1e4)))) == [0]
-    assert len(chosen(*many(8, seconds=dict.fromkeys(range(8), 6_000.0)))) == 3
-    assert sorted(chosen(*many(20))) == list(range(20))
-    assert chosen([], []) == []
+    assert sorted(choose_clips(*many(8, seconds=dict.fromkeys(range(8), 1e4)))) == [0]
+    assert len(choose_clips(*many(8, seconds=dict.fromkeys(range(8), 6_000.0)))) == 3
+    assert sorted(choose_clips(*many(20))) == list(range(20))
+    assert choose_clips([], []) == []
 
 
 def test_very_many_duplicates_are_counted(walker, holden31):

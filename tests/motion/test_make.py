@@ -95,7 +95,9 @@ def test_a_joint_above_the_hips_is_merged_into_them_and_reported(walker, bvh, ma
     made, report = make(bvh(carried(clip, turn, place), name="carried"))
     alone, without = make(bvh(clip))
     np.testing.assert_allclose(made.positions, alone.positions, atol=1e-4)
-    assert report["notes"][0] == "The joints above Hips (Reference) were folded into it."
+    assert (
+        report["notes"][0] == "The joints above Hips (Reference) were left out; their motion was added to it."
+    )
     assert report["rig"] == without["rig"] == rig
     assert without["repairs"] == []
     assert len(report["repairs"]) == 1

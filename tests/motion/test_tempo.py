@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from hobble.motion.look import look, step_count
+from hobble.motion.look import step_count, summarise_clips
 from hobble.motion.options import ClipMotion
 from hobble.motion.tempo import accelerations, too_fast
 
@@ -51,7 +51,7 @@ def test_few_steps_and_short_clips_show_nothing(walker, holden31):
 @pytest.mark.parametrize(("rate", "times"), [(60, 0.5), (120, 1.0), (240, 2.0)])
 def test_a_rate_that_is_wrong_by_two_is_noted_with_the_true_rate(shared, root, clip, rate, times):
     file, maps = shared / f"mocap/cmu/{clip}.bvh", root / "config/skeletons"
-    (seen,) = look(file, maps / "holden31.yaml", maps, ClipMotion(source_fps=float(rate))).clips
+    (seen,) = summarise_clips(file, maps / "holden31.yaml", maps, ClipMotion(source_fps=float(rate))).clips
     noted = [warning for warning in seen.warnings if "source_fps" in warning]
     if times == 1.0:
         assert noted == []

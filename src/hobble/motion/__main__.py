@@ -12,7 +12,7 @@ from hobble.motion.doubt import Doubt
 from hobble.motion.draft import draft, guessed
 from hobble.motion.file_motion import raw_clip, rig_of
 from hobble.motion.find_body import find_body
-from hobble.motion.look import look, table
+from hobble.motion.look import format_table, summarise_clips
 from hobble.motion.options import ClipMotion
 from hobble.motion.read import read_bvh
 from hobble.motion.retarget_picture import picture_of_file
@@ -80,8 +80,8 @@ def main() -> int:
             write_text(
                 arguments.picture, picture_of_file(arguments.folder, target, arguments.skeletons, options)
             )
-        summary = look(arguments.folder, target, arguments.skeletons, options)
-        print(table(summary))
+        summary = summarise_clips(arguments.folder, target, arguments.skeletons, options)
+        print(format_table(summary))
         return int(any(clip.refused for clip in summary.clips))
     except HobbleError as error:
         print(error, file=sys.stderr)

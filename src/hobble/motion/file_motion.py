@@ -17,7 +17,7 @@ from hobble.motion.body_in_file import body_in_file, notes_on_names
 from hobble.motion.decode import Decoded, check_angles, decode, frame_rate
 from hobble.motion.defects import Repaired, flips, repair
 from hobble.motion.doubt import check_height
-from hobble.motion.floor import on_floor
+from hobble.motion.floor import put_on_floor
 from hobble.motion.four_legs import on_four_legs
 from hobble.motion.hips_root import below_hips, decode_below
 from hobble.motion.options import ClipMotion
@@ -180,7 +180,7 @@ def _repaired(file: Bvh, source: FileMotion, options: ClipMotion) -> FileMotion:
     leave = options.defects == "leave"
     repaired = Repaired(source.clip, 0, []) if leave else repair(source.clip)
     flat = options.ground == "flat" and not leave
-    clip, moved, uneven = on_floor(repaired.clip) if flat else (repaired.clip, [], [])
+    clip, moved, uneven = put_on_floor(repaired.clip) if flat else (repaired.clip, [], [])
     repairs = repaired.sentences + moved
     if repairs and options.defects == "refuse":
         raise InputError(file.path, repairs[0], fix="Set motion.defects: repair to repair it this way.")

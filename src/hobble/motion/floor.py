@@ -1,4 +1,4 @@
-"""Finds the floor of a clip from the feet, and moves a flat floor to height 0."""
+"""Finds the height of a clip's floor from the feet, and moves the clip so that its floor lies at 0."""
 
 from __future__ import annotations
 
@@ -11,30 +11,35 @@ from hobble.core.quat import Array
 from hobble.motion.rig import leg_length
 
 SOLE = 3.0  # cm: height of the toe joint of a standing foot above the floor
-OFF = 3.0  # cm: a clip is moved if its floor is further than this from height 0
-CRAWLS = 15.0  # cm: used instead of OFF if the figure is not upright, since its toes hardly show the floor
-UPRIGHT = 0.8  # least height of the hips above the toes of an upright figure, in leg lengths
-# cm: on flat ground, the heights of high and low steps differ by at most this. In running they differ by 9,
-# on gentle bumps by 14.
+# A clip is moved if its floor is further than this from height 0, cm. The second limit holds for figures that
+# are not upright: the toes of a crawling figure hardly show where the floor is.
+MOST_OFF, MOST_OFF_CRAWLING = 3.0, 15.0
+UPRIGHT = 0.8  # leg lengths: in an upright figure, the hips are at least this high above the toes
+# cm: on flat ground, the heights of standing feet (10th and 90th percentile) differ by at most this. In
+# running they differ by 9, on gentle bumps by 14.
 EVEN = 12.0
 SLOW = 0.3  # cm a frame at 60 Hz: a toe that rises or falls faster is in the air
-FEWEST, SHORTEST = 4, 1 / 12  # least number of frames, and of seconds, in which feet have to show the floor
+# If the feet stand in fewer frames, or for fewer seconds, they do not show where the floor is.
+FEWEST_FRAMES, SHORTEST = 4, 1 / 12
 
 
-def on_floor(clip: Clip) -> tuple[Clip, list[str], list[str]]:
-    """A clip on flat ground, moved to height 0 if its floor was further off than OFF (crawling: CRAWLS).
+def put_on_floor(clip: Clip) -> tuple[Clip, list[str], list[str]]:
+    """Move a clip on flat ground up or down so that its floor lies at height 0, if it is too far off.
 
-    Also returns two lists. The first holds a sentence if the clip was moved. The second holds one if it was
-    not moved because its feet stand at heights too different for flat ground.
+    Too far is more than MOST_OFF, or more than MOST_OFF_CRAWLING for a figure that is not upright.
+
+    Returns the clip and two lists. If the clip was moved, the first list holds a sentence that says so. If it
+    was not moved because the heights of its standing feet differ too much for flat ground, the second list
+    holds a sentence that says so.
     """
     toes = [clip.skeleton.role(f"{side}_toe") for side in ("left", "right")]
-    lower = clip.positions[:, toes, 1].min(axis=1)
-    standing = lower[:-1][np.abs(np.diff(lower)) * clip.fps / 60.0 < SLOW]
-    if len(standing) < max(FEWEST, round(SHORTEST * clip.fps)):
+    lower_toe = clip.positions[:, toes, 1].min(axis=1)
+    standing = lower_toe[:-1][np.abs(np.diff(lower_toe)) * clip.fps / 60.0 < SLOW]
+    if len(standing) < max(FEWEST_FRAMES, round(SHORTEST * clip.fps)):
         return clip, [], []
     low, usual, high = np.percentile(standing, [10, 25, 90])
     floor = float(usual) - SOLE
-    if abs(floor) <= (OFF if _stands(clip, lower) else CRAWLS):
+    if abs(floor) <= (MOST_OFF if _is_upright(clip, lower_toe) else MOST_OFF_CRAWLING):
         return clip, [], []
     if high - low > EVEN:
         heights = f"The feet stand {low:.0f} to {high:.0f} cm high, too uneven for flat ground"
@@ -43,7 +48,7 @@ def on_floor(clip: Clip) -> tuple[Clip, list[str], list[str]]:
     return moved, [f"The floor lies at {floor:.1f} cm; the clip was moved so that it lies at 0."], []
 
 
-def _stands(clip: Clip, toes: Array) -> bool:
-    """Whether the figure is upright. toes: (F,) height of the lower toe joint."""
+def _is_upright(clip: Clip, lower_toe: Array) -> bool:
+    """Whether the figure is upright. lower_toe: (F,) height of the lower of the two toe joints, cm."""
     hips = clip.positions[:, clip.skeleton.role("hips"), 1]
-    return bool(np.median(hips - toes) > UPRIGHT * leg_length(clip.skeleton))
+    return bool(np.median(hips - lower_toe) > UPRIGHT * leg_length(clip.skeleton))

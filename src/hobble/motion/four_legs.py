@@ -8,17 +8,20 @@ from hobble.core.quat import Array
 from hobble.motion.body import SIDES, Body
 from hobble.motion.orient import unit
 
-STRETCHED = 0.7  # least distance of hips and feet, in leg lengths; a crawling person kneels and has less
-REACH = 0.6  # least depth of the hands below the hips, as a share of the depth of the feet
-LEVEL = -0.5  # least cosine between a level trunk and the legs; it is -1 in a standing person
-NEARLY_ALL = 0.9  # all this has to be true in more than this share of the frames
+# A figure counts as four-legged if three things hold in more than the share NEARLY_ALL of the frames:
+# - Hips and feet are further apart than STRETCHED, in leg lengths. In a person who crawls on the knees they
+# are   nearer. - The hands are further below the hips than the share REACH of the distance from hips to feet.
+# - The cosine of the angle between the directions from the hips to the chest and from the hips to the feet is
+# larger than LEVEL. It is -1 in a standing person, and 0 if the trunk is level.
+STRETCHED, REACH, LEVEL, NEARLY_ALL = 0.7, 0.6, -0.5, 0.9
 
 
 def on_four_legs(body: Body, positions: Array) -> bool:
-    """Whether the figure stands on hands and feet, below a level trunk, in nearly all frames.
+    """Whether the figure stands on hands and feet, with a level trunk, in nearly all frames.
 
-    positions: (F, J, 3) in the world, any unit, any axes.
+    positions: (F, J, 3) of the joints in the world, in any unit and along any axes.
     """
+    # In a Body, a leg lists hip, knee, heel and toe, and an arm lists clavicle, shoulder, elbow and wrist.
     hips, chest = (
         0.5 * (positions[:, limbs["left"][k]] + positions[:, limbs["right"][k]])
         for limbs, k in ((body.legs, 0), (body.arms, 1))
@@ -32,8 +35,9 @@ def on_four_legs(body: Body, positions: Array) -> bool:
         for a, b in ((0, 1), (1, 2)):
             bone = positions[:, body.legs[side][b]] - positions[:, body.legs[side][a]]
             leg_length += 0.5 * np.linalg.norm(bone, axis=-1)
+    # No axis needs to point up, because down is the direction from the hips to the feet.
     down = unit(feet - hips)
     depth = np.linalg.norm(feet - hips, axis=-1)
-    level = np.sum(unit(chest - hips) * down, axis=-1) > LEVEL
-    reach = np.sum((hands - hips) * down, axis=-1) > REACH * depth
-    return bool(np.mean(level & reach & (depth > STRETCHED * leg_length)) > NEARLY_ALL)
+    trunk_level = np.sum(unit(chest - hips) * down, axis=-1) > LEVEL
+    hands_low = np.sum((hands - hips) * down, axis=-1) > REACH * depth
+    return bool(np.mean(trunk_level & hands_low & (depth > STRETCHED * leg_length)) > NEARLY_ALL)

@@ -1,4 +1,9 @@
-"""Derives how joints are turned in a standing pose from the directions of the bones in motion."""
+"""Finds how a rig's joints are turned on its body, from the directions of the bones in motion.
+
+The result is a frame for each joint: the rotation (4,) from the axes of a figure in the stance to the joint's
+own axes. In the stance, the figure faces +Z, with its arms out sideways. The frame of a joint is the same at
+all times. It has nothing to do with the frames of a clip.
+"""
 
 from __future__ import annotations
 
@@ -17,75 +22,78 @@ from hobble.motion.orient import frame, mean_rotation, unit
 from hobble.motion.spine import SHORT, spine_shares
 
 UP, AHEAD = np.array([0.0, 1.0, 0.0]), np.array([0.0, 0.0, 1.0])
-KINK = 0.06  # leg lengths: a bone above the chest that is shorter than this is skipped
-AGREE = np.radians(25.0)  # two joints of the trunk count as turned alike if their frames differ by less
+KINK = 0.06  # leg lengths: a bone above the chest that is shorter does not show how the chest is turned
+AGREE = np.radians(25.0)  # joints of trunk and neck count as turned like the chest if they differ by less
 
 
-def from_motion(sample: BodySample, trunk: BodySample, zero: Array | None) -> dict[int, Array]:
-    """Joint -> (4,) frame, from the directions of the bones in motion.
+def frames_from_motion(sample: BodySample, trunk: BodySample, zero: Array | None) -> dict[int, Array]:
+    """Joint -> its frame (4,), for all joints of the body.
 
-    The frame of a joint is the rotation from the axes of a standing figure to the joint's own axes
-    (`BodySample` in `hobble.motion.body_sample` explains it). trunk: the moments that show how the trunk is
-    turned. zero: (4,) frame of the chest in the zero pose, for rigs without a neck; None if nobody could
-    stand in that pose.
+    sample: some moments of the clip. trunk: those of its moments that show how the trunk is turned. zero:
+    (4,) frame of the chest according to the zero pose (all rotations zero), or None if nobody could stand in
+    that pose. It is needed for rigs without a neck.
     """
     frames = trunk_frames(trunk, zero)
     for side, sign in (("left", 1.0), ("right", -1.0)):
-        _arm(sample, frames, side, sign)
-        _leg(sample, frames, side)
+        _add_arm(sample, frames, side, sign)
+        _add_leg(sample, frames, side)
     return frames | flat_feet(sample)
 
 
-def bends(sample: BodySample) -> dict[int, Bend]:
-    """Joint (hips, chest) -> the bone above it. A joint whose bone is shorter than SHORT is left out."""
+def find_bends(sample: BodySample) -> dict[int, Bend]:
+    """Joint (hips or chest) -> the bone above it, which may point elsewhere than the joint's frame says.
+
+    A joint whose bone is shorter than SHORT is left out.
+    """
     body, out = sample.body, {}
     above_chest = () if body.arms_on_neck else (*body.neck, body.head)
     for joint, following in ((body.hips, body.trunk), (body.chest, above_chest)):
         if following and sample.length(joint, following[0]) > SHORT:
-            bone, axis, left = _bone(sample, joint)
+            bone, axis, left = _trunk_bone(sample, joint)
             out[joint] = Bend(following[0], sample.bone(joint, following[0]), frame(bone, axis, left, LEFT))
     return out
 
 
 def trunk_frames(sample: BodySample, zero: Array | None) -> dict[int, Array]:
-    """The frames of hips, trunk, neck and head alone.
+    """Joint -> its frame (4,), only for the hips, trunk, neck and head.
 
-    sample: the moments that show how these are turned. zero: as for `from_motion`.
+    sample: moments that show how these joints are turned. zero: as for `frames_from_motion`.
     """
     body, frames = sample.body, dict[int, Array]()
     chain = (body.hips, *body.trunk, *body.neck)
     for joint in chain:
-        bone, axis, left = _bone(sample, joint)
+        bone, axis, left = _trunk_bone(sample, joint)
         if body.trunk and joint == body.chest and lacks_neck(sample):
             bone, axis = neck_bone(sample, left, zero), sample.target.spine.neck
-        # For hips and chest, the direction to the left is more reliable than the bone: hips and shoulders are
-        # level, but spines of captured rigs bend sideways by some degrees.
+        # `frame` fits its first direction exactly and its second one as nearly as possible. For hips and
+        # chest, the direction to the left is more reliable than the bone: hips and shoulders are level, but
+        # spines of captured rigs bend sideways by some degrees.
         carries_limbs = joint in (body.hips, body.chest)
         frames[joint] = frame(left, LEFT, bone, axis) if carries_limbs else frame(bone, axis, left, LEFT)
-    frames[body.head] = _head(sample, frames, chain)
+    frames[body.head] = _head_frame(sample, frames, chain)
     return frames
 
 
-def _bone(sample: BodySample, joint: int) -> tuple[Array, Array, Array]:
-    """Three vectors (3,): the bone above a joint of trunk or neck, this bone's direction in a standing rest
-    pose, and the direction to the body's left.
+def _trunk_bone(sample: BodySample, joint: int) -> tuple[Array, Array, Array]:
+    """Measure the bone above a joint of trunk or neck. Returns three vectors (3,).
 
-    The bone and the direction to the left are in the joint's coordinates.
+    They are: the bone, in the joint's coordinates; the direction of this bone in a figure that stands facing
+    +Z; and the direction to the body's left, in the joint's coordinates.
     """
     body = sample.body
     trunk = (body.hips, *body.trunk)
     chain = (*trunk, *body.neck, body.head)
     lengths = np.array([sample.length(a, b) for a, b in pairwise(chain)])
+    # Joint -> its position along the body: 0 at the hips, 1 at the chest, 2 at the head.
     share = dict(zip(chain, spine_shares(lengths, body.trunk_bones), strict=True))
     following = chain[chain.index(joint) + 1 :]
-    # A rig with many short bones has kinks. Where one bone of the target is as long as several bones of the
-    # rig, the direction is measured from the beginning of the first of these to the end of the last.
-    reach = [j for j in following if share[j] <= sample.target.spine.end(share[joint]) + 1e-6]
-    # The chest is stiff up to the shoulders. A very short bone above it does not show how the
-    # chest is turned.
+    # A chain of many short bones is not straight. If one bone of the target is as long as several bones of
+    # the rig, the direction is measured from the start of the first of these bones to the end of the last.
+    within_bone = [j for j in following if share[j] <= sample.target.spine.end(share[joint]) + 1e-6]
+    # The chest is stiff up to the shoulders. A very short bone above it does not show how it is turned.
     leg = sample.length(*body.legs["left"][:3])
     least = max(SHORT, KINK * leg) if joint == body.chest else SHORT
-    bone, end = sample.first_long(joint, [*reach[-1:], *following], least)
+    bone, end = sample.first_long(joint, [*within_bone[-1:], *following], least)
     left = sample.chest_left
     if joint == body.hips:
         left = sample.hips_left
@@ -94,11 +102,11 @@ def _bone(sample: BodySample, joint: int) -> tuple[Array, Array, Array]:
     return bone, sample.target.spine.direction(share[joint], share[end]), sample.local(joint, left)
 
 
-def _head(sample: BodySample, frames: dict[int, Array], chain: Sequence[int]) -> Array:
-    """(4,) the frame of the head.
+def _head_frame(sample: BodySample, frames: dict[int, Array], chain: Sequence[int]) -> Array:
+    """(4,) the frame of the head. chain: the joints from the hips to the last one below the head.
 
-    If all joints of trunk and neck have nearly the same frame as the chest, the head gets the chest's frame.
-    If not, the head is assumed to look ahead on average.
+    If all these joints have nearly the same frame as the chest, so has the head. Otherwise the head is
+    assumed to look ahead on average.
     """
     chest = frames[sample.body.chest]
     if len(chain) > 2 and max(float(quat.angle(frames[j], chest)) for j in chain) < AGREE:
@@ -108,7 +116,11 @@ def _head(sample: BodySample, frames: dict[int, Array], chain: Sequence[int]) ->
     return frame(up, UP, sample.local(sample.body.head, ahead), AHEAD)
 
 
-def _arm(sample: BodySample, frames: dict[int, Array], side: str, sign: float) -> None:
+def _add_arm(sample: BodySample, frames: dict[int, Array], side: str, sign: float) -> None:
+    """Add the frames of an arm's joints. side, sign: "left" and 1, or "right" and -1.
+
+    In the stance, the arm points to sign * LEFT. Its elbow bends forward, about the axis -sign * UP.
+    """
     clavicle, shoulder, elbow, wrist = sample.body.arms[side]
     chest = quat.mul(sample.turned[:, sample.body.chest], frames[sample.body.chest])
     if clavicle is not None:
@@ -122,7 +134,8 @@ def _arm(sample: BodySample, frames: dict[int, Array], side: str, sign: float) -
     )
 
 
-def _leg(sample: BodySample, frames: dict[int, Array], side: str) -> None:
+def _add_leg(sample: BodySample, frames: dict[int, Array], side: str) -> None:
+    """Add the frames of hip and knee. In the stance, the leg points down and its knee bends about LEFT."""
     hip, knee, heel, _ = sample.body.legs[side]
     hinge = sample.hinge(hip, knee, heel, sample.hips_left)
     for start, end in ((hip, knee), (knee, heel)):

@@ -1,4 +1,7 @@
-"""Converts a BVH file to a clip on the target skeleton, with a report of what was found and done."""
+"""Converts a BVH file to a clip on the target skeleton, and reports what was found and changed.
+
+The target is the skeleton of the data set. The source is the file's motion on its own rig.
+"""
 
 from __future__ import annotations
 
@@ -27,8 +30,9 @@ from hobble.motion.root import facing
 from hobble.motion.tilt import check_tilt
 from hobble.motion.upright_rest import upright
 
-SAME = 1e-3  # cm: offsets that differ from the target skeleton's by less count as equal
+SAME = 1e-3  # cm: offsets that differ from the target skeleton's by no more than this count as equal
 
+# Sentences for the report of a file in which joints other than the root have position channels that move.
 KEPT = "Movements of joints relative to their parents were kept."
 DROPPED = "Movements of joints relative to their parents were dropped, because the bone lengths changed."
 
@@ -44,8 +48,8 @@ def make_clip(
     """Read a BVH file, check it, and convert it to the skeleton at the frame rate of `options`.
 
     skeleton: file of the target skeleton. maps: the folder of the skeleton files. clip: name of the new clip.
-    skeleton_name: name of the target skeleton. options: the `motion` section of the data set, with the values
-    of the clip's entry.
+    skeleton_name: name of the target skeleton. options: the section `motion` of the data set. The values in
+    the clip's own entry come first.
 
     Returns the clip and its report (the content of `motion/<clip>.json`). Raises InputError for a file
     that cannot be read, for an unsuitable skeleton, and for defects that cannot be repaired; with
@@ -59,6 +63,7 @@ def make_clip(
     fitted = fit_skeleton(resampled, source, target.skeleton, options.proportions)
     if fitted.difference is not None:
         check(file.path, fitted.difference, source.match.rig)
+    # With `defects: leave`, or if the user has set what a check would doubt, the check accepts any clip.
     leave = options.defects == "leave"
     check_knees(file.path, fitted.clip, leave or options.handedness != "auto")
     doubtful_pace = check_pace(file.path, fitted.clip, leave)
@@ -83,19 +88,22 @@ def make_clip(
 
 
 def _check_length(file: Bvh, clip: Clip, target: Skeleton, options: ClipMotion) -> None:
-    """Raise InputError for a clip that would take more memory at the new frame rate than any real clip."""
+    """Raise InputError for a clip that would need too much memory at its new frame rate.
+
+    No real clip is that long: a wrong frame rate is more likely.
+    """
     frames = len(clip) / clip.fps * options.fps * options.loops
     if frames * max(len(clip.skeleton.joints), len(target.joints)) > MOST_POSES:
         raise InputError(
             file.path,
-            f"{len(clip)} frames at {clip.fps:g} a second become {frames:.0f} at {options.fps:g}: more "
-            f"than {MOST_POSES} poses of a joint",
+            f"{len(clip)} frames at {clip.fps:g} a second become {frames:.0f} at {options.fps:g}; frames "
+            f"times joints may be at most {MOST_POSES}",
             fix="Cut it into shorter clips, or set its source_fps.",
         )
 
 
 def _check_finite(file: Bvh, clip: Clip) -> None:
-    """Raise InputError for values that are not finite, which come from joints without length."""
+    """Raise InputError if a number of the clip is not finite. The usual cause is bones without length."""
     lengths = np.linalg.norm(file.offsets, axis=1)
     for values in (clip.rotations, clip.root, clip.positions):
         bad = ~np.isfinite(values).reshape(len(clip), -1).all(axis=1)
@@ -103,10 +111,10 @@ def _check_finite(file: Bvh, clip: Clip) -> None:
             short = ", ".join(
                 name for name, length in zip(file.names[1:], lengths[1:], strict=True) if not length
             )
-            why = f" (joints without length: {short:.200})" if short else ""
+            why = f" (in the file, these joints have no length: {short:.200})" if short else ""
             raise InputError(
                 file.path,
-                f"gives no motion of {clip.skeleton.name}{why}",
+                f"the joints of {clip.skeleton.name} get rotations or positions that are not finite{why}",
                 frame=int(np.argmax(bad)) + 1,
                 fix="Check the OFFSETs and the values, and export the clip again.",
             )
@@ -119,7 +127,7 @@ def first_facing(clip: Clip) -> float:
 
 
 def resample(clip: Clip, fps: float) -> Clip:
-    """The clip at another frame rate. A frame at the time of an old frame equals it exactly."""
+    """The clip at another frame rate. New frames at the times of old frames are exactly equal to these."""
     if clip.fps == fps:
         return clip
     times = sample_times(len(clip), clip.fps, fps)
@@ -134,12 +142,11 @@ def resample(clip: Clip, fps: float) -> Clip:
 
 @dataclass(frozen=True)
 class Fitted:
-    """A clip on the joints of the target.
+    """The result of `fit_skeleton`: a clip on the joints of the target.
 
-    scale: length of its path / length of the source's path. repairs: sentences on what was changed.
-    difference: how the clip differs from the source (from `hobble.motion.check_retarget.compare`), or None if
-    it was not retargeted.
-    unsure: sentences on what is uncertain.
+    scale: length of the clip's path / length of the source's path. repairs: sentences on what was changed.
+    difference: how the clip differs from the source (see `hobble.motion.check_retarget.compare`), or None if
+    it was not retargeted. unsure: sentences on what is uncertain.
     """
 
     clip: Clip
@@ -150,10 +157,11 @@ class Fitted:
 
 
 def fit_skeleton(clip: Clip, source: FileMotion, target: Skeleton, proportions: str) -> Fitted:
-    """The clip's motion on the target skeleton, or on its joints with the clip's own bone lengths.
+    """Put the clip's motion on the target skeleton.
 
-    clip: that of `source` at the new frame rate. proportions: "skeleton" for the target's bone lengths,
-    "clip" to keep the clip's own where possible.
+    clip: the clip of `source` at the new frame rate. proportions: "skeleton" for the target's bone lengths,
+    "clip" to keep the clip's own bone lengths. They can be kept if the clip has the target's joints and an
+    equal rest pose.
     """
     match = source.match
     if match.same:
@@ -181,6 +189,10 @@ def fit_skeleton(clip: Clip, source: FileMotion, target: Skeleton, proportions: 
 
 
 def _reordered(clip: Clip, order: Array, target: Skeleton) -> Clip:
+    """The clip with its joints in the target's order, and with its own bone lengths.
+
+    order: for each joint of the target, the index of the same joint in the clip.
+    """
     ends = {**target.end_sites, **clip.skeleton.end_sites}
     skeleton = replace(target, offsets=clip.skeleton.offsets[order], end_sites=ends)
     translations = None if clip.translations is None else clip.translations[:, order]
@@ -188,6 +200,7 @@ def _reordered(clip: Clip, order: Array, target: Skeleton) -> Clip:
 
 
 def _report(file: Bvh, source: FileMotion, new_clip: Clip) -> dict[str, Any]:
+    """The part of the report that tells about the file, its rig and the new clip."""
     return {
         "clip": new_clip.name,
         "source": file.path.name,

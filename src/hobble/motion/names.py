@@ -1,4 +1,4 @@
-"""Reads the side and the part of the body from the name of a joint."""
+"""Tells from the names of joints which side and which part of the body they are."""
 
 from __future__ import annotations
 
@@ -23,9 +23,9 @@ LEFT = {
 LEFT |= {"izquierdo", "sinistra", "sinistro", "sx", "hidari", "esq", "esquerda", "izq"}
 RIGHT = {"right", "r", "rgt", "rt", "rght", "rechts", "rechte", "rechter", "rechtes", "droite", "droit"}
 RIGHT |= {"derecha", "derecho", "destra", "destro", "dx", "migi", "dir", "direita", "der"}
-# Parts of the body and the words for each. The first match counts, so longer words come first: "forearm"
-# contains "arm". The meaning of `shoulder`, `arm`, `hip` and `leg` depends on the other joints of the limb:
-# see `limb_parts`.
+# (part of the body, words in names that mean it). The first part with a matching word counts. So "forearm"
+# comes before "arm", which it contains. What `shoulder`, `arm`, `hip` and `leg` mean depends on the other
+# joints of the limb: see `limb_parts`.
 WORDS = (
     ("twist", ("twist", "roll", "tweak", "helper", "corrective", "muscle")),
     (
@@ -74,12 +74,13 @@ WORDS = (
     ("leg", ("leg",)),
     ("hip", ("hip", "buttock", "femoral")),
 )
-CONTROLS = ("ik", "mch", "ctrl", "control", "ctl", "pole", "target", "effector")  # joints that move others
-ENDS = ("end", "nub", "site", "tip", "top")  # joints that only mark the end of a bone
+# Words in the names of joints that are no part of the body but move other joints.
+CONTROLS = ("ik", "mch", "ctrl", "control", "ctl", "pole", "target", "effector")
+ENDS = ("end", "nub", "site", "tip", "top")  # words in the names of joints that only mark the end of a bone
 
 
 def words(name: str) -> list[str]:
-    """The words of a name in lower case, split at capitals, digits and signs such as "_".
+    """The words of a joint's name in lower case. The name is split at capitals, digits and signs such as "_".
 
     >>> words("mixamorig:LeftUpLeg"), words("Bip01 L Thigh"), words("DEF-shin.R.001"), words("lShin")
     (['mixamorig', 'left', 'up', 'leg'], ['bip', 'l', 'thigh'], ['def', 'shin', 'r'], ['l', 'shin'])
@@ -88,7 +89,7 @@ def words(name: str) -> list[str]:
 
 
 def side_of(name: str) -> str | None:
-    """The side that a name says: "left" or "right", or None if it says neither or both.
+    """The side that a joint's name says: "left" or "right", or None if it says neither or both.
 
     >>> side_of("LeftUpLeg"), side_of("thigh.R"), side_of("rForeArm"), side_of("LLeg"), side_of("Spine")
     ('left', 'right', 'right', 'left', None)
@@ -104,17 +105,20 @@ def side_of(name: str) -> str | None:
 
 
 def side_of_pair(name: str, other: str) -> str | None:
-    """The side of a joint, by its own name and the name of its counterpart on the other side of the body.
+    """The side of a joint: "left" or "right", or None if the names do not say it.
 
-    None if the names do not say it. Two names that differ only in one letter may say it together, though
-    neither says it alone.
+    name: the name of the joint. other: the name of its counterpart on the other side of the body. If neither
+    name says the side alone, the two may say it together: they differ in only one letter, l in one and r in
+    the other.
 
     >>> side_of_pair("lfemur", "rfemur"), side_of_pair("toe_r2", "toe_l2"), side_of_pair("armA", "armB")
     ('left', 'right', None)
     """
-    own, across = side_of(name), side_of(other)
-    if own is not None or across is not None:
-        return None if own == across else own or ("left" if across == "right" else "right")
+    own_side, other_side = side_of(name), side_of(other)
+    if own_side is not None or other_side is not None:
+        if own_side == other_side:
+            return None
+        return own_side or ("left" if other_side == "right" else "right")
     if len(name) != len(other):
         return None
     unlike = [pair for pair in zip(name.lower(), other.lower(), strict=True) if pair[0] != pair[1]]
@@ -122,7 +126,7 @@ def side_of_pair(name: str, other: str) -> str | None:
 
 
 def are_twins(name: str, other: str) -> bool:
-    """Whether two names mean the same joint on the left and on the right.
+    """Whether two names say that the joints are the same part of the body, one left and one right.
 
     >>> are_twins("LeftToe2", "RightToe2"), are_twins("toe2.L", "toe1.R"), are_twins("lfemur", "rfemur")
     (True, False, True)
@@ -135,6 +139,7 @@ def are_twins(name: str, other: str) -> bool:
 
 
 def _without_side(name: str) -> list[str]:
+    """The words and numbers of a name in lower case, without the words for left and right."""
     parts = re.findall(r"[A-Z]+(?![a-z])|[A-Z]?[a-z]+|[0-9]+", re.sub("[左右]", " ", name))
     if glued := re.match(r"[LR](?=[A-Z][a-z])", name):
         parts = [parts[0].removeprefix(glued[0]), *parts[1:]]
@@ -142,7 +147,7 @@ def _without_side(name: str) -> list[str]:
 
 
 def part_of(name: str) -> str | None:
-    """The part of the body that a name means: the first in WORDS with a word that the name contains, or None.
+    """The part of the body that a joint's name means, as WORDS calls it, or None if it means none of them.
 
     >>> part_of("LeftForeArm"), part_of("RightShoulder"), part_of("Bip01 R Calf"), part_of("qwertz")
     ('forearm', 'shoulder', 'shank', None)
@@ -165,10 +170,14 @@ def is_control(name: str) -> bool:
 
 
 def limb_parts(names: Sequence[str]) -> dict[str, int]:
-    """The parts of a limb, by names alone. names: the names of its joints, from the trunk outward.
+    """Which joint of a limb begins which part, by the names of the joints alone.
 
-    Returns part -> index in `names`, as far as the names say. The parts are thigh, shank, foot and toe, or
-    clavicle, upperarm, forearm and hand.
+    names: the names of the limb's joints, from the trunk outward. Returns part -> index in `names`, as far as
+    the names say it: thigh, shank, foot and toe, or clavicle, upperarm, forearm and hand. Other parts of
+    WORDS that occur, such as finger or twist, are keys, too.
+
+    Some words mean different joints on different rigs. For example, `shoulder` is the clavicle if an upper
+    arm follows, and else the upper arm itself.
     """
     parts = [part_of(name) for name in names]
     out: dict[str, int] = {}
@@ -190,6 +199,7 @@ def limb_parts(names: Sequence[str]) -> dict[str, int]:
             part = "hand"
         elif part == "hand":
             part = "finger" if "wrist" in before else "hand"
+        # The first joint of a part counts. A joint like Hand_End is not where the hand begins.
         if part is not None and part not in out and not (is_end(names[i]) and part in ("hand", "foot")):
             out[part] = i
     return out

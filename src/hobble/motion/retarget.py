@@ -23,7 +23,7 @@ from hobble.core.quat import Array
 from hobble.core.skeleton import Skeleton, local_rotations, rest_positions
 from hobble.motion.axes import rest_frame
 from hobble.motion.body import SIDES
-from hobble.motion.heel_tilt import level_heels
+from hobble.motion.heel_tilt import steady_heels
 from hobble.motion.rig import leg_length, missing_bone
 
 # Bones of limbs: role of the joint -> role of the bone's other end.
@@ -164,7 +164,7 @@ def retarget_clip(clip: Clip, how: Retarget) -> Clip:
         heel, toe = (clip.positions[:, how.source.role(f"{side}_{part}")] for part in ("heel", "toe"))
         joint, ball = how.target.role(f"{side}_heel"), how.target.role(f"{side}_toe")
         foot = quat.rotate(rotations[:, joint], how.driver_offsets[ball])
-        tilt = level_heels(foot, heel * how.scale, toe * how.scale, clip.fps)
+        tilt = steady_heels(foot, heel * how.scale, toe * how.scale, clip.fps)
         rotations[:, joint] = quat.mul(tilt, rotations[:, joint])
     positions, rotations = _posed(how, clip.positions, rotations, clip.fps)
     local = quat.continuous(local_rotations(how.target, rotations))

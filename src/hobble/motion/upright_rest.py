@@ -21,8 +21,8 @@ from hobble.motion.added_joints import with_balls, with_split_joints
 from hobble.motion.body import Body, body_by_roles
 from hobble.motion.body_sample import LEFT, BodySample
 from hobble.motion.flat_feet import doubt, height_error
-from hobble.motion.from_motion import bends, from_motion, trunk_frames
-from hobble.motion.from_rest import TRUSTED, add_rest, from_rest, zero_doubt
+from hobble.motion.from_motion import find_bends, frames_from_motion, trunk_frames
+from hobble.motion.from_rest import TRUSTED, frames_from_rest, use_zero_pose, zero_doubt
 from hobble.motion.no_neck import lean_doubt
 from hobble.motion.orient import degrees_between, mean_rotation, pointed_along
 from hobble.motion.rebase import rebased
@@ -80,21 +80,21 @@ def upright(clip: Clip, body: Body, target: Skeleton, others: Collection[int] = 
         len(clip) / clip.fps,
     )
     problem = why_not_standing(body, rest)
-    zero = from_rest(sample) if problem is None else None
+    zero = frames_from_rest(sample) if problem is None else None
     if zero and _twisted(sample, zero):
         problem, zero = "the trunk is twisted", None
     trunk = trunk_sample(sample, zero is not None)
-    axes = from_motion(sample, trunk, zero[body.chest] if zero else None)
+    axes = frames_from_motion(sample, trunk, zero[body.chest] if zero else None)
     unsure = [lean_doubt(sample, zero is not None), stoop_doubt(sample, zero is not None)]
     if zero:
-        add_rest(axes, zero, sample)
+        use_zero_pose(axes, zero, sample)
         unsure.append(zero_doubt(sample, zero))
     source = "its zero pose" if problem is None else f"its motion, because in its zero pose {problem}"
     unsure.append(doubt(sample, problem is None))
     kept = _kept(clip, sample, others, axes)
     clip, body = with_balls(clip, body, axes)
     roles = body.roles(clip.skeleton.joints)
-    clip, body = with_split_joints(clip, body, axes, bends(trunk))
+    clip, body = with_split_joints(clip, body, axes, find_bends(trunk))
     clip, body = rebased(clip, body, [*body.joints, *kept], axes, roles)
     notes = [note for note in unsure if note]
     return UprightMotion(clip, body, source, notes, height_error(sample, problem is None))
