@@ -9,7 +9,7 @@ from pathlib import Path
 from hobble.core.errors import HobbleError
 from hobble.core.files import write_text
 from hobble.motion.doubt import Doubt
-from hobble.motion.draft import draft, guessed
+from hobble.motion.draft import draft, guess_roles
 from hobble.motion.file_motion import raw_clip, rig_of
 from hobble.motion.find_body import find_body
 from hobble.motion.look import look, table
@@ -30,7 +30,7 @@ def rig(file: Path) -> str:
         )
     except Doubt as doubt:
         print(f"{file}: {doubt}. Its roles are guessed from names", file=sys.stderr)
-        roles = guessed(skeleton)
+        roles = guess_roles(skeleton)
     return draft(skeleton, roles)
 
 
