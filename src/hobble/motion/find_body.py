@@ -2,8 +2,8 @@
 
 Limbs come in pairs: two chains of joints that start at the same joint and bend in the middle. Each bone of
 one chain is as long as its counterpart in the other. The legs point away from the joint that carries the
-arms, and they are the longer pair. Names show which side is left. Where they do not, the place of the head and
-the direction of feet and knees show it, but this is right only in right-handed coordinates.
+arms, and they are the longer pair. Names show which side is left. Where they do not, the place of the head
+and the direction of feet and knees show it, but this is right only in right-handed coordinates.
 """
 
 from __future__ import annotations

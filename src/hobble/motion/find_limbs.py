@@ -1,4 +1,4 @@
-"""Finds which pairs of chains are the legs and the arms of a rig, and which of their joints bend.
+"""Finds which pairs of chains are the legs and the arms of a rig, and the joints of these limbs.
 
 A chain is a row of joints from the trunk outward. A `LimbPair` is two equally long chains below one joint,
 its hub. `places` are the indices of three joints in both chains: hip, knee and ankle, or shoulder, elbow and
