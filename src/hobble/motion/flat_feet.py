@@ -52,9 +52,9 @@ EXACT_ERROR = np.radians(0.5)
 # in the rig's zero pose. It is 3 degrees over seven subjects of CMU. Differences between clips add a little.
 CAPTURED_ERROR = np.radians(3.5)
 # Radians. The feet of a rig are built either like those of people in the CMU database or in any way. In the
-# first case their mean tilt in the zero pose is PERSON, with the standard deviation PERSON_DEVIATION. On seven
-# subjects 15.0 and 2.0 degrees were measured. In the second case, all tilts in a range as wide as ANY_FOOT are
-# equally likely.
+# first case their mean tilt in the zero pose is PERSON, with the standard deviation PERSON_DEVIATION. (On
+# seven subjects 15.0 and 2.0 degrees were measured.) In the second case, all tilts in a range as wide as
+# ANY_FOOT are equally likely.
 PERSON, PERSON_DEVIATION, ANY_FOOT = np.radians(15.0), np.radians(2.5), np.radians(42.0)
 # In a clip shorter than BRIEF seconds, the feet may never stand. The standard deviation of their tilt is then
 # BRIEF_ERROR radians: clips of a third of a second or less were 10 to 15 degrees off.
