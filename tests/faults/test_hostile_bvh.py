@@ -49,7 +49,7 @@ def test_the_longest_allowed_chain_of_joints_is_read(tmp_path: Path) -> None:
     path = write(tmp_path / "a.bvh", text)
     assert len(bvh.read_bvh(path).names) == MOST_JOINTS
     make = lambda: make_clip(path, SKELETON, SKELETON.parent, "a", "holden31", OPTIONS)  # noqa: E731
-    more = f"  ... ({MOST_JOINTS - MOST_SHOWN} more; python -m hobble.motion rig a.bvh writes all)\n"
+    more = f"  ... ({MOST_JOINTS - MOST_SHOWN} more joints; python -m hobble.motion rig a.bvh writes all)\n"
     refused(make, "a.bvh: the parts of this rig are in doubt: ", more, letters=6000)
 
 

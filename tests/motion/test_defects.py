@@ -78,7 +78,7 @@ def test_a_few_broken_frames_in_the_middle_are_bridged(walk):
     assert top_speed(mended.clip) < 1.5 * top_speed(walk)
 
 
-def test_a_jump_at_a_seam_is_blended_and_the_path_goes_on(walk):
+def test_a_jump_at_a_seam_is_smoothed_and_the_path_goes_on(walk):
     first, second = slice(0, 100), slice(60, 160)
     turned = walk.rotations[second].copy()
     arm = walk.skeleton.role("left_shoulder")
@@ -86,7 +86,7 @@ def test_a_jump_at_a_seam_is_blended_and_the_path_goes_on(walk):
     root = np.concatenate([walk.root[first], walk.root[second] + [0, 0, 50]])
     seam = replace(walk, rotations=np.concatenate([walk.rotations[first], turned]), root=root)
     mended = repair(seam)
-    assert "between frames 100 and 101; the motion was blended" in mended.sentences[0]
+    assert "between frames 100 and 101; the motion was smoothed" in mended.sentences[0]
     assert top_speed(mended.clip) < 1.5 * top_speed(walk)
     assert find_jumps(mended.clip) == []
     assert np.diff(mended.clip.root[:, 2]).min() > 0

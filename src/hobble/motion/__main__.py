@@ -9,7 +9,7 @@ from pathlib import Path
 from hobble.core.errors import HobbleError
 from hobble.core.files import write_text
 from hobble.motion.doubt import Doubt
-from hobble.motion.draft import draft, guessed
+from hobble.motion.draft import draft, guess_roles
 from hobble.motion.file_motion import raw_clip, rig_of
 from hobble.motion.find_body import find_body
 from hobble.motion.look import format_table, summarise_clips
@@ -29,7 +29,7 @@ def skeleton_draft(file: Path) -> str:
         roles = body.roles(skeleton.joints)
     except Doubt as doubt:
         print(f"{file}: {doubt}. The roles are guessed from the names of the joints.", file=sys.stderr)
-        roles = guessed(skeleton)
+        roles = guess_roles(skeleton)
     return draft(skeleton, roles)
 
 

@@ -13,7 +13,7 @@ from hobble.core.errors import InputError
 from hobble.core.skeleton import Skeleton
 from hobble.motion.body import SIDES, body_by_roles, with_fingers
 from hobble.motion.doubt import Doubt, TwoFigures
-from hobble.motion.draft import refusal
+from hobble.motion.draft import doubt_error
 from hobble.motion.find_body import FoundBody, find_body
 from hobble.motion.options import ClipMotion
 from hobble.motion.read import Bvh
@@ -49,7 +49,7 @@ def body_in_file(
     except TwoFigures as error:
         raise InputError(file.path, str(error), fix="Export each figure on its own.") from None
     except Doubt as doubt:
-        raise refusal(file, rig, doubt) from None
+        raise doubt_error(file, rig, doubt) from None
     if not found.sided and options.handedness == "auto":
         raise InputError(
             file.path,

@@ -1,4 +1,4 @@
-"""The error for a rig whose parts are uncertain, and a check that a figure's height is certain enough."""
+"""The error for a rig whose body parts are uncertain, and a check that a figure's height is certain."""
 
 from __future__ import annotations
 
@@ -11,9 +11,10 @@ MOST_HEIGHT_ERROR = 3.0  # cm (two standard deviations): a clip whose height is 
 
 
 class Doubt(Exception):
-    """The parts of a rig are uncertain.
+    """It is uncertain which joints of a rig are which parts of the body.
 
-    why: what is uncertain, in words. certain_roles: role -> joint, for the roles that are certain.
+    why: what is uncertain, in words. certain_roles: role, such as left_knee -> index of the joint that surely
+    has it.
     """
 
     def __init__(self, why: str, certain_roles: dict[str, int] | None = None) -> None:
@@ -28,13 +29,13 @@ class TwoFigures(Doubt):
 def check_height(path: Path, error: float, notes: Sequence[str], accept: bool) -> None:
     """Raise InputError if the height of a figure is too uncertain.
 
-    error: of the height, cm (two standard deviations). notes: what is uncertain, in sentences. accept: take
-    the clip anyway.
+    error: by how many cm the height may be off (two standard deviations). notes: what is uncertain, in
+    sentences. accept: take the clip anyway.
     """
     if error > MOST_HEIGHT_ERROR and not accept:
         raise InputError(
             path,
             " ".join(notes),
-            fix="Use a clip in which both feet stand flat, or one in whose zero pose a person could stand. "
-            "To use this clip anyway, set motion.accept_doubt: true.",
+            fix="Use a clip in which both feet stand flat, or one with a zero pose (all rotations zero) in "
+            "which a person could stand. To use this clip anyway, set motion.accept_doubt: true.",
         )

@@ -26,15 +26,15 @@ log = logging.getLogger("hobble.download")
 
 ATTEMPTS = 5  # at most
 PAUSE = 1.0  # seconds before the second attempt; doubled before each further one
-TIMEOUT = 30.0  # seconds without data
-DEADLINE = 600.0  # seconds for all attempts; the workflow's rule asks a cluster for as much time
+TIMEOUT = 30.0  # seconds without data after which an attempt fails
+DEADLINE = 600.0  # seconds for all attempts together; the workflow asks a cluster for as much time
 BLOCK = 1 << 16  # bytes that are read at a time
 LENGTH = re.compile(r"\d{1,18}")  # a valid header Content-Length
 RETRY_STATUS = {408, 425, 429, *range(500, 600)}  # HTTP statuses after which a retry may work
 
 
 class _Failed(Exception):
-    """A failed attempt. again: whether another attempt may succeed."""
+    """A failed attempt. reason: in words. again: whether another attempt may succeed."""
 
     def __init__(self, reason: str, again: bool = True) -> None:
         super().__init__(reason)
@@ -46,7 +46,7 @@ class _TooLate(Exception):
 
 
 class _OtherFile(_Failed):
-    """The file has the wrong checksum. If it arrives twice, the server really has another file."""
+    """A file with the wrong checksum. If the same file arrives twice, it is not damaged but another one."""
 
 
 def download_clip(
@@ -68,12 +68,13 @@ def download_clip(
     beside `path`, from which this or a later call resumes.
 
     sha256: checksum of the file. It may also be the checksum after \\r\\n at the ends of lines is changed to
-    \\n, because version control may add the \\r. folder: where users can put the file themselves, for the
-    message.
+    \\n, because version control may add the \\r. folder: where users can put the file themselves. The error
+    message names it.
 
-    attempts: how many are made at most. pause: seconds before the second attempt. timeout: seconds without
-    data after which an attempt fails. deadline: seconds for all attempts. most: bytes; a larger file is not
-    kept. sleep: function that waits for a number of seconds.
+    attempts: how many are made at most. pause: seconds before the second attempt, doubled before each further
+    one. timeout: seconds without data after which an attempt fails. deadline: seconds for all attempts
+    together. most: size in bytes above which a file is refused. sleep: function that waits for a number of
+    seconds.
 
     Raises InputError with advice if no attempt succeeds.
     """
@@ -82,30 +83,35 @@ def download_clip(
     wrong_files: set[str] = set()
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
-        with _at_most(deadline):
+        with _time_limit(deadline):
             for attempt in range(attempts):
                 try:
                     _fetch(url, part, timeout, most)
                     _check(part, sha256)
-                    return _keep(part, path)
+                    return _move_into_place(part, path)
                 except _Failed as failure:
-                    last = failure
-                if attempt + 1 == attempts or not last.again or str(last) in wrong_files:
+                    last_failure = failure
+                # The message of an _OtherFile contains the checksum, so an equal message means the same file.
+                same_file_again = str(last_failure) in wrong_files
+                if attempt + 1 == attempts or not last_failure.again or same_file_again:
                     break
-                if isinstance(last, _OtherFile):
-                    wrong_files.add(str(last))
-                log.info("%s: %s; trying again", url, last)
+                if isinstance(last_failure, _OtherFile):
+                    wrong_files.add(str(last_failure))
+                log.info("%s: %s; trying again", url, last_failure)
                 sleep(pause * 2**attempt)
     except _TooLate:
-        last = _Failed(f"not done within {deadline:g} seconds")
+        last_failure = _Failed(f"not done within {deadline:g} seconds")
     except OSError as error:
         raise write_error(error, path) from error
-    raise _refusal(url, path, folder, str(last), attempt + 1)
+    raise _download_error(url, path, folder, str(last_failure), attempt + 1)
 
 
 @contextlib.contextmanager
-def _at_most(seconds: float) -> Iterator[None]:
-    """Raise _TooLate after so many seconds, whatever the server does. Works only in the main thread."""
+def _time_limit(seconds: float) -> Iterator[None]:
+    """Raise _TooLate after so many seconds, whatever the server does.
+
+    Outside the main thread there is no limit, because Python allows signal handlers only in the main thread.
+    """
 
     def late(*_: object) -> None:
         raise _TooLate
@@ -113,17 +119,17 @@ def _at_most(seconds: float) -> Iterator[None]:
     if threading.current_thread() is not threading.main_thread():
         yield
         return
-    before = signal.signal(signal.SIGALRM, late)
+    old_handler = signal.signal(signal.SIGALRM, late)
     signal.setitimer(signal.ITIMER_REAL, seconds)
     try:
         yield
     finally:
         signal.setitimer(signal.ITIMER_REAL, 0)
-        signal.signal(signal.SIGALRM, before)
+        signal.signal(signal.SIGALRM, old_handler)
 
 
-def _keep(part: Path, path: Path) -> int:
-    """Rename the complete file `part` to `path`. Returns its number of bytes."""
+def _move_into_place(part: Path, path: Path) -> int:
+    """Rename the complete file `part` to `path`, safely on disk. Returns its number of bytes."""
     with open(part, "rb") as file:
         os.fsync(file.fileno())
         size = os.fstat(file.fileno()).st_size
@@ -132,7 +138,8 @@ def _keep(part: Path, path: Path) -> int:
     return size
 
 
-def _refusal(url: str, path: Path, folder: str, reason: str, attempts: int) -> HobbleError:
+def _download_error(url: str, path: Path, folder: str, reason: str, attempts: int) -> HobbleError:
+    """The error for a download that failed. reason: of the last failure, in words."""
     times = f", {attempts} times" if attempts > 1 else ""
     return InputError(
         url,
@@ -142,22 +149,25 @@ def _refusal(url: str, path: Path, folder: str, reason: str, attempts: int) -> H
 
 
 def _fetch(url: str, part: Path, timeout: float, most: int) -> None:
-    """Download what is missing in the file `part`, or everything if the server cannot resume."""
+    """Download what is missing in the file `part`, or everything if the server cannot resume.
+
+    timeout, most: as in `download_clip`.
+    """
     have = part.stat().st_size if part.is_file() else 0
     headers = {"User-Agent": "hobble", "Accept-Encoding": "identity"}
     if have:
         headers["Range"] = f"bytes={have}-"
     try:
         with urllib.request.urlopen(urllib.request.Request(url, headers=headers), timeout=timeout) as answer:
-            goes_on = answer.status == 206 and _starts_at(answer.headers.get("Content-Range"), have)
-            if answer.status == 206 and not goes_on:
+            is_part = answer.status == 206  # else the server sends the whole file
+            if is_part and not _starts_at(answer.headers.get("Content-Range"), have):
                 part.unlink()
                 raise _Failed("the server sent the wrong part of the file")
-            with open(part, "ab" if goes_on else "wb") as file:
-                _copy(answer, file, have if goes_on else 0, timeout, most)
+            with open(part, "ab" if is_part else "wb") as file:
+                _copy(answer, file, have if is_part else 0, timeout, most)
     except urllib.error.HTTPError as error:
         error.close()
-        if error.code == 416 and have:  # `part` is complete already, or too long
+        if error.code == 416 and have:  # `part` is already complete, or too long: its checksum will tell
             return
         raise _Failed(
             f"the server says {error.code} {printable(error.reason)}", error.code in RETRY_STATUS
@@ -172,36 +182,44 @@ def _fetch(url: str, part: Path, timeout: float, most: int) -> None:
 
 
 def _starts_at(content_range: str | None, byte: int) -> bool:
+    """Whether a header Content-Range, such as "bytes 100-199/200", begins at this byte.
+
+    Some servers write "bytes=".
+    """
     return (content_range or "").replace("=", " ").startswith(f"bytes {byte}-")
 
 
 def _copy(answer: http.client.HTTPResponse, file: BinaryIO, have: int, timeout: float, most: int) -> None:
-    """Write the answer's body.
+    """Write the body of the server's answer to the end of the file.
 
     Raises _Failed if the file is shorter than announced, or larger than `most` bytes. A file that is too
     large is deleted. have: number of bytes that the file already has.
     """
     length = answer.headers.get("Content-Length") or ""
     announced = int(length) if LENGTH.fullmatch(length) else None
-    came = 0
+    received = 0
     if have + (announced or 0) > most:
-        _too_large(file, most)
-    while block := _block(answer, timeout):
-        came += len(block)
-        if have + came > most:
-            _too_large(file, most)
+        _refuse_too_large(file, most)
+    while block := _read_block(answer, timeout):
+        received += len(block)
+        if have + received > most:
+            _refuse_too_large(file, most)
         file.write(block)
-    if announced is not None and came < announced:
-        raise _Failed(f"the file was cut short after {have + came} of {have + announced} bytes")
+    if announced is not None and received < announced:
+        raise _Failed(f"the file was cut short after {have + received} of {have + announced} bytes")
 
 
-def _too_large(file: BinaryIO, most: int) -> NoReturn:
+def _refuse_too_large(file: BinaryIO, most: int) -> NoReturn:
+    """Delete the file and raise _Failed."""
     file.truncate(0)
     os.unlink(file.name)
-    raise _Failed(f"it is larger than {most / 1e6:g} MB, which is the most that a clip may be", again=False)
+    raise _Failed(
+        f"the file is larger than {most / 1e6:g} MB, which is the most that a clip may be", again=False
+    )
 
 
-def _block(answer: http.client.HTTPResponse, timeout: float) -> bytes:
+def _read_block(answer: http.client.HTTPResponse, timeout: float) -> bytes:
+    """The next bytes of the answer, or b"" at its end."""
     try:
         return answer.read1(BLOCK)  # returns what has arrived, without waiting for a full block
     except TimeoutError:
@@ -211,7 +229,10 @@ def _block(answer: http.client.HTTPResponse, timeout: float) -> bytes:
 
 
 def _check(part: Path, sha256: str) -> None:
-    """Delete the file and raise _OtherFile if its checksum is not `sha256`, which is from the manifest."""
+    """Delete the file and raise _OtherFile if its checksum is not `sha256`.
+
+    sha256: as in `download_clip`, from the manifest, the data set's list of checksums.
+    """
     data = part.read_bytes()
     found = hashlib.sha256(data).hexdigest()
     if sha256.lower() in (found, hashlib.sha256(data.replace(b"\r\n", b"\n")).hexdigest()):

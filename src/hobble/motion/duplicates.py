@@ -14,23 +14,23 @@ from hobble.core.files import load_npz, save_npz
 from hobble.core.quat import Array
 from hobble.motion.root import facing
 
-# cm: two clips show the same motion if their joints are on average less than this apart. In the release of
-# Holden et al. (2017), two mirrored clips are 1.2 and 1.3 cm from the mirror images of their originals. Two
-# walks or runs of one person are at least 2.6 cm apart.
+# cm: two clips show the same motion if their joints are on average less than this apart. The release of
+# Holden et al. (2017) contains two mirrored clips, which are 1.2 and 1.3 cm from the mirror images of their
+# originals. Two different walks or runs of one person are at least 2.6 cm apart.
 SAME_MOTION = 1.7
-LONGER = 0.02  # of two clips with the same motion, one may be longer than the other by this share
+LONGER = 0.02  # clips are compared only if one is longer than the other by at most this share
 POSES = 12  # number of poses of each clip that are compared
-FLIP = np.array([-1.0, 1.0, 1.0])  # times a position: the position mirrored in the plane x = 0
+MIRROR = np.array([-1.0, 1.0, 1.0])  # a position times this is mirrored in the plane x = 0
 
 
 @dataclass(frozen=True)
 class ClipDigest:
-    """The data by which clips are compared.
+    """The data of one clip by which it is compared with others.
 
-    sha256: checksum of the file. seconds: length of the clip. poses: (12, J, 3) cm, the positions of the
-    joints at times spread evenly over the clip, relative to the ground below the hips of the same pose. The
-    axes are turned so that the first pose faces +Z. mirrored: `poses` with left and right exchanged, or None
-    if the rig cannot be mirrored.
+    sha256: checksum of the file. seconds: length of the clip. poses: (POSES, J, 3) cm, the positions of the
+    joints at times spread evenly over the clip, relative to the point of the ground below the hips at the
+    same time. They are turned so that the first pose faces +Z. mirrored: `poses` with left and right
+    exchanged, or None if the rig cannot be mirrored.
     """
 
     name: str
@@ -42,22 +42,23 @@ class ClipDigest:
 
 def digest(clip: Clip, sha256: str) -> ClipDigest:
     """The data by which a clip is compared with others. sha256: checksum of its file."""
-    at = np.linspace(0, len(clip) - 1, POSES).round().astype(int)
-    moved = None if clip.translations is None else clip.translations[at]
-    few = replace(clip, rotations=clip.rotations[at], root=clip.root[at], translations=moved)
-    poses = few.positions - few.positions[:, :1] * [1.0, 0.0, 1.0]
-    ahead = facing(clip.skeleton, few.positions[:1], 0.0)[0]
+    sampled = np.linspace(0, len(clip) - 1, POSES).round().astype(int)
+    moved = None if clip.translations is None else clip.translations[sampled]
+    sample = replace(clip, rotations=clip.rotations[sampled], root=clip.root[sampled], translations=moved)
+    poses = sample.positions - sample.positions[:, :1] * [1.0, 0.0, 1.0]
+    ahead = facing(clip.skeleton, sample.positions[:1], 0.0)[0]
+    # Turn about the vertical axis, so that the facing direction (x, z) becomes (0, 1).
     x, z = ahead[[0, 2]] / max(float(np.hypot(ahead[0], ahead[2])), 1e-9)
     poses = poses @ np.array([[z, 0.0, x], [0.0, 1.0, 0.0], [-x, 0.0, z]])
     try:
-        mirrored = poses[:, clip.skeleton.mirror_joints] * FLIP
-    except HobbleError:
+        mirrored = poses[:, clip.skeleton.mirror_joints] * MIRROR
+    except HobbleError:  # the names of the rig's joints do not show which joint is whose counterpart
         mirrored = None
     return ClipDigest(clip.name, sha256, len(clip) / clip.fps, poses, mirrored)
 
 
 def save_digests(path: Path, clips: Sequence[ClipDigest]) -> None:
-    """Write the data of all clips to one file."""
+    """Write the data of all clips to one npz file. Its keys are like "3.poses", for the fourth clip."""
     arrays = {
         f"{number}.{name}": np.array(value)
         for number, clip in enumerate(clips)
@@ -83,19 +84,24 @@ def load_digests(path: Path) -> list[ClipDigest]:
 
 
 def same_pairs(clips: Sequence[ClipDigest]) -> list[tuple[str, str, str]]:
-    """Pairs of duplicates: two names, and "the same file", "the same motion" or "mirrors of each other"."""
+    """Pairs of duplicates.
+
+    Each pair is given as the names of the two clips and what they have in common: "the same file", "the same
+    motion" or "mirrors of each other".
+    """
     out = []
-    order = sorted(clips, key=lambda clip: clip.seconds)
-    for i, a in enumerate(order):
-        for b in order[i + 1 :]:
+    by_length = sorted(clips, key=lambda clip: clip.seconds)
+    for i, a in enumerate(by_length):
+        for b in by_length[i + 1 :]:
             if b.seconds - a.seconds > LONGER * a.seconds:
-                break
-            if what := _why_equal(a, b):
-                out.append((min(a.name, b.name), max(a.name, b.name), what))
+                break  # all further clips are even longer
+            if reason := _why_equal(a, b):
+                out.append((min(a.name, b.name), max(a.name, b.name), reason))
     return sorted(out)
 
 
 def _why_equal(a: ClipDigest, b: ClipDigest) -> str:
+    """What two clips have in common, in the words of `same_pairs`, or "" if they are no duplicates."""
     if a.sha256 == b.sha256:
         return "the same file"
     if a.poses.shape != b.poses.shape:

@@ -1,4 +1,9 @@
-"""Loads the motion of a BVH file: in centimetres, right-handed, Y up, on a rig with a standing rest pose."""
+"""Loads the motion of a BVH file.
+
+The result is in centimetres, right-handed, with Y up, on a rig with a standing rest pose. A rig is the
+skeleton in a BVH file. A known skeleton is one that has a file in `config/skeletons`. The zero pose of a rig
+is the one in which all rotations are zero.
+"""
 
 from __future__ import annotations
 
@@ -15,7 +20,7 @@ from hobble.motion.axes import RigAxes, straighten
 from hobble.motion.body import Body, body_by_roles, match_joints
 from hobble.motion.body_in_file import body_in_file, notes_on_names
 from hobble.motion.decode import Decoded, check_angles, decode, frame_rate
-from hobble.motion.defects import Repaired, flips, repair
+from hobble.motion.defects import Repaired, notes_on_flips, repair
 from hobble.motion.doubt import check_height
 from hobble.motion.floor import put_on_floor
 from hobble.motion.four_legs import on_four_legs
@@ -36,20 +41,22 @@ from hobble.motion.standing import why_not_standing
 from hobble.motion.upright_rest import upright
 
 STILL = 0.1  # cm: a joint that stays this close to its offset counts as fixed to its parent
-FOUND = "found"  # in reports: the name of a rig that has no skeleton file
+FOUND = "found"  # stands in reports instead of the rig's name if the rig is no known skeleton
 
 
 @dataclass(frozen=True)
 class FileMotion:
-    """A file's motion at its own frame rate, on its own rig or on the joints of its body.
+    """A file's motion at the file's own frame rate.
 
-    match: which known skeleton the rig is, if any, and which of its joints the target's joints follow. unit,
-    unit_name: cm per unit of the file, and the unit in words. axes: which of the file's axes points up, and
-    so on. first_frame: the file's frame (from 0) at which the clip begins. repairs, notes: sentences on what
-    was repaired, and on what else users should know. stance: where the rest pose comes from, in words.
-    moving: whether any joint of the body except the hips moves relative to its parent. straightened: whether
-    the clip is not on the file's rig, but on one with only the joints of the body and a standing rest pose.
-    unsure: sentences on what is uncertain about the rest pose.
+    It is on the file's own rig, or, if `straightened`, on a rig that has only the joints of the body and a
+    standing rest pose.
+
+    match: which known skeleton the rig is, if any, and which of the rig's joints each joint of the target
+    follows. unit, unit_name: cm per unit of the file, and the unit in words. axes: which of the file's axes
+    points up, and where the figure faces. first_frame: the file's frame (from 0) at which the clip begins.
+    repairs, notes: sentences on what was repaired, and on what else users should know. stance: where the rest
+    pose comes from, in words. moving: whether any joint of the body except the hips moves relative to its
+    parent. unsure: sentences on what is uncertain about the rest pose.
     """
 
     clip: Clip
@@ -69,32 +76,37 @@ class FileMotion:
 def load_source(file: Bvh, target: TargetSkeleton, maps: str | Path, options: ClipMotion) -> FileMotion:
     """A file's motion, checked and, if allowed, repaired.
 
-    target: the skeleton to which the motion will go. maps: the folder of the skeleton files. options: the
-    data set's options for this clip.
+    target: the skeleton to which the motion will be retargeted. maps: the folder of the skeleton files.
+    options: the data set's options for this clip.
 
-    A rig with a skeleton file and the rest pose given there counts as that skeleton. On other rigs the parts
-    of the body and a standing rest pose are found. Raises InputError if the parts cannot be found, or for
-    defects that cannot be repaired.
+    A rig counts as a known skeleton if it has the joint names and the rest pose of its file. On other rigs
+    the parts of the body and a standing rest pose are found. Raises InputError if the parts cannot be found,
+    or for defects that cannot be repaired.
     """
     check_angles(file)
-    repairs = _frame_count(file, options.defects)
+    repairs = _check_frame_count(file, options.defects)
     hips = find_hips(clean_names(file.names), target, maps)
     known = match_rig(rig_of(below_hips(file, hips)), target, maps)
+    # `alike`: the rest pose is that of the known skeleton. `sources`: a map leads from it to the target.
     if known is not None and known.alike and known.sources:
-        return _on_known_rig(file, hips, known, repairs, options)
-    return _on_unknown_rig(file, target, known, repairs, options)
+        return _load_known_rig(file, hips, known, repairs, options)
+    return _load_unknown_rig(file, target, known, repairs, options)
 
 
-def _on_known_rig(
+def _load_known_rig(
     file: Bvh, hips: int, match: RigMatch, repairs: list[str], options: ClipMotion
 ) -> FileMotion:
-    """The motion of a file whose rig has a skeleton file. hips: index of the joint. match: to that file."""
+    """The motion of a file whose rig is a known skeleton.
+
+    hips: index of the hips in the file. match: the known skeleton. repairs: sentences on what was repaired so
+    far.
+    """
     rig = replace(rig_of(below_hips(file, hips)), roles=match.roles)
     unit, unit_name = _unit(file.path, leg_length(rig), options.unit)
     decoded = decode_below(file, hips, STILL / unit)
     clip = _scaled(file, rig, decoded, unit, options)
     if bone := missing_bone(clip.skeleton):
-        raise _boneless(file, bone)
+        raise _no_length_error(file, bone)
     straight = straighten(clip, options.up, options.handedness)
     moving = decoded.translations is not None
     source = FileMotion(
@@ -111,26 +123,28 @@ def _on_known_rig(
         straightened=False,
         unsure=straight.unsure,
     )
-    return _repaired(file, source, options)
+    return _repair_and_ground(file, source, options)
 
 
-def _on_unknown_rig(
+def _load_unknown_rig(
     file: Bvh, target: TargetSkeleton, known: RigMatch | None, repairs: list[str], options: ClipMotion
 ) -> FileMotion:
-    """The motion of a file whose rig has no skeleton file, or another rest pose than the one given there.
+    """The motion of a file whose rig is no known skeleton, or has another rest pose than the known one.
 
-    The parts of the body and a standing rest pose are found. known: the match to a skeleton file with the
-    same joint names, if there is one. It tells the parts of the body.
+    The parts of the body and a standing rest pose are found. known: the known skeleton that has the rig's
+    joint names, if there is one. It tells the parts of the body. repairs: sentences on what was repaired so
+    far.
     """
     rig = rig_of(file)
-    decoded = _decoded(file)
+    decoded = _decode(file)
+    # In the file's unit and axes. The frame rate does not matter here.
     raw = Clip(file.path.stem, rig, 1.0, decoded.rotations, decoded.root, decoded.translations)
     found = body_in_file(file, rig, raw, known, options)
     body = found.body
-    for a, b in (pair for leg in body.legs.values() for pair in pairwise(leg[:3])):
-        if np.median(np.linalg.norm(raw.positions[:, b] - raw.positions[:, a], axis=-1)) < 1e-6:
-            raise _boneless(file, f"{rig.joints[a]} to {rig.joints[b]}")
-    unit, unit_name = _unit(file.path, _leg(raw, body), options.unit)
+    for start, end in (bone for leg in body.legs.values() for bone in pairwise(leg[:3])):
+        if np.median(np.linalg.norm(raw.positions[:, end] - raw.positions[:, start], axis=-1)) < 1e-6:
+            raise _no_length_error(file, f"{rig.joints[start]} to {rig.joints[end]}")
+    unit, unit_name = _unit(file.path, _leg_length(raw, body), options.unit)
     rig = replace(rig, roles=body.roles(rig.joints))
     clip = _scaled(file, rig, decoded, unit, options)
     standing = why_not_standing(body, rest_positions(rig)) is None
@@ -144,9 +158,11 @@ def _on_unknown_rig(
         raise InputError(
             file.path, f"the up axis is in doubt: {error}", fix="Set motion.up in the data set to Y or Z."
         ) from None
+    # The standing rest pose that replaces another one faces +Z.
     axes = straight.axes if standing else replace(straight.axes, facing="+Z")
     target_body = body_by_roles(target.skeleton)
-    # A rig with the target's own joint names is matched with the target by names, and any other by parts.
+    # A rig with the target's own joint names is matched with the target by these names, and any other rig by
+    # the parts of the body.
     named = known.sources if known is not None and known.rig == target.skeleton.name else {}
     named_joints = [rig.index(joint) for joint in named.values()]
     standing_clip = upright(straight.clip, body, target.skeleton, named_joints)
@@ -168,20 +184,23 @@ def _on_unknown_rig(
         repairs=repairs + decoded.repairs,
         notes=notes,
         stance=standing_clip.rest,
-        moving=_moving(decoded, body, unit),
+        moving=_has_moving_joints(decoded, body, unit),
         straightened=True,
         unsure=straight.unsure + standing_clip.notes,
     )
-    return _repaired(file, source, options)
+    return _repair_and_ground(file, source, options)
 
 
-def _repaired(file: Bvh, source: FileMotion, options: ClipMotion) -> FileMotion:
-    """The motion with broken frames repaired and its floor at height zero."""
+def _repair_and_ground(file: Bvh, source: FileMotion, options: ClipMotion) -> FileMotion:
+    """The motion with broken frames repaired and a flat floor at height zero.
+
+    If the option `defects` is "leave", both stay as they are.
+    """
     leave = options.defects == "leave"
     repaired = Repaired(source.clip, 0, []) if leave else repair(source.clip)
     flat = options.ground == "flat" and not leave
-    clip, moved, uneven = put_on_floor(repaired.clip) if flat else (repaired.clip, [], [])
-    repairs = repaired.sentences + moved
+    clip, floor_repairs, floor_notes = put_on_floor(repaired.clip) if flat else (repaired.clip, [], [])
+    repairs = repaired.sentences + floor_repairs
     if repairs and options.defects == "refuse":
         raise InputError(file.path, repairs[0], fix="Set motion.defects: repair to repair it this way.")
     return replace(
@@ -189,30 +208,36 @@ def _repaired(file: Bvh, source: FileMotion, options: ClipMotion) -> FileMotion:
         clip=clip,
         first_frame=repaired.first,
         repairs=source.repairs + repairs,
-        notes=source.notes + uneven + flips(clip, repaired.first),
+        notes=source.notes + floor_notes + notes_on_flips(clip, repaired.first),
     )
 
 
 def raw_clip(file: Bvh) -> Clip:
-    """A file's motion in its own unit and axes, at one frame a second."""
-    decoded = _decoded(file)
+    """A file's motion in its own unit and axes, for uses in which the frame rate does not matter: it is 1."""
+    decoded = _decode(file)
     return Clip(file.path.stem, rig_of(file), 1.0, decoded.rotations, decoded.root, decoded.translations)
 
 
-def _decoded(file: Bvh) -> Decoded:
+def _decode(file: Bvh) -> Decoded:
+    """The file's rotations and positions.
+
+    The file's unit is not known yet. So a joint counts as fixed to its parent if it moves by less than a
+    thousandth of the longest bone.
+    """
     longest = float(np.linalg.norm(file.offsets[1:], axis=-1).max(initial=0.0))
     return decode(file, 1e-3 * longest)
 
 
 def rig_of(file: Bvh) -> Skeleton:
-    """The joints of a file as a skeleton, in the file's unit. Prefixes of the names are left out."""
+    """The joints of a file as a skeleton, in the file's unit. Prefixes like "mixamorig:" are left out."""
     names = clean_names(file.names)
-    short = dict(zip(file.names, names, strict=True))
-    ends = {short[name]: sites[0] for name, sites in file.end_sites.items()}
+    new_name = dict(zip(file.names, names, strict=True))
+    ends = {new_name[name]: sites[0] for name, sites in file.end_sites.items()}
     return Skeleton(file.path.stem, names, file.parents, file.offsets, end_sites=ends)
 
 
-def _boneless(file: Bvh, bone: str) -> InputError:
+def _no_length_error(file: Bvh, bone: str) -> InputError:
+    """The error for a bone without length. bone: such as "LeftUpLeg to LeftLeg"."""
     return InputError(
         file.path,
         f"the bone from {bone} has no length",
@@ -220,32 +245,41 @@ def _boneless(file: Bvh, bone: str) -> InputError:
     )
 
 
-def _frame_count(file: Bvh, defects: str) -> list[str]:
+def _check_frame_count(file: Bvh, defects: str) -> list[str]:
+    """A sentence if the file has another number of frames than its header declares, else an empty list.
+
+    Raises InputError instead if the option `defects` is "refuse".
+    """
     if len(file) == file.declared:
         return []
     problem = f"declares {file.declared} frames and has {len(file)}"
     if defects == "refuse":
         raise InputError(file.path, problem, fix="Export the clip again, or set motion.defects: repair.")
-    return [f"The file {problem}; those it holds are used."]
+    return [f"The file {problem}. The {len(file)} frames are used."]
 
 
-def _leg(clip: Clip, body: Body) -> float:
-    """Length of thigh and shank together: mean of both sides, median over the frames."""
+def _leg_length(clip: Clip, body: Body) -> float:
+    """Length of thigh and shank together, in the clip's unit: mean of both sides, median over the frames."""
     bones = [pair for leg in body.legs.values() for pair in pairwise(leg[:3])]
     apart = [np.linalg.norm(clip.positions[:, b] - clip.positions[:, a], axis=-1) for a, b in bones]
     return float(np.median(sum(apart)) / 2)
 
 
-def _moving(decoded: Decoded, body: Body, unit: float) -> bool:
+def _has_moving_joints(decoded: Decoded, body: Body, unit: float) -> bool:
     """Whether any joint of the body except its hips moves relative to its parent."""
     if decoded.translations is None:
         return False
-    parts = [j for limbs in (body.arms, body.legs) for limb in limbs.values() for j in limb if j is not None]
-    local = decoded.translations[:, [*body.trunk, *body.neck, body.head, *parts]]
+    limb_joints = [j for limbs in (body.arms, body.legs) for limb in limbs.values() for j in limb]
+    joints = [*body.trunk, *body.neck, body.head, *(j for j in limb_joints if j is not None)]
+    local = decoded.translations[:, joints]
     return bool(np.abs(local - np.median(local, axis=0)).max() * unit > STILL)
 
 
 def _unit(path: Path, leg: float, unit: str | float) -> tuple[float, str]:
+    """Centimetres per unit of the file, and the unit in words.
+
+    leg: length of thigh and shank together, in the file's unit. unit: the option, a number or "auto".
+    """
     if unit != "auto":
         return float(unit), f"{float(unit):g} cm (given)"
     found = unit_of(leg)
@@ -259,6 +293,7 @@ def _unit(path: Path, leg: float, unit: str | float) -> tuple[float, str]:
 
 
 def _scaled(file: Bvh, rig: Skeleton, decoded: Decoded, unit: float, options: ClipMotion) -> Clip:
+    """The decoded motion as a clip in centimetres, at the file's frame rate. unit: cm per file unit."""
     fps = options.source_fps or frame_rate(file.frame_time, file.frame_time_text)
     offsets = decoded.offsets * unit
     offsets[0] = 0.0

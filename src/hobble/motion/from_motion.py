@@ -16,7 +16,7 @@ from hobble.core import quat
 from hobble.core.quat import Array
 from hobble.motion.added_joints import Bend
 from hobble.motion.body_sample import LEFT, BodySample
-from hobble.motion.flat_feet import flat_feet
+from hobble.motion.flat_feet import frames_of_feet
 from hobble.motion.no_neck import lacks_neck, neck_bone
 from hobble.motion.orient import frame, mean_rotation, unit
 from hobble.motion.spine import SHORT, spine_shares
@@ -37,7 +37,7 @@ def frames_from_motion(sample: BodySample, trunk: BodySample, zero: Array | None
     for side, sign in (("left", 1.0), ("right", -1.0)):
         _add_arm(sample, frames, side, sign)
         _add_leg(sample, frames, side)
-    return frames | flat_feet(sample)
+    return frames | frames_of_feet(sample)
 
 
 def find_bends(sample: BodySample) -> dict[int, Bend]:

@@ -15,7 +15,7 @@ from hobble.core import quat
 from hobble.core.quat import Array
 from hobble.motion.body import SIDES
 from hobble.motion.body_sample import LEFT, BodySample
-from hobble.motion.flat_feet import RAISED, feet_tilt, flat_frames, runs, upright_while_flat
+from hobble.motion.flat_feet import RAISED, feet_tilt, flat_moments, runs, upright_while_flat
 from hobble.motion.orient import (
     degrees_between,
     degrees_between_rotations,
@@ -112,7 +112,7 @@ def zero_doubt(sample: BodySample, zero: dict[int, Array]) -> str | None:
             # foot is steeper than flat by RAISED.
             differences.append(tilt - (RAISED if runs(sample) else 0.0) - np.arctan2(-y, np.hypot(x, z)))
             lengths.append(sample.length(heel, toe))
-            heights.append(sample.at[flat_frames(sample, side), toe, 1])
+            heights.append(sample.at[flat_moments(sample, side), toe, 1])
     if not differences or np.ptp(np.percentile(np.concatenate(heights), [5, 95])) > UNEVEN:
         return None
     if abs(np.mean(differences)) < UNLIKE_ZERO:

@@ -20,7 +20,7 @@ from hobble.core.clip import Clip
 from hobble.core.clip_files import find_clips, only_file, unused_file_notes
 from hobble.core.errors import HobbleError, InputError
 from hobble.core.quat import Array
-from hobble.motion.check_retarget import worst
+from hobble.motion.check_retarget import most_different
 from hobble.motion.duplicates import ClipDigest, digest, same_pairs
 from hobble.motion.make import make_clip
 from hobble.motion.options import ClipMotion
@@ -136,7 +136,7 @@ def summary_of_report(report: Mapping[str, Any]) -> ClipSummary:
         rig=report["rig"],
         fps=report["source_fps"],
         seconds=report["seconds"],
-        largest_difference=worst(report["retarget"]) if report.get("retarget") else None,
+        largest_difference=most_different(report["retarget"]) if report.get("retarget") else None,
         warnings=(*report.get("unsure", []), *_repair_warning(report)),
     )
 

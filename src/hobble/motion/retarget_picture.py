@@ -14,7 +14,7 @@ from hobble.core.clip import Clip
 from hobble.core.errors import InputError
 from hobble.core.quat import Array
 from hobble.motion.body import SIDES, TRUNK
-from hobble.motion.check_retarget import ANGLES, BONES, worst
+from hobble.motion.check_retarget import ANGLES, BONES, most_different
 from hobble.motion.file_motion import load_source
 from hobble.motion.make import fit_skeleton, resample
 from hobble.motion.options import ClipMotion
@@ -46,7 +46,7 @@ def picture_of_file(bvh: Path, skeleton: Path, maps: Path, options: ClipMotion) 
     fitted = fit_skeleton(before, source, target.skeleton, options.proportions)
     if fitted.difference is None:
         raise InputError(bvh, f"already has the bones of {target.skeleton.name}, so nothing is compared")
-    return retarget_picture(before, fitted.clip, *worst(fitted.difference))
+    return retarget_picture(before, fitted.clip, *most_different(fitted.difference))
 
 
 def retarget_picture(source: Clip, result: Clip, part: str, degrees: float) -> str:

@@ -20,7 +20,7 @@ from hobble.core.skeleton import Skeleton, rest_positions
 from hobble.motion.added_joints import with_balls, with_split_joints
 from hobble.motion.body import Body, body_by_roles
 from hobble.motion.body_sample import LEFT, BodySample
-from hobble.motion.flat_feet import doubt, height_error
+from hobble.motion.flat_feet import height_error, note_on_feet
 from hobble.motion.from_motion import find_bends, frames_from_motion, trunk_frames
 from hobble.motion.from_rest import TRUSTED, frames_from_rest, use_zero_pose, zero_doubt
 from hobble.motion.no_neck import lean_doubt
@@ -90,7 +90,7 @@ def upright(clip: Clip, body: Body, target: Skeleton, others: Collection[int] = 
         use_zero_pose(axes, zero, sample)
         unsure.append(zero_doubt(sample, zero))
     source = "its zero pose" if problem is None else f"its motion, because in its zero pose {problem}"
-    unsure.append(doubt(sample, problem is None))
+    unsure.append(note_on_feet(sample, problem is None))
     kept = _kept(clip, sample, others, axes)
     clip, body = with_balls(clip, body, axes)
     roles = body.roles(clip.skeleton.joints)

@@ -8,8 +8,7 @@ from typing import Any
 import numpy as np
 
 from hobble.channels.shown import shown_names
-from hobble.motion.check_retarget import MOST as MOST_DIFFERENCE
-from hobble.motion.check_retarget import worst
+from hobble.motion.check_retarget import MOST_DIFFERENCE, most_different
 from hobble.report.charts import Chart, Trace, axis
 from hobble.report.formats import size
 from hobble.report.gather import ReportMaterial
@@ -97,7 +96,7 @@ def retarget_chart(material: ReportMaterial) -> Chart | None:
     for report in material.motion:
         clip, differences = report["clip"], report.get("retarget")
         if differences and not (clip.endswith("_mirror") and clip.removesuffix("_mirror") in names):
-            bars.append((*worst(differences), clip))
+            bars.append((*most_different(differences), clip))
     if not bars:
         return None
     bars.sort(key=lambda bar: -bar[1])
