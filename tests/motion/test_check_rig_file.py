@@ -115,6 +115,20 @@ def test_hips_far_above_the_legs_are_refused(root, tmp_path):
         load_skeleton(tmp_path / "mine.yaml")
 
 
+def test_hips_far_up_the_spine_are_refused(root, tmp_path):
+    """The legs then hang from a joint above the hips in the tree. Its own offset does not matter."""
+    text = (root / "config/skeletons/holden31.yaml").read_text()
+    near = without("spine")(role("hips", "Spine")(text))
+    (tmp_path / "near.yaml").write_text(near)
+    load_skeleton(tmp_path / "near.yaml")
+    far = near.replace(
+        "Spine: {parent: LowerBack, offset: [0, 11.5, -1]}", "Spine: {parent: LowerBack, offset: [0, 30, -1]}"
+    )
+    (tmp_path / "mine.yaml").write_text(far)
+    with pytest.raises(InputError, match="hips is Spine, but the legs hang from Hips"):
+        load_skeleton(tmp_path / "mine.yaml")
+
+
 @pytest.mark.shared
 @pytest.mark.parametrize(
     ("parts", "refused"),

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -117,3 +118,20 @@ def test_a_disk_that_fills_up_leaves_the_old_file(
         write(path, data, 2)
     assert path.read_bytes() == before
     assert list(tmp_path.iterdir()) == [path]
+
+
+def test_if_no_row_stands_a_character_starts_from_the_stillest(small_database: Path) -> None:
+    """The gait "stand" can be common in the mean without a row that stands for certain."""
+    data = Database.open(small_database, 64)
+    stand = data.layout.x_gait.start + GAITS.index("stand") * data.layout.samples + data.layout.samples // 2
+    mean, std = data.statistics.x_mean.copy(), data.statistics.x_std.copy()
+    mean[stand], std[stand] = 0.3, 0.0  # each row stands to 30 %
+    s = replace(data.statistics, x_mean=mean, x_std=std)
+    seen = TrainingFacts.of(data.layout, data.each_row("train"), s)
+    (block,) = data.blocks("train", 0, 0, 1, 0, data.samples("train"))
+    x, y = block.x * s.x_std + s.x_mean, block.y * s.y_std + s.y_mean
+    moved = np.square(x[:, data.layout.x_position]).sum(axis=1)
+    moved += np.square(y[:, data.layout.y_joint_velocity]).sum(axis=1)
+    start = np.square(seen.start_x[data.layout.x_position]).sum()
+    start += np.square(seen.start_y[data.layout.y_joint_velocity]).sum()
+    assert start == pytest.approx(moved.min(), rel=1e-3)

@@ -24,6 +24,7 @@ ARRAYS = {
     "start_x": "start_x",
     "start_y": "start_y",
 }
+MOVES = 1e9  # added to a squared distance; larger than the squared distance of any row
 STANDING_GAIT = 0.99  # a row with at least this share of the gait "stand" counts as standing
 # If the mean of the gait "stand" over all rows is higher than this, a character starts from a standing row.
 # Otherwise it starts from the row nearest to the mean of all rows.
@@ -86,8 +87,10 @@ class TrainingFacts:
             fastest = max(fastest, float(speed.max()))
             # `distance`: how far each row is from the ideal start row.
             if often_stands:  # ideal: no movement, neither of the root along its path nor of any joint
-                distance = np.square(x[:, layout.x_position]).sum(axis=1) + np.square(speed).sum(axis=1)
-                distance = np.where(x[:, stand] >= STANDING_GAIT, distance, np.inf)
+                along_path = np.square(x[:, layout.x_position]).sum(axis=1, dtype=float)
+                distance = along_path + np.square(speed).sum(axis=1, dtype=float)
+                # A row that does not stand is taken only if no row stands.
+                distance = np.where(x[:, stand] >= STANDING_GAIT, distance, distance + MOVES)
             else:  # ideal: the mean of all rows
                 mean, std = statistics.x_mean[body], statistics.x_std[body]
                 distance = np.square((x[:, body] - mean) / std).mean(axis=1)

@@ -176,8 +176,10 @@ def _check_hubs(file: RigFile, roles: Mapping[str, str], parents: Mapping[str, i
     if "chest" in roles and arms_hub not in chest_and_neck:
         file.refuse(f"chest is {roles['chest']}, but the arms hang from {names[arms_hub]}", "roles", "chest")
     offsets = {name: np.array(joint["offset"], float) for name, joint in file.data["joints"].items()}
-    after_hips = path(tree, names.index(roles["hips"]), legs_hub)[1:]
-    distance = sum(float(np.linalg.norm(offsets[names[j]])) for j in after_hips)
+    from_hips = path(tree, names.index(roles["hips"]), legs_hub)
+    # A bone's length is the offset of its lower joint, which may be either end, because the path may go up.
+    lower = [a if tree[a] == b else b for a, b in pairwise(from_hips)]
+    distance = sum(float(np.linalg.norm(offsets[names[j]])) for j in lower)
     leg_length = sum(float(np.linalg.norm(offsets[roles[f"left_{part}"]])) for part in ("knee", "heel"))
     if distance > APART * leg_length:
         file.refuse(f"hips is {roles['hips']}, but the legs hang from {names[legs_hub]}", "roles", "hips")

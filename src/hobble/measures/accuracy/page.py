@@ -314,7 +314,9 @@ def _generalisation(found: Json) -> Iterator[Hint]:
             "clips under held_out in the data set.",
         )
         return
-    ratio = held_out["mean"] / train["mean"] if train.get("mean") else float("nan")
+    if not train.get("mean"):
+        return
+    ratio = held_out["mean"] / train["mean"]
     if ratio > 1.5:
         yield Hint(
             "warn",
