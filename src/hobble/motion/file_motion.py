@@ -33,7 +33,7 @@ from hobble.motion.rig import (
     unit_of,
 )
 from hobble.motion.standing import why_not_standing
-from hobble.motion.upright_rest import upright
+from hobble.motion.upright_rest import with_upright_rest
 
 STILL = 0.1  # cm: a joint that stays this close to its offset counts as fixed to its parent
 FOUND = "found"  # in reports: the name of a rig that has no skeleton file
@@ -149,7 +149,7 @@ def _on_unknown_rig(
     # A rig with the target's own joint names is matched with the target by names, and any other by parts.
     named = known.sources if known is not None and known.rig == target.skeleton.name else {}
     named_joints = [rig.index(joint) for joint in named.values()]
-    standing_clip = upright(straight.clip, body, target.skeleton, named_joints)
+    standing_clip = with_upright_rest(straight.clip, body, target.skeleton, named_joints)
     check_height(file.path, standing_clip.height_error, standing_clip.notes, options.accept_doubt)
     match = RigMatch(
         known.rig if known else FOUND,
