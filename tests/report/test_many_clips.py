@@ -67,7 +67,7 @@ def test_seconds_are_estimated_from_a_random_choice_of_clips(
     some = shown_clips.sampled(paths, most=10)
     assert len(some) == 10
     assert some != paths[:10]
-    every, few = coverage.seconds_of_data(paths, {}), coverage.seconds_of_data(some, {}, of=30)
+    every, few = coverage.seconds_of_data(paths, {}), coverage.seconds_of_data(some, {}, all_clips=30)
     np.testing.assert_allclose(few["both"], every["both"])
     np.testing.assert_allclose(few["turns"]["train"], every["turns"]["train"])
     assert every["estimate"] == ""
@@ -84,7 +84,7 @@ def test_seconds_are_estimated_from_random_excerpts_of_clips(
         examples.rows(path, holden31)
     every = coverage.seconds_of_data(paths, {})
     monkeypatch.setattr(coverage, "MOST_EXCERPTS", 3)
-    few = coverage.seconds_of_data(paths, {}, of=8)
+    few = coverage.seconds_of_data(paths, {}, all_clips=8)
     np.testing.assert_allclose(few["both"], 2 * every["both"])
     assert few["estimate"] == " Estimated from 4 of 8 clips and 75 % of their frames."
 
@@ -95,7 +95,7 @@ def test_many_remarks_are_grouped_by_kind(material: ReportMaterial, monkeypatch:
     motion = [{**material.motion[0], "clip": f"c{i}", "repairs": [s]} for i, s in enumerate(sentences)]
     table = data_section.remarks_table(replace(material, motion=motion, labels=[], channels=[]))
     assert table is not None
-    assert table.title == "4 messages on repairs and warnings, by kind"
+    assert table.title == "4 messages on repairs, doubts and warnings, by kind"
     assert table.rows == [
         [3, "motion", "c0", "frames 1-3 held"],
         [1, "motion", "c3", "no foot down for 2.5 s"],

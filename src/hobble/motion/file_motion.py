@@ -38,7 +38,7 @@ from hobble.motion.rig import (
     unit_of,
 )
 from hobble.motion.standing import why_not_standing
-from hobble.motion.upright_rest import upright
+from hobble.motion.upright_rest import with_upright_rest
 
 STILL = 0.1  # cm: a joint that stays this close to its offset counts as fixed to its parent
 FOUND = "found"  # stands in reports instead of the rig's name if the rig is no known skeleton
@@ -165,7 +165,7 @@ def _load_unknown_rig(
     # the parts of the body.
     named = known.sources if known is not None and known.rig == target.skeleton.name else {}
     named_joints = [rig.index(joint) for joint in named.values()]
-    standing_clip = upright(straight.clip, body, target.skeleton, named_joints)
+    standing_clip = with_upright_rest(straight.clip, body, target.skeleton, named_joints)
     check_height(file.path, standing_clip.height_error, standing_clip.notes, options.accept_doubt)
     match = RigMatch(
         known.rig if known else FOUND,

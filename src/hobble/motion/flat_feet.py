@@ -195,7 +195,7 @@ def height_error(sample: BodySample, zero: bool) -> float:
     return float(2 * np.mean([sample.length(*bone) for bone in feet]) * feet_tilt(sample).error)
 
 
-def note_on_feet(sample: BodySample, zero: bool) -> str | None:
+def feet_doubt(sample: BodySample, zero: bool) -> str | None:
     """A sentence on what is uncertain about how the feet stand, or None.
 
     zero: whether a person could stand in the zero pose. If so, the pose shows how the feet are turned.

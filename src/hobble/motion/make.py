@@ -28,7 +28,7 @@ from hobble.motion.retarget import plan, retarget_clip
 from hobble.motion.rig import load_skeleton
 from hobble.motion.root import facing
 from hobble.motion.tilt import check_tilt
-from hobble.motion.upright_rest import upright
+from hobble.motion.upright_rest import with_upright_rest
 
 SAME = 1e-3  # cm: offsets that differ from the target skeleton's by no more than this count as equal
 
@@ -173,7 +173,7 @@ def fit_skeleton(clip: Clip, source: FileMotion, target: Skeleton, proportions: 
     sources, unsure = match.sources, source.unsure
     if not source.straightened:
         followed_joints = {clip.skeleton.index(name) for name in sources.values()}
-        standing = upright(clip, body_by_roles(clip.skeleton), target, followed_joints)
+        standing = with_upright_rest(clip, body_by_roles(clip.skeleton), target, followed_joints)
         clip, unsure = standing.clip, unsure + standing.notes
         sources = {joint: followed for joint, followed in sources.items() if followed in clip.skeleton.joints}
     retargeting = plan(clip.skeleton, target, sources)

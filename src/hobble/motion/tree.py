@@ -1,4 +1,4 @@
-"""Paths between joints in the tree of a rig. Argument `parents`: each joint's parent, -1 for the root."""
+"""Paths between joints in the tree of a rig. `parents`: the index of each joint's parent, or -1."""
 
 from __future__ import annotations
 
@@ -6,21 +6,21 @@ from collections.abc import Iterable, Sequence
 
 
 def above(parents: Sequence[int], joint: int) -> list[int]:
-    """The joint and all joints above it, the root last."""
-    out = [joint]
-    while parents[out[-1]] >= 0:
-        out.append(parents[out[-1]])
-    return out
+    """The joint and all its ancestors, the root last."""
+    chain = [joint]
+    while parents[chain[-1]] >= 0:
+        chain.append(parents[chain[-1]])
+    return chain
 
 
 def common(parents: Sequence[int], joints: Iterable[int]) -> int:
-    """The nearest joint that is above all `joints`; it may be one of them."""
+    """The lowest common ancestor of `joints`. A joint counts as its own ancestor here."""
     first, *others = (above(parents, j) for j in joints)
     return next(j for j in first if all(j in other for other in others))
 
 
 def path(parents: Sequence[int], start: int, end: int) -> list[int]:
-    """The joints from `start` to `end`, both included: up to their common joint, then down."""
+    """The joints from `start` to `end`, both included: up to their lowest common ancestor, then down."""
     meet = common(parents, (start, end))
     up = above(parents, start)
     down = above(parents, end)

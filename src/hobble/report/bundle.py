@@ -1,4 +1,4 @@
-"""Bundles the page's scripts and their npm packages into one script, with Node."""
+"""Uses Node to bundle the scripts of the report page and their npm packages into one script."""
 
 from __future__ import annotations
 
@@ -18,26 +18,27 @@ from hobble.models import MODELS
 
 WEB = Path(__file__).parent / "web"
 MODELS_FOLDER = Path(__file__).parents[1] / "models"
-PACKAGES = ("package.json", "package-lock.json")
+PACKAGE_FILES = ("package.json", "package-lock.json")  # they name the npm packages and their hashes
 
 
 def install(folder: str | Path) -> None:
-    """Install the npm packages of the lock file into folder/node_modules and check their hashes.
+    """Install the npm packages of package-lock.json into folder/node_modules and check their hashes.
 
-    Node and npm come from the Python environment. npm has a cache, so a machine needs the internet only once.
-    Raises HobbleError if the registry cannot be reached.
+    Node and npm come from the Python environment. npm keeps downloads in a cache, so a machine needs the
+    internet only once. Raises HobbleError if npm fails, which usually means that its registry cannot be
+    reached.
     """
     folder = Path(folder)
     folder.mkdir(parents=True, exist_ok=True)
-    for name in PACKAGES:
+    for name in PACKAGE_FILES:
         shutil.copyfile(WEB / name, folder / name)
     arguments = ["ci", "--ignore-scripts", "--no-audit", "--no-fund", "--prefer-offline", "--loglevel=error"]
     arguments += ["--fetch-retries=2", "--fetch-retry-mintimeout=1000", "--fetch-retry-maxtimeout=4000"]
-    done = npm(arguments, return_completed_process=True, cwd=folder, capture_output=True, text=True)
-    if done.returncode:
+    process = npm(arguments, return_completed_process=True, cwd=folder, capture_output=True, text=True)
+    if process.returncode:
         raise HobbleError(
             "could not download the report page's packages from the npm registry. Run again with an internet "
-            f"connection; later runs do not need it. npm says: {_output(done)[-600:]}"
+            f"connection; later runs do not need it. npm says: {_one_line_output(process)[-600:]}"
         )
 
 
@@ -45,7 +46,7 @@ def bundle(modules: str | Path, target: str | Path, sources: str | Path = WEB) -
     """Bundle sources/index.js and everything it imports into one script.
 
     modules: the folder node_modules that `install` fills. target: the file to write. Needs no internet. The
-    same input gives the same bytes. Raises HobbleError with file and line if a script has an error.
+    same input gives the same bytes. Raises HobbleError if a script has an error, and says in which line.
     """
     with tempfile.TemporaryDirectory() as folder:
         networks = Path(folder, "networks.js")
@@ -54,9 +55,9 @@ def bundle(modules: str | Path, target: str | Path, sources: str | Path = WEB) -
 
 
 def bundle_module(modules: str | Path, target: str | Path) -> None:
-    """Bundle only the code of the character, as an ES module without imports.
+    """Bundle only the code that moves the character, as an ES module without imports.
 
-    Arguments and errors are those of `bundle`.
+    modules, target, and the error that is raised: as for `bundle`.
     """
     with tempfile.TemporaryDirectory() as folder:
         networks = Path(folder, "networks.js")
@@ -65,7 +66,10 @@ def bundle_module(modules: str | Path, target: str | Path) -> None:
 
 
 def networks_module() -> str:
-    """Source of the page's module "networks": for each kind of network, `createNetwork` of its network.js."""
+    """JavaScript source of the page's module "networks".
+
+    The module exports `networks`: kind of network -> the function `createNetwork` of its network.js.
+    """
     imports = [
         f"import {{ createNetwork as {kind} }} from {json.dumps(str(MODELS_FOLDER / kind / 'network.js'))};"
         for kind in MODELS
@@ -74,8 +78,12 @@ def networks_module() -> str:
 
 
 def _bundle(modules: Path, target: str | Path, entry: Path, networks: Path, form: str) -> None:
-    """Bundle `entry`. networks: file with the source of the module "networks". form: esbuild's format."""
-    done = node(
+    """Bundle the script `entry` and all that it imports into the file `target`.
+
+    networks: file with the source of the module "networks". form: esbuild's output format, "iife" (a script
+    that runs by itself) or "esm" (a module).
+    """
+    process = node(
         [
             str(modules / "esbuild" / "bin" / "esbuild"),
             str(entry.resolve()),
@@ -95,11 +103,11 @@ def _bundle(modules: Path, target: str | Path, entry: Path, networks: Path, form
         encoding="utf-8",
         env={**os.environ, "NODE_PATH": str(modules)},
     )
-    if done.returncode:
-        raise HobbleError(f"the page's scripts could not be bundled: {_output(done)[:300]}")
-    write_text(target, str(done.stdout))
+    if process.returncode:
+        raise HobbleError(f"the page's scripts could not be bundled: {_one_line_output(process)[:300]}")
+    write_text(target, str(process.stdout))
 
 
-def _output(done: CompletedProcess[Any]) -> str:
-    """The output of a program, on one line."""
-    return " ".join(str(done.stderr or done.stdout).split())
+def _one_line_output(process: CompletedProcess[Any]) -> str:
+    """What a program wrote to stderr, or else to stdout, on one line."""
+    return " ".join(str(process.stderr or process.stdout).split())

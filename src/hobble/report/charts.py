@@ -1,4 +1,7 @@
-"""Charts as plotly specifications. Colours are names of CSS colours of the page, such as "@accent"."""
+"""Charts as plotly specifications.
+
+A colour such as "@accent" stands for the CSS variable --accent of the page.
+"""
 
 from __future__ import annotations
 
@@ -14,9 +17,10 @@ Trace = dict[str, Any]
 class Chart:
     """A chart, with a caption that says how to read it.
 
-    name: its id in the page. traces, layout: as plotly takes them. height: pixels. A chart that shows one of
-    several options has no `traces`, but `options`: option -> its traces; a menu with the label `choose`
-    selects the option. option_layouts: option -> changes of the layout.
+    name: the chart's id in the page. traces, layout: as plotly takes them. height: pixels.
+
+    A chart with a menu has `options` instead of `traces`: text in the menu -> the traces to show. choose:
+    the menu's label. option_layouts: text in the menu -> changes of the layout.
     """
 
     name: str
@@ -30,7 +34,7 @@ class Chart:
     option_layouts: Mapping[str, Mapping[str, Any]] = field(repr=False, default_factory=dict)
 
     def spec(self) -> dict[str, Any]:
-        """The chart's data for the page's script."""
+        """What the page's script needs to draw the chart: its id, traces, layout and menu."""
         traces = list(self.traces) or list(next(iter(self.options.values()), ()))
         return {
             "name": self.name,
@@ -47,7 +51,8 @@ class Chart:
 class ChartGroup:
     """Small charts that share a title and a caption.
 
-    name: its id in the page. choose: label of a menu that selects the option of all charts; "" for no menu.
+    name: the group's id in the page. choose: label of a menu that selects one of the `options` of all charts;
+    "" for no menu.
     """
 
     name: str
@@ -58,9 +63,9 @@ class ChartGroup:
 
 
 def _escaped(value: Any) -> Any:
-    """`value` with "<" and "&" of every text escaped, because plotly reads texts as HTML.
+    """`value` with "<" and "&" escaped in every text, because plotly reads texts as HTML.
 
-    Hover templates are left alone: they come from the code and only refer to data.
+    Hover templates are not escaped. They are written in the code, and only refer to data.
     """
     if isinstance(value, Mapping):
         return {k: v if k == "hovertemplate" else _escaped(v) for k, v in value.items()}
@@ -88,21 +93,25 @@ def log_axis(title: str, values: Iterable[float | None]) -> dict[str, Any]:
 
 
 def line(name: str, x: Sequence, y: Sequence, colour: str, **more: Any) -> Trace:
-    """The trace of a line. more: `dash` and `width` of the stroke; anything else is set in the trace."""
+    """The trace of a line through the points x, y.
+
+    more: `dash` and `width` of the line; further settings are set in the trace.
+    """
     stroke = {"color": colour, "width": more.pop("width", 2), "dash": more.pop("dash", "solid")}
     mode = more.pop("mode", "lines")
     return {"type": "scatter", "mode": mode, "name": name, "x": list(x), "y": list(y), "line": stroke, **more}
 
 
 def mark(value: float, text: str, vertical: bool = True, colour: str = "@soft") -> tuple[dict, dict]:
-    """A dotted line across the plot at `value`, with a text at its end: plotly's shape and annotation.
+    """A dotted line across the whole plot at `value`, with a text at its end.
 
-    vertical: `value` is on the x axis, else on the y axis.
+    vertical: whether the line is vertical. `value` is on the x axis for a vertical line, otherwise on the y
+    axis. Returns the line as a plotly shape and the text as a plotly annotation.
     """
-    across = {"type": "line", "line": {"color": colour, "width": 1, "dash": "dot"}}
+    dotted = {"type": "line", "line": {"color": colour, "width": 1, "dash": "dot"}}
     note = {"text": text, "showarrow": False, "font": {"size": 11, "color": colour}}
     if vertical:
-        shape = {**across, "x0": value, "x1": value, "yref": "paper", "y0": 0, "y1": 1}
+        shape = {**dotted, "x0": value, "x1": value, "yref": "paper", "y0": 0, "y1": 1}
         return shape, {**note, "x": value, "yref": "paper", "y": 1, "yanchor": "bottom"}
-    shape = {**across, "y0": value, "y1": value, "xref": "paper", "x0": 0, "x1": 1}
+    shape = {**dotted, "y0": value, "y1": value, "xref": "paper", "x0": 0, "x1": 1}
     return shape, {**note, "y": value, "xref": "paper", "x": 1, "xanchor": "right", "yanchor": "bottom"}

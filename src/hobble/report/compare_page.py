@@ -6,9 +6,7 @@ from collections.abc import Mapping
 from typing import Any
 
 from hobble.figure.pack import packed_body
-from hobble.report import compare_sections as parts
-from hobble.report import compare_tables as tables
-from hobble.report import comparison_charts, measure_sections
+from hobble.report import compare_sections, compare_tables, comparison_charts, measure_sections
 from hobble.report.formats import embedded
 from hobble.report.hero import body_channel
 from hobble.report.playable import skeleton_of
@@ -17,7 +15,7 @@ from hobble.report.rounded_weights import has_weights, rounded
 from hobble.report.templates import FOLDER, specs, style, template, trusted
 
 LARGEST_PAGE = 19_850_000  # bytes; the page must stay under 20 MB
-RESERVED = 60_000  # bytes that are kept free for the page's text, style and tables
+RESERVED = 60_000  # bytes of LARGEST_PAGE that are kept free for the page's text, style and tables
 NAME = "compare"  # the page's name
 
 
@@ -29,44 +27,46 @@ def render_compared(
 ) -> str:
     """The comparison as one HTML document.
 
-    compared: the content of compare.json. playables: configuration -> data of its character, from `playable`
-    in `hobble.report.playable`. If these characters do not all fit into the page, their weights are rounded
-    to 8 bits. Characters that still do not fit are left out. bundle: the page's scripts in one. errors:
-    configuration -> mean distance in cm by which rounding the weights moves a predicted joint.
+    compared: the content of compare.json. playables: configuration -> data of a character that its network
+    moves in the page, from `playable` in `hobble.report.playable`. If these characters do not all fit into
+    the page, the weights of all of them are rounded to 8 bits. Characters that still do not fit are left out.
+    bundle: all scripts of the page as one script. errors: configuration -> mean distance in cm by which
+    rounding the weights moves a predicted joint.
     """
     errors = errors or {}
     sections: dict[str, dict[str, Any]] = {
         "overview": {
             "verdicts": measure_sections.compared_verdicts(compared),
-            "table": tables.configuration_table(compared),
-            "published": tables.published_table(compared),
+            "table": compare_tables.configuration_table(compared),
+            "published": compare_tables.published_table(compared),
         },
-        "training": {"curves": parts.training_curves(compared)},
-        "stages": {"charts": parts.stage_dots(compared)},
+        "training": {"curves": compare_sections.training_curves(compared)},
+        "stages": {"charts": compare_sections.stage_charts(compared)},
     }
-    shown, names = measure_sections.compared_sections(compared), comparison_charts.names(compared)
-    charts = specs([sections, shown])
+    measured, names = measure_sections.compared_sections(compared), comparison_charts.names(compared)
+    charts = specs([sections, measured])
+    # Configurations with the same skeleton share a body. Its key is in the entry `body` of a character.
     bodies = {spec["body"]: packed_body(skeleton_of(spec)) for spec in (playables or {}).values()}
     used = len(bundle.encode()) + len(embedded(charts).encode()) + len(embedded(bodies).encode())
-    kept, left_out = fitting(playables or {}, LARGEST_PAGE - RESERVED - used)
+    on_page, left_out = select_fitting(playables or {}, LARGEST_PAGE - RESERVED - used)
     rounded_names: list[str] = []
     if left_out:
         rounded_names = [name for name, spec in (playables or {}).items() if has_weights(spec)]
         smaller = {name: rounded(spec) for name, spec in (playables or {}).items()}
-        kept, left_out = fitting(smaller, LARGEST_PAGE - RESERVED - used)
-    bodies = {spec["body"]: bodies[spec["body"]] for spec in kept.values()}
-    data = {"name": NAME, "charts": charts, "playable": kept, "bodies": bodies}
+        on_page, left_out = select_fitting(smaller, LARGEST_PAGE - RESERVED - used)
+    bodies = {spec["body"]: bodies[spec["body"]] for spec in on_page.values()}
+    data = {"name": NAME, "charts": charts, "playable": on_page, "bodies": bodies}
     return template("compare.html.j2").render(
         name=NAME,
-        measured=shown,
+        measured=measured,
         title=" and ".join(names) if len(names) < 3 else f"{len(names)} configurations",
         eyebrow="Hobble report · comparison of configurations",
         lead="The same measurements of " + ", ".join(names) + ", compared with published results.",
         embedded={name: embedded(part) for name, part in data.items()},
-        playable=list(kept),
+        playable=list(on_page),
         left_out=left_out,
-        rounding=[(name, errors[name]) for name in rounded_names if name in kept and name in errors],
-        hurts=any(body_channel(spec) for spec in kept.values()),
+        rounding=[(name, errors[name]) for name in rounded_names if name in on_page and name in errors],
+        hurts=any(body_channel(spec) for spec in on_page.values()),
         style=style(),
         bundle=trusted("the bundle", bundle),
         provenance={"commit": commit(FOLDER), "machine": machine(), "versions": versions()},
@@ -74,14 +74,14 @@ def render_compared(
     )
 
 
-def fitting(
+def select_fitting(
     playables: Mapping[str, Mapping[str, Any]], largest: int
 ) -> tuple[dict[str, Mapping[str, Any]], list[str]]:
-    """The characters that fit into `largest` bytes together, in order, and the names of the others.
+    """The characters that fit into `largest` bytes together, and the names of those that are left out.
 
-    If one does not fit, a smaller one after it still may.
+    Characters are taken in order. After one that does not fit, a smaller one may still fit.
 
-    >>> fitting({"a": {"x": 1}, "b": {"x": "long" * 9}, "c": {"x": 2}}, 20)
+    >>> select_fitting({"a": {"x": 1}, "b": {"x": "long" * 9}, "c": {"x": 2}}, 20)
     ({'a': {'x': 1}, 'c': {'x': 2}}, ['b'])
     """
     kept: dict[str, Mapping[str, Any]] = {}

@@ -1,4 +1,4 @@
-"""Charts that compare configurations: training, and time and size of the stages."""
+"""Charts that compare configurations: their error in training, and the time and size of pipeline stages."""
 
 from __future__ import annotations
 
@@ -10,19 +10,19 @@ from hobble.report.comparison_charts import Compared, colours, dots
 from hobble.report.cost_section import log_range
 from hobble.report.formats import duration, size
 
-# Key of a configuration's training history -> title of the horizontal axis.
+# Column of a configuration's training history -> title of the horizontal axis.
 X_AXES = {"pass": "passes", "seconds": "seconds of training", "samples": "samples seen"}
 
 
 def training_curves(compared: Compared) -> Chart | None:
-    """Training and held-out error of all configurations, by passes, seconds or samples."""
+    """Training and held-out error of all configurations. A menu selects the horizontal axis, see X_AXES."""
     options: dict[str, list[Trace]] = {}
     values: list[float | None] = []
     for key, label in X_AXES.items():
         traces = []
         for entry in compared["training"]:
             name = entry["configuration"]
-            x = _passes(entry) if key == "pass" else entry.get(key, [])
+            x = _passes_done(entry) if key == "pass" else entry.get(key, [])
             colour = colours(compared)[name]
             held_out = entry.get("held_out_mse", [])
             if any(v is not None for v in held_out):
@@ -39,7 +39,7 @@ def training_curves(compared: Compared) -> Chart | None:
         "compare-training",
         "Error during training",
         "Mean squared error of the standardised output. Solid lines: held-out clips. Dotted lines: training "
-        "clips, with dropout.",
+        "clips, measured with dropout.",
         layout={"yaxis": log_axis("mean squared error", values)},
         height=420,
         choose="Horizontal axis",
@@ -48,11 +48,12 @@ def training_curves(compared: Compared) -> Chart | None:
     )
 
 
-def stage_dots(compared: Compared) -> list[Chart]:
-    """Time and size of each stage."""
+def stage_charts(compared: Compared) -> list[Chart]:
+    """Two charts: the time and the size on disk of each stage of the pipeline."""
+    # Plotly draws the first category at the bottom, so the order is reversed.
     order = list(dict.fromkeys(stage["stage"] for stage in compared["stages"]))[::-1]
     charts = []
-    for key, title, label, show in (
+    for key, title, label, as_text in (
         ("seconds", "Time of each stage", "seconds, sum over all jobs", duration),
         ("bytes", "Size of each stage", "bytes on disk", size),
     ):
@@ -61,7 +62,7 @@ def stage_dots(compared: Compared) -> list[Chart]:
         for name, colour in colours(compared).items():
             rows = [s for s in compared["stages"] if s["configuration"] == name and s.get(key)]
             trace = dots(name, [s[key] for s in rows], [s["stage"] for s in rows], colour, "%{y}: %{text}")
-            traces.append(trace | {"text": [show(s[key]) for s in rows]})
+            traces.append(trace | {"text": [as_text(s[key]) for s in rows]})
         layout = {
             "xaxis": axis(label, type="log", tickformat="~s", dtick=1, range=log_range(values)),
             "yaxis": {"automargin": True, "categoryorder": "array", "categoryarray": order},
@@ -71,8 +72,11 @@ def stage_dots(compared: Compared) -> list[Chart]:
     return charts
 
 
-def _passes(entry: Mapping[str, Any]) -> list[float]:
-    """How many passes were done at the end of each section of training. A section is a part of a pass."""
+def _passes_done(entry: Mapping[str, Any]) -> list[float]:
+    """How many passes were done at the end of each section of training. A section is a part of a pass.
+
+    entry: an entry of `training` in compare.json.
+    """
     sections = [s for s in entry.get("section", ()) if s is not None]
     per_pass = max(sections, default=1)
     passes = zip(entry.get("pass", ()), entry.get("section", ()), strict=True)

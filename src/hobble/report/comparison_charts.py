@@ -8,13 +8,14 @@ from typing import Any
 from hobble.report.charts import Trace
 
 Compared = Mapping[str, Any]  # the content of compare.json
-# The page's CSS colours for the configurations.
+# The page's CSS colours for the configurations. After the last, they begin again.
 PALETTE = ("@accent", "@g2", "@g3", "@g4", "@g5", "@g0", "@g1", "@predicted")
+# Split -> its name in the charts.
 SPLITS = {"held_out": "held-out clips", "train": "training clips"}
 
 
 def names(compared: Compared) -> list[str]:
-    """The names of the configurations, in order."""
+    """The names of the configurations, in the order of the page."""
     return [entry["configuration"] for entry in compared["configurations"]]
 
 
@@ -24,7 +25,8 @@ def colours(compared: Compared) -> dict[str, str]:
 
 
 def dots(name: str, x: Sequence, y: Sequence, colour: str, hover: str) -> Trace:
-    """Dots of one configuration. hover: plotly template of the text that the pointer shows."""
+    """A plotly trace with a dot at each point x, y. name: the configuration. hover: template of the text that
+    appears when the pointer is on a dot."""
     return {
         "type": "scatter",
         "mode": "markers",

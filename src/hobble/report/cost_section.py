@@ -14,11 +14,12 @@ from hobble.report.tables import Column, Table
 
 def stage_charts(material: ReportMaterial) -> list[Chart]:
     """Two charts: the seconds and the bytes of each stage."""
+    # Plotly draws the first category at the bottom, so the order is reversed.
     stages = list(material.pipeline.get("stages") or ())[::-1]
     names = [stage["stage"] for stage in stages]
     charts = []
     key: Literal["seconds", "bytes"]
-    for key, title, label, show, caption in (
+    for key, title, label, as_text, caption in (
         ("seconds", "Time of each stage", "seconds, sum over all jobs", duration,
          "The sum over all jobs of a stage. Jobs run in parallel, so the run itself takes less time. The "
          "scale is logarithmic."),
@@ -31,7 +32,7 @@ def stage_charts(material: ReportMaterial) -> list[Chart]:
             "mode": "markers+text",
             "y": names,
             "x": [value or None for value in values],
-            "text": [f"  {show(value)}" for value in values],
+            "text": [f"  {as_text(value)}" for value in values],
             "textposition": "middle right",
             "textfont": {"size": 11.5, "color": "@soft"},
             "marker": {"color": "@accent", "size": 10},
@@ -48,16 +49,20 @@ def stage_charts(material: ReportMaterial) -> list[Chart]:
 
 
 def log_range(values: Sequence[float]) -> list[float]:
-    """Range of a logarithmic axis, as exponents of ten, with room for text beyond the largest value.
+    """The two ends of a logarithmic axis for `values`, as exponents of ten.
 
-    It begins with the whole decade below the smallest positive value.
+    It begins with the whole decade below the smallest positive value. Beyond the largest value there is room
+    for a text.
     """
     powers = [math.log10(value) for value in values if value > 0] or [0.0, 1.0]
     return [math.floor(min(powers)), max(powers) + 0.4 * (max(powers) - math.floor(min(powers)) + 1)]
 
 
 def stage_table(material: ReportMaterial) -> Table:
-    """A row for each stage, with published times and sizes if there are any for this configuration."""
+    """A table of times and sizes: a row for each stage.
+
+    It has columns of published times and sizes if there are any for this configuration.
+    """
     published = {
         row["stage"]: row for row in material.published["stages"] if row["configuration"] == material.name
     }

@@ -1,4 +1,4 @@
-"""How many seconds of data there are at each speed, turning speed and channel value."""
+"""Counts the seconds of data at each speed, turning speed and channel value, and draws charts of them."""
 
 from __future__ import annotations
 
@@ -17,57 +17,64 @@ from hobble.rows.clip_rows import row_count
 from hobble.rows.excerpts import Excerpt, excerpts, load_excerpt
 
 FPS = 60.0  # of the clips' rows
-SPEEDS = np.arange(0, 6.01, 0.2)  # edges of the bins, metres a second
-TURNS = np.arange(-220, 221, 20.0)  # edges of the bins, degrees a second, positive to the left
-TENTHS = np.arange(1, 11)  # middles of the bins of channel values, in tenths of the highest value
+SPEEDS = np.arange(0, 6.01, 0.2)  # edges of the bins of speeds, metres a second
+# Edges of the bins of turning speeds, degrees a second, positive to the left.
+TURNS = np.arange(-220, 221, 20.0)
+# Middles of the bins of channel values, in tenths of the channel's highest value.
+TENTHS = np.arange(1, 11)
 MOST_EXCERPTS = 600  # the frames of at most this many excerpts of clips are counted
 # Split, its name on the page, the colour of its bars.
 SPLITS = (("train", "training", "@muted"), ("held_out", "held out", "@accent"))
 
 
 def seconds_of_data(
-    paths: Sequence[str | Path], splits: Mapping[str, str], of: int | None = None
+    paths: Sequence[str | Path], splits: Mapping[str, str], all_clips: int | None = None
 ) -> dict[str, Any]:
     """Seconds of data in the files `database/clips/<clip>.npz`. A frame with several rows counts once.
 
-    splits: clip -> "train" or "held_out". of: the number of all clips, if `paths` are a random choice of
-    them; the seconds are then an estimate for all clips.
+    splits: clip -> "train" or "held_out". all_clips: if `paths` are a random choice of clips, the number of
+    clips from which they were chosen. Then the seconds are an estimate for all of these.
 
-    The result has `turns`: split -> seconds in each bin of TURNS; `both`: (turns, speeds), seconds in each
-    bin of turn and speed; `channels`: channel -> column -> seconds in each bin of TENTHS; `estimate`: a
-    sentence that says which part of the data was read, empty if all was read.
+    The result has `turns`: split -> seconds in each bin of TURNS; `both`: (bins of TURNS, bins of SPEEDS)
+    seconds at each combination; `channels`: channel -> column -> seconds in each bin of TENTHS; `estimate`: a
+    sentence that says which part of the data was read, empty if all was read. Turning speeds and speeds
+    outside the bins count in the outermost bin. Channel values below half a tenth do not count.
     """
-    chosen, share = _chosen(paths)
-    # Each frame that is read stands for this many seconds of data.
-    each = max(of or 0, len(paths)) / max(len(paths), 1) / share / FPS
+    chosen, share = _chosen_excerpts(paths)
+    # Seconds of data for which each frame that is read stands.
+    weight = max(all_clips or 0, len(paths)) / max(len(paths), 1) / share / FPS
     turns = {split: np.zeros(len(TURNS) - 1) for split, *_ in SPLITS}
     both = np.zeros((len(TURNS) - 1, len(SPEEDS) - 1))
     channels: dict[str, dict[str, Array]] = {}
     for path, excerpt in chosen:
         rows = load_excerpt(path, excerpt)
-        once = np.unique(rows.frame, return_index=True)[1]
-        y, layout = np.asarray(rows.y[once], float), rows.layout
+        first_rows = np.unique(rows.frame, return_index=True)[1]  # of each frame
+        y, layout = np.asarray(rows.y[first_rows], float), rows.layout
         speed = np.linalg.norm(y[:, layout.y_root_velocity], axis=1) * FPS / 100
-        # The column has the opposite sign: it is the turn of the world relative to the root.
+        # The column y_turn has the opposite sign: it is the turn of the world relative to the root.
         turn = np.degrees(-y[:, layout.y_turn][:, 0]) * FPS
-        speed, turn = (np.clip(v, e[0], e[-1] - 1e-6) for v, e in ((speed, SPEEDS), (turn, TURNS)))
-        turns[splits.get(rows.clip, "train")] += np.histogram(turn, TURNS)[0] * each
-        both += np.histogram2d(turn, speed, (TURNS, SPEEDS))[0] * each
+        speed = np.clip(speed, SPEEDS[0], SPEEDS[-1] - 1e-6)
+        turn = np.clip(turn, TURNS[0], TURNS[-1] - 1e-6)
+        turns[splits.get(rows.clip, "train")] += np.histogram(turn, TURNS)[0] * weight
+        both += np.histogram2d(turn, speed, (TURNS, SPEEDS))[0] * weight
         skeleton = Skeleton.from_dict(rows.skeleton)
         for name, table in rows.channels.items():
             definition, seconds = channel(name), channels.setdefault(name, {})
-            for column, values in zip(definition.columns(skeleton), table[once].T, strict=True):
+            for column, values in zip(definition.columns(skeleton), table[first_rows].T, strict=True):
                 if values.any():
                     counts = np.histogram(10 * values / definition.highest, np.arange(0.5, 11))[0]
-                    seconds[column] = seconds.get(column, 0) + counts * each
-    part = [f"{len(paths):,} of {of:,} clips"] if of and of > len(paths) else []
-    part += [f"{100 * share:.0f} % of their frames"] if share < 1 else []
-    estimate = f" Estimated from {' and '.join(part)}." if part else ""
+                    seconds[column] = seconds.get(column, 0) + counts * weight
+    read = [f"{len(paths):,} of {all_clips:,} clips"] if all_clips and all_clips > len(paths) else []
+    read += [f"{100 * share:.0f} % of their frames"] if share < 1 else []
+    estimate = f" Estimated from {' and '.join(read)}." if read else ""
     return {"turns": turns, "both": both, "channels": channels, "estimate": estimate}
 
 
-def _chosen(paths: Sequence[str | Path]) -> tuple[list[tuple[str | Path, Excerpt]], float]:
-    """The excerpts to read: all, or MOST_EXCERPTS drawn at random. Also returns their share of all rows."""
+def _chosen_excerpts(paths: Sequence[str | Path]) -> tuple[list[tuple[str | Path, Excerpt]], float]:
+    """The excerpts to read, each with the file of its clip: all, or MOST_EXCERPTS drawn at random.
+
+    Also returns their share of all rows.
+    """
     every = [(path, excerpt) for path in paths for excerpt in excerpts(Path(path).stem, row_count(path))]
     if len(every) <= MOST_EXCERPTS:
         return every, 1.0
@@ -76,7 +83,7 @@ def _chosen(paths: Sequence[str | Path]) -> tuple[list[tuple[str | Path, Excerpt
 
 
 def turn_chart(counted: Mapping[str, Any]) -> Chart | None:
-    """Seconds at each turning speed. counted: from `seconds_of_data`."""
+    """A bar for each turning speed; None without data. counted: from `seconds_of_data`."""
     traces: list[Trace] = [
         {
             "type": "bar",
@@ -101,18 +108,19 @@ def turn_chart(counted: Mapping[str, Any]) -> Chart | None:
     return Chart("turns", "Turning speed", caption + counted["estimate"], traces, layout, 300)
 
 
-def both_chart(counted: Mapping[str, Any]) -> Chart | None:
-    """Seconds at each combination of speed and turn. counted: from `seconds_of_data`."""
+def speed_turn_chart(counted: Mapping[str, Any]) -> Chart | None:
+    """A cell for each combination of speed and turn; None without data. counted: from `seconds_of_data`."""
     both = counted["both"]
     if not both.any():
         return None
-    last = int(np.flatnonzero(both.any(axis=0)).max()) + 1
+    speeds_shown = int(np.flatnonzero(both.any(axis=0)).max()) + 1
     trace = {
         "type": "heatmap",
-        "x": _middles(SPEEDS)[:last],
+        "x": _middles(SPEEDS)[:speeds_shown],
         "y": _middles(TURNS),
-        "z": [[v or None for v in row] for row in np.round(both[:, :last], 3).tolist()],
+        "z": [[v or None for v in row] for row in np.round(both[:, :speeds_shown], 3).tolist()],
         "colorscale": [[0, "@sunken"], [0.15, "@muted"], [1, "@accent"]],
+        # Not the maximum: with one very full cell, all others would look alike.
         "zmax": float(np.percentile(both[both > 0], 95)),
         "zmin": 0,
         "colorbar": {"title": {"text": "s"}, "thickness": 10, "outlinewidth": 0},
@@ -140,6 +148,7 @@ def channel_charts(counted: Mapping[str, Any], shown_name: Callable[[str], str] 
 def _channel_chart(
     name: str, seconds: Mapping[str, Array], estimate: str, shown_name: Callable[[str], str]
 ) -> Chart:
+    """The chart of the channel `name`. seconds: column -> seconds in each bin of TENTHS."""
     definition, columns = channel(name), list(seconds)[::-1]
     tenth = definition.highest / 10
     trace = {
@@ -164,4 +173,5 @@ def _channel_chart(
 
 
 def _middles(edges: Array) -> list[float]:
+    """The middle of each bin."""
     return np.round((edges[:-1] + edges[1:]) / 2, 3).tolist()

@@ -1,4 +1,4 @@
-"""The section on the data: clips, gaits, speeds, labels, repairs and sources."""
+"""Charts and tables for the section on the data: gaits, speeds, retargeting, files, repairs and labels."""
 
 from __future__ import annotations
 
@@ -16,13 +16,13 @@ from hobble.report.tables import Column, Table
 
 GAIT_COLOURS = {"stand": "@g0", "walk": "@g1", "jog": "@g2", "crouch": "@g3", "jump": "@g4", "bump": "@g5"}
 MOST_BARS = 200  # the chart of retargeted clips has at most this many bars
-MOST_REMARKS = 500  # the table of repairs and warnings has at most this many rows
+MOST_REMARKS = 500  # the table of repairs, doubts and warnings has at most this many rows
 MOST_NAMED = 30  # if the chart of retargeted clips has more bars than this, none has a name under it
 SPLIT_NAMES = {"train": "training", "held_out": "held out"}
 
 
 def gait_chart(material: ReportMaterial) -> Chart | None:
-    """Seconds of each gait, training and held-out."""
+    """Seconds of each gait, in training clips and held-out clips; None without labels."""
     traces: list[Trace] = []
     for split, colour in (("train", "@muted"), ("held_out", "@accent")):
         totals = dict.fromkeys(GAIT_COLOURS, 0.0)
@@ -51,7 +51,7 @@ def gait_chart(material: ReportMaterial) -> Chart | None:
 
 
 def speed_chart(material: ReportMaterial) -> Chart | None:
-    """Seconds at each speed over the ground, from the speeds in the label reports."""
+    """Seconds at each speed over the ground, from the speed curves of the label reports; None without any."""
     edges = np.arange(0, 6.01, 0.2)
     traces: list[Trace] = []
     for split, colour in (("train", "@muted"), ("held_out", "@accent")):
@@ -61,6 +61,7 @@ def speed_chart(material: ReportMaterial) -> Chart | None:
             speed = [v for v in curves.get("speed") or () if v is not None]
             if speed and material.split(report["clip"]) == split:
                 counts, _ = np.histogram(np.clip(speed, 0, edges[-1] - 1e-6), edges)
+                # A curve may have fewer points than frames. Each stands for an equal part of the clip.
                 seconds += counts / len(speed) * curves["seconds"][-1]
         if seconds.any():
             traces.append(
@@ -75,11 +76,11 @@ def speed_chart(material: ReportMaterial) -> Chart | None:
             )
     if not traces:
         return None
-    last = max(x for t in traces for x, y in zip(t["x"], t["y"], strict=True) if y)
+    highest_speed = max(x for t in traces for x, y in zip(t["x"], t["y"], strict=True) if y)
     layout = {
         "barmode": "stack",
         "bargap": 0.08,
-        "xaxis": axis("m/s", range=[0, last + 0.3]),
+        "xaxis": axis("m/s", range=[0, highest_speed + 0.3]),
         "yaxis": axis("seconds", rangemode="tozero"),
     }
     caption = "Seconds at each speed. Where there is little or no data, the network has to interpolate."
@@ -87,9 +88,10 @@ def speed_chart(material: ReportMaterial) -> Chart | None:
 
 
 def retarget_chart(material: ReportMaterial) -> Chart | None:
-    """A bar for each retargeted clip: the joint or limb that differs most from the clip's file, in degrees.
+    """A bar for each retargeted clip; None if no clip was retargeted.
 
-    A mirrored clip has no bar if the clip that it mirrors is there.
+    A bar is the angle, in degrees, by which the joint or limb that changed most differs from the clip's file.
+    A mirrored clip has no bar if the clip that it mirrors is in the data set.
     """
     names = {report["clip"] for report in material.motion}
     bars = []
@@ -99,7 +101,7 @@ def retarget_chart(material: ReportMaterial) -> Chart | None:
             bars.append((*most_different(differences), clip))
     if not bars:
         return None
-    bars.sort(key=lambda bar: -bar[1])
+    bars.sort(key=lambda bar: -bar[1])  # a bar is (joint or limb, degrees, clip)
     total, bars = len(bars), bars[:MOST_BARS]
     trace: Trace = {
         "type": "bar",
@@ -116,19 +118,19 @@ def retarget_chart(material: ReportMaterial) -> Chart | None:
         "yaxis": axis("difference, degrees", rangemode="tozero"),
     }
     caption = (
-        "These clips were retargeted to the skeleton of the data set. Each bar is the joint or limb that "
-        "differs most from the file, in degrees averaged over the clip. Clips with more than "
-        f"{MOST_DIFFERENCE:.0f} degrees are refused."
+        "These clips were retargeted to the skeleton of the data set. Each bar shows by how many degrees, on "
+        "average over the clip, the joint or limb that differs most differs from the file. Clips with more "
+        f"than {MOST_DIFFERENCE:.0f} degrees are refused."
     )
     if total > len(bars):
-        caption += f" Shown are the {len(bars)} of {total:,} clips that differ most."
+        caption += f" The chart shows the {len(bars)} of {total:,} clips that differ most."
     return Chart(
         "retarget", "Difference between retargeted clips and their files", caption, [trace], layout, 220
     )
 
 
 def clip_table(material: ReportMaterial, clips: frozenset[str]) -> Table:
-    """File, length, split and checksum of these clips."""
+    """A row for each of `clips`: split, file, length, labels and checksum."""
     labels = {report["clip"]: report for report in material.labels}
     columns = [
         Column("clip"),
@@ -171,10 +173,10 @@ def clip_table(material: ReportMaterial, clips: frozenset[str]) -> Table:
 
 
 def remarks_table(material: ReportMaterial) -> Table | None:
-    """A row for each repair, doubt and warning.
+    """A row for each repair, doubt and warning; None without any.
 
-    If there are more than MOST_REMARKS, a row for each kind (messages that differ only in numbers), with the
-    number of its clips and one example.
+    If there are more than MOST_REMARKS, there is a row for each kind of message instead, with the number of
+    its clips and an example. Messages of one kind differ only in numbers.
     """
     rows = []
     for stage, reports, key in (
@@ -190,7 +192,7 @@ def remarks_table(material: ReportMaterial) -> Table | None:
     if not rows:
         return None
     columns = [Column("clip"), Column("stage"), Column("message", kind="long")]
-    title = f"{len(rows):,} messages on repairs and warnings"
+    title = f"{len(rows):,} messages on repairs, doubts and warnings"
     if len(rows) <= MOST_REMARKS:
         return Table(f"{material.name}-remarks", columns, rows, title)
     columns = [Column.count("clips"), Column("stage"), Column("example"), Column("message", kind="long")]
@@ -198,28 +200,33 @@ def remarks_table(material: ReportMaterial) -> Table | None:
 
 
 def _by_kind(rows: list[list[str]]) -> list[list[Any]]:
-    """A row for each kind of remark, most frequent first. Sentences of a kind differ only in numbers.
+    """A row for each kind of message, most frequent first. Messages of one kind differ only in numbers.
 
-    A row has the number of clips, the stage, the first clip, and the first clip's sentence.
+    rows: (clip, stage, message). A row of the result has the number of clips, the stage, the first clip, and
+    the message of the first clip.
     """
     kinds: dict[tuple[str, str], list[list[str]]] = {}
     for row in rows:
         kinds.setdefault((row[1], re.sub(r"[0-9][0-9.,:/-]*", "0", row[2])), []).append(row)
-    many = sorted(kinds.values(), key=len, reverse=True)[:MOST_REMARKS]
-    return [[len({row[0] for row in kind}), kind[0][1], kind[0][0], kind[0][2]] for kind in many]
+    frequent = sorted(kinds.values(), key=len, reverse=True)[:MOST_REMARKS]
+    return [[len({row[0] for row in kind}), kind[0][1], kind[0][0], kind[0][2]] for kind in frequent]
 
 
 def strips(material: ReportMaterial, clips: frozenset[str]) -> list[dict[str, Any]]:
     """Data for the strips. A strip is a chart of one clip over time: label curves and channel values.
 
-    Left out are clips that are not in `clips`, clips without label curves, and mirrored clips if the clip
-    that they mirror is there.
+    clips: names of the clips to show. Clips without label curves are left out, and mirrored clips if the clip
+    that they mirror is in the data set. Keys of a strip: those of `hobble.labels.label_picture`; `clip`;
+    `length` in seconds; `channels`, a list of columns with a value above 0. Keys of such a column: `name`,
+    `spans` (stretches above 0: [start in seconds, end, highest value]), and `highest`, the highest value of
+    the channel.
     """
-    of_clip: dict[str, dict[str, Any]] = {}
+    # Clip -> column -> (its entry in the channel report, highest value of the channel).
+    channels_of: dict[str, dict[str, Any]] = {}
     for report in material.channels:
         channel_highest = report.get("highest", 10.0)
         values = {label: (value, channel_highest) for label, value in report["values"].items()}
-        of_clip.setdefault(report["clip"], {}).update(values)
+        channels_of.setdefault(report["clip"], {}).update(values)
     shown_name = shown_names(material.network["skeleton"])
     lengths = {report["clip"]: report.get("seconds") for report in material.motion}
     labelled = {report["clip"] for report in material.labels}
@@ -233,10 +240,10 @@ def strips(material: ReportMaterial, clips: frozenset[str]) -> list[dict[str, An
         channel_values = [
             {
                 "name": shown_name(label),
-                "spans": value.get("spells") or [[0, length, value["highest"]]],
+                "spans": summary.get("spells") or [[0, length, summary["highest"]]],
                 "highest": channel_highest,
             }
-            for label, (value, channel_highest) in of_clip.get(clip, {}).items()
+            for label, (summary, channel_highest) in channels_of.get(clip, {}).items()
         ]
         out.append({**curves, "clip": clip, "length": length, "channels": channel_values})
     return out

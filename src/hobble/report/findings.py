@@ -1,4 +1,4 @@
-"""The summary at the top of the page: key figures, and advice that follows from the numbers."""
+"""The summary at the top of the report page: key figures, and hints that follow from the numbers."""
 
 from __future__ import annotations
 
@@ -14,13 +14,14 @@ from hobble.report.formats import duration, number, size
 from hobble.report.gather import ReportMaterial
 from hobble.report.summary import Hint, KeyFigure, placed
 
-TURNING = 40.0  # degrees a second: slower turning is not counted, because it is the sway of a straight walk
+# Degrees a second: slower turning is not counted, because the body sways that much in a straight walk.
+TURNING = 40.0
 LITTLE_TURNING = 0.01  # if turning takes less than this share of the time, the page warns
 # Kinds of hints, in the order of the page.
 ORDER = ("warn", "note", "good", "fact")
 
 
-def _recipe(material: ReportMaterial) -> Mapping[str, Any]:
+def _training_options(material: ReportMaterial) -> Mapping[str, Any]:
     """The options of training in the configuration; empty if they are not known."""
     return (material.resolved.get("configuration") or {}).get("training") or {}
 
@@ -30,7 +31,7 @@ def lead(material: ReportMaterial) -> str:
     clips = [report["clip"] for report in material.motion]
     held_out = sum(material.split(clip) == "held_out" for clip in clips)
     frames = sum(report.get("frames", 0) for report in material.motion)
-    passes = _recipe(material).get("passes")
+    passes = _training_options(material).get("passes")
     network = material.network
     text = (
         f"A {network['described']}, with {network['inputs']} inputs and {network['outputs']} outputs, trained"
@@ -45,6 +46,7 @@ def lead(material: ReportMaterial) -> str:
 
 def key_figures(material: ReportMaterial) -> list[KeyFigure]:
     """The numbers at the top of the page, most important first."""
+    # The last argument of a KeyFigure is its place among the figures, which are sorted by it.
     figures = measure_sections.figures(material)
     seconds = sum(report.get("seconds", 0) for report in material.motion)
     if seconds:
@@ -53,7 +55,8 @@ def key_figures(material: ReportMaterial) -> list[KeyFigure]:
         value, _, unit = duration(seconds).partition(" ")
         figures.append(KeyFigure("Motion data", value, unit, note, 30))
     network = material.network
-    # Of a PFNN, these are the parameters of one control point; of other kinds of network, all parameters.
+    # A PFNN has a set of weights at each control point, and `parameters` counts one of these sets. For other
+    # networks it counts all parameters. Motion matching has no layers, so its `sizes` are empty.
     which = " at each control point" if "control points" in network["described"] else ""
     note = f"parameters{which}; layers of {'–'.join(map(str, network['sizes']))}"
     note = f"{note if network['sizes'] else 'numbers in its tables'}; {size(network['bytes'])} on disk"
@@ -71,31 +74,33 @@ def key_figures(material: ReportMaterial) -> list[KeyFigure]:
 
 
 def hints(material: ReportMaterial, turns: Mapping[str, Array] | None = None) -> list[Hint]:
-    """Advice in the order in which to follow it, then what is good, then plain facts.
+    """Warnings and advice in the order in which to follow them, then what is good, then plain facts.
 
     turns: split -> seconds in each bin of `coverage.TURNS`, if they were counted.
     """
-    # The first argument of `placed` sorts hints of the same kind: see `at` in `hobble.report.summary.Hint`.
+    # The first argument of `placed` is the place among hints of the same kind, `at` in
+    # `hobble.report.summary.Hint`.
     found = [
         *measure_sections.hints(material),
-        *placed(10, _coverage(material)),  # before training, which cannot make up for missing data
-        *placed(10, _turning(turns or {})),
-        *placed(11, _repairs(material)),
-        *placed(20, _curve(material)),
-        *placed(90, _costs(material)),
+        *placed(10, _gait_hints(material)),  # before training, which cannot make up for missing data
+        *placed(10, _turning_hints(turns or {})),
+        *placed(11, _repair_hints(material)),
+        *placed(20, _training_hints(material)),
+        *placed(90, _cost_hints(material)),
     ]
     return sorted(found, key=lambda hint: (ORDER.index(hint.kind), hint.at))
 
 
-def _curve(material: ReportMaterial) -> Iterator[Hint]:
+def _training_hints(material: ReportMaterial) -> Iterator[Hint]:
+    """Whether the held-out error rises, still falls, or has stopped falling."""
     history = material.history
     curve = zip(history.get("pass", ()), history.get("held_out_mse", ()), strict=False)
-    measured = [(p, v) for p, v in curve if p is not None and v is not None]
-    if len(measured) < 8:
+    measured = [(p, error) for p, error in curve if p is not None and error is not None]
+    if len(measured) < 8:  # with fewer values, a trend is only noise
         return
-    passes, losses = zip(*measured, strict=True)
+    passes, errors = zip(*measured, strict=True)
     # The error is measured several times in a pass. One value is noisy, so compare means over passes.
-    means = {p: np.mean([v for q, v in measured if q == p]) for p in passes}
+    means = {p: np.mean([error for q, error in measured if q == p]) for p in passes}
     best = min(means, key=lambda p: means[p])
     if means[passes[-1]] > 1.05 * means[best]:
         yield Hint(
@@ -104,22 +109,24 @@ def _curve(material: ReportMaterial) -> Iterator[Hint]:
             "The network overfits: train for fewer passes, with more dropout, or on more data.",
         )
         return
-    quarter = max(1, len(losses) // 4)
-    before, after = np.mean(losses[-2 * quarter : -quarter]), np.mean(losses[-quarter:])
+    quarter = max(1, len(errors) // 4)
+    before, after = np.mean(errors[-2 * quarter : -quarter]), np.mean(errors[-quarter:])
     fall = 1 - after / before
-    if _recipe(material).get("schedule", "constant") != "constant":
-        return  # the error fell because the learning rate did, so it says nothing about more passes
+    if _training_options(material).get("schedule", "constant") != "constant":
+        # The error fell because the learning rate fell, so it does not show whether more passes would help.
+        return
     if fall > 0.03:
         yield Hint(
             "note",
             f"The held-out error still fell by {100 * fall:.0f} % in the last quarter of training.",
-            "More passes will help: a configuration can continue from the last checkpoint of this one.",
+            "More passes will help. Another configuration can continue from the last checkpoint of this one.",
         )
     else:
         yield Hint("good", "The held-out error has stopped falling.", "More passes will change little.")
 
 
-def _coverage(material: ReportMaterial) -> Iterator[Hint]:
+def _gait_hints(material: ReportMaterial) -> Iterator[Hint]:
+    """Gaits of which there is little data or none."""
     totals: dict[str, float] = {}
     for report in material.labels:
         for gait, seconds in (report.get("seconds") or {}).items():
@@ -132,21 +139,27 @@ def _coverage(material: ReportMaterial) -> Iterator[Hint]:
             "So the character steps on the spot when it should stand, and more training will not change "
             "that. Add clips in which somebody stands, starts and stops.",
         )
-    thin = [g for g, s in totals.items() if 0 < s < 0.03 * everything and g not in ("jump", "bump")]
-    if thin:
+    scarce = [
+        gait
+        for gait, seconds in totals.items()
+        if 0 < seconds < 0.03 * everything and gait not in ("jump", "bump")
+    ]
+    if scarce:
         yield Hint(
             "note",
-            f"There is little data of {' and '.join(sorted(thin))}:",
-            f"less than three per cent of the time{' each' if len(thin) > 1 else ''}. Add clips, or expect "
+            f"There is little data of {' and '.join(sorted(scarce))}:",
+            f"less than three per cent of the time{' each' if len(scarce) > 1 else ''}. Add clips, or expect "
             "the character to be unsteady there.",
         )
 
 
-def _turning(turns: Mapping[str, Array]) -> Iterator[Hint]:
+def _turning_hints(turns: Mapping[str, Array]) -> Iterator[Hint]:
+    """A warning if hardly anybody turns. turns: split -> seconds in each bin of TURNS."""
     seconds = np.sum(list(turns.values()), axis=0)
     if not np.any(seconds):
         return
-    share = float(np.sum(seconds[np.abs(TURNS[:-1] + TURNS[1:]) / 2 > TURNING]) / np.sum(seconds))
+    middles = (TURNS[:-1] + TURNS[1:]) / 2  # of the bins, degrees a second
+    share = float(np.sum(seconds[np.abs(middles) > TURNING]) / np.sum(seconds))
     if share < LITTLE_TURNING:
         yield Hint(
             "warn",
@@ -157,9 +170,11 @@ def _turning(turns: Mapping[str, Array]) -> Iterator[Hint]:
         )
 
 
-def _repairs(material: ReportMaterial) -> Iterator[Hint]:
+def _repair_hints(material: ReportMaterial) -> Iterator[Hint]:
+    """How many clips were repaired or have warnings."""
     repaired = {report["clip"] for report in material.motion if report.get("repairs")}
-    warned = {r["clip"] for r in (*material.labels, *material.channels) if r.get("warnings")}
+    with_warnings = (report for report in (*material.labels, *material.channels) if report.get("warnings"))
+    warned = {report["clip"] for report in with_warnings}
     if repaired or warned:
         yield Hint(
             "note",
@@ -168,7 +183,8 @@ def _repairs(material: ReportMaterial) -> Iterator[Hint]:
         )
 
 
-def _costs(material: ReportMaterial) -> Iterator[Hint]:
+def _cost_hints(material: ReportMaterial) -> Iterator[Hint]:
+    """The stage that took more than half of the time, if any."""
     stages = material.pipeline.get("stages") or []
     total = material.pipeline.get("total_seconds") or 0
     if stages and total:

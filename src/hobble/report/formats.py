@@ -1,4 +1,4 @@
-"""Numbers formatted for people, and data encoded safely for a page."""
+"""Turns numbers into text for readers, and encodes data safely for a page."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from markupsafe import Markup
 
 
 def duration(seconds: float | None) -> str:
-    """Seconds as text for people.
+    """A time as text in a suitable unit; a dash for None.
 
     >>> duration(0.42), duration(93), duration(5400), duration(154800), duration(None)
     ('0.42 s', '1 min 33 s', '1 h 30 min', '43 h', '–')
@@ -20,15 +20,15 @@ def duration(seconds: float | None) -> str:
         return "–"
     if seconds < 60:
         return f"{seconds:.2g} s" if seconds < 10 else f"{seconds:.0f} s"
-    minutes, rest = divmod(round(seconds), 60)
+    minutes, more_seconds = divmod(round(seconds), 60)
     if minutes < 60:
-        return f"{minutes} min {rest} s" if rest else f"{minutes} min"
+        return f"{minutes} min {more_seconds} s" if more_seconds else f"{minutes} min"
     hours, minutes = divmod(minutes, 60)
     return f"{hours} h {minutes} min" if minutes and hours < 24 else f"{hours} h"
 
 
 def size(count: float | None) -> str:
-    """Bytes in powers of a thousand.
+    """A number of bytes as text, in B, kB, MB or GB (powers of 1000); a dash for None.
 
     >>> size(512), size(7_120_000_000), size(606e6), size(None)
     ('512 B', '7.12 GB', '606 MB', '–')
@@ -43,7 +43,9 @@ def size(count: float | None) -> str:
 
 
 def number(value: float | None, digits: int = 3) -> str:
-    """A number with `digits` significant digits and thousands separators; a dash for None, NaN and infinity.
+    """A number as text with `digits` significant digits; a dash for None, NaN and infinity.
+
+    Digits before the decimal point are all shown, with separators of thousands.
 
     >>> number(0.04391), number(20000, 5), number(1234.5), number(None), number(float("nan")), number(0)
     ('0.0439', '20,000', '1,234', '–', '–', '0')
@@ -57,7 +59,7 @@ def number(value: float | None, digits: int = 3) -> str:
 
 
 def plain(value: Any) -> Any:
-    """`value` as dicts, lists, strings and finite numbers only; NaN and infinities become None."""
+    """`value` as plain JSON data: tuples and arrays become lists, NaN and infinities become None."""
     if isinstance(value, dict):
         return {str(key): plain(item) for key, item in value.items()}
     if isinstance(value, (list, tuple)):
@@ -74,7 +76,7 @@ def plain(value: Any) -> Any:
 def embedded(value: Any) -> Markup:
     """JSON that is safe inside a <script> element, whatever its strings contain.
 
-    With every "<" written as an escape, no string can end the element or open a comment.
+    Every "<" is written as an escape, so that no string can end the element or open a comment.
 
     >>> embedded({"clip": "</script><b>"})
     Markup('{"clip":"\\\\u003c/script\\\\u003e\\\\u003cb\\\\u003e"}')

@@ -1,4 +1,4 @@
-"""Reads the artefacts from which the report of a configuration is made."""
+"""Reads the files from which the report of a configuration is made."""
 
 from __future__ import annotations
 
@@ -15,7 +15,8 @@ from hobble.measures.inputs import Json
 from hobble.models.load import load_network
 
 PUBLISHED = Path(__file__).parents[1] / "evaluation" / "published.yaml"
-# Columns of the history that are not the error of one block of the output Y.
+# Columns of the training history. Each further column has the held-out error of one block of the network's
+# output Y. A block is a group of columns of Y, such as the joint positions.
 GENERAL_COLUMNS = ("pass", "section", "samples", "seconds", "train_mse", "held_out_mse")
 
 
@@ -25,11 +26,11 @@ class ReportMaterial:
 
     name: of the configuration. dataset: name of the data set. title: heading of the page, if it is not the
     name. splits: clip -> "train" or "held_out". resolved: the configuration with all defaults. measured:
-    measurement -> its JSON. pipeline: content of pipeline.json. history: column -> values, one for each
-    section (part of a pass) of training, None for an empty cell. network: from `describe_network`. motion,
-    labels: for each clip, the report on its motion and the one on its labels, in the same order. channels:
-    reports on the channels of clips. terrain, rows: paths of the clips' terrain fits and rows. published:
-    content of published.yaml.
+    measurement -> the JSON with its results. pipeline: content of pipeline.json. history: column of the
+    training history -> values, one for each section (part of a pass) of training, None for an empty cell.
+    network: from `describe_network`. motion: the report on each clip's motion. labels: the report on each
+    clip's labels, in the same order. channels: a report for each clip and channel. terrain, rows: paths of
+    the files with the clips' terrain fits and rows. published: content of published.yaml.
     """
 
     name: str
@@ -53,17 +54,17 @@ class ReportMaterial:
         return self.splits.get(clip, "train")
 
     def found(self, measure: str) -> Json:
-        """The JSON of a measurement; empty if it was not run."""
+        """The results of a measurement; empty if it was not run."""
         return self.measured.get(measure, {})
 
     def published_entry(self, what: str) -> Json | None:
-        """The published entry for this configuration under the key `what`, or None."""
+        """The first entry for this configuration in the list `what` of published.yaml, or None."""
         rows = self.published.get(what, ())
         return next((row for row in rows if row["configuration"] == self.name), None)
 
     @property
     def blocks(self) -> list[str]:
-        """Columns of the history that hold the held-out error of one block of the output Y."""
+        """The columns of the history with the held-out error of one block of the output Y each."""
         return [name for name in self.history if name not in GENERAL_COLUMNS]
 
 
@@ -86,7 +87,7 @@ def gather(
 ) -> ReportMaterial:
     """Read the files of a report. All arguments after `splits` are paths.
 
-    Raises InputError with the name of a file that cannot be read.
+    Raises InputError, which names the file, if one cannot be read.
     """
     return ReportMaterial(
         name=name,
@@ -108,7 +109,12 @@ def gather(
 
 
 def describe_network(path: str | Path) -> dict[str, Any]:
-    """What the page needs to know about a network: description, sizes, parameters, skeleton, channels."""
+    """What the page says about the network in the file `path`.
+
+    Keys of the result: `described`: the kind of network in words. `sizes`: of its layers, empty if it has
+    none. `inputs`, `outputs`: numbers of columns of X and Y. `parameters`: their number. `bytes`: size of the
+    file. `skeleton`: a dict, empty if the file has none. `channels`: channel -> its columns.
+    """
     network = load_network(path)
     return {
         "described": network.described,

@@ -49,7 +49,7 @@ def render(
     clips = shown_clips.shown(material)
     terrain = shown_clips.files_of(material.terrain, clips)
     row_files = shown_clips.sampled(material.rows)
-    counted = coverage.seconds_of_data(row_files, material.splits, of=len(material.rows))
+    counted = coverage.seconds_of_data(row_files, material.splits, all_clips=len(material.rows))
     sections, measured = _sections(material, counted, clips, terrain), measure_sections.sections(material)
     scenes, playable = dict(scenes or {}), playable or {}
     captured_and_predicted = captured_and_predicted or {}
@@ -140,7 +140,7 @@ def _sections(
             "gaits": data.gait_chart(material),
             "speeds": data.speed_chart(material),
             "turns": coverage.turn_chart(counted),
-            "both": coverage.both_chart(counted),
+            "both": coverage.speed_turn_chart(counted),
             "channels": coverage.channel_charts(counted, shown_names(material.network["skeleton"])),
             "retarget": data.retarget_chart(material),
             "clips": data.clip_table(material, clips),
