@@ -25,7 +25,7 @@ from hobble.motion.from_motion import bends, from_motion, trunk_frames
 from hobble.motion.from_rest import TRUSTED, add_rest, from_rest, zero_doubt
 from hobble.motion.no_neck import lean_doubt
 from hobble.motion.orient import degrees_between, mean_rotation, pointed_along
-from hobble.motion.rebase import rebased
+from hobble.motion.rebase import with_new_rest_pose
 from hobble.motion.spine import SHORT
 from hobble.motion.standing import why_not_standing
 from hobble.motion.target_build import TargetBuild
@@ -95,7 +95,7 @@ def upright(clip: Clip, body: Body, target: Skeleton, others: Collection[int] = 
     clip, body = with_balls(clip, body, axes)
     roles = body.roles(clip.skeleton.joints)
     clip, body = with_split_joints(clip, body, axes, bends(trunk))
-    clip, body = rebased(clip, body, [*body.joints, *kept], axes, roles)
+    clip, body = with_new_rest_pose(clip, body, [*body.joints, *kept], axes, roles)
     notes = [note for note in unsure if note]
     return UprightMotion(clip, body, source, notes, height_error(sample, problem is None))
 
