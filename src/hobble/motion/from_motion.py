@@ -57,7 +57,7 @@ def trunk_frames(sample: BodySample, zero: Array | None) -> dict[int, Array]:
     for joint in chain:
         bone, axis, left = _bone(sample, joint)
         if body.trunk and joint == body.chest and lacks_neck(sample):
-            bone, axis = neck_bone(sample, left, zero), sample.target.spine.neck
+            bone, axis = neck_bone(sample, left, zero), sample.target.spine.neck_direction
         # For hips and chest, the direction to the left is more reliable than the bone: hips and shoulders are
         # level, but spines of captured rigs bend sideways by some degrees.
         carries_limbs = joint in (body.hips, body.chest)
@@ -80,7 +80,7 @@ def _bone(sample: BodySample, joint: int) -> tuple[Array, Array, Array]:
     following = chain[chain.index(joint) + 1 :]
     # A rig with many short bones has kinks. Where one bone of the target is as long as several bones of the
     # rig, the direction is measured from the beginning of the first of these to the end of the last.
-    reach = [j for j in following if share[j] <= sample.target.spine.end(share[joint]) + 1e-6]
+    reach = [j for j in following if share[j] <= sample.target.spine.bone_end(share[joint]) + 1e-6]
     # The chest is stiff up to the shoulders. A very short bone above it does not show how the
     # chest is turned.
     leg = sample.length(*body.legs["left"][:3])

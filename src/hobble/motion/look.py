@@ -25,7 +25,7 @@ from hobble.motion.duplicates import ClipDigest, digest, same_pairs
 from hobble.motion.make import make_clip
 from hobble.motion.options import ClipMotion
 from hobble.motion.rig import leg_length
-from hobble.motion.tempo import too_fast
+from hobble.motion.tempo import times_too_fast
 
 SLOWEST, FASTEST = 40.0, 260.0  # steps a minute of people who walk or run
 RATES = (24, 25, 30, 60, 120, 240)  # usual frame rates of files
@@ -192,7 +192,7 @@ def rate_warnings(steps: int, moving: float, way: float, clip: Clip, report: Map
     leg = leg_length(clip.skeleton)
     # Cadence grows with step length (Grieve and Gear 1966). With steps of .8 leg lengths it is 110 a minute.
     usual = 110.0 * np.clip(step_length / (0.8 * leg), 0.5, 2.2) ** 0.6
-    fps, found = report["source_fps"], too_fast(clip, steps, report["scale"])
+    fps, found = report["source_fps"], times_too_fast(clip, steps, report["scale"])
     odd = not (SLOWEST <= cadence <= FASTEST and 0.45 < cadence / usual < 2.2)
     likely = found.likely if found and found.likely > HIDDEN else float(cadence / usual)
     rate = _usual_rate(fps / likely, fps)

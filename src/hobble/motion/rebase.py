@@ -34,7 +34,7 @@ def with_new_rest_pose(
         body.hips,
         *sorted((j for j in joints if j != body.hips), key=lambda j: _depth(skeleton, body, j)),
     ]
-    new = {old: i for i, old in enumerate(joints)}
+    new = {old: i for i, old in enumerate(joints)}  # old index of a joint -> new index
     parents = [-1, *(new[_new_parent(skeleton.parents, body, old, new)] for old in joints[1:])]
     # How far each body part has turned, in the world, from the new rest pose.
     turned = quat.mul(clip.global_rotations[:, joints], np.stack([axes[j] for j in joints]))
@@ -52,11 +52,11 @@ def with_new_rest_pose(
     offsets = np.median(from_parent, axis=0)
     moving = np.abs(from_parent - offsets).max() > MOVES
     names = tuple(skeleton.joints[j] for j in joints)
-    rebased_skeleton = Skeleton(skeleton.name, names, tuple(parents), offsets, roles=roles)
-    rotations = quat.continuous(local_rotations(rebased_skeleton, turned))
+    new_skeleton = Skeleton(skeleton.name, names, tuple(parents), offsets, roles=roles)
+    rotations = quat.continuous(local_rotations(new_skeleton, turned))
     translations = from_parent if moving else None
-    rebased_clip = Clip(clip.name, rebased_skeleton, clip.fps, rotations, places[:, 0], translations)
-    return rebased_clip, body.renumbered(new)
+    new_clip = Clip(clip.name, new_skeleton, clip.fps, rotations, places[:, 0], translations)
+    return new_clip, body.renumbered(new)
 
 
 def _depth(skeleton: Skeleton, body: Body, joint: int) -> int:

@@ -106,13 +106,13 @@ def _draw_figures(clip: Clip, frames: Array, part: str, view: str) -> list[str]:
     return [
         "".join(
             _draw_bone(places[a][k], places[b][k], lowest[k], scale, WRONG if wrong else COLOURS[side])
-            for a, b, side, wrong in _bones(places, part)
+            for a, b, side, wrong in _bones_to_draw(places, part)
         )
         for k in range(len(frames))
     ]
 
 
-def _bones(places: Mapping[str, Array], part: str) -> list[tuple[str, str, str, bool]]:
+def _bones_to_draw(places: Mapping[str, Array], part: str) -> list[tuple[str, str, str, bool]]:
     """For each bone to draw: the roles of its start and end, its side, and whether it belongs to `part`.
 
     The side of trunk and head is "". places: its keys are the roles that the figure has.

@@ -115,7 +115,7 @@ def clean_names(names: Sequence[str]) -> tuple[str, ...]:
 
 
 def find_hips(names: Sequence[str], target: TargetSkeleton, folder: str | Path) -> int:
-    """Index of the hips among a clip's joints. It is not always 0: some programs export a joint above the hips.
+    """Index of the hips among a clip's joints. It may not be 0, because some programs export a joint above.
 
     names: of the clip's joints, the root first. folder: the folder of the skeleton files. The name of the
     hips is taken from the known skeleton that has the most of the clip's joint names. If the clip has no
@@ -302,9 +302,10 @@ def missing_bone(skeleton: Skeleton) -> str | None:
 
 
 def unit_of(leg: float) -> tuple[float, str] | None:
-    """The likely unit of a file: centimetres per unit, and its name. None if no unit gives a leg in LEG_RANGE.
+    """The likely unit of a file: centimetres per unit, and the name of the unit.
 
-    leg: length of thigh plus shank in the file's unit. The unit is the one that brings it nearest to LEG.
+    leg: length of thigh plus shank in the file's unit. The unit is the one that brings this length
+    nearest to LEG. None if it is not within LEG_RANGE even then.
     """
     if leg <= 0:
         return None

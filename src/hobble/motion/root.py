@@ -1,4 +1,4 @@
-"""Computes the root of each frame: where the character is and which way it faces. Converts to its coordinates.
+"""Computes the root of each frame: where the character is and where it faces. Converts to root coordinates.
 
 The formulas are those of the original pipeline (Holden, Komura, Saito 2017). The root is on the ground below
 the hips. Its Z axis is the facing direction, its X axis points to the character's left. A rotation "world to
@@ -121,7 +121,10 @@ def vectors_to_root(root: RootFrames, vectors: Array, frames: Array | slice | No
 
 
 def rotations_to_root(root: RootFrames, rotations: Array, frames: Array | slice | None = None) -> Array:
-    """World rotations (N, ..., 4) as rotations (N, ..., 4) relative to the root. frames: as for `points_to_root`."""
+    """World rotations (N, ..., 4) as rotations (N, ..., 4) relative to the root.
+
+    frames: as for `points_to_root`.
+    """
     _, to_root = _roots_to_broadcast(root, slice(None) if frames is None else frames, rotations)
     return quat.mul(np.broadcast_to(to_root, rotations.shape), rotations)
 
