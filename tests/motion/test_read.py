@@ -112,7 +112,11 @@ BROKEN = {
     "twice the frames": (lambda s: s + s[s.index("1 2 3 4") :] * 2, "declares 2 frames and has 6", None),
     "two billion frames": (lambda s: s.replace("Frames: 2", "Frames: 2000000000"), "2000000000 frames", 21),
     "minus one frame": (lambda s: s.replace("Frames: 2", "Frames: -1"), "-1 frames", 21),
-    "frames no number": (lambda s: s.replace("Frames: 2", "Frames: many"), "'many' is not a number", 21),
+    "frames no number": (
+        lambda s: s.replace("Frames: 2", "Frames: many"),
+        "'many' is not a whole number",
+        21,
+    ),
     "nan": (lambda s: s.replace(" 5 6 7 8 -9", " nan 6 7 8 -9"), "NaN", 24),
     "infinity": (lambda s: s.replace(" 5 6 7 8 -9", " inf 6 7 8 -9"), "infinite", 24),
     "windows' nan": (
@@ -148,8 +152,8 @@ BROKEN = {
     "joint in joint": (lambda s: s.replace("ROOT Hips\n{", "ROOT Hips\nJOINT a\n{"), "brace is missing", 3),
     "no offset": (lambda s: s.replace("\t\tOFFSET 1 -2e1 3.5\n", ""), "no OFFSET", 17),
     "brace too many": (lambda s: s.replace("}\nMOTION", "}\n}\nMOTION"), "closing brace too many", 20),
-    "frame time nought": (lambda s: s.replace("0.0333333", "0"), "makes no sense", 22),
-    "frame time nan": (lambda s: s.replace("0.0333333", "nan"), "makes no sense", 22),
+    "frame time nought": (lambda s: s.replace("0.0333333", "0"), "Frame Time is 0 s; it must be", 22),
+    "frame time nan": (lambda s: s.replace("0.0333333", "nan"), "Frame Time is nan s; it must be", 22),
     "strange word": (lambda s: s.replace("OFFSET 0 0 0", "OFSET 0 0 0"), "'OFSET'", 4),
 }
 

@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from hobble.core import quat
 from hobble.motion.root import (
     RootFrames,
-    continued,
+    extend_root,
     facing,
     local_pose,
     points_to_root,
@@ -125,7 +125,7 @@ def test_the_root_goes_straight_on_past_both_ends():
     yaw = 0.02 * n
     direction = np.stack([np.sin(yaw), 0 * n, np.cos(yaw)], axis=1)
     root = RootFrames(position, direction, quat.yaw(-yaw), np.full(39, 0.02))
-    longer = continued(root, 7)
+    longer = extend_root(root, 7)
     assert len(longer) == 54
     assert len(longer.turn) == 53
     for name in ("position", "direction", "rotation"):
@@ -141,4 +141,4 @@ def test_the_root_goes_straight_on_past_both_ends():
 
 def test_a_clip_of_one_frame_stands_still():
     root = RootFrames(np.ones((1, 2)), np.array([[0, 0, 1.0]]), quat.yaw(np.zeros(1)), np.zeros(0))
-    np.testing.assert_array_equal(continued(root, 3).position, np.ones((7, 2)))
+    np.testing.assert_array_equal(extend_root(root, 3).position, np.ones((7, 2)))

@@ -9,12 +9,12 @@ import pytest
 
 from hobble.motion.look import step_count, summarise_clips
 from hobble.motion.options import ClipMotion
-from hobble.motion.tempo import accelerations, too_fast
+from hobble.motion.tempo import measure_accelerations, times_too_fast
 
 
 def test_accelerations_grow_with_the_square_of_the_frame_rate(walker, holden31):
     clip = walker(holden31, 601, 120.0)
-    once, twice = (accelerations(replace(clip, fps=fps), 10) for fps in (120.0, 240.0))
+    once, twice = (measure_accelerations(replace(clip, fps=fps), 10) for fps in (120.0, 240.0))
     assert once is not None
     assert twice is not None
     for name in ("level", "vertical", "falling", "pendulum"):
@@ -29,21 +29,25 @@ def test_hips_that_are_lowest_over_the_standing_foot_run(walker, holden31):
     root = clip.root.copy()
     time = np.arange(len(clip)) / clip.fps
     root[:, 1] -= 3 * np.cos(4 * np.pi * time)
-    assert accelerations(replace(clip, root=root), 10).runs
+    assert measure_accelerations(replace(clip, root=root), 10).runs
 
 
 def test_a_child_on_an_adult_skeleton_does_not_play_too_fast(walker, holden31, scaled):
     clip = walker(holden31, 601, 120.0)
     large = scaled(clip, 2.0)
-    assert too_fast(large, 10, scale=2.0).likely == pytest.approx(too_fast(clip, 10).likely, rel=1e-9)
-    assert accelerations(large, 10).level == pytest.approx(2 * accelerations(clip, 10).level, rel=1e-9)
+    assert times_too_fast(large, 10, scale=2.0).likely == pytest.approx(
+        times_too_fast(clip, 10).likely, rel=1e-9
+    )
+    assert measure_accelerations(large, 10).level == pytest.approx(
+        2 * measure_accelerations(clip, 10).level, rel=1e-9
+    )
 
 
 def test_few_steps_and_short_clips_show_nothing(walker, holden31):
-    assert too_fast(walker(holden31, 601, 120.0), 2) is None
-    assert too_fast(walker(holden31, 11, 120.0), 3) is None
+    assert times_too_fast(walker(holden31, 601, 120.0), 2) is None
+    assert times_too_fast(walker(holden31, 11, 120.0), 3) is None
     standing = replace(walker(holden31, 60, 60.0), root=np.zeros((60, 3)))
-    assert step_count(standing) < 3 or np.isfinite(too_fast(standing, step_count(standing)).least)
+    assert step_count(standing) < 3 or np.isfinite(times_too_fast(standing, step_count(standing)).least)
 
 
 @pytest.mark.shared

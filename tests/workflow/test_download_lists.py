@@ -45,7 +45,7 @@ def test_missing_clips_are_downloaded(base: Path) -> None:
     ("old", "new", "message"),
     [
         ("https://host/", "ftp://host/", r"download: url: must be an address like"),
-        ("{clip}", "{name}", r"download: url: 'name'"),
+        ("{clip}", "{name}", r"download: url: must contain \{clip\}; only"),
         ("{clip}", "a", r"download: url: must contain \{clip\}"),
         ("{clip}", "{clip.x}", "download: url: "),
         ("{clip}", "{clip:a>400000000}", "only a width of up to 99 may follow a name"),

@@ -64,7 +64,7 @@ def trunk_frames(sample: BodySample, zero: Array | None) -> dict[int, Array]:
     for joint in chain:
         bone, axis, left = _trunk_bone(sample, joint)
         if body.trunk and joint == body.chest and lacks_neck(sample):
-            bone, axis = neck_bone(sample, left, zero), sample.target.spine.neck
+            bone, axis = neck_bone(sample, left, zero), sample.target.spine.neck_direction
         # `frame` fits its first direction exactly and its second one as nearly as possible. For hips and
         # chest, the direction to the left is more reliable than the bone: hips and shoulders are level, but
         # spines of captured rigs bend sideways by some degrees.
@@ -89,7 +89,7 @@ def _trunk_bone(sample: BodySample, joint: int) -> tuple[Array, Array, Array]:
     following = chain[chain.index(joint) + 1 :]
     # A chain of many short bones is not straight. If one bone of the target is as long as several bones of
     # the rig, the direction is measured from the start of the first of these bones to the end of the last.
-    within_bone = [j for j in following if share[j] <= sample.target.spine.end(share[joint]) + 1e-6]
+    within_bone = [j for j in following if share[j] <= sample.target.spine.bone_end(share[joint]) + 1e-6]
     # The chest is stiff up to the shoulders. A very short bone above it does not show how it is turned.
     leg = sample.length(*body.legs["left"][:3])
     least = max(SHORT, KINK * leg) if joint == body.chest else SHORT

@@ -25,7 +25,7 @@ from hobble.motion.duplicates import ClipDigest, digest, same_pairs
 from hobble.motion.make import make_clip
 from hobble.motion.options import ClipMotion
 from hobble.motion.rig import leg_length
-from hobble.motion.tempo import too_fast
+from hobble.motion.tempo import times_too_fast
 
 SLOWEST, FASTEST = 40.0, 260.0  # range of the cadences of people who walk or run, steps a minute
 RATES = (24, 25, 30, 60, 120, 240)  # usual frame rates of files
@@ -219,7 +219,7 @@ def rate_warnings(
     # Cadence grows with step length (Grieve and Gear 1966). With steps of .8 leg lengths it is 110 a minute.
     # The relation is not extended to steps shorter than .4 or longer than 1.76 leg lengths.
     usual = 110.0 * np.clip(step_length / (0.8 * leg), 0.5, 2.2) ** 0.6
-    fps, found = report["source_fps"], too_fast(clip, steps, report["scale"])
+    fps, found = report["source_fps"], times_too_fast(clip, steps, report["scale"])
     impossible = not (SLOWEST <= cadence <= FASTEST and 0.45 < cadence / usual < 2.2)
     # How many times too fast the clip probably plays.
     likely = found.likely if found and found.likely > HIDDEN else float(cadence / usual)

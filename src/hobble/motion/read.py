@@ -1,7 +1,8 @@
-"""Reads BVH files of all kinds. Errors name the line.
+"""Reads BVH files from any program. Errors name the line.
 
 The reader accepts any order of rotations, any channels on any joint, tabs, CRLF, scientific notation, several
-end sites, joint names with spaces or prefixes, and braces anywhere. Other modules interpret the numbers.
+end sites on a joint, joint names with spaces or prefixes, and braces anywhere. It returns the numbers as they
+are written; `hobble.motion.decode` computes rotations and positions from them.
 """
 
 from __future__ import annotations
@@ -21,12 +22,14 @@ from hobble.core.untrusted import read_bytes
 from hobble.motion.read_header import EXPORT, Header, read_header
 from hobble.motion.read_numbers import read_numbers
 
-# Limits. An hour of a rig of 191 joints at 60 Hz is 41 million joint poses, whose rotations take 1.3 GB.
+# Limits. One hour at 60 Hz on the largest known rig (191 joints) has 41 million joint poses (frames times
+# joints). Their rotations take 1.3 GB of memory.
 MOST_BYTES = 1 << 30
-MOST_HEADER = 1 << 24  # bytes before MOTION
-MOST_LINES = 50_000_000  # after MOTION
+MOST_HEADER = 1 << 24  # bytes before the word MOTION
+MOST_LINES = 50_000_000  # lines after the word MOTION
 LONGEST_LINE = 1 << 22  # bytes; a frame of 4096 joints with six values of 25 characters has 614,400
-MOST_POSES = 50_000_000  # frames times joints
+MOST_POSES = 50_000_000  # joint poses
+CUT = "Cut the file into shorter clips."
 
 
 @dataclass(frozen=True)
@@ -37,9 +40,10 @@ class Bvh:
     the file's order.
     offsets: (J, 3) in the file's unit.
     channels: for each joint the names of its channels in the file's order, such as ("Xposition", ...).
-    values: (F, C) of F frames and C channels, in degrees and the file's unit.
+    values: (F, C) values of all C channels in F frames. Rotations are in degrees, positions in the file's
+    unit.
     frame_time: seconds from frame to frame. frame_time_text: the same, as it is written in the file.
-    end_sites: joint -> offsets of its end sites.
+    end_sites: name of a joint -> offsets (x, y, z) of its end sites, in the file's unit.
     declared: the number of frames that the file declares. F may differ by one (see `read_bvh`).
     sha256, bytes: hash and size of the file.
     """
@@ -64,39 +68,51 @@ class Bvh:
 def read_bvh(path: str | Path) -> Bvh:
     """Read a BVH file.
 
-    A file may have one frame more or less than it declares. Raises InputError, with the line if there is one,
-    for a file that is missing, empty, binary, truncated or malformed, that has NaN or infinity or a wrong
-    number of values or frames, or that declares more frames than it can hold.
+    A file may have one frame more or less than it declares. Raises InputError for a file that is missing,
+    empty, binary, truncated or malformed, that has NaN or infinity or a wrong number of values or frames, or
+    that declares more frames than it can hold. The error names the line where that is possible.
     """
     path = Path(path)
     raw = read_bytes(path, MOST_BYTES)
-    data = _text(path, raw)
-    split = _motion_at(path, data)
+    data = _clean_text(path, raw)
+    split = _find_motion(path, data)
     header = read_header(path, data[:split])
-    bvh = _motion(path, data, split, header)
+    bvh = _read_motion(path, data, split, header)
     return replace(bvh, sha256=hashlib.sha256(raw).hexdigest(), bytes=len(raw))
 
 
-def _text(path: Path, data: bytes) -> bytes:
+def _clean_text(path: Path, data: bytes) -> bytes:
+    """The file's content without a byte order mark, with \\n or \\r\\n at the ends of lines.
+
+    Raises InputError if it is not a BVH text.
+    """
     if not data.strip():
         raise InputError(path, "the file is empty", fix=EXPORT)
     if data.startswith(b"Kaydara FBX"):
         raise InputError(path, "this is an FBX file, not BVH", fix="Export the clip as BVH.")
     if b"\0" in data[:65536] or b"\0" in data[-65536:]:
-        raise InputError(path, "binary data, not a BVH text file", fix=EXPORT)
+        raise InputError(path, "this is a binary file, not a BVH text file", fix=EXPORT)
     data = data.removeprefix(b"\xef\xbb\xbf")
     if b"\n" not in data:
         data = data.replace(b"\r", b"\n")  # line ends of old Macintosh files
     if not data[:4096].lstrip()[:9].upper() == b"HIERARCHY":
-        raise InputError(path, "not a BVH file: it does not begin with HIERARCHY", line=1)
+        raise InputError(
+            path,
+            "this is not a BVH file, because it does not begin with HIERARCHY",
+            line=1,
+            fix="Export the clip as BVH.",
+        )
     return data
 
 
 _MOTION = re.compile(rb"^[ \t\r}]*MOTION(?![^\s])", re.MULTILINE | re.IGNORECASE)
 
 
-def _motion_at(path: Path, data: bytes) -> int:
-    """The index of the first word MOTION at the start of a line, after blanks or closing braces if any."""
+def _find_motion(path: Path, data: bytes) -> int:
+    """The index in `data` of the first word MOTION that begins a line.
+
+    Blanks or closing braces may precede the word.
+    """
     found = _MOTION.search(data)
     if not found:
         lines = data.count(b"\n") + 1
@@ -106,32 +122,38 @@ def _motion_at(path: Path, data: bytes) -> int:
     return found.end() - len(b"MOTION")
 
 
-def _motion(path: Path, data: bytes, at: int, header: Header) -> Bvh:
+def _read_motion(path: Path, data: bytes, at: int, header: Header) -> Bvh:
+    """The file with its table of values. at: index of the word MOTION in `data`."""
     line = data.count(b"\n", 0, at) + 1
-    head = data[at + 6 : at + 4096].split(b"\n")
-    frames_text, line_frames, at_frames = _declaration(path, head, b"FRAMES:", line)
-    time_text, line_time, at_time = _declaration(path, head, b"FRAME TIME:", line)
-    body = at + 6 + max(at_frames, at_time)
+    after = at + len(b"MOTION")
+    head = data[after : at + 4096].split(b"\n")
+    frames_text, frames_line, frames_end = _declaration(path, head, b"FRAMES:", line)
+    time_text, time_line, time_end = _declaration(path, head, b"FRAME TIME:", line)
+    body = after + max(frames_end, time_end)
     width = sum(len(c) for c in header.channels)
     try:
         declared = int(frames_text.replace("_", "?"))  # Python would accept 1_000
     except ValueError:
-        raise InputError(path, f"Frames: {frames_text[:40]!r} is not a number", line=line_frames) from None
+        problem = f"Frames: {frames_text[:40]!r} is not a whole number"
+        raise InputError(path, problem, line=frames_line, fix=EXPORT) from None
     try:
         frame_time = float(time_text.replace("_", "?"))
     except ValueError:
-        raise InputError(path, f"Frame Time: {time_text[:40]!r} is not a number", line=line_time) from None
+        problem = f"Frame Time: {time_text[:40]!r} is not a number"
+        raise InputError(path, problem, line=time_line, fix=EXPORT) from None
     if not 1e-4 <= frame_time <= 10:
-        raise InputError(path, f"Frame Time {time_text[:40]} s makes no sense", line=line_time, fix=EXPORT)
+        problem = f"Frame Time is {time_text[:40]} s; it must be .0001 to 10 s"
+        raise InputError(path, problem, line=time_line, fix=EXPORT)
     if declared < 1:
-        raise InputError(path, f"declares {declared} frames", line=line_frames, fix=EXPORT)
+        raise InputError(path, f"declares {declared} frames, but needs one", line=frames_line, fix=EXPORT)
     if not width:
         raise InputError(path, "no joint has a channel", fix=EXPORT)
+    # Each value takes at least two bytes: a digit and a blank. One frame may be missing.
     if (declared - 1) * width * 2 > len(data) - body + 2:
         raise InputError(
             path,
             f"truncated: declares {declared} frames of {width} values, more than the file can hold",
-            line=line_frames,
+            line=frames_line,
             fix=EXPORT,
         )
     if declared * len(header.names) > MOST_POSES:
@@ -139,11 +161,11 @@ def _motion(path: Path, data: bytes, at: int, header: Header) -> Bvh:
             path,
             f"declares {declared} frames of {len(header.names)} joints: more than {MOST_POSES} joint "
             "poses (frames times joints)",
-            line=line_frames,
-            fix="Cut it into shorter clips.",
+            line=frames_line,
+            fix=CUT,
         )
-    first = max(line_frames, line_time) + 1
-    values = _values(path, data, body, width, declared, first)
+    first_line = max(frames_line, time_line) + 1
+    values = _read_values(path, data, body, width, declared, first_line)
     return Bvh(
         path,
         tuple(header.names),
@@ -159,9 +181,10 @@ def _motion(path: Path, data: bytes, at: int, header: Header) -> Bvh:
 
 
 def _declaration(path: Path, head: list[bytes], key: bytes, line: int) -> tuple[str, int, int]:
-    """The text after `key` in the lines `head`, the number of its line, and where in `head` that line ends.
+    """Find the line of `head` that begins with `key`.
 
-    line: number of the first line of `head`.
+    Returns the text after `key`, the number of the line in the file, and how many bytes `head` has up to the
+    end of this line. head: the lines after the word MOTION. line: number of the first of them in the file.
     """
     end = 0
     for i, raw in enumerate(head[:8]):
@@ -173,19 +196,21 @@ def _declaration(path: Path, head: list[bytes], key: bytes, line: int) -> tuple[
     raise InputError(path, f"truncated: no {name!r} after MOTION", line=line + 1, fix=EXPORT)
 
 
-def _values(path: Path, data: bytes, at: int, width: int, declared: int, first_line: int) -> Array:
+def _read_values(path: Path, data: bytes, at: int, width: int, declared: int, first_line: int) -> Array:
     """The table (F, width) of the numbers in `data` from `at` on.
 
-    If a line does not hold exactly one frame, a slower reader reads the table or finds the error.
+    Compiled code reads the usual large files, and `np.loadtxt` reads other files with one frame on each line.
+    For the rest, `_read_or_explain` reads the table or finds the error. declared: the number of frames that
+    the file declares. first_line: number of the line that begins at `at`.
     """
-    text = io.BytesIO(data)  # shares the bytes; a slice would copy them
+    text = io.BytesIO(data)  # shares the memory of `data`; a slice would be a copy
     text.seek(at)
     if not re.compile(rb"\S").search(data, at):
         raise InputError(path, f"truncated: declares {declared} frames and has none", line=first_line)
     _check_lines(path, data, at, first_line)
-    quick = read_numbers(data, at, width, declared)
+    compiled = read_numbers(data, at, width, declared)
     try:
-        table = np.loadtxt(text, dtype=float, comments=None, ndmin=2) if quick is None else quick
+        table = np.loadtxt(text, dtype=float, comments=None, ndmin=2) if compiled is None else compiled
     except ValueError:
         table = _read_or_explain(path, data[at:], width, first_line)
     if table.shape[1] != width:
@@ -196,36 +221,44 @@ def _values(path: Path, data: bytes, at: int, width: int, declared: int, first_l
         line = _line_of(data[at:], frame, first_line)
         raise InputError(path, "a value is NaN or infinite", line=line, frame=frame + 1, fix=EXPORT)
     if abs(len(table) - declared) > 1:
-        what = "truncated: declares" if len(table) < declared else "declares"
-        raise InputError(path, f"{what} {declared} frames and has {len(table)}", fix=EXPORT)
+        declares = "truncated: declares" if len(table) < declared else "declares"
+        raise InputError(path, f"{declares} {declared} frames and has {len(table)}", fix=EXPORT)
     return table
 
 
 def _check_lines(path: Path, data: bytes, at: int, first_line: int) -> None:
-    """Raise InputError if a line is too long or there are too many lines, before splitting takes memory."""
+    """Raise InputError if a line is too long or there are too many lines.
+
+    This is checked first, because splitting such a text into lines would take too much memory.
+    """
     for start in range(at, len(data) - LONGEST_LINE, LONGEST_LINE):
         if data.find(b"\n", start, start + LONGEST_LINE) < 0:
             line = first_line + data.count(b"\n", at, start)
             problem = f"a line of more than {LONGEST_LINE >> 20} MB"
             raise InputError(path, problem, line=line, fix=EXPORT)
     if data.count(b"\n", at) > MOST_LINES:
-        raise InputError(path, f"more than {MOST_LINES} lines after MOTION", fix="Cut it into shorter clips.")
+        raise InputError(path, f"more than {MOST_LINES} lines after MOTION", fix=CUT)
 
 
 def _read_or_explain(path: Path, body: bytes, width: int, first_line: int) -> Array:
-    """Read frames that are split over several lines. Anything else raises InputError with the line."""
-    counts = np.fromiter((len(raw.split()) for raw in io.BytesIO(body)), np.int32)
-    used, total = np.flatnonzero(counts), int(counts.sum(dtype=np.int64))
-    if total % width or not total or not (counts[used] < width).all():
-        wrong = np.flatnonzero(counts[used] != width)
+    """The table (F, width) of a text in which each frame is split over several lines.
+
+    Raises InputError with the line for any other text. body: the text of the table. first_line: the number of
+    its first line in the file.
+    """
+    counts = np.fromiter((len(raw.split()) for raw in io.BytesIO(body)), np.int32)  # values on each line
+    filled, total = np.flatnonzero(counts), int(counts.sum(dtype=np.int64))
+    # A line with `width` values or more shows that each line should hold one frame.
+    if total % width or not total or not (counts[filled] < width).all():
+        wrong = np.flatnonzero(counts[filled] != width)
         if len(wrong):
-            n, i = int(wrong[0]), int(used[wrong[0]])
-            last = " (truncated?)" if i == used[-1] else ""
+            frame, i = int(wrong[0]), int(filled[wrong[0]])
+            last = " (truncated?)" if i == filled[-1] else ""
             problem = f"{counts[i]} values, but the joints have {width} channels{last}"
-            raise InputError(path, problem, line=first_line + i, frame=n + 1, fix=EXPORT)
+            raise InputError(path, problem, line=first_line + i, frame=frame + 1, fix=EXPORT)
     for i, raw in enumerate(io.BytesIO(body)):
         for word in raw.split():
-            if not _number(word):
+            if not _is_number(word):
                 shown = word[:40].decode("latin-1")
                 comma = " (a decimal comma?)" if b"," in word else ""
                 problem = f"{shown!r} is not a number{comma}"
@@ -234,15 +267,19 @@ def _read_or_explain(path: Path, body: bytes, width: int, first_line: int) -> Ar
     return np.fromiter(words, float, total).reshape(-1, width)
 
 
-def _number(word: bytes) -> bool:
+def _is_number(word: bytes) -> bool:
     try:
         float(word)
     except ValueError:
         return False
-    return b"_" not in word
+    return b"_" not in word  # Python would accept 1_000
 
 
 def _line_of(body: bytes, frame: int, first_line: int) -> int | None:
-    used = (i for i, raw in enumerate(io.BytesIO(body)) if raw.strip())
-    at = next(itertools.islice(used, frame, None), None)
-    return None if at is None else first_line + at
+    """The number of the line with frame `frame` (from 0), if each line that is not blank holds one frame.
+
+    None if there are fewer such lines. body, first_line: as for `_read_or_explain`.
+    """
+    filled = (i for i, raw in enumerate(io.BytesIO(body)) if raw.strip())
+    index = next(itertools.islice(filled, frame, None), None)
+    return None if index is None else first_line + index

@@ -1,8 +1,9 @@
 """Transfers one figure's motion to another, by joint maps, rest poses and leg lengths.
 
-World rotations are transferred relative to the rest poses. Limbs get the directions of the source's limbs.
-Trunk, head and feet turn as far from their rest pose as in the source, so that a flat foot stays flat
-whatever the height of its ankle. The path is scaled by leg length of the target / leg length of the source.
+The source is the figure whose motion is known; the target gets this motion. World rotations are transferred
+relative to the rest poses. Limbs get the directions of the source's limbs. Trunk, head and feet turn from
+their rest pose by the same rotation as in the source, so that a flat foot stays flat even if its ankle is
+higher. The path is scaled by leg length of the target / leg length of the source.
 Two-bone inverse kinematics puts the balls of the feet where they are in the scaled source, so that feet that
 do not slide in the source do not slide in the result. Joints that follow no joint of the source (fingers,
 face, roll joints) keep their rest pose relative to the joint above.
@@ -26,16 +27,16 @@ from hobble.motion.body import SIDES
 from hobble.motion.heel_tilt import steady_heels
 from hobble.motion.rig import leg_length, missing_bone
 
-# Bones of limbs: role of the joint -> role of the bone's other end.
+# Bones of limbs, without the side: role of the joint that turns the bone -> role of the joint at its end.
 LIMB_BONES = {"shoulder": "elbow", "elbow": "wrist", "hip": "knee", "knee": "heel"}
-# Distance from hip to ankle, as a share of the leg's length. If the share in the source is NEARLY_STRAIGHT or
-# more, the hips come down so that the target's leg is no straighter than the source's. If the share is BENT
-# or less, the hips do not come down. Between BENT and NEARLY_STRAIGHT, this rule sets in gradually.
+# Both are distances from hip to ankle, as shares of the leg's length. If the source's leg has the share
+# NEARLY_STRAIGHT or more, the target's hips come down until its leg is no straighter than the source's. If
+# the share is BENT or less, they do not come down. Between the two shares, they come down by a growing part.
 BENT, NEARLY_STRAIGHT = 0.88, 0.95
-SMOOTH = 0.08  # seconds before and after a frame over which the drop of its hips is smoothed
+SMOOTH = 0.08  # seconds before and after a frame over which the drop of the hips is smoothed
 MOST_DROP = 6.0  # cm by which the hips come down at most
-# cm: a knee nearer than this to the line from hip to ankle hardly shows which way it bends, so its direction
-# is mixed with forward.
+# cm: a knee that is nearer than this to the line from hip to ankle hardly shows which way it bends. So its
+# direction is mixed with the forward direction.
 STRAIGHT = 0.5
 
 
@@ -43,15 +44,20 @@ STRAIGHT = 0.5
 class Retarget:
     """How the skeleton `target` follows the skeleton `source`. Made once by `plan`, applied to any pose.
 
-    joints: (M,) target joints that follow a joint of the source, parents first. follows: (M,) the source
-    joints that they follow. turns: (M, 4); the world rotation of a target joint is the world rotation of its
-    source joint times its turn. drivers: (J,) for each target joint the nearest of `joints` above it, or the
-    joint itself if it is one of them. driver_offsets: (J, 3) cm, position of each joint in the coordinates of
-    its driver, or of its parent's driver if the joint is its own driver. levels: the `joints` below the hips,
-    in groups in the order in which they are placed. forward: (3,) the direction that the target's rest pose
-    faces. pelvis: (3,) cm, from the target's hips to the middle between its two hip joints. scale: leg length
-    of the target / leg length of the source. lift: cm by which the target's ankles are higher above the balls
-    of its feet than the ankles of the scaled source.
+    joints: (M,) indices of the target joints that follow a joint of the source, parents first. follows: (M,)
+    indices of the source joints that they follow. turns: (M, 4); the world rotation of a target joint is the
+    world rotation of its source joint times its turn.
+
+    drivers: (J,) for each target joint the nearest of `joints` above it, or the joint itself if it is one of
+    them. A joint has the world rotation of its driver. driver_offsets: (J, 3) cm, position of each joint in
+    the coordinates of its driver, or of its parent's driver if the joint is its own driver. levels: the
+    `joints` below the hips, grouped by the number of drivers between them and the hips. Groups nearer to the
+    hips come first, because the positions of a group follow from those of the groups before it.
+
+    forward: (3,) the direction that the target's rest pose faces. pelvis: (3,) cm, from the target's hips to
+    the middle between its two hip joints. scale: leg length of the target / leg length of the source. lift:
+    cm by which the target's ankles are higher above the balls of its feet than the ankles of the scaled
+    source.
     """
 
     source: Skeleton = field(repr=False)
@@ -69,13 +75,14 @@ class Retarget:
 
 
 def plan(source: Skeleton, target: Skeleton, sources: Mapping[str, str]) -> Retarget:
-    """Plan how `target` follows `source`. sources: joint of the target -> joint of the source.
+    """Plan how `target` follows `source`.
 
-    Both skeletons need the roles hips and head, and on both sides shoulder, hip, knee, heel and toe. Raises
-    HobbleError if the target's hips or legs follow nothing, or if a bone of a leg has no length.
+    sources: name of a target joint -> name of the source joint that it follows. Both skeletons need the roles
+    hips and head, and on both sides shoulder, hip, knee, heel and toe. Raises HobbleError if the target's
+    hips, or a hip, knee or heel, follows nothing, or if a bone of a leg has no length.
     """
     pairs = sorted((target.index(follower), source.index(leader)) for follower, leader in sources.items())
-    joints, follows = (np.array(side) for side in zip(*pairs, strict=True))
+    joints, follows = (np.array(column) for column in zip(*pairs, strict=True))
     for role in ("hips", *(f"{s}_{part}" for s in SIDES for part in ("hip", "knee", "heel"))):
         if target.role(role) not in joints:
             raise HobbleError(
@@ -84,11 +91,12 @@ def plan(source: Skeleton, target: Skeleton, sources: Mapping[str, str]) -> Reta
     for skeleton in (source, target):
         if bone := missing_bone(skeleton):
             raise HobbleError(f"the bone from {bone} of {skeleton.name} has no length")
-    from_source, to_target = rest_frame(source), quat.inv(rest_frame(target))
-    turns = np.broadcast_to(quat.mul(from_source, to_target), (len(pairs), 4)).copy()
-    bones = _limb_bones(source, target, from_source, to_target)
+    # The upright pose has the body's left at +X, up at +Y and forward at +Z.
+    upright_to_source, target_to_upright = rest_frame(source), quat.inv(rest_frame(target))
+    turns = np.broadcast_to(quat.mul(upright_to_source, target_to_upright), (len(pairs), 4)).copy()
+    limb_turns = _limb_turns(source, target, upright_to_source, target_to_upright)
     for i, pair in enumerate(pairs):
-        turns[i] = bones.get(pair, turns[i])
+        turns[i] = limb_turns.get(pair, turns[i])
     scale = leg_length(target) / leg_length(source)
     drivers, driver_offsets = _drivers(target, joints)
     rest = rest_positions(target)
@@ -105,15 +113,19 @@ def plan(source: Skeleton, target: Skeleton, sources: Mapping[str, str]) -> Reta
         forward=quat.rotate(rest_frame(target), np.array([0.0, 0.0, 1.0])),
         pelvis=middle - rest[target.role("hips")],
         scale=scale,
-        lift=_ankle_height(target, to_target) - scale * _ankle_height(source, quat.inv(from_source)),
+        lift=_ankle_height(target, target_to_upright)
+        - scale * _ankle_height(source, quat.inv(upright_to_source)),
     )
 
 
-def _limb_bones(
-    source: Skeleton, target: Skeleton, from_source: Array, to_target: Array
+def _limb_turns(
+    source: Skeleton, target: Skeleton, upright_to_source: Array, target_to_upright: Array
 ) -> dict[tuple[int, int], Array]:
-    """(target joint, source joint) of each limb bone -> its turn (4,), which makes the two bones parallel."""
-    a, b = rest_positions(target), rest_positions(source)
+    """(target joint, source joint) -> the turn (4,) that makes their bones parallel, for each limb bone.
+
+    The joints are those at the start of the bones. `Retarget` explains turns.
+    """
+    target_rest, source_rest = rest_positions(target), rest_positions(source)
     out = {}
     for side in SIDES:
         for start, end in LIMB_BONES.items():
@@ -121,24 +133,26 @@ def _limb_bones(
             if not all(role in s.roles for role in roles for s in (source, target)):
                 continue
             follower, leader = target.role(roles[0]), source.role(roles[0])
-            bone = quat.rotate(to_target, a[target.role(roles[1])] - a[follower])
-            source_bone = quat.rotate(quat.inv(from_source), b[source.role(roles[1])] - b[leader])
-            turn = quat.between(bone, source_bone)
-            out[follower, leader] = quat.mul(from_source, quat.mul(turn, to_target))
+            bone = target_rest[target.role(roles[1])] - target_rest[follower]
+            source_bone = source_rest[source.role(roles[1])] - source_rest[leader]
+            turn = quat.between(
+                quat.rotate(target_to_upright, bone), quat.rotate(quat.inv(upright_to_source), source_bone)
+            )
+            out[follower, leader] = quat.mul(upright_to_source, quat.mul(turn, target_to_upright))
     return out
 
 
 def _ankle_height(skeleton: Skeleton, to_upright: Array) -> float:
-    """Height of the ankles above the balls of the feet in the rest pose, in the skeleton's unit.
+    """Height of the ankles above the balls of the feet in the rest pose, cm; mean of both feet.
 
     to_upright: (4,) rotation that makes the rest pose stand along Y and face +Z.
     """
-    p = quat.rotate(to_upright, rest_positions(skeleton))[:, 1]
-    return float(np.mean([p[skeleton.role(f"{s}_heel")] - p[skeleton.role(f"{s}_toe")] for s in SIDES]))
+    y = quat.rotate(to_upright, rest_positions(skeleton))[:, 1]
+    return float(np.mean([y[skeleton.role(f"{s}_heel")] - y[skeleton.role(f"{s}_toe")] for s in SIDES]))
 
 
 def _drivers(target: Skeleton, joints: Array) -> tuple[Array, Array]:
-    """`drivers` and `driver_offsets` of a Retarget. Joints above the hips follow the hips."""
+    """`drivers` and `driver_offsets` of a Retarget. The driver of a joint above the hips is the hips."""
     rest, hips = rest_positions(target), target.role("hips")
     drivers = np.full(len(target.joints), hips)
     driver_offsets = np.zeros((len(target.joints), 3))
@@ -150,6 +164,7 @@ def _drivers(target: Skeleton, joints: Array) -> tuple[Array, Array]:
 
 
 def _levels(target: Skeleton, joints: Array, drivers: Array) -> tuple[Array, ...]:
+    """`levels` of a Retarget."""
     depth = {target.role("hips"): 0}
     for j in joints:
         if j not in depth:
@@ -158,43 +173,48 @@ def _levels(target: Skeleton, joints: Array, drivers: Array) -> tuple[Array, ...
 
 
 def retarget_clip(clip: Clip, how: Retarget) -> Clip:
-    """The clip's motion on the target skeleton."""
-    rotations = _carried(how, clip.global_rotations)
+    """The clip's motion on the target skeleton. how: what `plan` returns for the two skeletons."""
+    rotations = _follow_rotations(how, clip.global_rotations)
     for side in SIDES:
         heel, toe = (clip.positions[:, how.source.role(f"{side}_{part}")] for part in ("heel", "toe"))
-        joint, ball = how.target.role(f"{side}_heel"), how.target.role(f"{side}_toe")
-        foot = quat.rotate(rotations[:, joint], how.driver_offsets[ball])
+        ankle, ball = how.target.role(f"{side}_heel"), how.target.role(f"{side}_toe")
+        foot = quat.rotate(rotations[:, ankle], how.driver_offsets[ball])
         tilt = steady_heels(foot, heel * how.scale, toe * how.scale, clip.fps)
-        rotations[:, joint] = quat.mul(tilt, rotations[:, joint])
-    positions, rotations = _posed(how, clip.positions, rotations, clip.fps)
+        rotations[:, ankle] = quat.mul(tilt, rotations[:, ankle])
+    positions, rotations = _place_joints(how, clip.positions, rotations, clip.fps)
     local = quat.continuous(local_rotations(how.target, rotations))
     return Clip(clip.name, how.target, clip.fps, local, positions[:, 0])
 
 
 def retarget_pose(how: Retarget, positions: Array, rotations: Array) -> tuple[Array, Array]:
-    """Transfer poses to the target, such as the pose of a network in each frame of a game.
+    """Transfer single poses to the target, such as the pose of a network in each frame of a game.
 
-    positions: (..., J, 3) and rotations: (..., J, 4) of the source's joints in the world. Returns positions
-    and rotations of the target's joints in the world.
+    how: what `plan` returns. positions: (..., J, 3) cm and rotations: (..., J, 4) of the source's joints in
+    the world. Returns positions and rotations of the target's joints in the world, with the same shapes but
+    for the number of joints.
     """
-    return _posed(how, positions, _carried(how, rotations))
+    return _place_joints(how, positions, _follow_rotations(how, rotations))
 
 
-def _carried(how: Retarget, rotations: Array) -> Array:
-    """World rotations (..., J, 4) of the target. Only those of `how.joints` are set."""
+def _follow_rotations(how: Retarget, rotations: Array) -> Array:
+    """World rotations (..., J, 4) of the target, from those of the source. Only `how.joints` are set."""
     out = np.empty((*rotations.shape[:-2], len(how.target.joints), 4))
     out[..., how.joints, :] = quat.mul(rotations[..., how.follows, :], how.turns)
     return out
 
 
-def _posed(how: Retarget, source: Array, rotations: Array, fps: float | None = None) -> tuple[Array, Array]:
-    """World positions and rotations of the target's joints, with the feet at the source's scaled positions.
+def _place_joints(
+    how: Retarget, source: Array, rotations: Array, fps: float | None = None
+) -> tuple[Array, Array]:
+    """World positions and rotations of the target's joints.
 
-    source: (..., J, 3) world positions of the source's joints. rotations: (..., J, 4) as from `_carried`;
-    they are changed in place. fps: frame rate of successive frames, in which the hips come down smoothly, or
+    The balls of the feet are at the source's scaled positions, if the legs reach so far.
+
+    source: (..., J, 3) world positions of the source's joints. rotations: (..., J, 4) as `_follow_rotations`
+    returns them; they are changed in place. fps: frame rate of a clip, whose hips must come down smoothly; or
     None for single poses.
     """
-    hips = _hips(how, source, rotations)
+    hips = _hips_position(how, source, rotations)
     legs = [_Leg(how, source, rotations, hips, side) for side in SIDES]
     drop = np.max([leg.drop() for leg in legs], axis=0)
     drop = (drop if fps is None else _smoothed(drop, fps))[..., None] * [0.0, 1.0, 0.0]
@@ -216,22 +236,23 @@ def _posed(how: Retarget, source: Array, rotations: Array, fps: float | None = N
     return positions, rotations
 
 
-def _hips(how: Retarget, source: Array, rotations: Array) -> Array:
-    """Position of the hips that puts the middle between the legs at the source's scaled position.
+def _hips_position(how: Retarget, source: Array, rotations: Array) -> Array:
+    """(..., 3) position of the target's hips before they come down.
 
-    The legs and feet must fit; where the hips joint lies in the pelvis differs between skeletons.
+    It puts the middle between the target's hip joints where it is in the scaled source, raised by `how.lift`.
+    The hips joint itself is not compared, because skeletons have it at different places in the pelvis.
     """
     middle = 0.5 * sum(source[..., how.source.role(f"{side}_hip"), :] for side in SIDES)
-    arm = quat.rotate(rotations[..., how.target.role("hips"), :], how.pelvis)
-    return middle * how.scale + np.array([0.0, how.lift, 0.0]) - arm
+    to_middle = quat.rotate(rotations[..., how.target.role("hips"), :], how.pelvis)
+    return middle * how.scale + np.array([0.0, how.lift, 0.0]) - to_middle
 
 
 def _smoothed(drop: Array, fps: float) -> Array:
-    """A smooth curve (F,) that is nowhere below `drop`: a moving average of the running maximum of `drop`."""
+    """A smooth curve (F,) that is nowhere below `drop` (F,): a moving average of its running maximum."""
     reach = max(1, round(SMOOTH * fps))
     padded = np.pad(drop, 2 * reach, mode="edge")
     highest = np.lib.stride_tricks.sliding_window_view(padded, 2 * reach + 1).max(axis=-1)
-    window = np.hanning(2 * reach + 3)[1:-1]
+    window = np.hanning(2 * reach + 3)[1:-1]  # without the zeros at both ends
     return np.convolve(highest, window / window.sum(), mode="valid")
 
 
@@ -240,8 +261,9 @@ class _Leg:
 
     source: (..., J, 3) positions of the source's joints. rotations: (..., J, 4) of the target's joints; the
     method `bend` changes the rotations of thigh and shank. hips: (..., 3) position of the target's hips.
-    Attributes start and ankle: where the leg begins and where its ankle must be. stretch: distance from hip
-    to ankle in the source, as a share of the leg's length.
+    Attributes start, ankle: (..., 3) where the leg begins, and where its ankle must be so that the ball of
+    the foot is where the scaled source has it. stretch: (...) distance from hip to ankle in the source, as a
+    share of the leg's length.
     """
 
     def __init__(self, how: Retarget, source: Array, rotations: Array, hips: Array, side: str) -> None:
@@ -256,38 +278,42 @@ class _Leg:
             joint = above
         toe = source[..., how.source.role(roles[3]), :] * how.scale
         self.ankle = toe - quat.rotate(rotations[..., heel, :], how.driver_offsets[ball])
-        a, b, c = (source[..., how.source.role(role), :] for role in roles[:3])
-        length = np.linalg.norm(b - a, axis=-1) + np.linalg.norm(c - b, axis=-1)
-        self.stretch = np.linalg.norm(c - a, axis=-1) / length
+        hip_at, knee_at, heel_at = (source[..., how.source.role(role), :] for role in roles[:3])
+        length = np.linalg.norm(knee_at - hip_at, axis=-1) + np.linalg.norm(heel_at - knee_at, axis=-1)
+        self.stretch = np.linalg.norm(heel_at - hip_at, axis=-1) / length
 
     def drop(self) -> Array:
         """(...) cm by which the hips must come down for the leg to be no straighter than the source's."""
         reach = self.stretch * (np.linalg.norm(self.thigh) + np.linalg.norm(self.shank))
-        way = self.start - self.ankle
-        level = np.minimum(way[..., 0] ** 2 + way[..., 2] ** 2, reach**2)
-        need = np.maximum(way[..., 1] - np.sqrt(reach**2 - level), 0.0)
+        from_ankle = self.start - self.ankle
+        # After the drop, the hip is at most the distance `reach` from the ankle (Pythagoras).
+        level_squared = np.minimum(from_ankle[..., 0] ** 2 + from_ankle[..., 2] ** 2, reach**2)
+        need = np.maximum(from_ankle[..., 1] - np.sqrt(reach**2 - level_squared), 0.0)
         share = np.clip((self.stretch - BENT) / (NEARLY_STRAIGHT - BENT), 0.0, 1.0)
-        return np.minimum(need, MOST_DROP) * share * share * (3 - 2 * share)
+        return np.minimum(need, MOST_DROP) * share * share * (3 - 2 * share)  # smooth step from 0 to 1
 
     def bend(self, start: Array) -> None:
-        """Turn thigh and shank so that the ankle reaches its position. The foot keeps its rotation."""
+        """Turn thigh and shank so that the ankle reaches its position. The foot keeps its rotation.
+
+        start: (..., 3) where the leg begins after the hips came down.
+        """
         upper, lower = self.rotations[..., self.hip, :], self.rotations[..., self.knee, :]
         pole = _knee_direction(upper, lower, self.thigh, self.shank, self.forward)
         lengths = float(np.linalg.norm(self.thigh)), float(np.linalg.norm(self.shank))
-        middle, end = two_bone_knee(start, self.ankle, pole, *lengths)
-        self.rotations[..., self.hip, :] = aim(upper, self.thigh, middle - start)
-        self.rotations[..., self.knee, :] = aim(lower, self.shank, end - middle)
+        knee_at, ankle_at = two_bone_knee(start, self.ankle, pole, *lengths)
+        self.rotations[..., self.hip, :] = aim(upper, self.thigh, knee_at - start)
+        self.rotations[..., self.knee, :] = aim(lower, self.shank, ankle_at - knee_at)
 
 
 def _knee_direction(hip: Array, knee: Array, thigh: Array, shank: Array, ahead: Array) -> Array:
-    """(..., 3) direction in which the knee is off the line from hip to ankle; forward for a straight leg.
+    """(..., 3) direction from the line between hip and ankle to the knee; forward for a straight leg.
 
     hip, knee: (..., 4) rotations of these joints. thigh, shank: (3,) bones below them. ahead: (3,) forward in
     the rest pose.
     """
-    along = quat.rotate(hip, thigh)
-    line = along + quat.rotate(knee, shank)
+    to_knee = quat.rotate(hip, thigh)
+    line = to_knee + quat.rotate(knee, shank)
     line = line / np.linalg.norm(line, axis=-1, keepdims=True)
-    bend = along - line * np.sum(along * line, axis=-1, keepdims=True)
+    bend = to_knee - line * np.sum(to_knee * line, axis=-1, keepdims=True)
     straight = np.clip(STRAIGHT - np.linalg.norm(bend, axis=-1, keepdims=True), 0.0, None)
     return bend + straight * quat.rotate(hip, ahead)

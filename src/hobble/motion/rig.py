@@ -1,6 +1,7 @@
 """Identifies the rig of a BVH file, maps it to the target skeleton, and finds its unit.
 
-A rig is the skeleton in a BVH file. A known skeleton is one that has a file in `config/skeletons`.
+A rig is the skeleton in a BVH file. A known skeleton is one that has a file in `config/skeletons`. The target
+is the known skeleton to which clips are retargeted. A role is the body part of a joint, such as "left_knee".
 """
 
 from __future__ import annotations
@@ -22,16 +23,17 @@ from hobble.core.untrusted import printable, read_text, read_yaml
 from hobble.motion.check_rig_file import check_rig_file
 from hobble.motion.tree import path
 
-# Centimetres per unit of the file. The unit of CMU files is an inch / 0.45.
+# Name of a unit of length -> centimetres. The unit of CMU files is an inch / 0.45.
 UNITS = {"cm": 1.0, "inch": 2.54, "m": 100.0, "mm": 0.1, "CMU": 5.6444, "foot": 30.48}
 LEG = 80.0  # cm: length of thigh plus shank of an average adult
-KNOWN = 0.75  # a known skeleton is a clip's rig if it has at least this share of the clip's joint names
-# Finds the names of joints (and other keys) in the text of a skeleton file.
+KNOWN = 0.75  # a rig can be a known skeleton if that has at least this share of the rig's joint names
+# Finds the names of joints (and other indented keys) in the text of a skeleton file.
 NAME = re.compile(r"^ +['\"]?([^\s'\":{}][^'\":{}]*)['\"]?\s*:", re.MULTILINE)
-# Role at the end of a bone -> degrees. Two rest poses count as equal if no bone differs by more than this.
-LIKE = {"elbow": 20.0, "wrist": 25.0, "knee": 35.0, "heel": 35.0, "toe": 35.0}
+# Role at the end of a bone, without the side -> degrees. Two rest poses count as equal if no bone's direction
+# differs by more than this.
+MOST_APART = {"elbow": 20.0, "wrist": 25.0, "knee": 35.0, "heel": 35.0, "toe": 35.0}
 LEG_RANGE = (35.0, 125.0)  # cm: length of thigh plus shank, from small children to giants
-# Roles that every rig must have.
+# Roles that a rig must have if the known skeleton has them.
 LIMBS = ("shoulder", "hip", "knee", "heel", "toe")
 MANDATORY = ("hips", "head", *(f"{side}_{part}" for side in ("left", "right") for part in LIMBS))
 
@@ -40,7 +42,7 @@ MANDATORY = ("hips", "head", *(f"{side}_{part}" for side in ("left", "right") fo
 class TargetSkeleton:
     """A known skeleton, read from its file, with its maps to other skeletons.
 
-    maps: name of the other skeleton -> {joint of this one: joint of the other}.
+    maps: name of another skeleton -> {joint of this skeleton: joint of the other}.
     """
 
     skeleton: Skeleton
@@ -52,9 +54,9 @@ class RigMatch:
     """Which known skeleton a clip's rig is, and how it maps to the target.
 
     rig: name of the known skeleton, or "found" if the joints' roles were found without one. roles: role ->
-    the clip's joint. same: whether the clip has the target's own joints and an equal rest pose. sources: the
-    target's joint -> the clip's joint that it follows. alike: whether the clip's rest pose equals that of the
-    known skeleton.
+    name of the clip's joint. same: whether the clip has the target's own joints and an equal rest pose.
+    sources: name of a target joint -> name of the clip's joint that it follows. alike: whether the clip's
+    rest pose equals that of the known skeleton (as `rest_alike` compares them).
     """
 
     rig: str
@@ -69,14 +71,15 @@ def load_skeleton(path: str | Path, name: str | None = None) -> TargetSkeleton:
     if not Path(path).is_file():
         raise InputError(path, "no such skeleton file")
     state = Path(path).stat()
-    return _loaded(Path(path), name or Path(path).stem, state.st_mtime_ns, state.st_size)
+    return _load_cached(Path(path), name or Path(path).stem, state.st_mtime_ns, state.st_size)
 
 
 @lru_cache(maxsize=32)
-def _loaded(path: Path, name: str, changed: int, size: int) -> TargetSkeleton:
-    """Read a skeleton file.
+def _load_cached(path: Path, name: str, changed: int, size: int) -> TargetSkeleton:
+    """Read a skeleton file, or return what was read before.
 
-    The arguments `changed` and `size` make the cache read it again after a change.
+    changed, size: time of the last change and size of the file. They are part of the cache's key, so that a
+    changed file is read again.
     """
     data: Any = read_yaml(path)
     check_rig_file(path, data, read_text(path))
@@ -88,16 +91,16 @@ def _loaded(path: Path, name: str, changed: int, size: int) -> TargetSkeleton:
         raise InputError(path, f"not a skeleton file: {printable(error)}") from None
 
 
-def nearest(names: Collection[str], target: TargetSkeleton, folder: str | Path) -> TargetSkeleton:
+def nearest_skeleton(names: Collection[str], target: TargetSkeleton, folder: str | Path) -> TargetSkeleton:
     """The skeleton in `folder` that has the most of these joint names; the target if none has more.
 
-    A file whose text shows that it cannot have more of them is not parsed, because parsing YAML takes longer
-    than reading most clips.
+    A skeleton file is not parsed if its text shows that it has no more of these names, because parsing YAML
+    takes longer than reading most clips.
     """
     best, found = len(set(names) & set(target.skeleton.joints)), target
     for file in sorted(Path(folder).glob("*.yaml")):
-        written = set(NAME.findall(read_text(file)))
-        if file.stem == target.skeleton.name or len(set(names) & written) <= best:
+        in_text = set(NAME.findall(read_text(file)))
+        if file.stem == target.skeleton.name or len(set(names) & in_text) <= best:
             continue
         other = load_skeleton(file)
         if (shared := len(set(names) & set(other.skeleton.joints))) > best:
@@ -112,34 +115,37 @@ def clean_names(names: Sequence[str]) -> tuple[str, ...]:
 
 
 def find_hips(names: Sequence[str], target: TargetSkeleton, folder: str | Path) -> int:
-    """Index of a clip's hips. This is needed because some programs export a joint above the hips.
+    """Index of the hips among a clip's joints. It may not be 0, because some programs export a joint above.
 
-    The name of the hips is taken from the known skeleton that has the most of the clip's joint names. If the
-    clip has no joint of this name, its root counts as the hips. folder: the folder of the skeleton files.
+    names: of the clip's joints, the root first. folder: the folder of the skeleton files. The name of the
+    hips is taken from the known skeleton that has the most of the clip's joint names. If the clip has no
+    joint of this name, its root counts as the hips.
     """
     if names[0] == target.skeleton.roles["hips"]:
         return 0
-    hips = nearest(names, target, folder).skeleton.roles["hips"]
+    hips = nearest_skeleton(names, target, folder).skeleton.roles["hips"]
     return names.index(hips) if hips in names else 0
 
 
 def match_rig(rig: Skeleton, target: TargetSkeleton, folder: str | Path) -> RigMatch | None:
     """Find which known skeleton a clip's rig is, and how it maps to the target.
 
-    rig: the clip's skeleton. folder: the folder of the skeleton files. Returns None if no skeleton file has
-    the rig's joint names. If no map leads to the target, the match has roles but no sources.
+    rig: the clip's skeleton. folder: the folder of the skeleton files. Returns None if no known skeleton has
+    enough of the rig's joint names in the same hierarchy. The match has roles but no sources if no map leads
+    to the target, or if the rig has other joints between hips and head than the known skeleton.
     """
     if not _differences(rig, target.skeleton):
         roles = target.skeleton.roles
         alike = rest_alike(replace(rig, roles=roles), target.skeleton)
         itself = {name: name for name in target.skeleton.joints}
         return RigMatch(target.skeleton.name, roles, same=alike, sources=itself, alike=alike)
-    known = nearest(rig.joints, target, folder)
-    if _share_of_names(rig, known.skeleton) < KNOWN or _unfit(rig, known.skeleton):
+    known = nearest_skeleton(rig.joints, target, folder)
+    if _share_of_names(rig, known.skeleton) < KNOWN or _misfits(rig, known.skeleton):
         return None
-    roles = _roles(rig, known.skeleton)
-    if _trunk(rig, roles) != _trunk(known.skeleton, known.skeleton.roles):
-        # With fewer or more joints in the spine, names like Neck may mean other joints than in the file.
+    roles = _roles_in_rig(rig, known.skeleton)
+    if _trunk_joints(rig, roles) != _trunk_joints(known.skeleton, known.skeleton.roles):
+        # With another number of joints in the spine, a name such as Neck may mean another joint than in the
+        # skeleton file.
         return RigMatch(known.skeleton.name, roles, same=False, sources={}, alike=False)
     sources = {a: b for a, b in joint_pairs(known, target).items() if b in rig.joints}
     alike = rest_alike(replace(rig, roles=roles), known.skeleton)
@@ -147,27 +153,33 @@ def match_rig(rig: Skeleton, target: TargetSkeleton, folder: str | Path) -> RigM
 
 
 def rest_alike(rig: Skeleton, known: Skeleton) -> bool:
-    """Whether the bones of two rest poses have equal directions. Turned or mirrored bodies count as equal.
+    """Whether the limb bones of two rest poses have equal directions, to within MOST_APART.
 
-    A rig without toe joints (the balls of the feet) never counts as equal, because they have to be added.
+    Directions are measured along the body's own axes, so turned or mirrored bodies count as equal. A rig
+    without toe joints (the balls of the feet) never counts as equal, because these joints have to be added.
     """
     if "left_toe" not in rig.roles:
         return False
-    of_rig, of_known = (_bones(skeleton) for skeleton in (rig, known))
+    of_rig, of_known = (_bone_directions(skeleton) for skeleton in (rig, known))
     for bone, direction in of_known.items():
-        if bone in of_rig and of_rig[bone] @ direction < np.cos(np.radians(LIKE[bone[1].partition("_")[2]])):
+        if bone in of_rig and of_rig[bone] @ direction < np.cos(
+            np.radians(MOST_APART[bone[1].partition("_")[2]])
+        ):
             return False
     return True
 
 
-def _bones(skeleton: Skeleton) -> dict[tuple[str, str], Array]:
-    """(role, role) -> unit direction (3,) of the bone between them: to the body's left, up and forward."""
+def _bone_directions(skeleton: Skeleton) -> dict[tuple[str, str], Array]:
+    """(role at the start, role at the end) of each limb bone -> its unit direction (3,).
+
+    The components of a direction are along the body's left, up and forward.
+    """
     at = rest_positions(skeleton)
     place = {role: at[skeleton.role(role)] for role in skeleton.roles}
     left = place["left_hip"] - place["right_hip"] + place["left_shoulder"] - place["right_shoulder"]
     up = place["head"] - place["hips"]
     feet = sum(place[f"{side}_toe"] - place[f"{side}_heel"] for side in ("left", "right"))
-    axes: list[Array] = []
+    axes: list[Array] = []  # made orthonormal in this order (Gram-Schmidt)
     for axis in (left, up, feet):
         for other in axes:
             axis = axis - other * (axis @ other)
@@ -205,22 +217,23 @@ def _parent_names(skeleton: Skeleton) -> dict[str, str | None]:
     return {n: names[p] if p >= 0 else None for n, p in zip(names, skeleton.parents, strict=True)}
 
 
-def _roles(rig: Skeleton, known: Skeleton) -> dict[str, str]:
+def _roles_in_rig(rig: Skeleton, known: Skeleton) -> dict[str, str]:
+    """Role -> name of its joint, for those roles of a known skeleton whose joints the rig has."""
     return {role: joint for role, joint in known.roles.items() if joint in rig.joints}
 
 
-def _trunk(skeleton: Skeleton, roles: Mapping[str, str]) -> list[str]:
+def _trunk_joints(skeleton: Skeleton, roles: Mapping[str, str]) -> list[str]:
     """The names of the joints from the hips to the head."""
     ends = (skeleton.index(roles[role]) for role in ("hips", "head"))
     return [skeleton.joints[j] for j in path(skeleton.parents, *ends)]
 
 
-def _unfit(rig: Skeleton, known: Skeleton) -> list[str]:
+def _misfits(rig: Skeleton, known: Skeleton) -> list[str]:
     """Why a rig cannot be treated as a known skeleton, in words; empty if it can.
 
-    The rig may lack fingers or eyes, but no mandatory role. It may have unknown joints.
+    The rig may lack fingers or eyes, but no mandatory role. It may have joints that the skeleton lacks.
     """
-    roles = _roles(rig, known)
+    roles = _roles_in_rig(rig, known)
     needed = [role for role in MANDATORY if role in known.roles]
     missing = [f"joint {known.roles[role]} ({role}) is missing" for role in needed if role not in roles]
     in_rig, in_known = _common_parents(rig, known), _common_parents(known, rig)
@@ -241,7 +254,11 @@ def _common_parents(skeleton: Skeleton, other: Skeleton) -> dict[str, str | None
 
 
 def joint_pairs(source: TargetSkeleton, target: TargetSkeleton) -> dict[str, str]:
-    """Target joint -> source joint, by a map of one skeleton to the other, or by maps of both to a third."""
+    """Name of a target joint -> name of the source joint that it follows.
+
+    The pairs come from a map of one skeleton to the other, or from maps of both to a third skeleton. Without
+    such maps, the result is empty.
+    """
     source_name, target_name = source.skeleton.name, target.skeleton.name
     if source_name == target_name:
         return {name: name for name in target.skeleton.joints}
@@ -257,7 +274,7 @@ def joint_pairs(source: TargetSkeleton, target: TargetSkeleton) -> dict[str, str
 
 
 def _reverse(pairs: Mapping[str, str]) -> dict[str, str]:
-    """Invert a map. If several joints map to the same joint, the first of them in the file counts."""
+    """Invert a map. If several joints map to the same joint, the first of them in the map counts."""
     out: dict[str, str] = {}
     for a, b in pairs.items():
         out.setdefault(b, a)
@@ -265,14 +282,17 @@ def _reverse(pairs: Mapping[str, str]) -> dict[str, str]:
 
 
 def leg_length(skeleton: Skeleton, roles: Mapping[str, str] | None = None) -> float:
-    """Length of thigh and shank together, mean of both sides, in the skeleton's unit."""
+    """Length of thigh and shank together, mean of both sides, in the skeleton's unit.
+
+    roles: role -> name of its joint; by default the skeleton's own.
+    """
     roles = skeleton.roles if roles is None else roles
     bones = [skeleton.index(roles[f"{side}_{end}"]) for side in ("left", "right") for end in ("knee", "heel")]
     return float(np.linalg.norm(skeleton.offsets[bones], axis=-1).sum() / 2)
 
 
 def missing_bone(skeleton: Skeleton) -> str | None:
-    """The first leg bone without length, such as "LeftUpLeg to LeftLeg", or None."""
+    """The first leg bone without length, such as "LeftUpLeg to LeftLeg"; None if all have a length."""
     for side in ("left", "right"):
         for start, end in (("hip", "knee"), ("knee", "heel")):
             a, b = (skeleton.roles[f"{side}_{part}"] for part in (start, end))
@@ -282,9 +302,10 @@ def missing_bone(skeleton: Skeleton) -> str | None:
 
 
 def unit_of(leg: float) -> tuple[float, str] | None:
-    """The unit in which a leg of length `leg` is nearest to an adult's: (centimetres per unit, name).
+    """The likely unit of a file: centimetres per unit, and the name of the unit.
 
-    None if no unit gives a leg within LEG_RANGE.
+    leg: length of thigh plus shank in the file's unit. The unit is the one that brings this length
+    nearest to LEG. None if it is not within LEG_RANGE even then.
     """
     if leg <= 0:
         return None

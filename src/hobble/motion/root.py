@@ -1,8 +1,8 @@
-"""The root frame: position and facing direction of the character, and coordinates relative to it.
+"""Computes the root of each frame: where the character is and where it faces. Converts to root coordinates.
 
 The formulas are those of the original pipeline (Holden, Komura, Saito 2017). The root is on the ground below
-the hips. Its Z axis is the facing direction, its X axis the character's left. "World to root" converts a
-world vector to root coordinates.
+the hips. Its Z axis is the facing direction, its X axis points to the character's left. A rotation "world to
+root" converts a world vector to root coordinates.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from hobble.core.quat import Array
 from hobble.core.skeleton import Skeleton
 from hobble.core.smooth import gaussian
 
-STEADY = 10  # frames at 60 Hz whose median velocity continues the root past the ends of its clip
+STEADY = 10  # frames at 60 Hz; their median velocity continues the root beyond an end of the clip
 
 
 @dataclass(frozen=True)
@@ -27,7 +27,7 @@ class RootFrames:
     position: (F, 2) x and z of the hips, cm, not smoothed. direction: (F, 3) unit facing direction,
     horizontal, smoothed. rotation: (F, 4) world to root: the rotation about Y that takes `direction` to +Z.
     turn: (F - 1,) radians by which the world turns, seen from the root, from each frame to the next. The root
-    itself turns by the negative. The network's output has the sign of `turn`.
+    itself turns by the same angle in the other direction. The network predicts `turn` with this sign.
     """
 
     position: Array = field(repr=False)
@@ -40,7 +40,10 @@ class RootFrames:
 
 
 def across_body(skeleton: Skeleton, positions: Array) -> Array:
-    """Unit vectors (..., 3) from right to left, through shoulders and hips. positions: (..., J, 3)."""
+    """Unit vectors (..., 3) from the body's right to its left: the mean over shoulders and hips.
+
+    positions: (..., J, 3) of the joints.
+    """
     shoulders = (
         positions[..., skeleton.role("left_shoulder"), :] - positions[..., skeleton.role("right_shoulder"), :]
     )
@@ -52,8 +55,9 @@ def across_body(skeleton: Skeleton, positions: Array) -> Array:
 def facing(skeleton: Skeleton, positions: Array, sigma: float) -> Array:
     """Facing direction (F, 3), unit and horizontal, of joint positions (F, J, 3).
 
-    It is the cross product of `across_body` and up, smoothed over time by a Gaussian of `sigma` frames and
-    normalised again. The smoothing continues the clip past its ends with the first and last frame.
+    It is the cross product of `across_body` and up, smoothed over time by a Gaussian and normalised again.
+    Beyond the ends of the clip, the smoothing uses its first and last frame. sigma: standard deviation of the
+    Gaussian in frames; 0 for no smoothing.
     """
     forward = np.cross(across_body(skeleton, positions), [0.0, 1.0, 0.0])
     if sigma > 0:
@@ -62,7 +66,7 @@ def facing(skeleton: Skeleton, positions: Array, sigma: float) -> Array:
 
 
 def root_frames(clip: Clip, sigma: float) -> RootFrames:
-    """The root of every frame of a clip. sigma: of `facing`, in frames of the clip (20 at 60 Hz)."""
+    """The root of every frame of a clip. sigma: as for `facing`; usually 20 frames at 60 Hz."""
     direction = facing(clip.skeleton, clip.positions, sigma)
     rotation = quat.yaw(-np.arctan2(direction[:, 0], direction[:, 2]))
     change = quat.rotate(quat.mul(rotation[1:], quat.inv(rotation[:-1])), np.array([0.0, 0.0, 1.0]))
@@ -71,17 +75,17 @@ def root_frames(clip: Clip, sigma: float) -> RootFrames:
     return RootFrames(clip.positions[:, hips][:, [0, 2]], direction, rotation, turn)
 
 
-def continued(root: RootFrames, frames: int) -> RootFrames:
+def extend_root(root: RootFrames, frames: int) -> RootFrames:
     """The root, continued by `frames` frames at each end of the clip.
 
-    It goes straight on, with the smoothed facing direction at that end and the median velocity of the nearest
-    STEADY frames. Frame i of the clip is frame i + `frames` of the result. On walks of the CMU database, a
-    path that is continued in this way for half a second ends 11 cm off the captured path.
+    It goes straight on, with the facing direction at that end and the median velocity of the nearest STEADY
+    frames. Frame i of the clip is frame i + `frames` of the result. On walks of the CMU database, a path that
+    is continued in this way for half a second ends 11 cm off the captured path.
     """
     steps = np.diff(root.position, axis=0) if len(root) > 1 else np.zeros((1, 2))
-    n = np.arange(1, frames + 1)[:, None]
-    before = root.position[0] - n[::-1] * np.median(steps[:STEADY], axis=0)
-    after = root.position[-1] + n * np.median(steps[-STEADY:], axis=0)
+    distance = np.arange(1, frames + 1)[:, None]  # frames from the end of the clip
+    before = root.position[0] - distance[::-1] * np.median(steps[:STEADY], axis=0)
+    after = root.position[-1] + distance * np.median(steps[-STEADY:], axis=0)
 
     def repeat_ends(values: Array) -> Array:
         return np.pad(values, ((frames, frames), (0, 0)), mode="edge")
@@ -95,44 +99,56 @@ def continued(root: RootFrames, frames: int) -> RootFrames:
 
 
 def points_to_root(root: RootFrames, points: Array, frames: Array | slice | None = None) -> Array:
-    """World points (N, ..., 3), cm, in the root coordinates of N `frames` (by default all frames).
+    """World points (N, ..., 3), cm, in root coordinates.
 
-    Heights stay relative to the world's zero.
+    frames: the N frames whose roots are used, point by point; by default all frames. Heights stay relative to
+    the world's zero.
     """
     at = slice(None) if frames is None else frames
-    position, _ = _for_broadcast(root, at, points)
+    position, _ = _roots_to_broadcast(root, at, points)
     origin = np.zeros((*position.shape[:-1], 3))
     origin[..., [0, 2]] = position
     return vectors_to_root(root, points - origin, at)
 
 
 def vectors_to_root(root: RootFrames, vectors: Array, frames: Array | slice | None = None) -> Array:
-    """World vectors (N, ..., 3), such as velocities and directions, in the root coordinates of `frames`."""
-    _, rotation = _for_broadcast(root, slice(None) if frames is None else frames, vectors)
+    """World vectors (N, ..., 3), such as velocities and directions, in root coordinates.
+
+    frames: as for `points_to_root`.
+    """
+    _, rotation = _roots_to_broadcast(root, slice(None) if frames is None else frames, vectors)
     return quat.rotate(rotation, vectors)
 
 
 def rotations_to_root(root: RootFrames, rotations: Array, frames: Array | slice | None = None) -> Array:
-    """World rotations (N, ..., 4) as rotations (N, ..., 4) relative to the roots of `frames`."""
-    _, turn = _for_broadcast(root, slice(None) if frames is None else frames, rotations)
-    return quat.mul(np.broadcast_to(turn, rotations.shape), rotations)
+    """World rotations (N, ..., 4) as rotations (N, ..., 4) relative to the root.
+
+    frames: as for `points_to_root`.
+    """
+    _, to_root = _roots_to_broadcast(root, slice(None) if frames is None else frames, rotations)
+    return quat.mul(np.broadcast_to(to_root, rotations.shape), rotations)
 
 
 def local_pose(clip: Clip, root: RootFrames) -> tuple[Array, Array, Array]:
     """The pose as the network sees it, for the frames 0 .. F-2.
 
+    The last frame is left out, because it has no velocity to a next frame.
+
     Returns positions (F-1, J, 3) in cm, velocities (F-1, J, 3) in cm a frame, and rotations (F-1, J, 3) as
-    axis times half the angle. All are in the root coordinates of their frame.
+    axis times half the angle in radians. All are in the root coordinates of their frame.
     """
-    n = slice(0, len(clip) - 1)
-    positions = points_to_root(root, clip.positions[n], n)
-    velocities = vectors_to_root(root, np.diff(clip.positions, axis=0), n)
-    rotations = quat.log(rotations_to_root(root, clip.global_rotations[n], n))
+    frames = slice(0, len(clip) - 1)
+    positions = points_to_root(root, clip.positions[frames], frames)
+    velocities = vectors_to_root(root, np.diff(clip.positions, axis=0), frames)
+    rotations = quat.log(rotations_to_root(root, clip.global_rotations[frames], frames))
     return positions, velocities, rotations
 
 
-def _for_broadcast(root: RootFrames, frames: Array | slice, values: Array) -> tuple[Array, Array]:
-    """Position and rotation of the chosen roots, with axes added to broadcast with `values` (N, ..., k)."""
+def _roots_to_broadcast(root: RootFrames, frames: Array | slice, values: Array) -> tuple[Array, Array]:
+    """Position (N, 1, ..., 2) and rotation (N, 1, ..., 4) of the roots of N frames.
+
+    They have as many axes as `values` (N, ..., k), so that they broadcast with them.
+    """
     position, rotation = root.position[frames], root.rotation[frames]
     between = (1,) * (values.ndim - 2)
     return (

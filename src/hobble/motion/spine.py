@@ -1,4 +1,4 @@
-"""The shape of trunk and neck in a standing rest pose."""
+"""Describes the shape of trunk and neck in a standing rest pose."""
 
 from __future__ import annotations
 
@@ -13,15 +13,15 @@ from hobble.motion.axes import rest_frame
 from hobble.motion.body import REACH, Body
 from hobble.motion.orient import unit
 
-SHORT = 2.0  # cm: a bone shorter than this has no direction
+SHORT = 2.0  # cm: a bone shorter than this does not show a direction
 
 
 @dataclass(frozen=True)
 class Spine:
     """The points where trunk and neck may bend, in a rest pose that stands facing +Z.
 
-    shares: (N,) position of each point along the body, where hips are at 0, chest at 1 and head at 2. points:
-    (N, 3) cm.
+    These are joints. A joint less than SHORT above the one before it is left out. points: (N, 3) cm, from the
+    hips up. shares: (N,) position of each point along the body: 0 at the hips, 1 at the chest, 2 at the head.
     """
 
     shares: Array
@@ -29,34 +29,36 @@ class Spine:
 
     @classmethod
     def of(cls, skeleton: Skeleton, body: Body) -> Spine:
-        """The spine of a skeleton with a standing rest pose. body: its joints.
+        """The spine of a skeleton with a standing rest pose. body: which joint is which part.
 
-        When a rig gets a new rest pose, the bones of its trunk and neck get the directions of this spine.
+        The skeleton is the target of retargeting. In the new rest pose of another rig, the bones of trunk and
+        neck get the directions of this spine.
         """
         rest = quat.rotate(quat.inv(rest_frame(skeleton)), rest_positions(skeleton))
         chain = (body.hips, *body.trunk, *body.neck, body.head)
         places = rest[list(chain)]
         lengths = np.linalg.norm(np.diff(places, axis=0), axis=-1)
-        long = [0, *(k for k, length in enumerate(lengths, 1) if length > SHORT)]
-        return cls(spine_shares(lengths, body.trunk_bones)[long], places[long])
+        used = [0, *(k for k, length in enumerate(lengths, 1) if length > SHORT)]
+        return cls(spine_shares(lengths, body.trunk_bones)[used], places[used])
 
     def direction(self, start: float, end: float) -> Array:
-        """(3,) direction of a bone between two positions along the body, `start` and `end` (see `shares`).
+        """(3,) unit direction that a bone of another rig gets from this spine.
 
-        The bone is of another rig. If that rig has fewer joints, one of its bones may span several bones of
-        this spine.
+        start, end: positions along the body between which the bone lies, counted like `shares`. If the rig
+        has fewer joints, one of its bones may span several bones of this spine.
         """
-        chest, first = int(np.searchsorted(self.shares, 1.0 - 1e-6)), self._bone(start)
-        last = min(self._below(end), chest if end <= 1 else len(self.shares) - 1)
+        chest, first = int(np.searchsorted(self.shares, 1.0 - 1e-6)), self._first_point(start)
+        # A bone that ends at the chest or below does not reach into the neck.
+        last = min(self._last_point(end), chest if end <= 1 else len(self.shares) - 1)
         return unit(self.points[max(last, first + 1)] - self.points[first])
 
-    def end(self, start: float) -> float:
-        """Position along the body at which the bone from `start` ends in this spine."""
-        return float(self.shares[self._bone(start) + 1])
+    def bone_end(self, start: float) -> float:
+        """Position along the body of the upper end of a bone of this spine. start: that of its lower end."""
+        return float(self.shares[self._first_point(start) + 1])
 
     @property
-    def neck(self) -> Array:
-        """(3,) direction from the chest to the next joint above: the neck, or the head if it has none."""
+    def neck_direction(self) -> Array:
+        """(3,) unit direction from the chest to the next point: the neck, or the head if there is no neck."""
         chest = min(int(np.searchsorted(self.shares, 1.0 - 1e-6)), len(self.shares) - 2)
         return unit(self.points[chest + 1] - self.points[chest])
 
@@ -65,26 +67,26 @@ class Spine:
         """Whether there is a point between chest and head."""
         return bool(((self.shares > 1.0 + 1e-6) & (self.shares < 2.0 - 1e-6)).any())
 
-    def _bone(self, start: float) -> int:
+    def _first_point(self, start: float) -> int:
         """Index of the point at which the bone from position `start` along the body begins."""
         chest = int(np.searchsorted(self.shares, 1.0 - 1e-6))
-        return max(min(self._below(start), chest - 1 if start < 1 else len(self.shares) - 2), 0)
+        return max(min(self._last_point(start), chest - 1 if start < 1 else len(self.shares) - 2), 0)
 
-    def _below(self, share: float) -> int:
+    def _last_point(self, share: float) -> int:
         """Index of the highest point that is at most REACH above the position `share` along the body."""
         return int(np.searchsorted(self.shares, share + REACH, side="right")) - 1
 
 
-def spine_shares(lengths: Array, trunk: int) -> Array:
-    """(N,) position of each joint along the body, where hips are at 0, chest at 1 and head at 2.
+def spine_shares(lengths: Array, trunk_bones: int) -> Array:
+    """(N,) position of each joint along the body: 0 at the hips, 1 at the chest, 2 at the head.
 
-    lengths: (N-1,) of the bones from the hips through trunk and neck to the head. trunk: number of bones of
-    the trunk, the last of which ends at the chest.
+    lengths: (N-1,) of the bones from the hips through trunk and neck to the head. trunk_bones: how many of
+    them belong to the trunk. The last of these ends at the chest.
     """
-    way = np.concatenate([[0.0], np.cumsum(lengths)])
-    below, above = way[: trunk + 1], way[trunk:] - way[trunk]
+    distances = np.concatenate([[0.0], np.cumsum(lengths)])  # from the hips, along the bones
+    below, above = distances[: trunk_bones + 1], distances[trunk_bones:] - distances[trunk_bones]
     shares = np.concatenate(
         [below[:-1] / max(float(below[-1]), 1e-9), 1.0 + above / max(float(above[-1]), 1e-9)]
     )
-    shares[0] = 0.0
+    shares[0] = 0.0  # also if the hips carry the arms and are the chest
     return shares

@@ -1,4 +1,4 @@
-"""The build of the skeleton to which a motion will be retargeted: spine, slope of the feet, limbs."""
+"""Measures the build of the skeleton to which a motion will be retargeted: spine, tilt of the feet, limbs."""
 
 from __future__ import annotations
 
@@ -14,8 +14,8 @@ from hobble.motion.axes import rest_frame
 from hobble.motion.body import SIDES, Body
 from hobble.motion.spine import Spine
 
-# A rig has the target's proportions if rig / target is the same for the lengths of all limb bones, to within
-# this share.
+# A rig has the target's proportions if length in the rig / length in the target is the same for all limb
+# bones. The largest of these quotients may exceed the smallest by less than this share.
 SAME = 0.01
 
 
@@ -23,8 +23,9 @@ SAME = 0.01
 class TargetBuild:
     """The build of a skeleton with a standing rest pose.
 
-    spine: the shape of its trunk in that pose. tilt: radians by which the bones from ankle to ball point
-    below the horizontal, mean of both feet. limbs: (B,) lengths of `limb_bones`, cm.
+    spine: the shape of its trunk and neck in that pose. tilt: angle in radians by which the bone from ankle
+    to ball of the foot points below the horizontal, mean of both feet. limbs: (B,) lengths of the B bones
+    that `limb_bones` returns, cm.
     """
 
     spine: Spine
@@ -33,7 +34,7 @@ class TargetBuild:
 
     @classmethod
     def of(cls, skeleton: Skeleton, body: Body) -> TargetBuild:
-        """The build of a skeleton. body: its joints."""
+        """The build of a skeleton. body: which joint is which part."""
         rest = quat.rotate(quat.inv(rest_frame(skeleton)), rest_positions(skeleton))
         feet = np.array([rest[toe] - rest[heel] for *_, heel, toe in body.legs.values() if toe is not None])
         tilt = float(np.mean(np.arctan2(-feet[:, 1], np.linalg.norm(feet[:, [0, 2]], axis=-1))))
@@ -41,7 +42,10 @@ class TargetBuild:
         return cls(Spine.of(skeleton, body), tilt, limbs)
 
     def is_built_like(self, limbs: Array) -> bool:
-        """Whether a rig has these proportions. limbs: lengths of the rig's `limb_bones`, in any unit."""
+        """Whether a rig has the proportions of this build.
+
+        limbs: lengths of the bones that `limb_bones` returns for the rig, in any unit.
+        """
         if len(limbs) != len(self.limbs):
             return False
         quotients = np.maximum(limbs, 1e-9) / self.limbs
@@ -49,7 +53,10 @@ class TargetBuild:
 
 
 def limb_bones(body: Body) -> list[tuple[int, int]]:
-    """The bones of legs, feet and arms as pairs of joints. A foot without a joint at its ball is left out."""
+    """The bones of legs, feet and arms, as pairs (joint at the start, joint at the end).
+
+    Clavicles are left out, and feet without a joint at the ball.
+    """
     bones: list[tuple[int, int]] = []
     for side in SIDES:
         for limb in (body.legs[side], body.arms[side][1:]):

@@ -26,7 +26,7 @@ from hobble.motion.from_motion import find_bends, frames_from_motion, trunk_fram
 from hobble.motion.from_rest import TRUSTED, frames_from_rest, use_zero_pose, zero_doubt
 from hobble.motion.no_neck import lean_doubt
 from hobble.motion.orient import degrees_between, mean_rotation, pointed_along
-from hobble.motion.rebase import rebased
+from hobble.motion.rebase import with_new_rest_pose
 from hobble.motion.spine import SHORT
 from hobble.motion.standing import why_not_standing
 from hobble.motion.target_build import TargetBuild
@@ -100,7 +100,7 @@ def with_upright_rest(
     clip, body = with_balls(clip, body, axes)
     roles = body.roles(clip.skeleton.joints)
     clip, body = with_split_joints(clip, body, axes, find_bends(trunk))
-    clip, body = rebased(clip, body, [*body.joints, *kept], axes, roles)
+    clip, body = with_new_rest_pose(clip, body, [*body.joints, *kept], axes, roles)
     notes = [doubt for doubt in doubts if doubt]
     return UprightMotion(clip, body, rest_source, notes, height_error(sample, problem is None))
 

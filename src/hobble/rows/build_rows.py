@@ -14,7 +14,14 @@ from hobble.channels import channel
 from hobble.core.clip import Clip
 from hobble.core.errors import InputError
 from hobble.core.quat import Array
-from hobble.motion.root import RootFrames, continued, local_pose, points_to_root, root_frames, vectors_to_root
+from hobble.motion.root import (
+    RootFrames,
+    extend_root,
+    local_pose,
+    points_to_root,
+    root_frames,
+    vectors_to_root,
+)
 from hobble.rows.clip_rows import ClipRows
 from hobble.rows.layout import RowLayout
 
@@ -51,7 +58,7 @@ def clip_rows(
     frame, cycle = cycle_frames(labels["cycles"])
     _check(name, clip, labels, channels, terrain, frame)
     root = root_frames(clip, facing_sigma)
-    path, here = continued(root, window), frame + window
+    path, here = extend_root(root, window), frame + window
     x, y = _columns(labels, layout, frame, (path, here), root, local_pose(clip, root), skeleton.role("hips"))
     centre = terrain["heights"][:, layout.samples : 2 * layout.samples]
     mean = centre.mean(axis=1, dtype=np.float64)

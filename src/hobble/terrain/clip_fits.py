@@ -18,7 +18,7 @@ from hobble.core.clip import Clip
 from hobble.core.errors import InputError
 from hobble.core.files import save_npz
 from hobble.core.quat import Array
-from hobble.motion.root import RootFrames, continued, root_frames
+from hobble.motion.root import RootFrames, extend_root, root_frames
 from hobble.terrain.cycle_ground import Ground, fit_cycle, flat_ground
 from hobble.terrain.fit_picture import FitPicture, picture_cycles, picture_of
 from hobble.terrain.options import Fitting, HeightSampling
@@ -77,7 +77,7 @@ def clip_fits(
             "terrain.patches",
             f"{len(patches)} patches are fewer than the {options.fits} fits of a cycle",
         )
-    root = continued(root_frames(clip, sampling.facing_sigma), window)
+    root = extend_root(root_frames(clip, sampling.facing_sigma), window)
     samples = sample_points(root, sampling.terrain_side)
     feet = _standing_feet(clip, contacts, cycles, window, ground == "flat", options)
     offsets = np.arange(-window, window, sampling.step)
