@@ -147,7 +147,7 @@ def _load_unknown_rig(
     unit, unit_name = _unit(file.path, _leg_length(raw, body), options.unit)
     rig = replace(rig, roles=body.roles(rig.joints))
     clip = _scaled(file, rig, decoded, unit, options)
-    standing = why_not_standing(body, rest_positions(rig)) is None
+    standing = why_not_standing(body, rest_positions(clip.skeleton)) is None
     if not standing and on_four_legs(body, raw.positions):
         raise InputError(
             file.path, "the figure goes on four legs", fix="Only clips of figures with two legs can be used."
