@@ -6,7 +6,7 @@ import numpy as np
 
 from hobble.core import quat
 from hobble.core.skeleton import Skeleton, forward_kinematics
-from hobble.runtime.feet import carried, knees_ahead, leg_joints, place_feet
+from hobble.runtime.feet import foot_parts, knees_ahead, leg_joints, place_feet
 
 
 def crouched(skeleton: Skeleton, thigh: float = 0.5, knee: float = 0.9) -> tuple[np.ndarray, np.ndarray]:
@@ -24,7 +24,7 @@ class Feet:
 
     def __init__(self, skeleton: Skeleton, *bent: float) -> None:
         self.legs = leg_joints(skeleton)
-        self.below = carried(skeleton, self.legs)
+        self.below = foot_parts(skeleton, self.legs)
         self.lock, self.hold, self.lift = np.zeros((1, 2)), np.zeros((1, 2, 2)), np.zeros((1, 2))
         self.step, self.missed = np.zeros((1, 2)), np.zeros((1, 2))
         self.added = np.tile([1.0, 0, 0, 0], (1, 2, 2, 1))

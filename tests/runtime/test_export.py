@@ -16,7 +16,7 @@ from hobble.runtime import ProceduralAnimation
 from hobble.runtime.export import export_bvh, fitted_skeleton, motion_clip
 from hobble.runtime.feet import leg_joints
 from hobble.runtime.options import Runtime
-from hobble.runtime.scenarios import generate, scenarios, swept
+from hobble.runtime.scenarios import generate, scenarios, swept_columns
 
 
 def motion(skeleton, frames: int = 20) -> tuple[np.ndarray, np.ndarray]:
@@ -119,19 +119,19 @@ def test_every_scenario_is_written(tmp_path: Path, hurtable) -> None:
 
 
 def test_each_scenario_hurts_its_link(hurtable, network) -> None:
-    assert {name: link for name, (_, link) in swept(hurtable).items()} == {
+    assert {name: link for name, (_, link) in swept_columns(hurtable).items()} == {
         "left_knee": "LeftUpLeg-LeftLeg",
         "right_knee": "RightUpLeg-RightLeg",
         "left_ankle": "LeftLeg-LeftFoot",
         "lower_back": "Hips-LowerBack",
         "left_arm": "LeftArm-LeftForeArm",
     }
-    assert swept(network) == {}
+    assert swept_columns(network) == {}
     mean = np.zeros_like(hurtable.x_mean)
     mean[hurtable.layout.x_channel("injury").start + hurtable.channels["injury"].index("LowerBack-Spine")] = (
         0.1
     )
-    trained = {name: link for name, (_, link) in swept(replace(hurtable, x_mean=mean)).items()}
+    trained = {name: link for name, (_, link) in swept_columns(replace(hurtable, x_mean=mean)).items()}
     assert trained["lower_back"] == "LowerBack-Spine"
     assert trained["left_knee"] == "LeftUpLeg-LeftLeg"
     assert len(scenarios(hurtable)) == len(scenarios(network)) + 5

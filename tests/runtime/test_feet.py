@@ -17,8 +17,8 @@ from hobble.runtime.feet import (
     FOOT,
     STRETCH,
     TOES,
-    carried,
     carry_body,
+    foot_parts,
     knees_ahead,
     leg_joints,
 )
@@ -65,7 +65,7 @@ def test_a_held_foot_ahead_of_the_body_stays_flat(holden31: Skeleton) -> None:
 
 
 def test_a_foot_moves_the_joints_below_it(holden31: Skeleton) -> None:
-    below = carried(holden31, leg_joints(holden31))
+    below = foot_parts(holden31, leg_joints(holden31))
     names = [[holden31.joints[j] for j in np.flatnonzero(row == TOES)] for row in below]
     assert names == [["LeftToeBase"], ["RightToeBase"]]
     assert not (below == FOOT).any()
@@ -134,7 +134,7 @@ def test_standing_feet_raise_and_lower_the_body(holden31: Skeleton) -> None:
         lift = np.zeros(1)
         for _ in range(80):
             position = base[None].copy()
-            both = legs, carried(holden31, legs), sole, knees_ahead(holden31), far
+            both = legs, foot_parts(holden31, legs), sole, knees_ahead(holden31), far
             carry_body(np.array([contacts], np.float32), ground, hips, (low, high), both, lift, position)
         moved = position[0] - base
         np.testing.assert_allclose(moved[:, 1], moved[0, 1], atol=1e-12)

@@ -47,7 +47,7 @@ def playable(network: Network, runtime: Runtime) -> dict[str, Any]:
     inputs = np.flatnonzero(scale > NO_EFFECT)
     legs = feet.leg_joints(skeleton)
     sole = feet.sole_heights(network, legs).tolist()
-    carried = feet.carried(skeleton, legs)
+    parts = feet.foot_parts(skeleton, legs)
     return {
         "network": {"kind": network.kind, **network.page(inputs, outputs)},
         "recordedPoses": network.recorded_poses,
@@ -72,8 +72,8 @@ def playable(network: Network, runtime: Runtime) -> dict[str, Any]:
         "channels": shown_channels(network, runtime),
         "legs": legs.tolist(),
         "ahead": feet.knees_ahead(skeleton).tolist(),
-        "carried": [np.flatnonzero(row).tolist() for row in carried],
-        "toes": [np.flatnonzero(row == feet.TOES).tolist() for row in carried],
+        "carried": [np.flatnonzero(row).tolist() for row in parts],
+        "toes": [np.flatnonzero(row == feet.TOES).tolist() for row in parts],
         "sole": sole,
         "body": mesh_key(skeleton),
         "footLocking": runtime.foot_locking,

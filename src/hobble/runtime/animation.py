@@ -256,7 +256,7 @@ class ProceduralAnimation:
             for columns, values in targets:
                 self.state.channel_targets[:, columns] = values
             if self._limited:
-                self._limiter.hold(self.state.channel_values, velocity, shares)
+                self._limiter.limit(self.state.channel_values, velocity, shares)
             controller.frame((velocity, direction, strafe, shares), self._terrain[1])
         except BaseException:
             if before is not None:  # on flat ground nothing in a frame can fail

@@ -1,4 +1,8 @@
-"""A character's state between frames: pose, trajectory, phase, targets, channel values, feet."""
+"""A character's state between frames: pose, trajectory, phase, targets, channel values, feet.
+
+A channel is a group of network inputs that tell how hurt or how sad the body is. In a healthy character the
+values of all channels are 0.
+"""
 
 from __future__ import annotations
 
@@ -10,26 +14,28 @@ from hobble.core import quat
 from hobble.core.quat import Array
 from hobble.models.network import Network
 
-SHOWN = ("knee", "heel", "toe")  # the joints of `leg_shown`
+SHOWN_JOINTS = ("knee", "heel", "toe")  # the joints of each leg in `Character.leg_shown`, in this order
 
 
 @dataclass
 class Character:
     """The state of C characters, changed in place by the controller. World axes, cm, velocities per frame.
 
-    position, direction: (C, T, 2) x and z of the trajectory; gait: (C, T, 6) shares; T frames, of which frame
-    T/2 is the present one.
-    ground: (C, samples, 3) heights left of, on and right of the path; root_height: (C,) mean height on it.
-    joint_position, joint_velocity: (C, J, 3); joint_rotation: (C, J, 4) world: the predicted pose, with
-    limited turns of the joints, before feet are placed.
-    phase: (C,). channel_values, channel_targets: (C, K) present and target values of all channels' columns.
-    smoothed_velocity, smoothed_direction: (C, 2); strafe: (C,); correction: (C, 2): the smoothed target, see
+    position, direction: (C, T, 2) x and z of the trajectory and of the facing along it. gait: (C, T, 6)
+    shares of the gaits. The trajectory has T frames, and frame T/2 is the present one.
+    ground: (C, samples, 3) ground heights left of the path, on it and right of it. root_height: (C,) mean
+    ground height on the path.
+    joint_position, joint_velocity (C, J, 3), joint_rotation (C, J, 4), in the world: the pose before foot
+    placement. Joints follow the prediction, but move and turn by a limited amount in a frame.
+    phase: (C,) cycles, 0 to 1. channel_values, channel_targets: (C, K) present and target values of the K
+    columns of all channels.
+    smoothed_velocity, smoothed_direction (C, 2), strafe (C,), correction (C, 2): the smoothed target, see
     `Smoothed` in `hobble.runtime.trajectory`.
-    foot_lock (C, 2), foot_hold (C, 2, 2), foot_step (C, 2), foot_missed (C, 2): see `Hold` in
-    `hobble.runtime.foot_lock`.
-    foot_lift (C, 2), foot_added (C, 2, 2, 4), leg_shown (C, 2, 3, 3), body_lift (C,): see `Feet` in
-    `hobble.runtime.feet`.
-    placed: (C,) whether the joints have been lifted to the ground at the start.
+    foot_lock (C, 2), foot_hold (C, 2, 2), foot_step (C, 2), foot_missed (C, 2): where and how firmly feet are
+    held, see `Hold` in `hobble.runtime.foot_lock`.
+    foot_lift (C, 2), foot_added (C, 2, 2, 4), leg_shown (C, 2, 3, 3), body_lift (C,): the rest of foot
+    placement, see `Feet` and `carry_body` in `hobble.runtime.feet`.
+    placed: (C,) bool, whether the joints have been lifted to the ground, which happens once, at the start.
     memory: (C, M) the network's own state of the character, see `Network.memory`.
     """
 
@@ -65,50 +71,50 @@ class Character:
 
 
 class Snapshot:
-    """A copy of the state and of the arrays `more`, to restore all of them if a frame fails."""
+    """A copy of a state and of other arrays. It restores all of them if a frame fails."""
 
-    def __init__(self, state: Character, *more: Array) -> None:
-        arrays = (*(getattr(state, field.name) for field in fields(state)), *more)
+    def __init__(self, state: Character, *other_arrays: Array) -> None:
+        arrays = (*(getattr(state, field.name) for field in fields(state)), *other_arrays)
         self._arrays = [(array, array.copy()) for array in arrays]
 
     def restore(self) -> None:
         """Copy the values back into the same arrays."""
-        for array, before in self._arrays:
-            array[...] = before
+        for array, saved in self._arrays:
+            array[...] = saved
 
 
-def start(network: Network, characters: int, position: Array, yaw: Array) -> Character:
-    """C healthy characters at ground positions (C, 2), facing `yaw` (C,) in radians.
+def start(network: Network, count: int, position: Array, yaw: Array) -> Character:
+    """The states of `count` healthy characters at ground positions (C, 2), facing `yaw` (C,) in radians.
 
-    They start in the start frame of the network's file, a standing pose unless the training clips hardly have
-    any. If the file has no start frame, they start in the network's mean pose.
+    They start in the start frame of the network's file. It is a standing pose, unless the training clips
+    hardly have any. If the file has no start frame, they start in the network's mean pose.
     """
     layout, facts = network.layout, network.training_facts
-    count = characters
-    columns = sum(columns for _, columns in layout.channels)
-    now = network.y_mean.astype(float) if facts is None else facts.start_y.astype(float)
-    path, heading, gait = _start_path(network)
+    channel_columns = sum(columns for _, columns in layout.channels)
+    # A row of network outputs, relative to the root.
+    start_row = network.y_mean.astype(float) if facts is None else facts.start_y.astype(float)
+    path, path_direction, gait = _start_path(network)
     sin, cos = np.sin(yaw)[:, None], np.cos(yaw)[:, None]
-    joints = now[layout.y_joint_position].reshape(-1, 3)
-    in_world = _turned(joints, sin, cos)
+    joints = start_row[layout.y_joint_position].reshape(-1, 3)
+    in_world = _turn_about_y(joints, sin, cos)
     in_world[..., ::2] += position[:, None]
     assert network.skeleton is not None
-    legs = [[network.skeleton.role(f"{side}_{part}") for part in SHOWN] for side in ("left", "right")]
-    moving = np.zeros_like(joints) if facts is None else now[layout.y_joint_velocity].reshape(-1, 3)
-    turns = now[layout.y_joint_rotation].reshape(-1, 3)
+    legs = [[network.skeleton.role(f"{side}_{part}") for part in SHOWN_JOINTS] for side in ("left", "right")]
+    velocity = np.zeros_like(joints) if facts is None else start_row[layout.y_joint_velocity].reshape(-1, 3)
+    half_turns = start_row[layout.y_joint_rotation].reshape(-1, 3)  # axis times half the angle
     facing = np.concatenate([sin, cos], axis=1)
     return Character(
-        position=_turned(path, sin, cos) + position[:, None],
-        direction=_turned(heading, sin, cos),
+        position=_turn_about_y(path, sin, cos) + position[:, None],
+        direction=_turn_about_y(path_direction, sin, cos),
         gait=np.repeat(gait[None], count, axis=0),
         ground=np.zeros((count, layout.samples, 3)),
         root_height=np.zeros(count),
         joint_position=np.ascontiguousarray(in_world),
-        joint_velocity=np.ascontiguousarray(_turned(moving, sin, cos)),
-        joint_rotation=quat.mul(quat.yaw(yaw)[:, None], quat.exp(turns)),
+        joint_velocity=np.ascontiguousarray(_turn_about_y(velocity, sin, cos)),
+        joint_rotation=quat.mul(quat.yaw(yaw)[:, None], quat.exp(half_turns)),
         phase=np.full(count, 0.0 if facts is None else facts.start_phase),
-        channel_values=np.zeros((count, columns)),
-        channel_targets=np.zeros((count, columns)),
+        channel_values=np.zeros((count, channel_columns)),
+        channel_targets=np.zeros((count, channel_columns)),
         smoothed_velocity=np.zeros((count, 2)),
         smoothed_direction=facing.copy(),
         strafe=np.zeros(count),
@@ -127,9 +133,9 @@ def start(network: Network, characters: int, position: Array, yaw: Array) -> Cha
 
 
 def _start_path(network: Network) -> tuple[Array, Array, Array]:
-    """Path (T, 2), facing (T, 2) and gait (T, 6) around the start frame, relative to its root.
+    """Path (T, 2), facing (T, 2) and gait shares (T, 6) around the start frame, relative to its root.
 
-    If the file has no start frame, the character stands still.
+    If the network's file has no start frame, these are the values of a character that stands still.
     """
     layout, facts = network.layout, network.training_facts
     length = 2 * layout.window
@@ -139,21 +145,25 @@ def _start_path(network: Network) -> tuple[Array, Array, Array]:
         return np.zeros((length, 2)), np.tile([0.0, 1.0], (length, 1)), gait
     frames, samples = np.arange(-layout.window, layout.window), np.array(layout.offsets)
 
-    def through(block: slice) -> Array:
+    def in_each_frame(block: slice) -> Array:
+        """(T, n) the n values of a block of the start row in each frame, interpolated between its samples."""
         rows = facts.start_x[block].astype(float).reshape(-1, layout.samples)
         return np.stack([np.interp(frames, samples, row) for row in rows], axis=1)
 
-    facing = through(layout.x_direction)
+    facing = in_each_frame(layout.x_direction)
     facing /= np.maximum(np.linalg.norm(facing, axis=1, keepdims=True), 1e-6)
-    return through(layout.x_position), facing, through(layout.x_gait)
+    return in_each_frame(layout.x_position), facing, in_each_frame(layout.x_gait)
 
 
-def _turned(vectors: Array, sin: Array, cos: Array) -> Array:
-    """Vectors (N, 2 or 3) turned about Y by C angles: (C, N, 2 or 3). sin, cos: (C, 1)."""
+def _turn_about_y(vectors: Array, sin: Array, cos: Array) -> Array:
+    """(C, N, 2 or 3) the N vectors turned about Y by each of C angles.
+
+    vectors: (N, 2) x and z, or (N, 3) x, y and z. sin, cos: (C, 1) of the angles.
+    """
     x, z = vectors[:, 0], vectors[:, -1]
-    parts = [
+    components = [
         x * cos + z * sin,
-        *(np.broadcast_to(v, (len(sin), len(x))) for v in vectors.T[1:-1]),
+        *(np.broadcast_to(y, (len(sin), len(x))) for y in vectors.T[1:-1]),
         z * cos - x * sin,
     ]
-    return np.stack(parts, axis=-1)
+    return np.stack(components, axis=-1)

@@ -1,9 +1,10 @@
 """One frame of a character in six timed steps: prepare, input, insert, predict, output, update.
 
 - prepare: smooth the caller's target, bend the future trajectory toward it, look up the ground;
-- input: write trajectory, gait, ground, last pose and channel values into a row X, in root coordinates;
+- input: write trajectory, gait, ground, last pose and channel values into the input row X, in root
+  coordinates;
 - insert: standardise the row;
-- predict: evaluate the network at the present phase, which gives Y;
+- predict: evaluate the network at the present phase, which gives the output row Y;
 - output: turn Y into a world pose, and place the feet in the copy that the caller gets;
 - update: advance root, past and future trajectory, and phase by one frame.
 """
@@ -28,30 +29,35 @@ from hobble.runtime.character import Character, start
 
 STEPS = ("prepare", "input", "insert", "predict", "output", "update")
 FPS = 60
-HIGHEST = 1e7  # cm, 100 km: largest height of the ground above or below 0; larger heights are imprecise
+HIGHEST_GROUND = 1e7  # cm, 100 km above or below 0; at larger heights, floats are imprecise
 
-# In each frame the runtime checks that these arrays of the state are finite. The others are checked when the
-# caller gives them, or made anew in each frame.
+# In each frame the runtime checks that these arrays of the state are finite and not too large. The other
+# arrays are checked when the caller gives them, are computed anew in each frame, or stay within 0 to 1.
 CHECKED = (
-    *("position", "direction", "gait", "joint_position", "joint_velocity", "joint_rotation", "phase"),
-    *(
-        "channel_values",
-        "smoothed_velocity",
-        "smoothed_direction",
-        "correction",
-        "foot_hold",
-        "foot_lift",
-        "foot_added",
-        "leg_shown",
-    ),
-    *("body_lift", "memory"),
+    "position",
+    "direction",
+    "gait",
+    "joint_position",
+    "joint_velocity",
+    "joint_rotation",
+    "phase",
+    "channel_values",
+    "smoothed_velocity",
+    "smoothed_direction",
+    "correction",
+    "foot_hold",
+    "foot_lift",
+    "foot_added",
+    "leg_shown",
+    "body_lift",
+    "memory",
 )
 
-Ground = Callable[[Array, Array], Array]
+Ground = Callable[[Array, Array], Array]  # x, z (N,), cm -> heights (N,), cm
 
 
 class ControllerOptions(TypedDict):
-    """The keywords of a `Controller`, which its docstring describes."""
+    """The keyword arguments of `Controller`, which are described there."""
 
     rates: Mapping[str, float]
     foot_locking: bool
@@ -60,11 +66,16 @@ class ControllerOptions(TypedDict):
 
 
 class Controller:
-    """Runs the characters of one network. `seconds` (6,) holds the time of each of STEPS in the last frame.
+    """Runs the characters of one network.
 
-    rates: channel -> largest change of its values per second; foot_locking: hold feet in contact where they
-    landed; steering: gain of the correction when the target velocity is not reached, 0 for none; side: cm
-    from the path to the points at its sides where the ground is looked up.
+    character: their state, changed in place. rates: channel -> largest change of its values per second.
+    foot_locking: hold feet in contact where they landed. steering: gain with which the target velocity is
+    corrected while the character does not reach it; 0: no correction. side: cm from the path to the points at
+    its sides where the ground is looked up.
+
+    After `frame`, these are the pose for the caller: root (C, 3), yaw (C,), pose_position (C, J, 3) and
+    pose_rotation (C, J, 4). The attributes x, z and y are the rows of inputs, of
+    standardised inputs and of outputs. seconds: (6,) how long each of STEPS took.
     """
 
     def __init__(
@@ -90,43 +101,45 @@ class Controller:
         self.root = np.stack([here[:, 0], np.zeros(count), here[:, 1]], axis=1)
         self.yaw = np.arctan2(ahead[:, 0], ahead[:, 1])
         self.bounds = Bounds.of(network)
-        # Passed to `evaluate` only if the network has a memory.
+        # An argument of `evaluate`, but only if the network has a memory.
         self._memory = (character.memory,) if network.memory else ()
         self._unsound = np.zeros(count, bool)
         self.pose_position = character.joint_position.copy()
         self.pose_rotation = character.joint_rotation.copy()
+        # x and z of the points left of the path, on it and right of it where the ground is looked up.
         self._points = np.zeros((count, layout.samples, 3, 2))
         blocks = layout.blocks("x")
-        of_body = np.array([blocks[name].start for name in BODY], np.int64)
-        of_channel = [np.arange(layout.x_size)[layout.x_channel(name)] for name, _ in layout.channels]
-        self._x_columns = (of_body, np.concatenate([np.zeros(0, np.int64), *of_channel]))
-        steps = [np.full(columns, rates[name] / FPS) for name, columns in layout.channels]
-        self._channel_steps = np.concatenate([np.zeros(0), *steps])
+        body_starts = np.array([blocks[name].start for name in BODY], np.int64)
+        channel_columns = [np.arange(layout.x_size)[layout.x_channel(name)] for name, _ in layout.channels]
+        self._x_columns = (body_starts, np.concatenate([np.zeros(0, np.int64), *channel_columns]))
+        # The largest change of each channel value in a frame.
+        channel_steps = [np.full(columns, rates[name] / FPS) for name, columns in layout.channels]
+        self._channel_steps = np.concatenate([np.zeros(0), *channel_steps])
         self._y_columns = advance_columns(layout)
         self._y_joints = layout.y_joint_position.start
         assert network.skeleton is not None
         legs = feet.leg_joints(network.skeleton)
         self._legs = (
             legs,
-            feet.carried(network.skeleton, legs),
+            feet.foot_parts(network.skeleton, legs),
             feet.sole_heights(network, legs),
             feet.knees_ahead(network.skeleton),
             self.bounds.fastest,
         )
         self._hips = network.skeleton.role("hips")
-        # The joints under which the ground is looked up (heels, toes, hips), and the heights found.
-        self._standing = np.append(legs[:, 2:].reshape(-1), self._hips)
-        self._under = np.zeros((count, len(self._standing)))
+        # The joints under which the ground is looked up (heels, toes, hips), and the ground heights there.
+        self._ground_joints = np.append(legs[:, 2:].reshape(-1), self._hips)
+        self._ground_heights = np.zeros((count, len(self._ground_joints)))
         self._warned = False
-        self._group(character)
+        self._group_arrays(character)
 
     def take_pose(self, other: Controller, of: np.ndarray) -> None:
         """Copy the pose of character i from character of[i] of the controller `other`. of: (C,) indices."""
         for name in ("root", "yaw", "pose_position", "pose_rotation"):
             getattr(self, name)[:] = getattr(other, name)[of]
 
-    def _group(self, c: Character) -> None:
-        """Group the arrays for the compiled functions: once, because the arrays only change in place."""
+    def _group_arrays(self, c: Character) -> None:
+        """Group the arrays for the compiled functions. Once is enough: the arrays only change in place."""
         self._path = (c.position, c.direction, c.gait)
         self._smoothed = (c.smoothed_velocity, c.smoothed_direction, c.strafe, c.correction)
         self._channels = (c.channel_values, c.channel_targets, self._channel_steps)
@@ -145,7 +158,7 @@ class Controller:
         t0 = clock()
         c = self.character
         if find_unsound(self._checked, self._unsound):
-            self._restore()
+            self._restart_unsound()
         self._prepare(target, ground)
         t1 = clock()
         self._input()
@@ -155,7 +168,9 @@ class Controller:
         t3 = clock()
         self.predictor.evaluate(self.z, c.phase, self.y, *self._memory)
         if clip_rows(self.y, self.bounds.y_low, self.bounds.y_high, self._unsound):
-            self._warn("the network's prediction", "such numbers are replaced by the middle of their range")
+            self._warn_once(
+                "the network's prediction", "such numbers are replaced by the middle of their range"
+            )
         t4 = clock()
         self._output(ground)
         t5 = clock()
@@ -163,19 +178,20 @@ class Controller:
         t6 = clock()
         self.seconds[:] = (t1 - t0, t2 - t1, t3 - t2, t4 - t3, t5 - t4, t6 - t5)
 
-    def _restore(self) -> None:
+    def _restart_unsound(self) -> None:
         """Restart the characters marked in `_unsound` where they are, with the same channel targets."""
-        self._warn("the state", "they restart where they were, in the start pose")
+        self._warn_once("the state", "they restart where they were, in the start pose")
         marked = np.flatnonzero(self._unsound)
         fresh = start(self.predictor.network, len(marked), self.root[marked][:, ::2], self.yaw[marked])
         for field in fields(fresh):
             if field.name != "channel_targets":
                 getattr(self.character, field.name)[marked] = getattr(fresh, field.name)
 
-    def _warn(self, what: str, remedy: str) -> None:
+    def _warn_once(self, what: str, remedy: str) -> None:
+        """Warn that `what` has unusable numbers, unless this controller has warned before."""
         if not self._warned:
             warnings.warn(
-                f"{what} was not finite for {int(self._unsound.sum())} characters; {remedy}",
+                f"{what} was not finite or too large for {int(self._unsound.sum())} characters; {remedy}",
                 RuntimeWarning,
                 stacklevel=4,
             )
@@ -192,8 +208,8 @@ class Controller:
         else:
             points = self._points.reshape(-1, 2)
             c.ground[:] = _heights(ground, points[:, 0], points[:, 1]).reshape(c.ground.shape)
-        trajectory.stand_on(c.ground, c.root_height)
-        if not c.placed.all():  # at the start the ground may have any height
+        trajectory.write_mean_height(c.ground, c.root_height)
+        if not c.placed.all():  # once, at the start: lift the joints to the ground, which may have any height
             new = ~c.placed
             c.joint_position[new, :, 1] += c.root_height[new, None]
             self.root[new, 1] = c.root_height[new]
@@ -208,27 +224,27 @@ class Controller:
 
     def _output(self, ground: Ground | None) -> None:
         c = self.character
-        network_rows.take_outputs(
+        network_rows.write_poses(
             self.y, self._y_joints, self._path, (c.root_height, c.body_lift), self._joints,
             self.bounds.fastest, self._drawn,
         )  # fmt: skip
         if ground is not None:
-            at = np.ascontiguousarray(self.pose_position[:, self._standing]).reshape(-1, 3)
-            self._under[:] = _heights(ground, at[:, 0], at[:, 2]).reshape(self._under.shape)
+            at = np.ascontiguousarray(self.pose_position[:, self._ground_joints]).reshape(-1, 3)
+            self._ground_heights[:] = _heights(ground, at[:, 0], at[:, 2]).reshape(self._ground_heights.shape)
         else:
-            self._under[:] = 0.0
+            self._ground_heights[:] = 0.0
         feet.carry_body(
-            self._contacts, self._under, self._hips, self.bounds.hips, self._legs, c.body_lift,
+            self._contacts, self._ground_heights, self._hips, self.bounds.hips, self._legs, c.body_lift,
             self.pose_position,
         )  # fmt: skip
         feet.place_feet(
-            self._contacts, self._under, self.foot_locking, self._legs, self._feet,
+            self._contacts, self._ground_heights, self.foot_locking, self._legs, self._feet,
             self.pose_position, self.pose_rotation,
         )  # fmt: skip
 
     def _update(self, velocity: Array) -> None:
         recorded_poses = self.predictor.network.recorded_poses
-        steered = self.steering > 0
+        steered = self.steering > 0  # otherwise the root moves as predicted
         loss = BACKWARD_LOSS if steered and not recorded_poses else 0.0
         pull = PULL if steered and recorded_poses else 0.0
         advance(
@@ -239,14 +255,18 @@ class Controller:
 def _heights(ground: Ground, x: Array, z: Array) -> Array:
     """Heights (N,) of the caller's ground at x, z (N,), cm.
 
-    Raises ValueError for a wrong shape, and for heights that are not finite or too large: they would stay in
-    the state.
+    Raises ValueError for a wrong shape, and for heights that are not finite or too large, because they would
+    stay in the characters' state.
     """
     heights = np.asarray(ground(x, z), float)
     if heights.shape not in ((), x.shape):
-        raise ValueError(f"the terrain returned heights of shape {heights.shape} for {x.size} points")
+        raise ValueError(
+            f"the terrain returned heights of shape {heights.shape} for {x.size} points; "
+            "it has to return one height for each"
+        )
     if not np.isfinite(heights).all():
         raise ValueError("the terrain has heights that are not finite")
-    if np.abs(heights).max() > HIGHEST:
-        raise ValueError(f"the terrain has a height of {np.abs(heights).max():.4g} cm; {HIGHEST:g} at most")
+    if np.abs(heights).max() > HIGHEST_GROUND:
+        highest = np.abs(heights).max()
+        raise ValueError(f"the terrain has a height of {highest:.4g} cm; {HIGHEST_GROUND:g} cm at most")
     return np.broadcast_to(heights, x.shape)

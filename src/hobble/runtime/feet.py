@@ -1,4 +1,8 @@
-"""Foot placement: hold a foot in contact where it landed, and bend the leg to reach it (two-bone IK)."""
+"""Places feet: holds a foot in contact where it landed, and bends the leg so that the foot gets there.
+
+Below, "the network's foot" is the foot where the network predicts it. The foot lift is how far, in cm, foot
+placement raises one foot. The body lift is how far it raises the whole body.
+"""
 
 from __future__ import annotations
 
@@ -10,38 +14,39 @@ from hobble.core.compiled import njit
 from hobble.core.skeleton import Skeleton, rest_positions
 from hobble.models.network import Network
 from hobble.runtime.foot_lock import Hold, hold_foot, note_missed, step_rise
-from hobble.runtime.leg_reach import MOST_ADDED, LastFrame, bend, hold_back, turn, turned
+from hobble.runtime.leg_reach import MOST_ADDED, LastFrame, bend, hold_back, turn_rotation, turn_vector
 
-# Foot lift and body lift: cm by which foot placement raises a foot, or the whole body.
-HEIGHT_MIX = 0.5  # share of the remaining foot lift that is applied each frame
+HEIGHT_MIX = 0.5  # each frame changes the foot lift by this share of the change that is still missing
 # Largest change of the foot lift, cm a frame. It is needed because a network may predict contact while the
 # foot is at knee height.
 FASTEST_LIFT = 8.0
 # A held foot behind the hip may stretch the leg to this share of the leg's full length, or as far as the
-# network stretches it. Instead of stretching further, the leg raises its heel. Without this rule, holding a
-# foot 5 cm behind the network's foot straightens a knee that is bent by 26 degrees, and a leg that should
-# stay stiff bends and stretches.
+# network stretches it if that is further. Instead of stretching more, the leg raises its heel. Without this
+# rule, holding a foot 5 cm behind the network's foot straightens a knee that is bent by 26 degrees, and a leg
+# that should stay stiff bends and stretches.
 STRETCH = 0.99
 # The rule of STRETCH applies in full if the toe is at least this many cm behind the hip. A foot ahead of the
 # hip stays flat.
 BEHIND = 10.0
-BODY_MIX = 0.15  # share of the remaining body lift that is applied each frame
+BODY_MIX = 0.15  # the same share as HEIGHT_MIX, for the body lift
 BODY_FREE = 3.0  # cm that standing feet may be off the ground before the body is raised or lowered
 BODY_MIN_CONTACT = 0.3  # if the contacts of both feet sum to less, the feet do not decide the body's height
-FLOATING = 3.0  # cm that a standing foot may be above SOLE, because skeletons differ
 SOLE = (5.0, 4.0)  # height of heel and toe joint above the ground in a standing foot, cm
-FOOT, TOES = 1, 2  # which part of a foot a joint belongs to; 0: neither
+# A held foot is lowered only if its joints are more than this many cm above SOLE. Skeletons differ in how
+# high these joints are.
+FLOATING = 3.0
+FOOT, TOES = 1, 2  # the part of a foot to which a joint belongs, see `foot_parts`; 0: neither
 
 
 # Groups of arrays for compiled functions, which unpack them into names.
 #
-# joints (2, 4), see `leg_joints`; carried (2, J), see `carried`; sole (2,), see `sole_heights`; ahead (3,),
+# joints (2, 4), see `leg_joints`; parts (2, J), see `foot_parts`; sole (2,), see `sole_heights`; ahead (3,),
 # see `knees_ahead`; fastest: a drawn joint of a leg may move at most this many cm in a frame.
 Legs = tuple[Any, Any, Any, Any, float]
-# The state of the feet between frames: the hold of each foot; lift (C, 2), smoothed rise of the foot, cm;
-# added (C, 2, 2, 4), rotations added to thigh and shank; shown (C, 2, 3, 3), knee, heel and toe as they were
-# drawn. The heights in `shown` are above root_height (C,) + body_lift (C,), because the whole body may rise
-# in a frame.
+# The state of the feet between frames: held, see `Hold`; lift (C, 2), the foot lift; added (C, 2, 2, 4),
+# rotations added to thigh and shank of each leg; shown (C, 2, 3, 3), knee, heel and toe of each leg as they
+# were drawn; root_height (C,), mean ground height on the path; body_lift (C,). The heights in `shown` are
+# above root_height + body_lift, because the whole body may rise in a frame.
 Feet = tuple[Hold, Any, Any, Any, Any, Any]
 
 
@@ -54,8 +59,8 @@ def leg_joints(skeleton: Skeleton) -> np.ndarray:
 def sole_heights(network: Network, legs: np.ndarray) -> np.ndarray:
     """(2,) heel and toe height below which a foot is in the ground, cm: SOLE, or less for a smaller foot.
 
-    The network's mean pose gives the mean heights of heel and toe. They are above those of a standing
-    foot, because feet are in the air half of the time. 60% of them is below any standing foot.
+    The network's mean pose gives the mean heights of heel and toe. They are larger than in a standing foot,
+    because feet are in the air half of the time. 60% of them is less than in any standing foot.
     """
     layout = network.layout
     height = network.y_mean[layout.y_joint_position].reshape(-1, 3)[:, 1]
@@ -63,7 +68,7 @@ def sole_heights(network: Network, legs: np.ndarray) -> np.ndarray:
 
 
 def knees_ahead(skeleton: Skeleton) -> np.ndarray:
-    """(3,) the direction in which the body looks in the rest pose. Straight knees bend in this direction."""
+    """(3,) the direction in which the body faces in the rest pose. Straight knees bend in this direction."""
     rest, legs = rest_positions(skeleton), leg_joints(skeleton)
     left, down = rest[legs[0, 0]] - rest[legs[1, 0]], (rest[legs[:, 2]] - rest[legs[:, 0]]).sum(axis=0)
     ahead = np.cross(down, left)
@@ -71,84 +76,97 @@ def knees_ahead(skeleton: Skeleton) -> np.ndarray:
 
 
 @njit
-def raise_heel(position: Any, hip: int, knee: int, heel: int, toe: int, shift: Any, by: Any) -> None:
-    """Raise the heel of a foot that moves back by `shift` (3,), so that the leg stretches to STRETCH at most.
+def raise_heel(position: Any, hip: int, knee: int, heel: int, toe: int, shift: Any, roll: Any) -> None:
+    """Raise the heel of a foot that `shift` moves behind the hip, so that the leg obeys STRETCH.
 
-    The foot turns about its toe, by MOST_ADDED at most. This rotation is written to `by` (4,), and the heel's
-    movement is added to `shift`. A foot ahead of the hip stays flat.
+    position: (J, 3) of the pose, not changed. shift: (3,) how far the whole foot moves, cm. The foot turns
+    about its toe, by MOST_ADDED at most. This rotation is written to `roll` (4,), and the heel's movement is
+    added to `shift`. A foot ahead of the hip stays flat.
     """
-    by[0], by[1], by[2], by[3] = 1.0, 0.0, 0.0, 0.0
+    roll[0], roll[1], roll[2], roll[3] = 1.0, 0.0, 0.0, 0.0
+    # Squares of: the lengths of thigh and shank, the distance from hip to heel before the shift and after it.
     upper, lower, before, needed = 0.0, 0.0, 0.0, 0.0
     for i in range(3):
         upper += (position[knee, i] - position[hip, i]) ** 2
         lower += (position[heel, i] - position[knee, i]) ** 2
         before += (position[heel, i] - position[hip, i]) ** 2
         needed += (position[heel, i] + shift[i] - position[hip, i]) ** 2
-    most = max(before, (STRETCH * (np.sqrt(upper) + np.sqrt(lower))) ** 2)
+    most = max(before, (STRETCH * (np.sqrt(upper) + np.sqrt(lower))) ** 2)  # what `needed` may be
+    # The foot from heel to toe has the horizontal direction (fx, fz) and length `along`. The heel is `high`
+    # above the toe.
     fx, fz = position[toe, 0] - position[heel, 0], position[toe, 2] - position[heel, 2]
     along, high = np.sqrt(fx * fx + fz * fz), position[heel, 1] - position[toe, 1]
     if needed <= most or along < 1e-6:
         return
     fx, fz = fx / along, fz / along
+    # The shifted toe is at (wx, up, wz) from the hip, and `ahead` of it in the direction of the foot.
     wx, wz = position[toe, 0] + shift[0] - position[hip, 0], position[toe, 2] + shift[2] - position[hip, 2]
     ahead, up = wx * fx + wz * fz, position[toe, 1] + shift[1] - position[hip, 1]
     if ahead >= 0.0:
         return
     most += max(1.0 + ahead / BEHIND, 0.0) * (needed - most)
-    # The heel is at (-along, high) from the toe. Find the angle about the toe at which its squared distance
-    # from the hip is `most`.
+    # Find the angle of the turn about the toe after which the squared distance from hip to heel is `most`.
+    # Before the turn, the heel is at (-along, high) from the toe. This leads to the equation
+    # cosine * cos(angle) + sine * sin(angle) = right.
     cosine, sine = up * high - ahead * along, ahead * high + up * along
-    share = 0.5 * (most - wx * wx - up * up - wz * wz - along * along - high * high)
-    share = min(max(share / np.sqrt(cosine * cosine + sine * sine), -1.0), 1.0)
-    angle = min(max(np.arctan2(sine, cosine) + np.arccos(share), 0.0), MOST_ADDED)
+    right = 0.5 * (most - wx * wx - up * up - wz * wz - along * along - high * high)
+    right = min(max(right / np.sqrt(cosine * cosine + sine * sine), -1.0), 1.0)
+    angle = min(max(np.arctan2(sine, cosine) + np.arccos(right), 0.0), MOST_ADDED)
     forward = along * (1 - np.cos(angle)) + high * np.sin(angle)
     shift[0] += forward * fx
     shift[1] += along * np.sin(angle) - high * (1 - np.cos(angle))
     shift[2] += forward * fz
-    by[0], by[1], by[3] = np.cos(angle / 2), np.sin(angle / 2) * fz, -np.sin(angle / 2) * fx
+    roll[0], roll[1], roll[3] = np.cos(angle / 2), np.sin(angle / 2) * fz, -np.sin(angle / 2) * fx
 
 
 @njit
 def carry_foot(
-    position: Any, rotation: Any, below: Any, heel: int, toe: int, was: tuple[float, float, float], by: Any
+    position: Any,
+    rotation: Any,
+    parts: Any,
+    heel: int,
+    toe: int,
+    old_heel: tuple[float, float, float],
+    roll: Any,
 ) -> None:
-    """Move a foot along with its heel, which was at `was` (x, y, z).
+    """Move a foot along with its heel, which has moved away from `old_heel` (x, y, z), and turn it by `roll`.
 
-    below: (J,) which joints belong to the foot, see `carried`. by: (4,) rotation of the foot. The toes
-    keep their rotation.
+    parts: (J,) which joints belong to the foot, see `foot_parts`. roll: (4,) rotation. The toes move, but do
+    not turn.
     """
-    x, y, z = was
-    tx, ty, tz = turned(by, position[toe, 0] - x, position[toe, 1] - y, position[toe, 2] - z)
+    x, y, z = old_heel
+    # (tx, ty, tz): first from the new heel to the new toe, then the toe's movement.
+    tx, ty, tz = turn_vector(roll, position[toe, 0] - x, position[toe, 1] - y, position[toe, 2] - z)
     tx += position[heel, 0] - position[toe, 0]
     ty += position[heel, 1] - position[toe, 1]
     tz += position[heel, 2] - position[toe, 2]
-    turn(by, rotation[heel])
+    turn_rotation(roll, rotation[heel])
     for j in range(position.shape[0]):
-        if below[j] == TOES:
+        if parts[j] == TOES:
             position[j, 0] += tx
             position[j, 1] += ty
             position[j, 2] += tz
-        elif below[j] == FOOT:
-            px, py, pz = turned(by, position[j, 0] - x, position[j, 1] - y, position[j, 2] - z)
+        elif parts[j] == FOOT:
+            px, py, pz = turn_vector(roll, position[j, 0] - x, position[j, 1] - y, position[j, 2] - z)
             position[j, 0] = position[heel, 0] + px
             position[j, 1] = position[heel, 1] + py
             position[j, 2] = position[heel, 2] + pz
-            turn(by, rotation[j])
+            turn_rotation(roll, rotation[j])
 
 
 @njit
-def hold_toes_back(position: Any, below: Any, toe: int, last: LastFrame) -> None:
+def hold_toes_back(position: Any, parts: Any, toe: int, last: LastFrame) -> None:
     """Limit how far the toe moves in a frame, and move the joints below it along.
 
-    It is needed because a foot that turns may move its toe faster than its heel. below: (J,) which joints
-    belong to the toe, see `carried`. last: the leg in the last frame.
+    The limit is needed because a foot that turns may move its toe faster than its heel. parts: (J,) which
+    joints belong to the toes, see `foot_parts`. last: the leg in the last frame.
     """
     shown, base, fastest = last
     x, y, z = position[toe, 0], position[toe, 1], position[toe, 2]
     if hold_back(position[toe], shown[2], base, fastest):
-        x, y, z = position[toe, 0] - x, position[toe, 1] - y, position[toe, 2] - z
+        x, y, z = position[toe, 0] - x, position[toe, 1] - y, position[toe, 2] - z  # movement of the toe
         for j in range(position.shape[0]):
-            if below[j] == TOES and j != toe:
+            if parts[j] == TOES and j != toe:
                 position[j, 0], position[j, 1], position[j, 2] = (
                     position[j, 0] + x,
                     position[j, 1] + y,
@@ -158,7 +176,10 @@ def hold_toes_back(position: Any, below: Any, toe: int, last: LastFrame) -> None
 
 @njit
 def sole_depth(position: Any, heel: int, toe: int, ground_heel: float, ground_toe: float, sole: Any) -> float:
-    """How deep a foot of a pose (J, 3) is in the ground, cm; negative if it is above."""
+    """How deep a foot of a pose (J, 3) is in the ground, cm; negative if it is above.
+
+    ground_heel, ground_toe: height of the ground under them. sole: (2,) see `sole_heights`.
+    """
     heel_depth = ground_heel + sole[0] - position[heel, 1]
     toe_depth = ground_toe + sole[1] - position[toe, 1]
     return max(heel_depth, toe_depth)
@@ -176,14 +197,15 @@ def carry_body(
 ) -> None:
     """Raise or lower whole bodies, positions (C, J, 3), so that they stand on the ground under them.
 
-    The network stands on the mean ground height along two seconds of path. On a hill a few metres long this
-    height is 30 cm off the ground under the feet, and a network trained on gentler hills does not correct it:
-    legs fold, or hang in the air. So the standing feet decide the height of the body, and the hips stay in
-    the range of heights above the ground that they had in training.
+    The network predicts a body that stands at the mean ground height along two seconds of path. On a hill a
+    few metres long, this height is 30 cm above or below the ground under the feet. A network trained on
+    gentler hills does not correct such a difference, and legs fold or hang in the air. So the standing feet
+    decide the height of the body, and the hips stay in the range of heights above the ground that they had in
+    training.
 
     contacts: see `place_feet`. ground: (C, 5) heights under the feet as in `place_feet`, then under the hips.
-    hips: the joint. hips_range: lowest and highest height of this joint, cm above the ground. lift: (C,) cm
-    by which the body is raised, kept between frames.
+    hips: index of the hips joint. hips_range: lowest and highest height of this joint, cm above the ground.
+    lift: (C,) the body lift, cm, kept between frames.
     """
     joints, _, sole, _, _ = legs
     for c in range(position.shape[0]):
@@ -192,6 +214,7 @@ def carry_body(
             under = ground[c, 2 * f], ground[c, 2 * f + 1]
             rise = sole_depth(position[c], joints[f, 2], joints[f, 3], under[0], under[1], sole)
             stands = min(max(contacts[c, 2 * f], contacts[c, 2 * f + 1], 0.0), 1.0)
+            # Only what is beyond BODY_FREE counts.
             rises += stands * (max(rise - BODY_FREE, 0.0) + min(rise + BODY_FREE, 0.0))
             weight += stands
         if weight > BODY_MIN_CONTACT:
@@ -208,14 +231,14 @@ def place_feet(
 ) -> None:
     """Hold feet in contact and keep feet out of the ground. Changes the pose and the state of the feet.
 
-    contacts: (C, 4) of left heel, left toe, right heel, right toe; 0 is written for a foot that the runtime
-    makes step. ground: (C, 4 or more) heights under them. locking: whether feet are held at all.
-    position: (C, J, 3); rotation: (C, J, 4) of the pose.
+    contacts: (C, 4) predicted, of left heel, left toe, right heel, right toe. 0 is written for a foot that
+    the runtime makes step. ground: (C, 4 or more) heights under these four joints. locking: whether feet are
+    held at all. position (C, J, 3), rotation (C, J, 4): the pose.
     """
-    joints, below, sole, ahead, fastest = legs
+    joints, parts, sole, ahead, fastest = legs
     held, lift, added, shown, root_height, body_lift = feet
     lock, _, step, _ = held
-    shift, by = np.zeros(3), np.zeros(4)
+    shift, roll = np.zeros(3), np.zeros(4)
     for c in range(position.shape[0]):
         base = root_height[c] + body_lift[c]
         for f in range(2):
@@ -225,25 +248,25 @@ def place_feet(
                 c, f, at, contacts[c, 2 * f + 1], locking, shown[c, f, 2], fastest, held
             )
             # Lift a foot out of the ground; lower a held foot that floats; raise a foot that steps.
-            deep = sole_depth(position[c], heel, toe, ground[c, 2 * f], ground[c, 2 * f + 1], sole)
-            rise = max(deep, 0.0)
+            depth = sole_depth(position[c], heel, toe, ground[c, 2 * f], ground[c, 2 * f + 1], sole)
+            rise = max(depth, 0.0)
             if step[c, f] == 0.0:
-                rise += lock[c, f] * min(deep + FLOATING, 0.0)
+                rise += lock[c, f] * min(depth + FLOATING, 0.0)
             change = HEIGHT_MIX * (rise - lift[c, f])
             lift[c, f] += min(max(change, -FASTEST_LIFT), FASTEST_LIFT)
             shift[1] = lift[c, f]
             if step[c, f] > 0.0:
-                shift[1] += step_rise(step[c, f], -deep)
+                shift[1] += step_rise(step[c, f], -depth)
                 contacts[c, 2 * f] = contacts[c, 2 * f + 1] = 0.0
             if lock[c, f] > 0.0:
-                raise_heel(position[c], hip, knee, heel, toe, shift, by)
+                raise_heel(position[c], hip, knee, heel, toe, shift, roll)
             else:
-                by[0], by[1], by[2], by[3] = 1.0, 0.0, 0.0, 0.0
-            was = position[c, heel, 0], position[c, heel, 1], position[c, heel, 2]
+                roll[0], roll[1], roll[2], roll[3] = 1.0, 0.0, 0.0, 0.0
+            old_heel = position[c, heel, 0], position[c, heel, 1], position[c, heel, 2]
             last = shown[c, f], base, fastest
             bend(position[c], rotation[c], joints[f], shift, ahead, added[c, f], last)
-            carry_foot(position[c], rotation[c], below[f], heel, toe, was, by)
-            hold_toes_back(position[c], below[f], toe, last)
+            carry_foot(position[c], rotation[c], parts[f], heel, toe, old_heel, roll)
+            hold_toes_back(position[c], parts[f], toe, last)
             note_missed(c, f, position[c, toe, 0], position[c, toe, 2], held)
             for i in range(3):
                 j = joints[f, i + 1]
@@ -251,8 +274,12 @@ def place_feet(
                 shown[c, f, i, 1] = position[c, j, 1] - base
 
 
-def carried(skeleton: Skeleton, legs: np.ndarray) -> np.ndarray:
-    """(2, J) for each foot: TOES for its toe and the joints below, FOOT for others below its heel, else 0."""
+def foot_parts(skeleton: Skeleton, legs: np.ndarray) -> np.ndarray:
+    """(2, J) which joints belong to the left foot, and which to the right.
+
+    TOES for the toe joint and the joints below it, FOOT for the other joints below the heel, 0 for all else.
+    legs: (2, 4) from `leg_joints`.
+    """
     out = np.zeros((2, len(skeleton.joints)), np.int8)
     for f in range(2):
         for j, p in enumerate(skeleton.parents):

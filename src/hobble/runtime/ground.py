@@ -1,4 +1,4 @@
-"""The caller's ground: a function, a heightmap, an array, or None (flat)."""
+"""Turns the ground that the caller gives (a function, a heightmap, an array or None) into one function."""
 
 from __future__ import annotations
 
@@ -20,7 +20,8 @@ class Heightmap:
     """Heights (rows, columns) on a grid around `centre` with spacing `cell`, in the caller's axes and unit.
 
     Columns run along the first ground coordinate and rows along the second: +X and +Z, or +X and +Y if Z is
-    up. cell: None for 3.937 cm, whatever the unit. Outside the grid, the heights at its border continue.
+    up. cell: distance between two columns or rows; None for 3.937 cm, whatever the unit. Outside the grid,
+    the heights at its border continue.
     """
 
     heights: Array = field(repr=False)
@@ -31,12 +32,13 @@ class Heightmap:
         heights = np.ascontiguousarray(self.heights, float)
         if heights.ndim != 2 or min(heights.shape) < 2 or not np.all(np.isfinite(heights)):
             raise ValueError(
-                f"a heightmap has to be a 2D array of finite numbers, at least 2 x 2, not {heights.shape}"
+                "a heightmap has to be a 2D array of finite numbers, at least 2 x 2; this one has the shape "
+                f"{heights.shape} and {np.sum(~np.isfinite(heights))} numbers that are not finite"
             )
         object.__setattr__(self, "heights", heights)
 
     def __call__(self, x: Array, z: Array) -> Array:
-        """Heights (N,) at the ground coordinates x, z (N,), bilinear."""
+        """Heights (N,), bilinear, at points with the first ground coordinate x (N,) and the second z (N,)."""
         cell = CELL if self.cell is None else self.cell
         return _bilinear(self.heights, cell, self.centre[0], self.centre[1], x, z)
 
@@ -56,7 +58,7 @@ def as_ground(terrain: Any, axes: Axes) -> Callable[[Array, Array], Array] | Non
         raise TypeError(
             f"terrain has to be a function, a Heightmap, a 2D array or None, not {type(terrain).__name__}"
         )
-    if axes.native:
+    if axes.native:  # the caller's axes and unit are Hobble's
         return terrain  # type: ignore[no-any-return]
     if isinstance(terrain, Heightmap) and terrain.cell is None:
         terrain = replace(terrain, cell=CELL * axes.scale)
@@ -73,9 +75,11 @@ def as_ground(terrain: Any, axes: Axes) -> Callable[[Array, Array], Array] | Non
 
 @njit
 def _bilinear(heights: Any, cell: float, centre_x: float, centre_z: float, x: Any, z: Any) -> Any:
+    """Heights (N,) of a grid at the points x, z (N,), see `Heightmap`."""
     rows, columns = heights.shape
     out = np.empty(x.size)
     for n in range(x.size):
+        # u, v: column and row of the point, with fractions; then its place within the grid cell, 0 to 1.
         u = min(max((x[n] - centre_x) / cell + (columns - 1) / 2, 0.0), columns - 1.0)
         v = min(max((z[n] - centre_z) / cell + (rows - 1) / 2, 0.0), rows - 1.0)
         i, j = min(int(u), columns - 2), min(int(v), rows - 2)

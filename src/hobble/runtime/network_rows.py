@@ -1,6 +1,6 @@
-"""Writes a character's state into the network's input row X, and turns its output row Y into the next pose.
+"""Writes a character's state into the input row X of the network, and turns the output row Y into a pose.
 
-The first axis of every array is the C characters.
+Every array begins with an axis of the C characters.
 """
 
 from __future__ import annotations
@@ -14,20 +14,21 @@ from hobble.character import rule
 from hobble.core.compiled import njit
 from hobble.runtime.trajectory import Trajectory
 
+# The rule for a joint's new position, in a form that compiled functions can call.
 joint_place = register_jitable(rule.joint_place)
 # Largest turn of a joint, radians a frame (1500 degrees a second). No joint of a walking or running person
-# turns as fast, but a predicted joint can. If the rotations of a joint in the clips are half a turn apart, as
-# in hands, the network predicts their mean, which may be any rotation. A new target may also change the
-# predicted pose at once.
+# turns as fast, but a predicted joint may. If a joint has rotations in the clips that are half a turn apart,
+# as in hands, the network predicts their mean, which may be any rotation. A new target may also change the
+# predicted pose from one frame to the next.
 FASTEST_TURN = np.radians(25)
-# Largest rise or fall of the body, cm a frame, because the mean ground height along the path changes. When a
-# new target turns the path around on a hill, this mean may change by 20 cm at once, although the ground under
-# the feet stays the same.
+# The body stands at the mean ground height along the path. When this height changes, the body rises or falls
+# by at most this many cm a frame. On a hill, a new target may turn the path around. Then the mean may change
+# by 20 cm in a frame, although the ground under the feet stays the same.
 MOST_CLIMB = 5.0
 
 # Groups of arrays for compiled functions, which unpack them into names.
 #
-# The pose that the network predicted last: position, velocity (C, J, 3); rotation (C, J, 4), in the world.
+# The last pose before foot placement, in the world: position, velocity (C, J, 3); rotation (C, J, 4).
 Joints = tuple[Any, Any, Any]
 # The copy of the pose that the caller gets: root (C, 3), yaw (C,), position (C, J, 3), rotation (C, J, 4).
 Drawn = tuple[Any, Any, Any, Any]
@@ -46,48 +47,51 @@ def write_inputs(
 ) -> None:
     """Write the state into the network's input rows x (C, X), not standardised.
 
-    ground: (C, samples, 3) ground heights to the left of the path, on it and to its right. height: (C,) mean
-    ground height along the path. channel_values: (C, K). columns: two arrays of columns of x. The first has
-    the first column of each block of `hobble.rows.layout.BODY`, the second the column of each channel value.
-    step: frames between two samples.
+    ground: (C, samples, 3) ground heights left of the path, on it and right of it. height: (C,) mean ground
+    height along the path. channel_values: (C, K). columns: two arrays of columns of x. The first has the
+    first column of each block of `hobble.rows.layout.BODY`. The second has the column of each channel value.
+    step: frames between two samples of the trajectory.
     """
     position, direction, gait = path
     joints, velocities, _ = pose
-    at, channel_at = columns
+    # first: of the blocks position 0, direction 1, gait 2, joint_position 3, joint_velocity 4 and terrain 5.
+    first, channel_columns = columns
     middle, samples = position.shape[1] // 2, ground.shape[1]
     for c in range(x.shape[0]):
+        # The trajectory is relative to the present root.
         px, pz = position[c, middle]
         cos, sin = direction[c, middle, 1], direction[c, middle, 0]
         for s in range(samples):
             dx, dz = position[c, s * step, 0] - px, position[c, s * step, 1] - pz
-            x[c, at[0] + s] = dx * cos - dz * sin
-            x[c, at[0] + samples + s] = dx * sin + dz * cos
+            x[c, first[0] + s] = dx * cos - dz * sin
+            x[c, first[0] + samples + s] = dx * sin + dz * cos
             dx, dz = direction[c, s * step]
-            x[c, at[1] + s] = dx * cos - dz * sin
-            x[c, at[1] + samples + s] = dx * sin + dz * cos
+            x[c, first[1] + s] = dx * cos - dz * sin
+            x[c, first[1] + samples + s] = dx * sin + dz * cos
             for g in range(gait.shape[2]):
-                x[c, at[2] + g * samples + s] = gait[c, s * step, g]
+                x[c, first[2] + g * samples + s] = gait[c, s * step, g]
             for side in range(3):
-                x[c, at[5] + side * samples + s] = ground[c, s, side] - height[c]
+                x[c, first[5] + side * samples + s] = ground[c, s, side] - height[c]
+        # The pose is still that of the frame before, and relative to the root of that frame.
         px, pz = position[c, middle - 1]
         cos, sin = direction[c, middle - 1, 1], direction[c, middle - 1, 0]
         for j in range(joints.shape[1]):
             dx, dz = joints[c, j, 0] - px, joints[c, j, 2] - pz
-            k = at[3] + 3 * j
+            k = first[3] + 3 * j
             x[c, k], x[c, k + 1], x[c, k + 2] = (
                 dx * cos - dz * sin,
                 joints[c, j, 1] - height[c],
                 dx * sin + dz * cos,
             )
             dx, dz = velocities[c, j, 0], velocities[c, j, 2]
-            k = at[4] + 3 * j
+            k = first[4] + 3 * j
             x[c, k], x[c, k + 1], x[c, k + 2] = dx * cos - dz * sin, velocities[c, j, 1], dx * sin + dz * cos
         for k in range(channel_values.shape[1]):
-            x[c, channel_at[k]] = channel_values[c, k]
+            x[c, channel_columns[k]] = channel_values[c, k]
 
 
 @njit
-def take_outputs(
+def write_poses(
     y: Any,
     first: int,
     path: Trajectory,
@@ -96,11 +100,12 @@ def take_outputs(
     fastest: float,
     drawn: Drawn,
 ) -> None:
-    """Turn the prediction y (C, Y) into the world poses `pose` and `drawn`.
+    """Turn the prediction y (C, Y) into the world poses `pose` and `drawn`, which are changed in place.
 
-    first: first column of the joints in y. heights: (C,) mean ground height along the path, and (C,) cm by
-    which the body is raised above the predicted pose, changed so that the body climbs by at most MOST_CLIMB.
-    fastest: largest movement of a joint, cm a frame, apart from the change of the ground's height.
+    first: first column of the joints in y. heights: two arrays (C,): mean ground height along the path, and
+    body lift, which is how far the body is raised above the predicted pose, cm. The lift is changed so that
+    the body rises or falls by at most MOST_CLIMB. fastest: largest movement of a joint, cm a frame, apart
+    from the change of the mean ground height.
 
     A new joint position is the mean of two: the predicted position, and the old position plus the predicted
     velocity. No joint turns by more than FASTEST_TURN.
@@ -118,6 +123,7 @@ def take_outputs(
         yaw[c] = np.arctan2(sin, cos)
         half_cos, half_sin = np.cos(yaw[c] / 2), np.sin(yaw[c] / 2)
         for j in range(count):
+            # First columns of the joint's position, velocity and rotation.
             p = first + 3 * j
             v, r = p + 3 * count, p + 6 * count
             velocities[c, j, 0] = y[c, v] * cos + y[c, v + 2] * sin
@@ -141,15 +147,15 @@ def _move_joint(
 ) -> None:
     """Move the joint position `place` (3,) toward the predicted position x, y, z, by at most `fastest` cm.
 
-    velocity: (3,) predicted. climbed: change of the ground's height, cm, which does not count toward
+    velocity: (3,) predicted. climbed: change of the mean ground height, cm, which does not count toward
     `fastest`.
     """
     sx = joint_place(place[0] + velocity[0], x) - place[0]
     sy = joint_place(place[1] + velocity[1], y) - place[1]
     sz = joint_place(place[2] + velocity[2], z) - place[2]
-    step = np.sqrt(sx * sx + (sy - climbed) ** 2 + sz * sz)
-    if step > fastest:
-        sx, sy, sz = sx * fastest / step, climbed + (sy - climbed) * fastest / step, sz * fastest / step
+    moved = np.sqrt(sx * sx + (sy - climbed) ** 2 + sz * sz)
+    if moved > fastest:
+        sx, sy, sz = sx * fastest / moved, climbed + (sy - climbed) * fastest / moved, sz * fastest / moved
     place[0] += sx
     place[1] += sy
     place[2] += sz
@@ -157,7 +163,7 @@ def _move_joint(
 
 @njit
 def _turn_joint(rotation: Any, x: float, y: float, z: float, half_cos: float, half_sin: float) -> None:
-    """Turn the world rotation `rotation` (4,) of a joint to the predicted one, by at most FASTEST_TURN.
+    """Turn `rotation` (4,), a joint's world rotation, to the predicted rotation, by at most FASTEST_TURN.
 
     x, y, z: the predicted axis times half the angle, relative to the root. half_cos, half_sin: cosine and
     sine of half the root's yaw.
@@ -165,6 +171,7 @@ def _turn_joint(rotation: Any, x: float, y: float, z: float, half_cos: float, ha
     half = np.sqrt(x * x + y * y + z * z)
     scale = np.sin(half) / half if half > 1e-8 else 1.0
     w, x, y, z = np.cos(half), x * scale, y * scale, z * scale
+    # From the root's axes to the world: turn by the root's yaw.
     w, x, y, z = (
         half_cos * w - half_sin * y,
         half_cos * x + half_sin * z,

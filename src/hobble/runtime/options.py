@@ -15,14 +15,16 @@ class Runtime(Section):
     mode: PhaseMode = Field(
         "cubic",
         description="how the network's weights follow from the phase: cubic is exact, linear blends weights "
-        "stored at 10 phases, constant takes those of one of 50 phases",
+        "stored at 10 phases, constant takes the weights stored at one of 50 phases",
     )
     rates: dict[str, PositiveFloat] = Field(
         {},
         description="for each channel, the largest change of its values per second; default: the channel's "
         "own rate",
     )
-    scales: dict[str, PositiveFloat] = Field({}, description="for each channel, the divisor of its values")
+    scales: dict[str, PositiveFloat] = Field(
+        {}, description="for each channel, a number by which its values are divided; default: 1"
+    )
     foot_locking: bool = Field(True, description="hold feet in contact where they landed")
     limits: bool = Field(True, description="limit the target speed to what the hurt or sad body can do")
     steering: Annotated[float, Field(ge=0)] = Field(

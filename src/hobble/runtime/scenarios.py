@@ -1,4 +1,8 @@
-"""Scripted scenarios (walk, jog, strafe, ...) for the report and the BVH files."""
+"""Generates motion from scripts, the scenarios (walk, jog, strafe, ...), for the report and the BVH files.
+
+In some scenarios the value of a channel's column is swept: it rises from 0 to the highest. A channel is a
+group of network inputs that tell, for example, how hurt each part of the body is.
+"""
 
 from __future__ import annotations
 
@@ -18,16 +22,16 @@ from hobble.runtime.animation import ProceduralAnimation
 from hobble.runtime.export import export_bvh, fitted_skeleton
 from hobble.runtime.options import Runtime
 
-Target = tuple[Array, Array | None, str]  # velocity, facing, gait
+# Velocity (2,), cm a frame; facing (2,), or None to look where the character goes; gait.
+Target = tuple[Array, Array | None, str]
 
 
 @dataclass(frozen=True)
 class Scenario:
-    """A script of `frames` frames.
+    """A script of `frames` frames at 60 Hz.
 
-    target: frame -> velocity (2,) in cm a frame, facing (2,) or None to look where the character goes, and
-    gait. swept: the channel, and its column whose value rises from 0 to the highest during the script; None:
-    all values are 0.
+    target: function from the frame's number to the target. swept: channel and column of the value that rises
+    from 0 to the channel's highest during the script; None: all values are 0.
     """
 
     name: str
@@ -42,8 +46,8 @@ class Track:
 
     positions: (F, J, 3) world, cm. rotations: (F, J, 4) world. contacts: (F, 4) from 0 to 1, of left heel,
     left toe, right heel and right toe. phase: (F,) cycles. target: (F, 2) target velocity, cm a frame. root:
-    (F, 3) cm, on the ground. gait: (F,) names of the target gait. swept_values: (F,) of the swept column, 0
-    if there is none.
+    (F, 3) position of the root on the ground, cm. gait: (F,) name of the target gait. swept_values: (F,)
+    value of the swept column, 0 if there is none.
     """
 
     scenario: Scenario
@@ -63,9 +67,10 @@ def _vector(length: float, degrees: float = 0.0) -> Array:
 
 
 def scenarios(network: Network) -> list[Scenario]:
-    """The seven scenarios for every network, and a walk for each value that `swept` lists."""
+    """The seven scenarios for every network, and a walk for each column that `swept_columns` lists."""
     facing = _vector(1.0)
     out = [
+        # Five seconds straight ahead, then a curve of half a degree a frame.
         Scenario("walk", 900, lambda f: (_vector(2.5, max(0, f - 300) * 0.5), None, "walk")),
         Scenario("jog", 900, lambda f: (_vector(7.0, max(0, f - 300) * 0.5), None, "jog")),
         Scenario("crouch", 600, lambda f: (_vector(2.0), None, "crouch")),
@@ -75,20 +80,21 @@ def scenarios(network: Network) -> list[Scenario]:
         Scenario("turn_in_place", 600, lambda f: (_vector(0.0), _vector(1.0, 90 * (f // 120)), "walk")),
     ]
     taken = {scenario.name for scenario in out}
-    for name, column in swept(network).items():
+    for name, column in swept_columns(network).items():
         unused_name = name if name not in taken else "_".join((column[0], name))
         out.append(Scenario(unused_name, 720, lambda f: (_vector(2.5), None, "walk"), column))
     return out
 
 
-def swept(network: Network) -> dict[str, tuple[str, str]]:
+def swept_columns(network: Network) -> dict[str, tuple[str, str]]:
     """The scenarios with a swept value: name -> channel and column. Empty without channels or skeleton."""
-    if network.skeleton is None:
+    skeleton = network.skeleton
+    if skeleton is None:
         return {}
     return {
-        name: (group, column)
-        for group, columns in network.channels.items()
-        for name, column in sweeps(group, network.skeleton, columns, network.trained(group)).items()
+        name: (of_channel, column)
+        for of_channel, columns in network.channels.items()
+        for name, column in sweeps(of_channel, skeleton, columns, network.trained(of_channel)).items()
     }
 
 
@@ -134,10 +140,10 @@ def write_motions(network: Network, bvh: str | Path, options: Runtime) -> Iterat
 def generate(network: Network, npz: str | Path, bvh: str | Path, options: Runtime) -> None:
     """Run every scenario; write all of them to the file `npz`, and each to a BVH file in the folder `bvh`.
 
-    npz: names (N,), joints (J,), parents (J,), fps; for each scenario <name>: <name>/positions (F, J, 3)
-    float32 cm, <name>/rotations (F, J, 4) world, w first, <name>/contacts (F, 4), <name>/phase (F,),
-    <name>/gait (F,) str, <name>/target (F, 2), <name>/root (F, 3), <name>/swept_values (F,) float32 of the
-    swept column, <name>/swept (2,) channel and column, both "" if nothing is swept.
+    The file has names (N,) of the scenarios, joints (J,) names, parents (J,) and fps. For each scenario it
+    has, as float32, <name>/positions, <name>/rotations (w first), <name>/contacts, <name>/phase,
+    <name>/target, <name>/root and <name>/swept_values, which `Track` describes. It also has <name>/gait (F,)
+    str and <name>/swept (2,), channel and column, both "" if nothing is swept.
     """
     assert network.skeleton is not None
     arrays: dict[str, Any] = {}

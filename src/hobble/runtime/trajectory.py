@@ -13,12 +13,13 @@ import numpy as np
 
 from hobble.core.compiled import njit
 
-# Largest correction of the target velocity, as a multiple of that velocity. With 1, a network that saw few
+# Largest correction of the target velocity, as a multiple of the target. With 1, a network that saw few
 # starts of a walk in training stands for seconds before it walks.
 STEERING_LIMIT = 2.0
-TARGET_MIX = 0.9  # share of the remaining difference to the target that is applied each frame
+TARGET_MIX = 0.9  # each frame, this share of the remaining difference to the target is removed
 GAIT_MIX = 0.1  # the same for the shares of the gaits
-# Integral gain of the velocity error, a frame: a steady error is corrected within a second or two.
+# Gain, per frame, with which the velocity error is integrated. A steady error is corrected within a second or
+# two.
 CORRECTION_RATE = 0.01
 # Largest velocity error that is integrated, as a share of the target speed. While the error is larger, the
 # character is still turning or starting.
@@ -26,22 +27,24 @@ CORRECTION_WITHIN = 0.8
 MOST_CORRECTION = 1.0  # largest integral correction, as a share of the target velocity
 # Largest turn to ask the network for, radians. If asked for more, the character may turn the other way.
 FURTHEST_TURN = np.radians(137)
-STRAFE_FROM = np.radians(45)  # from this angle between facing and velocity on, the strafe share is 1
+STRAFE_FROM = np.radians(45)  # the strafe share is 1 if facing and velocity are at least this far apart
 STILL = 0.1  # cm a frame: a slower target means standing
 
 
 # Groups of arrays for compiled functions, which unpack them into names. They are plain tuples, because
 # passing a named tuple costs a microsecond.
 #
-# position, direction (C, T, 2): world x and z. gait (C, T, 6): shares. By default T is 120: 60 frames of the
-# past, then the present (entry T/2) and the 59 frames after it.
+# position, direction (C, T, 2): world x and z. gait (C, T, 6): shares of the gaits. By default T is 120: 60
+# frames of the past, then the present (entry T/2) and the 59 frames after it.
 Trajectory = tuple[Any, Any, Any]
-# What the caller wants: velocity, direction (C, 2); strafe (C,) share; gait (C, 6) shares.
+# What the caller wants: velocity, direction (C, 2), the facing; strafe (C,), the strafe share; gait (C, 6),
+# shares of the gaits. The strafe share rises with the angle between facing and velocity, from 0 to 1.
 Target = tuple[Any, Any, Any, Any]
-# The smoothed target: velocity, direction (C, 2); strafe (C,); correction (C, 2) of a steady error of the
-# velocity, see `_ask_velocity`.
+# The smoothed target: velocity, direction (C, 2); strafe (C,). correction (C, 2): what corrects a steady
+# error of the velocity, see `_ask_velocity`.
 Smoothed = tuple[Any, Any, Any, Any]
-# values, targets (C, K) of all channels' columns; steps (K,), largest change of a value in a frame.
+# values, targets (C, K): present and target values of all channels' columns. steps (K,): largest change of a
+# value in a frame.
 Channels = tuple[Any, Any, Any]
 
 
@@ -53,11 +56,11 @@ def wrap(angle: float) -> float:
 
 @njit
 def target_facing(velocity: Any, ahead: Any, direction: Any, strafe: Any, look: Any) -> None:
-    """Write the share of strafing into `strafe` (C,) and the target facing into `look` (C, 2).
+    """Write the strafe share into `strafe` (C,) and the target facing into `look` (C, 2).
 
     velocity: (C, 2) target velocity. ahead: (C, 2) direction in which the caller wants the character to look;
-    zero if it is to look where it goes. direction: (C, 2) smoothed facing, which such a character keeps while
-    it stands.
+    zero if the character is to look where it goes. direction: (C, 2) smoothed facing. A standing character
+    keeps it if `ahead` is zero. With another `ahead`, a standing character has the strafe share 1.
     """
     for c in range(velocity.shape[0]):
         x, z = velocity[c, 0], velocity[c, 1]
@@ -76,8 +79,8 @@ def target_facing(velocity: Any, ahead: Any, direction: Any, strafe: Any, look: 
 def follow_target(target: Target, steering: float, smoothed: Smoothed, path: Trajectory) -> None:
     """Move `smoothed` toward the caller's target, and the gait of the present frame toward the target gait.
 
-    `_ask_velocity` and `_ask_turn` correct the target. With `steering` 0 there is no correction, as in the
-    runtime of Holden et al. (2017).
+    Before that, `_ask_velocity` and `_ask_turn` correct the target. With `steering` 0 there is no correction,
+    as in the runtime of Holden et al. (2017).
     """
     target_velocity, target_direction, target_strafe, target_gait = target
     velocity, direction, strafe, correction = smoothed
@@ -85,17 +88,17 @@ def follow_target(target: Target, steering: float, smoothed: Smoothed, path: Tra
     middle = gait.shape[1] // 2
     for c in range(velocity.shape[0]):
         x, z = target_velocity[c, 0], target_velocity[c, 1]
-        goal = np.arctan2(target_direction[c, 0], target_direction[c, 1])
+        goal_yaw = np.arctan2(target_direction[c, 0], target_direction[c, 1])
         if steering > 0.0:
             if x * x + z * z >= STILL * STILL:
                 facing = np.arctan2(heading[c, middle, 0], heading[c, middle, 1])
-                goal += _ask_turn(0.5 * steering, wrap(goal - facing))
+                goal_yaw += _ask_turn(0.5 * steering, wrap(goal_yaw - facing))
             x, z = _ask_velocity(steering, x, z, position[c], correction[c])
         velocity[c, 0] += TARGET_MIX * (x - velocity[c, 0])
         velocity[c, 1] += TARGET_MIX * (z - velocity[c, 1])
-        now = np.arctan2(direction[c, 0], direction[c, 1])
-        now += TARGET_MIX * wrap(goal - now)
-        direction[c, 0], direction[c, 1] = np.sin(now), np.cos(now)
+        yaw = np.arctan2(direction[c, 0], direction[c, 1])
+        yaw += TARGET_MIX * wrap(goal_yaw - yaw)
+        direction[c, 0], direction[c, 1] = np.sin(yaw), np.cos(yaw)
         strafe[c] += TARGET_MIX * (target_strafe[c] - strafe[c])
         for k in range(gait.shape[2]):
             gait[c, middle, k] += GAIT_MIX * (target_gait[c, k] - gait[c, middle, k])
@@ -105,10 +108,11 @@ def follow_target(target: Target, steering: float, smoothed: Smoothed, path: Tra
 def _ask_velocity(steering: float, x: float, z: float, position: Any, correction: Any) -> tuple[float, float]:
     """The velocity to ask the network for, so that the character reaches the velocity (x, z).
 
-    A network tends to keep its past velocity. So `steering` times the error is added to the target, at most
-    STEERING_LIMIT times the target. The error is the target minus the mean velocity over the later half of
-    the past. A steady error, such as weaker strafing to one side, is integrated in `correction` (2,): along
-    the target velocity, and to its left, as shares of the target speed. position: (T, 2) of the trajectory.
+    A network tends to keep its past velocity. So a correction is added to the target, at most STEERING_LIMIT
+    times the target. One part is `steering` times the error, which is the target minus the mean velocity over
+    the later half of the past. The other part, `correction` (2,), is for a steady error, such as weaker
+    strafing to one side. It is the integral of the error along the target velocity and to its left, as shares
+    of the target speed. position: (T, 2) of the trajectory.
     """
     middle = position.shape[0] // 2
     span = middle // 2
@@ -134,7 +138,10 @@ def _ask_velocity(steering: float, x: float, z: float, position: Any, correction
 
 @njit
 def _ask_turn(gain: float, turn: float) -> float:
-    """Radians to add to the remaining `turn`: `gain` times the turn. The sum is at most FURTHEST_TURN."""
+    """Radians to add to the remaining `turn`: `gain` times the turn, or less.
+
+    It is less if the sum would exceed FURTHEST_TURN, and 0 if the turn alone exceeds it.
+    """
     room = max(FURTHEST_TURN - abs(turn), 0.0)
     return min(max(gain * turn, -room), room)
 
@@ -144,7 +151,7 @@ def blend_future(smoothed: Smoothed, path: Trajectory) -> None:
     """Bend the predicted future toward the target velocity and facing, more at later times.
 
     At time t of the future (0 to 1), the share of the target is 1 - (1 - t)^b. b is .5 for the position (1
-    when strafing) and 2 for the direction (.5 when strafing).
+    when strafing) and 2 for the direction (.5 when strafing). The gait of the future is the present gait.
     """
     velocity, facing, strafe, _ = smoothed
     position, direction, gait = path
@@ -152,13 +159,14 @@ def blend_future(smoothed: Smoothed, path: Trajectory) -> None:
     middle = length // 2
     shares = np.empty((2, length))  # of the target, for the position and for the direction
     for c in range(position.shape[0]):
-        # Powers take half of the time of this function, and most characters of a crowd strafe equally (by 0).
+        # Powers take half of the time of this function. Most characters of a crowd have the same strafe share
+        # (0) as the one before, so that its powers can be used again.
         if c == 0 or strafe[c] != strafe[c - 1]:
             for i in range(middle + 1, length):
-                left = 1.0 - (i - middle) / middle
-                shares[0, i] = 1.0 - left ** (0.5 + 0.5 * strafe[c])
-                shares[1, i] = 1.0 - left ** (2.0 - 1.5 * strafe[c])
-        goal = np.arctan2(facing[c, 0], facing[c, 1])
+                remaining = 1.0 - (i - middle) / middle
+                shares[0, i] = 1.0 - remaining ** (0.5 + 0.5 * strafe[c])
+                shares[1, i] = 1.0 - remaining ** (2.0 - 1.5 * strafe[c])
+        goal_yaw = np.arctan2(facing[c, 0], facing[c, 1])
         old_x, old_z = position[c, middle]
         for i in range(middle + 1, length):
             step_x, step_z = position[c, i, 0] - old_x, position[c, i, 1] - old_z
@@ -166,7 +174,7 @@ def blend_future(smoothed: Smoothed, path: Trajectory) -> None:
             position[c, i, 0] = position[c, i - 1, 0] + step_x + shares[0, i] * (velocity[c, 0] - step_x)
             position[c, i, 1] = position[c, i - 1, 1] + step_z + shares[0, i] * (velocity[c, 1] - step_z)
             yaw = np.arctan2(direction[c, i, 0], direction[c, i, 1])
-            yaw += shares[1, i] * wrap(goal - yaw)
+            yaw += shares[1, i] * wrap(goal_yaw - yaw)
             direction[c, i, 0], direction[c, i, 1] = np.sin(yaw), np.cos(yaw)
             for k in range(gait.shape[2]):
                 gait[c, i, k] = gait[c, middle, k]
@@ -189,8 +197,11 @@ def sample_points(path: Trajectory, step: int, side: float, points: Any) -> None
 
 
 @njit
-def stand_on(ground: Any, height: Any) -> None:
-    """Write the mean ground height on the path into height (C,). ground: (C, samples, 3)."""
+def write_mean_height(ground: Any, height: Any) -> None:
+    """Write the mean ground height on the path into height (C,).
+
+    ground: (C, samples, 3) heights left of the path, on it and right of it.
+    """
     for c in range(ground.shape[0]):
         total = 0.0
         for s in range(ground.shape[1]):
@@ -209,10 +220,10 @@ def prepare(
     side: float,
     points: Any,
 ) -> None:
-    """`follow_target`, `blend_future` and `sample_points` in one call.
+    """Call `follow_target`, `blend_future` and `sample_points`, and move channel values to their targets.
 
-    Also moves the channel values toward their targets. All are in this file because numba compiles a cached
-    function again only if its own file changes, not if the file of a callee changes.
+    All these functions are in this file because numba compiles a cached function again only if its own file
+    changes, not if the file of a function that it calls changes.
     """
     follow_target(target, steering, smoothed, path)
     blend_future(smoothed, path)

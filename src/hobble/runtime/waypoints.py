@@ -16,7 +16,8 @@ from hobble.core.quat import Array
 class Waypoint:
     """A ground position x, z in cm, with the gait and speed (cm a frame) on the way to it.
 
-    facing: world direction (x, z) to look in on the way (strafing); None: look toward the waypoint.
+    facing: world direction (x, z), of any length, in which the character looks on the way; None: it looks
+    toward the waypoint.
     """
 
     position: tuple[float, float]
@@ -38,19 +39,19 @@ ARRIVED = 100.0  # cm: a waypoint counts as reached within this distance
 
 
 class Follower:
-    """Makes C characters (`characters`) follow a closed track, each at its own pace.
+    """Makes C characters follow a closed track of W waypoints, each character at its own pace.
 
-    Every character starts at the track's last waypoint and goes toward waypoint 0. arrived: distance, in cm,
-    within which a waypoint counts as reached. places: (W, 2) positions of the waypoints. `reached` (C,)
-    counts the waypoints that each character has reached. `off_path` (C,) is its distance in cm from the line
-    between the waypoint that it reached last and the next one.
+    Every character starts at the track's last waypoint and goes toward waypoint 0. characters: C. arrived:
+    distance, in cm, within which a waypoint counts as reached. `places` (W, 2) are the positions of the
+    waypoints. `reached` (C,) counts the waypoints that each character has reached. `off_path` (C,) is the
+    distance, in cm, of each character from the line between the last reached waypoint and the next one.
     """
 
     def __init__(
         self, track: Sequence[Waypoint] = TRACK, characters: int = 1, arrived: float = ARRIVED
     ) -> None:
         if len(track) < 2:
-            raise ValueError("a track needs at least two waypoints")
+            raise ValueError(f"a track needs at least two waypoints, not {len(track)}")
         self.track, self.arrived = tuple(track), arrived
         self.places = np.array([w.position for w in self.track], float)
         self._speeds = np.array([w.speed for w in self.track], float)
@@ -59,14 +60,14 @@ class Follower:
 
     @property
     def start(self) -> tuple[Array, float]:
-        """Start of a lap, (2,) cm, and the yaw from there toward waypoint 0, radians."""
-        way = self.places[0] - self.places[-1]
-        return self.places[-1].copy(), float(np.arctan2(way[0], way[1]))
+        """Position (2,), cm, where a lap starts, and the yaw from there toward waypoint 0, radians."""
+        ahead = self.places[0] - self.places[-1]
+        return self.places[-1].copy(), float(np.arctan2(ahead[0], ahead[1]))
 
     def lead(self, position: Array) -> tuple[Array, list[Waypoint]]:
-        """The velocity of each character (C, 2) toward its next waypoint, and these C waypoints.
+        """The velocity (C, 2), cm a frame, of each character toward its next waypoint, and these C waypoints.
 
-        position: (C, 2) x and z, cm.
+        position: (C, 2) x and z of the characters, cm. Updates `reached` and `off_path`.
         """
         velocity = np.empty((len(position), 2))
         _lead(self.places, self._speeds, self.arrived, position, self.reached, self.off_path, velocity)
@@ -74,21 +75,22 @@ class Follower:
 
 
 @njit
-def _distance_to_line(p: Any, a: Any, b: Any) -> float:
-    """Distance of point p from the segment a to b, each (2,) cm."""
-    ax, az, bx, bz = p[0] - a[0], p[1] - a[1], b[0] - a[0], b[1] - a[1]
-    t = min(max((ax * bx + az * bz) / max(bx * bx + bz * bz, 1e-9), 0.0), 1.0)
-    return np.sqrt((ax - t * bx) ** 2 + (az - t * bz) ** 2)
+def _distance_to_segment(p: Any, a: Any, b: Any) -> float:
+    """Distance of point p from the segment a to b, cm. All three are (2,)."""
+    px, pz, bx, bz = p[0] - a[0], p[1] - a[1], b[0] - a[0], b[1] - a[1]
+    # The nearest point of the segment is at the share t of the way from a to b.
+    t = min(max((px * bx + pz * bz) / max(bx * bx + bz * bz, 1e-9), 0.0), 1.0)
+    return np.sqrt((px - t * bx) ** 2 + (pz - t * bz) ** 2)
 
 
 @njit
 def _lead(
     places: Any, speeds: Any, arrived: float, position: Any, reached: Any, off_path: Any, velocity: Any
 ) -> None:
-    """Write the velocities of `Follower.lead`, and update `reached` and `off_path`."""
+    """Write the velocities of `Follower.lead` into `velocity`, and update `reached` and `off_path`."""
     count = len(places)
     for c in range(position.shape[0]):
-        n = reached[c] % count
+        n = reached[c] % count  # the next waypoint; x and z lead to it
         x, z = places[n, 0] - position[c, 0], places[n, 1] - position[c, 1]
         distance = np.sqrt(x * x + z * z)
         if distance < arrived:
@@ -96,6 +98,6 @@ def _lead(
             n = (n + 1) % count
             x, z = places[n, 0] - position[c, 0], places[n, 1] - position[c, 1]
             distance = np.sqrt(x * x + z * z)
-        off_path[c] = _distance_to_line(position[c], places[n - 1], places[n])
+        off_path[c] = _distance_to_segment(position[c], places[n - 1], places[n])
         scale = speeds[n] / max(distance, 1e-6)
         velocity[c, 0], velocity[c, 1] = x * scale, z * scale

@@ -1,4 +1,7 @@
-"""Positions of the ankle and rotations of the foot: it rolls in stance and swings to the next stance."""
+"""Moves a foot through its planned stances: it rolls in a stance, and swings to the next stance.
+
+The pitch of a foot is its angle about the X axis, positive if the toe is up.
+"""
 
 from __future__ import annotations
 
@@ -18,13 +21,13 @@ from hobble.synthetic.style import Style
 X_AXIS = np.array([1.0, 0.0, 0.0])
 HEEL = np.array([0.0, -4.2, -3.0])  # cm from the ankle joint to the heel, approximately
 READY = 0.95  # after this share of the swing, the foot has the pitch with which it lands
-# Exponents of the time in a swing, which runs from 0 to 1. Because they are below 1, the foot is highest
-# before the middle of the swing (KICK), and in the middle it has more than half of its way behind it (EARLY).
+# Exponents of the time in a swing, which runs from 0 to 1. KICK is below 1, so the foot is highest before the
+# middle of the swing. EARLY is below 1, so the foot covers more than half of its way in the first half.
 KICK, EARLY = 0.68, 0.81
-FOLLOW = 0.45  # the swing begins with this share of the pitch rate at the end of the stance
+FOLLOW = 0.45  # the pitch begins the swing with this share of its rate of change at the end of the stance
 LANDING_SPEED = 0.36  # speed of the foot as it lands, as a share of its mean speed in the swing
-# Where the ground is in the way, the foot rises over it in the first RISE of the swing, and comes down in the
-# last SETTLE (shares of the swing).
+# Where the ground is in the way, the foot is raised more. The raise grows in the first RISE of the swing, and
+# shrinks in the last SETTLE of it (shares of the swing).
 RISE, SETTLE = 0.36, 0.3
 SOLE_HEIGHT = 2.0  # cm: heel, toe joint and toe tip count as this high above the sole
 
@@ -41,22 +44,22 @@ class FootPoses:
     toes: Array
 
 
-def move_foot(steps: list[PlannedStance], style: Style, side: int, ground: Ground) -> FootPoses:
-    """The path of one foot through its stances, `steps`.
+def move_foot(stances: list[PlannedStance], style: Style, side: int, ground: Ground) -> FootPoses:
+    """The path of one foot through its stances.
 
-    side: LEFT or RIGHT of `hobble.synthetic.style`. Frames before the first landing, and from the last
-    landing on, are not set: there positions are 0 and rotations the identity.
+    side: LEFT or RIGHT of `hobble.synthetic.style`. In frames before the first landing, and from the last
+    landing on, positions are 0 and rotations are the identity.
     """
     frames = len(style.duty)
-    turns = np.tile(quat.IDENTITY, (frames, 1))
-    foot = FootPoses(np.zeros((frames, 3)), turns, turns.copy())
-    rest = np.radians(style.rest_pitch)
-    rolls = [_Roll.of(step, style, side, rest) for step in steps]
+    rotations = np.tile(quat.IDENTITY, (frames, 1))
+    foot = FootPoses(np.zeros((frames, 3)), rotations, rotations.copy())
+    rest_pitch = np.radians(style.rest_pitch)
+    rolls = [_Roll.of(stance, style, side, rest_pitch) for stance in stances]
     for i, (here, there) in enumerate(pairwise(rolls)):
-        stays = not there.step.swings  # no swing to the next stance: the foot stands until then
-        leave = there.step.land if stays else here.step.leave
-        t = _frames(here.step.land, leave)
-        pitch = here.pitch(t, lands=here.step.swings or i == 0, leaves=not stays)
+        stays = not there.stance.swings  # without a swing, the foot stands until the next stance begins
+        leave = there.stance.land if stays else here.stance.leave
+        t = _frames(here.stance.land, leave)
+        pitch = here.pitch(t, lands=here.stance.swings or i == 0, leaves=not stays)
         _stand(foot, t, here, pitch)
         if not stays:
             _swing(foot, here, there, style, side, ground)
@@ -64,6 +67,7 @@ def move_foot(steps: list[PlannedStance], style: Style, side: int, ground: Groun
 
 
 def _frames(start: float, end: float) -> np.ndarray:
+    """The whole frames from `start` to `end`, without `end`."""
     return np.arange(int(np.ceil(start)), int(np.ceil(end)))
 
 
@@ -71,106 +75,126 @@ def _frames(start: float, end: float) -> np.ndarray:
 class _Roll:
     """A stance, and the pitch of the foot in it: the toe comes down, the foot is flat, then the heel goes up.
 
-    land_pitch, off_pitch: radians, as the foot lands and as it leaves. rest: (F,) radians, the pitch of a
-    standing foot; one array for all stances. flat, heel_off: shares of the stance after which the toe is down
-    and the heel leaves the ground. power: exponent of the heel's rise over time.
+    land_pitch, off_pitch: pitch as the foot lands and as it leaves, radians. rest_pitch: (F,) pitch of a
+    standing foot, radians. All stances share this array. flat: share of the stance after which the toe is
+    down. heel_off: share of the stance after which the heel leaves the ground. power: exponent of the heel's
+    rise over time.
     """
 
-    step: PlannedStance
+    stance: PlannedStance
     land_pitch: float
     off_pitch: float
-    rest: Array
+    rest_pitch: Array
     flat: float
     heel_off: float
     power: float
 
     @classmethod
-    def of(cls, step: PlannedStance, style: Style, side: int, rest: Array) -> _Roll:
-        land = value_at(style.land_pitch[:, side], step.land)
-        off = value_at(style.off_pitch[:, side], step.leave)
-        flat = value_at(style.flat, step.land)
-        heel_off = value_at(style.heel_off[:, side], (step.land + step.leave) / 2)
+    def of(cls, stance: PlannedStance, style: Style, side: int, rest_pitch: Array) -> _Roll:
+        """The roll of a stance, with the values that the style has during it."""
+        land = value_at(style.land_pitch[:, side], stance.land)
+        off = value_at(style.off_pitch[:, side], stance.leave)
+        flat = value_at(style.flat, stance.land)
+        heel_off = value_at(style.heel_off[:, side], (stance.land + stance.leave) / 2)
         return cls(
-            step,
+            stance,
             float(np.radians(land)),
             float(np.radians(off)),
-            rest,
+            rest_pitch,
             float(flat),
             float(heel_off),
-            float(value_at(style.roll, step.leave)),
+            float(value_at(style.roll, stance.leave)),
         )
 
     def pitch(self, t: Array | float, lands: bool = True, leaves: bool = True) -> Array:
-        """Radians, positive for toe up, at frames `t` in or just outside the stance.
+        """The pitch, radians, at frames `t` in the stance or just outside it.
 
-        lands, leaves: whether the stance begins with a landing and ends with a swing. If not, the foot
-        keeps the pitch of standing at that end.
+        lands: whether the stance begins with a landing. leaves: whether it ends with a swing. Without a
+        landing or a swing, the foot has the pitch of a standing foot at that end.
         """
-        u = (np.asarray(t, float) - self.step.land) / (self.step.leave - self.step.land)
-        down = u / self.flat
-        rise = np.clip((u - self.heel_off) / (1 - self.heel_off), 0, None)
-        rest = value_at(self.rest, t)
+        stance = self.stance
+        share = (np.asarray(t, float) - stance.land) / (stance.leave - stance.land)  # of the stance
+        down = share / self.flat
+        rise = np.clip((share - self.heel_off) / (1 - self.heel_off), 0, None)
+        rest = value_at(self.rest_pitch, t)
         landing = (self.land_pitch - rest) * (1 - _ease(down)) if lands else 0.0
-        return np.asarray(rest + landing + ((self.off_pitch - rest) * rise**self.power if leaves else 0.0))
+        leaving = (self.off_pitch - rest) * rise**self.power if leaves else 0.0
+        return np.asarray(rest + landing + leaving)
 
     def toe(self, pitch: Array) -> Array:
-        """(3,) position of the toe joint.
+        """(..., 3) position of the toe joint at pitches (...).
 
-        It stands still while the heel is up, and moves on an arc about the ankle while the toe is up.
+        The toe joint stands still while the heel is up, and moves on an arc about the ankle while the toe is
+        up.
         """
-        turned = quat.mul(self.step.turn, quat.from_axis_angle(X_AXIS, -np.maximum(pitch, 0.0)))
-        return self.step.ankle + quat.rotate(turned, FOOT)
+        rotation = quat.mul(self.stance.turn, quat.from_axis_angle(X_AXIS, -np.maximum(pitch, 0.0)))
+        return self.stance.ankle + quat.rotate(rotation, FOOT)
 
     def ankle(self, pitch: Array) -> Array:
-        """(..., 3) position of the ankle.
+        """(..., 3) position of the ankle at pitches (...).
 
-        It stands still while the toe is up, and moves on an arc about the toe joint while the heel is up.
+        The ankle stands still while the toe is up, and moves on an arc about the toe joint while the heel is
+        up.
         """
-        turned = quat.mul(self.step.turn, quat.from_axis_angle(X_AXIS, -np.minimum(pitch, 0)))
-        return self.step.ankle + quat.rotate(self.step.turn, FOOT) - quat.rotate(turned, FOOT)
+        stance = self.stance
+        rotation = quat.mul(stance.turn, quat.from_axis_angle(X_AXIS, -np.minimum(pitch, 0)))
+        return stance.ankle + quat.rotate(stance.turn, FOOT) - quat.rotate(rotation, FOOT)
 
 
 def _stand(foot: FootPoses, t: np.ndarray, roll: _Roll, pitch: Array) -> None:
+    """Set the frames t (N,) of a stance, in which the foot has the pitches (N,).
+
+    While the heel is up, the toes stay flat on the ground.
+    """
     foot.ankle[t] = roll.ankle(pitch)
-    foot.foot[t] = quat.mul(roll.step.turn, quat.from_axis_angle(X_AXIS, -pitch))
-    foot.toes[t] = quat.mul(roll.step.turn, quat.from_axis_angle(X_AXIS, -np.maximum(pitch, 0)))
+    foot.foot[t] = quat.mul(roll.stance.turn, quat.from_axis_angle(X_AXIS, -pitch))
+    foot.toes[t] = quat.mul(roll.stance.turn, quat.from_axis_angle(X_AXIS, -np.maximum(pitch, 0)))
 
 
 def _swing(foot: FootPoses, here: _Roll, there: _Roll, style: Style, side: int, ground: Ground) -> None:
-    start, end = here.step.leave, there.step.land
+    """Set the frames of the swing from the stance `here` to the stance `there`."""
+    start, end = here.stance.leave, there.stance.land
     t = _frames(start, end)
     if not len(t):
         return
-    u = (t - start) / (end - start)
-    bump = np.sin(np.pi * u**KICK) ** 2
-    p0, p1 = here.pitch(start), there.pitch(end)
-    rate = (p0 - here.pitch(start - 0.01)) / 0.01 * (end - start) * READY
-    pitch = _hermite(p0, rate * FOLLOW, p1, 0.0, np.minimum(u / READY, 1))
-    turn = quat.slerp(here.step.turn, there.step.turn, _ease(u))
+    u = (t - start) / (end - start)  # time in the swing, 0 to 1
+    bump = np.sin(np.pi * u**KICK) ** 2  # how much the swing is raised: 0 at both ends, 1 in between
+    first_pitch, last_pitch = here.pitch(start), there.pitch(end)
+    # The rate of change at the end of the stance, radians in the time READY of the swing.
+    rate = (first_pitch - here.pitch(start - 0.01)) / 0.01 * (end - start) * READY
+    pitch = _hermite(first_pitch, rate * FOLLOW, last_pitch, 0.0, np.minimum(u / READY, 1))
+    turn = quat.slerp(here.stance.turn, there.stance.turn, _ease(u))
     rotation = quat.mul(turn, quat.from_axis_angle(X_AXIS, -pitch))
+    # While the heel is up, the toes are bent up as in a stance, but by up to 40% less in the swing.
     bend = np.minimum(pitch, 0) * (1 - 0.4 * bump)
     toes = quat.mul(rotation, quat.from_axis_angle(X_AXIS, bend))
     # The toe joint starts at rest and is moving when it lands. Its position and the pitch give the ankle.
-    going = _hermite(0.0, 0.0, 1.0, LANDING_SPEED / EARLY, u**EARLY)
-    share = np.stack([going, _ease(u), going], axis=1)
-    toe = here.toe(p0) + (there.toe(p1) - here.toe(p0)) * share
+    along = _hermite(0.0, 0.0, 1.0, LANDING_SPEED / EARLY, u**EARLY)
+    share = np.stack([along, _ease(u), along], axis=1)  # of the way in x, y and z
+    first_toe = here.toe(first_pitch)
+    toe = first_toe + (there.toe(last_pitch) - first_toe) * share
     toe[:, 1] += style.lift[t, side] * bump
     toe[:, 1] += (
-        _lack(toe, rotation, toes, style.clearance[t, side] * bump, ground)
+        _missing_height(toe, rotation, toes, style.clearance[t, side] * bump, ground)
         * _ease(u / RISE)
         * _ease((1 - u) / SETTLE)
     )
     foot.ankle[t], foot.foot[t], foot.toes[t] = toe - quat.rotate(rotation, FOOT), rotation, toes
 
 
-def _lack(toe: Array, rotation: Array, toes: Array, clearance: Array, ground: Ground) -> Array:
-    """(N,) how much higher, cm, the swing must be for heel, toe joint and toe tip to clear the ground."""
-    tip = toe + quat.rotate(toes, np.array([0.0, 0.0, 6.0]))
+def _missing_height(toe: Array, rotation: Array, toes: Array, clearance: Array, ground: Ground) -> Array:
+    """(N,) how much higher, cm, the swing must be so that heel, toe joint and toe tip clear the ground.
+
+    toe: (N, 3) toe joint. rotation, toes: (N, 4) of foot and toes. clearance: (N,) height of the sole above
+    the ground that is wanted, cm.
+    """
+    tip = toe + quat.rotate(toes, np.array([0.0, 0.0, 6.0]))  # 6 cm in front of the toe joint
     heel = toe + quat.rotate(rotation, HEEL - FOOT)
-    lack = np.zeros(len(toe))
+    missing = np.zeros(len(toe))
     for point in (toe, tip, heel):
-        lack = np.maximum(lack, ground(point[:, 0], point[:, 2]) + SOLE_HEIGHT + clearance - point[:, 1])
-    return smooth_above(lack, max(1, len(toe) // 14))
+        lowest = ground(point[:, 0], point[:, 2]) + SOLE_HEIGHT + clearance
+        missing = np.maximum(missing, lowest - point[:, 1])
+    return smooth_above(missing, max(1, len(toe) // 14))
 
 
 def _ease(u: Array) -> Array:
