@@ -208,13 +208,13 @@ def training(folder: Path, memory_mb: int, rounds: int) -> None:
     from hobble.config.sections import Training
     from hobble.models.pfnn.options import PfnnOptions
     from hobble.training.batches import HostRows
-    from hobble.training.start import fresh, step_for, use_threads
+    from hobble.training.start import new_state, step_for, use_threads
     from hobble.training.update import update_for
 
     use_threads(int(os.environ.get("OMP_NUM_THREADS", "2")))
     options = Training(memory_mb=memory_mb)
     disk, memory = (Database.open(folder / "db", mb) for mb in (memory_mb, 1 << 20))
-    state = fresh(disk, PfnnOptions(), options)
+    state = new_state(disk, PfnnOptions(), options)
     device = state.network.flat.device
     update = update_for(step_for(state.network, options), state.adam, options.batch)
     rows = disk.block_rows(options.batch)

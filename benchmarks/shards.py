@@ -28,7 +28,7 @@ from hobble.database.reader import Database
 from hobble.database.shard import write_shard
 from hobble.models.pfnn.options import PfnnOptions
 from hobble.training.batches import HostRows
-from hobble.training.start import fresh, step_for, use_threads
+from hobble.training.start import new_state, step_for, use_threads
 from hobble.training.update import update_for
 
 SAMPLES = 50_000  # of a turn of reading; a tenth of them in a turn of training
@@ -84,7 +84,7 @@ def read(db: Database, section: int) -> float:
 def trainer(db: Database) -> Callable[[Database, int], float]:
     """Takes steps of a training and returns the samples a second."""
     options = Training()
-    state = fresh(db, PfnnOptions(), options)
+    state = new_state(db, PfnnOptions(), options)
     update = update_for(step_for(state.network, options), state.adam, options.batch)
 
     def turn(db: Database, section: int) -> float:

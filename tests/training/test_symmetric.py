@@ -19,7 +19,7 @@ from hobble.models.pfnn.options import PfnnOptions
 from hobble.models.plain.options import PlainOptions
 from hobble.models.trainable import Trainable
 from hobble.rows.mirror_columns import mirror_of_x, mirror_of_y
-from hobble.training.start import fresh
+from hobble.training.start import new_state
 from hobble.training.symmetric import Symmetry
 from hobble.training.train import train
 from training.conftest import SPLITS, Recipe, clip_rows, figure
@@ -77,7 +77,7 @@ def test_a_network_trained_so_mirrors_its_output(
 def test_new_weights_are_symmetric_and_as_large_as_before(
     data: Database, network: Options, training: Recipe
 ) -> None:
-    made = fresh(data, network, training).network
+    made = new_state(data, network, training).network
     spread = [float(layer[:, :, :-1].std()) for layer in made.layers]
     Symmetry(made, data).start()
     assert apart(made, data) < 1e-5
@@ -86,7 +86,7 @@ def test_new_weights_are_symmetric_and_as_large_as_before(
 
 @pytest.mark.parametrize("network", NETWORKS, ids=str)
 def test_a_symmetric_network_stays_as_it_is(data: Database, network: Options, training: Recipe) -> None:
-    made = fresh(data, network, training).network
+    made = new_state(data, network, training).network
     symmetry = Symmetry(made, data)
     made.flat.normal_(0, 0.1, generator=torch.Generator().manual_seed(2))
     before = made.flat.clone()

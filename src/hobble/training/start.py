@@ -1,4 +1,7 @@
-"""The start of a training: threads, device, recipe hash, and the checkpoint to resume from."""
+"""Prepares a training: sets threads and device, names the run, and reads the checkpoint to resume from.
+
+A run is a training that has a folder of checkpoints of its own.
+"""
 
 from __future__ import annotations
 
@@ -29,11 +32,12 @@ from hobble.training.schedule import depends_on_passes
 
 log = logging.getLogger("hobble.training")
 
-# Keys of the section `training` that the recipe hash leaves out.
+# Keys of the section `training` that the recipe hash leaves out; see `recipe_hash`.
 NOT_IN_RECIPE_HASH = ("continues", "device", "keep", "patience", *Machines.model_fields)
 # Keys of the section `training` that are arguments of `Adam`.
 ADAM_KEYS = ("learning_rate", "beta1", "beta2", "l1")
-# The arrays of a start checkpoint that determine how a training goes on. They are part of the run's name.
+# The arrays of a checkpoint that determine how a training goes on. `run_name` includes them in the run's
+# name: weights, first and second (moments of the optimiser), and the numbers of steps and sections so far.
 START_ARRAYS = (
     "weights",
     "first",
@@ -41,13 +45,16 @@ START_ARRAYS = (
     "steps",
     "sections",
 )
-BFLOAT16_FROM_BATCH = 256  # with batches of this size or more, matrix products take most of the time
+# `precision: auto` uses bfloat16 for batches of this many rows or more, in which matrix products take most of
+# the time.
+BFLOAT16_FROM_BATCH = 256
 
 
 def use_threads(threads: int, batch: int | None = None) -> None:
-    """Set the number of threads of PyTorch and numba, at most the number of cores; be deterministic.
+    """Set the number of threads of PyTorch and numba, and make PyTorch deterministic.
 
-    batch: rows of a batch. If it is given, a trial decides whether one thread is faster.
+    threads: the wanted number; it is lowered to the number of cores. batch: rows of a batch. If `batch` is
+    given, a short trial decides whether one thread is faster than `threads`.
     """
     threads = max(1, min(threads, count_cores(), numba.config.NUMBA_NUM_THREADS))  # type: ignore[attr-defined]
     if batch is not None:
@@ -63,31 +70,33 @@ def use_threads(threads: int, batch: int | None = None) -> None:
 def recipe_hash(network: Options, training: Training, database: Database, code: str | None) -> str:
     """A hash of everything that determines the state of a training after each section.
 
-    The number of passes counts only if the learning rate depends on it. Machines and processes do not count,
-    because a training can resume with others. code: a fingerprint of the training's source, or None.
+    These are the options, the data and the code. The number of passes is included only if the learning rate
+    depends on it. Machines and processes are not included, because a training can resume with others. code: a
+    fingerprint of the source code of the training, or None.
     """
-    kept = training.model_dump(mode="json", exclude=set(NOT_IN_RECIPE_HASH))
+    settings = training.model_dump(mode="json", exclude=set(NOT_IN_RECIPE_HASH))
     if not depends_on_passes(training):
-        del kept["passes"]
+        del settings["passes"]
     if training.stretches is None:
-        del kept["stretches"]
+        del settings["stretches"]
     data = hashlib.sha256((database.path / FILE).read_bytes()).hexdigest()
-    text = json.dumps([network.model_dump(mode="json"), kept, data, code], sort_keys=True)
+    text = json.dumps([network.model_dump(mode="json"), settings, data, code], sort_keys=True)
     return hashlib.sha256(text.encode()).hexdigest()[:16]
 
 
 def run_name(recipe: str, start: Arrays | None) -> str:
-    """The name of a run: the recipe hash, combined with the start checkpoint if its recipe is another one.
+    """The name of a run, and of its folder of checkpoints.
 
-    start: arrays of the start checkpoint. If it has the same recipe, it does not change the name, because the
-    run would reach the same state without it.
+    recipe: the recipe hash. start: arrays of the checkpoint to start from, or None. If it has another recipe,
+    the name is a hash of the recipe and of these arrays. Otherwise the name is the recipe hash, because the
+    run would reach the same state without this checkpoint.
     """
     if start is None or str(start.get("recipe")) == recipe:
         return recipe
-    name = hashlib.sha256(recipe.encode())
-    for part in START_ARRAYS:
-        name.update(start[part].tobytes())
-    return name.hexdigest()[:16]
+    digest = hashlib.sha256(recipe.encode())
+    for name in START_ARRAYS:
+        digest.update(start[name].tobytes())
+    return digest.hexdigest()[:16]
 
 
 def begin(
@@ -101,20 +110,21 @@ def begin(
 ) -> tuple[State, Path]:
     """The state to begin with, and the path of the run's own checkpoint.
 
-    recipe: the recipe hash. checkpoints: folder; the run's own checkpoint is in the subfolder that
-    `run_name` names.
+    recipe: the recipe hash. checkpoints: a folder with a subfolder for each run, called as `run_name` says.
+    start: path of another checkpoint to start from, or None.
 
-    The state comes from the run's own checkpoint, else from `start`, else it is new. If the run's own
-    checkpoint has more passes than `training.passes`, it is ignored. Raises InputError for a checkpoint that
-    is damaged or has a network of another shape, and for a start that is past `training.passes` or has
-    another number of sections. With several processes, the first one reads the checkpoint and sends the state
-    to the others; for these, the returned path is only `checkpoints`.
+    The state comes from the run's own checkpoint. If there is none, or if it has more passes than
+    `training.passes`, the state comes from `start`. Without `start`, it is new. Raises InputError for a
+    checkpoint that is damaged or has a network of another shape, and for a `start` that has more passes than
+    `training.passes` or another number of sections in a pass. If there are several processes, the first one
+    reads the checkpoint and sends the state to the other processes. These get `checkpoints` as the path,
+    which they do not use.
     """
     start_arrays = load_npz(start) if start is not None and processes.first else None
-    state = fresh(database, network, training, processes)
+    state = new_state(database, network, training, processes)
     if not processes.first:
         return _send_state(state, processes), checkpoints
-    state, own_path = _restored(state, training, recipe, checkpoints, start, start_arrays)
+    state, own_path = _restore(state, training, recipe, checkpoints, start, start_arrays)
     return _send_state(state, processes), own_path
 
 
@@ -126,7 +136,7 @@ def _send_state(state: State, processes: Processes) -> State:
     return state
 
 
-def _restored(
+def _restore(
     state: State,
     training: Training,
     recipe: str,
@@ -134,31 +144,42 @@ def _restored(
     start: Path | None,
     start_arrays: Arrays | None,
 ) -> tuple[State, Path]:
-    """Restore `state` from the run's own checkpoint or from the start, if there is one; see `begin`.
+    """Fill `state` from the run's own checkpoint or from `start`; see `begin`. Without both, leave it new.
 
-    Returns the state and the path of the run's own checkpoint.
+    start_arrays: what the file `start` holds. Returns the state and the path of the run's own checkpoint.
     """
     state.recipe = run_name(recipe, start_arrays)
     own_path = checkpoints / state.recipe / "checkpoint.npz"
-    goal = training.all_sections
+    last_section = training.all_sections
     if own_path.exists():
         data = load_npz(own_path)
-        if int(data.get("sections", 0)) <= goal:
+        if int(data.get("sections", 0)) <= last_section:
             unpack(data, state, own_path)
-            log.info("resuming from %s, after section %d of %d", own_path, state.sections_done, goal)
+            log.info("resuming from %s, after section %d of %d", own_path, state.sections_done, last_section)
             return state, own_path
-        log.warning("%s is past %g passes; starting again", own_path, training.passes)
+        log.warning(
+            "%s has more than %g passes, so it is not used and the training starts again",
+            own_path,
+            training.passes,
+        )
     if start is not None and start_arrays is not None:
         unpack(start_arrays, state, start)
         _check_start(state, training, start)
         if state.recipe != recipe:
-            log.warning("%s was made with other settings, data or code; training resumes from it", start)
-        log.info("resuming from %s, after section %d of %d", start, state.sections_done, goal)
+            log.warning(
+                "%s was made with other settings, data or code; the training resumes from it all the same",
+                start,
+            )
+        log.info("resuming from %s, after section %d of %d", start, state.sections_done, last_section)
     return state, own_path
 
 
 def _check_start(state: State, training: Training, path: Path) -> None:
-    """Raise InputError if the start has more passes than the training, or more or fewer sections a pass."""
+    """Raise InputError if the start checkpoint does not fit the training.
+
+    It must have the same number of sections in a pass, and must not have more passes than the training.
+    """
+    # row[1] is the number of a section in its pass, from 1. So the largest is the number of sections a pass.
     sections = int(max(row[1] for row in state.history)) if state.history else training.sections
     if sections != training.sections:
         raise InputError(
@@ -175,34 +196,39 @@ def _check_start(state: State, training: Training, path: Path) -> None:
         )
 
 
-def fresh(database: Database, network: Options, training: Training, processes: Processes = ALONE) -> State:
-    """A new network for the database's rows, and a new optimiser."""
+def new_state(
+    database: Database, network: Options, training: Training, processes: Processes = ALONE
+) -> State:
+    """The state before the first section: a new network for the database's rows, and a new optimiser."""
     skeleton = Skeleton.from_dict(database.skeleton)
     kind = model(network.kind)
-    assert isinstance(kind, Trained), "this kind is built, not trained"
-    new = kind.trainable(network, database.layout, skeleton, training.seed)
-    new = new.to(device(training.device, processes))
-    return State(new, Adam(new, **training.model_dump(include=set(ADAM_KEYS))))
+    assert isinstance(kind, Trained), "networks of this kind are built from rows without a training"
+    new_network = kind.trainable(network, database.layout, skeleton, training.seed)
+    new_network = new_network.to(device(training.device, processes))
+    return State(new_network, Adam(new_network, **training.model_dump(include=set(ADAM_KEYS))))
 
 
 def device(wanted: str, processes: Processes = ALONE) -> torch.device:
-    """The device to train on. wanted: auto, cpu or cuda. Each of several processes has its own GPU.
+    """The device to train on. wanted: "auto", "cpu" or "cuda"; "auto" is CUDA if there is a GPU.
 
-    Raises HobbleError if cuda is wanted but not available.
+    If there are several processes, each one has its own GPU. Raises HobbleError if "cuda" is wanted but not
+    available.
     """
     has_cuda = torch.cuda.is_available()
     if wanted == "cuda" and not has_cuda:
-        raise HobbleError("training.device is cuda, but PyTorch finds no CUDA device here; use auto or cpu")
+        raise HobbleError(
+            "training.device is cuda, but PyTorch finds no CUDA device here. Set it to auto or cpu"
+        )
     if not has_cuda or wanted == "cpu":
         return torch.device("cpu")
     return torch.device("cuda") if processes.alone else torch.device("cuda", processes.local)
 
 
 def step_for(network: Trainable, training: Training) -> TrainingStep:
-    """The `TrainingStep` for the device, the precision and the batch size.
+    """The `TrainingStep` for the network's device and for the precision and batch size of the training.
 
-    Sums are always float32. TF32, which rounds the factors of products to 11 bits, is switched on or off for
-    the whole process.
+    The precision is that of the factors in matrix products; their sums are always float32. TF32 rounds the
+    factors to 11 bits. PyTorch switches it on or off for the whole process.
     """
     on_cpu = network.flat.device.type == "cpu"
     precision = training.precision

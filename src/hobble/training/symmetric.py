@@ -1,9 +1,9 @@
-"""Keep a network in training symmetric: mirrored inputs give exactly the mirrored outputs.
+"""Keeps a network symmetric during its training: mirrored inputs then give exactly the mirrored outputs.
 
-A data set with `mirror: true` has every clip and its mirror image, so its best network is symmetric. But the
-first weights and the order of the samples are not, and the difference between left and right grows with the
-training. A symmetric network also learns from each sample for both sides: how a hurt left thigh moves, from
-clips with a hurt right one.
+A data set with `mirror: true` has every clip and its mirror image, so the network that fits it best is
+symmetric. But the first weights and the order of the samples are not symmetric, and the difference between
+left and right grows during the training. A symmetric network also learns more: a clip with a hurt right thigh
+shows it how a hurt left thigh moves, too.
 """
 
 from __future__ import annotations
@@ -14,14 +14,17 @@ from hobble.models.layer_mirror import LayerSymmetry
 from hobble.models.trainable import Trainable
 from hobble.rows.mirror_columns import mirror_of_x, mirror_of_y
 
-EVERY = 16  # steps between enforcements; one after each step would take longer and not improve the weights
+# The network is made symmetric after every 16 steps. To do so after each step would take longer and would not
+# improve the weights.
+STEPS_BETWEEN = 16
 
 
 class Symmetry:
     """Keeps a network symmetric while it trains on a database.
 
-    The property `why_asymmetric` of the network's options must be empty. Raises HobbleError if the skeleton
-    has no mirror image, or if left and right columns are standardised differently.
+    The property `why_asymmetric` of the network's options must be empty; else it says why the network cannot
+    be symmetric. Raises HobbleError if the skeleton has no mirror image, or if left and right columns are
+    standardised differently.
     """
 
     def __init__(self, network: Trainable, database: Database) -> None:
@@ -35,19 +38,22 @@ class Symmetry:
         ]
 
     def start(self) -> None:
-        """Make new weights symmetric.
+        """Make the random weights of a new network symmetric.
 
-        This makes a weight the mean of two independent ones. It is multiplied by sqrt(2) to restore the
-        variance.
+        Each weight becomes the mean of two independent random weights, which halves the variance. So the
+        weights, but not the biases, are then multiplied by sqrt(2).
         """
         self.enforce()
         for symmetry in self.layers:
             symmetry.layer[:, :, :-1].mul_(2**0.5)
-        self.enforce()  # the biases depend on the weights
+        self.enforce()  # again, because the symmetric biases depend on the weights
 
-    def after(self, steps: int) -> None:
-        """Call after each step. steps: number of all steps so far."""
-        if steps % EVERY == 0:
+    def after_step(self, steps: int) -> None:
+        """Make the network symmetric after some of the steps. Call this after each step.
+
+        steps: number of steps of the whole training so far.
+        """
+        if steps % STEPS_BETWEEN == 0:
             self.enforce()
 
     def enforce(self) -> None:

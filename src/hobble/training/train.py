@@ -1,9 +1,9 @@
 """The training loop.
 
-A pass goes once through all training samples. It has `training.sections` sections, and a section has batches.
-If the options say so, each batch is augmented: its motion is played slower or faster, other poses are mixed
-in, and earlier errors of the network are added. Then the optimiser takes a step. After each section the loop
-logs the errors and saves a checkpoint.
+A pass goes once through all training samples. It has `training.sections` sections, and each section has many
+batches. If the options say so, each batch is augmented: its motion is played slower or faster, other poses
+are mixed into its input poses, and the network's earlier errors are added to them. Then the optimiser takes a
+step. After each section the loop logs the errors and saves a checkpoint.
 """
 
 from __future__ import annotations
@@ -51,28 +51,31 @@ def train(
     """Train to `training.passes` passes over the database's training clips; returns the final state.
 
     network, training: the options of a configuration. checkpoints: a folder with a subfolder for each run,
-    named by the hash of everything that determines it; a run resumes from its own checkpoint there. start: a
-    checkpoint to start from if the run has none of its own. If it was trained with another recipe (options,
-    data, code), it is part of the hash. code: a fingerprint of the training's source, also part of the hash.
-    processes: the group that trains together. Each process calls this function; the first one reads and
-    writes checkpoints and keeps the history.
+    which is called by a hash of everything that determines the run's result. A run resumes from its own
+    checkpoint there. start: a checkpoint to start from if the run has none of its own. If it was trained with
+    another recipe (options, data, code), its arrays are also part of the hash. code: a fingerprint of the
+    source code of the training, also part of the hash. processes: the group that trains together. Each
+    process calls this function; the first one reads and writes checkpoints and records the history.
 
-    The result depends on the arguments and the number of threads, never on interruptions. Raises HobbleError
-    if the training error is not finite (the message names the batch, and the last checkpoint stays), if there
-    are fewer samples than sections, if `keep` or `patience` need a held-out error but no clip is held out,
-    and if `symmetric` is set for a network that cannot be symmetric.
+    The result depends on the arguments and the number of threads, but not on interruptions. Raises
+    HobbleError if the training error is not finite (the message names the batch, and the last checkpoint
+    stays), if there are fewer samples than sections, if `keep` or `patience` need a held-out error but no
+    clip is held out, and if `symmetric` is set for a network that cannot be symmetric.
     """
     use_threads(threads, training.batch)
     if (training.patience or training.keep == "best") and not database.rows(SPLIT):
         raise HobbleError(
-            "training.keep (best) and training.patience need the held-out error, but no clip is held out. "
-            "List some under held_out in the data set."
+            "`training.keep: best` and training.patience need the held-out error, but no clip is held out. "
+            "List some clips under held_out in the data set."
         )
     if training.symmetric and network.why_asymmetric:
         raise HobbleError(f"training.symmetric: {network.why_asymmetric}. Write `symmetric: false`.")
     samples, sections = database.samples(TRAIN), training.sections
     if samples < sections:
-        raise HobbleError(f"{samples} training samples are fewer than training.sections, {sections}")
+        raise HobbleError(
+            f"{samples} training samples are fewer than training.sections, {sections}. "
+            "Lower training.sections, or add clips."
+        )
     recipe = recipe_hash(network, training, database, code)
     state, path = begin(database, network, training, recipe, Path(checkpoints), start, processes)
     if not processes.first:
@@ -88,68 +91,72 @@ def _run(
     database: Database,
     training: Training,
     processes: Processes,
-    record: TrainingRecorder | None,
+    recorder: TrainingRecorder | None,
 ) -> None:
-    """Train section by section from `state`. record: None except in the first process."""
+    """Train section by section, and change `state` in place. recorder: None except in the first process."""
     sections, seed = training.sections, training.seed
     device, batch_size = state.network.flat.device, training.batch
     step = step_for(state.network, training)
-    update = update_for(step, state.adam, batch_size, processes, _kept(database, training))
+    update = update_for(step, state.adam, batch_size, processes, _undropped_inputs(database, training))
     symmetry = Symmetry(state.network, database) if training.symmetric else None
-    if symmetry and not state.adam.steps:
+    if symmetry and not state.adam.steps:  # no step yet, so the weights are new
         symmetry.start()
     rows = rows_for(database, device, processes, training.stretches)
-    places = processes.places(batch_size)
-    others = OtherPoses(database, training.other_poses, len(places), device, places.start)
-    versions = VersionPoses(database, training.version_poses, len(places), device, places.start)
-    paces = OtherPaces(database, training.other_paces, len(places), device, places.start)
+    places = processes.places(batch_size)  # the places in each batch that this process fills
+    other_poses = OtherPoses(database, training.other_poses, len(places), device, places.start)
+    version_poses = VersionPoses(database, training.version_poses, len(places), device, places.start)
+    other_paces = OtherPaces(database, training.other_paces, len(places), device, places.start)
     roll_out = RollOut(database, training.rollout, len(places), device, places.start)
     samples = database.samples(TRAIN)
     for index in range(state.sections_done, training.all_sections):
         if training.patience and processes.from_first(state.since_best)[0] >= training.patience:
-            log.info("no lower held-out error for %d sections: training ends", training.patience)
+            log.info("training ends, because %d sections did not lower the held-out error", training.patience)
             break
         pass_index, section = divmod(index, sections)
         where = f"pass {pass_index + 1} of {training.passes:g}, section {section + 1} of {sections}"
         watch = LossWatch(where, database.clips, processes)
         step.seed(section_seed(seed, index))
-        others.begin()
-        versions.begin()
-        paces.begin()
+        other_poses.begin()
+        version_poses.begin()
+        other_paces.begin()
         roll_out.begin()
         for batch in rows.batches(pass_index, section, sections, seed, batch_size):
-            # Play the motion slower or faster; mix in poses of rows with other channel values, then poses of
-            # hurt or healthy versions of the same clip; add the network's own errors.
-            paces.play(batch.x, batch.y)
-            others.mix(batch.x, batch.p)
-            versions.mix(batch.x, batch.p, batch.clip)
+            # Play the motion slower or faster. Mix in poses of rows with other channel values, then poses of
+            # hurt or healthy versions of the same clip. Add the network's own errors.
+            other_paces.play(batch.x, batch.y)
+            other_poses.mix(batch.x, batch.p)
+            version_poses.mix(batch.x, batch.p, batch.clip)
             roll_out.add(batch.x)
-            rate = learning_rate_share(training, (state.samples + watch.seen) / samples)
-            watch.add(update(batch.x, batch.y, batch.p, rate, batch.total), batch)
+            rate_share = learning_rate_share(training, (state.samples + watch.seen) / samples)
+            watch.add(update(batch.x, batch.y, batch.p, rate_share, batch.total), batch)
             roll_out.remember(step.error)
             if symmetry:
-                symmetry.after(state.adam.steps)
-            if record:
-                record.bar.update(batch.total)
+                symmetry.after_step(state.adam.steps)
+            if recorder:
+                recorder.bar.update(batch.total)
         if symmetry:
             symmetry.enforce()
         train_mse = watch.mean()
         processes.check_same(state.network.flat)
         state.sections_done, state.samples = index + 1, state.samples + watch.samples
-        if record:
-            record.section(where, [pass_index + 1, section + 1], train_mse)
-    if record:
-        record.close()
+        if recorder:
+            recorder.end_section(where, [pass_index + 1, section + 1], train_mse)
+    if recorder:
+        recorder.close()
 
 
-def _kept(database: Database, training: Training) -> list[slice]:
-    """The blocks of inputs that dropout never drops."""
+def _undropped_inputs(database: Database, training: Training) -> list[slice]:
+    """The blocks of columns of X that dropout never drops: the channels, or none."""
     layout = database.layout
     return [layout.x_channel(name) for name, _ in layout.channels] if training.keep_channels else []
 
 
 def section_seed(seed: int, index: int) -> int:
-    """The seed of dropout in a section. index: number of sections before it, in all passes."""
+    """The seed of dropout in a section, from 0 to 2^63 - 1.
+
+    seed: that of the training. index: number of sections before this one, in all passes.
+    """
+    # 1 gives other random numbers than 0, which is for the first weights. The shift clears the highest bit.
     return int(np.random.SeedSequence([seed, 1, index]).generate_state(1, np.uint64)[0] >> 1)
 
 
@@ -160,15 +167,19 @@ class TrainingRecorder:
         self.state, self.saver = state, saver
         samples = database.samples(TRAIN)
         self.held_out = HeldOut(database, state.network.flat.device, samples // training.sections)
-        self.goal = round(training.passes * samples)
-        self.samples_before, self.seconds_before = state.samples, state.seconds
+        self.goal = round(training.passes * samples)  # samples of the whole training
+        self.samples_before, self.seconds_before = state.samples, state.seconds  # before this process began
         self.began = time.perf_counter()
         self.bar = tqdm(
             total=self.goal, initial=state.samples, unit=" samples", unit_scale=True, disable=None
         )
 
-    def section(self, where: str, place: list[int], train_mse: float) -> None:
-        """Measure the network after a section, add to the history, save. place: pass and section, from 1."""
+    def end_section(self, where: str, place: list[int], train_mse: float) -> None:
+        """Measure the network on the held-out clips, add a row to the history, save a checkpoint, log.
+
+        where: names the pass and the section in the log. place: their numbers, from 1. train_mse: mean loss
+        of the section.
+        """
         state = self.state
         state.seconds = self.seconds_before + time.perf_counter() - self.began
         errors = self.held_out.errors(state.network)
@@ -183,11 +194,11 @@ class TrainingRecorder:
         self.saver.wait()
 
     def _report(self, where: str) -> None:
-        """Log speed, time left and errors."""
+        """Log the errors, the speed and the time left."""
         state, seconds = self.state, time.perf_counter() - self.began
         speed = (state.samples - self.samples_before) / seconds
         left = duration((self.goal - state.samples) / speed)
-        train, held_out = state.history[-1][4:6]
-        errors = f"error {train:.4f}, held out {held_out:.4f}"
+        train_mse, held_out_mse = state.history[-1][4:6]
+        errors = f"error {train_mse:.4f}, held out {held_out_mse:.4f}"
         log.info("%s: %s, %s samples/s, %s left", where, errors, f"{speed:,.0f}", left)
         self.bar.set_postfix_str(errors, refresh=False)

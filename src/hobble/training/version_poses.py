@@ -1,4 +1,8 @@
-"""Moves input poses between a clip and its hurt versions, so that a network learns what an injury changes."""
+"""Moves input poses between a clip and its hurt versions, so that a network learns what an injury changes.
+
+A hurt version is a copy of a healthy clip in which Hobble has made some links injured. A link is a pair of
+neighbouring joints, such as hip and knee.
+"""
 
 from __future__ import annotations
 
@@ -16,29 +20,30 @@ from hobble.rows.compose import lower_joints, without_terrain
 from hobble.training.even_spread import EvenSpread
 
 SPLIT = "train"
-TABLE_BYTES = 256 << 20  # memory for poses; if they need more, only every second (third, ...) row is kept
-CANDIDATES = 8  # number of rows with the nearest phases, among which the most similar path is chosen
+# Memory for the poses of the training rows. If they need more, only every second (third, ...) row is used.
+TABLE_BYTES = 256 << 20
+CANDIDATES = 8  # the pose comes from one of this many rows with the nearest phases: the most similar path
 NEAR = 1 / 32  # largest difference in phase between two poses that are mixed, in cycles
 
 
 class VersionPoses:
-    """Moves the pose in rows of X towards that of another version of the same clip. Y is unchanged.
+    """Moves the pose in rows of X towards the pose of another version of the same clip. Y is unchanged.
 
-    Each link is hurt in few clips. A network can take the posture of these clips for a part of the injury,
-    and continue the walk that it sees: a character that limps as at severity 10 then limps just as much after
-    the severity has fallen to 5. With these rows the network sees each clip's poses with and without the
-    injury, and only the channels tell whether Y is hurt.
+    Each link is hurt in few clips. So a network can take the posture of these clips for a sign of the injury,
+    and continue the walk that it sees. If a character limps as at severity 10 and the severity then falls to
+    5, it goes on limping just as much. With the moved poses, the network sees the poses of each clip both
+    with and without the injury, and only the channels tell whether Y is hurt.
 
-    The pose of a hurt row moves along the line to a pose of the healthy clip, and that of a healthy row along
-    the line to a pose of a hurt version. The other pose is that of the row whose path turns most like that of
-    the moved row, among rows with nearly the same phase. The pose moves by -1 to 1 times the way to the other
-    pose; a negative factor moves it away. These factors are spread evenly. They depend only on the row's
-    place in the batch and on the number of the batch, so several processes get the same rows as one would.
-    Rows of clips without hurt versions are not changed.
+    The pose of a hurt row moves along the line to a pose of the healthy clip. The pose of a healthy row moves
+    along the line to a pose of a hurt version. This other pose comes from a row with nearly the same phase:
+    the one whose path turns most like the path of the moved row. The pose moves by a factor of -1 to 1 times
+    the way to the other pose; a negative factor moves it away. The factors are spread evenly. They depend
+    only on the row's place in the batch and on the number of the batch, so several processes change the rows
+    just as one process would. Rows of clips without hurt versions are not changed.
 
-    The factors have the mean 0. If all poses of X moved towards the other version, Y, which does not move,
-    would always be further from that version than X. The network would learn to step away from it in each
-    frame, so the character would exaggerate its limp at run time.
+    The mean of the factors is 0, for this reason: if all poses of X moved towards the other version, Y would
+    always be further from that version than X, because Y does not move. The network would learn to step away
+    from that version in each frame, so the character would exaggerate its limp at run time.
 
     share: share of the rows that are moved; 0 changes nothing. batch: largest number of this process's rows
     in a batch. first: the place of its first row in the whole batch.
@@ -52,24 +57,29 @@ class VersionPoses:
         if not self.share:
             return
         layout = database.layout
-        of_name = {name: i for i, name in enumerate(names)}
+        index_of = {name: i for i, name in enumerate(names)}
         hurt = np.array([name in sources for name in names])
-        family = np.array([of_name.get(sources.get(name, name), -1) for name in names])
+        # Each clip's family: the index of its healthy original; -1 for clips without hurt versions.
+        family = np.array([index_of.get(sources.get(name, name), -1) for name in names])
         family[~np.isin(family, family[hurt])] = -1
-        # Rows are sorted by the key of their clip plus the phase. Keys of clips are 2 apart, so that rows of
-        # different keys are never near. Clips without hurt versions have a negative key.
+        # The healthy clip of a family has one key, and its hurt versions share another. `own_key` is the key
+        # of each clip, and `other_key` is the key of the clips whose poses it gets. Rows are sorted by the
+        # key of their clip plus their phase. Keys are 2 apart, so that rows of different keys are never near.
+        # Clips without hurt versions have a negative key.
         self.own_key = np.where(family < 0, -2.0, 2.0 * (family + len(names) * hurt))
         self.other_key = np.where(family < 0, -2.0, 2.0 * (family + len(names) * ~hurt))
-        self.pose, self.direction = (layout.x_joint_position, layout.x_joint_velocity), layout.x_direction
-        key, poses, directions = _table(database, self.own_key)
+        self.pose_blocks = (layout.x_joint_position, layout.x_joint_velocity)
+        self.direction_block = layout.x_direction
+        key, poses, directions = _pose_table(database, self.own_key)
         self.key = torch.from_numpy(key).to(device)
         self.poses, self.directions = (torch.from_numpy(array).to(device) for array in (poses, directions))
         self.spread = EvenSpread(batch, device, first)
+        # The places of the candidates, counted from the place of the sought key.
         self.offsets = torch.arange(CANDIDATES, device=device) - CANDIDATES // 2
-        self.batches = 0
+        self.batches = 0  # number of batches since `begin`
 
     def begin(self) -> None:
-        """Start again, so that a section of the training does not depend on the previous one."""
+        """Count batches from 0 again, so that a section does not depend on the previous one."""
         self.batches = 0
 
     def mix(self, x: Tensor, p: Tensor, clip: np.ndarray) -> None:
@@ -82,43 +92,55 @@ class VersionPoses:
         factors = self._factors(len(x))
         self.batches += 1
         moved = torch.nonzero(factors).flatten()
-        key = torch.from_numpy(self.other_key[clip]).to(x.device)[moved] + p[moved].double()
-        candidates = torch.searchsorted(self.key, key)[:, None] + self.offsets
+        sought = torch.from_numpy(self.other_key[clip]).to(x.device)[moved] + p[moved].double()
+        candidates = torch.searchsorted(self.key, sought)[:, None] + self.offsets
         candidates = candidates.clamp(0, len(self.key) - 1)
-        near = ((self.key[candidates] - key[:, None]).abs() < NEAR) & (key >= 0)[:, None]
-        apart = torch.linalg.vector_norm(
-            self.directions[candidates] - x[moved, self.direction][:, None], dim=2
+        is_near = ((self.key[candidates] - sought[:, None]).abs() < NEAR) & (sought >= 0)[:, None]
+        path_difference = torch.linalg.vector_norm(
+            self.directions[candidates] - x[moved, self.direction_block][:, None], dim=2
         )
-        least, chosen = torch.where(near, apart, torch.inf).min(dim=1)
-        factor = torch.where(least < torch.inf, factors[moved], 0.0).to(x.dtype)
-        other = self.poses[candidates.gather(1, chosen[:, None])[:, 0]]
-        for block, other_block in zip(self.pose, other.chunk(2, dim=1), strict=True):
+        smallest, chosen = torch.where(is_near, path_difference, torch.inf).min(dim=1)
+        factor = torch.where(smallest < torch.inf, factors[moved], 0.0).to(x.dtype)
+        other_pose = self.poses[candidates.gather(1, chosen[:, None])[:, 0]]
+        for block, other_block in zip(self.pose_blocks, other_pose.chunk(2, dim=1), strict=True):
             x[moved, block] = torch.lerp(x[moved, block], other_block, factor[:, None])
 
     def _factors(self, rows: int) -> Tensor:
-        """(rows,) the factor of each row: in `share` of the rows spread evenly from -1 to 1, else 0."""
+        """(rows,) the factor of each row: spread evenly from -1 to 1 in `share` of the rows, else 0."""
         even = self.spread.numbers(rows, self.batches)
         return torch.where(even < self.share, 2 * even / self.share - 1, 0.0)
 
 
-def _table(database: Database, clip_keys: Array) -> tuple[Array, Array, Array]:
+def _pose_table(database: Database, clip_keys: Array) -> tuple[Array, Array, Array]:
     """Keys (n,), poses (n, D) and path directions (n, E) of the training rows of clips with hurt versions.
 
+    These are the clips of hurt versions and their healthy originals. Poses and directions are standardised.
     clip_keys: (clips,) key of each clip; clips with a negative key are left out. The key of a row is the key
     of its clip plus the phase. The rows are sorted by key.
     """
     manifest = database.manifest
-    bare, into = without_terrain(database.layout), empty_buffers(manifest, SPLIT, 1)
-    pose, direction = (
-        np.r_[tuple(bare[name] for name in names)]
+    blocks, buffers = without_terrain(database.layout), empty_buffers(manifest, SPLIT, 1)
+    pose_columns, direction_columns = (
+        np.r_[tuple(blocks[name] for name in names)]
         for names in (("joint_position", "joint_velocity"), ("direction",))
     )
-    row_bytes = 4 * (len(pose) + len(direction)) * manifest.rows(SPLIT)
-    row_step = max(1, math.ceil(row_bytes / TABLE_BYTES))
+    table_bytes = 4 * (len(pose_columns) + len(direction_columns)) * manifest.rows(SPLIT)  # float32
+    row_step = max(1, math.ceil(table_bytes / TABLE_BYTES))
     parts = [
-        (np.empty(0), np.empty((0, len(pose)), np.float32), np.empty((0, len(direction)), np.float32)),
+        (  # arrays without rows, so that there is something to concatenate
+            np.empty(0),
+            np.empty((0, len(pose_columns)), np.float32),
+            np.empty((0, len(direction_columns)), np.float32),
+        ),
         *(
-            _of_chunk(database.load(SPLIT, [number], into), clip_keys, pose, direction, database, row_step)
+            _chunk_table(
+                database.load(SPLIT, [number], buffers),
+                clip_keys,
+                pose_columns,
+                direction_columns,
+                database,
+                row_step,
+            )
             for number in range(len(manifest.chunks[SPLIT]))
         ),
     ]
@@ -127,25 +149,27 @@ def _table(database: Database, clip_keys: Array) -> tuple[Array, Array, Array]:
     return key[order], poses[order], directions[order]
 
 
-def _of_chunk(
+def _chunk_table(
     window: ChunkWindow,
     clip_keys: Array,
-    pose: np.ndarray,
-    direction: np.ndarray,
+    pose_columns: np.ndarray,
+    direction_columns: np.ndarray,
     database: Database,
     row_step: int,
 ) -> tuple[Array, Array, Array]:
-    """The arrays of `_table` for one chunk, not sorted, with only one of `row_step` rows.
+    """The arrays of `_pose_table` for one chunk, not sorted, with every `row_step`-th row of the clips.
 
-    pose, direction: columns of x. Joint heights are measured from the
-    mean ground height of the row's first terrain fit.
+    window: the rows of the chunk. pose_columns, direction_columns: columns of X without terrain. Joint
+    heights are measured from the mean ground height of the row's first terrain fit.
     """
     key = clip_keys[window.clip] + window.phase
-    kept = np.flatnonzero(key >= 0)[::row_step]
-    x = widen(window.x[kept]).astype(np.float32)
-    lift = widen(window.fits[window.first[kept]]).astype(np.float32)[:, -1:]
+    chosen = np.flatnonzero(key >= 0)[::row_step]
+    x = widen(window.x[chosen]).astype(np.float32)
+    lift = widen(window.fits[window.first[chosen]]).astype(np.float32)[
+        :, -1:
+    ]  # cm, from the mean of the fits
     lower_joints(x, without_terrain(database.layout)["joint_position"], lift, _without_terrain_std(database))
-    return key[kept], x[:, pose], x[:, direction]
+    return key[chosen], x[:, pose_columns], x[:, direction_columns]
 
 
 def _without_terrain_std(database: Database) -> Array:

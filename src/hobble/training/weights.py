@@ -1,4 +1,4 @@
-"""Write network/weights.npz, which holds everything that the runtime needs."""
+"""Writes network/weights.npz, which holds everything that is needed to run the network."""
 
 from __future__ import annotations
 
@@ -30,19 +30,26 @@ def write_weights(
 ) -> None:
     """Write the arrays of the network, of the standardisation and of `TrainingFacts`, and `meta`.
 
-    about_training: numbers such as its passes and samples, which are added to `meta`. (`TrainingFacts`, in
-    contrast, are arrays about the training rows.) Equal networks give equal bytes.
+    configuration: its name. about_training: facts such as the numbers of passes and samples, which are added
+    to `meta`. (`TrainingFacts`, in contrast, are arrays about the training rows.) Equal arguments give a file
+    with equal bytes.
     """
-    s = database.statistics
-    arrays = {**network.arrays(), "Xmean": s.x_mean, "Xstd": s.x_std, "Ymean": s.y_mean, "Ystd": s.y_std}
-    arrays |= TrainingFacts.of(database.layout, database.each_row(TRAIN), s).arrays()
+    statistics = database.statistics
+    arrays = {
+        **network.arrays(),
+        "Xmean": statistics.x_mean,
+        "Xstd": statistics.x_std,
+        "Ymean": statistics.y_mean,
+        "Ystd": statistics.y_std,
+    }
+    arrays |= TrainingFacts.of(database.layout, database.each_row(TRAIN), statistics).arrays()
     save_npz(path, **arrays, meta=np.array(meta(network, database, configuration, about_training)))
 
 
 def meta(
     network: FinishedNetwork, database: Database, configuration: str, about_training: Mapping[str, Any]
 ) -> str:
-    """The array `meta` of the file, as JSON: meaning of the columns and origin of the network."""
+    """The text of the array `meta`: JSON that says what each column means and how the network was made."""
     skeleton = Skeleton.from_dict(database.skeleton)
     channels = [channel(name) for name, _ in database.layout.channels]
     return json.dumps(
