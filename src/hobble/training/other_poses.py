@@ -9,7 +9,7 @@ from hobble.database.reader import Database
 from hobble.rows.layout import GAITS
 from hobble.training.even_spread import EvenSpread
 
-KEPT = 32  # each place in a batch remembers this many last rows
+REMEMBERED_ROWS = 32  # each place in a batch remembers this many last rows
 NEAR = 1 / 16  # largest difference in phase between two poses that are mixed, in cycles
 SAME_GAIT = 0.5  # poses are mixed only if the share of each gait differs by less than this
 BEYOND = 0.5  # a pose may also move away from the other one, by up to this part of the distance
@@ -55,10 +55,10 @@ class OtherPoses:
         self.spread = EvenSpread(batch, device, first)
         rows = batch if self.share else 0
         self.poses, self.gaits, self.channels = (
-            torch.zeros(rows, KEPT, len(columns), device=device)
+            torch.zeros(rows, REMEMBERED_ROWS, len(columns), device=device)
             for columns in (self.pose, self.gait, self.values)
         )
-        self.phases = torch.full((rows, KEPT), torch.nan, device=device)  # nan: no row yet
+        self.phases = torch.full((rows, REMEMBERED_ROWS), torch.nan, device=device)  # nan: no row yet
         self.batches = 0
 
     def begin(self) -> None:
@@ -70,7 +70,7 @@ class OtherPoses:
         """Move the poses of standardised inputs x (B, X) in place. p: (B,) phases, 0 to 1."""
         if not self.share or not len(x):
             return
-        rows, slot = len(x), self.batches % KEPT
+        rows, slot = len(x), self.batches % REMEMBERED_ROWS
         pose, gait, values = x[:, self.pose], x[:, self.gait] * self.gait_std, x[:, self.values]
         same_gait = (gait[:, None] - self.gaits[:rows]).abs().amax(dim=2) < SAME_GAIT
         other_value = (values[:, None] - self.channels[:rows]).abs().amax(dim=2) > OTHER_VALUE

@@ -22,7 +22,9 @@ from torch import Tensor
 from hobble.core.errors import HobbleError
 from hobble.database.sharing import PassSharing, own_places
 
-PATIENCE = timedelta(minutes=30)  # longest wait for the slowest process; a dead process is noticed at once
+LONGEST_WAIT = timedelta(
+    minutes=30
+)  # longest wait for the slowest process; a dead process is noticed at once
 
 
 @dataclass(frozen=True)
@@ -69,7 +71,7 @@ class Processes:
             for tensor in tensors:
                 torch.distributed.broadcast(tensor, 0)
 
-    def from_first(self, *numbers: int) -> list[int]:
+    def numbers_of_first(self, *numbers: int) -> list[int]:
         """The numbers that the first process passed, returned in every process."""
         shared: list[Any] = [numbers]
         if not self.alone:
@@ -101,13 +103,13 @@ ALONE = Processes()
 
 
 @contextlib.contextmanager
-def joined(on_cuda: bool) -> Iterator[Processes]:
+def join_processes(on_cuda: bool) -> Iterator[Processes]:
     """Join the processes that torchrun started: with NCCL on GPUs, with gloo on CPUs."""
     numbers = (int(os.environ[name]) for name in ("RANK", "WORLD_SIZE", "LOCAL_RANK"))
     processes = Processes(*numbers)
     if on_cuda:
         torch.cuda.set_device(processes.local)
-    torch.distributed.init_process_group("nccl" if on_cuda else "gloo", timeout=PATIENCE)
+    torch.distributed.init_process_group("nccl" if on_cuda else "gloo", timeout=LONGEST_WAIT)
     try:
         yield processes
     finally:

@@ -13,7 +13,7 @@ from hobble.models import model
 from hobble.models.model import Built
 from hobble.models.network import TERRAIN_SIDE
 from hobble.models.options import Options
-from hobble.training.build_network import run_built
+from hobble.training.build_network import build_and_save
 from hobble.training.checkpoint import State, pack
 from hobble.training.held_out import HeldOut
 from hobble.training.history import write_history
@@ -50,7 +50,7 @@ def run(
     """
     data = Database.open(database, training.memory_mb).with_phase_weight(training.phase_weight)
     if isinstance(model(network.kind), Built):
-        run_built(
+        build_and_save(
             data,
             clips or {},
             configuration=configuration,
@@ -88,14 +88,14 @@ def _write(
     about_training = _about(state, training) | {"terrain_side": terrain_side}
     if training.keep == "best" and state.best is not None:
         state.network.flat.copy_(state.best)
-        about_training["best_section"] = state.sections_done - state.since_best
+        about_training["best_section"] = state.sections_done - state.sections_since_best
         log.info(
             "best weights: section %d of %d, by the held-out error",
             about_training["best_section"],
             state.sections_done,
         )
     blocks = data.layout.blocks("y")
-    errors = HeldOut(data, state.network.flat.device, 0).every_row(state.network)
+    errors = HeldOut(data, state.network.flat.device, 0).errors_on_every_row(state.network)
     named = zip(["held out, every row", *blocks], errors, strict=True)
     log.info("%s", ", ".join(f"{name} {error:.4f}" for name, error in named))
     if data.rows("held_out"):
