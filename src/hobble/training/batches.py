@@ -42,8 +42,8 @@ class SampleBatch(NamedTuple):
 class TrainingRows:
     """The training rows of a database, as one process reads them. A section is a part of a pass over them.
 
-    processes: the processes that share a batch. stretches: number of consecutive parts
-    that a section is cut into. Each batch takes samples from every part. None: one part for each process.
+    processes: the processes that share a batch. stretches: number of consecutive parts that a section is cut
+    into. Each batch takes samples from every part. None: one part for each process.
     """
 
     def __init__(

@@ -23,11 +23,11 @@ HELD_OUT_COLUMN = COLUMNS.index("held_out_mse")  # the place of the held-out err
 class State:
     """The state of a training after `sections_done` whole sections (parts of a pass), counted from its start.
 
-    adam: the optimiser. samples, seconds: how many were used so far. best_mse, best: the lowest held-out error
-    so far, and the weights with this error, laid out like `network.flat`. history: one row of numbers per
-    section, with the COLUMNS of `hobble.training.history`, then the held-out error of each block of Y.
-    recipe: hash of everything that determines the result (`hobble.training.start.run_name`). There is no
-    state of random generators, because the order of the rows and dropout are seeded by pass and section.
+    adam: the optimiser. samples, seconds: training samples and training time so far. best_mse, best: the
+    lowest held-out error so far, and the weights with this error, laid out like `network.flat`. history: one
+    row of numbers per section, with the COLUMNS of `hobble.training.history`, then the held-out error of each
+    block of Y. recipe: hash of everything that determines the result (`hobble.training.start.run_name`).
+    There is no state of random generators: pass and section seed the order of the rows and dropout.
     """
 
     network: Trainable
@@ -82,7 +82,7 @@ def unpack(data: Mapping[str, np.ndarray], state: State, path: Path) -> None:
             raise InputError(
                 path,
                 f"holds a network of {described:.200}, not of {state.network.described}",
-                fix="Training can resume only with a network of the same shape: change the section `network`, "
+                fix="Training can resume only with a network of the same shape: change the section network, "
                 "or remove training.continues.",
             )
         state.network.flat.copy_(torch.from_numpy(data["weights"]))

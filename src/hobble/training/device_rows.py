@@ -96,7 +96,7 @@ class DeviceRows(TrainingRows):
     def _own_indices(
         self, sharing: PassSharing, order_key: tuple[int, int, int, int]
     ) -> tuple[np.ndarray, np.ndarray]:
-        """Indices (n,) of the rows that this process has in a section, batch by batch, and of their fits (n,).
+        """Indices (n,) of the rows that this process has in a section, batch by batch, and of their fits.
 
         order_key: pass, section, number of sections and seed.
         """

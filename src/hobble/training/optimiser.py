@@ -68,7 +68,7 @@ class Adam:
         return rate, 1 / (1 - self.beta2**steps) ** 0.5
 
     def _step_on_cpu(self, gradients: list[Tensor], rate: float, root: float) -> None:
-        """Take the step on a CPU. One loop reads and writes all memory once, because memory limits the speed."""
+        """Take the step on a CPU. One loop goes through memory once, because memory limits the speed."""
         views = [self.network.layers, self.network.views(self.first), self.network.views(self.second)]
         for *tensors, gradient, slope in zip(*views, gradients, self.slopes, strict=True):
             arrays = [as_numpy(tensor.flatten(0, 1)) for tensor in tensors]  # w, m and v of `_adam_loop`
@@ -78,7 +78,7 @@ class Adam:
             _adam_loop(*arrays, *(arrays[0].dtype.type(number) for number in numbers))
 
     def step_with_torch(self, gradients: list[Tensor], factors: Tensor) -> None:
-        """Take the step in PyTorch, on any device. factors: (2,) the result of `step_factors`, on the device."""
+        """Take the step in PyTorch, on any device. factors: (2,) from `step_factors`, on the device."""
         rate, root = factors.to(self.network.flat.dtype).unbind()
         views = [self.network.layers, self.network.views(self.first), self.network.views(self.second)]
         for w, m, v, gradient, slope in zip(*views, gradients, self.slopes, strict=True):
@@ -93,10 +93,10 @@ class Adam:
 def _adam_loop(
     w: Any, m: Any, v: Any, g: Any, b1: Any, b2: Any, rate: Any, root: Any, slope: Any, epsilon: Any
 ) -> None:
-    """One step of Adam on a layer: the parameters w, the moments m and v, and the gradient g, all (rows, in + 1).
+    """One step of Adam on a layer: parameters w, moments m and v, and gradient g, all (rows, in + 1).
 
-    b1, b2: beta1 and beta2. rate, root: see `Adam.step_factors`. slope: see `l1_slopes`. g may be bfloat16, as
-    the bits in uint16.
+    b1, b2: beta1 and beta2. rate, root: see `Adam.step_factors`. slope: see `l1_slopes`. g may be bfloat16,
+    whose bits are in uint16.
     """
     one, zero = w.dtype.type(1), w.dtype.type(0)
     last = w.shape[1] - 1

@@ -114,8 +114,8 @@ class Recipe(Section):
             )
         if self.stretches and self.stretches > self.batch:
             raise ValueError(
-                f"`stretches` ({self.stretches}) must not be more than `batch` ({self.batch}): each batch takes at "
-                "least one sample from each stretch"
+                f"`stretches` ({self.stretches}) must not be more than `batch` ({self.batch}): "
+                "each batch takes at least one sample from each stretch"
             )
         return self
 
@@ -126,7 +126,7 @@ class Recipe(Section):
 
 
 class Machines(Section):
-    """Where the training runs: on `nodes` machines, each with a process per GPU, or `processes` on the CPU.
+    """Where the training runs: on `nodes` machines, each with one process per GPU or `processes` on the CPU.
 
     This is not part of the recipe: a training can resume from its checkpoint with other values.
     """
@@ -151,7 +151,7 @@ class Machines(Section):
 
 
 class Training(Machines, Recipe):
-    """All keys of the section `training`. Their defaults are the recipe of Holden et al. (2017), on one machine."""
+    """All keys of the section `training`. The defaults are those of Holden et al. (2017), on one machine."""
 
     @model_validator(mode="after")
     def _check_processes(self) -> Training:
