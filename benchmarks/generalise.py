@@ -63,7 +63,7 @@ def measured(
     lap = responsivity(
         character, configuration="", runtime=Runtime(), laps=1, lap_seconds=400, modes=(), track=track
     )
-    whole = HeldOut(database, torch.device("cpu"), 0).every_row(state.network)[0]
+    whole = HeldOut(database, torch.device("cpu"), 0).errors_on_every_row(state.network)[0]
     strayed = " ".join(f"{entry['held_out']['position_error_cm']:5.2f}" for entry in rolled["lengths"])
     laps = f"{lap['waypoints_reached']}/{lap['waypoints']} {lap['laps'][0]['seconds']:4.0f}"
     laps += f" {lap['path_overshoot_cm']:5.0f} {lap['largest_turn_degrees']:4.0f}"

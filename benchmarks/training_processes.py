@@ -27,7 +27,7 @@ import torch
 from hobble.models.pfnn.trainable import initialise
 from hobble.training.optimiser import Adam
 from hobble.training.options import Training
-from hobble.training.processes import ALONE, Processes, joined
+from hobble.training.processes import ALONE, Processes, join_processes
 from hobble.training.start import step_for, use_threads
 from hobble.training.update import update_for
 
@@ -72,7 +72,7 @@ def work(sizes: tuple[int, ...], batches: list[int]) -> None:
     if "RANK" not in os.environ:
         print(json.dumps([measured(ALONE, sizes, batch) for batch in batches]))
         return
-    with joined(False) as processes:
+    with join_processes(False) as processes:
         found = [measured(processes, sizes, batch) for batch in batches]
     if processes.first:
         print(json.dumps(found))

@@ -130,7 +130,9 @@ def test_patches_round_trip_and_are_small(tmp_path: Path, patches: Patches) -> N
 
 
 def test_maps_without_patches_are_refused_by_name() -> None:
-    with pytest.raises(InputError, match="plane: none of 1000 views of 128 cells stay within 50 cm"):
+    with pytest.raises(
+        InputError, match="plane: none of 1000 random views, 128 cells wide, stay within 50 cm"
+    ):
         draw(plane(0, 0), plane(3, 3))
     with pytest.raises(InputError, match="plane: 90 x 300 cells are too few for patches of 128 x 128"):
         draw(plane(0, 0, rows=90))

@@ -23,7 +23,7 @@ from hobble.training.batches import HostRows, SampleBatch
 from hobble.training.device_rows import DeviceRows
 from hobble.training.options import Training
 from hobble.training.other_poses import OtherPoses
-from hobble.training.processes import ALONE, Processes, joined
+from hobble.training.processes import ALONE, Processes, join_processes
 from hobble.training.rollout import RollOut
 
 WINDOW = Database.window
@@ -68,7 +68,7 @@ def main(jobs: list[dict[str, Any]]) -> None:
         for job in jobs:
             one(job, ALONE)
         return
-    with joined(False) as processes:
+    with join_processes(False) as processes:
         for job in jobs:
             one(job, processes)
 

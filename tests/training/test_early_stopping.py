@@ -69,9 +69,9 @@ def test_training_ends_after_that_many_sections_without_a_lower_error(
 def test_sections_are_counted_since_the_lowest_error(go: Callable[..., State]) -> None:
     state = go()
     errors = held_out(state)
-    assert state.since_best == len(errors) - 1 - errors.index(min(errors))
+    assert state.sections_since_best == len(errors) - 1 - errors.index(min(errors))
     state.history.clear()
-    assert state.since_best == 0
+    assert state.sections_since_best == 0
 
 
 def written(folder: Path, small_database: Path, network: Settings, training: Settings, keep: str) -> Any:

@@ -19,7 +19,7 @@ def test_the_compiled_adam_equals_the_plain_one(dtype: torch.dtype) -> None:
         gradients = [torch.randn(layer.shape, generator=generator).to(dtype) for layer in networks[0].layers]
         adams[0].step(gradients, share)
         adams[1].steps += 1
-        adams[1].move(gradients, torch.tensor(adams[1].numbers(share)))
+        adams[1].step_with_torch(gradients, torch.tensor(adams[1].step_factors(share)))
     assert torch.allclose(networks[0].flat, networks[1].flat, rtol=1e-4, atol=1e-6)
     assert torch.allclose(adams[0].first, adams[1].first, rtol=1e-4, atol=1e-6)
 

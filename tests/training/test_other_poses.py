@@ -10,7 +10,7 @@ import pytest
 import torch
 
 from hobble.database.reader import Database
-from hobble.training.other_poses import BEYOND, KEPT, NEAR, OtherPoses
+from hobble.training.other_poses import BEYOND, NEAR, REMEMBERED_ROWS, OtherPoses
 from hobble.training.train import train
 
 CPU = torch.device("cpu")
@@ -88,7 +88,7 @@ def test_only_recent_rows_are_mixed_in(data: Database) -> None:
     others = OtherPoses(data, 1.0, ROWS, CPU)
     others.begin()
     others.mix(*batch(data, 10.0, 0.5))
-    for _ in range(KEPT):
+    for _ in range(REMEMBERED_ROWS):
         others.mix(*batch(data, 0.0, 0.5, hurt=1.0))
     x, p = batch(data, 0.0, 0.5, hurt=2.0)
     others.mix(x, p)

@@ -42,8 +42,8 @@ class Means:
 
 
 def test_held_out_errors_do_not_depend_on_the_weight(data: Database) -> None:
-    errors = HeldOut(data, CPU, 0).every_row(Means(data))
-    assert HeldOut(data.with_phase_weight(8.0), CPU, 0).every_row(Means(data)) == pytest.approx(
+    errors = HeldOut(data, CPU, 0).errors_on_every_row(Means(data))
+    assert HeldOut(data.with_phase_weight(8.0), CPU, 0).errors_on_every_row(Means(data)) == pytest.approx(
         errors, rel=1e-4
     )
 

@@ -20,7 +20,7 @@ from hobble.models.pfnn.trainable import initialise
 from hobble.training import checkpoint, start, train
 from hobble.training.batches import HostRows
 from hobble.training.checkpoint import State
-from hobble.training.device_rows import DeviceRows, fits_on, rows_for
+from hobble.training.device_rows import DeviceRows, gpu_has_room, rows_for
 from hobble.training.held_out import HeldOut
 from hobble.training.history import columns, write_history
 
@@ -136,7 +136,7 @@ def test_history_counts_and_agrees_with_the_network(run: Run, data: Database, tm
 def test_without_held_out_clips_the_errors_are_left_empty(
     run: Run, monkeypatch: pytest.MonkeyPatch, data: Database, tmp_path: Path
 ) -> None:
-    monkeypatch.setattr(HeldOut, "_stream", lambda self: iter(()))
+    monkeypatch.setattr(HeldOut, "_batches", lambda self: iter(()))
     write_history(tmp_path / "history.csv", data.layout.blocks("y"), run(passes=1).history)
     row = next(csv.DictReader((tmp_path / "history.csv").open()))
     assert row["held_out_mse"] == row["held_out_turn"] == ""
@@ -149,7 +149,7 @@ def test_a_sample_of_all_held_out_rows_has_their_error(
     network = initialise((data.layout.x_size, 8, data.layout.y_size), 4, 1)
     held_out = HeldOut(data, torch.device("cpu"), 0)
     assert sum(len(part[0]) for part in held_out.sample) == 70
-    assert held_out.errors(network) == held_out.every_row(network)
+    assert held_out.errors(network) == held_out.errors_on_every_row(network)
 
 
 def poisoned(data: Database, monkeypatch: pytest.MonkeyPatch, turn: int, value: float) -> None:
@@ -253,9 +253,9 @@ def test_where_rows_are_kept_does_not_depend_on_free_memory(
     device = torch.device("cuda")
     for free in (0, 1 << 34):
         monkeypatch.setattr(torch.cuda, "mem_get_info", lambda _, free=free: (free, 1 << 34))
-        assert fits_on(device, data.manifest)
+        assert gpu_has_room(device, data.manifest)
     monkeypatch.setattr(torch.cuda, "mem_get_info", lambda _: (1 << 18, 1 << 18))
-    assert not fits_on(device, data.manifest)
+    assert not gpu_has_room(device, data.manifest)
 
 
 def test_each_section_is_logged_with_speed_and_time_left(run: Run, caplog: pytest.LogCaptureFixture) -> None:

@@ -24,7 +24,7 @@ rule training:
         nodes=lambda w: demands.machines(w.configuration).nodes,
         tasks=lambda w: demands.machines(w.configuration).nodes,
         gres=lambda w: demands.gres(w.configuration),
-        processes=lambda w: demands.machines(w.configuration).each,
+        processes=lambda w: demands.machines(w.configuration).processes_per_node,
     params:
         configuration=lambda w: w.configuration,
         network=lambda w: configurations.section(w.configuration, "network"),

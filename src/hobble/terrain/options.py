@@ -1,4 +1,4 @@
-"""The keys of a data set's `terrain` section."""
+"""The keys of the section `terrain` in the YAML file of a data set."""
 
 from __future__ import annotations
 
@@ -13,17 +13,20 @@ class HeightmapOptions(Section):
     """One heightmap: generated, read from a file, or matplotlib's elevation model of a real landscape."""
 
     kind: Literal["fractal", "hills", "stairs", "slope", "boxes", "beams", "elevation", "file"]
-    path: MocapPath | None = Field(None, description="for kind: file; relative to the mocap folder")
+    path: MocapPath | None = Field(
+        None, description="file of the map, only for `kind: file`; relative to the mocap folder"
+    )
     seed: int = 0
     cell: PositiveFloat | None = Field(
         None, description="width of this map's cells, cm; default: terrain.cell"
     )
     height_scale: PositiveFloat | None = Field(
-        None, description="factor on the heights; for `kind: file` it replaces terrain.height_scale"
+        None,
+        description="factor that multiplies the heights; for `kind: file` it replaces terrain.height_scale",
     )
 
     @model_validator(mode="after")
-    def _path_for_files(self) -> HeightmapOptions:
+    def _check_path(self) -> HeightmapOptions:
         if (self.kind == "file") != (self.path is not None):
             raise ValueError("`path` is required for `kind: file` and not allowed for other kinds")
         return self
@@ -40,24 +43,29 @@ class Drawing(Section):
     )
     patches: Positive = 20_000
     cell: PositiveFloat = Field(
-        3.937007874, description="width of a patch's cells, and of a heightmap's unless it has its own, cm"
+        3.937007874,
+        description="width of the cells of patches, and of heightmaps without their own `cell`, cm",
     )
     size: Annotated[int, Field(gt=0, le=2048)] = Field(128, description="width of a patch, cells")
     height_scale: PositiveFloat = Field(3.0, description="factor that converts the heights in files to cm")
     highest: PositiveFloat = Field(
-        50.0, description="a patch is dropped if one of its heights is further than this from their mean, cm"
+        50.0,
+        description="a patch is dropped if one of its heights is further than this from its mean height, cm",
     )
     seed: int = 1
 
     @model_validator(mode="after")
-    def _some_ground(self) -> Drawing:
+    def _check_heightmaps(self) -> Drawing:
         if not self.heightmaps:
-            raise ValueError("`heightmaps` is empty, so there is no ground to draw patches from")
+            raise ValueError("`heightmaps` is empty: list at least one, as ground to draw patches from")
         return self
 
 
 class Fitting(Section):
-    """How patches are fitted under the gait cycles of a clip, for the rule `terrain_fits`."""
+    """How patches are fitted under the gait cycles of a clip, for the rule `terrain_fits`.
+
+    A fit is a patch that suits the footsteps of a cycle, corrected to meet the feet.
+    """
 
     fits: Positive = Field(
         10,
@@ -68,14 +76,18 @@ class Fitting(Section):
     )
     heel_height: Literal["auto"] | Finite = Field(
         "auto",
-        description="height of the heel joint above its sole, cm; `auto`: from the clip; Holden et al.: 5",
+        description="height of the heel joint above its sole, cm; `auto`: computed from the clip; Holden et "
+        "al. (2017) use 5",
     )
     toe_height: Literal["auto"] | Finite = Field(
         "auto",
-        description="height of the toe joint above its sole, cm; `auto`: from the clip; Holden et al.: 4",
+        description="height of the toe joint above its sole, cm; `auto`: computed from the clip; Holden et "
+        "al. (2017) use 4",
     )
     sole: Finite = Field(
-        4.0, description="`toe_height: auto` means this height on ground that is not flat, cm"
+        4.0,
+        description="height of the toe joint above its sole if `toe_height` is `auto` and the ground is not "
+        "flat, cm",
     )
     deepest: PositiveFloat | None = Field(
         1.0,
@@ -83,19 +95,19 @@ class Fitting(Section):
     )
     bend_flat: bool = Field(
         True,
-        description="correct flat ground that is on average more than `deepest` from the feet in contact, or "
-        "more than `deepest` above a foot; false: keep it level",
+        description="correct flat ground if the feet in contact are on average more than `deepest` from it, "
+        "or if a foot is more than `deepest` below it; false: keep it level",
     )
     flat_level: Literal["zero", "feet"] = Field(
         "zero",
-        description="height of flat ground: zero, or the mean height of the soles in contact in each cycle, "
-        "as in Holden et al. (2017)",
+        description="height of flat ground. zero: 0; feet: the mean height of the soles in contact in each "
+        "cycle, as in Holden et al. (2017)",
     )
     held_up: PositiveFloat | None = Field(
         2.0,
-        description="on flat ground, a heel does not count as in contact if the toe of its foot does and is "
-        "more than this lower, cm; likewise for a toe above its heel; null: no such rule, as in Holden "
-        "et al. (2017)",
+        description="on flat ground, a heel in contact does not count if the toe of the same foot is in "
+        "contact, too, and lower by more than this, cm; likewise for a toe above its heel; null: every "
+        "contact counts, as in Holden et al. (2017)",
     )
 
 
@@ -112,9 +124,9 @@ class Terrain(Drawing, Fitting):
 class HeightSampling(Section):
     """The keys of the section `database` that decide at which points rows need ground heights.
 
-    window: frames of the trajectory before and after the present one. step: frames between its samples.
-    facing_sigma: smoothing of the facing direction, frames. terrain_side: cm from the path to the points
-    beside it.
+    window: frames of the trajectory before and after the present one. step: frames between the samples
+    of the trajectory. facing_sigma: smoothing of the facing direction, frames. terrain_side: distance from
+    the path to the points at its sides, cm.
     """
 
     window: Positive

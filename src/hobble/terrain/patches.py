@@ -1,8 +1,8 @@
 """Patches of ground: views of a few heightmaps, drawn at random.
 
 A patch does not store its cells. It stores which heightmap it is from, the affine transform from its cells to
-those of the heightmap, and its mean height, which is subtracted. 20,000 patches take 1 MB; their cells would
-take 600 MB.
+those of the heightmap, and the mean of its heights, which is subtracted from them. 20,000 patches take 1 MB;
+their cells would take 600 MB.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ from hobble.core.quat import Array
 from hobble.terrain.heightmaps import TerrainMap
 
 VIEWS_PER_DRAW = 1_000  # random views of a heightmap that are tried at a time
-HOLE_HEIGHT = 1e9  # height that holes in a map get, cm: views with a hole are then dropped as too high
+HOLE_HEIGHT = 1e9  # cm; holes in a map get this height, so that views with a hole are dropped
 FEWEST_PASSING = 1 / 1_000  # drawing from a map fails if a smaller share of its random views can be used
 
 
@@ -30,8 +30,8 @@ class Patches:
     heights: all maps one after another, row by row, cm, float32. starts: (M,) index of each map's first cell.
     shapes: (M, 2) rows and columns. names: (M,) names of the maps. which: (P,) index of each view's map.
     affine: (P, 2, 3) such that row, column of the map = affine (u, v, 1), where (u, v) is a cell counted from
-    the middle of the patch, u along the world's x and v along z. mean: (P,) height to subtract, cm. cell:
-    width of a patch's cell, cm. size: width of a patch, cells.
+    the middle of the patch, u along the world's x and v along z. mean: (P,) mean height of each view, cm; it
+    is subtracted. cell: width of a patch's cell, cm. size: width of a patch, cells.
     """
 
     heights: Array = field(repr=False)
@@ -62,7 +62,10 @@ class Patches:
         return np.clip(cells, -half, self.size - 1 - half).astype(np.float32)
 
     def at(self, chosen: Sequence[int] | np.ndarray, cells: Array) -> Array:
-        """Heights (K, N), cm, of the K chosen patches at cells (N, 2) from their middle."""
+        """Heights (K, N), cm above the mean of the patch, of K patches at cells (N, 2) from their middle.
+
+        chosen: (K,) indices of the patches.
+        """
         from hobble.terrain.kernels import view_heights
 
         k = np.asarray(chosen, int)
@@ -73,23 +76,23 @@ class Patches:
 def draw_patches(
     maps: Sequence[TerrainMap], *, count: int, cell: float, size: int, highest: float, seed: int
 ) -> Patches:
-    """Draw `count` patches of `size` x `size` cells, `cell` cm wide, equally many from each map.
+    """Draw `count` patches of `size` x `size` cells, `cell` cm wide, divided equally among the maps.
 
     Each patch is a view at a random place, flipped at random and turned by up to 90 degrees either way. A
-    view with a height more than `highest` cm from its mean is dropped, and another one is drawn. Raises
+    view with a height more than `highest` cm from its mean is dropped, and another view is drawn. Raises
     InputError for a map that is too small, or if fewer than one in a thousand of its views can be used.
     """
     if not maps:
-        raise HobbleError("terrain.heightmaps is empty, so there is nothing to draw patches from.")
+        raise HobbleError("terrain.heightmaps is empty: list at least one, as ground to draw patches from.")
     counts = [count // len(maps) + (i < count % len(maps)) for i in range(len(maps))]
     drawn = [
-        _draw_from(heightmap, views, cell, size, highest, np.random.default_rng([seed, i]))
+        _draw_views(heightmap, views, cell, size, highest, np.random.default_rng([seed, i]))
         for i, (heightmap, views) in enumerate(zip(maps, counts, strict=True))
     ]
     shapes = np.array([m.heights.shape for m in maps], np.int64)
     return Patches(
         heights=np.concatenate([np.nan_to_num(m.heights).astype(np.float32).ravel() for m in maps]),
-        starts=_starts(shapes),
+        starts=_first_cells(shapes),
         shapes=shapes,
         names=np.array([Path(m.name).name for m in maps]),
         which=np.repeat(np.arange(len(maps), dtype=np.int32), counts),
@@ -100,29 +103,32 @@ def draw_patches(
     )
 
 
-def _draw_from(
+def _draw_views(
     heightmap: TerrainMap, count: int, cell: float, size: int, highest: float, rng: np.random.Generator
 ) -> tuple[Array, Array]:
-    """`count` views of one map that can be used, (count, 2, 3), and their mean heights (count,)."""
+    """Draw `count` views of one heightmap: their affine maps (count, 2, 3) and mean heights (count,), cm.
+
+    All heights of these views are within `highest` cm of their mean.
+    """
     from hobble.terrain.kernels import view_extents
 
     heights = _with_holes_marked(heightmap, cell).astype(np.float32)
     only_map = heights.ravel(), np.zeros(1, np.int64), np.array([heights.shape], np.int64)
     affines, means = [np.zeros((0, 2, 3), np.float32)], [np.zeros(0, np.float32)]
-    found, drawn = 0, 0
+    found, tried = 0, 0
     while found < count:
-        affine = _views(rng, heightmap, cell, size)
+        affine = _random_views(rng, heightmap, cell, size)
         mean, passes = view_extents(*only_map, np.zeros(len(affine), np.int32), affine, size, highest)
-        keep = np.flatnonzero(passes)[: count - found]
-        affines.append(affine[keep])
-        means.append(mean[keep])
-        found += len(keep)
-        drawn += VIEWS_PER_DRAW
-        if found < count and found < FEWEST_PASSING * drawn:
+        kept = np.flatnonzero(passes)[: count - found]
+        affines.append(affine[kept])
+        means.append(mean[kept])
+        found += len(kept)
+        tried += VIEWS_PER_DRAW
+        if found < count and found < FEWEST_PASSING * tried:
             raise InputError(
                 heightmap.name,
-                f"{found or 'none'} of {drawn} views of {size} cells stay within {highest:g} cm "
-                "of their mean",
+                f"{found or 'none'} of {tried} random views, {size} cells wide, stay within {highest:g} cm "
+                "of their mean height",
                 fix="Lower its height_scale, or leave this heightmap out.",
             )
     return np.concatenate(affines), np.concatenate(means)
@@ -135,11 +141,11 @@ def save_patches(path: str | Path, patches: Patches) -> None:
 
 
 def load_patches(path: str | Path) -> Patches:
-    """Read what `save_patches` wrote. Raises InputError if it is damaged."""
+    """Read a file that `save_patches` wrote. Raises InputError if the file is damaged."""
     data = load_npz(path)
     try:
         cell, size = float(data.pop("cell")), int(data.pop("size"))
-        return Patches(starts=_starts(data["shapes"]), cell=cell, size=size, **data)
+        return Patches(starts=_first_cells(data["shapes"]), cell=cell, size=size, **data)
     except (KeyError, TypeError) as error:
         raise InputError(
             path, f"not a file of patches ({error})", fix="Delete it; the next run makes it again."
@@ -160,15 +166,18 @@ def _with_holes_marked(heightmap: TerrainMap, cell: float) -> Array:
     return np.where(maximum_filter(holes, 2 * reach + 1), HOLE_HEIGHT, heightmap.heights)
 
 
-def _starts(shapes: np.ndarray) -> np.ndarray:
-    """(M,) index of the first cell of each map. shapes: (M, 2)."""
+def _first_cells(shapes: np.ndarray) -> np.ndarray:
+    """(M,) index of the first cell of each map, if all maps are one after another in one array.
+
+    shapes: (M, 2) rows and columns of the maps.
+    """
     sizes = np.prod(shapes, axis=1)
     return np.cumsum(sizes) - sizes
 
 
-def _views(rng: np.random.Generator, heightmap: TerrainMap, cell: float, size: int) -> Array:
-    """At most VIEWS_PER_DRAW random views (N, 2, 3) that lie inside the map."""
-    scale = cell / heightmap.cell
+def _random_views(rng: np.random.Generator, heightmap: TerrainMap, cell: float, size: int) -> Array:
+    """The affine maps (N, 2, 3) of at most VIEWS_PER_DRAW random views that lie inside the heightmap."""
+    scale = cell / heightmap.cell  # cells of the map for each cell of the view
     half = size // 2
     corners = np.array([[a, b] for a in (-half, size - 1 - half) for b in (-half, size - 1 - half)])
     angle = rng.uniform(-np.pi / 2, np.pi / 2, VIEWS_PER_DRAW)
@@ -176,6 +185,7 @@ def _views(rng: np.random.Generator, heightmap: TerrainMap, cell: float, size: i
     place_in_map = rng.uniform(size=(VIEWS_PER_DRAW, 2))
     c, s = np.cos(angle), np.sin(angle)
     turn = scale * np.stack([np.stack([c, -s], -1), np.stack([s, c], -1)], -2) * flips[:, None]
+    # The corners of each view relative to its centre, in cells of the map. All must lie inside the map.
     from_centre = np.einsum("nij,kj->nki", turn, corners)
     low, high = -from_centre.min(axis=1), np.array(heightmap.heights.shape) - 1 - from_centre.max(axis=1)
     has_room = np.all(high >= low, axis=1)
@@ -184,7 +194,7 @@ def _views(rng: np.random.Generator, heightmap: TerrainMap, cell: float, size: i
         rows, columns = heightmap.heights.shape
         raise InputError(
             heightmap.name,
-            f"{rows} x {columns} cells are too few for patches of {needed} x {needed}",
+            f"{rows} x {columns} cells are too few for patches of {needed} x {needed} of its cells",
             fix="Use a larger map, a larger `cell` for this map, or a smaller terrain.size.",
         )
     centre = low + place_in_map * (high - low)

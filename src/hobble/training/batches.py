@@ -1,4 +1,4 @@
-"""Batches of training samples from the database, and a monitor of their losses."""
+"""Batches of training samples from the database, and a check of their losses."""
 
 from __future__ import annotations
 
@@ -15,8 +15,9 @@ from hobble.database.sharing import PassSharing, SampleRange
 from hobble.training.processes import ALONE, Processes
 
 TRAIN = "train"
-CHECK_EVERY = 2048  # samples between checks of the losses; checking every batch would wait for the GPU
-DIVERGED = 100.0  # a larger mean loss of a section means that training diverged; predicting the mean gives 1
+CHECK_EVERY = 2048  # samples between checks of the losses; each check waits for the GPU
+# A larger mean loss of a section means that training diverged. Predicting the mean of Y gives a loss of 1.
+DIVERGED = 100.0
 MOST_NAMED = 8  # at most this many clips or rows are named in a message
 
 Piece = tuple[Tensor, Tensor, Tensor, np.ndarray, np.ndarray]  # x, y, p, clip and frame of a `SampleBatch`
@@ -25,7 +26,8 @@ Piece = tuple[Tensor, Tensor, Tensor, np.ndarray, np.ndarray]  # x, y, p, clip a
 class SampleBatch(NamedTuple):
     """The n samples of a batch that one process has, maybe none, on the device of the training.
 
-    x (n, X) and y (n, Y): standardised. p (n,): phase. clip (n,): index of the clip; frame (n,): its frame.
+    A sample is a row of the database (a frame of a clip) with one of its terrain fits. x (n, X) and y (n, Y):
+    standardised. p (n,): phase. clip (n,): index of the clip. frame (n,): number of the frame in the clip.
     total: number of samples of the batch over all processes.
     """
 
@@ -40,8 +42,8 @@ class SampleBatch(NamedTuple):
 class TrainingRows:
     """The training rows of a database, as one process reads them. A section is a part of a pass over them.
 
-    processes: the processes that share a batch. stretches: number of parts of a section from which each batch
-    takes its samples; None: one for each process.
+    processes: the processes that share a batch. stretches: number of consecutive parts that a section is cut
+    into. Each batch takes samples from every part. None: one part for each process.
     """
 
     def __init__(
@@ -61,7 +63,7 @@ class TrainingRows:
 
 
 class HostRows(TrainingRows):
-    """Rows that are read and composed on the host, then copied to `device`."""
+    """Rows that the host reads and composes from frame, channels and terrain fit, then copies to `device`."""
 
     def batches(
         self, pass_index: int, section: int, sections: int, seed: int, size: int
@@ -69,43 +71,46 @@ class HostRows(TrainingRows):
         """Yield this process's part of each batch of a section. size: samples of a batch over all processes.
 
         section: from 0 to `sections` - 1 in each pass. seed: of the order of the rows. The last batch may be
-        shorter. It is used all the same: so a section uses each of its samples once and leaves none for the
-        next section, and a checkpoint between sections is complete.
+        shorter. It is not dropped, so a section uses each of its samples once and leaves none for the next
+        section, and a checkpoint between sections is complete.
         """
         order_key = (pass_index, section, sections, seed)
-        # The order of the rows depends on this window and must be the same for any number of processes. So
-        # the window follows from the size of the whole batch, not of this process's part.
+        # The number of chunks in memory at a time. The order of the rows depends on it and must be the same
+        # for any number of processes. So it follows from the size of the whole batch, not of this process's
+        # part.
         window = self.database.window(TRAIN, self.database.block_rows(size))
         sharing = self.sharing(section, sections, size)
-        stretches = [self._pieces(order_key, stretch, window) for stretch in sharing.own_stretches()]
+        stretches = [
+            self._pieces_of_stretch(order_key, stretch, window) for stretch in sharing.own_stretches()
+        ]
         for total, _ in sharing.batch_sizes():
             # The last batch may be so short that some stretches have no samples for it.
             pieces = [piece for stretch in stretches if (piece := next(stretch, None)) is not None]
-            piece = pieces[0] if len(pieces) == 1 else _joined(pieces, self._nothing)
+            piece = pieces[0] if len(pieces) == 1 else _join(pieces, self._empty_piece)
             yield SampleBatch(*piece, total)
 
-    def _pieces(
+    def _pieces_of_stretch(
         self, order_key: tuple[int, int, int, int], stretch: SampleRange, window: int
     ) -> Iterator[Piece]:
-        """The samples of one stretch, batch by batch."""
-        size = stretch.high - stretch.low
-        rows = self.database.block_rows(size)
+        """Yield the samples that this process has of one stretch, batch by batch."""
+        per_batch = stretch.high - stretch.low
+        rows = self.database.block_rows(per_batch)
         for block in self.database.blocks(TRAIN, *order_key, rows, stretch, window):
             x, y, p = (torch.from_numpy(array).to(self.device) for array in block[:3])
-            for start in range(0, len(p), size):
-                part = slice(start, start + size)
+            for start in range(0, len(p), per_batch):
+                part = slice(start, start + per_batch)
                 yield x[part], y[part], p[part], block.clip[part], block.frame[part]
 
     @property
-    def _nothing(self) -> Piece:
-        """A piece without rows."""
-        layout, none = self.database.layout, np.empty(0, np.int32)
+    def _empty_piece(self) -> Piece:
+        layout, no_indices = self.database.layout, np.empty(0, np.int32)
         x, y = (torch.empty(0, size, device=self.device) for size in (layout.x_size, layout.y_size))
-        return x, y, x[:, 0], none, none
+        return x, y, x[:, 0], no_indices, no_indices
 
 
-def _joined(pieces: Sequence[Piece], nothing: Piece) -> Piece:
-    x, y, p, clip, frame = zip(nothing, *pieces, strict=True)
+def _join(pieces: Sequence[Piece], empty: Piece) -> Piece:
+    """The samples of all pieces as one piece. empty: a piece without samples, the result for no pieces."""
+    x, y, p, clip, frame = zip(empty, *pieces, strict=True)
     return torch.cat(x), torch.cat(y), torch.cat(p), np.concatenate(clip), np.concatenate(frame)
 
 
@@ -113,22 +118,22 @@ class LossWatch:
     """Adds up the losses of a section, and stops the training if it diverges.
 
     where: names the pass and section in messages. clips: names by index. processes: all of them stop
-    together, with the message of the process that has the broken rows. seen, samples: numbers of samples that
-    were added, and whose losses were checked.
+    together, with the message of the process that has the broken rows. seen: number of samples that were
+    added. samples: number of those whose losses were already checked.
     """
 
     def __init__(self, where: str, clips: tuple[str, ...], processes: Processes = ALONE) -> None:
         self.where, self.clips, self.processes = where, clips, processes
-        self.seen, self.samples, self._batches, self._total, self._new = 0, 0, 0, 0.0, 0
-        self._waiting: list[tuple[Tensor, SampleBatch]] = []
-        self._worst: tuple[float, int, SampleBatch] | None = None
+        self.seen, self.samples, self._batches, self._total, self._unchecked = 0, 0, 0, 0.0, 0
+        self._waiting: list[tuple[Tensor, SampleBatch]] = []  # loss and batch, not yet checked
+        self._worst: tuple[float, int, SampleBatch] | None = None  # loss, number of the batch, and batch
 
     def add(self, loss: Tensor, batch: SampleBatch) -> None:
         """Add a batch and its loss over all processes, a scalar tensor on any device."""
         self._waiting.append((loss, batch))
         self.seen += batch.total
-        self._new += batch.total
-        if self._new >= CHECK_EVERY:
+        self._unchecked += batch.total
+        if self._unchecked >= CHECK_EVERY:
             self._check()
 
     def mean(self) -> float:
@@ -138,7 +143,7 @@ class LossWatch:
         if mean > DIVERGED and self._worst is not None:
             raise HobbleError(
                 self._message(
-                    f"the mean error of the section is {mean:.3g}, and this batch has the largest",
+                    f"the mean error of the section is {mean:.3g}, and this batch has the largest error",
                     *self._worst[1:],
                 )
             )
@@ -157,18 +162,22 @@ class LossWatch:
             self.samples += batch.total
             self._total += loss * batch.total
         self._waiting.clear()
-        self._new = 0
+        self._unchecked = 0
 
-    def _message(self, what: str, number: int, batch: SampleBatch) -> str:
-        text = f"training diverged in {self.where}, batch {number}: {what}"
-        return self.processes.most_certain(*self._explained(text, batch))
+    def _message(self, problem: str, number: int, batch: SampleBatch) -> str:
+        text = f"training diverged in {self.where}, batch {number}: {problem}"
+        return self.processes.most_certain(*self._explain(text, batch))
 
-    def _explained(self, text: str, batch: SampleBatch) -> tuple[str, bool]:
-        """`text` with the broken rows or the clips of the batch, and whether broken rows are the cause."""
+    def _explain(self, text: str, batch: SampleBatch) -> tuple[str, bool]:
+        """The message that begins with `text`, and whether broken rows are the cause.
+
+        A row is broken if a number in it is not finite. The message names the broken rows, or the clips of
+        the batch if no row is broken.
+        """
         x, y, p = (part.isfinite().cpu().numpy() for part in batch[:3])
-        bad = ~(x.all(1) & y.all(1) & p)
-        if bad.any():
-            places = zip(batch.clip[bad], batch.frame[bad], strict=True)
+        broken = ~(x.all(1) & y.all(1) & p)
+        if broken.any():
+            places = zip(batch.clip[broken], batch.frame[broken], strict=True)
             rows = _name_list([f"{self.clips[clip]} frame {frame}" for clip, frame in places])
             return f"{text}, because rows of the database are not finite: {rows}. Check these frames.", True
         names = _name_list([self.clips[clip] for clip in np.unique(batch.clip)])

@@ -28,7 +28,7 @@ from hobble.training.weights import write_weights
 log = logging.getLogger("hobble.training")
 
 
-def run_built(
+def build_and_save(
     database: Database,
     clips: Mapping[str, str | Path],
     *,
@@ -41,42 +41,47 @@ def run_built(
 ) -> None:
     """Build a network and write the files that a training would write: weights, history and checkpoint.
 
-    clips: name -> file with the clip's rows in order; has all training clips of the database. configuration:
-    its name. terrain_side: cm from the path to the points at its sides where rows have ground heights. The
-    history has one row, since every frame is read once. The checkpoint only describes the network; training
-    cannot resume from it.
+    clips: name -> file with the clip's rows in order; it has at least the training clips of the database.
+    configuration: its name. terrain_side: distance from the path to the points at its sides where rows have
+    ground heights, cm. The history has one line, because every frame is read once. The checkpoint only
+    describes the network; training cannot resume from it.
     """
     began = time.perf_counter()
-    built, frames = build(database, network, clips)
+    built, rows = build(database, network, clips)
     seconds = time.perf_counter() - began
-    log.info("%s, from %d rows in %s", built.described, frames, duration(seconds))
-    about_training = {"passes": 1, "samples": frames, "steps": 0, "terrain_side": terrain_side}
+    log.info("%s, from %d rows in %s", built.described, rows, duration(seconds))
+    about_training = {"passes": 1, "samples": rows, "steps": 0, "terrain_side": terrain_side}
     write_weights(weights, built, database, configuration, about_training)
     blocks = database.layout.blocks("y")
-    errors = HeldOut(database, torch.device("cpu"), 0).every_row(Standardised(load_network(weights)))
-    log.info("held out, every row: %.4f", errors[0])
-    write_history(history, blocks, [[1, 1, frames, seconds, float("nan"), *errors]])
+    errors = HeldOut(database, torch.device("cpu"), 0).errors_on_every_row(
+        StandardisedNetwork(load_network(weights))
+    )
+    log.info("error on every held-out row: %.4f", errors[0])
+    write_history(history, blocks, [[1, 1, rows, seconds, float("nan"), *errors]])
     save_npz(checkpoint, network=np.array(built.described), sections=np.array(0))
 
 
 def build(
     database: Database, network: Options, clips: Mapping[str, str | Path]
 ) -> tuple[FinishedNetwork, int]:
-    """The network built from the database's training clips, and the number of their rows.
+    """Build the network from the training clips; return it and the number of their rows in the database.
 
-    Raises InputError if a file does not fit the database, HobbleError if one is missing.
+    clips: as in `build_and_save`. Raises InputError if a file does not fit the database, and HobbleError if
+    a clip has no file.
     """
     kind = model(network.kind)
     assert isinstance(kind, Built), "this kind is trained, not built"
     used = [clip for clip in database.manifest.clips if clip["split"] == TRAIN and clip["rows"]]
     if missing := [clip["clip"] for clip in used if clip["clip"] not in clips]:
-        raise HobbleError(f"the database has rows of {', '.join(missing)}, but their files are missing")
+        raise HobbleError(
+            f"the database has rows of {', '.join(missing)}, but the files of these clips are missing"
+        )
     files = [clips[clip["clip"]] for clip in used]
     built = kind.build(network, files, database.layout, Skeleton.from_dict(database.skeleton))
     return built, sum(clip["rows"] for clip in used)
 
 
-class Standardised:
+class StandardisedNetwork:
     """A network read from a file, with standardised inputs and outputs like a network in training."""
 
     def __init__(self, network: Network) -> None:

@@ -1,4 +1,4 @@
-"""Checkpoints: the complete state of a training in one file, written atomically."""
+"""Checkpoints. Each is one file with the complete state of a training."""
 
 from __future__ import annotations
 
@@ -16,18 +16,18 @@ from hobble.models.trainable import Trainable
 from hobble.training.history import COLUMNS
 from hobble.training.optimiser import Adam
 
-HELD_OUT = COLUMNS.index("held_out_mse")  # the place of the held-out error in a row of the history
+HELD_OUT_COLUMN = COLUMNS.index("held_out_mse")  # the place of the held-out error in a row of the history
 
 
 @dataclass
 class State:
-    """The state of a training after `sections_done` whole sections, counted from its start.
+    """The state of a training after `sections_done` whole sections (parts of a pass), counted from its start.
 
-    adam: the optimiser. samples, seconds: used so far. best_mse, best: the lowest held-out error so far, and
-    the weights with this error, laid out like `network.flat`. history: one row of numbers per section:
-    COLUMNS of `hobble.training.history`, then the held-out error of each block of Y. recipe: hash of
-    everything that determines the result (`hobble.training.start.run_name`). There is no state of random
-    generators, because the order of the rows and dropout are seeded by pass and section.
+    adam: the optimiser. samples, seconds: training samples and training time so far. best_mse, best: the
+    lowest held-out error so far, and the weights with this error, laid out like `network.flat`. history: one
+    row of numbers per section, with the COLUMNS of `hobble.training.history`, then the held-out error of each
+    block of Y. recipe: hash of everything that determines the result (`hobble.training.start.run_name`).
+    There is no state of random generators: pass and section seed the order of the rows and dropout.
     """
 
     network: Trainable
@@ -46,20 +46,20 @@ class State:
             self.best_mse, self.best = held_out_mse, self.network.flat.clone()
 
     @property
-    def since_best(self) -> int:
+    def sections_since_best(self) -> int:
         """Number of sections since the one with the lowest held-out error; 0 before the first section."""
-        errors = [row[HELD_OUT] for row in self.history]
+        errors = [row[HELD_OUT_COLUMN] for row in self.history]
         return len(errors) - 1 - int(np.argmin(errors)) if errors else 0
 
 
 def pack(state: State) -> dict[str, np.ndarray]:
-    """Copies of everything in `state`, as arrays for an npz file."""
+    """Copies of everything in `state`, as the arrays of a checkpoint file."""
     best = state.network.flat if state.best is None else state.best
     return {
-        "weights": _copied(state.network.flat),
-        "first": _copied(state.adam.first),
-        "second": _copied(state.adam.second),
-        "best": _copied(best),
+        "weights": _numpy_copy(state.network.flat),
+        "first": _numpy_copy(state.adam.first),
+        "second": _numpy_copy(state.adam.second),
+        "best": _numpy_copy(best),
         "best_mse": np.array(state.best_mse),
         "steps": np.array(state.adam.steps),
         "sections": np.array(state.sections_done),
@@ -72,14 +72,18 @@ def pack(state: State) -> dict[str, np.ndarray]:
 
 
 def unpack(data: Mapping[str, np.ndarray], state: State, path: Path) -> None:
-    """Set `state` from a checkpoint. Raises InputError if its network has another shape."""
+    """Set `state` from the arrays `data` of the checkpoint `path`.
+
+    Raises InputError if an array is missing or the checkpoint's network has another shape.
+    """
     try:
         described = str(data["network"])
         if described != state.network.described:
             raise InputError(
                 path,
                 f"holds a network of {described:.200}, not of {state.network.described}",
-                fix="Training can resume only with the network that it started with.",
+                fix="Training can resume only with a network of the same shape: change the section network, "
+                "or remove training.continues.",
             )
         state.network.flat.copy_(torch.from_numpy(data["weights"]))
         state.adam.first.copy_(torch.from_numpy(data["first"]))
@@ -90,20 +94,23 @@ def unpack(data: Mapping[str, np.ndarray], state: State, path: Path) -> None:
         state.seconds = float(data["seconds"])
         state.history = data["history"].tolist()
     except KeyError as error:
-        raise InputError(path, f"is not a checkpoint of a training: it has no {error}") from None
+        raise InputError(path, f"is not a checkpoint of a training: it has no array {error}") from None
 
 
-def _copied(flat: torch.Tensor) -> np.ndarray:
+def _numpy_copy(flat: torch.Tensor) -> np.ndarray:
     return flat.detach().cpu().numpy().copy()
 
 
 class Saver:
-    """Writes checkpoints in a background thread, one at a time, under a temporary name until complete."""
+    """Writes checkpoints to `path` in a background thread, one at a time.
+
+    A file has a temporary name until it is complete, so `path` always holds a whole checkpoint.
+    """
 
     def __init__(self, path: Path) -> None:
         self.path = path
-        for left_by_a_kill in path.parent.glob(f".{path.name}.*.part"):
-            left_by_a_kill.unlink()
+        for incomplete in path.parent.glob(f".{path.name}.*.part"):  # left by a run that was killed
+            incomplete.unlink()
         self._worker = ThreadPoolExecutor(max_workers=1, thread_name_prefix="checkpoint")
         self._pending: Future[None] | None = None
 
@@ -114,7 +121,10 @@ class Saver:
         self._worker.shutdown(wait=True)
 
     def save(self, arrays: dict[str, np.ndarray]) -> None:
-        """Wait for the previous checkpoint (its errors are raised here), then start to write this one."""
+        """Wait until the previous checkpoint is on disk, then start to write this one. arrays: from `pack`.
+
+        Raises the errors of writing the previous one.
+        """
         self.wait()
         self._pending = self._worker.submit(save_npz, self.path, **arrays)
 

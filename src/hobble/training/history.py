@@ -1,4 +1,4 @@
-"""The history of a training: history.csv with one row per section, and times for log lines."""
+"""The history of a training: writes history.csv, with one row per section. Also durations as text."""
 
 from __future__ import annotations
 
@@ -7,28 +7,33 @@ from pathlib import Path
 
 from hobble.core.files import write_text
 
+# The columns of history.csv before the held-out errors of the blocks of Y; `columns` explains them.
 COLUMNS = ("pass", "section", "samples", "seconds", "train_mse", "held_out_mse")
 
 
 def columns(blocks: Iterable[str]) -> list[str]:
-    """Names of the columns of history.csv. blocks: names of the blocks of Y.
+    """The names of all columns of history.csv. blocks: names of the blocks of Y.
 
     Samples and seconds are totals from the start; passes and sections begin at 1. train_mse is the mean over
     the section's batches, with dropout. The held-out errors are measured at the end of the section, without
-    dropout. All are mean squared errors of the standardised output.
+    dropout. All errors are mean squared errors of the standardised output.
     """
     return [*COLUMNS, *(f"held_out_{name}" for name in blocks)]
 
 
 def write_history(path: Path, blocks: Iterable[str], rows: Sequence[Sequence[float]]) -> None:
-    """Write history.csv. A value that is nan (an error without held-out clips) is left empty."""
+    """Write history.csv. blocks: names of the blocks of Y. rows: the values of `columns` for each section.
+
+    A value that is nan (a held-out error without held-out clips) is left empty.
+    """
     lines = [",".join(columns(blocks))]
     lines += [",".join(_cell(i, value) for i, value in enumerate(row)) for row in rows]
     write_text(path, "\n".join(lines) + "\n")
 
 
 def _cell(column: int, value: float) -> str:
-    if value != value:
+    """A value as text: counts in columns 0 to 2, seconds in column 3, then errors."""
+    if value != value:  # nan
         return ""
     return str(round(value)) if column < 3 else f"{value:.3f}" if column == 3 else f"{value:.8g}"
 

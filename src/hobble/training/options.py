@@ -1,4 +1,4 @@
-"""The keys of a configuration's `training` section."""
+"""The keys of the section `training` of a configuration."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from hobble.core.section import Positive, PositiveFloat, Section, Share
 
 
 def _int_if_whole(number: float) -> float:
-    """Turns 3.0 into 3, so that both are the same recipe."""
+    """Turn 3.0 into 3, so that both give the same hash of the recipe."""
     return int(number) if number == int(number) else number
 
 
@@ -21,9 +21,10 @@ Passes = Annotated[float, Field(gt=0, le=1_000_000), AfterValidator(_int_if_whol
 
 
 class Recipe(Section):
-    """How a network is trained. A pass visits every (frame, terrain fit) pair once, in `sections` sections.
+    """How a network is trained. A pass visits every (frame, terrain fit) pair once.
 
-    The order of the pairs is random, so even a few sections of a pass are a random sample of the data.
+    It is cut into `sections` sections. The order of the pairs is random, so even a few sections of a pass are
+    a random sample of the data.
     """
 
     passes: Passes = Field(20, description="passes over the data; with a fraction, the last one ends early")
@@ -65,12 +66,13 @@ class Recipe(Section):
     keep_channels: bool = Field(False, description="dropout never drops the inputs of channels")
     symmetric: bool = Field(
         False,
-        description="keep the network the same for left and right; for data sets with `mirror: true`",
+        description="keep the network symmetric: mirrored inputs give mirrored outputs; for data sets with "
+        "`mirror: true`",
     )
     phase_weight: PositiveFloat = Field(
         1.0,
-        description="factor of the error in the change of phase, before errors are squared. This change is "
-        "only one of 311 outputs, but decides when each foot lands",
+        description="factor of the error in the change of phase, before errors are squared. The change of "
+        "phase is only one of 311 outputs, but decides when each foot lands",
     )
     keep: Literal["last", "best"] = Field(
         "last",
@@ -95,21 +97,26 @@ class Recipe(Section):
     )
     stretches: Positive | None = Field(
         None,
-        description="parts of a section from which each batch takes its samples; default: the number of "
-        "processes, so that each process reads its own part",
+        description="number of parts that a section is cut into; each batch takes samples from every part; "
+        "default: the number of processes, so that each process reads its own part",
     )
 
     @model_validator(mode="after")
-    def _can_go_on(self) -> Recipe:
+    def _check_recipe(self) -> Recipe:
         if self.continues and self.schedule != "constant":
-            raise ValueError("`continues` needs `schedule: constant`; another schedule ends at a rate of 0")
+            raise ValueError(
+                "`continues` needs `schedule: constant`: other schedules end at a learning rate of 0"
+            )
         if not math.isclose(self.passes * self.sections, self.all_sections, rel_tol=1e-9):
             raise ValueError(
                 f"`passes` ({self.passes:g}) times `sections` ({self.sections}) must be a whole number: "
                 "training can end only after a whole section"
             )
         if self.stretches and self.stretches > self.batch:
-            raise ValueError(f"`stretches` ({self.stretches}) is above `batch` ({self.batch})")
+            raise ValueError(
+                f"`stretches` ({self.stretches}) must not be more than `batch` ({self.batch}): "
+                "each batch takes at least one sample from each stretch"
+            )
         return self
 
     @property
@@ -119,7 +126,7 @@ class Recipe(Section):
 
 
 class Machines(Section):
-    """Where the training runs: on `nodes` machines, each with one process per GPU or `processes` on its CPU.
+    """Where the training runs: on `nodes` machines, each with one process per GPU or `processes` on the CPU.
 
     This is not part of the recipe: a training can resume from its checkpoint with other values.
     """
@@ -133,27 +140,27 @@ class Machines(Section):
     )
 
     @property
-    def each(self) -> int:
-        """Processes on each node."""
+    def processes_per_node(self) -> int:
+        """Number of processes on each node."""
         return self.gpus or self.processes
 
     @property
     def count(self) -> int:
-        """Processes on all nodes."""
-        return self.nodes * self.each
+        """Number of processes on all nodes together."""
+        return self.nodes * self.processes_per_node
 
 
 class Training(Machines, Recipe):
-    """The keys of the section. Their defaults are the recipe of Holden et al. (2017), on one machine."""
+    """All keys of the section `training`. The defaults are those of Holden et al. (2017), on one machine."""
 
     @model_validator(mode="after")
-    def _have_work(self) -> Training:
+    def _check_processes(self) -> Training:
         if self.gpus and self.processes > 1:
             raise ValueError(
                 "set `gpus` or `processes`, not both: there is one process for each GPU of a node"
             )
         if self.gpus and self.device == "cpu":
-            raise ValueError("`gpus` needs `device: cuda` or `auto`")
+            raise ValueError("`gpus` needs `device: cuda` or `device: auto`")
         if self.count > self.batch:
             raise ValueError(
                 f"{self.count} processes share a batch of {self.batch}: each needs at least one sample"

@@ -22,14 +22,14 @@ from torch import Tensor
 from hobble.core.errors import HobbleError
 from hobble.database.sharing import PassSharing, own_places
 
-PATIENCE = timedelta(minutes=30)  # longest wait for the slowest process; a dead process is noticed at once
+LONGEST_WAIT = timedelta(minutes=30)  # for the slowest process; a dead process is noticed at once
 
 
 @dataclass(frozen=True)
 class Processes:
     """A group of `count` processes, as one of them sees it.
 
-    rank: number of this process, from 0. local: its number among those on the same machine, from 0.
+    rank: number of this process, from 0. local: its number among the processes of its machine, from 0.
     """
 
     rank: int = 0
@@ -38,7 +38,7 @@ class Processes:
 
     @property
     def first(self) -> bool:
-        """Whether this process writes the files and the log."""
+        """Whether this is the first process, which writes the files and the log."""
         return self.rank == 0
 
     @property
@@ -53,8 +53,8 @@ class Processes:
     def sharing(self, total: int, batch: int, stretches: int | None) -> PassSharing:
         """What this process reads of a section of `total` samples, in batches of `batch` samples.
 
-        stretches: number of parts of the section from which each batch takes samples; None: one for each
-        process.
+        stretches: number of consecutive parts that the section is cut into. Each batch takes samples from
+        every part. None: one part for each process.
         """
         return PassSharing.of(total, batch, stretches or self.count, self.rank, self.count)
 
@@ -69,15 +69,19 @@ class Processes:
             for tensor in tensors:
                 torch.distributed.broadcast(tensor, 0)
 
-    def from_first(self, *numbers: int) -> list[int]:
-        """The numbers that the first process passed, returned in every process."""
+    def numbers_of_first(self, *numbers: int) -> list[int]:
+        """The numbers that the first process passes. Every process calls this and gets them."""
         shared: list[Any] = [numbers]
         if not self.alone:
             torch.distributed.broadcast_object_list(shared, 0)
         return list(shared[0])
 
     def most_certain(self, text: str, certain: bool) -> str:
-        """The text of the first process that is `certain` of the cause; if none is, the text of process 0."""
+        """Choose one error message for all processes. text: that of this process.
+
+        certain: whether this process knows the cause of the error. The first process that knows it decides;
+        if none does, process 0.
+        """
         if self.alone:
             return text
         texts: list[Any] = [None] * self.count
@@ -85,12 +89,12 @@ class Processes:
         return str(min(enumerate(texts), key=lambda item: (item[1][0], item[0]))[1][1])
 
     def check_same(self, flat: Tensor) -> None:
-        """Raise HobbleError if the processes hold different weights. flat: those of this process."""
+        """Raise HobbleError if the processes hold different weights. flat: the weights of this process."""
         if self.alone:
             return
-        sums: list[Any] = [None] * self.count
-        torch.distributed.all_gather_object(sums, zlib.crc32(flat.cpu().numpy().tobytes()))
-        if len(set(sums)) > 1:
+        checksums: list[Any] = [None] * self.count
+        torch.distributed.all_gather_object(checksums, zlib.crc32(flat.cpu().numpy().tobytes()))
+        if len(set(checksums)) > 1:
             raise HobbleError(
                 "the processes that train together hold different weights. The last checkpoint is kept. "
                 "Give all processes the same kind of processor, the same PyTorch and the same database."
@@ -101,13 +105,13 @@ ALONE = Processes()
 
 
 @contextlib.contextmanager
-def joined(on_cuda: bool) -> Iterator[Processes]:
-    """Join the processes that torchrun started: with NCCL on GPUs, with gloo on CPUs."""
+def join_processes(on_cuda: bool) -> Iterator[Processes]:
+    """Connect this process with the others that torchrun started: by NCCL on GPUs, by gloo on CPUs."""
     numbers = (int(os.environ[name]) for name in ("RANK", "WORLD_SIZE", "LOCAL_RANK"))
     processes = Processes(*numbers)
     if on_cuda:
         torch.cuda.set_device(processes.local)
-    torch.distributed.init_process_group("nccl" if on_cuda else "gloo", timeout=PATIENCE)
+    torch.distributed.init_process_group("nccl" if on_cuda else "gloo", timeout=LONGEST_WAIT)
     try:
         yield processes
     finally:

@@ -1,4 +1,4 @@
-"""Roll-outs in training: input poses get the network's own errors, as at run time."""
+"""Roll-outs in training: the network's own errors are added to its input poses, as at run time."""
 
 from __future__ import annotations
 
@@ -15,8 +15,7 @@ class RollOut:
     At run time a joint's next position is the mean of two: the predicted position, and the old position plus
     the predicted velocity. Let d be the present error of the joint's position, and p and v the errors of the
     predicted position and velocity. In the next frame the joint's position is off by (d + v + p) / 2, and its
-    velocity by v.
-    (The turn of the root between the frames, a few hundredths of a radian, is ignored.)
+    velocity by v. (The turn of the root between the frames, a few hundredths of a radian, is ignored.)
 
     Each place in a batch carries its errors to the same place in the next batch. There the row is usually of
     another clip, because rows are shuffled. The errors still have a realistic size and pattern over the
@@ -34,17 +33,17 @@ class RollOut:
         self.frames, self.first = frames, first
         self.x_position, self.x_velocity = layout.x_joint_position, layout.x_joint_velocity
         self.y_position, self.y_velocity = layout.y_joint_position, layout.y_joint_velocity
-        # Factors from errors in standardised Y to errors in standardised X: `position_of_velocity` is the one
-        # from a velocity in Y to a position in X.
+        # Factors that turn errors in standardised Y into errors in standardised X. For example,
+        # `position_of_velocity` is for the error that a velocity in Y causes in a position in X.
         self.position_of_position, self.position_of_velocity, self.velocity_of_velocity = (
-            torch.from_numpy(s.y_std[of_y] / s.x_std[of_x]).to(device, torch.float32)
-            for of_x, of_y in (
+            torch.from_numpy(s.y_std[y_block] / s.x_std[x_block]).to(device, torch.float32)
+            for x_block, y_block in (
                 (self.x_position, self.y_position),
                 (self.x_position, self.y_velocity),
                 (self.x_velocity, self.y_velocity),
             )
         )
-        # The present errors in standardised X.
+        # The present errors in standardised X, for each place in the batch.
         self.position, self.velocity = (
             torch.zeros(batch, 3 * layout.joints, device=device) for _ in range(2)
         )
@@ -63,15 +62,16 @@ class RollOut:
             x[:, self.x_velocity] += self.velocity[: len(x)]
 
     def remember(self, error: Tensor) -> None:
-        """Advance the errors by a frame. error: (B, Y) prediction minus truth of this batch, standardised."""
+        """Advance the errors by a frame. error: (B, Y) prediction minus Y of this batch, standardised."""
         if self.frames == 1:
             return
         rows = len(error)
         position, velocity = error[:, self.y_position], error[:, self.y_velocity]
         added = position * self.position_of_position + velocity * self.position_of_velocity
-        self.position[:rows] = joint_place(self.position[:rows], added)
+        self.position[:rows] = joint_place(self.position[:rows], added)  # (d + p + v) / 2
         torch.mul(velocity, self.velocity_of_velocity, out=self.velocity[:rows])
         self.batches += 1
+        # After each batch, the roll-outs of every `frames`-th place end, so that not all end at once.
         ended = slice((self.batches - self.first) % self.frames, None, self.frames)
         self.position[ended] = 0
         self.velocity[ended] = 0

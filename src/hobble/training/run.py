@@ -1,4 +1,4 @@
-"""Entry point of the stage: from a database on disk to weights, history and checkpoint."""
+"""Entry point of the stage `training`: from a database on disk to weights, history and checkpoint."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from hobble.models import model
 from hobble.models.model import Built
 from hobble.models.network import TERRAIN_SIDE
 from hobble.models.options import Options
-from hobble.training.build_network import run_built
+from hobble.training.build_network import build_and_save
 from hobble.training.checkpoint import State, pack
 from hobble.training.held_out import HeldOut
 from hobble.training.history import write_history
@@ -44,13 +44,13 @@ def run(
 
     The written weights are the last ones, as in Holden et al. (2017); with `training.keep: best` they are
     those with the lowest held-out error. The checkpoint holds both. configuration: its name. network,
-    training, checkpoints, threads, start, code: as in `hobble.training.train.train`. terrain_side: cm from
-    the path to the points at its sides where the rows have ground heights. clips: name -> file with the
+    training, checkpoints, threads, start, code: as in `hobble.training.train.train`. terrain_side: distance
+    from the path to the points at its sides where rows have ground heights, cm. clips: name -> file with the
     clip's rows in order, needed only for a network that is built, not trained.
     """
     data = Database.open(database, training.memory_mb).with_phase_weight(training.phase_weight)
     if isinstance(model(network.kind), Built):
-        run_built(
+        build_and_save(
             data,
             clips or {},
             configuration=configuration,
@@ -85,19 +85,19 @@ def _write(
 ) -> None:
     """Measure the held-out error of the finished network, and write the three files."""
     checkpoint_arrays = pack(state)  # of the last state, before the best weights replace the last ones
-    about_training = _about(state, training) | {"terrain_side": terrain_side}
+    about_training = _training_numbers(state, training) | {"terrain_side": terrain_side}
     if training.keep == "best" and state.best is not None:
         state.network.flat.copy_(state.best)
-        about_training["best_section"] = state.sections_done - state.since_best
+        about_training["best_section"] = state.sections_done - state.sections_since_best
         log.info(
             "best weights: section %d of %d, by the held-out error",
             about_training["best_section"],
             state.sections_done,
         )
     blocks = data.layout.blocks("y")
-    errors = HeldOut(data, state.network.flat.device, 0).every_row(state.network)
-    named = zip(["held out, every row", *blocks], errors, strict=True)
-    log.info("%s", ", ".join(f"{name} {error:.4f}" for name, error in named))
+    errors = HeldOut(data, state.network.flat.device, 0).errors_on_every_row(state.network)
+    named = zip(["all outputs", *blocks], errors, strict=True)
+    log.info("error on every held-out row: %s", ", ".join(f"{name} {error:.4f}" for name, error in named))
     if data.rows("held_out"):
         about_training["held_out_mse"] = errors[0]
     write_weights(weights, state.network, data, configuration, about_training)
@@ -105,8 +105,8 @@ def _write(
     save_npz(checkpoint, **checkpoint_arrays)
 
 
-def _about(state: State, training: Training) -> dict[str, Any]:
-    """Numbers about a training, for the meta data of its weights."""
+def _training_numbers(state: State, training: Training) -> dict[str, Any]:
+    """Passes, samples and optimiser steps of a training, for the metadata in the file of its weights."""
     return {
         "passes": passes_of(state.sections_done, training.sections),
         "samples": state.samples,
@@ -114,10 +114,12 @@ def _about(state: State, training: Training) -> dict[str, Any]:
     }
 
 
-def passes_of(sections: int, each: int) -> float:
-    """How many passes `sections` sections are; an int if it is whole. each: number of sections of a pass.
+def passes_of(sections: int, per_pass: int) -> float:
+    """The number of passes that `sections` sections make up; an int if it is whole.
+
+    per_pass: number of sections in a pass.
 
     >>> passes_of(40, 4), passes_of(1, 4)
     (10, 0.25)
     """
-    return sections // each if sections % each == 0 else round(sections / each, 6)
+    return sections // per_pass if sections % per_pass == 0 else round(sections / per_pass, 6)

@@ -131,7 +131,7 @@ def begin(
 def _send_state(state: State, processes: Processes) -> State:
     """Copy the first process's state to all processes."""
     processes.take_from_first(state.network.flat, state.adam.first, state.adam.second)
-    numbers = processes.from_first(state.adam.steps, state.sections_done, state.samples)
+    numbers = processes.numbers_of_first(state.adam.steps, state.sections_done, state.samples)
     state.adam.steps, state.sections_done, state.samples = numbers
     return state
 

@@ -109,8 +109,11 @@ def _run(
     roll_out = RollOut(database, training.rollout, len(places), device, places.start)
     samples = database.samples(TRAIN)
     for index in range(state.sections_done, training.all_sections):
-        if training.patience and processes.from_first(state.since_best)[0] >= training.patience:
-            log.info("training ends, because %d sections did not lower the held-out error", training.patience)
+        if (
+            training.patience
+            and processes.numbers_of_first(state.sections_since_best)[0] >= training.patience
+        ):
+            log.info("no lower held-out error for %d sections: training ends", training.patience)
             break
         pass_index, section = divmod(index, sections)
         where = f"pass {pass_index + 1} of {training.passes:g}, section {section + 1} of {sections}"

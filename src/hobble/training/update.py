@@ -104,7 +104,7 @@ class CapturedUpdate(Update):
         flat, widths = adam.network.flat, (adam.network.inputs, adam.network.outputs)
         self.x, self.y = (torch.zeros(rows, width, device=flat.device) for width in widths)
         self.p = torch.zeros(rows, device=flat.device)
-        self.numbers = torch.zeros(len(adam.numbers(0.0)), dtype=torch.float32, device=flat.device)
+        self.numbers = torch.zeros(len(adam.step_factors(0.0)), dtype=torch.float32, device=flat.device)
         self.graph = torch.cuda.CUDAGraph()
         self.graph.register_generator_state(step.generator)
         # The updates of the warm-up change these tensors, so they are put back below.
@@ -124,7 +124,7 @@ class CapturedUpdate(Update):
     def _update_from_fixed_memory(self) -> Tensor:
         """The operations that are captured. Returns the loss."""
         loss = self.step(self.x, self.y, self.p, self.masks(len(self.p)))
-        self.adam.move(self.step.gradients, self.numbers)
+        self.adam.step_with_torch(self.step.gradients, self.numbers)
         return loss
 
     def __call__(self, x: Tensor, y: Tensor, p: Tensor, share: float, total: int | None = None) -> Tensor:
@@ -135,7 +135,7 @@ class CapturedUpdate(Update):
         self.y.copy_(y)
         self.p.copy_(p)
         self.adam.steps += 1
-        self.numbers.copy_(torch.tensor(self.adam.numbers(share)), non_blocking=True)
+        self.numbers.copy_(torch.tensor(self.adam.step_factors(share)), non_blocking=True)
         self.graph.replay()
         self.step.error = self.error  # a plain update may have replaced it
         return self.loss.clone()

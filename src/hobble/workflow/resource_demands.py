@@ -130,7 +130,7 @@ class Demands:
         if self.project.configurations.is_built(configuration):
             layout, dataset = self.layout(configuration), self.project.configurations.dataset(configuration)
             needed += 3 * 4e-3 * (layout.x_size + layout.y_size) * self.all_thousands(dataset)
-        return _megabytes(self.machines(configuration).each * needed, attempt)
+        return _megabytes(self.machines(configuration).processes_per_node * needed, attempt)
 
     def training_minutes(self, configuration: str, attempt: int = 1) -> int:
         """Minutes for a training, at most a week. If it is killed, it continues from its last checkpoint.

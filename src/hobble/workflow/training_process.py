@@ -47,11 +47,11 @@ def _train(job: dict[str, Any]) -> None:
     from hobble.database.reader import Database
     from hobble.models import network_options
     from hobble.training.options import Training
-    from hobble.training.processes import joined
+    from hobble.training.processes import join_processes
     from hobble.training.train import train
 
     training = Training.model_validate(job["training"])
-    with joined(training.device == "cuda") as processes:
+    with join_processes(training.device == "cuda") as processes:
         train(
             Database.open(job["database"], training.memory_mb),
             network=network_options(job["network"]),

@@ -27,7 +27,10 @@ GRACE_SECONDS = 10.0  # time for torchrun to end its processes
 def on_machines(training: Training, machines: Machines, gpus: bool) -> Training:
     """The training options for these machines. gpus: whether each of several processes uses a GPU."""
     device = training.device if machines.count == 1 else "cuda" if gpus else "cpu"
-    keys = {"nodes": machines.nodes, **({"gpus": machines.each} if gpus else {"processes": machines.each})}
+    keys = {
+        "nodes": machines.nodes,
+        **({"gpus": machines.processes_per_node} if gpus else {"processes": machines.processes_per_node}),
+    }
     return Training.model_validate({**training.model_dump(), **keys, "device": device})
 
 
@@ -60,7 +63,7 @@ def train_together(
     checkpoints.mkdir(parents=True, exist_ok=True)
     with tempfile.TemporaryDirectory(prefix="processes-", dir=checkpoints) as folder:
         job_file = Path(folder, "job.json")
-        each = max(1, threads // machines.each)
+        each = max(1, threads // machines.processes_per_node)
         job_file.write_text(json.dumps({**job, "threads": each, "log": str(log)}), encoding="utf-8")
         with open(log, "ab") as output:
             status = _run(command(machines, job_file), _environment(machines, each), output)
@@ -77,7 +80,12 @@ def train_together(
 
 def command(machines: Machines, job_file: Path) -> list[str]:
     """The command that starts the processes. Raises HobbleError for several machines without SLURM."""
-    torchrun = [sys.executable, "-m", "torch.distributed.run", f"--nproc-per-node={machines.each}"]
+    torchrun = [
+        sys.executable,
+        "-m",
+        "torch.distributed.run",
+        f"--nproc-per-node={machines.processes_per_node}",
+    ]
     program = ["-m", training_process.__name__, str(job_file)]
     if machines.nodes == 1:
         return [*torchrun, "--standalone", *program]
