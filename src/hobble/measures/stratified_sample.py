@@ -165,4 +165,4 @@ def _drawn(members: Sequence[Excerpt], rows: float) -> tuple[Excerpt, ...]:
 
 
 def _random_order(one: Excerpt) -> bytes:
-    return shuffle_key(one.clip if one.whole else f"{one.clip} {one.first}")
+    return shuffle_key(one.clip if one.is_whole_clip else f"{one.clip} {one.first}")
