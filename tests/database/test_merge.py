@@ -237,9 +237,13 @@ def test_clips_without_rows_are_allowed(rows_of, tmp_path):
 @pytest.mark.parametrize(
     ("field", "change", "message"),
     [
-        ("x", lambda v: v[:, :-1], "x is"),
-        ("y", lambda v: np.where(np.arange(len(v))[:, None] == 4, np.nan, v), "frame 64: y is not a number"),
-        ("fits", lambda v: np.where(np.arange(len(v)) == 7, 0, v), "heights is"),
+        ("x", lambda v: v[:, :-1], "x has shape"),
+        (
+            "y",
+            lambda v: np.where(np.arange(len(v))[:, None] == 4, np.nan, v),
+            "frame 64: y has a value that is not finite",
+        ),
+        ("fits", lambda v: np.where(np.arange(len(v)) == 7, 0, v), "heights has shape"),
         ("mean", lambda v: v * np.inf, "terrain heights"),
         ("layout", lambda v: np.array("{}"), "not a file of rows"),
     ],

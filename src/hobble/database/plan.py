@@ -14,7 +14,7 @@ from pathlib import Path
 from typing import Any
 
 from hobble.core.errors import InputError
-from hobble.rows.clip_rows import ClipRows, Outline, outline
+from hobble.rows.clip_rows import ClipRows, Outline, read_outline
 from hobble.rows.compose import fit_columns, x_columns
 from hobble.rows.layout import RowLayout
 
@@ -83,7 +83,7 @@ def make_plan(
     # versions of a clip use different frames.
     versions: Counter[str] = Counter()
     for name in sorted(clips):
-        current = outline(clips[name])
+        current = read_outline(clips[name])
         first = first or current
         if not have_same_columns(current, first):
             source = clips[name]

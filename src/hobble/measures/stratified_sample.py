@@ -186,4 +186,4 @@ def _draw_excerpts(members: Sequence[Excerpt], rows: float) -> tuple[Excerpt, ..
 
 
 def _excerpt_shuffle_key(excerpt: Excerpt) -> bytes:
-    return shuffle_key(excerpt.clip if excerpt.whole else f"{excerpt.clip} {excerpt.first}")
+    return shuffle_key(excerpt.clip if excerpt.is_whole_clip else f"{excerpt.clip} {excerpt.first}")

@@ -12,7 +12,13 @@ from scipy.ndimage import gaussian_filter
 
 from hobble.core.quat import Array
 from hobble.figure.mesh import Mesh
-from hobble.report.triangles import averaged, fill, grid, normals, shade
+from hobble.report.triangles import (
+    corner_normals,
+    draw_ground,
+    draw_triangles,
+    fill_triangles,
+    finish_picture,
+)
 
 SUPERSAMPLING = 2  # rendered pixels per picture pixel, in each direction
 # Colours: red, green and blue from 0 to 1. PAPER: background. LINE: grid on the ground. BODY: parts of the
@@ -82,10 +88,12 @@ class BodyRenderer:
         rim_light = np.array([0.9 * np.sin(camera.yaw + 2.5), 0.35, 0.9 * np.cos(camera.yaw + 2.5)])
         fine = camera.size * SUPERSAMPLING
         cover = np.zeros((camera.size, camera.size), np.float32)
-        fill(camera.project(corners - key_light * (corners[:, 1:2] / key_light[1])), self._faces, cover)
+        fill_triangles(
+            camera.project(corners - key_light * (corners[:, 1:2] / key_light[1])), self._faces, cover
+        )
         background = _ground(camera)
         background *= 1 - 0.42 * gaussian_filter(cover, camera.size / 130)[..., None]
-        facing = normals(corners, self._faces)
+        facing = corner_normals(corners, self._faces)
         tone = (
             (0.50 + 0.10 * facing[:, 1]) * (0.55 + 0.45 * self._body.shade)
             + 0.58 * np.maximum(facing @ key_light, 0)
@@ -93,8 +101,8 @@ class BodyRenderer:
         )
         colours = self._colours(values) * tone[:, None]
         picture, depth = np.zeros((fine, fine, 3), np.float32), np.full((fine, fine), np.inf, np.float32)
-        shade(camera.project(corners, SUPERSAMPLING), colours, self._faces, picture, depth)
-        return averaged(picture, depth, background, SUPERSAMPLING)
+        draw_triangles(camera.project(corners, SUPERSAMPLING), colours, self._faces, picture, depth)
+        return finish_picture(picture, depth, background, SUPERSAMPLING)
 
     def _colours(self, values: Array | None) -> Array:
         """RGB of every corner: from grey for value 0 over amber to red for value 1."""
@@ -133,4 +141,4 @@ def _ground(camera: Camera) -> Array:
     """RGB (size, size, 3) of the ground at height 0 with its grid, fading into the background far away."""
     x, height, z = (float(v) for v in camera.target)
     pixels = _ground_in_pixels(camera.yaw, camera.pitch, camera.distance, camera.size, height)
-    return grid(*pixels, x, z, GRID, np.array([PAPER, GROUND, LINE]))
+    return draw_ground(*pixels, x, z, GRID, np.array([PAPER, GROUND, LINE]))

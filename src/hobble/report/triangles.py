@@ -14,10 +14,11 @@ from hobble.core.quat import Array
 
 
 @njit(nogil=True)
-def normals(corners: Array, faces: Any) -> Array:  # pragma: no cover
-    """Unit normals (V, 3) of corners (V, 3). faces: (T, 3) corners of each triangle.
+def corner_normals(corners: Array, faces: Any) -> Array:  # pragma: no cover
+    """Unit normals (V, 3) at the V corners of a mesh, for shading.
 
-    A corner's normal is the mean over its triangles, weighted by area.
+    corners: (V, 3) positions. faces: (T, 3) indices of the corners of each triangle. A corner's normal is the
+    mean of the normals of its triangles, weighted by their areas.
     """
     out = np.zeros_like(corners)
     for f in range(len(faces)):
@@ -25,6 +26,7 @@ def normals(corners: Array, faces: Any) -> Array:  # pragma: no cover
         a, b, c = corners[i], corners[j], corners[k]
         ux, uy, uz = b[0] - a[0], b[1] - a[1], b[2] - a[2]
         vx, vy, vz = c[0] - a[0], c[1] - a[1], c[2] - a[2]
+        # The cross product of two edges: the triangle's normal, with twice its area as length.
         x, y, z = uy * vz - uz * vy, uz * vx - ux * vz, ux * vy - uy * vx
         for corner in (i, j, k):
             out[corner, 0] += x
@@ -37,20 +39,22 @@ def normals(corners: Array, faces: Any) -> Array:  # pragma: no cover
 
 
 @njit(nogil=True)
-def grid(
+def draw_ground(
     place: Array, seen: Array, wide: Array, x: float, z: float, cell: float, colours: Array
 ) -> Array:  # pragma: no cover
-    """RGB (H, W, 3) of a ground with lines every `cell` cm.
+    """RGB (H, W, 3), from 0 to 1, of the ground with a grid of lines every `cell` cm.
 
-    place: (H, W, 2) points of the ground relative to (x, z), cm. seen: (H, W), share of the ground's
-    colour, the rest being background. wide: (H, W), half the width of a line, cm. colours: (3, 3),
-    of background, ground and lines.
+    place: (H, W, 2) the point of the ground that each pixel shows, relative to (x, z), cm. seen: (H, W) share
+    of the ground's colour in each pixel; the background has the remaining share. wide: (H, W) half the width
+    of a line, cm. colours: (3, 3) RGB of background, ground and lines.
     """
     out = np.empty((*seen.shape, 3))
     for i in range(seen.shape[0]):
         for j in range(seen.shape[1]):
             a, b = (place[i, j, 0] + x) / cell, (place[i, j, 1] + z) / cell
+            # Distance to the nearest line, cm.
             near = cell * min(abs(a - np.round(a)), abs(b - np.round(b)))
+            # The share of the line's colour. It falls smoothly to 0, so that lines have no jagged edges.
             line = 0.30 * min(max(1.4 - near / wide[i, j], 0.0), 1.0) * seen[i, j]
             for k in range(3):
                 paper, ground, lines = colours[0, k], colours[1, k], colours[2, k]
@@ -59,41 +63,49 @@ def grid(
 
 
 @njit(nogil=True, cache=False, inline="always")
-def _range(a: float, b: float, c: float, size: int) -> tuple[int, int]:  # pragma: no cover
-    """First and last whole number between the least and the greatest of a, b and c, within 0 and size - 1."""
+def _pixel_range(a: float, b: float, c: float, size: int) -> tuple[int, int]:  # pragma: no cover
+    """The first and the last pixel from the least to the greatest of a, b and c, within 0 and size - 1.
+
+    a, b, c: x (or y) of a triangle's corners, in pixels. size: width (or height) of the picture.
+    """
     return max(0, int(np.ceil(min(a, b, c)))), min(size - 1, int(np.floor(max(a, b, c))))
 
 
 @njit(nogil=True, cache=False, inline="always")
-def _weights(
+def _barycentric_weights(
     a: Array, b: Array, c: Array, x: int, y: int, area: float
 ) -> tuple[float, float]:  # pragma: no cover
-    """Barycentric weights of corners a and b at pixel (x, y). area: twice the signed area."""
+    """Barycentric weights of the corners a and b of a triangle a, b, c at pixel (x, y).
+
+    The weight of c is 1 minus both. area: twice the signed area of the triangle.
+    """
     u = ((b[0] - x) * (c[1] - y) - (b[1] - y) * (c[0] - x)) / area
     v = ((c[0] - x) * (a[1] - y) - (c[1] - y) * (a[0] - x)) / area
     return u, v
 
 
 @njit(nogil=True)
-def shade(
+def draw_triangles(
     points: Array, colours: Array, faces: Any, picture: Array, depth: Array
 ) -> None:  # pragma: no cover
-    """Draw triangles `faces` (T, 3) into `picture` (H, W, 3), with a depth buffer `depth` (H, W).
+    """Draw the triangles that face the camera into `picture` (H, W, 3), RGB. Nearer triangles hide others.
 
-    points: (V, 3) corners, x and y in pixels, and depth. colours: (V, 3) of the corners.
+    points: (V, 3) x and y in pixels and depth of each corner. colours: (V, 3) RGB of each corner. faces: (T,
+    3) indices of the corners of each triangle. depth: (H, W) depth of what each pixel shows; drawing updates
+    it.
     """
     height, width = depth.shape
     for f in range(len(faces)):
         i, j, k = faces[f]
         a, b, c = points[i], points[j], points[k]
         area = (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0])
-        if area >= 0:  # back face: y points down, so front faces have a negative area
+        if area >= 0:  # a back face: front faces have a negative area, because y points down
             continue
-        x0, x1 = _range(a[0], b[0], c[0], width)
-        y0, y1 = _range(a[1], b[1], c[1], height)
+        x0, x1 = _pixel_range(a[0], b[0], c[0], width)
+        y0, y1 = _pixel_range(a[1], b[1], c[1], height)
         for y in range(y0, y1 + 1):
             for x in range(x0, x1 + 1):
-                u, v = _weights(a, b, c, x, y, area)
+                u, v = _barycentric_weights(a, b, c, x, y, area)
                 w = 1.0 - u - v
                 if u < 0 or v < 0 or w < 0:
                     continue
@@ -105,29 +117,34 @@ def shade(
 
 
 @njit(nogil=True)
-def fill(points: Array, faces: Any, cover: Array) -> None:  # pragma: no cover
-    """Set the pixels of `cover` (H, W) under triangles to 1. points: (V, 3) corners, in pixels."""
+def fill_triangles(points: Array, faces: Any, cover: Array) -> None:  # pragma: no cover
+    """Set the pixels of `cover` (H, W) that a triangle covers to 1.
+
+    points: (V, 3) corners; their first two columns are x and y in pixels. faces: (T, 3) indices of the
+    corners of each triangle.
+    """
     height, width = cover.shape
     for f in range(len(faces)):
         a, b, c = points[faces[f, 0]], points[faces[f, 1]], points[faces[f, 2]]
         area = (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0])
         if area == 0:
             continue
-        x0, x1 = _range(a[0], b[0], c[0], width)
-        y0, y1 = _range(a[1], b[1], c[1], height)
+        x0, x1 = _pixel_range(a[0], b[0], c[0], width)
+        y0, y1 = _pixel_range(a[1], b[1], c[1], height)
         for y in range(y0, y1 + 1):
             for x in range(x0, x1 + 1):
-                u, v = _weights(a, b, c, x, y, area)
+                u, v = _barycentric_weights(a, b, c, x, y, area)
                 if u >= 0 and v >= 0 and u + v <= 1:
                     cover[y, x] = 1.0
 
 
 @njit(nogil=True)
-def averaged(picture: Array, depth: Array, background: Array, scale: int) -> Any:  # pragma: no cover
-    """RGB bytes (H, W, 3): means over squares of `scale` by `scale` pixels, with the background behind.
+def finish_picture(picture: Array, depth: Array, background: Array, scale: int) -> Any:  # pragma: no cover
+    """The finished picture: RGB bytes (H, W, 3).
 
-    picture: (scale H, scale W, 3). depth: (scale H, scale W), infinite where nothing was drawn.
-    background: (H, W, 3).
+    Each of its pixels is the mean of a square of `scale` by `scale` pixels of `picture`. Where nothing was
+    drawn, the background shows. picture: (scale * H, scale * W, 3) RGB from 0 to 1. depth: (scale * H,
+    scale * W), infinite where nothing was drawn. background: (H, W, 3) RGB from 0 to 1.
     """
     height, width = background.shape[:2]
     out = np.empty((height, width, 3), np.uint8)

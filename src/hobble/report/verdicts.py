@@ -1,19 +1,20 @@
-"""Sentences of the comparison page, each of which names the best configuration in one respect."""
+"""Sentences for the comparison page. Each names the configuration that is best in one respect: a verdict."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 
-EQUAL = 0.03  # two values are called almost equal if they differ by at most this share of the lower one
+# Two values are called almost equal if the higher one exceeds the lower one by at most this share.
+EQUAL = 0.03
 
 
 @dataclass(frozen=True)
 class Verdict:
-    """A sentence about the best configuration.
+    """A sentence about the configuration that is best in one respect.
 
-    at: a number; the page shows verdicts in the order of these numbers. title: what is compared. name: the
-    best configuration. text: the sentence.
+    at: place on the page, which sorts its verdicts by this number. title: heading of the sentence, such as
+    "Closest to captured motion". name: the best configuration. text: the sentence.
     """
 
     at: int
@@ -22,19 +23,22 @@ class Verdict:
     text: str
 
 
-def best(
+def verdict_on_lowest(
     at: int,
     title: str,
     values: Mapping[str, float | None],
     say: Callable[[str, float], str],
     more: str = "",
 ) -> Iterator[Verdict]:
-    """The verdict on the two configurations with the lowest values; nothing if fewer than two have a value.
+    """Yield one verdict: the configuration with the lowest value is best, and is compared with the second.
 
-    at, title: of the verdict. values: configuration -> value or None. say: (configuration, value) -> half of
-    the sentence. more: another sentence after the first one, with a leading space.
+    Yields nothing if fewer than two configurations have a value. at, title: see `Verdict`. values:
+    configuration -> value, or None if it was not measured. say: function (configuration, value) -> half of
+    the sentence. more: further text after the sentence; it begins with a space.
 
-    >>> [v.text for v in best(1, "Fastest", {"a": 2.0, "b": 3.0}, lambda n, v: f"a frame of {n} takes {v} s")]
+    >>> seconds = {"a": 2.0, "b": 3.0}
+    >>> found = verdict_on_lowest(1, "Fastest", seconds, lambda name, s: f"a frame of {name} takes {s} s")
+    >>> [verdict.text for verdict in found]
     ['A frame of a takes 2.0 s; a frame of b takes 3.0 s.']
     """
     ranked = sorted((value, name) for name, value in values.items() if value is not None)

@@ -1,4 +1,4 @@
-"""Exports the character for use in any web page: an ES module, its network, and an example page."""
+"""Exports a trained character for use in any web page: an ES module, its network, and an example page."""
 
 from __future__ import annotations
 
@@ -17,13 +17,17 @@ THREE_FILES = ("three.module.js", "three.core.js")  # files of three.js that the
 
 
 def export_web(folder: str | Path, network: Network, runtime: Runtime, modules: str | Path) -> None:
-    """Write hobble.js, hobble.d.ts, character.json, and an example index.html with three.js into a folder.
+    """Write the runtime (hobble.js, hobble.d.ts), the character (character.json) and an example page.
 
-    modules: the node_modules folder with three.js and the bundler. Raises HobbleError for a network without a
-    skeleton.
+    The example is index.html, which needs the two files of three.js that are copied beside it. folder: where
+    to write all files. modules: the folder node_modules with three.js and the bundler. Raises HobbleError for
+    a network without a skeleton.
     """
     if network.skeleton is None:
-        raise HobbleError("the file of this network has no skeleton, so there is no body to draw")
+        raise HobbleError(
+            "the file of this network has no skeleton, so there is no body to draw. "
+            "Pass a file of config/skeletons when you load the network."
+        )
     folder = Path(folder)
     folder.mkdir(parents=True, exist_ok=True)
     spec = playable(network, runtime)

@@ -1,4 +1,6 @@
-"""Rows for one clip: input X, output Y and phase P of the network, for each frame of the clip's cycles.
+"""Builds the rows of one clip. A row is input X, output Y and phase P of the network for one frame.
+
+Only the frames of the clip's gait cycles have rows.
 
 The columns, and the coordinate system that moves with the root, are those of the pipeline that Holden,
 Komura, Saito (2017) released.
@@ -41,14 +43,14 @@ def clip_rows(
     step: int,
     facing_sigma: float,
 ) -> ClipRows:
-    """The rows of a clip's locomotion cycles, one cycle after another.
+    """Build the rows of a clip's gait cycles, one cycle after another.
 
-    name: of the clip. labels, terrain: the arrays that the stages of these names saved for the clip.
-    channels: name -> values (F, columns).
-    window: frames of the trajectory before and after the row's frame. step: frames between two samples of the
-    trajectory. facing_sigma: sigma of the Gaussian that smooths the facing direction, frames.
-    Past the ends of the clip the root moves straight on, and the gait of the first or the last frame is
-    repeated.
+    name: name of the clip. labels: the arrays of `hobble.labels.clip_labels.Labels`. channels: channel ->
+    values (F, columns). terrain: the arrays of `hobble.terrain.clip_fits.ClipFits`. window: frames of the
+    trajectory before and after the row's frame. step: frames between two samples of the trajectory.
+    facing_sigma: sigma of the Gaussian that smooths the facing direction, frames.
+    The trajectory may reach past the ends of the clip. There the root moves straight on, and the gait of the
+    first or the last frame is repeated.
     Raises InputError if labels, channels or terrain do not fit the clip, or if the clip has no frame before
     or after a cycle.
     """
@@ -58,10 +60,19 @@ def clip_rows(
     frame, cycle = cycle_frames(labels["cycles"])
     _check(name, clip, labels, channels, terrain, frame)
     root = root_frames(clip, facing_sigma)
-    path, here = extend_root(root, window), frame + window
-    x, y = _columns(labels, layout, frame, (path, here), root, local_pose(clip, root), skeleton.role("hips"))
-    centre = terrain["heights"][:, layout.samples : 2 * layout.samples]
-    mean = centre.mean(axis=1, dtype=np.float64)
+    longer_root, frame_in_longer = extend_root(root, window), frame + window
+    x, y = _body_columns(
+        labels,
+        layout,
+        frame,
+        (longer_root, frame_in_longer),
+        root,
+        local_pose(clip, root),
+        skeleton.role("hips"),
+    )
+    # Ground heights come in three groups, left of the path, on it and right of it. Each has all samples.
+    heights_on_path = terrain["heights"][:, layout.samples : 2 * layout.samples]
+    mean = heights_on_path.mean(axis=1, dtype=np.float64)
     return ClipRows(
         clip=name,
         layout=layout,
@@ -75,11 +86,11 @@ def clip_rows(
         fits=terrain["fits"],
         heights=terrain["heights"] - mean[:, None],
         mean=mean,
-        visits=terrain["patch"].shape[1],
+        visits=terrain["patch"].shape[1],  # the number of fits that was asked for
     )
 
 
-def _columns(
+def _body_columns(
     labels: Arrays,
     layout: RowLayout,
     frame: np.ndarray,
@@ -88,16 +99,17 @@ def _columns(
     pose: tuple[Array, Array, Array],
     hips: int,
 ) -> tuple[list[Array], list[Array]]:
-    """The blocks of X (without terrain and channels) and of Y, in column order, for R rows.
+    """The blocks of X without terrain and channels, and the blocks of Y, both in column order.
 
-    frame: (R,) the clip's frame of each row. path: the root with more frames before and after the clip, and
-    the index (R,) in it of each row's frame. root: the root in the clip alone. pose: joint positions,
-    velocities and rotations in root coordinates, in all frames but the last. hips: index of this joint.
+    A block has one entry for each of the R rows. frame: (R,) the frame of the clip for each row. path: the
+    root continued past the ends of the clip, and the index (R,) of each row's frame in it. root: the root in
+    the clip only. pose: result of `local_pose`. hips: index of this joint.
     """
-    longer_root, here = path
+    longer_root, frame_in_longer = path
+    next_frame = frame_in_longer + 1
     position, velocity, rotation = pose
     x = [
-        *trajectory(longer_root, here, here, layout.offsets),
+        *trajectory(longer_root, frame_in_longer, frame_in_longer, layout.offsets),
         gait_columns(labels["gait"], frame, layout.offsets),
         position[frame - 1],
         velocity[frame - 1],
@@ -107,7 +119,7 @@ def _columns(
         root.turn[frame],
         phase_change(labels["phase"])[frame],
         labels["contacts"][frame],
-        *trajectory(longer_root, here + 1, here + 1, layout.offsets[layout.future :]),
+        *trajectory(longer_root, next_frame, next_frame, layout.offsets[layout.future :]),
         position[frame],
         velocity[frame],
         rotation[frame],
@@ -116,22 +128,25 @@ def _columns(
 
 
 def cycle_frames(cycles: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Frame (R,) and cycle number (R,) of each row. cycles: (C, 2) first and last frame of each cycle.
+    """The frame of the clip (R,) and the number of the cycle (R,) of each row.
 
-    The first and the last frame both belong to the cycle. So a frame in which one cycle ends and the next
-    begins has two rows.
+    cycles: (C, 2) first and last frame of each cycle. Both belong to the cycle. So a frame in which one cycle
+    ends and the next begins has two rows.
 
     >>> cycle_frames(np.array([[60, 62], [62, 63]]))
     (array([60, 61, 62, 62, 63]), array([0, 0, 0, 1, 1]))
     """
     lengths = cycles[:, 1] - cycles[:, 0] + 1
     cycle = np.repeat(np.arange(len(cycles)), lengths)
-    within = np.arange(len(cycle)) - np.repeat(np.cumsum(lengths) - lengths, lengths)
-    return np.repeat(cycles[:, 0], lengths) + within, cycle
+    frame_in_cycle = np.arange(len(cycle)) - np.repeat(np.cumsum(lengths) - lengths, lengths)
+    return np.repeat(cycles[:, 0], lengths) + frame_in_cycle, cycle
 
 
 def cycle_phase(phase: Array, cycles: np.ndarray) -> Array:
-    """Phase (R,) of the rows of the cycles, exactly 0 in the first row of a cycle and 1 in the last."""
+    """Phase (R,) of each row: exactly 0 in the first row of a cycle and exactly 1 in the last.
+
+    phase: (F,) phase in the clip, from 0 to 1. cycles: see `cycle_frames`.
+    """
     frame, cycle = cycle_frames(cycles)
     out = phase[frame].astype(float)
     out[frame == cycles[cycle, 0]] = 0.0
@@ -140,39 +155,45 @@ def cycle_phase(phase: Array, cycles: np.ndarray) -> Array:
 
 
 def phase_change(phase: Array) -> Array:
-    """(F - 1,) change of `phase` (F,) from each frame to the next. Where the phase restarts, 1 is added."""
+    """Change of `phase` (F,) from each frame to the next (F - 1,), in cycles.
+
+    Where the phase falls, a new cycle begins. There 1 is added, so that the change is never negative.
+    """
     change = np.diff(phase.astype(float))
     return np.where(change < 0, change + 1, change)
 
 
 def trajectory(root: RootFrames, frame: np.ndarray, seen_from: np.ndarray, offsets: range) -> list[Array]:
-    """Positions and facing directions of the root, sampled at `offsets` from each of R frames.
+    """Positions and facing directions of the root around each of R frames.
 
-    frame: (R,) numbers of these frames. seen_from: (R,) for each of them, the number of the frame in whose
-    root coordinates the result is given. Returns four arrays (R, samples): position x and z (cm), direction x
-    and z.
+    frame: (R,) these frames. offsets: frames from each of them to the samples. seen_from: (R,) the frames in
+    whose root coordinates the samples are given, one for each frame. Returns four arrays (R, samples): x and z of the position
+    (cm), then x and z of the facing direction.
     """
-    at = frame[:, None] + np.array(offsets)
-    ground = np.zeros((*at.shape, 3))
-    ground[..., [0, 2]] = root.position[at]
-    position = points_to_root(root, ground, seen_from)
-    direction = vectors_to_root(root, root.direction[at], seen_from)
+    sampled = frame[:, None] + np.array(offsets)
+    on_ground = np.zeros((*sampled.shape, 3))
+    on_ground[..., [0, 2]] = root.position[sampled]
+    position = points_to_root(root, on_ground, seen_from)
+    direction = vectors_to_root(root, root.direction[sampled], seen_from)
     return [position[..., 0], position[..., 2], direction[..., 0], direction[..., 2]]
 
 
 def gait_columns(gait: Array, frame: np.ndarray, offsets: range) -> Array:
-    """(R, gaits, samples) share of each gait, at each of `offsets` from each frame.
+    """The shares of the gaits around each of R frames, (R, gaits, samples).
 
-    gait: (F, gaits) shares in the clip; past its ends, the first and the last are repeated. frame: (R,)
-    numbers of the frames.
+    gait: (F, gaits) shares in the clip. Past the ends of the clip, the shares in its first or last frame are
+    repeated. frame: (R,) these frames. offsets: frames from each of them to the samples.
     """
-    at = np.clip(frame[:, None] + np.array(offsets), 0, len(gait) - 1)
-    return np.swapaxes(gait[at], 1, 2)
+    sampled = np.clip(frame[:, None] + np.array(offsets), 0, len(gait) - 1)
+    return np.swapaxes(gait[sampled], 1, 2)
 
 
-def _table(columns: list[Array], rows: int) -> Array:
+def _table(blocks: list[Array], rows: int) -> Array:
+    """One float32 table (rows, columns) of blocks (rows, ...), side by side."""
     flat = [
-        np.asarray(c, np.float32).reshape(rows, -1 if rows else int(np.prod(c.shape[1:]))) for c in columns
+        # With 0 rows, numpy cannot find out the number of columns, so that -1 is an error.
+        np.asarray(block, np.float32).reshape(rows, -1 if rows else int(np.prod(block.shape[1:])))
+        for block in blocks
     ]
     return np.concatenate(flat, axis=1)
 
@@ -185,23 +206,27 @@ def _check(
     terrain: Arrays,
     frame: np.ndarray,
 ) -> None:
-    where = name
+    """Raise InputError if the arguments of `clip_rows` do not match. frame: (R,) frames of the rows."""
     lengths = {"labels": len(labels["phase"])}
-    lengths |= {f"values of {name}": len(values) for name, values in channels.items()}
+    lengths |= {f"values of {channel_name}": len(values) for channel_name, values in channels.items()}
     for what, length in lengths.items():
         if length != len(clip):
-            raise InputError(where, f"{what} have {length} frames, the clip has {len(clip)}", fix=MAKE_AGAIN)
+            raise InputError(name, f"{what} have {length} frames, the clip has {len(clip)}", fix=MAKE_AGAIN)
     for channel_name, values in channels.items():
         columns = len(channel(channel_name).columns(clip.skeleton))
         if values.shape[1] != columns:
             problem = f"{channel_name} has {values.shape[1]} columns where the skeleton needs {columns}"
-            raise InputError(where, problem, fix=MAKE_AGAIN)
+            raise InputError(name, problem, fix=MAKE_AGAIN)
     if not np.array_equal(terrain["frame"], frame):
         raise InputError(
-            where,
-            "terrain was fitted to other cycles than those of the labels",
-            fix=MAKE_AGAIN,
+            name, "its terrain was fitted to other cycles than its labels have now", fix=MAKE_AGAIN
         )
+    # A row needs the pose of the frame before it, and the velocity to the frame after it.
     if len(frame) and (frame.min() < 1 or frame.max() + 2 > len(clip)):
         outside = int(frame.min() if frame.min() < 1 else frame.max())
-        raise InputError(where, "the clip has no frame before or after a cycle", frame=outside)
+        raise InputError(
+            name,
+            "the clip has no frame before or after a cycle",
+            frame=outside,
+            fix="Leave out this cycle, or use a clip that is longer at this end.",
+        )

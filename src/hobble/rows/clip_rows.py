@@ -1,7 +1,7 @@
 """The rows of one clip: a row for each frame of its cycles.
 
-Each row has several terrain fits: ground heights that suit the motion. What depends only on the frame is
-stored once for each row, what depends on the fit once for each fit.
+Each row has several terrain fits. A fit is a set of ground heights that suit the motion. Values that depend
+only on the frame are stored once for each row. Values that depend on the fit are stored once for each fit.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ from hobble.core.quat import Array
 from hobble.rows.compose import body_columns, compose, frame_inputs
 from hobble.rows.layout import RowLayout
 
-CHANNEL_PREFIX = "channel_"  # names of channel arrays in a file begin with it
+CHANNEL_PREFIX = "channel_"  # in a file, the name of each channel's array begins with it
 DELETE_IT = "Delete it; the next run makes it again."
 
 
@@ -29,15 +29,16 @@ DELETE_IT = "Delete it; the next run makes it again."
 class ClipRows:
     """R rows of a clip. Together they have S terrain fits.
 
-    clip: its name. layout: the columns of X and Y with every channel of the data set.
-    skeleton: see `Skeleton.to_dict`.
-    x: (R, columns of X without terrain and channels). y: (R, columns of Y). Joint heights in both are
-    measured from height 0 of the world. p: (R,) phase. channels: name -> (R, columns of the channel).
+    clip: name of the clip. layout: the columns of X and Y, with every channel of the data set. skeleton: see
+    `Skeleton.to_dict`.
+    x: (R, columns) X without terrain and channels. y: (R, columns) Y. Joint heights in x and y are measured
+    from height 0 of the world. p: (R,) phase, 0 to 1. channels: channel -> values (R, columns).
     frame: (R,) int, frame of the clip. cycle: (R,) int, number of the cycle.
-    fits: (R,) number of terrain fits of each row; their sum is S. heights: (S, 3 * samples) ground heights
-    minus `mean`, cm. mean: (S,) mean height of the ground on the path, cm; it has to be subtracted from the
-    joint heights. `heights` and `mean` are in the order of the rows.
-    visits: how often a pass over the data uses each row, however many fits the row has.
+    fits: (R,) how many terrain fits each row has; their sum is S. heights: (S, 3 * samples) ground heights
+    minus `mean`, cm. mean: (S,) mean height of the ground on the path, cm. To pair a row with a fit, subtract
+    the fit's `mean` from the joint heights. `heights` and `mean` have the fits of row 0 first, then those of
+    row 1, and so on.
+    visits: how often a pass over the data uses each row. The number is the same for a row with fewer fits.
     """
 
     clip: str
@@ -63,23 +64,23 @@ class ClipRows:
         return np.cumsum(self.fits) - self.fits
 
     def every(self, step: int, first: int = 0) -> ClipRows:
-        """Every `step`-th row from row `first` on, with its fits."""
+        """Every `step`-th row from row `first` on, with the fits of these rows."""
         kept = np.zeros(len(self), bool)
         kept[first::step] = True
-        of_fits = np.repeat(kept, self.fits)
-        of_rows = {name: getattr(self, name)[kept] for name in ("x", "y", "p", "frame", "cycle", "fits")}
+        kept_fits = np.repeat(kept, self.fits)
+        by_row = {name: getattr(self, name)[kept] for name in ("x", "y", "p", "frame", "cycle", "fits")}
         return replace(
             self,
-            **of_rows,
+            **by_row,
             channels={name: values[kept] for name, values in self.channels.items()},
-            heights=self.heights[of_fits],
-            mean=self.mean[of_fits],
+            heights=self.heights[kept_fits],
+            mean=self.mean[kept_fits],
         )
 
     def check(self, where: str | Path) -> None:
-        """Check shapes and numbers of fits, and that all values are finite.
+        """Raise InputError if shapes do not match, a row has no fit, or a value is not finite.
 
-        Raises InputError, which names `where`.
+        where: file or clip that the message names.
         """
         layout, rows, fits = self.layout, len(self.p), int(np.sum(self.fits))
         expected = {
@@ -92,14 +93,12 @@ class ClipRows:
             "mean": (fits,),
         }
         if set(self.channels) != set(dict(layout.channels)):
-            raise InputError(where, "its channels differ from those of its layout", fix=DELETE_IT)
+            raise InputError(where, "its channels are not those that its layout names", fix=DELETE_IT)
         tables = {name: getattr(self, name) for name in expected} | dict(self.channels)
         expected |= {name: (rows, columns) for name, columns in layout.channels}
         for name, shape in expected.items():
             if tables[name].shape != shape:
-                raise InputError(
-                    where, f"{name} is {tables[name].shape} where {shape} belongs", fix=DELETE_IT
-                )
+                raise InputError(where, f"{name} has shape {tables[name].shape}, not {shape}", fix=DELETE_IT)
         if rows and np.min(self.fits) < 1:
             frame = int(self.frame[np.argmin(self.fits)])
             raise InputError(where, "a row has no terrain fit", frame=frame, fix=DELETE_IT)
@@ -108,16 +107,17 @@ class ClipRows:
             bad = ~(finite if finite.ndim == 1 else finite.all(axis=1))
             if bad.any():
                 frame = int(self.frame[np.argmax(bad)])
-                raise InputError(where, f"{name} is not a number", frame=frame, fix=DELETE_IT)
+                raise InputError(where, f"{name} has a value that is not finite", frame=frame, fix=DELETE_IT)
         if not (np.isfinite(self.heights).all() and np.isfinite(self.mean).all()):
-            raise InputError(where, "terrain heights are not numbers", fix=DELETE_IT)
+            raise InputError(where, "terrain heights are not finite", fix=DELETE_IT)
 
 
 class Pairs(NamedTuple):
-    """n pairs of a row and one of its terrain fits. A row in the data of Holden et al. (2017) is such a pair.
+    """n pairs of a row and one of its terrain fits. What Holden et al. (2017) call a row is such a pair.
 
-    x: (n, X) float32. y: (n, Y) float32. p: (n,) phase. row: (n,) index of the row. weight: (n,) 1 divided by
-    the row's number of fits, so that every row has the same weight.
+    x: (n, X) and y: (n, Y), float32, with heights relative to the fit's `mean`. p: (n,) phase. row: (n,)
+    index of the row. weight: (n,) 1 divided by the number of the row's fits, so that all pairs of a row
+    together have weight 1.
     """
 
     x: Array
@@ -128,22 +128,25 @@ class Pairs(NamedTuple):
 
 
 def expanded(rows: ClipRows, layout: RowLayout, batch: int = 2048) -> Iterator[Pairs]:
-    """Yield all pairs of a row and a fit in raw units, about `batch` at a time.
+    """Yield all pairs of a row and one of its fits, about `batch` at a time.
 
-    layout: the layout of the rows, or one with fewer channels.
+    Values are not standardised. layout: the layout of the rows, or one with fewer channels.
     """
-    first = rows.first_fit
+    first_fit = rows.first_fit
     start = 0
     while start < len(rows):
-        stop = max(start + 1, int(np.searchsorted(first, first[start] + batch)))
+        stop = max(start + 1, int(np.searchsorted(first_fit, first_fit[start] + batch)))
         fits = rows.fits[start:stop]
         row = np.repeat(np.arange(start, stop), fits)
-        yield pairs(rows, layout, row, np.arange(first[start], first[stop - 1] + fits[-1]))
+        yield pairs(rows, layout, row, np.arange(first_fit[start], first_fit[stop - 1] + fits[-1]))
         start = stop
 
 
 def pairs(rows: ClipRows, layout: RowLayout, row: np.ndarray, fit: np.ndarray) -> Pairs:
-    """The pairs of row[i] and fit[i] in raw units, for indices of rows (n,) and of fits (n,)."""
+    """The n pairs of row[i] and fit[i], not standardised.
+
+    layout: see `expanded`. row: (n,) indices of rows. fit: (n,) indices of their fits in `rows.heights`.
+    """
     x = np.empty((len(row), layout.x_size), np.float32)
     y = rows.y[row].astype(np.float32)
     values = {name: rows.channels[name][row] for name, _ in layout.channels}
@@ -152,7 +155,7 @@ def pairs(rows: ClipRows, layout: RowLayout, row: np.ndarray, fit: np.ndarray) -
 
 
 def save_clip_rows(path: str | Path, rows: ClipRows) -> None:
-    """Write rows as an npz with float32 values."""
+    """Write rows as an npz file. Its values are float32, except for the integer arrays."""
     floats = {n: getattr(rows, n).astype(np.float32) for n in ("x", "y", "p", "heights", "mean")}
     floats |= {CHANNEL_PREFIX + name: values.astype(np.float32) for name, values in rows.channels.items()}
     integers = {n: getattr(rows, n).astype(np.int32) for n in ("frame", "cycle", "fits")}
@@ -160,7 +163,7 @@ def save_clip_rows(path: str | Path, rows: ClipRows) -> None:
         path,
         clip=np.array(rows.clip),
         layout=np.array(json.dumps(rows.layout.to_dict(), sort_keys=True)),
-        skeleton=np.array(json.dumps(rows.skeleton)),  # not sorted: joints are in the order of the columns
+        skeleton=np.array(json.dumps(rows.skeleton)),  # keys not sorted: joints have the order of the columns
         visits=np.array(rows.visits),
         **floats,
         **integers,
@@ -168,7 +171,7 @@ def save_clip_rows(path: str | Path, rows: ClipRows) -> None:
 
 
 class Outline(NamedTuple):
-    """The small part of a clip's rows that is read before clips are merged. See `ClipRows` for the fields."""
+    """The few facts about a clip's rows that are needed before clips are merged. Fields as in `ClipRows`."""
 
     layout: RowLayout
     skeleton: Mapping[str, Any]
@@ -176,8 +179,11 @@ class Outline(NamedTuple):
     visits: int
 
 
-def outline(source: ClipRows | str | Path) -> Outline:
-    """The outline of rows or of a file of rows. Reads only a few kilobytes of the file."""
+def read_outline(source: ClipRows | str | Path) -> Outline:
+    """The outline of `source`: rows, or the path of a file of rows.
+
+    Of a file, only a few kilobytes are read. Raises InputError if it is not a file of rows.
+    """
     if isinstance(source, ClipRows):
         return Outline(source.layout, source.skeleton, source.fits, source.visits)
     data = load_npz(source, ("layout", "skeleton", "fits", "visits"))
@@ -191,17 +197,17 @@ def outline(source: ClipRows | str | Path) -> Outline:
 def load_clip_rows(path: str | Path, part: tuple[int, int] | None = None) -> ClipRows:
     """Read what `save_clip_rows` wrote. Raises InputError if the file is damaged or inconsistent.
 
-    part: the first row to read and the first one not to read; None for all rows. The file's checksums are
-    checked only if all rows are read.
+    part: (first, stop), to read the rows from `first` up to `stop`, which is not included; None reads all
+    rows. The file's checksums are checked only if all rows are read.
     """
-    data: dict[str, Any] = load_npz(path) if part is None else _part(ArrayParts(path), *part)
+    data: dict[str, Any] = load_npz(path) if part is None else _read_part(ArrayParts(path), *part)
     try:
         data["clip"] = str(data["clip"])
         data["layout"] = RowLayout.from_dict(json.loads(str(data["layout"])))
         data["skeleton"] = json.loads(str(data["skeleton"]))
         data["visits"] = int(data["visits"])
-        named = [key for key in data if key.startswith(CHANNEL_PREFIX)]
-        data["channels"] = {key.removeprefix(CHANNEL_PREFIX): data.pop(key) for key in named}
+        channel_keys = [key for key in data if key.startswith(CHANNEL_PREFIX)]
+        data["channels"] = {key.removeprefix(CHANNEL_PREFIX): data.pop(key) for key in channel_keys}
         rows = ClipRows(**data)
     except (KeyError, TypeError, ValueError) as error:
         raise InputError(path, f"not a file of rows ({error})", fix=DELETE_IT) from error
@@ -210,15 +216,15 @@ def load_clip_rows(path: str | Path, part: tuple[int, int] | None = None) -> Cli
 
 
 def row_count(path: str | Path) -> int:
-    """Number of rows in a file of rows, without reading them."""
+    """Number of rows in a file of rows. Does not read the rows."""
     return ArrayParts(path).shape("p")[0]
 
 
-def _part(file: ArrayParts, first: int, stop: int) -> dict[str, Any]:
-    """The arrays of the rows from `first` up to `stop`, which is not included."""
+def _read_part(file: ArrayParts, first: int, stop: int) -> dict[str, Any]:
+    """Read all arrays of a file, but only for the rows from `first` up to `stop`, which is not included."""
     of_fits = ("heights", "mean")
     whole = {name: file.whole(name) for name in ("clip", "layout", "skeleton", "visits")}
     rows = {name: file.rows(name, first, stop) for name in file.names if name not in (*whole, *of_fits)}
-    skipped = int(file.rows("fits", 0, first).sum())
-    fits = skipped, skipped + int(rows["fits"].sum())
-    return {**whole, **rows, **{name: file.rows(name, *fits) for name in of_fits}}
+    first_fit = int(file.rows("fits", 0, first).sum())  # number of fits of the rows before `first`
+    stop_fit = first_fit + int(rows["fits"].sum())
+    return {**whole, **rows, **{name: file.rows(name, first_fit, stop_fit) for name in of_fits}}

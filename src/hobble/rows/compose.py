@@ -1,7 +1,8 @@
 """Composes rows of X from the body's columns, the channels, and the ground heights of one terrain fit.
 
-`compose` and `lower_joints` take numpy arrays or PyTorch tensors, raw or standardised. n is the number of
-rows.
+A terrain fit is a set of ground heights that suit the motion. A row may have several, so they are stored
+apart from the columns that depend only on the frame. `compose` and `lower_joints` take numpy arrays or
+PyTorch tensors, raw or standardised. In shapes, n is the number of rows.
 """
 
 from __future__ import annotations
@@ -24,40 +25,40 @@ def body_columns(layout: RowLayout) -> int:
 
 
 def body_layout(layout: RowLayout) -> RowLayout:
-    """The same layout without channels, with the blocks of X in the order of `hobble.rows.layout.BODY`."""
+    """`layout` without channels, and with the blocks of X in the order of `hobble.rows.layout.BODY`."""
     return replace(layout, channels=(), order=())
 
 
 def x_columns(layout: RowLayout) -> int:
-    """Number of columns of X without terrain, that is of those that depend only on the frame."""
+    """Number of columns of X without terrain. These columns depend only on the frame."""
     return layout.x_size - 3 * layout.samples
 
 
 def fit_columns(layout: RowLayout) -> int:
-    """Number of values that a database stores for a terrain fit: ground heights, and the mean on the path."""
+    """Number of values that a database stores for a terrain fit: ground heights and their mean."""
     return 3 * layout.samples + 1
 
 
 def joint_heights(joints: slice) -> slice:
-    """The columns of the heights in a block of joint positions."""
+    """The columns of y, the height, in a block `joints` of joint positions x, y, z."""
     return slice(joints.start + 1, joints.stop, 3)
 
 
 def frame_inputs(layout: RowLayout, body: Array, channels: Mapping[str, Array]) -> Array:
-    """The columns of X without terrain (n, x_columns), in the order of the layout.
+    """X without its terrain columns, (n, columns), in the order of the layout.
 
-    body: (n, body_columns) the columns without terrain and channels, in the order of `body_layout`. channels:
-    name -> (n, columns of the channel).
+    body: (n, columns) X without terrain and channels, in the order of `body_layout`. channels: channel ->
+    values (n, columns).
     """
-    if not layout.order:  # the channels come last
+    if not layout.order:  # the blocks of the body come first, then the channels
         return np.concatenate([body, *(channels[name] for name, _ in layout.channels)], axis=1)
-    bare = without_terrain(body_layout(layout))
-    source = {name: body[:, block] for name, block in bare.items()} | dict(channels)
-    return np.concatenate([source[name] for name in without_terrain(layout)], axis=1)
+    body_blocks = without_terrain(body_layout(layout))
+    values = {name: body[:, block] for name, block in body_blocks.items()} | dict(channels)
+    return np.concatenate([values[name] for name in without_terrain(layout)], axis=1)
 
 
 def without_terrain(layout: RowLayout) -> dict[str, slice]:
-    """The blocks of X, by name, after the terrain columns are removed."""
+    """Name -> columns of each block of X, counted without the terrain columns."""
     terrain = layout.x_terrain
     width = terrain.stop - terrain.start
     return {
@@ -77,12 +78,12 @@ def compose(
     x_std: Any = None,
     y_std: Any = None,
 ) -> None:
-    """Fill x (n, X) in place, then subtract `mean_height` from the joint heights of x and of y (n, Y).
+    """Fill x (n, X) in place, then subtract `mean_height` from the joint heights of x and y (n, Y) in place.
 
-    frames: (n, x_columns) columns without terrain. ground: (n, 3 * samples) ground heights. If x is
-    to be standardised, pass both standardised. mean_height: (n, 1) of the ground, in cm, or None to subtract
-    nothing. x_std (X,), y_std (Y,): standard deviations by which standardised rows were divided; None for raw
-    rows.
+    frames: (n, columns) X without terrain, see `frame_inputs`. ground: (n, 3 * samples) ground heights. If
+    `frames` and `ground` are standardised, so is x. mean_height: (n, 1) mean height of the ground, always in
+    cm; None subtracts nothing. x_std (X,), y_std (Y,): standard deviations by which standardised rows were
+    divided; None for raw rows.
     """
     terrain = layout.x_terrain
     x[:, : terrain.start] = frames[:, : terrain.start]
@@ -94,6 +95,10 @@ def compose(
 
 
 def lower_joints(values: Any, joints: slice, by: Any, std: Any = None) -> None:
-    """Subtract `by` (n, 1) cm from the heights in the block `joints` of values (n, columns), in place."""
+    """Subtract `by` (n, 1), in cm, from the joint heights in `values` (n, columns), in place.
+
+    joints: the block of joint positions. std: (columns,) by which standardised values were divided; None for
+    raw values.
+    """
     heights = joint_heights(joints)
     values[:, heights] -= by if std is None else by / std[heights]

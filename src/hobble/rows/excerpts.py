@@ -1,6 +1,7 @@
-"""Excerpts of clips. A sample of a large data set consists of excerpts, so that no long clip is read whole.
+"""Cuts clips into excerpts, from which a sample of a large data set is drawn.
 
-A clip is cut into as few excerpts as possible, of about equal length. A short clip is one excerpt.
+With excerpts, a long clip need not be read whole. A clip is cut into as few excerpts as possible, of about
+equal length. A short clip is one excerpt.
 """
 
 from __future__ import annotations
@@ -17,16 +18,16 @@ from hobble.rows.clip_rows import DELETE_IT, ClipRows, load_clip_rows
 from hobble.rows.compose import body_layout
 from hobble.rows.layout import GAITS
 
-# An excerpt has at most this many rows. 1200 rows are 20 seconds: enough for several steps, and short enough
-# for an hour of walking to give many excerpts.
+# An excerpt has at most this many rows. 1200 rows are 20 seconds, which is long enough for several steps. It
+# is also short enough to cut an hour of walking into many excerpts.
 LONGEST = 1200
 
 
 class Excerpt(NamedTuple):
     """Consecutive rows of a clip.
 
-    clip: its name. first: index of the first row. rows: number of rows. clip_rows: number of rows of the
-    whole clip.
+    clip: name of the clip. first: index of the excerpt's first row in the clip. rows: number of rows of the
+    excerpt. clip_rows: number of rows of the whole clip.
     """
 
     clip: str
@@ -35,22 +36,22 @@ class Excerpt(NamedTuple):
     clip_rows: int
 
     @property
-    def whole(self) -> bool:
-        """Whether it is the whole clip."""
+    def is_whole_clip(self) -> bool:
+        """Whether the excerpt is the whole clip."""
         return self.rows == self.clip_rows
 
     @property
     def stop(self) -> int:
-        """The first row after it."""
+        """Index in the clip of the first row after the excerpt."""
         return self.first + self.rows
 
 
 @dataclass(frozen=True)
 class ExcerptKind:
-    """What is in an excerpt.
+    """What kind of motion is in an excerpt.
 
-    gait: the gait with the largest share. speed: mean speed of the root, cm a frame. channels: names of the
-    channels with a value above 0 in some row.
+    gait: the gait with the largest mean share. speed: mean speed of the root, cm a frame. channels: names of
+    the channels that have a value other than 0 in some row.
     """
 
     gait: str
@@ -59,35 +60,40 @@ class ExcerptKind:
 
 
 def excerpts(clip: str, rows: int, longest: int = LONGEST) -> list[Excerpt]:
-    """The excerpts of a clip of `rows` rows, with at most `longest` rows each.
+    """Cut a clip of `rows` rows into excerpts of at most `longest` rows each.
 
-    Their lengths differ by at most one row.
+    The lengths of the excerpts differ by at most one row.
 
     >>> [(excerpt.first, excerpt.rows) for excerpt in excerpts("walk", 2500)]
     [(0, 833), (833, 833), (1666, 834)]
     >>> excerpts("empty", 0)
     []
     """
-    count = -(-rows // longest)
+    count = -(-rows // longest)  # rows / longest, rounded up
     edges = [rows * i // count for i in range(count + 1)] if count else []
     return [Excerpt(clip, a, b - a, rows) for a, b in pairwise(edges)]
 
 
 def excerpt_kind(rows: ClipRows, first: int, stop: int) -> ExcerptKind:
-    """What is in the rows from `first` up to `stop`, which is not included. `stop` is above `first`."""
+    """What kind of motion is in the rows from `first` up to `stop`, which is not included.
+
+    There has to be at least one such row.
+    """
     layout, part = rows.layout, slice(first, stop)
     channels = tuple(name for name, values in rows.channels.items() if np.any(values[part] != 0))
     shares = rows.x[part, body_layout(layout).x_gait].reshape(stop - first, len(GAITS), layout.samples)
+    # Of the samples around each frame, the middle one is the frame itself.
     gait = GAITS[int(shares[:, :, layout.samples // 2].mean(axis=0).argmax())]
     speed = np.hypot(*rows.y[part, layout.y_root_velocity].astype(float).T).mean()
     return ExcerptKind(gait, float(speed), channels)
 
 
 def load_excerpt(path: str | Path, excerpt: Excerpt, before: int = 0, after: int = 0) -> ClipRows:
-    """The rows of an excerpt, with up to `before` rows of the clip before it and `after` rows after it.
+    """Read the rows of an excerpt, with neighbouring rows of its clip.
 
-    Only these rows are read from the file. Raises InputError if the file is damaged, or if the clip does not
-    have `excerpt.clip_rows` rows.
+    path: the clip's file of rows. before, after: how many rows before and after the excerpt to add, if the
+    clip has them. Only these rows are read from the file. Raises InputError if the file is damaged, or if the
+    clip does not have `excerpt.clip_rows` rows.
     """
     first, stop = max(0, excerpt.first - before), min(excerpt.clip_rows, excerpt.stop + after)
     rows = load_clip_rows(path, None if stop - first == excerpt.clip_rows else (first, stop))

@@ -1,4 +1,4 @@
-"""How the columns of a row change if the motion is mirrored: left and right swap, some signs change."""
+"""Mirrors rows, as if the motion were mirrored: left and right columns swap, and some columns change sign."""
 
 from __future__ import annotations
 
@@ -12,16 +12,18 @@ from hobble.core.quat import Array
 from hobble.core.skeleton import Skeleton
 from hobble.rows.layout import CONTACTS, SIDES, RowLayout
 
-POINT = (-1, 1, 1)  # signs that mirror x, y, z of a point or a velocity
-ROTATION = (1, -1, -1)  # the same for axis times angle of a rotation; a mirror also reverses every turn
+POINT = (-1, 1, 1)  # signs that mirror x, y, z of a point or a velocity: +x is the left
+# Signs that mirror x, y, z of a rotation, given as axis times angle. They are the negative of POINT, because
+# a mirror also reverses the sense of every turn.
+ROTATION = (1, -1, -1)
 
 
 @dataclass(frozen=True)
 class ColumnMirror:
     """Mirrors rows of C columns: the mirrored row is row[source] * sign + shift.
 
-    Mirroring twice gives the same row. source: (C,) int, the column that each column is taken from. sign:
-    (C,) 1 or -1. shift: (C,), 0 for rows in raw units.
+    Mirroring twice gives the original row. source: (C,) int, the column from which each column is taken.
+    sign: (C,) 1 or -1. shift: (C,) what is added; 0 unless the rows are standardised.
     """
 
     source: np.ndarray = field(repr=False)
@@ -29,18 +31,18 @@ class ColumnMirror:
     shift: Array = field(repr=False)
 
     def __call__(self, values: Array) -> Array:
-        """The mirrored rows of values (..., C)."""
+        """Mirror the rows `values` (..., C)."""
         return values[..., self.source] * self.sign + self.shift
 
     def standardised(self, mean: Array, std: Array) -> ColumnMirror:
-        """The mirror of standardised rows, that is (raw - mean) / std.
+        """The mirror of rows that are standardised: (row - mean) / std. mean, std: (C,).
 
-        `shift` makes up for the different means of a column and its mirror. Raises HobbleError
-        if a column and its mirror are divided by different numbers.
+        `shift` makes up for the different means of a column and its mirror. Raises HobbleError if a column
+        and its mirror have different standard deviations.
         """
         mean, std = mean.astype(float), std.astype(float)
-        if len(odd := np.flatnonzero(std != std[self.source])):
-            a, b = odd[0], self.source[odd[0]]
+        if len(unequal := np.flatnonzero(std != std[self.source])):
+            a, b = unequal[0], self.source[unequal[0]]
             raise HobbleError(
                 f"training.symmetric: columns {a} and {b} of the rows mirror each other, but their standard "
                 f"deviations are {std[a]:.6g} and {std[b]:.6g}. Use a data set with `mirror: true`."
@@ -49,10 +51,12 @@ class ColumnMirror:
 
 
 def mirror_of_x(layout: RowLayout, skeleton: Skeleton) -> ColumnMirror:
-    """The mirror of the inputs, in raw units. The phase is not a column; the caller moves it by half a cycle.
+    """The mirror of rows of X that are not standardised.
 
-    Raises HobbleError if the joints or links of the skeleton do not form pairs of left and right.
+    The phase is not a column of X. The caller has to add half a cycle to it. Raises HobbleError if the joints
+    or links of the skeleton do not form pairs of left and right.
     """
+    # The gait shares are not mentioned, because they stay the same.
     collected = _Columns(layout.x_size, skeleton)
     collected.trajectory(layout.x_position)
     collected.trajectory(layout.x_direction)
@@ -60,51 +64,60 @@ def mirror_of_x(layout: RowLayout, skeleton: Skeleton) -> ColumnMirror:
     collected.joints(layout.x_joint_velocity, POINT)
     collected.swap(layout.x_terrain, np.arange(len(SIDES))[::-1])
     for name, columns in layout.channels:
+        # Mirrors the numbers of the columns, which shows from which column each one is taken.
         swapped = channel(name).mirror(np.arange(columns, dtype=float)[None], skeleton)[0]
         collected.swap(layout.x_channel(name), swapped.astype(int))
     return collected.mirror()
 
 
 def mirror_of_y(layout: RowLayout, skeleton: Skeleton) -> ColumnMirror:
-    """The mirror of the outputs, in raw units. Raises HobbleError as `mirror_of_x` does."""
+    """The mirror of rows of Y that are not standardised. Raises HobbleError as `mirror_of_x` does."""
+    # The change of phase is not mentioned, because it stays the same.
     collected = _Columns(layout.y_size, skeleton)
     collected.trajectory(layout.y_root_velocity)
     collected.trajectory(layout.y_position)
     collected.trajectory(layout.y_direction)
     collected.sign[layout.y_turn] = -1
-    collected.swap(layout.y_contacts, np.array([CONTACTS.index(_other(name)) for name in CONTACTS]))
+    collected.swap(layout.y_contacts, np.array([CONTACTS.index(_on_other_foot(name)) for name in CONTACTS]))
     collected.joints(layout.y_joint_position, POINT)
     collected.joints(layout.y_joint_velocity, POINT)
     collected.joints(layout.y_joint_rotation, ROTATION)
     return collected.mirror()
 
 
-def _other(contact: str) -> str:
-    """The contact of the other foot: right_toe for left_toe."""
+def _on_other_foot(contact: str) -> str:
+    """The name of the same contact of the other foot: right_toe for left_toe."""
     side, part = contact.split("_")
     return f"{'right' if side == 'left' else 'left'}_{part}"
 
 
 class _Columns:
-    """Collects the mirror of `count` columns, block by block. A block that is not set stays as it is."""
+    """Collects the mirror of `count` columns, block by block. Columns of all other blocks stay the same."""
 
     def __init__(self, count: int, skeleton: Skeleton) -> None:
-        self.source, self.sign, self.swapped = np.arange(count), np.ones(count), skeleton.mirror_joints
+        self.source, self.sign = np.arange(count), np.ones(count)
+        self.mirror_joints = skeleton.mirror_joints
 
     def trajectory(self, block: slice) -> None:
-        """Set a block of x of every sample, then z of every sample: x changes its sign."""
+        """Mirror a block that has x of every sample, then z of every sample: x changes its sign."""
         self.sign[block.start : (block.start + block.stop) // 2] = -1
 
     def joints(self, block: slice, signs: tuple[int, int, int]) -> None:
-        """Set a block of x, y, z of every joint: left and right joints swap, signs multiply x, y, z."""
-        self.swap(block, self.swapped)
-        self.sign[block] = np.tile(signs, len(self.swapped))
+        """Mirror a block that has x, y, z of every joint.
+
+        Left and right joints swap, and x, y, z are multiplied by `signs`.
+        """
+        self.swap(block, self.mirror_joints)
+        self.sign[block] = np.tile(signs, len(self.mirror_joints))
 
     def swap(self, block: slice, order: np.ndarray) -> None:
-        """Set a block that consists of equally long parts: part i of the mirrored block is part order[i]."""
+        """Mirror a block of equally long parts by changing their order.
+
+        Part i of the mirrored block is part order[i] of the block.
+        """
         columns = np.arange(block.start, block.stop).reshape(len(order), -1)
         self.source[block] = columns[order].ravel()
 
     def mirror(self) -> ColumnMirror:
-        """The mirror of all columns, after the blocks were set."""
+        """The mirror of all columns. Call it after the blocks are mirrored."""
         return ColumnMirror(self.source, self.sign, np.zeros(len(self.source)))

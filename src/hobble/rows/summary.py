@@ -1,4 +1,4 @@
-"""A summary of the rows of a clip, so that excerpts of clips can be chosen without reading their rows."""
+"""A summary of a clip's rows, so that excerpts of the clip can be chosen before its rows are read."""
 
 from __future__ import annotations
 
@@ -17,8 +17,8 @@ from hobble.rows.excerpts import Excerpt, ExcerptKind, excerpt_kind, excerpts
 class RowsSummary:
     """A summary of a clip's rows.
 
-    clip: its name. rows: number of rows. kinds: what is in each excerpt, in the order of
-    `hobble.rows.excerpts.excerpts`.
+    clip: name of the clip. rows: number of rows. kinds: what kind of motion is in each excerpt of the clip,
+    in the order of `hobble.rows.excerpts.excerpts`.
     """
 
     clip: str
@@ -27,12 +27,12 @@ class RowsSummary:
 
     @property
     def excerpts(self) -> dict[Excerpt, ExcerptKind]:
-        """Excerpt -> what is in it."""
+        """Each excerpt of the clip -> what kind of motion is in it."""
         return dict(zip(excerpts(self.clip, self.rows), self.kinds, strict=True))
 
 
 def summary_of_rows(rows: ClipRows) -> RowsSummary:
-    """The summary of the rows of one clip."""
+    """Make the summary of a clip's rows."""
     parts = excerpts(rows.clip, len(rows))
     return RowsSummary(
         rows.clip, len(rows), tuple(excerpt_kind(rows, part.first, part.stop) for part in parts)
@@ -45,14 +45,14 @@ def save_summary(path: str | Path, summary: RowsSummary) -> None:
 
 
 def load_summary(path: str | Path) -> RowsSummary:
-    """Read a summary. Raises InputError if the file holds something else."""
+    """Read what `save_summary` wrote. Raises InputError if the file holds something else."""
     values: Mapping[str, Any] = read_json(Path(path))
     try:
         kinds = tuple(
             ExcerptKind(**{**kind, "channels": tuple(kind["channels"])}) for kind in values["kinds"]
         )
         summary = RowsSummary(str(values["clip"]), int(values["rows"]), kinds)
-        summary.excerpts  # noqa: B018 - ValueError unless there is a kind for each excerpt
+        summary.excerpts  # noqa: B018 - raises ValueError if there is not one kind for each excerpt
     except (KeyError, TypeError, ValueError) as error:
         raise InputError(path, f"not the summary of a clip ({error})", fix=DELETE_IT) from error
     return summary

@@ -1,4 +1,4 @@
-"""The character at run time. A game uses `ProceduralAnimation`, which returns one pose a frame."""
+"""The character at run time. A game calls `ProceduralAnimation`, which returns one pose for each frame."""
 
 from __future__ import annotations
 
@@ -12,9 +12,10 @@ __all__ = ["Pose", "ProceduralAnimation"]
 
 
 def __getattr__(name: str) -> Any:
-    """Import the public names on first use.
+    """Import a public name when it is first used.
 
-    Every job of Snakemake imports the options in this package, and should not wait for numpy and numba.
+    Every job of Snakemake imports the module `options` of this package. So this file must not import the
+    animation: the job would have to wait for numpy and numba.
     """
     if name in __all__:
         return getattr(importlib.import_module("hobble.runtime.animation"), name)

@@ -1,4 +1,4 @@
-"""Export a network (onnx, bin), or walks that it generates (bvh).
+"""Command that exports a network (onnx, bin), or walks that the network generates (bvh).
 
 python -m hobble.runtime onnx|bin|bvh NETWORK TARGET
 
@@ -25,10 +25,10 @@ from hobble.runtime.scenarios import write_motions
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Run the command; returns the exit status."""
+    """Run the command. Returns its exit status, 1 after an error."""
     parser = argparse.ArgumentParser(
         prog="python -m hobble.runtime",
-        description="Export a network (onnx, bin), or walks that it generates (bvh).",
+        description="Export a network (onnx, bin), or walks that the network generates (bvh).",
     )
     parser.add_argument(
         "to",
@@ -36,7 +36,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
         help="onnx: one file, checked with onnxruntime; bin: .bin files as in the release of Holden et al. "
         "(2017); bvh: a few walks that the network generates (straight, turning, ...), one BVH file each",
     )
-    parser.add_argument("network", help="weights.npz, its folder, or a folder of .bin files")
+    parser.add_argument(
+        "network", help="the network: weights.npz, the folder that holds it, or a folder of .bin files"
+    )
     parser.add_argument("target", help="the file or folder to write")
     parser.add_argument(
         "--mode",
@@ -44,7 +46,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
         default="cubic",
         help="how the network's weights are interpolated over the phase; cubic is exact",
     )
-    parser.add_argument("--skeleton", help="a file of config/skeletons, if the network has no skeleton")
+    parser.add_argument(
+        "--skeleton", help="a file of config/skeletons, for a network file that has no skeleton"
+    )
     options = parser.parse_args(arguments)
     try:
         network = load_network(options.network, options.skeleton)
@@ -56,6 +60,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 
 def _write(to: str, network: Network, target: str, mode: str) -> str:
+    """Write the file or folder `target` in format `to`. Returns a message for the user."""
     if to == "bvh":
         if network.skeleton is None:
             raise HobbleError("the network has no skeleton: pass one with --skeleton")

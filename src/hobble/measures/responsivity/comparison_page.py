@@ -11,7 +11,7 @@ from hobble.report.formats import number, size
 from hobble.report.measure_sections import OverviewColumn
 from hobble.report.page_parts import PageSection, SectionPart
 from hobble.report.tables import Column
-from hobble.report.verdicts import Verdict, best
+from hobble.report.verdicts import Verdict, verdict_on_lowest
 
 
 def section(compared: Compared) -> PageSection:
@@ -40,14 +40,14 @@ def verdicts(compared: Compared) -> Iterator[Verdict]:
     arrived = {name: e for name, e in exact.items() if e["waypoints_reached"] == e["waypoints"]}
     astray = [name for name in exact if name not in arrived]
     left_out = f" Did not reach every waypoint: {', '.join(astray)}." if astray else ""
-    yield from best(
+    yield from verdict_on_lowest(
         20,
         "Closest to the track",
         {name: e["path_overshoot_cm"] for name, e in arrived.items()},
         lambda name, v: f"{name} is never more than {number(v, 3)} cm off the track",
         left_out,
     )
-    yield from best(
+    yield from verdict_on_lowest(
         30,
         "Smoothest",
         {name: e["foot_slide_cm"] for name, e in arrived.items()},
@@ -56,13 +56,13 @@ def verdicts(compared: Compared) -> Iterator[Verdict]:
             f"{number(exact[name]['largest_turn_degrees'], 2)} degrees in a frame"
         ),
     )
-    yield from best(
+    yield from verdict_on_lowest(
         40,
         "Fastest",
         {name: e["milliseconds"]["spread"]["median"] for name, e in exact.items()},
         lambda name, v: f"the median frame of {name} takes {number(v, 3)} ms",
     )
-    yield from best(
+    yield from verdict_on_lowest(
         50, "Smallest", _bytes(compared), lambda name, v: f"{name} needs {size(v)} of memory to run"
     )
 

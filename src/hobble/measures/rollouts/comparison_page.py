@@ -9,7 +9,7 @@ from hobble.report.charts import Chart, Trace, axis, line, log_axis
 from hobble.report.comparison_charts import SPLITS, Compared, colours
 from hobble.report.formats import number
 from hobble.report.page_parts import PageSection, SectionPart
-from hobble.report.verdicts import Verdict, best
+from hobble.report.verdicts import Verdict, verdict_on_lowest
 
 FRAMES_PER_SECOND = 60
 
@@ -31,7 +31,7 @@ def verdicts(compared: Compared) -> Iterator[Verdict]:
         errors = {row["configuration"]: (row[split] or {}).get("position_error_cm") for row in rows}
         if any(value is not None for value in errors.values()):
             ending = f"cm from the captured joints on average, in roll-outs of {length} frames on {label}"
-            yield from best(
+            yield from verdict_on_lowest(
                 10,
                 "Closest to captured motion",
                 errors,
