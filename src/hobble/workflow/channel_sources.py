@@ -67,8 +67,8 @@ class ChannelSources:
 
     def check(self, dataset: str) -> None:
         """Raise HobbleError if the data set's clip entries or options are wrong about channels."""
-        model = self.catalogue.dataset(dataset)
-        rig = self.catalogue.skeleton(model.skeleton)
+        settings = self.catalogue.dataset(dataset)
+        rig = self.catalogue.skeleton(settings.skeleton)
         for clip, entry in self.clips.listed(dataset).items():
             if unknown := set(entry.channels) - set(self.channels(dataset)):
                 raise HobbleError(
