@@ -38,7 +38,7 @@ def test_a_hurt_version_has_the_mood_of_its_clip(base: Path) -> None:
     (base / "config/both.yaml").write_text("extends: one\nchannels: [mood, injury]\n")
     project = Project(base, {})
     values = project.datasets.channel_sources
-    assert [values.neutral("mine", clip, "mood") for clip in ("a_hurt1", "b_hurt1")] == [True, False]
+    assert [values.is_neutral("mine", clip, "mood") for clip in ("a_hurt1", "b_hurt1")] == [True, False]
     source = channel("mood").source(values.source("mine", "b_hurt1", "mood"))
     assert not channel("mood").is_neutral(source)
     plain, moods = ("a", "a_mirror"), ("a", "a_mirror", "b", "b_mirror")
@@ -68,7 +68,9 @@ def test_severities_of_0_count_as_healthy(base: Path) -> None:
     (base / "data/mine/c_injuries.txt").write_text(
         "frames:9\n1-4 LeftLeg-LeftFoot[0];\n5-9 LeftLeg-LeftFoot[.5];\n"
     )
-    assert [Project(base, {}).datasets.channel_sources.neutral("mine", clip, "injury") for clip in "abc"] == [
+    assert [
+        Project(base, {}).datasets.channel_sources.is_neutral("mine", clip, "injury") for clip in "abc"
+    ] == [
         True,
         True,
         False,
@@ -79,7 +81,9 @@ def test_severities_of_0_count_as_healthy(base: Path) -> None:
         + "b: {channels: {injury: 'LeftLeg-LeftFoot[0]'}}, c: }\n"
     )
     (base / "config/datasets/mine.yaml").write_text(text)
-    assert [Project(base, {}).datasets.channel_sources.neutral("mine", clip, "injury") for clip in "abc"] == [
+    assert [
+        Project(base, {}).datasets.channel_sources.is_neutral("mine", clip, "injury") for clip in "abc"
+    ] == [
         False,
         True,
         False,

@@ -108,7 +108,7 @@ rule database_shard:
         sources=lambda w: datasets.sources(
             datasets.in_shard(w.dataset, channels_of_folder(w.channels), int(w.shard))
         ),
-        every=lambda w: datasets.every_row(w.dataset),
+        every=lambda w: datasets.hurt_row_step(w.dataset),
         options=lambda w: datasets.part(w.dataset, "database", Merging),
         code=lambda w: package.code(
             "database_shard", *modules_of(channels_of_folder(w.channels))
@@ -146,7 +146,7 @@ rule database_merge:
         sources=lambda w: datasets.sources(
             datasets.selected(w.dataset, channels_of_folder(w.channels))
         ),
-        every=lambda w: datasets.every_row(w.dataset),
+        every=lambda w: datasets.hurt_row_step(w.dataset),
         options=lambda w: datasets.part(w.dataset, "database", Merging),
         code=lambda w: package.code(
             "database_merge", *modules_of(channels_of_folder(w.channels))

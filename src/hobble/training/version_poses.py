@@ -165,9 +165,7 @@ def _chunk_table(
     key = clip_keys[window.clip] + window.phase
     chosen = np.flatnonzero(key >= 0)[::row_step]
     x = widen(window.x[chosen]).astype(np.float32)
-    lift = widen(window.fits[window.first[chosen]]).astype(np.float32)[
-        :, -1:
-    ]  # cm, from the mean of the fits
+    lift = widen(window.fits[window.first[chosen]]).astype(np.float32)[:, -1:]
     lower_joints(x, without_terrain(database.layout)["joint_position"], lift, _without_terrain_std(database))
     return key[chosen], x[:, pose_columns], x[:, direction_columns]
 

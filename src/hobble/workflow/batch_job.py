@@ -1,6 +1,7 @@
-"""Runs a job that makes the files of one clip after another.
+"""Runs a job that makes the files of several clips, one clip after another.
 
-Files that an earlier try finished are not made again. A bad clip does not stop the others.
+Files that an earlier try of the job finished are not made again. If one clip fails, the files of the other
+clips are still made.
 """
 
 from __future__ import annotations
@@ -20,17 +21,17 @@ from hobble.workflow.clip_batches import family_of
 from hobble.workflow.job import JobLog, checked, reporting
 from hobble.workflow.kept_files import KeptFiles, fingerprint
 
-# Disk full, quota used up, disk read-only: errors that would stop every other clip, too.
+# The disk is full, a quota is used up, or the disk is read-only. Every other clip would fail, too.
 DISK_ERRORS = (errno.ENOSPC, errno.EDQUOT, errno.EROFS)
 
 
 @dataclass(frozen=True)
 class JobPiece:
-    """A piece of a job's work: usually a clip and its mirror.
+    """A piece of a job's work: usually one clip, or one clip and its mirror.
 
-    name: the clip's name. params: the params of the rule and of this clip. input: name of each input -> the
-    piece's file, or a list of files for an input in `files_per_clip` (see `pieces`). output: name of each
-    output -> the piece's file.
+    name: the clip's name. params: Snakemake's params, those of the rule and those of this clip. input: name
+    of each input -> the piece's file, or a list of files for an input in `files_per_clip` (see `pieces`).
+    output: name of each output -> the piece's file.
     """
 
     name: str
@@ -41,28 +42,27 @@ class JobPiece:
     @property
     def files(self) -> list[str]:
         """All input files, ordered by the names of the inputs."""
-        found = [
-            [files] if isinstance(files, str) else list(files) for _, files in sorted(self.input.items())
-        ]
-        return [file for files in found for file in files]
+        return [file for _, files in sorted(self.input.items()) for file in _as_list(files)]
 
 
 def pieces(snakemake: Any) -> list[JobPiece]:
-    """The pieces of a job.
+    """The pieces of a job. snakemake: the object that Snakemake gives to scripts.
 
     params.per_clip: a list with the params of each piece; the param `clip` is the piece's name.
-    params.files_per_clip (optional): name of an input -> list with the number of files of each piece. All
-    other inputs, and all outputs, have one file for each piece, or one for all pieces. An input or output
-    without files is left out.
+    params.files_per_clip (optional): name of an input -> list with the number of files of each piece. Each
+    other input, and each output, has one file for each piece, or one file for all pieces. An input or output
+    without files is left out of the pieces.
     """
-    special = ("per_clip", "files_per_clip")
-    common = {name: value for name, value in snakemake.params.items() if name not in special}
+    not_common = ("per_clip", "files_per_clip")
+    common = {name: value for name, value in snakemake.params.items() if name not in not_common}
     per_clip, counts = snakemake.params.per_clip, snakemake.params.get("files_per_clip", {})
     inputs = {
-        name: _distributed(_as_list(files), len(per_clip), counts.get(name))
+        name: _files_of_pieces(_as_list(files), len(per_clip), counts.get(name))
         for name, files in snakemake.input.items()
     }
-    outputs = {name: _distributed(_as_list(files), len(per_clip)) for name, files in snakemake.output.items()}
+    outputs = {
+        name: _files_of_pieces(_as_list(files), len(per_clip)) for name, files in snakemake.output.items()
+    }
     return [
         JobPiece(
             params["clip"],
@@ -75,29 +75,33 @@ def pieces(snakemake: Any) -> list[JobPiece]:
 
 
 def make_each(snakemake: Any, make: Callable[[JobPiece, logging.Logger], None]) -> None:
-    """Call `make` for each piece of a job, except where undamaged files are kept from an earlier try.
+    """Call `make` for each piece of a job, except for pieces whose files an earlier try has finished.
 
-    If a piece fails, its error is reported and the other pieces are still made, unless the disk is full or
-    read-only. At the end of a job with a failed piece, the process exits with status 1, and Snakemake deletes
-    the job's outputs. The next try takes the kept files.
+    Finished files are kept in a second place (see `hobble.workflow.kept_files`), and are used again if they
+    are undamaged and nothing that they depend on has changed. If a piece fails, its error is reported, and
+    the other pieces are still made, unless the disk is full or read-only. If any piece failed, the process
+    exits at the end with status 1, and Snakemake deletes the job's outputs. The next try uses the kept files.
+
+    snakemake: the object that Snakemake gives to scripts. make: function that makes the files of a piece.
     """
     with reporting(snakemake) as report:
         checksums.forget(snakemake.output)
-        # A family is the rules that make the same kind of file, of all data sets and batches.
+        # Each data set and each batch has a rule of its own. The rules that make the same kind of file are a
+        # family, and share the kept files.
         kept, digests = KeptFiles(family_of(snakemake.rule)), _Digests()
         all_pieces = pieces(snakemake)
-        taken = failed = 0
+        reused = failed = 0
         for piece in all_pieces:
             try:
-                taken += _make_piece(piece, make, kept, digests, report)
+                reused += _make_piece(piece, make, kept, digests, report)
             except Exception as error:
                 report.error(error)
                 failed += 1
-                if _is_of_disk(error):
+                if _is_disk_error(error):
                     break
-        if len(all_pieces) > 1 or taken:
+        if len(all_pieces) > 1 or reused:
             report.logger.info(
-                "%d pieces, %d of them kept from before, %d failed", len(all_pieces), taken, failed
+                "%d pieces, %d of them kept from before, %d failed", len(all_pieces), reused, failed
             )
         if failed:
             sys.exit(1)
@@ -110,7 +114,7 @@ def _make_piece(
     digests: _Digests,
     report: JobLog,
 ) -> bool:
-    """Make a piece, or take its kept files. Returns whether kept files were taken."""
+    """Make a piece, or use its kept files. Returns whether kept files were used."""
     outputs, began = list(piece.output.values()), time.monotonic()
     with checked(piece.files, outputs):
         key = fingerprint(piece.params, digests.of(piece.files), outputs)
@@ -123,12 +127,13 @@ def _make_piece(
 
 
 class _Digests:
-    """Names and SHA-256 of files. A file that several pieces need is read only once."""
+    """Computes the SHA-256 of files. A file that several pieces need is read only once."""
 
     def __init__(self) -> None:
         self.computed: dict[tuple[str, checksums.Stamp], str] = {}
 
     def of(self, files: list[str]) -> list[tuple[str, str]]:
+        """(file name without folder, SHA-256) of each file that exists."""
         found = []
         for file, stamp in checksums.stamps(files).items():
             if (file, stamp) not in self.computed:
@@ -141,17 +146,18 @@ def _sha256(file: str) -> str:
     try:
         return checksums.file_sha256(file)
     except OSError:
-        return "cannot be read"  # the job that reads it reports why
+        return "cannot be read"  # no error here: the piece that reads the file reports why
 
 
 def _as_list(files: Any) -> list[str]:
     return [files] if isinstance(files, str) else list(files)
 
 
-def _distributed(files: list[str], pieces: int, counts: list[int] | None = None) -> list[Any]:
-    """For each piece its file or, with `counts`, its list of files; [] if there are no files at all.
+def _files_of_pieces(files: list[str], pieces: int, counts: list[int] | None = None) -> list[Any]:
+    """The file of each piece or, if `counts` is given, the list of files of each piece.
 
-    counts: number of files of each piece.
+    files: one file for each piece, or one for all pieces; if there are none, [] is returned. pieces: number
+    of pieces. counts: number of files of each piece.
     """
     if counts is not None:
         assert sum(counts) == len(files), f"{len(files)} files, but files_per_clip adds up to {sum(counts)}"
@@ -163,6 +169,7 @@ def _distributed(files: list[str], pieces: int, counts: list[int] | None = None)
     return files
 
 
-def _is_of_disk(error: Exception) -> bool:
+def _is_disk_error(error: Exception) -> bool:
+    """Whether an error has one of DISK_ERRORS as its cause. An InputError is raised from its cause."""
     cause = error.__cause__ if isinstance(error, InputError) else error
     return isinstance(cause, OSError) and cause.errno in DISK_ERRORS

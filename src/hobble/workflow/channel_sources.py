@@ -1,4 +1,7 @@
-"""The channels of a data set, and where their values for each clip come from."""
+"""Finds the channels of a data set, and the files or options that give their values for each clip.
+
+A channel is an input of the network besides motion and ground. Its values are 0 or more.
+"""
 
 from __future__ import annotations
 
@@ -23,23 +26,24 @@ class ChannelSources:
         self.catalogue, self.clips = catalogue, clips
 
     def channels(self, dataset: str) -> tuple[str, ...]:
-        """The channels of a data set: those with a section in it, and those that need no section."""
-        given = self.catalogue.dataset(dataset).channels
-        return tuple(name for name in NAMES if name in given or channel(name).Options is None)
+        """The channels of a data set: those with a section in its file, and those that need no section."""
+        sections = self.catalogue.dataset(dataset).channels
+        return tuple(name for name in NAMES if name in sections or channel(name).Options is None)
 
     def files(self, dataset: str, clip: str, name: str) -> list[str]:
-        """The files that channel `name` reads for a clip: the file beside the clip, and the channel's tables.
+        """The files that channel `name` reads for a clip.
 
-        The file beside the clip is not read if the clip's entry in the data set has a value.
+        They are the file beside the clip, and the tables of all clips that the channel's options name. The
+        file beside the clip is left out if the clip's entry in the data set has a value for the channel.
         """
         suffix, has_value = channel(name).suffix, self._value(dataset, clip, name) is not None
         files = self.clips.side_files(dataset, clip, (suffix,)) if suffix and not has_value else []
         return [*files, *self._tables(dataset, name)]
 
     def source(self, dataset: str, clip: str, name: str) -> dict[str, Any]:
-        """Where channel `name` has the values of a clip from, as plain data.
+        """What the data set says about the values of channel `name` in a clip, as plain data.
 
-        Holds the fields of `hobble.channels.channel.ClipSource`, without `files`.
+        The keys are the fields of `hobble.channels.channel.ClipSource`, without `files`.
         """
         return {
             "clip": self.clips.original(clip),
@@ -51,38 +55,38 @@ class ChannelSources:
         }
 
     @functools.cache  # noqa: B019 - one project lives as long as the process
-    def neutral(self, dataset: str, clip: str, name: str) -> bool:
+    def is_neutral(self, dataset: str, clip: str, name: str) -> bool:
         """Whether all values of channel `name` are 0 in a clip."""
         if self.clips.is_hurt_version(clip) and name == self.clips.hurt_channel:
             return False
-        # The files of a synthetic clip need not exist yet.
+        # The file beside a synthetic clip is not read, because it need not exist yet.
         synthetic = self.catalogue.dataset(dataset).synthetic is not None
         files = self._tables(dataset, name) if synthetic else self.files(dataset, clip, name)
         definition = channel(name)
         return definition.is_neutral(definition.source(self.source(dataset, clip, name), files))
 
     def check(self, dataset: str) -> None:
-        """Check what the data set's clip entries and options say about channels.
-
-        Raises HobbleError if something is wrong.
-        """
-        model = self.catalogue.dataset(dataset)
-        rig = self.catalogue.skeleton(model.skeleton)
+        """Raise HobbleError if the data set's clip entries or options are wrong about channels."""
+        settings = self.catalogue.dataset(dataset)
+        rig = self.catalogue.skeleton(settings.skeleton)
         for clip, entry in self.clips.listed(dataset).items():
-            if extra := set(entry.channels) - set(self.channels(dataset)):
+            if unknown := set(entry.channels) - set(self.channels(dataset)):
                 raise HobbleError(
                     f"data set {dataset}: clips.{clip}.channels: the data set has no channel "
-                    f"{', '.join(sorted(extra))}; it has {', '.join(self.channels(dataset)) or 'none'}"
+                    f"{', '.join(sorted(unknown))}; it has {', '.join(self.channels(dataset)) or 'none'}"
                 )
             for name in self.channels(dataset):
+                # Error messages show "clip", so it names the place in the data set's file.
                 fields = self.source(dataset, clip, name) | {"clip": f"data set {dataset}: clips.{clip}"}
                 definition = channel(name)
                 definition.check(definition.source(fields, self._tables(dataset, name)), rig)
 
     def _value(self, dataset: str, clip: str, name: str) -> Any:
+        """The value of channel `name` in the clip's entry, or None."""
         return self.clips.entry(dataset, clip).channels.get(name)
 
     def _tables(self, dataset: str, name: str) -> list[str]:
+        """Paths of the tables in the options of channel `name`. Raises InputError if a table is missing."""
         definition, section = channel(name), self.catalogue.dataset(dataset).channels.get(name, {})
         tables = definition.tables(definition.options_of(section))
         files = [self.clips.mocap / file for file in tables]
@@ -94,16 +98,19 @@ class ChannelSources:
 
 
 def database_folder(channels: Sequence[str]) -> str:
-    """The folder name of the database with these channels."""
+    """The name of the folder that holds the database with these channels."""
     return "+".join(channels) or NO_CHANNEL
 
 
 def channels_of_folder(folder_name: str) -> tuple[str, ...]:
-    """The inverse of `database_folder`. Raises HobbleError for a name that no database can have."""
+    """The channels of the database in a folder, from the folder's name: the inverse of `database_folder`.
+
+    Raises HobbleError for a name that no database can have.
+    """
     names = () if folder_name == NO_CHANNEL else tuple(folder_name.split("+"))
     if any(name not in NAMES for name in names) or list(names) != sorted(set(names), key=NAMES.index):
         raise HobbleError(
-            f"no database is called {folder_name}. A database is called `{NO_CHANNEL}`, or by the names of "
-            f"its channels with + between them, in the order {', '.join(NAMES)}"
+            f"no database can be called {folder_name}. A database without channels is called `{NO_CHANNEL}`. "
+            f"Any other is called by its channels with + between them, in the order {', '.join(NAMES)}"
         )
     return names

@@ -1,8 +1,8 @@
 """Checksums of the files that jobs write, so that the next job notices a damaged or changed file.
 
-An npz and the chunks of a database have checksums of their own. For all other files every job writes
-checksums to results/<configuration>/checksums/ or results/datasets/<dataset>/checksums/, and every job that
-reads such a file verifies them.
+An npz file and a chunk of a database contain a checksum. For all other files, the job that makes a file
+writes its checksum to results/<configuration>/checksums/ or results/datasets/<dataset>/checksums/. Each job
+that reads the file verifies this checksum.
 """
 
 from __future__ import annotations
@@ -19,9 +19,11 @@ from hobble.core.files import write_text
 
 OWN_CHECKSUM = {".npz"}  # suffixes of files that contain a checksum
 BLOCK_BYTES = 1 << 20  # bytes of a file that are read at once
-CLOCK_TICK = 0.02  # seconds; writes that are this far apart get different file times
+CLOCK_TICK = 0.02  # seconds; two writes that are this far apart get different modification times
 
-Stamp = tuple[int, int, int]  # modification time, size and inode of a file
+# Modification time (ns), size (bytes) and inode of a file. If the file is changed or replaced, its stamp
+# changes, too.
+Stamp = tuple[int, int, int]
 
 
 def record_of(path: Path) -> Path | None:
@@ -29,11 +31,13 @@ def record_of(path: Path) -> Path | None:
     parts = path.parts
     if "results" not in parts:
         return None
-    results = len(parts) - parts[::-1].index("results")
-    root = results + (2 if parts[results : results + 1] == ("datasets",) else 1)
-    if len(parts) <= root or path.suffix in OWN_CHECKSUM:
+    # Numbers of leading parts of the path: up to the last folder called results, and up to the folder of the
+    # configuration or data set.
+    to_results = len(parts) - parts[::-1].index("results")
+    to_folder = to_results + (2 if parts[to_results : to_results + 1] == ("datasets",) else 1)
+    if len(parts) <= to_folder or path.suffix in OWN_CHECKSUM:
         return None
-    return Path(*parts[:root], "checksums", *parts[root:-1], f"{path.name}.crc32")
+    return Path(*parts[:to_folder], "checksums", *parts[to_folder:-1], f"{path.name}.crc32")
 
 
 def forget(paths: Iterable[str]) -> None:
@@ -43,44 +47,52 @@ def forget(paths: Iterable[str]) -> None:
 
 
 def record(paths: Iterable[str]) -> None:
-    """Write the checksums of finished files. For a folder, those of the files directly in it."""
+    """Write the checksums of finished files and folders.
+
+    The checksum file of a folder holds the checksums of the files directly in it.
+    """
     for path in map(Path, paths):
-        if (where := record_of(path)) is not None and path.exists():
+        if (checksum_file := record_of(path)) is not None and path.exists():
             lines = [f"{_checksum(file):08x} {file.name}" for file in _files(path)]
-            write_text(where, "\n".join(lines) + "\n")
+            write_text(checksum_file, "\n".join(lines) + "\n")
 
 
 def verify(paths: Iterable[str]) -> None:
-    """Raise InputError for a file that differs from what its job wrote. Files without checksums pass."""
+    """Raise InputError for a file that differs from what its job wrote.
+
+    A file without a recorded checksum is not checked.
+    """
     for path in map(Path, paths):
-        where = record_of(path)
-        if where is None or not where.is_file() or not path.exists():
+        checksum_file = record_of(path)
+        if checksum_file is None or not checksum_file.is_file() or not path.exists():
             continue
-        lines = where.read_text(encoding="utf-8", errors="replace").splitlines()
+        lines = checksum_file.read_text(encoding="utf-8", errors="replace").splitlines()
         recorded = {name: checksum for checksum, _, name in (line.partition(" ") for line in lines)}
         for file in _files(path):
             if recorded.get(file.name) != f"{_checksum(file):08x}":
                 raise InputError(
                     file,
                     "damaged or changed: it differs from what its job wrote",
-                    fix=f"Delete it; the next run makes it again. To keep your change, delete {where}.",
+                    fix="Delete it; the next run makes it again. "
+                    f"To keep your change, delete {checksum_file}.",
                 )
 
 
 def stamps(paths: Iterable[str]) -> Mapping[str, Stamp]:
-    """The stamp of each file that exists."""
+    """Path -> stamp, for those of the files that exist."""
     out = {}
     for path in map(str, paths):
         if os.path.isfile(path):
+            # Wait if the file was written just now, because another write could get the same time.
             if 0 <= time.time() - os.stat(path).st_mtime < CLOCK_TICK:
-                time.sleep(CLOCK_TICK)  # a write right after this could get the same time
+                time.sleep(CLOCK_TICK)
             status = os.stat(path)
             out[path] = (status.st_mtime_ns, status.st_size, status.st_ino)
     return out
 
 
 def check_unchanged(before: Mapping[str, Stamp]) -> None:
-    """Raise InputError for a file that was written, replaced or deleted since `stamps` returned `before`."""
+    """Raise InputError for a file that was changed, replaced or deleted since `stamps` returned `before`."""
     now = stamps(before)
     for path, stamp in before.items():
         if now.get(path) != stamp:
@@ -88,7 +100,7 @@ def check_unchanged(before: Mapping[str, Stamp]) -> None:
 
 
 def _files(path: Path) -> list[Path]:
-    """The file itself, or the files in the folder. Hidden files are left out: they are Snakemake's."""
+    """The file itself in a list, or the files in a folder, except hidden ones, which are Snakemake's."""
     if not path.is_dir():
         return [path]
     return sorted(file for file in path.iterdir() if file.is_file() and not file.name.startswith("."))
@@ -110,6 +122,7 @@ def file_sha256(path: str | Path) -> str:
 
 
 def _checksum(path: Path) -> int:
+    """CRC-32 of a file. Raises InputError if it cannot be read."""
     try:
         return file_crc32(path)
     except OSError as error:

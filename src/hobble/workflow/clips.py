@@ -1,4 +1,9 @@
-"""The clips of each data set by name, and the files that they come from."""
+"""Finds the clips of each data set, and the files that they come from.
+
+Besides the clips that the user gives, a data set can have two kinds of clips that Hobble makes from them. A
+mirror is the mirror image of a clip. A hurt version is a copy of a healthy clip in which some links of the
+body are injured. The clip from which they are made is their original.
+"""
 
 from __future__ import annotations
 
@@ -30,7 +35,7 @@ DATASETS = "results/datasets"
 MIRROR_SUFFIX = "_mirror"
 HURT_SUFFIX = re.compile(r"_hurt([1-9])$")  # at the end of the name of a hurt version
 MAX_NOTES = 10  # at most this many notes are shown for a folder
-LABEL_FILES = (".phase", ".gait", "_footsteps.txt", "_gait.txt")  # suffixes of hand-made label files
+LABEL_SUFFIXES = (".phase", ".gait", "_footsteps.txt", "_gait.txt")  # of hand-made files <clip><suffix>
 
 
 def original(clip: str) -> str:
@@ -39,7 +44,11 @@ def original(clip: str) -> str:
 
 
 class Clips:
-    """Clips and their files. base: the checkout. mocap: the folder with the user's clips."""
+    """The clips of all data sets, and their files.
+
+    base: the folder of the checkout of Hobble. mocap: the folder with the user's clips. catalogue: reads the
+    files of the data sets.
+    """
 
     def __init__(self, base: Path, mocap: Path, catalogue: Catalogue) -> None:
         self.base, self.mocap, self.catalogue = base, mocap, catalogue
@@ -58,15 +67,15 @@ class Clips:
     def listed(self, dataset: str) -> dict[str, ClipEntry]:
         """Name -> entry of the data set's listed clips or, if it lists none, of those in its folder."""
         listed = self.catalogue.dataset(dataset).clips or dict.fromkeys(self._scanned(dataset))
-        if odd := [name for name in listed if name.endswith(MIRROR_SUFFIX)]:
+        if reserved := [name for name in listed if name.endswith(MIRROR_SUFFIX)]:
             raise HobbleError(
-                f"data set {dataset}: {', '.join(odd)}: names that end in _mirror are reserved for mirrors, "
-                "which `mirror: true` makes. List the original clip instead, or rename the file."
+                f"data set {dataset}: {', '.join(reserved)}: names that end in _mirror are reserved for "
+                "mirrors, which `mirror: true` makes. List the original clip instead, or rename the file."
             )
-        if odd := [name for name in listed if HURT_SUFFIX.search(name)]:
+        if reserved := [name for name in listed if HURT_SUFFIX.search(name)]:
             raise HobbleError(
-                f"data set {dataset}: {', '.join(odd)}: names that end in _hurt1 to _hurt9 are reserved for "
-                "the hurt versions that `hurt` makes. Take the clip out, or rename its file."
+                f"data set {dataset}: {', '.join(reserved)}: names that end in _hurt1 to _hurt9 are reserved "
+                "for the hurt versions that `hurt` makes. Take the clip out, or rename its file."
             )
         return {name: entry or ClipEntry() for name, entry in listed.items()}
 
@@ -84,13 +93,17 @@ class Clips:
 
     @functools.cache  # noqa: B019
     def hurt_versions(self, dataset: str) -> dict[str, int]:
-        """Name of each hurt version -> its number among all hurt versions, from 0."""
+        """Name of each hurt version -> its number among all hurt versions of the data set, from 0.
+
+        The numbers go first through the first versions of all clips, then through their second versions, ...
+        Only clips in which the values of the channel `hurt_channel` are 0 get hurt versions.
+        """
         options = self.catalogue.dataset(dataset).hurt
         healthy = (
             [
                 clip
                 for clip in self.listed(dataset)
-                if self.channel_sources.neutral(dataset, clip, HURT_CHANNEL)
+                if self.channel_sources.is_neutral(dataset, clip, HURT_CHANNEL)
             ]
             if options
             else []
@@ -110,7 +123,8 @@ class Clips:
         assert options is not None
         if amount is None:
             return options
-        # The entry gives the total length of the versions as a multiple of the clip's.
+        # The entry gives the total length of all versions, as a multiple of the clip's length. `longest` is
+        # the length of one version.
         versions = math.ceil(amount)
         return options.model_copy(update={"versions": versions, "longest": amount / max(versions, 1)})
 
@@ -123,16 +137,16 @@ class Clips:
         return clips[name]
 
     def folder(self, dataset: str) -> Path:
-        """The folder of the data set's source files.
+        """The folder of the data set's BVH files.
 
-        Raises InputError if a user's folder cannot be read, or if it is missing and its clips cannot be
-        downloaded.
+        Raises InputError if the user's folder cannot be read. A missing folder is an error only if its clips
+        cannot be downloaded.
         """
-        model = self.catalogue.dataset(dataset)
-        if model.synthetic is not None:
-            return Path(DATASETS, model.source or dataset, "synthetic")
-        path = self.mocap / (model.folder or "")
-        if model.download is not None and not path.exists():
+        settings = self.catalogue.dataset(dataset)
+        if settings.synthetic is not None:
+            return Path(DATASETS, settings.source or dataset, "synthetic")
+        path = self.mocap / (settings.folder or "")
+        if settings.download is not None and not path.exists():
             return path
         if not path.is_dir():
             raise InputError(
@@ -145,50 +159,60 @@ class Clips:
         return path
 
     def source(self, dataset: str, clip: str) -> str:
-        """Path of the clip's BVH file."""
-        self.entry(dataset, clip)
-        model = self.catalogue.dataset(dataset)
-        if model.synthetic is not None:
+        """Path of the clip's BVH file. Raises HobbleError if there is no such clip or no file."""
+        self.entry(dataset, clip)  # raises HobbleError for an unknown clip
+        settings = self.catalogue.dataset(dataset)
+        if settings.synthetic is not None:
             return str(self.folder(dataset) / f"{clip}.bvh")
         if clip in (files := self._files(dataset)):
             return str(only_file(clip, files[clip]))
         if clip in (downloads := self._checksums(dataset)):
-            return self.downloaded(model.source or dataset, clip)
+            return self.downloaded(settings.source or dataset, clip)
         path = self.folder(dataset) / f"{clip}.bvh"
-        nor = f", and it is not in the download list {self._manifest(dataset)}" if downloads else ""
-        raise InputError(path, f"no such file, but data set {dataset} lists this clip{nor}")
+        nor = f", and it is not in the download list {self._download_list(dataset)}" if downloads else ""
+        raise InputError(
+            path,
+            f"no such file, but data set {dataset} lists this clip{nor}",
+            fix="Put the file there, or take the clip out of the data set.",
+        )
 
     def downloaded(self, dataset: str, clip: str) -> str:
-        """Path of a downloaded clip."""
+        """Path to which a clip is downloaded."""
         return str(self.base / "data" / "downloaded" / dataset / f"{clip}.bvh")
 
     def download(self, dataset: str, clip: str) -> dict[str, str]:
-        """How to download a clip: its `url`, its `sha256`, and the user's `folder`, which lacks it."""
-        model = self.catalogue.dataset(dataset)
-        if model.download is None or clip not in self._checksums(dataset):
-            raise HobbleError(f"data set {dataset}: clip {clip} cannot be downloaded")
+        """How to download a clip, as a mapping with three keys.
+
+        url: the address of its BVH file. sha256: the checksum of this file. folder: the user's folder, which
+        does not hold this clip.
+        """
+        settings = self.catalogue.dataset(dataset)
+        if settings.download is None or clip not in self._checksums(dataset):
+            raise HobbleError(
+                f"data set {dataset}: clip {clip} cannot be downloaded, because it is not in a download list"
+            )
         return {
-            "url": model.download.url.format(clip=quote(clip), subject=quote(clip.partition("_")[0])),
+            "url": settings.download.url.format(clip=quote(clip), subject=quote(clip.partition("_")[0])),
             "sha256": self._checksums(dataset)[clip],
-            "folder": str(self.mocap / (model.folder or "")),
+            "folder": str(self.mocap / (settings.folder or "")),
         }
 
     @functools.cache  # noqa: B019
     def label_files(self, dataset: str, clip: str) -> list[str]:
-        """The label files beside the clip: hand-made ones, or those of a synthetic clip."""
+        """Paths of the label files beside the clip: hand-made files, or the files of a synthetic clip."""
         if self.catalogue.dataset(dataset).synthetic is not None:
             return self.side_files(dataset, clip, ("_footsteps.txt", "_gait.txt"))
-        return self.side_files(dataset, clip, LABEL_FILES) if self._reads_labels(dataset) else []
+        return self.side_files(dataset, clip, LABEL_SUFFIXES) if self._reads_labels(dataset) else []
 
     def side_files(self, dataset: str, clip: str, suffixes: Iterable[str]) -> list[str]:
-        """The files beside a clip that have its name and one of `suffixes`.
+        """Paths of the existing files <clip><suffix> beside a clip, for the given suffixes.
 
-        Files of synthetic clips need not exist yet, because a rule makes them.
+        Files of a synthetic clip need not exist yet, because a rule makes them.
         """
         synthetic = self.catalogue.dataset(dataset).synthetic is not None
         if synthetic:
             suffixes = [suffix for suffix in suffixes if suffix in WRITES]
-        stem = self.folder(dataset) / clip
+        stem = self.folder(dataset) / clip  # the path without suffix
         if not synthetic and clip in (files := self._files(dataset)):
             stem = files[clip][0].with_suffix("")
         files_of_clip = (f"{stem}{suffix}" for suffix in suffixes)
@@ -208,15 +232,18 @@ class Clips:
 
     @functools.cache  # noqa: B019
     def rig_files(self, dataset: str, clip: str) -> list[str]:
-        """The skeleton file of the clip's rig, in a list; [] if the rig is the data set's skeleton."""
-        model = self.catalogue.dataset(dataset)
-        if model.synthetic is not None:
-            name: str | None = self.catalogue.dataset(model.source or dataset).skeleton
+        """The file of the clip's own skeleton, in a list; [] if this is the data set's skeleton.
+
+        A clip's own skeleton (its rig) is the known one that has the most joints of the clip's BVH file.
+        """
+        settings = self.catalogue.dataset(dataset)
+        if settings.synthetic is not None:
+            name: str | None = self.catalogue.dataset(settings.source or dataset).skeleton
         else:
             rigs = sorted(path.stem for path in Path(self.skeletons).glob("*.yaml"))
             known = {rig: self.catalogue.skeleton(rig).joints for rig in rigs}
-            name = nearest_rig(joint_names(Path(self.source(dataset, clip))), known, model.skeleton)
-        return [self._skeleton(name)] if name is not None and name != model.skeleton else []
+            name = nearest_rig(joint_names(Path(self.source(dataset, clip))), known, settings.skeleton)
+        return [self._skeleton(name)] if name is not None and name != settings.skeleton else []
 
     @property
     def skeletons(self) -> str:
@@ -230,7 +257,11 @@ class Clips:
         return self.catalogue.dataset(dataset).labels.files
 
     def _scanned(self, dataset: str) -> list[str]:
-        """The clips in the user's folder. A mirror is left out if its original is in the folder."""
+        """The names of the clips in the user's folder.
+
+        A mirror is left out if its original is in the folder. Raises InputError if there are no clips, or if
+        a clip has a bad name or two files.
+        """
         folder, files = self.folder(dataset), self._files(dataset)
         for name in sorted(files):
             if not is_valid_clip_name(name):
@@ -248,21 +279,23 @@ class Clips:
 
     def notes(self, dataset: str) -> list[str]:
         """Sentences that say which files in the user's folder are not used, and why."""
-        model = self.catalogue.dataset(dataset)
-        if model.synthetic is not None or not (folder := self.folder(dataset)).is_dir():
+        settings = self.catalogue.dataset(dataset)
+        if settings.synthetic is not None or not (folder := self.folder(dataset)).is_dir():
             return []
         notes = unused_file_notes(folder, {*self._files(dataset), *self._checksums(dataset)})
-        mirrors = [] if model.clips or model.mirror else self._mirrors(dataset)
+        mirrors = [] if settings.clips or settings.mirror else self._mirrors(dataset)
         if mirrors:
             notes.insert(
                 0,
-                f"{len(mirrors)} files in {folder} are mirrors of other clips ({mirrors[0]}.bvh, ...) and "
-                "are left out. With `mirror: true` Hobble makes mirrors of all clips, with labels.",
+                f"{len(mirrors)} files in {folder} are not used, because they are mirrors of other clips "
+                f"({mirrors[0]}.bvh, ...). With `mirror: true` Hobble makes mirrors of all clips, with "
+                "labels.",
             )
-        more = len(notes) - MAX_NOTES
-        return [*notes[:MAX_NOTES], *([f"{more} more files belong to no clip."] if more > 0 else [])]
+        not_shown = len(notes) - MAX_NOTES
+        last = [f"{not_shown} more files belong to no clip."] if not_shown > 0 else []
+        return [*notes[:MAX_NOTES], *last]
 
-    def _manifest(self, dataset: str) -> Path:
+    def _download_list(self, dataset: str) -> Path:
         """Path of the data set's download list."""
         options = self.catalogue.dataset(dataset).download
         return self.base / "config" / "datasets" / (options.checksums if options else "")
@@ -271,7 +304,7 @@ class Clips:
     def _checksums(self, dataset: str) -> dict[str, str]:
         """Clip -> SHA-256 from the download list; {} if the data set has no downloads."""
         has_downloads = self.catalogue.dataset(dataset).download is not None
-        return read_checksums(self._manifest(dataset)) if has_downloads else {}
+        return read_checksums(self._download_list(dataset)) if has_downloads else {}
 
     @functools.cache  # noqa: B019
     def _files(self, dataset: str) -> dict[str, list[Path]]:

@@ -1,4 +1,4 @@
-"""The configurations that are compared, and the files that the comparison reads."""
+"""Reads which configurations the user wants to compare, and lists the files that the comparison needs."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ COMPARE = "compare"  # name of a folder in results/, and of a key of --config
 class ComparedConfigurations:
     """The configurations that `--config compare='[holden,injured]'` names.
 
-    value: the value from the command line, not yet checked.
+    value: what the command line says after `compare=`, not yet checked.
     """
 
     def __init__(self, configurations: Configurations, value: Any) -> None:
@@ -27,12 +27,15 @@ class ComparedConfigurations:
             raise HobbleError(f"compare: must be a list of names, as in '[holden,injured]', not {names!r}")
         if not names or len(set(names)) < len(names):
             raise HobbleError(
-                f"compare: needs at least one configuration, each once, not {', '.join(names) or 'none'}"
+                f"compare: must name at least one configuration, each once, not {', '.join(names) or 'none'}"
             )
         return list(names)
 
     def input_files(self) -> dict[str, list[str]]:
-        """Kind of file, or name of a measurement -> this file of each compared configuration."""
+        """Input files of the comparison: kind of file or name of a measurement -> paths.
+
+        Each list has one path for each compared configuration, in the order of `names`.
+        """
         names = self.names()
         return {
             "configuration": [f"results/{name}/configuration.yaml" for name in names],

@@ -1,4 +1,4 @@
-"""What rules have to know about a configuration: its sections, its clips, the paths of its inputs."""
+"""Tells Snakemake's rules about configurations: their sections, their clips, and paths of their inputs."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from hobble.workflow.datasets import Datasets
 
 
 class Configurations:
-    """The configurations of a project."""
+    """The configurations of a project. Each method has the name of a configuration as first argument."""
 
     def __init__(self, catalogue: Catalogue, datasets: Datasets) -> None:
         self.catalogue, self.datasets = catalogue, datasets
@@ -27,12 +27,12 @@ class Configurations:
 
     def resolved(self, configuration: str) -> dict[str, Any]:
         """Everything that determines a configuration's results, as plain data."""
-        model = self.catalogue.configuration(configuration)
-        dataset = self.catalogue.dataset(model.dataset).model_dump(mode="json")
+        settings = self.catalogue.configuration(configuration)
+        dataset = self.catalogue.dataset(settings.dataset).model_dump(mode="json")
         return {
             "name": configuration,
-            "configuration": model.model_dump(mode="json"),
-            "dataset": {"name": model.dataset, **dataset},
+            "configuration": settings.model_dump(mode="json"),
+            "dataset": {"name": settings.dataset, **dataset},
         }
 
     def digest(self, configuration: str) -> str:
@@ -53,22 +53,26 @@ class Configurations:
         return self.datasets.selected(self.dataset(configuration), self.channels(configuration))
 
     def of_dataset(self, configuration: str, pattern: str) -> list[str]:
-        """Paths of the data set's files: one for each clip of `splits` if `pattern` has {clip}, else one."""
+        """Paths of files in the data set's folder.
+
+        pattern: a path in this folder. If it contains {clip}, there is a path for each clip of `splits`, else
+        there is one path.
+        """
         root = f"{DATASETS}/{self.dataset(configuration)}"
         if "{clip}" not in pattern:
             return [f"{root}/{pattern}"]
         return [f"{root}/{pattern.format(clip=clip)}" for clip in self.splits(configuration)]
 
     def owner(self, configuration: str) -> str:
-        """The configuration that trains the network: this one, or the one that `network_of` names."""
+        """Name of the configuration that trains the network: `network_of`, or this one if it is not set."""
         return self.catalogue.configuration(configuration).network_of or configuration
 
     def kind(self, configuration: str) -> str:
-        """The package of the kind of network, such as hobble.models.pfnn."""
+        """Name of the package for the kind of network, such as hobble.models.pfnn."""
         return f"hobble.models.{self.catalogue.configuration(self.owner(configuration)).network.kind}"
 
     def model(self, configuration: str) -> Model:
-        """The kind of network."""
+        """The kind of network, an object of `hobble.models`."""
         return model(self.catalogue.configuration(self.owner(configuration)).network.kind)
 
     def network(self, configuration: str, file: str) -> str:
@@ -81,11 +85,11 @@ class Configurations:
         return f"{DATASETS}/{self.dataset(configuration)}/database/{folder}"
 
     def is_built(self, configuration: str) -> bool:
-        """Whether the network is built directly from rows instead of trained."""
+        """Whether the network is built directly from rows of the database instead of trained."""
         return isinstance(model(self.catalogue.configuration(configuration).network.kind), Built)
 
     def rows_in_order(self, configuration: str) -> list[str]:
-        """Files with the rows of training clips, in order of frames, if the network is built; else []."""
+        """If the network is built: files with the rows of the training clips, in order of frames. Else []."""
         if not self.is_built(configuration):
             return []
         root = f"{DATASETS}/{self.dataset(configuration)}/database/clips"
@@ -94,6 +98,6 @@ class Configurations:
         ]
 
     def start(self, configuration: str) -> list[str]:
-        """The checkpoint from which the training continues, in a list; [] if there is none."""
+        """Path of the checkpoint from which the training continues, in a list; [] if there is none."""
         other = self.catalogue.configuration(configuration).training.continues
         return [f"results/{other}/network/checkpoint.npz"] if other else []

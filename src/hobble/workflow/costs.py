@@ -1,4 +1,8 @@
-"""Folders of each stage's benchmark files and artefacts, for the summary of time, memory and disk."""
+"""Lists the folders that tell how much time, memory and disk each stage of the workflow takes.
+
+A benchmark file is where Snakemake writes the time and the memory of a job. An artefact is a file that a
+stage makes.
+"""
 
 from __future__ import annotations
 
@@ -20,20 +24,22 @@ BATCH_RULES = {
 }
 DATASET_STAGES = tuple(BATCH_RULES)
 
-Places = dict[str, list[str]]  # "benchmarks", "files", "batches" or "made" -> paths or names, see `stages`
+# Where to find the costs of a stage: the keys "benchmarks", "files", "batches" and "made", see `stages`.
+Places = dict[str, list[str]]
 
 
 def stages(configurations: Configurations, batches: Batches, name: str) -> dict[str, Places]:
-    """Stage -> where to find its costs, for the configuration `name`.
+    """Name of each stage -> where to find its costs, for the configuration `name`.
 
-    benchmarks: folders of benchmark files. files: folders of artefacts. batches: names of the benchmark files
-    of the present batches; the folders may also have old files, from before a clip was added. made: folders
-    in which finished clips are kept.
+    benchmarks: folders of benchmark files. files: folders of artefacts. Stages of a data set have two more
+    keys. batches: names, without suffix, of the benchmark files of the present batches. (The folders may also
+    hold old benchmark files, from before a clip was added.) made: folders in which `KeptFiles` keeps finished
+    files and the seconds that they took.
     """
     dataset = configurations.dataset(name)
     source = configurations.catalogue.dataset(dataset).source or dataset
     out = {
-        stage: _of_dataset(batches, source if stage == "synthetic" else dataset, stage)
+        stage: _places_in_dataset(batches, source if stage == "synthetic" else dataset, stage)
         for stage in DATASET_STAGES
     }
     out["database"]["files"] = [f"{DATASETS}/{dataset}/database/clips", configurations.database(name)]
@@ -44,7 +50,7 @@ def stages(configurations: Configurations, batches: Batches, name: str) -> dict[
     return out
 
 
-def _of_dataset(batches: Batches, dataset: str, stage: str) -> Places:
+def _places_in_dataset(batches: Batches, dataset: str, stage: str) -> Places:
     root = Path(DATASETS, dataset)
     return {
         **_places(root, stage, stage),
@@ -54,4 +60,5 @@ def _of_dataset(batches: Batches, dataset: str, stage: str) -> Places:
 
 
 def _places(home: Path, stage: str, folder: str) -> Places:
+    """home: the folder of the configuration or data set. folder: the name of the stage's folder in it."""
     return {"benchmarks": [str(home / "benchmarks" / stage)], "files": [str(home / folder)]}

@@ -1,4 +1,4 @@
-"""What rules have to know about a data set: its options, its clip entries, the clips for training."""
+"""Tells Snakemake's rules about data sets: their options, their clips, and which clips are for training."""
 
 from __future__ import annotations
 
@@ -14,16 +14,17 @@ from hobble.workflow.clips import MIRROR_SUFFIX, Clips, original
 
 
 def shard_of(clip: str, shards: int) -> int:
-    """The number, from 0, of the database shard with a clip's rows. shards: number of shards.
+    """The number of the shard that holds a clip's rows, from 0 to `shards` - 1.
 
-    Mirrors and hurt versions are in the shard of their original. Other clips do not change the shard. If the
-    number of batches is a multiple of `shards`, all clips of a batch are in the same shard.
+    A shard is a part of a database that one job makes from the rows of some clips. Mirrors and hurt versions
+    are in the shard of their original. The shard does not depend on other clips. If the number of batches is
+    a multiple of `shards`, all clips of a batch are in the same shard.
     """
     return batch_of(original(clip), shards)
 
 
 class Datasets:
-    """The data sets of a project."""
+    """The data sets of a project. Most methods have the name of a data set as first argument."""
 
     def __init__(self, catalogue: Catalogue, clips: Clips) -> None:
         self.catalogue, self.clips, self.channel_sources = catalogue, clips, clips.channel_sources
@@ -33,35 +34,40 @@ class Datasets:
         values = getattr(self.catalogue.dataset(dataset), section).model_dump(mode="json")
         return {key: values[key] for key in keys} if keys else values
 
-    def part(self, dataset: str, section: str, model: type[Section]) -> dict[str, Any]:
-        """Key -> value of a section as plain data, only for keys that are fields of `model`."""
-        return self.options(dataset, section, *model.model_fields)
+    def part(self, dataset: str, section: str, options_class: type[Section]) -> dict[str, Any]:
+        """Key -> value of a section as plain data, only for keys that are fields of `options_class`."""
+        return self.options(dataset, section, *options_class.model_fields)
 
     def motion_options(self, dataset: str, clip: str) -> dict[str, Any]:
-        """The section `motion`, but with the values that the clip's entry has, and the entry's `ground`."""
+        """The section `motion`, changed by the values in the clip's entry, and with the entry's `ground`."""
         keys = {"source_fps", "loops", "heading", "ground"}
         entry = self.clips.entry(dataset, clip).model_dump(include=keys, exclude_none=True)
         return {**self.options(dataset, "motion"), **entry}
 
     def frames(self, dataset: str, clip: str) -> int:
-        """Number of frames at 60 Hz of a synthetic clip."""
+        """Number of frames, at 60 Hz, of a synthetic clip: its share of the frames of the data set."""
         synthetic = self.catalogue.dataset(dataset).synthetic
         assert synthetic is not None
-        total = sum(entry.share for entry in self.clips.listed(dataset).values())
-        return round(synthetic.frames * self.clips.entry(dataset, clip).share / total)
+        all_shares = sum(entry.share for entry in self.clips.listed(dataset).values())
+        return round(synthetic.frames * self.clips.entry(dataset, clip).share / all_shares)
 
     def walkers(self, names: Iterable[str]) -> list[str]:
-        """The data sets whose walkers make the synthetic clips of the data sets `names`."""
-        models = {name: self.catalogue.dataset(name) for name in names}
-        walkers = [model.source or name for name, model in models.items() if model.synthetic is not None]
+        """The data sets whose walkers make the synthetic clips of the data sets `names`.
+
+        A walker computes the motion of synthetic clips. A data set uses the walker of its `source`, or its
+        own if it has no `source`.
+        """
+        settings = {name: self.catalogue.dataset(name) for name in names}
+        walkers = [each.source or name for name, each in settings.items() if each.synthetic is not None]
         return list(dict.fromkeys(walkers))
 
     def selected(self, dataset: str, channels: Sequence[str]) -> dict[str, str]:
         """Clip -> "train" or "held_out", for the clips that a network can learn from.
 
-        channels: the channels of the network. A clip is left out if a channel that the network lacks is not 0
-        in it. A mirror is trained on or held out like its original. Raises HobbleError if the data set lacks
-        one of `channels`, if `held_out` names a clip that does not exist, or if no clip is left for training.
+        channels: the channels of the network. If the network lacks a channel of the data set, it cannot learn
+        from clips in which this channel is not 0, so they are left out. A mirror is in the split of its
+        original. Raises HobbleError if the data set lacks one of `channels`, if `held_out` names a clip that
+        does not exist, or if no clip is left for training.
         """
         available = self.channel_sources.channels(dataset)
         if lacking := [name for name in channels if name not in available]:
@@ -69,33 +75,40 @@ class Datasets:
                 f"data set {dataset} has no channel {', '.join(lacking)}. Give it a section "
                 f"`channels: {{{lacking[0]}: ...}}`, or use another data set"
             )
-        others = [name for name in available if name not in channels]
-        model, clips = self.catalogue.dataset(dataset), self.clips.of(dataset)
-        held_out = set(model.held_out)
+        unused = [name for name in available if name not in channels]
+        settings, clips = self.catalogue.dataset(dataset), self.clips.of(dataset)
+        held_out = set(settings.held_out)
         if missing := held_out - set(self.clips.listed(dataset)):
             missing_names = ", ".join(sorted(missing))
-            raise HobbleError(f"data set {dataset}: held_out names clips that do not exist: {missing_names}")
+            raise HobbleError(
+                f"data set {dataset}: held_out names clips that do not exist: {missing_names}. Correct the "
+                "names, or take them out of held_out"
+            )
         splits = {}
         for clip in clips:
-            if not all(self.channel_sources.neutral(dataset, clip, name) for name in others):
+            if not all(self.channel_sources.is_neutral(dataset, clip, name) for name in unused):
                 continue
-            for name in (clip, clip + MIRROR_SUFFIX) if model.mirror else (clip,):
+            for name in (clip, clip + MIRROR_SUFFIX) if settings.mirror else (clip,):
                 splits[name] = "held_out" if original(clip) in held_out else "train"
         if "train" not in splits.values():
-            only = f" without {' or '.join(others)}" if others else ""
-            raise HobbleError(f"data set {dataset}: no clip{only} is left to train on")
+            without = f" without {' or '.join(unused)}" if unused else ""
+            raise HobbleError(
+                f"data set {dataset}: no clip{without} is left to train on. Add clips, or shorten held_out"
+            )
         return splits
 
     def compared(self, dataset: str, channels: Sequence[str]) -> list[str]:
-        """The clips among which jobs look for copies, so that no motion is both trained on and held out.
+        """The clips that a job compares to find copies, so that no motion is both trained on and held out.
 
-        Mirrors and hurt versions are not among them. [] if nothing is held out or the clips are synthetic.
+        Mirrors and hurt versions are not compared. The list is empty if no clip is held out, or if the clips
+        are synthetic.
         """
         if self.catalogue.dataset(dataset).synthetic is not None:
             return []
         splits = self.selected(dataset, channels)
-        both = len(set(splits.values())) > 1
-        return [clip for clip in splits if both and clip == original(clip)]
+        if len(set(splits.values())) < 2:
+            return []
+        return [clip for clip in splits if clip == original(clip)]
 
     def shards(self, dataset: str) -> int:
         """The number of shards of each of the data set's databases."""
@@ -110,19 +123,19 @@ class Datasets:
         return splits
 
     def in_shard(self, dataset: str, channels: Sequence[str], shard: int) -> dict[str, str]:
-        """What `selected` returns, for the clips of one shard only. shard: its number, from 0."""
+        """The part of what `selected` returns for the clips of one shard. shard: its number, from 0."""
         return self._splits_by_shard(dataset, tuple(channels))[shard]
 
-    def every_row(self, dataset: str) -> int:
-        """The n for which training uses every n-th row of hurt versions."""
+    def hurt_row_step(self, dataset: str) -> int:
+        """The number n such that training uses every n-th row of the hurt versions."""
         hurt = self.catalogue.dataset(dataset).hurt
         return hurt.every if hurt else 1
 
     def sources(self, chosen: Iterable[str]) -> dict[str, str]:
         """Hurt version -> its healthy original, for the hurt versions among the chosen clips.
 
-        For the mirror of a hurt version: the mirror of the original.
+        The mirror of a hurt version gets the mirror of the original.
         """
         chosen = list(chosen)
-        mirrors = {clip: MIRROR_SUFFIX if clip.endswith(MIRROR_SUFFIX) else "" for clip in chosen}
-        return {clip: original(clip) + mirrors[clip] for clip in chosen if self.clips.is_hurt_version(clip)}
+        suffixes = {clip: MIRROR_SUFFIX if clip.endswith(MIRROR_SUFFIX) else "" for clip in chosen}
+        return {clip: original(clip) + suffixes[clip] for clip in chosen if self.clips.is_hurt_version(clip)}
