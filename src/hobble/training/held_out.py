@@ -12,7 +12,7 @@ from torch import Tensor
 from hobble.database.reader import Database
 
 SPLIT = "held_out"
-ROWS_AT_ONCE = 2048  # rows predicted at once: so many are fast, and take less than 50 MB
+ROWS_AT_ONCE = 2048  # rows predicted at once: enough to be fast, in less than 50 MB
 
 
 class Predicts(Protocol):

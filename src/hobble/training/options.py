@@ -23,7 +23,7 @@ Passes = Annotated[float, Field(gt=0, le=1_000_000), AfterValidator(_int_if_whol
 class Recipe(Section):
     """How a network is trained. A pass visits every (frame, terrain fit) pair once.
 
-    It is cut into `sections` sections. The order of the pairs is random, so even a few sections of a pass are
+    Each pass is cut into `sections` sections. The order of the pairs is random, so even a few sections are
     a random sample of the data.
     """
 
