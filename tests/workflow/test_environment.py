@@ -41,6 +41,12 @@ def test_on_a_terminal_one_line_shows_the_package_and_progress() -> None:
     assert not any("Progress" in word for word in words)
 
 
+def test_no_download_is_counted_twice() -> None:
+    out = io.StringIO()
+    follow([line for line in SAID if "cached" not in line], ProgressLine(out))
+    assert out.getvalue().splitlines()[-1].startswith("environment: 190 MB fetched; unpacking")
+
+
 def test_in_a_file_progress_is_printed_now_and_then() -> None:
     out = io.StringIO()
     follow(SAID * 20, ProgressLine(out))

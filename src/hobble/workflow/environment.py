@@ -49,7 +49,7 @@ class ProgressLine:
         elif found := PROGRESS_LINE.match(text):
             self.arrived = float(found[1])
         elif text.startswith("Installing collected packages"):
-            self.finished_bytes, self.size = self.finished_bytes + self.size, 0.0
+            self.finished_bytes, self.size, self.arrived = self.finished_bytes + self.size, 0.0, 0.0
             self.name = f"unpacking {text.count(',') + 1} packages, which takes a while"
             self.last_written = float("-inf")  # write the line at once, because pip prints nothing after this
         else:
@@ -100,7 +100,7 @@ def is_sound(python: Path) -> bool:
     """Whether the interpreter `python` has pip and is of the same version as the one that runs this."""
     print_version = "import sys, pip; print(sys.version)"
     try:
-        command = [python, "-c", print_version]
+        command = [str(python), "-c", print_version]
         found = subprocess.run(command, capture_output=True, text=True, check=True).stdout
     except (OSError, subprocess.CalledProcessError):
         return False
