@@ -44,7 +44,7 @@ def test_on_a_terminal_one_line_shows_the_package_and_progress() -> None:
 def test_no_download_is_counted_twice() -> None:
     out = io.StringIO()
     follow([line for line in SAID if "cached" not in line], ProgressLine(out))
-    assert out.getvalue().splitlines()[-1].startswith("environment: 190 MB fetched; unpacking")
+    assert out.getvalue().splitlines()[-1].startswith("environment: 191 MB fetched; unpacking")
 
 
 def test_in_a_file_progress_is_printed_now_and_then() -> None:
