@@ -8,7 +8,7 @@ from pydantic import Field
 
 from hobble.core.section import Section
 
-LABEL_SUFFIXES = ("_footsteps.txt", "_gait.txt")  # endings of the label files that each clip gets
+WRITES = ("_footsteps.txt", "_gait.txt")  # endings of the label files that each clip gets
 
 
 class Synthetic(Section):

@@ -22,7 +22,7 @@ from hobble.core.clip_files import (
 from hobble.core.errors import HobbleError, InputError
 from hobble.core.untrusted import check_regular
 from hobble.hurt.options import HURT_CHANNEL, Hurt
-from hobble.synthetic.options import LABEL_SUFFIXES
+from hobble.synthetic.options import WRITES
 from hobble.workflow.channel_sources import ChannelSources
 from hobble.workflow.sources import joint_names, nearest_rig, read_checksums
 
@@ -187,7 +187,7 @@ class Clips:
         """
         synthetic = self.catalogue.dataset(dataset).synthetic is not None
         if synthetic:
-            suffixes = [suffix for suffix in suffixes if suffix in LABEL_SUFFIXES]
+            suffixes = [suffix for suffix in suffixes if suffix in WRITES]
         stem = self.folder(dataset) / clip
         if not synthetic and clip in (files := self._files(dataset)):
             stem = files[clip][0].with_suffix("")
