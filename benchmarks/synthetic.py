@@ -14,7 +14,7 @@ import yaml
 from hobble.core.bvh import write_bvh
 from hobble.core.processors import processor
 from hobble.core.skeleton import Skeleton
-from hobble.synthetic.generate_clip import generate
+from hobble.synthetic.generate_clip import generate_walk
 
 ROOT = Path(__file__).resolve().parents[1]
 
@@ -27,7 +27,7 @@ def main() -> None:
     print(f"{'recipe':15s} {'walk s':>7s} {'write s':>8s} {'x real time':>12s}")
     for recipe in ("walk-straight", "jog", "steps"):
         start = time.perf_counter()
-        walk = generate("benchmark", skeleton, frames, recipe, 120, 1)
+        walk = generate_walk("benchmark", skeleton, frames, recipe, 120, 1)
         walked = time.perf_counter()
         with tempfile.TemporaryDirectory() as folder:
             write_bvh(Path(folder) / "benchmark.bvh", walk.clip)

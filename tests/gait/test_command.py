@@ -15,7 +15,7 @@ from hobble.gait.__main__ import main
 from hobble.gait.comparison import compare, healthy_profile
 from hobble.gait.limp_grade import HEALTHY
 from hobble.motion.mirror import mirror_clip
-from hobble.synthetic.generate_clip import walk
+from hobble.synthetic.generate_clip import walk_from_plan
 from hobble.synthetic.recipes import WALK, Segment
 
 
@@ -25,7 +25,7 @@ def walker(holden31) -> Callable[[float], Clip]:
 
     def make(speed: float) -> Clip:
         segments = [Segment(WALK, speed, seconds=12.0)]
-        return walk(f"at-{speed:g}", holden31, segments, 600, "flat", 60.0, 1).clip
+        return walk_from_plan(f"at-{speed:g}", holden31, segments, 600, "flat", 60.0, 1).clip
 
     return make
 

@@ -18,7 +18,7 @@ from hobble.labels.label import label_clip
 from hobble.labels.options import LabelOptions
 from hobble.motion.make import make_clip
 from hobble.motion.options import ClipMotion
-from hobble.synthetic.generate_clip import walk
+from hobble.synthetic.generate_clip import walk_from_plan
 from hobble.synthetic.recipes import Segment
 
 # The tests of this folder share these measurements. Tests are no package, so the module is loaded by path.
@@ -57,7 +57,7 @@ def made(holden31: Skeleton) -> Callable[[str], Healthy]:
     def make(name: str) -> Healthy:
         segments, ground = SEGMENTS[name]
         frames = round(60 * sum(s.seconds for s in segments))
-        result = walk(name, holden31, segments, frames, ground, 60, 1)
+        result = walk_from_plan(name, holden31, segments, frames, ground, 60, 1)
         return labelled(result.clip, "jog" if name == "jog" else "walk", ground == "flat")
 
     return make

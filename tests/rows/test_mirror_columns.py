@@ -17,7 +17,7 @@ from hobble.rows.build_rows import clip_rows, cycle_frames
 from hobble.rows.clip_rows import ClipRows, Pairs, expanded
 from hobble.rows.layout import RowLayout
 from hobble.rows.mirror_columns import ColumnMirror, mirror_of_x, mirror_of_y
-from hobble.synthetic.generate_clip import walk
+from hobble.synthetic.generate_clip import walk_from_plan
 from hobble.synthetic.recipes import Segment
 
 OPTIONS = {"window": 60, "step": 10, "facing_sigma": 20.0}
@@ -35,7 +35,7 @@ def ground(frame: np.ndarray, cycle: np.ndarray) -> dict[str, np.ndarray]:
 @pytest.fixture(scope="module")
 def walked(holden31: Skeleton) -> tuple[ClipRows, ClipRows]:
     """Rows of a walk that turns, on uneven ground with injuries and a mood, and those of its mirror."""
-    clip = walk("walk", holden31, SEGMENTS, FRAMES, "flat", 60, 1).clip
+    clip = walk_from_plan("walk", holden31, SEGMENTS, FRAMES, "flat", 60, 1).clip
     about = {"source_frames": FRAMES, "source_fps": 60.0}
     labels, report = label_clip(clip, [], about, "walk", "flat", LabelOptions())
     rng = np.random.default_rng(3)

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from hobble.core import quat
-from hobble.synthetic.generate_clip import generate, walk
+from hobble.synthetic.generate_clip import generate_walk, walk_from_plan
 from hobble.synthetic.recipes import Segment
 
 SIDES = ("Left", "Right")
@@ -50,7 +50,7 @@ def test_the_stance_knee_bends_after_landing_and_straightens_again(walking):
 def test_a_faster_jog_has_larger_movements(holden31):
     stride, flight = [], []
     for speed in (210, 280, 350, 420):
-        made = walk("m", holden31, [Segment("jog", speed, seconds=12)], 720, "flat", 60, 1)
+        made = walk_from_plan("m", holden31, [Segment("jog", speed, seconds=12)], 720, "flat", 60, 1)
         places = dict(zip(holden31.joints, np.moveaxis(made.clip.positions, 1, 0), strict=True))
         part = slice(made.right[2], made.right[-2])
         cycles = len(made.right) - 4
@@ -136,7 +136,7 @@ def test_no_joint_turns_fast(holden31, dataset):
     total = sum(entry.get("share", 1) for entry in dataset["clips"].values())
     for name, entry in dataset["clips"].items():
         frames = round(dataset["synthetic"]["frames"] * entry.get("share", 1) / total)
-        made = generate(name, holden31, frames, entry["recipe"], 120, 1)
+        made = generate_walk(name, holden31, frames, entry["recipe"], 120, 1)
         turns = np.degrees(quat.angle(made.clip.rotations[2::2], made.clip.rotations[:-2:2]))
         frame, joint = np.unravel_index(np.argmax(turns), turns.shape)
         assert turns.max() < 15, f"{name}: {holden31.joints[joint]} at frame {frame}"
@@ -207,7 +207,7 @@ def test_standing_has_slow_cycles_with_both_feet_still(written):
 
 
 def test_no_foot_goes_through_the_edge_of_a_step(holden31):
-    made = generate("steps-1", holden31, 673, "steps", 120, 1)
+    made = generate_walk("steps-1", holden31, 673, "steps", 120, 1)
     places = dict(zip(holden31.joints, np.moveaxis(made.clip.positions, 1, 0), strict=True))
     for side in SIDES:
         toe = places[f"{side}ToeBase"]
@@ -221,7 +221,7 @@ def test_memory_grows_with_the_length_of_a_clip_and_not_with_its_square(holden31
     peaks = []
     for frames in (2000, 8000):
         tracemalloc.start()
-        generate("long", holden31, frames, "sidesteps", 120, 1)
+        generate_walk("long", holden31, frames, "sidesteps", 120, 1)
         peaks.append(tracemalloc.get_traced_memory()[1])
         tracemalloc.stop()
     assert peaks[1] < 4.1 * peaks[0]

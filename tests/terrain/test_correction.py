@@ -97,22 +97,22 @@ def test_pits_are_below_the_feet_and_change_nothing_far_away(seed: int) -> None:
     standing = Stances(rng.uniform(-50, 50, (4, 2)), np.full(4, -20.0), np.ones(4))
     where = np.concatenate([soles[:, [0, 2]], rng.uniform(-100, 100, (50, 2))])
     ground = rng.uniform(0, 5, 55)
-    dug = dig_pits(soles, standing, 0.5).of(ground, where)
+    dug = dig_pits(soles, standing, 0.5).lower(ground, where)
     assert np.all(dug[:5] <= soles[:, 1] + 0.5 + 1e-9)
     assert np.all(dug <= ground)
     far = distances(where, soles[:, [0, 2]]).min(axis=1) > 15 / WALL_STEEPNESS
     assert np.array_equal(dug[far], ground[far])
-    assert dig_pits(soles[:0], standing, 0.5).of(ground, where) is ground
+    assert dig_pits(soles[:0], standing, 0.5).lower(ground, where) is ground
 
 
 def test_pits_are_steep_only_beside_other_feet() -> None:
     along = np.column_stack([np.linspace(-40, 40, 801), np.zeros(801)])
     sole = np.array([[0.0, -8.0, 0.0]])
     far = Stances(np.array([[30.0, 0.0]]), np.array([3.0]), np.ones(1))
-    dug = dig_pits(sole, far, 0.0).of(np.full(801, 3.0), along)
+    dug = dig_pits(sole, far, 0.0).lower(np.full(801, 3.0), along)
     assert dug.min() == pytest.approx(-8)
     assert np.abs(np.diff(dug)).max() == pytest.approx(WALL_STEEPNESS * 0.1)
     near = Stances(np.array([[1.0, 0.0]]), np.array([3.0]), np.ones(1))
-    dug = dig_pits(sole, near, 0.0).of(np.full(801, 3.0), along)
+    dug = dig_pits(sole, near, 0.0).lower(np.full(801, 3.0), along)
     assert dug.min() == pytest.approx(-8)
     assert dug[410] == pytest.approx(3.0)

@@ -10,8 +10,8 @@ from PIL import Image
 from PIL.TiffImagePlugin import ImageFileDirectory_v2
 
 from hobble.core.errors import InputError
-from hobble.terrain.generate import KINDS, generate
-from hobble.terrain.heightmaps import elevation, heightmaps, read_heights
+from hobble.terrain.generate import KINDS, generate_heights
+from hobble.terrain.heightmaps import heightmaps, landscape_heights, read_heights
 from hobble.terrain.options import HeightmapOptions
 
 CELL = 3.937007874
@@ -20,23 +20,23 @@ RAMP = np.add.outer(np.arange(5.0), 10 * np.arange(4.0))
 
 @pytest.mark.parametrize("kind", KINDS)
 def test_equal_seeds_give_equal_ground_and_others_do_not(kind: str) -> None:
-    one = generate(kind, 3, CELL)
+    one = generate_heights(kind, 3, CELL)
     assert one.shape == (400, 400)
-    assert np.array_equal(one, generate(kind, 3, CELL))
-    assert not np.array_equal(one, generate(kind, 4, CELL))
+    assert np.array_equal(one, generate_heights(kind, 3, CELL))
+    assert not np.array_equal(one, generate_heights(kind, 4, CELL))
     assert np.isfinite(one).all()
     assert 20 < np.ptp(one) < 400
 
 
 def test_beams_are_narrow_and_stand_more_than_40_cm_above_the_floor() -> None:
-    ground = generate("beams", 0, CELL)
+    ground = generate_heights("beams", 0, CELL)
     assert set(np.unique(ground)) - {0.0} == set(ground[ground > 0])
     assert ground[ground > 0].min() > 40
     assert (ground > 0).mean() < 0.2
 
 
 def test_the_elevation_model_has_its_real_scale() -> None:
-    heights = elevation(CELL)
+    heights = landscape_heights(CELL)
     assert heights.shape == (
         344,
         323,
@@ -106,7 +106,7 @@ def test_files_are_scaled_by_their_own_cell_and_height_scale(tmp_path: Path) -> 
     ]
     maps = heightmaps(entries, [tmp_path / "a.txt", tmp_path / "b.txt"], cell=CELL, height_scale=3.0)
     assert np.array_equal(maps[0].heights, 3 * RAMP)
-    assert np.array_equal(maps[1].heights, generate("hills", 0, CELL) / 2)
+    assert np.array_equal(maps[1].heights, generate_heights("hills", 0, CELL) / 2)
     assert np.array_equal(maps[2].heights, 2 * RAMP)
     assert [m.cell for m in maps] == [CELL, CELL, 10.0]
 

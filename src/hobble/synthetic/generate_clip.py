@@ -1,4 +1,7 @@
-"""Makes one synthetic clip: motion, footsteps and gait labels from a plan."""
+"""Makes one synthetic clip: motion, footsteps and gait labels.
+
+The motion follows a plan: a list of segments, each with a gait, a speed, a turn and a length.
+"""
 
 from __future__ import annotations
 
@@ -16,12 +19,12 @@ from hobble.core.files import write_text
 from hobble.core.skeleton import Skeleton
 from hobble.synthetic import label_files
 from hobble.synthetic.foot_motion import move_foot
-from hobble.synthetic.footsteps import landings, phase_curve, stances
+from hobble.synthetic.footsteps import landing_frames, phase_curve, plan_stances
 from hobble.synthetic.options import Synthetic
 from hobble.synthetic.planned_ground import Ground, make_ground
-from hobble.synthetic.planned_path import gait_keys, walk_path
-from hobble.synthetic.pose import pose
-from hobble.synthetic.recipes import GROUND, Segment, generator, plan
+from hobble.synthetic.planned_path import gait_keys, plan_path
+from hobble.synthetic.pose import pose_figure
+from hobble.synthetic.recipes import GROUND, Segment, plan, random_generator
 from hobble.synthetic.style import LEFT, RIGHT, healthy_style
 
 SHORTEST = 60  # frames at 60 Hz: least length of a clip, so that a foot lands in it
@@ -31,8 +34,9 @@ SHORTEST = 60  # frames at 60 Hz: least length of a clip, so that a foot lands i
 class GeneratedWalk:
     """A generated clip and its labels. Frames count from 0 at the clip's rate.
 
-    right, left: frames in which each foot lands. gait: (frame, label); labels fade linearly from one of these
-    frames to the next. ground: the heights for which the clip was planned.
+    right, left: frames in which each foot lands. gait: a list of (frame, label). Between two of these frames,
+    the first label fades linearly into the second. ground: a function that gives the height of the ground for
+    which the clip was planned.
     """
 
     clip: Clip
@@ -42,46 +46,47 @@ class GeneratedWalk:
     ground: Ground
 
 
-def generate(
+def generate_walk(
     clip: str, skeleton: Skeleton, frames: int, recipe: str | None, fps: float, seed: int
 ) -> GeneratedWalk:
-    """Generate a walk from a recipe. Equal arguments give equal motion.
+    """Generate a clip from a recipe. Equal arguments give equal motion.
 
     clip: name of the clip. frames: its length, in frames at 60 Hz. recipe: a key of
-    `hobble.synthetic.recipes.RECIPES`; None: "walk-straight". fps: frame rate of the clip.
+    `hobble.synthetic.recipes.RECIPES`; None: "walk-straight". fps: frame rate of the clip. seed: number that
+    decides all random choices.
 
     Raises HobbleError for an unknown recipe.
     """
     recipe = recipe or "walk-straight"
     total = round(frames * fps / 60)
     segments = plan(recipe, total, fps, seed, clip)
-    return walk(clip, skeleton, segments, total, GROUND.get(recipe, "flat"), fps, seed)
+    return walk_from_plan(clip, skeleton, segments, total, GROUND.get(recipe, "flat"), fps, seed)
 
 
-def walk(
+def walk_from_plan(
     clip: str, skeleton: Skeleton, segments: list[Segment], total: int, ground: str, fps: float, seed: int
 ) -> GeneratedWalk:
-    """Generate a walk of `total` frames at `fps` from a plan, `segments`.
+    """Generate a clip of `total` frames at `fps` from a plan, `segments`.
 
-    ground: kind of ground: "flat", "slopes", "steps" or "uneven".
+    clip: name of the clip. ground: kind of ground: "flat", "slopes", "steps" or "uneven".
     """
-    path = walk_path(segments, total, fps)
+    path = plan_path(segments, total, fps)
     style = healthy_style(path)
-    phase = phase_curve(style, fps, generator(seed, clip, "phase").random())
-    right, left = (_frames(landings(phase, side), path.first, total) for side in (RIGHT, LEFT))
-    rng = generator(seed, clip, "walk")
+    phase = phase_curve(style, fps, random_generator(seed, clip, "phase").random())
+    right, left = (_frames_in_clip(landing_frames(phase, side), path.first, total) for side in (RIGHT, LEFT))
+    rng = random_generator(seed, clip, "walk")
     terrain = make_ground(ground, rng)
-    steps = stances(path, style, phase, terrain, rng)
+    steps = plan_stances(path, style, phase, terrain, rng)
     feet = (move_foot(steps[LEFT], style, LEFT, terrain), move_foot(steps[RIGHT], style, RIGHT, terrain))
-    rotations, root = pose(skeleton, path, style, phase, feet, terrain, rng)
-    part = slice(path.first, path.first + total)
-    motion = Clip(clip, skeleton, fps, rotations[part], root[part])
+    rotations, root = pose_figure(skeleton, path, style, phase, feet, terrain, rng)
+    in_clip = slice(path.first, path.first + total)  # the path also has frames before and after the clip
+    motion = Clip(clip, skeleton, fps, rotations[in_clip], root[in_clip])
     return GeneratedWalk(motion, right, left, gait_keys(segments, total, fps), terrain)
 
 
-def _frames(at: np.ndarray, first: int, total: int) -> list[int]:
-    """The frames `at` of the planned path as whole frames of the clip, without those outside the clip."""
-    frames = np.ceil(at).astype(int) - first
+def _frames_in_clip(path_frames: np.ndarray, first: int, total: int) -> list[int]:
+    """Frames of the planned path as whole frames of the clip. Frames outside the clip are left out."""
+    frames = np.ceil(path_frames).astype(int) - first
     return [int(f) for f in frames if 0 <= f < total]
 
 
@@ -98,9 +103,9 @@ def write_clip(
 ) -> None:
     """Generate a clip and write it as BVH and label files.
 
-    skeleton: from `Skeleton.to_dict`. frames: length of the clip at 60 Hz. options: the section
-    `synthetic` of the data set. bvh, footsteps, gait: paths of the three files. Raises HobbleError for an
-    unknown recipe or too few frames.
+    skeleton: from `Skeleton.to_dict`. frames: length of the clip, in frames at 60 Hz. recipe: see
+    `generate_walk`. options: the section `synthetic` of the data set. bvh, footsteps, gait: paths of the
+    three files. Raises HobbleError for an unknown recipe or too few frames.
     """
     if frames < SHORTEST:
         enough = math.ceil(options.frames * SHORTEST / max(frames, 1))
@@ -109,7 +114,7 @@ def write_clip(
             f"Set synthetic.frames to {enough} or more, or give the clip a larger `share`."
         )
     rig = Skeleton.from_dict(skeleton)
-    walk = generate(clip, rig, frames, recipe, options.fps, options.seed)
+    walk = generate_walk(clip, rig, frames, recipe, options.fps, options.seed)
     write_bvh(bvh, walk.clip)
     write_text(footsteps, label_files.footsteps_text(walk.right, walk.left))
     write_text(gait, label_files.gait_text(walk.gait))

@@ -8,12 +8,16 @@ import numpy as np
 
 from hobble.core.quat import Array
 
-Ground = Callable[[Array, Array], Array]  # x, z in cm -> heights in cm
+Ground = Callable[[Array, Array], Array]  # a function from x and z to the height of the ground, all in cm
 
 
 def make_ground(kind: str, rng: np.random.Generator) -> Ground:
-    """The ground of one clip. kind: "flat", "slopes", "steps" or "uneven". Slopes and steps run along Z."""
-    return {"flat": lambda _: flat, "slopes": _slopes, "steps": _steps, "uneven": _uneven}[kind](rng)
+    """The ground of one clip. kind: "flat", "slopes", "steps" or "uneven".
+
+    Slopes and steps go up and down along Z, which the figure faces at the start of the clip.
+    """
+    makers = {"flat": lambda _: flat, "slopes": _make_slopes, "steps": _make_steps, "uneven": _make_uneven}
+    return makers[kind](rng)
 
 
 def flat(x: Array, z: Array) -> Array:
@@ -21,14 +25,14 @@ def flat(x: Array, z: Array) -> Array:
     return np.zeros(np.broadcast_shapes(np.shape(x), np.shape(z)))
 
 
-def _slopes(rng: np.random.Generator) -> Ground:
+def _make_slopes(rng: np.random.Generator) -> Ground:
     """Long hills, up to about 12 degrees steep along Z and less steep along X."""
-    return _waves(rng, lengths=(480, 640, 900), steepness=(0.07, 0.07, 0.07), across=0.35)
+    return _make_waves(rng, lengths=(480, 640, 900), steepness=(0.07, 0.07, 0.07), across=0.35)
 
 
-def _uneven(rng: np.random.Generator) -> Ground:
-    """Bumps and hollows of a few centimetres."""
-    return _waves(
+def _make_uneven(rng: np.random.Generator) -> Ground:
+    """Bumps and hollows of a few centimetres, in all directions."""
+    return _make_waves(
         rng,
         lengths=(110, 150, 190, 260, 340, 600),
         steepness=(0.05, 0.06, 0.06, 0.06, 0.06, 0.05),
@@ -36,12 +40,13 @@ def _uneven(rng: np.random.Generator) -> Ground:
     )
 
 
-def _waves(
+def _make_waves(
     rng: np.random.Generator, lengths: tuple[float, ...], steepness: tuple[float, ...], across: float
 ) -> Ground:
-    """Sum of sine waves. lengths: wavelengths, cm. steepness: greatest slope of each wave.
+    """A sum of sine waves, each with a random start.
 
-    across: greatest angle between the Z axis and the direction of a wave, radians.
+    lengths: wavelengths, cm, varied by up to 10 %. steepness: greatest slope of each wave, cm per cm. across:
+    greatest angle between the Z axis and the direction of a wave, radians.
     """
     angles = rng.uniform(-across, across, len(lengths))
     wave_numbers = 2 * np.pi / (np.array(lengths) * rng.uniform(0.9, 1.1, len(lengths)))
@@ -57,17 +62,21 @@ def _waves(
     return ground
 
 
-def _steps(rng: np.random.Generator) -> Ground:
-    """Stairs up and down along Z: flights of up to four steps, each 7 to 16 cm high and 62 to 130 cm deep."""
-    count = 400
+def _make_steps(rng: np.random.Generator) -> Ground:
+    """Stairs along Z. Flights of one to four steps go up and down in turn.
+
+    Each step is 7 to 16 cm high and 62 to 130 cm deep.
+    """
+    count = 400  # steps; they reach more than 100 m in front of the start and behind it
     edges = np.cumsum(rng.uniform(62, 130, count))
     edges -= edges[count // 2]
-    flights = np.repeat(np.where(np.arange(count) % 2 == 0, 1.0, -1.0), rng.integers(1, 5, count))[:count]
-    levels = np.concatenate([[0.0], np.cumsum(flights * rng.uniform(7, 16, count))])
-    levels -= levels[count // 2]
+    # 1 for a step up, -1 for a step down.
+    directions = np.repeat(np.where(np.arange(count) % 2 == 0, 1.0, -1.0), rng.integers(1, 5, count))[:count]
+    levels = np.concatenate([[0.0], np.cumsum(directions * rng.uniform(7, 16, count))])
+    levels -= levels[count // 2]  # height 0 at the start
 
     def ground(x: Array, z: Array) -> Array:
-        z = np.asarray(z) + 0 * np.asarray(x)
+        z = np.asarray(z) + 0 * np.asarray(x)  # in the common shape of x and z
         return levels[np.searchsorted(edges, z)]
 
     return ground

@@ -12,18 +12,18 @@ from hobble.core.quat import Array
 from hobble.synthetic.recipes import CROUCH, JOG, STAND, WALK, Segment
 
 GAITS = (STAND, WALK, JOG, CROUCH)
-BLEND = 0.30  # seconds: sigma of the Gaussian that blends segments; a change takes about a second
+BLEND_SIGMA = 0.30  # seconds: sigma of the Gaussian that blends segments; a change takes about a second
 
 
 @dataclass(frozen=True)
 class PlannedPath:
     """A path of F frames at `fps`.
 
-    The clip is frames `first` to F - `first` - 1. The frames before and after it are padding: steps at the
-    ends of the clip begin or end there.
+    The clip is frames `first` to F - `first` - 1. The frames before and after the clip are padding, in which
+    its first steps can begin and its last steps can end.
 
     position: (F, 2) x and z in cm. facing: (F,) radians from +Z, positive to the left. velocity: (F, 2) cm/s
-    to the left and forward, relative to the facing. gait: (F, 4) shares of GAITS.
+    to the left and forward, relative to the facing. gait: (F, 4) share of each gait of GAITS; they sum to 1.
     """
 
     fps: float
@@ -42,27 +42,27 @@ class PlannedPath:
         return np.linalg.norm(self.velocity, axis=1)
 
 
-def walk_path(segments: Sequence[Segment], frames: int, fps: float) -> PlannedPath:
-    """The path of a plan (`segments`) for a clip of `frames` frames, with padding at both ends."""
-    first = margin(fps)
+def plan_path(segments: Sequence[Segment], frames: int, fps: float) -> PlannedPath:
+    """The path of a plan (a list of segments) for a clip of `frames` frames, with padding at both ends."""
+    first = padding_frames(fps)
     total = frames + 2 * first
-    which = _segment_of_frame(segments, frames, fps)
-    which = np.pad(which, (first, total - first - len(which)), mode="edge")
+    segment = _segment_of_frame(segments, frames, fps)
+    segment = np.pad(segment, (first, total - first - len(segment)), mode="edge")
     heading = np.radians([s.heading for s in segments])
     speed = np.array([s.speed for s in segments])
-    target = np.stack([speed * np.sin(heading), speed * np.cos(heading)], axis=1)[which]
-    turning = np.array([np.radians(s.turn) / s.seconds for s in segments])[which]
-    gait = np.eye(len(GAITS))[[GAITS.index(s.gait) for s in segments]][which]
-    sigma = BLEND * fps
-    velocity = gaussian_filter1d(target, sigma, axis=0, mode="nearest")
-    turning = gaussian_filter1d(turning, sigma * 0.8, mode="nearest")
-    facing = np.cumsum(turning) / fps
+    planned_velocity = np.stack([speed * np.sin(heading), speed * np.cos(heading)], axis=1)[segment]
+    turn_rate = np.array([np.radians(s.turn) / s.seconds for s in segments])[segment]  # radians a second
+    gait = np.eye(len(GAITS))[[GAITS.index(s.gait) for s in segments]][segment]
+    sigma = BLEND_SIGMA * fps
+    velocity = gaussian_filter1d(planned_velocity, sigma, axis=0, mode="nearest")
+    turn_rate = gaussian_filter1d(turn_rate, sigma * 0.8, mode="nearest")
+    facing = np.cumsum(turn_rate) / fps
     facing -= facing[first]
     sin, cos = np.sin(facing), np.cos(facing)
-    step = np.stack(
+    world_velocity = np.stack(
         [velocity[:, 0] * cos + velocity[:, 1] * sin, velocity[:, 1] * cos - velocity[:, 0] * sin], 1
     )
-    position = np.cumsum(step, axis=0) / fps
+    position = np.cumsum(world_velocity, axis=0) / fps
     return PlannedPath(
         fps,
         first,
@@ -73,30 +73,29 @@ def walk_path(segments: Sequence[Segment], frames: int, fps: float) -> PlannedPa
     )
 
 
-def margin(fps: float) -> int:
-    """Number of frames of padding before and after a clip."""
+def padding_frames(fps: float) -> int:
+    """Number of frames of padding on each side of a clip: four seconds."""
     return round(4 * fps)
 
 
 def _segment_of_frame(segments: Sequence[Segment], frames: int, fps: float) -> np.ndarray:
     """(frames,) index of the segment of each frame."""
     ends = np.cumsum([s.seconds for s in segments])
-    which = np.searchsorted(ends, np.arange(frames) / fps, side="right")
-    return np.minimum(which, len(segments) - 1)
+    segment = np.searchsorted(ends, np.arange(frames) / fps, side="right")
+    return np.minimum(segment, len(segments) - 1)
 
 
 def gait_keys(segments: Sequence[Segment], frames: int, fps: float) -> list[tuple[int, str]]:
-    """The gait labels as keys (frame, label). Frames count from 0. Labels fade linearly between two keys.
+    """The gait labels as keys (frame, label). Frames count from 0. Labels fade linearly from key to key.
 
-    A fade lasts as long as the motion takes to change.
+    A fade from one gait to another takes about a second, like the change of the motion.
     """
-    which = _segment_of_frame(segments, frames, fps)
-    labels = [segments[i].gait for i in which]
-    half = round(1.6 * BLEND * fps)
+    labels = [segments[i].gait for i in _segment_of_frame(segments, frames, fps)]
+    half_fade = round(1.6 * BLEND_SIGMA * fps)  # frames
     keys = [(0, labels[0])]
     for i in (i for i in range(1, frames) if labels[i] != labels[i - 1]):
-        start = max(i - half, keys[-1][0] + 1)
-        end = min(max(i + half, start + 1), frames - 1)
+        start = max(i - half_fade, keys[-1][0] + 1)
+        end = min(max(i + half_fade, start + 1), frames - 1)
         if start < end:
             keys += [(start, labels[i - 1]), (end, labels[i])]
     return keys

@@ -1,4 +1,7 @@
-"""Recipes of clips: sequences of segments, each with a gait, a velocity, a turn and a length."""
+"""Recipes for clips. A recipe is a sequence of segments, each with a gait, a velocity, a turn and a length.
+
+The plan of a clip is its recipe, repeated, stretched and varied at random to fill the clip.
+"""
 
 from __future__ import annotations
 
@@ -14,7 +17,7 @@ STAND, WALK, JOG, CROUCH = "stand", "walk", "jog", "crouch"
 
 @dataclass(frozen=True)
 class Segment:
-    """One segment of a plan.
+    """One segment of a recipe or a plan.
 
     speed: cm/s. turn: degrees by which the facing direction turns in the segment, positive to the left.
     seconds: length of the segment. heading: degrees from the facing direction to the direction of travel,
@@ -44,7 +47,8 @@ def _stand(seconds: float = 2.0) -> Segment:
     return Segment(STAND, seconds=seconds)
 
 
-# Arguments of each segment: speed, turn, seconds, heading.
+# Arguments of each segment: speed, turn, seconds, heading; see `Segment`. The inner tuples only keep several
+# segments on one line.
 RECIPES: dict[str, tuple[Segment, ...]] = {
     "walk-straight": (_walk(130, 0, 4), _walk(150, 8, 3), _walk(105, -8, 3), _walk(130, 0, 3)),
     "walk": (
@@ -81,46 +85,49 @@ RECIPES: dict[str, tuple[Segment, ...]] = {
     "steps": (_walk(85, 0, 4), _walk(70, 12, 3), _walk(100, -12, 3), _stand(1.8)),
     "uneven": (_walk(115, 0, 3), _walk(95, 70, 3), _walk(125, -70, 3), _walk(70, 0, 2.5)),
 }
-# recipe -> kind of ground; all other recipes are on flat ground
+# recipe -> kind of ground, see `hobble.synthetic.planned_ground`; all other recipes are on flat ground
 GROUND = {"slopes": "slopes", "steps": "steps", "uneven": "uneven"}
 
 
 def plan(recipe: str, frames: float, fps: float, seed: int, clip: str) -> list[Segment]:
-    """The segments of a clip of `frames` frames, each varied at random (the same in every run).
+    """The plan of a clip of `frames` frames: segments that last at least as long as the clip.
 
-    The recipe is repeated as often as fits best. Its segments are stretched to fill the clip, or shortened,
-    but not to less than three quarters of their length. Every other repetition is mirrored. Raises
-    HobbleError for an unknown recipe.
+    The recipe is repeated as often as fits best. Then the segments are stretched or shortened to fill the
+    clip, but to no less than three quarters of their length. Every other repetition is mirrored. Each segment
+    is varied a little at random; equal arguments give an equal plan.
+
+    Raises HobbleError for an unknown recipe.
     """
     if recipe not in RECIPES:
         raise HobbleError(
             f"clip {clip}: there is no recipe {recipe!r}. Name one of these: {', '.join(RECIPES)}."
         )
-    rng = generator(seed, clip, "plan")
+    rng = random_generator(seed, clip, "plan")
     segments = RECIPES[recipe]
-    side = 1.0 if rng.random() < 0.5 else -1.0
+    mirror = 1.0 if rng.random() < 0.5 else -1.0  # factor of turns and headings
     seconds = frames / fps
     once = sum(segment.seconds for segment in segments)
-    rounds = max(1, round(seconds / once))
-    pace = max(0.75, seconds / (rounds * once))
+    repetitions = max(1, round(seconds / once))
+    stretch = max(0.75, seconds / (repetitions * once))
     out: list[Segment] = []
     while sum(s.seconds for s in out) < seconds:
-        out += [_varied(segment, side, pace, rng) for segment in segments]
-        side = -side
+        out += [_vary(segment, mirror, stretch, rng) for segment in segments]
+        mirror = -mirror
     return out
 
 
-def _varied(segment: Segment, side: float, pace: float, rng: np.random.Generator) -> Segment:
-    speed, turn, seconds = rng.uniform([0.93, 0.9, 0.95], [1.07, 1.1, 1.05])
+def _vary(segment: Segment, mirror: float, stretch: float, rng: np.random.Generator) -> Segment:
+    """The segment with speed, turn and length changed by random factors. mirror: -1 to mirror it, else 1."""
+    speed_factor, turn_factor, time_factor = rng.uniform([0.93, 0.9, 0.95], [1.07, 1.1, 1.05])
     return replace(
         segment,
-        speed=segment.speed * speed,
-        turn=segment.turn * turn * side,
-        seconds=segment.seconds * seconds * pace,
-        heading=segment.heading * side,
+        speed=segment.speed * speed_factor,
+        turn=segment.turn * turn_factor * mirror,
+        seconds=segment.seconds * time_factor * stretch,
+        heading=segment.heading * mirror,
     )
 
 
-def generator(seed: int, clip: str, purpose: str) -> np.random.Generator:
+def random_generator(seed: int, clip: str, purpose: str) -> np.random.Generator:
     """The random generator of one clip for one purpose. It is the same on every machine and in every run."""
     return np.random.default_rng([seed, zlib.crc32(clip.encode()), zlib.crc32(purpose.encode())])

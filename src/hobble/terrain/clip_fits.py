@@ -1,7 +1,7 @@
 """Fits the ground under each gait cycle of a clip, and looks up its heights along the trajectory.
 
-A fit is a patch of ground that suits the footsteps of a cycle, corrected to meet the feet. A cycle gets
-several fits, or one if its ground is flat.
+A fit is a patch of ground that suits the footsteps of a cycle, corrected so that it meets the feet. A cycle
+gets several fits, or one if its ground is flat.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ from hobble.core.files import save_npz
 from hobble.core.quat import Array
 from hobble.motion.root import RootFrames, extend_root, root_frames
 from hobble.terrain.cycle_ground import Ground, fit_cycle, flat_ground
-from hobble.terrain.fit_picture import FitPicture, picture_cycles, picture_of
+from hobble.terrain.fit_picture import FitPicture, cycles_to_picture, make_picture
 from hobble.terrain.options import Fitting, HeightSampling
 from hobble.terrain.patches import Patches
 from hobble.terrain.soles import Feet, Mask, find_soles, held_above_other
@@ -33,14 +33,16 @@ REMAKE = "Delete the motion and the labels of this clip; the next run makes both
 class ClipFits:
     """The terrain fits of a clip with C cycles and R rows. A row is a frame of a cycle.
 
-    frame, cycle, fits: (R,) the row's frame, its cycle, and how many fits it has. heights: (sum of fits, 36)
-    cm in the clip's world, for 12 samples to the left of the path, then on it, then to its right; the fits of
-    a row are consecutive.
-    patch, error: (C, 10) index of each fit's patch, and the fit's error, cm²; -1 and 0 on flat ground.
-    foot_error: (C, 10, 2) mean and largest distance of a foot in contact from the ground, cm.
-    foot_below: (C, 10) how far the lowest foot, in contact or not, is below the ground, cm; at least 0.
+    frame, cycle, fits: (R,) the row's frame, the number of its cycle, and how many fits it has.
+    heights: (sum of `fits`, 36) heights of the ground, cm, in the clip's world. There is a line for each fit
+    of each row. The lines of a row are consecutive. A line has 12 points to the left of the path, then 12 on
+    the path, then 12 to its right.
+    patch, error: (C, K) index of each fit's patch, and the fit's error, cm²; -1 and 0 on flat ground. K is
+    the option `fits`. On flat ground the only fit of a cycle is repeated K times.
+    foot_error: (C, K, 2) mean and largest distance of a foot in contact from the ground, cm.
+    foot_below: (C, K) how far the lowest foot, in contact or not, is below the ground, cm; at least 0.
     heel_height, toe_height: height of these joints above their soles, cm.
-    pictures: of the fits of some cycles, for the report.
+    pictures: data for pictures of some fits, for the report.
     """
 
     frame: np.ndarray = field(repr=False)
@@ -66,16 +68,18 @@ def clip_fits(
 ) -> ClipFits:
     """Fit the ground under every cycle of a clip.
 
-    labels: `contacts` (F, 4) and `cycles` (C, 2). ground: "flat", "rocky", "jumpy" or "beam".
+    labels: `contacts` (F, 4) bool, and `cycles` (C, 2), the first and last frame of each cycle. ground:
+    "flat", "rocky", "jumpy" or "beam".
     Raises InputError if the labels do not belong to the clip, or if there are fewer patches than fits.
     """
     cycles, contacts = np.asarray(labels["cycles"], int), np.asarray(labels["contacts"], bool)
     window = sampling.window
-    _check(clip, cycles, contacts)
+    _check_labels(clip, cycles, contacts)
     if len(patches) < options.fits:
         raise InputError(
             "terrain.patches",
             f"{len(patches)} patches are fewer than the {options.fits} fits of a cycle",
+            fix="Raise terrain.patches or lower terrain.fits.",
         )
     root = extend_root(root_frames(clip, sampling.facing_sigma), window)
     samples = sample_points(root, sampling.terrain_side)
@@ -83,15 +87,16 @@ def clip_fits(
     offsets = np.arange(-window, window, sampling.step)
     heights: list[Array] = [np.zeros((0, 3 * len(offsets)))]
     fitted, pictures = [], []
-    shown = picture_cycles(len(cycles))
+    shown = cycles_to_picture(len(cycles))
     for c, (start, end) in enumerate(cycles):
         around = _fitted_frames(start, end, window, len(clip))
-        fit = _fit_ground(feet, around, samples[:, window:-window], patches, ground, options)
+        samples_of_clip = samples[:, window:-window]  # without the frames before and after it
+        fit = _fit_ground(feet, around, samples_of_clip, patches, ground, options)
         heights.append(heights_under(fit, samples, start + window, end + window, offsets))
         fitted.append((fit, feet.soles[around], feet.contacts[around]))
         if c in shown and np.any(heights[-1]):
-            pictures.append(picture_of(clip, c, fit, feet, around))
-    frame, cycle = _rows(cycles)
+            pictures.append(make_picture(clip, c, fit, feet, around))
+    frame, cycle = _frame_and_cycle_of_rows(cycles)
     fits = ClipFits(
         frame=frame,
         cycle=cycle,
@@ -107,15 +112,18 @@ def clip_fits(
 
 
 def _warn_if_off_ground(name: str, fits: ClipFits, deepest: float | None) -> None:
-    """Log a warning if the ground does not meet the feet within `deepest` cm.
+    """Log a warning if the ground does not meet the feet. deepest: cm; None: log nothing.
 
-    That is, if feet in contact are on average further than this from it, or any foot is further below it.
+    The ground does not meet the feet if the mean distance of feet in contact from it is more than `deepest`,
+    or if any foot is more than `deepest` below it.
     """
     if deepest is None or not len(fits.patch):
         return
     mean, below = float(fits.foot_error[..., 0].mean()), float(fits.foot_below.max())
-    if max(mean, below) > 1.001 * deepest:
-        text = "%s: on average, feet in contact are %.2f cm from the ground; the lowest foot is %.2f cm below"
+    if max(mean, below) > 1.001 * deepest:  # the factor allows for rounding
+        text = (
+            "%s: on average, feet in contact are %.2f cm from the ground; the lowest foot is %.2f cm below it"
+        )
         log.warning(text, name, mean, below)
 
 
@@ -124,9 +132,9 @@ def _standing_feet(
 ) -> Feet:
     """The soles of a clip, and which of them stand on the ground.
 
-    On flat ground, a joint in contact does not count if the other joint of its foot is in contact, too, and
-    more than `options.held_up` cm lower. If no joint is in contact in a cycle and its window, the lowest 5 %
-    of the sole positions count. window: frames before and after a cycle.
+    On flat ground, a joint in contact does not count as standing if the other joint of its foot is in
+    contact, too, and more than `options.held_up` cm lower. If no joint is in contact in a cycle and its
+    window, the lowest 5 % of the sole positions count as standing. window: frames before and after a cycle.
     """
     counted = np.zeros(len(clip), bool)
     for start, end in cycles:
@@ -147,7 +155,7 @@ def _standing_feet(
     for start, end in cycles:
         around = _fitted_frames(start, end, window, len(clip))
         if not contacts[around].any():
-            text = "%s: no contact in frames %d to %d; the lowest positions of the feet are used"
+            text = "%s: no contact in frames %d to %d; the lowest positions of the feet count as contacts"
             log.warning(text, clip.name, start, end)
             height = feet.soles[around][..., 1]
             contacts[around] = height <= np.quantile(height, 0.05)
@@ -155,14 +163,21 @@ def _standing_feet(
 
 
 def _fitted_frames(start: int, end: int, window: int, frames: int) -> slice:
-    """The frames that the ground is fitted to: the cycle, inclusive, and `window` frames on each side."""
+    """The frames that the ground is fitted to: `start` to `end`, and `window` frames before and after these.
+
+    frames: number of frames of the clip.
+    """
     return slice(max(start - window, 0), min(end + window + 1, frames))
 
 
 def _fit_ground(
     feet: Feet, around: slice, samples: Array, patches: Patches, kind: str, options: Fitting
 ) -> Ground:
-    """The fits of one cycle. around: the frames to fit to. samples: (3, F, 2) as from `sample_points`."""
+    """The ground of one cycle, with all its fits.
+
+    around: the frames to fit to. samples: (3, F, 2) as from `sample_points`, for the F frames of the clip.
+    kind: "flat", "rocky", "jumpy" or "beam".
+    """
     soles, contacts = feet.soles[around], feet.contacts[around]
     smoothing, deepest = options.smoothing, options.deepest
     if kind == "flat":
@@ -191,7 +206,11 @@ def _fit_ground(
 
 
 def _fit_statistics(fitted: Sequence[tuple[Ground, Array, Mask]], fits: int) -> dict[str, Any]:
-    """The fields patch to foot_below of `ClipFits`. The only fit of a flat cycle is repeated `fits` times."""
+    """The fields patch, error, foot_error and foot_below of `ClipFits`.
+
+    fitted: for each cycle, its ground, and the soles and contacts in its frames and window. fits: number of
+    fits of a cycle. The only fit of a cycle on flat ground is repeated this many times.
+    """
     patch, error = np.zeros((len(fitted), fits), np.int32), np.zeros((len(fitted), fits), np.float32)
     foot_error, foot_below = np.zeros((*error.shape, 2), np.float32), np.zeros_like(error)
     for c, (ground, soles, contacts) in enumerate(fitted):
@@ -210,9 +229,9 @@ def sample_points(root: RootFrames, side: float) -> Array:
 
 
 def heights_under(ground: Ground, samples: Array, start: int, end: int, offsets: np.ndarray) -> Array:
-    """Ground heights (rows * fits, 3 * len(offsets)), cm, for the rows of one cycle.
+    """Ground heights (rows * fits, 3 * len(offsets)), cm, for the rows of one cycle, as in `ClipFits`.
 
-    Rows share points of the path, and each point is looked up only once.
+    Neighbouring rows share points. Each point is looked up only once.
 
     samples: (3, F, 2) from `sample_points`. start, end: first and last frame of the cycle, as indices into
     axis 1 of `samples`. offsets: frames of the points of a row, relative to the row's frame.
@@ -220,11 +239,11 @@ def heights_under(ground: Ground, samples: Array, start: int, end: int, offsets:
     first, last = start + offsets[0], end + offsets[-1]
     points = samples[:, first : last + 1]
     heights = ground.at(points.reshape(-1, 2)).reshape(-1, 3, points.shape[1])
-    at = np.arange(start, end + 1)[:, None] + offsets - first
-    return np.moveaxis(heights[:, :, at], 2, 0).reshape(-1, 3 * len(offsets))
+    point_of_row = np.arange(start, end + 1)[:, None] + offsets - first
+    return np.moveaxis(heights[:, :, point_of_row], 2, 0).reshape(-1, 3 * len(offsets))
 
 
-def _rows(cycles: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def _frame_and_cycle_of_rows(cycles: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """The frame (R,) and the number of the cycle (R,) of each row."""
     frames = [np.arange(start, end + 1) for start, end in cycles]
     numbers = [np.full(len(f), c) for c, f in enumerate(frames)]
@@ -235,7 +254,8 @@ def _rows(cycles: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     )
 
 
-def _check(clip: Clip, cycles: np.ndarray, contacts: Mask) -> None:
+def _check_labels(clip: Clip, cycles: np.ndarray, contacts: Mask) -> None:
+    """Raise InputError if contacts or cycles do not match the frames of the clip."""
     if contacts.shape != (len(clip), 4):
         raise InputError(
             clip.name,
@@ -253,7 +273,7 @@ def _check(clip: Clip, cycles: np.ndarray, contacts: Mask) -> None:
 
 
 def save_fits(path: str | Path, fits: ClipFits) -> None:
-    """Write the fits as one npz file. Its arrays picture0_x, picture0_z, ..., picture1_x are the pictures."""
+    """Write the fits as one npz file. Pictures are arrays picture0_x, picture0_z, ..., picture1_x, ..."""
     arrays = {f.name: np.asarray(getattr(fits, f.name)) for f in fields(fits) if f.name != "pictures"}
     for k, picture in enumerate(fits.pictures):
         arrays |= {f"picture{k}_{f.name}": np.asarray(getattr(picture, f.name)) for f in fields(picture)}

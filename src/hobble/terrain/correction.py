@@ -1,8 +1,8 @@
-"""Corrects the chosen patch so that the ground meets the feet.
+"""Corrects the patch that was chosen for a gait cycle, so that the ground meets the feet.
 
-First, as in Holden et al. (2017), a surface of radial basis functions is fitted to the residual, which is the
-distances that are left between feet in contact and the ground. This surface is added to the ground. Then the
-ground is lowered around feet that are still below it.
+First, as in Holden et al. (2017), a surface of radial basis functions is fitted to the residual: the heights
+of feet in contact above the ground. This surface is added to the ground. Then, where a foot is still too far
+below the ground, a pit is dug: the ground is lowered to a cone around the foot.
 """
 
 from __future__ import annotations
@@ -15,8 +15,8 @@ from hobble.core.quat import Array
 from hobble.terrain.soles import Mask
 
 WALL_STEEPNESS = 2.0  # least steepness of the walls of a pit, cm per cm
-# A surface that leaves too much residual is fitted again, each time with a quarter of the smoothing, at most
-# this many times.
+# A surface that leaves too large a residual is fitted again with a quarter of the smoothing, at most this
+# many times.
 MAX_REFITS = 8
 
 
@@ -24,7 +24,8 @@ MAX_REFITS = 8
 class Stances:
     """Positions of soles, gathered into N points, for example one for each contact of a foot joint.
 
-    place: (N, 2) x and z, cm. height: (N,) of the sole, cm. count: (N,) number of frames, used as a weight.
+    place: (N, 2) x and z, cm. height: (N,) of the sole, cm. count: (N,) number of frames of each point, which
+    is its weight.
     """
 
     place: Array = field(repr=False)
@@ -41,15 +42,15 @@ def gather_stances(soles: Array, contacts: Mask, longest: int) -> Stances:
     frame, joint = np.nonzero(contacts)
     order = np.lexsort((frame, joint))
     frame, joint = frame[order], joint[order]
-    new = np.ones(len(frame), bool)
-    new[1:] = (np.diff(frame) != 1) | (np.diff(joint) != 0)
-    first = np.flatnonzero(new)
-    contact = np.cumsum(new) - 1
-    within = np.arange(len(frame)) - first[contact]
-    piece = np.cumsum(new | (within % longest == 0)) - 1
-    count = np.bincount(piece)
-    points = soles[frame, joint]
-    mean = [np.bincount(piece, points[:, k]) / count for k in range(3)]
+    begins = np.ones(len(frame), bool)  # whether a contact begins at this entry
+    begins[1:] = (np.diff(frame) != 1) | (np.diff(joint) != 0)
+    first = np.flatnonzero(begins)
+    contact = np.cumsum(begins) - 1
+    frames_since_begin = np.arange(len(frame)) - first[contact]
+    point = np.cumsum(begins | (frames_since_begin % longest == 0)) - 1
+    count = np.bincount(point)
+    positions = soles[frame, joint]
+    mean = [np.bincount(point, positions[:, k]) / count for k in range(3)]
     return Stances(np.stack([mean[0], mean[2]], axis=1), mean[1], count.astype(float))
 
 
@@ -64,7 +65,7 @@ def join_points(a: Stances, b: Stances) -> Stances:
 
 @dataclass(frozen=True)
 class Surface:
-    """A surface of radial basis functions phi(r) = r / spread around N places, r being the distance.
+    """A surface: the weighted sum of r / spread over N places, where r is the distance from the place.
 
     places: (N, 2) x and z, cm. weights: (N,). spread: mean distance between the places, cm.
     """
@@ -83,36 +84,39 @@ class Surface:
 def fit_surfaces(
     points: Stances, residual: Array, smoothing: float, most: float | None = None, standing: int | None = None
 ) -> list[Surface]:
-    """One surface for each row of `residual` (K, N) at N points, regularised by `smoothing`.
+    """One surface for each row of `residual` (K, N), the heights that it should have at N points, cm.
 
-    A point with count m has smoothing / m on the diagonal of the system, and the weight m in the mean
-    distance. This gives exactly the surface of m points at one place.
+    smoothing: regularisation. A point with count m has smoothing / m on the diagonal of the system of
+    equations, and the weight m in the mean distance between points. So the surface is exactly that of m
+    points at one place.
 
-    most: largest mean distance, cm, that a surface may leave to the points; None: no limit. A surface that
-    leaves more is fitted again with less smoothing. This happens, for example, if feet stand half a metre
-    beside a beam. standing: the mean is taken over this many points, from the first on; None: all.
+    most: largest mean difference, cm, that may be left between a surface and its residual; None: no limit. A
+    surface that leaves more is fitted again with less smoothing. This happens, for example, if feet stand
+    half a metre beside a beam. standing: the mean is taken over the first `standing` points; None: all.
     """
     apart = distances(points.place, points.place)
     spread = float(points.count @ apart @ points.count / points.count.sum() ** 2)
-    if spread < 1e-6:
+    if spread < 1e-6:  # all points are at one place, so no surface can be fitted
         return [Surface(points.place[:1], np.zeros(1), 1.0)] * len(residual)
     diagonal = smoothing / points.count
     weights = np.linalg.solve(apart / spread - np.diag(diagonal), residual.T).T
     share = points.count[:standing] / points.count[:standing].sum()
-    rough = np.arange(len(residual)) if most is not None else np.zeros(0, int)
+    # Indices of the surfaces that may leave too much.
+    refit = np.arange(len(residual)) if most is not None else np.zeros(0, int)
     for _ in range(MAX_REFITS):
-        left = np.sum(np.abs(weights[rough] * diagonal)[:, :standing] * share, axis=1)  # mean residual, cm
-        rough = rough[left > (most or 0.0)]
-        if not len(rough):
+        # The system of equations is surface - diagonal * weights = residual, so diagonal * weights is left.
+        mean_left = np.sum(np.abs(weights[refit] * diagonal)[:, :standing] * share, axis=1)  # cm
+        refit = refit[mean_left > (most or 0.0)]
+        if not len(refit):
             break
         diagonal = diagonal / 4
-        weights[rough] = np.linalg.solve(apart / spread - np.diag(diagonal), residual[rough].T).T
+        weights[refit] = np.linalg.solve(apart / spread - np.diag(diagonal), residual[refit].T).T
     return [Surface(points.place, w, spread) for w in weights]
 
 
 @dataclass(frozen=True)
 class Pits:
-    """Cones, open at the top, that cut into the ground.
+    """Cones with the tip at the bottom, down to which the ground is lowered.
 
     places: (N, 2) x and z of the tips, cm. heights: (N,) of the tips, cm. steepness: (N,) cm per cm.
     """
@@ -121,8 +125,8 @@ class Pits:
     heights: Array = field(repr=False)
     steepness: Array = field(repr=False)
 
-    def of(self, ground: Array, points: Array) -> Array:
-        """The heights `ground` (M,) at points (M, 2), lowered to the cones where the ground is above them."""
+    def lower(self, ground: Array, points: Array) -> Array:
+        """(M,) at points (M, 2): the lowest of the heights `ground` (M,) and the cones."""
         from hobble.terrain.kernels import lowest_cone
 
         if not len(self.places):
@@ -139,8 +143,8 @@ def dig_pits(soles: Array, standing: Stances, depth: float) -> Pits:
     """
     places, heights = soles[:, [0, 2]], soles[:, 1] + depth
     apart = np.maximum(distances(places, standing.place), 1e-3)
-    needed = ((standing.height - heights[:, None]) / apart).max(axis=1)
-    return Pits(places, heights, np.maximum(needed, WALL_STEEPNESS))
+    needed_steepness = ((standing.height - heights[:, None]) / apart).max(axis=1)
+    return Pits(places, heights, np.maximum(needed_steepness, WALL_STEEPNESS))
 
 
 def distances(a: Array, b: Array) -> Array:
@@ -150,4 +154,5 @@ def distances(a: Array, b: Array) -> Array:
 
 
 def _columns(points: Array) -> tuple[Array, Array]:
+    """The x and z of points (M, 2), each (M,)."""
     return np.ascontiguousarray(points[:, 0]), np.ascontiguousarray(points[:, 1])

@@ -1,4 +1,4 @@
-"""The ground under one cycle: the patches that fit it best, corrected to meet the feet."""
+"""Fits the ground under one cycle: finds the patches that suit it best, and makes them meet the feet."""
 
 from __future__ import annotations
 
@@ -21,11 +21,11 @@ from hobble.terrain.correction import (
 from hobble.terrain.patches import Patches
 from hobble.terrain.soles import Mask
 
-STANCE_FRAMES = 8  # at most this many frames of a stance are averaged to one point
-COVERED_FRAMES = 4  # at most this many frames of a foot below the ground are averaged to one point
-# This far to the sides of a path on a beam, the ground must be far below the beam.
+STANCE_FRAMES = 8  # at most this many frames of a foot in contact are averaged to one point
+COVERED_FRAMES = 4  # the same for a foot that is below the ground
+# cm: at these distances to the sides of a path on a beam, the ground must be far below the beam.
 BEAM_SIDE_CM = (35.0, 50.0)
-# Points beside the path are left out if another part of the path is closer than this.
+# cm: points beside the path are left out if another part of the path, and so the beam, is closer than this.
 PATH_CLEARANCE_CM = 25.0
 
 
@@ -36,7 +36,7 @@ class Ground:
     patches: all patches; None for flat ground. chosen, error: (K,) indices of the fitted patches and their
     errors, best first. centre: (2,) x and z of the middle of the patches, cm. level: (K,) height that is
     added to each patch, cm. surfaces: for each fit, the surface that is added so that the ground meets
-    the feet. pits: for each fit, the pits in the ground. Both may be empty.
+    the feet; empty if none is added. pits: for each fit, the pits in the ground; empty if there are none.
     """
 
     patches: Patches | None = field(repr=False)
@@ -55,11 +55,11 @@ class Ground:
         for k, surface in enumerate(self.surfaces):
             heights[k] += surface.at(points)
         for k, pit in enumerate(self.pits):
-            heights[k] = pit.of(heights[k], points)
+            heights[k] = pit.lower(heights[k], points)
         return heights
 
     def above(self, soles: Array) -> Array:
-        """(K, ...) height of the ground above each sole (..., 3), cm; negative if the sole is higher."""
+        """(K, ...) height of the ground above each sole (..., 3), cm; negative if the ground is lower."""
         heights = self.at(soles[..., [0, 2]].reshape(-1, 2))
         return heights.reshape(-1, *soles.shape[:-1]) - soles[..., 1]
 
@@ -76,12 +76,13 @@ def fit_cycle(
     smoothing: float,
     deepest: float | None,
 ) -> Ground:
-    """Fit the ground under one cycle and its window.
+    """Fit the ground under one cycle and the frames around it, T frames together.
 
-    soles: (T, 4, 3) of heels and toes in T frames, cm. contacts: (T, 4) bool, at least one true. path: (T, 2)
-    x and z of the root. sides: (T, 2) unit vectors to the left of the path. kind: "rocky", "jumpy" or "beam";
-    "jumpy" and "beam" add terms to the error. fits: number of fits. smoothing: regularisation of the surfaces
-    that are added. deepest: how far a foot may be below the ground, cm; None: no limit.
+    soles: (T, 4, 3) positions of the soles at heels and toes, cm. contacts: (T, 4) bool, at least one true.
+    path: (T, 2) x and z of the root. sides: (T, 2) unit vectors to the left of the path. kind: "rocky",
+    "jumpy" or "beam"; "jumpy" and "beam" add terms to the error. fits: number of fits. smoothing:
+    regularisation of the surfaces that are added. deepest: how far a foot may be below the ground, cm; None:
+    no limit.
     """
     from hobble.terrain.search import (  # here, because it loads compiled code, which flat clips do not need
         FootPoints,
@@ -91,13 +92,14 @@ def fit_cycle(
     where, height = soles[..., [0, 2]], soles[..., 1]
     centre, level = where[contacts].mean(axis=0), height[contacts].mean()
     cells = patches.cells(where.reshape(-1, 2), centre).reshape(where.shape)
-    table = np.concatenate([cells, (height - level)[..., None]], axis=-1)
+    foot_points = np.concatenate([cells, (height - level)[..., None]], axis=-1)
     beam_sides = beam_side_points(patches, path, sides, centre) if kind == "beam" else np.zeros((0, 4))
-    footing = FootPoints(table[contacts], table[~contacts], kind == "jumpy", beam_sides)
+    footing = FootPoints(foot_points[contacts], foot_points[~contacts], kind == "jumpy", beam_sides)
     chosen, error = best_patches(patches, footing, fits)
+    # Mean height of each patch under the feet in contact, subtracted to make the patch level with the feet.
     patch_level = patches.at(chosen, cells[contacts]).mean(axis=1, dtype=float)
-    plain = Ground(patches, chosen, error, centre, level - patch_level)
-    return meet_feet(plain, soles, contacts, smoothing, deepest)
+    uncorrected = Ground(patches, chosen, error, centre, level - patch_level)
+    return meet_feet(uncorrected, soles, contacts, smoothing, deepest)
 
 
 def flat_ground(
@@ -106,70 +108,89 @@ def flat_ground(
     """Flat ground, with one fit.
 
     soles, contacts, smoothing, deepest: see `fit_cycle`. level: "zero", or "feet" for the mean height of the
-    soles in contact, as in Holden et al. (2017). They compute contacts from velocities, of which the last
-    frame has none. As there, the last frame gets the contacts of the frame before.
+    soles in contact, as in Holden et al. (2017). They compute contacts from velocities, and the last frame
+    has no velocity. So for this mean, as in their work, the last frame gets the contacts of the frame before
+    it.
 
-    correct: whether to correct the ground. If the feet in contact are more than `deepest` cm from it on
-    average (an uneven floor or capture), a surface is added. Otherwise pits are dug under feet that are more
-    than `deepest` below the ground.
+    correct: whether to correct the ground. If the feet in contact are on average more than `deepest` cm from
+    it (because the floor or the capture is uneven), a surface is added and pits are dug where a foot is still
+    too low. Otherwise only pits are dug, under feet that are more than `deepest` below the ground.
     """
     heights = soles[..., 1]
     by_velocity = np.concatenate([contacts[:-1], contacts[-2:-1]])
-    flat = heights[by_velocity if by_velocity.any() else contacts].mean() if level == "feet" else 0.0
-    plain = Ground(None, np.array([-1]), np.zeros(1), np.zeros(2), np.array([flat]))
+    height = heights[by_velocity if by_velocity.any() else contacts].mean() if level == "feet" else 0.0
+    uncorrected = Ground(None, np.array([-1]), np.zeros(1), np.zeros(2), np.array([height]))
     if deepest is None or not correct:
-        return plain
-    if np.abs(heights[contacts] - flat).mean() > deepest:
-        return meet_feet(plain, soles, contacts, smoothing, deepest)
-    return replace(plain, pits=_pits(plain, soles, gather_stances(soles, contacts, STANCE_FRAMES), deepest))
+        return uncorrected
+    if np.abs(heights[contacts] - height).mean() > deepest:
+        return meet_feet(uncorrected, soles, contacts, smoothing, deepest)
+    return replace(
+        uncorrected,
+        pits=_dig_pits_for_each_fit(
+            uncorrected, soles, gather_stances(soles, contacts, STANCE_FRAMES), deepest
+        ),
+    )
 
 
-def meet_feet(plain: Ground, soles: Array, contacts: Mask, smoothing: float, deepest: float | None) -> Ground:
+def meet_feet(
+    uncorrected: Ground, soles: Array, contacts: Mask, smoothing: float, deepest: float | None
+) -> Ground:
     """Correct the ground so that it meets the feet in contact.
 
-    A smooth surface is fitted to the residual at the contacts, so that at most deepest / 2 is left on
-    average. If feet are then more than deepest / 2 below the ground, they are added to the points and the
-    surface is fitted again. Feet that are still more than `deepest` below the ground get pits.
+    A smooth surface is fitted to the residual, the heights of feet in contact above the ground. At most
+    deepest / 2 of it is left on average. If feet are then more than deepest / 2 below the ground, they are
+    added to the points and the surface is fitted again. Pits are dug for feet that are still more than
+    `deepest` below the ground. If `deepest` is None, one surface is fitted, without a limit.
     """
     standing = gather_stances(soles, contacts, STANCE_FRAMES)
-    residual = standing.height - plain.at(standing.place)
+    residual = standing.height - uncorrected.at(standing.place)
     most = None if deepest is None else deepest / 2
-    ground = replace(plain, surfaces=fit_surfaces(standing, residual, smoothing, most))
+    ground = replace(uncorrected, surfaces=fit_surfaces(standing, residual, smoothing, most))
     if deepest is None:
         return ground
     surfaces = [
-        _refitted(plain, k, standing, gather_stances(soles, c & ~contacts, COVERED_FRAMES), smoothing, most)
-        if c.any()
+        _refit_surface(
+            uncorrected,
+            k,
+            standing,
+            gather_stances(soles, covered & ~contacts, COVERED_FRAMES),
+            smoothing,
+            most,
+        )
+        if covered.any()
         else surface
-        for k, (c, surface) in enumerate(zip(ground.above(soles) > deepest / 2, ground.surfaces, strict=True))
+        for k, (covered, surface) in enumerate(
+            zip(ground.above(soles) > deepest / 2, ground.surfaces, strict=True)
+        )
     ]
-    ground = replace(plain, surfaces=surfaces)
-    return replace(ground, pits=_pits(ground, soles, standing, deepest))
+    ground = replace(uncorrected, surfaces=surfaces)
+    return replace(ground, pits=_dig_pits_for_each_fit(ground, soles, standing, deepest))
 
 
-def _pits(ground: Ground, soles: Array, standing: Stances, deepest: float) -> list[Pits]:
-    """For each fit, the pits for feet that are more than `deepest` below the ground.
+def _dig_pits_for_each_fit(ground: Ground, soles: Array, standing: Stances, deepest: float) -> list[Pits]:
+    """For each fit, pits for the feet that are more than `deepest` below the ground.
 
-    A pit lowers the ground so far that these feet are only deepest / 2 below it.
+    In a pit the ground is lowered until the foot is only deepest / 2 below it.
     """
     return [dig_pits(soles[covered], standing, deepest / 2) for covered in ground.above(soles) > deepest]
 
 
-def _refitted(
-    plain: Ground, k: int, standing: Stances, covered: Stances, smoothing: float, most: float | None
+def _refit_surface(
+    uncorrected: Ground, k: int, standing: Stances, covered: Stances, smoothing: float, most: float | None
 ) -> Surface:
-    """The surface of fit k, fitted to the feet in contact and to the feet that were below the ground."""
+    """The surface of fit k, fitted to feet in contact, `standing`, and feet below the ground, `covered`."""
     points = join_points(standing, covered)
-    residual = points.height - plain.at(points.place)[k]
+    residual = points.height - uncorrected.at(points.place)[k]
     return fit_surfaces(points, residual[None], smoothing, most, len(standing.count))[0]
 
 
 def beam_side_points(patches: Patches, path: Array, sides: Array, centre: Array) -> Array:
-    """(N, 4) points beside a path on a beam, at which the ground has to be far below the beam.
+    """(N, 4) points beside a path on a beam, at which the ground must be far below the beam.
 
     Columns: u and v of the point, then u and v of the path beside it, in cells from the middle of the patch.
+    path, sides: see `fit_cycle`. centre: (2,) x and z of the middle of the patch, cm.
     """
-    off = np.concatenate([path + sign * d * sides for d in BEAM_SIDE_CM for sign in (1, -1)])
-    on = np.tile(path, (2 * len(BEAM_SIDE_CM), 1))
-    free = distances(off, path).min(axis=1) > PATH_CLEARANCE_CM
-    return np.concatenate([patches.cells(off[free], centre), patches.cells(on[free], centre)], axis=1)
+    beside = np.concatenate([path + sign * d * sides for d in BEAM_SIDE_CM for sign in (1, -1)])
+    on_path = np.tile(path, (2 * len(BEAM_SIDE_CM), 1))
+    free = distances(beside, path).min(axis=1) > PATH_CLEARANCE_CM
+    return np.concatenate([patches.cells(beside[free], centre), patches.cells(on_path[free], centre)], axis=1)

@@ -1,4 +1,4 @@
-"""Data for a picture of a fit: the ground as a grid, the feet over time, and three poses."""
+"""Data for a picture of a fit of the ground: heights on a grid, the feet over time, and three poses."""
 
 from __future__ import annotations
 
@@ -19,10 +19,10 @@ MARGIN_CM = 60.0  # the grid reaches this far beyond the feet
 class FitPicture:
     """The best fit of one cycle, in centimetres in the clip's world.
 
-    cycle: its number in the clip. x, z: (G,) coordinates of the grid. ground: (G, G) heights at x[i], z[j].
-    soles, contacts: (T, 4, 3) and (T, 4), in the T frames of the cycle and its window. pose: (3, J, 3)
-    joint positions after a quarter, half and three quarters of the frames. parents: (J,) parent of each
-    joint.
+    cycle: number of the cycle in the clip. x, z: (G,) coordinates of the grid. ground: (G, G) height at each
+    x[i], z[j]. soles, contacts: (T, 4, 3) and (T, 4), in the T frames that the ground is fitted to. pose:
+    (3, J, 3) joint positions after a quarter, half and three quarters of these frames. parents: (J,) index of
+    each joint's parent.
     """
 
     cycle: int
@@ -35,13 +35,13 @@ class FitPicture:
     parents: np.ndarray = field(repr=False)
 
 
-def picture_cycles(cycles: int) -> set[int]:
-    """The cycles of a clip that get a picture: one from the first half and one from the second."""
-    return {cycles // 4, (3 * cycles) // 4} if cycles > 1 else set(range(cycles))
+def cycles_to_picture(count: int) -> set[int]:
+    """Numbers of the cycles that get a picture: one in each half of the `count` cycles of a clip."""
+    return {count // 4, (3 * count) // 4} if count > 1 else set(range(count))
 
 
-def picture_of(clip: Clip, cycle: int, ground: Ground, feet: Feet, around: slice) -> FitPicture:
-    """The picture of the best fit of a cycle. around: the frames that it was fitted to."""
+def make_picture(clip: Clip, cycle: int, ground: Ground, feet: Feet, around: slice) -> FitPicture:
+    """The picture of the best fit of a cycle. around: the frames that the ground was fitted to."""
     soles = feet.soles[around]
     low, high = (
         soles[..., [0, 2]].min(axis=(0, 1)) - MARGIN_CM,

@@ -1,6 +1,6 @@
-"""Generated ground: fractal noise, hills, stairs, slopes, boxes and beams, from a seed.
+"""Generates heightmaps of six kinds from a seed: fractal noise, hills, stairs, slopes, boxes and beams.
 
-Heights are chosen so that most patches of 5 x 5 m stay within 50 cm of their mean.
+Heights are chosen so that most patches of 5 x 5 m stay within 50 cm of their mean. Others are not used.
 """
 
 from __future__ import annotations
@@ -12,11 +12,11 @@ import numpy as np
 
 from hobble.core.quat import Array
 
-CELLS = 400  # rows, and also columns, of a map
+CELLS = 400  # number of rows, and of columns, of a map
 
 
-def generate(kind: str, seed: int, cell: float) -> Array:
-    """(400, 400) heights of one kind of ground, cm. Equal arguments give equal ground.
+def generate_heights(kind: str, seed: int, cell: float) -> Array:
+    """(400, 400) heights of one kind of ground, cm. Equal arguments give equal heights.
 
     kind: a key of KINDS. cell: width of a cell, cm.
     """
@@ -25,17 +25,17 @@ def generate(kind: str, seed: int, cell: float) -> Array:
 
 
 def fractal(rng: np.random.Generator, cell: float) -> Array:
-    """Noise like rough soil: its amplitude is 1 / frequency², but constant for waves longer than 8 m."""
+    """Noise like rough soil. Its amplitude is 1 / frequency², and constant for waves longer than 8 m."""
     frequency = np.hypot(np.fft.fftfreq(CELLS, cell)[:, None], np.fft.rfftfreq(CELLS, cell))
     amplitude = 1 / np.maximum(frequency, 1 / 800) ** 2
     amplitude[0, 0] = 0
     noise = np.fft.irfft2(amplitude * np.fft.rfft2(rng.normal(size=(CELLS, CELLS))), (CELLS, CELLS))
-    return noise / noise.std() * rng.uniform(12, 18)
+    return noise / noise.std() * rng.uniform(12, 18)  # standard deviation 12 to 18 cm
 
 
 def hills(rng: np.random.Generator, cell: float) -> Array:
     """Round hills and hollows, 0.6 to 2 m in radius, up to 35 cm high."""
-    x, z = _grid(cell)
+    x, z = _cell_positions(cell)
     heights = np.zeros_like(x)
     for _ in range(60):
         centre = rng.uniform(0, CELLS * cell, 2)
@@ -45,24 +45,25 @@ def hills(rng: np.random.Generator, cell: float) -> Array:
 
 
 def stairs(rng: np.random.Generator, cell: float) -> Array:
-    """Lanes side by side. In each lane, a flight of 3 to 5 steps goes up or down, and the next one back."""
+    """Lanes side by side. In each lane, a flight of 3 to 5 steps goes up or down; the next one goes back."""
     heights = np.zeros((CELLS, CELLS))
     along = np.arange(CELLS) * cell
     lane = 0
     while lane < CELLS:
         width = int(rng.uniform(200, 400) / cell)
+        # Each step begins at an edge and has a level. position: along the lane, cm.
         edges, levels, level = [], [], 0.0
-        at = -rng.uniform(0, 300)
-        while at < CELLS * cell:
+        position = -rng.uniform(0, 300)
+        while position < CELLS * cell:
             tread, riser = rng.uniform(28, 42), rng.uniform(8, 17) * rng.choice([-1, 1])
             for sign in (1, -1):
                 for _ in range(rng.integers(3, 6)):
-                    if abs(level + sign * riser) > 60:
+                    if abs(level + sign * riser) > 60:  # cm; a flight that would go further ends here
                         break
-                    at, level = at + tread, level + sign * riser
-                    edges.append(at)
+                    position, level = position + tread, level + sign * riser
+                    edges.append(position)
                     levels.append(level)
-                at += rng.uniform(80, 250)
+                position += rng.uniform(80, 250)
         steps = np.concatenate([[0.0], levels])[np.searchsorted(edges, along)]
         heights[lane : lane + width] = steps
         lane += width
@@ -75,9 +76,10 @@ def slope(rng: np.random.Generator, cell: float) -> Array:
     knots, levels = [0.0], [0.0]
     while knots[-1] < along[-1]:
         length, steepness = rng.uniform(100, 400), np.tan(np.radians(rng.uniform(2, 12)))
-        up = -np.sign(levels[-1]) if abs(levels[-1]) > 30 else rng.choice([-1, 1])
+        # 1 for up, -1 for down; from beyond 30 cm, a ramp leads back.
+        direction = -np.sign(levels[-1]) if abs(levels[-1]) > 30 else rng.choice([-1, 1])
         knots.append(knots[-1] + length)
-        levels.append(levels[-1] + up * steepness * length)
+        levels.append(levels[-1] + direction * steepness * length)
     across = along * np.tan(np.radians(rng.uniform(-5, 5)))
     return np.interp(along, knots, levels)[:, None] + across[None]
 
@@ -94,7 +96,7 @@ def boxes(rng: np.random.Generator, cell: float) -> Array:
 
 def beams(rng: np.random.Generator, cell: float) -> Array:
     """Crossing beams, 20 to 35 cm wide and 45 to 55 cm above the floor."""
-    x, z = _grid(cell)
+    x, z = _cell_positions(cell)
     heights = np.zeros_like(x)
     for _ in range(9):
         angle, height = rng.uniform(0, np.pi), rng.uniform(45, 55)
@@ -104,12 +106,14 @@ def beams(rng: np.random.Generator, cell: float) -> Array:
     return heights
 
 
-def _grid(cell: float) -> tuple[Array, Array]:
+def _cell_positions(cell: float) -> tuple[Array, Array]:
+    """x and z of every cell, each (400, 400), cm."""
     along = np.arange(CELLS) * cell
     x, z = np.meshgrid(along, along, indexing="ij")
     return x, z
 
 
+# name -> function of a random generator and the width of a cell, cm
 KINDS: dict[str, Callable[[np.random.Generator, float], Array]] = {
     "fractal": fractal,
     "hills": hills,

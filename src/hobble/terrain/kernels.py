@@ -1,16 +1,18 @@
-"""Compiled loops: heights and errors of patches, and sums over distances.
+"""Compiled loops that compute heights and errors of patches, sums of distances, and heights of cones.
 
-A patch is a view of a heightmap. Its cell (u, v) is counted from the middle of the patch along the world's x
-and z. The affine map A (2, 3) of the patch gives its place in the heightmap: row, column = A (u, v, 1).
+A patch is a view of a heightmap. A cell (u, v) of the patch is counted from its middle, along the world's x
+and z. Its row and column in the heightmap are A (u, v, 1), where A (2, 3) is the affine map of the patch.
 
 The functions `view_...` and `search_views` have these arguments. heights: all heightmaps, one after another,
-in one float32 array. starts, shapes: where each map begins, and its rows and columns. which, affine: map and
-A of each patch. All arguments are plain arrays, so one compiled version serves all data sets. Functions that
-these call get the heights of one map, its rows and columns, and `a`, the two rows of A.
+in one float32 array. starts: (M,) index of the first cell of each of M maps. shapes: (M, 2) rows and columns
+of each map. which: (P,) index of the map of each of P patches. affine: (P, 2, 3) the A of each patch. All
+arguments are arrays or numbers, or tuples of these, so that one compiled version serves all data sets. The
+functions that they call get the heights of one map, its rows and columns, and `a`, the two rows of A.
 
-Everything is in one file because numba renews its cache only if the file of the called function changes. Only
-functions that other modules call are cached, and the others are inlined in them. If those were compiled
-separately, versions from the cache could add up sums in another order, and so round them differently.
+All loops are in one file because numba renews the cache of a function only if the file of this function
+changes. The functions that other modules call are cached. The other functions are not cached, but inlined in
+their callers. If they were compiled and cached separately, they could add up sums in another order, and so
+round them differently.
 """
 
 from __future__ import annotations
@@ -19,16 +21,16 @@ import numpy as np
 
 from hobble.core.compiled import njit
 
-DOWN_WEIGHT = 0.1  # weight of the feet in contact in the error of a patch
+DOWN_WEIGHT = 0.1  # weight of the feet in contact in the error of a patch; the other terms have weight 1
 JUMP_HEIGHT = 5.0  # cm; in jumps the ground should not be further than this below a foot in the air
 BEAM_HEIGHT = 40.0  # cm; next to a beam the ground should be at least this far below it
-FAST = {"reassoc", "contract", "nsz", "nnan"}  # allow vectorised sums; heights are never nan
-ONE = np.uint32(1)
+FAST = {"reassoc", "contract", "nsz", "nnan"}  # LLVM flags that allow vectorised sums; heights are never nan
+ONE = np.uint32(1)  # keeps indices unsigned, see `height`
 
 
 @njit(fastmath=FAST, forceinline=True, cache=False)
 def height(heights, rows, columns, r, c):
-    """Bilinear height of one map at row r, column c (float32, inside the map)."""
+    """Height of one map at row r and column c (float32, inside the map), by bilinear interpolation."""
     i = min(np.int32(r), np.int32(rows - 2))
     j = min(np.int32(c), np.int32(columns - 2))
     fr = r - np.float32(i)
@@ -41,21 +43,21 @@ def height(heights, rows, columns, r, c):
 
 
 @njit(inline="always", cache=False)
-def map_of(heights, starts, shapes, m):
-    """The cells of map m, and its numbers of rows and columns."""
+def cells_of_map(heights, starts, shapes, m):
+    """The heights of the cells of map m, and its numbers of rows and columns."""
     rows, columns = shapes[m, 0], shapes[m, 1]
     return heights[starts[m] : starts[m] + rows * columns], rows, columns
 
 
 @njit
 def view_heights(heights, starts, shapes, which, affine, mean, points):
-    """Heights (P, N) of P patches, each at the same points.
+    """Heights (P, N) of P patches, all at the same points, cm.
 
-    points: (N, 2) in cells from the middle of a patch, inside it. mean: (P,) heights to subtract.
+    points: (N, 2) u and v, inside the patches. mean: (P,) mean height of each patch, which is subtracted.
     """
     out = np.empty((len(which), len(points)), np.float32)
     for p in range(len(which)):
-        cells, rows, columns = map_of(heights, starts, shapes, which[p])
+        cells, rows, columns = cells_of_map(heights, starts, shapes, which[p])
         a = affine[p]
         for n in range(len(points)):
             u, v = points[n, 0], points[n, 1]
@@ -67,17 +69,18 @@ def view_heights(heights, starts, shapes, which, affine, mean, points):
 
 @njit
 def view_extents(heights, starts, shapes, which, affine, size, highest):
-    """Mean height (P,) of P views of `size` x `size` cells, and (P,) whether each stays close to its mean.
+    """Mean height (P,) of P views of `size` x `size` cells, and whether (P,) each view stays near its mean.
 
     A view passes if all its cells are within `highest` cm of the mean. First only every eighth row and column
-    is read. If these cells differ by more than 2 * highest, the view is skipped and its mean is 0.
+    is read. If the heights there differ by more than 2 * highest, the view does not pass. The rest of it is
+    not read, and its mean is given as 0.
     """
     mean = np.zeros(len(which), np.float32)
     passes = np.zeros(len(which), np.bool_)
     half = size // 2
     seen = np.empty(size * size, np.float32)
     for p in range(len(which)):
-        cells, rows, columns = map_of(heights, starts, shapes, which[p])
+        cells, rows, columns = cells_of_map(heights, starts, shapes, which[p])
         a = affine[p]
         low, high = np.float32(np.inf), np.float32(-np.inf)
         for i in range(0, size, 8):
@@ -111,9 +114,9 @@ def view_extents(heights, starts, shapes, which, affine, size, highest):
 
 @njit(fastmath=FAST)
 def distance_sum(x, z, place_x, place_z, weights):
-    """(M,) at each point x, z (M,), the weighted sum of its distances from N places.
+    """(M,) weighted sum of the distances from each of M points to N places.
 
-    place_x, place_z, weights: (N,) of the places.
+    x, z: (M,) of the points. place_x, place_z, weights: (N,) of the places.
     """
     out = np.empty(len(x))
     for m in range(len(x)):
@@ -127,9 +130,10 @@ def distance_sum(x, z, place_x, place_z, weights):
 
 @njit(fastmath=FAST)
 def lowest_cone(x, z, place_x, place_z, heights, steepness):
-    """(M,) at each point x, z (M,), the height of the lowest of N cones that are open at the top.
+    """(M,) height of the lowest of N cones at each of M points, cm. The cones have the tip at the bottom.
 
-    place_x, place_z, heights: (N,) of the tips, cm. steepness: (N,) rise from the tip, cm per cm.
+    x, z: (M,) of the points. place_x, place_z, heights: (N,) of the tips, cm. steepness: (N,) rise from the
+    tip, cm per cm.
     """
     out = np.empty(len(x))
     for m in range(len(x)):
@@ -143,10 +147,10 @@ def lowest_cone(x, z, place_x, place_z, heights, steepness):
 
 @njit(fastmath=FAST, forceinline=True, cache=False)
 def _down_means(heights, rows, columns, a, points):
-    """The first d, the mean of d - first and the mean of (d - first)², over all feet in contact.
+    """Returns `first`, the mean of d - first, and the mean of (d - first)², over all feet in contact.
 
-    d is the height of the patch above a foot. d - first is a small number, so single precision is enough.
-    points: u, v and height of each foot.
+    d is the height of the patch above a foot, cm, and `first` is the d of the first foot. The differences are
+    small numbers, so single precision is enough. points: u, v and height of each foot.
     """
     u, v, foot = points
     (ru, rv, r0), (cu, cv, c0) = a
@@ -164,10 +168,11 @@ def _down_means(heights, rows, columns, a, points):
 
 @njit(fastmath=FAST, forceinline=True, cache=False)
 def _up_sum(heights, rows, columns, a, offset, points, jumps):
-    """Sum of squared heights of the ground above feet in the air.
+    """Sum of squared heights, cm², of the ground above feet in the air.
 
-    Ground below a foot does not count, except in jumps if it is more than JUMP_HEIGHT below. offset: mean
-    height of the patch above the feet in contact, which is subtracted. points: u, v and height of each foot.
+    Ground below a foot does not count. In jumps, ground more than JUMP_HEIGHT below a foot counts by the
+    square of the excess. offset: mean height of the patch above the feet in contact, which is subtracted.
+    points: u, v and height of each foot.
     """
     u, v, foot = points
     (ru, rv, r0), (cu, cv, c0) = a
@@ -184,9 +189,10 @@ def _up_sum(heights, rows, columns, a, offset, points, jumps):
 
 @njit(fastmath=FAST, forceinline=True, cache=False)
 def _beam_side_sum(heights, rows, columns, a, points):
-    """Sum, over points beside the path, of max(0, height - height of the path + BEAM_HEIGHT) squared.
+    """Sum of squares, over points beside the path, of how far the ground is too high there, cm².
 
-    points: u and v of each point, and u and v of the path beside it.
+    It is too high if it is less than BEAM_HEIGHT below the path. points: u and v of each point, and u and v
+    of the path beside it.
     """
     u, v, path_u, path_v = points
     (ru, rv, r0), (cu, cv, c0) = a
@@ -206,9 +212,12 @@ def _beam_side_sum(heights, rows, columns, a, points):
 def _error(heights, rows, columns, a, tables, jumps, limit):
     """The error of one patch, cm², or infinity as soon as it is known to exceed `limit`.
 
-    tables: four tables, each as a tuple of its columns: feet in contact (u, v, height); the feet in the air
-    that are tried first, and the other feet in the air (the same columns); points beside a beam (u, v, and u,
-    v of the path). jumps: whether the ground must not be far below feet in the air.
+    The error is DOWN_WEIGHT times the variance of the patch's height above feet in contact, plus the mean
+    squares of `_up_sum` and `_beam_side_sum`.
+
+    tables: four tables, each as a tuple of its columns. 1: feet in contact (u, v, height). 2: feet in the air
+    that are tried first (u, v, height). 3: the other feet in the air (u, v, height). 4: points beside a beam
+    (u, v, and u, v of the path). jumps: whether the ground must not be far below feet in the air.
     """
     down, up_first, up_rest, beam_sides = tables
     first, offset, squares = _down_means(heights, rows, columns, a, down)
@@ -229,7 +238,8 @@ def _error(heights, rows, columns, a, tables, jumps, limit):
 
 
 @njit(inline="always", cache=False)
-def _map_to_cells(a):
+def _rows_as_tuples(a):
+    """The two rows of A, as tuples of numbers."""
     return (a[0, 0], a[0, 1], a[0, 2]), (a[1, 0], a[1, 1], a[1, 2])
 
 
@@ -238,19 +248,22 @@ def view_errors(heights, starts, shapes, which, affine, tables, jumps):
     """The error (P,) of every patch, cm². tables, jumps: see `_error`."""
     out = np.empty(len(which))
     for p in range(len(which)):
-        cells, rows, columns = map_of(heights, starts, shapes, which[p])
-        out[p] = _error(cells, rows, columns, _map_to_cells(affine[p]), tables, jumps, np.inf)
+        cells, rows, columns = cells_of_map(heights, starts, shapes, which[p])
+        out[p] = _error(cells, rows, columns, _rows_as_tuples(affine[p]), tables, jumps, np.inf)
     return out
 
 
 @njit
 def search_views(heights, starts, shapes, which, affine, tables, jumps, count):
-    """Indices and errors (count,) of the patches with the lowest errors, best first; ties go by index."""
+    """Indices (count,) and errors (count,), cm², of the patches with the lowest errors, best first.
+
+    Of two patches with equal errors, the one with the lower index is first. tables, jumps: see `_error`.
+    """
     best = np.full(count, -1)
     errors = np.full(count, np.inf)
     for p in range(len(which)):
-        cells, rows, columns = map_of(heights, starts, shapes, which[p])
-        error = _error(cells, rows, columns, _map_to_cells(affine[p]), tables, jumps, errors[-1])
+        cells, rows, columns = cells_of_map(heights, starts, shapes, which[p])
+        error = _error(cells, rows, columns, _rows_as_tuples(affine[p]), tables, jumps, errors[-1])
         if error < errors[-1]:
             k = count - 1
             while k > 0 and errors[k - 1] > error:
