@@ -35,7 +35,7 @@ class LogHandler(LogHandlerBase):
                 text = self.snakemake_formatter.format(record)
                 self.terminal.stream.write(f"{text}\n")
             else:
-                self.terminal.take(record)
+                self.terminal.show_record(record)
         except BrokenPipeError:
             raise
         except Exception:

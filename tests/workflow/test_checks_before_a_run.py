@@ -43,7 +43,10 @@ def test_holding_out_all_clips_is_refused(base: Path) -> None:
             "results/one/questionnaire/questionnaire.html",
             r"configuration one has no channel injury.*\[injury\]",
         ),
-        ("results/hurt/export/cubik.onnx", "export/cubik.onnx: the phase modes are constant, linear, cubic"),
+        (
+            "results/hurt/export/cubik.onnx",
+            "cubik is not a phase mode. The phase modes are constant, linear, cubic",
+        ),
     ],
 )
 def test_impossible_targets_are_reported_before_training(
@@ -150,7 +153,7 @@ def test_a_skeleton_that_cannot_be_mirrored_is_reported_before_anything_runs(com
         ("training: {sections: 5}", r"its training\.sections must be 10, not 5"),
         (
             "training: {passes: 19}",
-            r"which has 20 passes\. Its training\.passes must not be fewer, but it is 19",
+            r"which has training\.passes: 20\. Write at least this number, not 19",
         ),
         ("network: {kind: matching}", "but matching is built and not trained"),
         ("training: {learning_rate: 1.0e-3, batch: 64}", None),

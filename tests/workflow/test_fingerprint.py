@@ -80,13 +80,13 @@ class Options(Section):
 
 
 def mark(root: Path) -> str:
-    for cached in (fp._module, fp._files_of):
+    for cached in (fp._parse_module, fp._files_of):
         cached.cache_clear()
     return fp.fingerprint(root / "script.py", root / "src")
 
 
 def test_a_fingerprint_follows_imports_but_not_infrastructure(source: Path) -> None:
-    found = fp.closure(source / "script.py", source / "src")
+    found = fp.imported_files(source / "script.py", source / "src")
     assert {path.name for path in found} == {"__init__.py", "near.py", "far.py", "options.py"}
 
 
@@ -140,14 +140,14 @@ def test_no_stage_imports_a_later_one(root: Path) -> None:
     order.insert(order.index("channels"), "gait")  # how a walk is measured; no rule is its own
     # A channel's folder also holds how it is shown and measured, which comes after all stages.
     channels = [f"hobble.channels.{name}" for name in NAMES]
-    of_stage = fp.closure(root / "workflow/scripts/channel_clips.py", root / "src", channels)
+    of_stage = fp.imported_files(root / "workflow/scripts/channel_clips.py", root / "src", channels)
     assert any("injury" in module.parts for module in of_stage)
     for rank, stage in enumerate(order):
         for module in (root / "src/hobble" / stage).rglob("*.py"):
             within = module.relative_to(root / "src/hobble" / stage).parts
             if stage == "channels" and len(within) > 1 and module not in of_stage:
                 continue
-            for path in fp._module(module, root / "src").imports:
+            for path in fp._parse_module(module, root / "src").imports:
                 used = path.relative_to(root / "src/hobble").parts[0]
                 assert used not in order[rank + 1 :], f"{module.name} of {stage} imports {used}"
 
@@ -155,7 +155,7 @@ def test_no_stage_imports_a_later_one(root: Path) -> None:
 @pytest.mark.parametrize("measure", MEASURES, ids=lambda measure: measure.name)
 def test_a_measurement_depends_neither_on_the_page_nor_on_the_list(root: Path, measure: Measure) -> None:
     """Otherwise a new measurement or another text on a page would run all measurements again."""
-    files = fp.closure(root / "workflow/scripts/measure.py", root / "src", [measure.module("run")])
+    files = fp.imported_files(root / "workflow/scripts/measure.py", root / "src", [measure.module("run")])
     used = {path.relative_to(root / "src/hobble").as_posix() for path in files}
     assert "measures/registry.py" not in used
     assert not [path for path in used if path.startswith("report/")]

@@ -32,7 +32,7 @@ class Run:
         record.__dict__.update(data)
         if event is not None:
             record.event = event
-        self.terminal.take(record)
+        self.terminal.show_record(record)
 
     def job(self, number: int, rule: str, log: str = "", **wildcards: str) -> None:
         self.say("job_info", jobid=number, rule_name=rule, wildcards=wildcards, log=[log])

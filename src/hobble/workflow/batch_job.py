@@ -118,7 +118,7 @@ def _make_piece(
     outputs, began = list(piece.output.values()), time.monotonic()
     with checked(piece.files, outputs):
         key = fingerprint(piece.params, digests.of(piece.files), outputs)
-        if kept.take(key, outputs):
+        if kept.restore(key, outputs):
             return True
         report.logger.info("%s:", piece.name)
         make(piece, report.logger)

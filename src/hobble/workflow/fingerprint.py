@@ -1,8 +1,9 @@
-"""A hash of a rule's code: its script and every project module that the script imports.
+"""Computes a hash of a rule's code: its script and every project module that the script imports.
 
-The hash ignores what cannot change a result: comments, docstrings, annotations of functions, the text of
-errors and log messages, descriptions of options, and the modules of `INFRASTRUCTURE`. It also ignores the
-fields of configuration sections, because their values are params of the rules.
+Snakemake runs a rule's jobs again if the hash changes. So the hash ignores what cannot change a result:
+comments, docstrings, annotations of functions, the text of errors and log messages, descriptions of options,
+and the modules of `INFRASTRUCTURE`. It also ignores the fields of configuration sections, because their
+values are params of the rules, and Snakemake compares these itself.
 """
 
 from __future__ import annotations
@@ -14,48 +15,52 @@ from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
-# Modules or packages that cannot change a result, and why. A change in them re-runs nothing.
+# Modules and packages that cannot change a result -> the reason. A change in them re-runs nothing.
 INFRASTRUCTURE = {
     "hobble.config": "its values are params of the rules",
-    "hobble.workflow": "runs jobs and answers the Snakefile",
-    "hobble.core.errors": "only the wording of errors",
-    "hobble.core.files": "a file is read back as it was written, or refused",
-    "hobble.core.section": "checks the configuration before any job",
+    "hobble.workflow": "tells the Snakefile which jobs there are, and runs them",
+    "hobble.core.errors": "decides only the wording of errors",
+    "hobble.core.files": "reads a file back as it was written, or refuses it",
+    "hobble.core.section": "checks the configuration before any job runs",
     "hobble.core.untrusted": "only limits what is read",
 }
-# Calls such as logger.info(...) are not hashed. These are the names of loggers and of their methods.
+# Calls such as logger.info(...) are not hashed: the names of loggers, and of the methods that log.
 LOGGERS = {"log", "logger", "logging", "warnings"}
 LOG_METHODS = {"debug", "info", "warning", "error", "exception", "critical", "warn"}
-NOT_HASHED = {"__future__", "collections.abc", "logging", "typing", "warnings"}  # imports that are not hashed
+# Lines `from MODULE import ...` with these modules are not hashed.
+NOT_HASHED = {"__future__", "collections.abc", "logging", "typing", "warnings"}
 
 
 def fingerprint(script: Path, source: Path, modules: Iterable[str] = ()) -> str:
-    """Hash `script` and all modules in folder `source` that it imports, directly or through others.
+    """The hash, 16 hex digits, of `script` and of all project modules that it imports.
 
+    A module counts, too, if another imported module imports it. source: the folder of the project's packages.
     modules: full names of modules that the script imports dynamically.
     """
-    files = [_module(path, source) for path in (script, *sorted(closure(script, source, modules)))]
-    used = frozenset().union(*(file.names for file in files))
+    paths = (script, *sorted(imported_files(script, source, modules)))
+    parsed = [_parse_module(path, source) for path in paths]
+    used_names = frozenset().union(*(module.names for module in parsed))
     digest = hashlib.sha256()
-    for module in files:
+    for module in parsed:
         digest.update(module.digest)
         for name, text in module.texts:
-            if name in used:  # otherwise only messages use it
+            if name in used_names:  # otherwise only messages use the text
                 digest.update(f"{name}={text}".encode())
     return digest.hexdigest()[:16]
 
 
-def closure(script: Path, source: Path, modules: Iterable[str] = ()) -> set[Path]:
-    """The project files that `script` and `modules` import, directly or through others.
+def imported_files(script: Path, source: Path, modules: Iterable[str] = ()) -> set[Path]:
+    """The files of `modules`, and the project files that `script` and `modules` import.
 
-    The modules of INFRASTRUCTURE are left out.
+    The files that these import are included, too, and so on. Left out are the script itself and imported
+    modules of INFRASTRUCTURE. The arguments are those of `fingerprint`.
     """
     files = {path for module in modules for path in _files_of(module, source)}
-    waiting = [script, *files]
-    while waiting:
-        new = set(_module(waiting.pop(), source).imports) - files
+    unread = [script, *files]
+    while unread:
+        new = set(_parse_module(unread.pop(), source).imports) - files
         files |= new
-        waiting += new
+        unread += new
     return files
 
 
@@ -63,9 +68,9 @@ def closure(script: Path, source: Path, modules: Iterable[str] = ()) -> set[Path
 class _Module:
     """What the fingerprint needs of a module.
 
-    digest: hash of its code without string constants. texts: (name, value) of its string constants,
-    which are hashed only if code other than messages uses them. names: the names that its code uses. imports:
-    the project files that it imports.
+    digest: hash of its code without its string constants. texts: (name, value) of each string constant at
+    module level; it is hashed only if code other than messages uses it. names: the variables and attributes
+    that the code uses. imports: the project files that the module imports.
     """
 
     digest: bytes
@@ -75,30 +80,30 @@ class _Module:
 
 
 @functools.cache
-def _module(path: Path, source: Path) -> _Module:
-    bare = _Bare()
-    tree = bare.visit(ast.parse(path.read_text(encoding="utf-8"), filename=str(path)))
+def _parse_module(path: Path, source: Path) -> _Module:
+    remover = _Remover()
+    tree = remover.visit(ast.parse(path.read_text(encoding="utf-8"), filename=str(path)))
     texts, code = [], []
     for node in tree.body:
-        if (constant := _text(node)) is not None:
+        if (constant := _string_constant(node)) is not None:
             texts.append(constant)
         else:
             code.append(ast.dump(node))
-    imports = {file for name in bare.imported for file in _files_of(name, source)}
+    imports = {file for name in remover.imported for file in _files_of(name, source)}
     return _Module(
         hashlib.sha256("\n".join(code).encode()).digest(),
         tuple(texts),
-        frozenset(bare.names),
+        frozenset(remover.names),
         frozenset(imports),
     )
 
 
-class _Bare(ast.NodeTransformer):
+class _Remover(ast.NodeTransformer):
     """Removes what cannot change a result. Collects the names and the imports of the remaining code."""
 
     def __init__(self) -> None:
-        self.names: set[str] = set()
-        self.imported: set[str] = set()
+        self.names: set[str] = set()  # variables and attributes that are used
+        self.imported: set[str] = set()  # full names of what is imported: modules, and objects in them
 
     def visit_Name(self, node: ast.Name) -> ast.AST:
         if isinstance(node.ctx, ast.Load):
@@ -120,9 +125,9 @@ class _Bare(ast.NodeTransformer):
         return self.generic_visit(node)
 
     def visit_Call(self, node: ast.Call) -> ast.AST:
-        name = _name(node.func)
+        name = _last_name(node.func)
         if name.endswith("Error"):
-            return ast.Call(node.func, [], [])
+            return ast.Call(node.func, [], [])  # without the message
         if name == "Field":
             node.keywords = [keyword for keyword in node.keywords if keyword.arg != "description"]
         return self.generic_visit(node)
@@ -132,8 +137,9 @@ class _Bare(ast.NodeTransformer):
         return self.generic_visit(node)
 
     def visit_ClassDef(self, node: ast.ClassDef) -> ast.AST:
-        if any(_name(base) == "Section" for base in node.bases):
-            node.body = [part for part in node.body if not isinstance(part, ast.AnnAssign)] or [ast.Pass()]
+        if any(_last_name(base) == "Section" for base in node.bases):  # a configuration section
+            kept = [statement for statement in node.body if not isinstance(statement, ast.AnnAssign)]
+            node.body = kept or [ast.Pass()]
         return self.generic_visit(node)
 
     def visit_FunctionDef(self, node: ast.FunctionDef) -> ast.AST:
@@ -145,7 +151,7 @@ class _Bare(ast.NodeTransformer):
         return node
 
     def visit_If(self, node: ast.If) -> ast.AST:
-        return ast.Pass() if _name(node.test) == "TYPE_CHECKING" else self.generic_visit(node)
+        return ast.Pass() if _last_name(node.test) == "TYPE_CHECKING" else self.generic_visit(node)
 
     def visit_Import(self, node: ast.Import) -> ast.AST:
         names = [alias.name for alias in node.names]
@@ -156,22 +162,22 @@ class _Bare(ast.NodeTransformer):
         module = node.module or ""
         if module in NOT_HASHED or _is_infrastructure(module):
             return ast.Pass()
-        if not node.level:
+        if not node.level:  # not a relative import
             full = [f"{module}.{alias.name}" for alias in node.names]
             self.imported.update(name for name in (module, *full) if not _is_infrastructure(name))
             node.names = [alias for alias in node.names if not _is_infrastructure(f"{module}.{alias.name}")]
         return node if node.names else ast.Pass()
 
 
-def _name(node: ast.AST) -> str:
-    """The last part of a dotted name, or "" for anything else."""
+def _last_name(node: ast.AST) -> str:
+    """The last part of a dotted name; "" if the node is not a name."""
     if isinstance(node, ast.Attribute):
         return node.attr
     return node.id if isinstance(node, ast.Name) else ""
 
 
-def _text(node: ast.stmt) -> tuple[str, str] | None:
-    """Name and value of a module's string constant, or None for other statements."""
+def _string_constant(node: ast.stmt) -> tuple[str, str] | None:
+    """(name, value) if the statement assigns a string or an f-string to a name, else None."""
     if isinstance(node, ast.Assign) and len(node.targets) == 1 and isinstance(node.targets[0], ast.Name):
         if isinstance(node.value, ast.JoinedStr):
             return node.targets[0].id, ast.dump(node.value)
@@ -181,16 +187,21 @@ def _text(node: ast.stmt) -> tuple[str, str] | None:
 
 
 def _is_infrastructure(module: str) -> bool:
+    """Whether a module, given by its full name, is in INFRASTRUCTURE or in a package listed there."""
     return any(module == name or module.startswith(f"{name}.") for name in INFRASTRUCTURE)
 
 
 @functools.cache
 def _files_of(module: str, source: Path) -> tuple[Path, ...]:
+    """What `_files_of_module` yields. The result is cached."""
     return tuple(_files_of_module(module, source))
 
 
 def _files_of_module(module: str, source: Path) -> Iterator[Path]:
-    """The module's file and the `__init__.py` of each package on the way to it."""
+    """The module's file, and the `__init__.py` of each package that contains it.
+
+    Yields nothing for a module outside `source`. For an object in a module, it yields the module's files.
+    """
     parts = module.split(".")
     for n in range(1, len(parts) + 1):
         here = source.joinpath(*parts[:n])

@@ -1,4 +1,4 @@
-"""The context in which every job's script runs: its log, checks of its files, and errors as messages."""
+"""The context in which a job's script runs: it logs, checks files and turns errors into messages."""
 
 from __future__ import annotations
 
@@ -21,10 +21,10 @@ BUG = "This is a bug in Hobble, not a fault in your data. Please report it with 
 
 @contextlib.contextmanager
 def job(snakemake: Any) -> Iterator[logging.Logger]:
-    """Run a script with logging, checks of its files, and clear errors.
+    """Run a script with logging, checks of its files, and clear errors. Yields the logger.
 
-    snakemake: the object that Snakemake gives to scripts. It is an error if an input has changed since it was
-    made, or changes while this job runs. Logging and other errors are handled by `reporting`.
+    snakemake: the object that Snakemake gives to scripts. An input causes an error if it has changed since
+    its own job wrote it, or if it changes while this job runs. `reporting` logs messages and errors.
     """
     with reporting(snakemake) as report:
         checksums.forget(getattr(snakemake, "output", ()))
@@ -34,7 +34,10 @@ def job(snakemake: Any) -> Iterator[logging.Logger]:
 
 @contextlib.contextmanager
 def checked(inputs: Any, outputs: Any) -> Iterator[None]:
-    """Check the inputs before and after the work in this context, then write the outputs' checksums."""
+    """Check the inputs before and after the work in this context, then write the outputs' checksums.
+
+    inputs, outputs: paths. Raises InputError for an input that is damaged or has changed.
+    """
     before = checksums.stamps(inputs)
     checksums.verify(inputs)
     yield
@@ -46,8 +49,8 @@ def checked(inputs: Any, outputs: Any) -> Iterator[None]:
 def reporting(snakemake: Any) -> Iterator[JobLog]:
     """Run a script with logging and clear errors. If the run of Snakemake ends, the script ends, too.
 
-    Everything is logged to the job's log file; warnings and errors also go to the terminal. Every exception
-    ends the process with status 1.
+    Every message goes to the job's log file. Warnings and errors also go to the terminal. Every error ends
+    the process with status 1.
     """
     report = JobLog(str(snakemake.log[0]), family_of(snakemake.rule))
     try:
@@ -62,52 +65,55 @@ def reporting(snakemake: Any) -> Iterator[JobLog]:
 
 
 class JobLog:
-    """A job's log file, and its messages on the terminal, which begin with the name of the rule."""
+    """Writes a job's messages to its log file, and warnings and errors also to the terminal.
+
+    path: the log file. rule: name of the rule, with which each message on the terminal begins.
+    """
 
     def __init__(self, path: str, rule: str) -> None:
         self.path = path
         with contextlib.suppress(OSError):
             os.makedirs(os.path.dirname(path) or ".", exist_ok=True)
-            open(path, "w").close()
+            open(path, "w").close()  # empty the log of an earlier try
         self.logger = logging.getLogger("hobble")
         self.logger.setLevel(logging.INFO)
-        to_file = _LogFile(path, encoding="utf-8", delay=True)
-        to_file.setFormatter(logging.Formatter("%(asctime)s %(levelname)s %(message)s"))
+        file_handler = _LogFile(path, encoding="utf-8", delay=True)
+        file_handler.setFormatter(logging.Formatter("%(asctime)s %(levelname)s %(message)s"))
         self.terminal = logging.StreamHandler(sys.stderr)
         self.terminal.setLevel(logging.WARNING)
-        # A message on a terminal first clears the line of progress.
+        # On a terminal, each message first clears the line of progress, which Snakemake's process prints.
         clear = "\r\x1b[K" if sys.stderr.isatty() else ""
         self.terminal.setFormatter(logging.Formatter(f"{clear}{rule}: %(message)s"))
-        self.logger.handlers = [to_file, self.terminal]
+        self.logger.handlers = [file_handler, self.terminal]
         logging.captureWarnings(True)
 
     def error(self, error: Exception) -> None:
-        """Report an error. Of a HobbleError, only the message is reported.
+        """Log an error. The log file also gets the traceback, except for a HobbleError or a lack of memory.
 
-        For most other errors the terminal shows one line, and the log file also has the traceback.
+        The message of a HobbleError says everything that a user needs.
         """
         if isinstance(error, HobbleError):
             self.logger.error("%s", error)
         elif isinstance(error, MemoryError):
             self.logger.error("out of memory. Give the job more memory, or use a smaller data set or batch.")
         elif isinstance(error, OSError):
-            # Such as a full disk or a missing permission, if no other code has raised a HobbleError for it.
+            # For example a full disk or a missing permission that no code has turned into a HobbleError.
             path, reason = error.filename or "a file", error.strerror or error
             self.logger.error("%s: %s. See %s", path, reason, self.path)
-            self._trace(error)
+            self._log_traceback(error)
         else:
             self.logger.error("%s: %s. %s See %s", type(error).__name__, error, BUG, self.path)
-            self._trace(error)
+            self._log_traceback(error)
 
-    def _trace(self, error: Exception) -> None:
-        """Write the traceback to the log, not to the terminal."""
+    def _log_traceback(self, error: Exception) -> None:
+        """Write the traceback to the log file, not to the terminal."""
         self.logger.removeHandler(self.terminal)
         self.logger.error("%s", "".join(traceback.format_exception(error)))
         self.logger.addHandler(self.terminal)
 
 
 class _LogFile(logging.FileHandler):
-    """A log file that ignores failed writes, so that on a full disk messages still reach the terminal."""
+    """A log file that ignores failed writes, so that messages reach the terminal even if the disk is full."""
 
     def emit(self, record: logging.LogRecord) -> None:
         with contextlib.suppress(OSError):

@@ -1,8 +1,8 @@
 """Clears locks of killed runs, and ends all jobs together with their run. A run is one call of Snakemake.
 
-Snakemake's lock does not say which process it belongs to, so after a kill it stays until a person removes it.
-And on SIGINT or SIGTERM Snakemake waits for running jobs. So a run writes its process id next to its lock and
-ends its jobs on these signals. Each job checks regularly whether its run still exists.
+Snakemake's lock does not say which process made it. So the lock of a killed run stays until a person removes
+it. And after SIGINT or SIGTERM, Snakemake waits for running jobs. Therefore a run writes its process id next
+to its lock, and ends its jobs on these signals. Each job checks regularly whether its run still exists.
 """
 
 from __future__ import annotations
@@ -20,36 +20,40 @@ from pathlib import Path
 from types import FrameType
 from typing import Any
 
-LOCKS = Path(".snakemake/locks")  # Snakemake removes the folder when it unlocks
-OWNER = "owner.json"  # file beside the locks; it says which process they belong to
-RUN_VARIABLE = "HOBBLE_RUN"  # environment variable of a job: process id and start time of its run
-CHECK_SECONDS = 0.5  # how often a job checks that its run exists
+LOCKS = Path(".snakemake/locks")  # Snakemake's folder of lock files; a run that ends removes it
+OWNER = "owner.json"  # file in this folder that says which process made the locks
+RUN_VARIABLE = "HOBBLE_RUN"  # environment variable of a job: "<process id> <start time>" of its run
+CHECK_SECONDS = 0.5  # time between two checks of a job that its run exists
 GRACE_SECONDS = 2.0  # time for a job to clean up after SIGTERM
 
 
 def set_run_variable() -> None:
-    """Put the id and start time of this process into the environment, which jobs inherit."""
+    """Put the id and start time of this run's process into the environment, which jobs inherit."""
     os.environ[RUN_VARIABLE] = this_process()
 
 
 def this_process() -> str:
-    """Id and start time of this process, in the form of RUN_VARIABLE."""
+    """Id and start time of this process, in the form that RUN_VARIABLE has."""
     return f"{os.getpid()} {_start_time(os.getpid())}"
 
 
 def record_lock_owner(locks: Path = LOCKS) -> None:
-    """Write this process as the owner into the folder of Snakemake's lock."""
+    """Write a file into the folder `locks` that says that this process owns Snakemake's lock."""
     if locks.is_dir():
         owner = {"host": platform.node(), "pid": os.getpid(), "began": _start_time(os.getpid())}
         unfinished = locks / f"{OWNER}.{os.getpid()}.part"
         with contextlib.suppress(OSError):
-            # A run that is killed here must not leave an empty file: nobody could clear such a lock.
+            # The file must be complete even if the run is killed here. With an empty one, no later run could
+            # tell whose lock it is, and so none would clear it.
             unfinished.write_text(json.dumps(owner), encoding="utf-8")
             os.replace(unfinished, locks / OWNER)
 
 
 def clear_stale_lock(locks: Path = LOCKS) -> bool:
-    """Remove a lock if its owner, a process of this machine, has ended. Returns whether it was removed."""
+    """Remove the lock if its owner is a process of this machine that has ended.
+
+    Returns whether the lock was removed.
+    """
     try:
         text = (locks / OWNER).read_text(encoding="utf-8")
         owner = json.loads(text)
@@ -58,13 +62,13 @@ def clear_stale_lock(locks: Path = LOCKS) -> bool:
         return False
     if host != platform.node() or _is_alive(pid, began):
         return False
-    # Rename it first, so that only one of two runs that start together removes it.
+    # Rename the folder first. If two runs start together, this works for only one, which removes the lock.
     stale = locks.with_name(f"{locks.name}.stale.{os.getpid()}")
     try:
         os.rename(locks, stale)
         same_lock = (stale / OWNER).read_text(encoding="utf-8") == text
         if same_lock:
-            locks.mkdir(exist_ok=True)
+            locks.mkdir(exist_ok=True)  # Snakemake has made this folder already and expects it
             shutil.rmtree(stale, ignore_errors=True)
         else:
             os.rename(stale, locks)  # another run has made a new lock meanwhile
@@ -76,10 +80,11 @@ def clear_stale_lock(locks: Path = LOCKS) -> bool:
 def end_jobs_on_signal() -> None:
     """On SIGINT or SIGTERM, end the running jobs and interrupt Snakemake, which then removes its lock."""
     for number in (signal.SIGINT, signal.SIGTERM):
-        signal.signal(number, _stop)
+        signal.signal(number, _stop_run)
 
 
-def _stop(number: int, frame: FrameType | None) -> None:
+def _stop_run(number: int, frame: FrameType | None) -> None:
+    """Signal handler of a run: end its jobs and raise KeyboardInterrupt."""
     for caught in (signal.SIGINT, signal.SIGTERM):
         signal.signal(caught, signal.SIG_IGN)  # ignore further signals; stopping takes only seconds
     threading.Thread(target=end_children, args=(os.getpid(),), daemon=True).start()
@@ -87,7 +92,10 @@ def _stop(number: int, frame: FrameType | None) -> None:
 
 
 def end_children(pid: int, grace: float = GRACE_SECONDS) -> None:
-    """End all descendants of a process with SIGTERM, and those that run on after `grace` s with SIGKILL."""
+    """End all descendants of process `pid` with SIGTERM.
+
+    SIGKILL ends those that still run after `grace` seconds.
+    """
     import psutil  # a dependency of Snakemake; imported here because it is slow to import
 
     with contextlib.suppress(psutil.NoSuchProcess):
@@ -95,8 +103,8 @@ def end_children(pid: int, grace: float = GRACE_SECONDS) -> None:
         for process in descendants:
             with contextlib.suppress(psutil.Error):
                 process.terminate()
-        until = time.monotonic() + grace
-        while time.monotonic() < until and any(map(_is_running, descendants)):
+        deadline = time.monotonic() + grace
+        while time.monotonic() < deadline and any(map(_is_running, descendants)):
             time.sleep(0.05)
         for process in filter(_is_running, descendants):
             with contextlib.suppress(psutil.Error):
@@ -104,6 +112,7 @@ def end_children(pid: int, grace: float = GRACE_SECONDS) -> None:
 
 
 def _is_running(process: Any) -> bool:
+    """Whether a `psutil.Process` runs and is not a zombie."""
     import psutil
 
     with contextlib.suppress(psutil.Error):
@@ -114,10 +123,11 @@ def _is_running(process: Any) -> bool:
 @contextlib.contextmanager
 def ends_with_run() -> Iterator[None]:
     """Within this context the job ends cleanly on SIGINT and SIGTERM, and soon after its run ends."""
-    before = {}
-    with contextlib.suppress(ValueError):  # only the main thread can set handlers; tests may use another one
+    earlier_handlers = {}
+    # Only the main thread can set handlers. Tests may use another thread, which raises ValueError.
+    with contextlib.suppress(ValueError):
         for number in (signal.SIGINT, signal.SIGTERM):
-            before[number] = signal.signal(number, _exit)
+            earlier_handlers[number] = signal.signal(number, _exit)
     done = threading.Event()
     if run := os.environ.get(RUN_VARIABLE):
         threading.Thread(target=_exit_with_run, args=(run, done), daemon=True).start()
@@ -125,25 +135,33 @@ def ends_with_run() -> Iterator[None]:
         yield
     finally:
         done.set()
-        for number, handler in before.items():
+        for number, handler in earlier_handlers.items():
             if signal.getsignal(number) is _exit:
                 signal.signal(number, handler)
 
 
 def _exit(number: int, frame: FrameType | None) -> None:
-    # Ctrl-C brings two signals: from the terminal and from Snakemake. The second would interrupt the
-    # clean-up.
+    """Signal handler of a job: end it cleanly, with the usual exit status of a process ended by a signal."""
+    # After Ctrl-C a job gets two signals, from the terminal and from its run. The second one must not
+    # interrupt the clean-up.
     for caught in (signal.SIGINT, signal.SIGTERM):
         signal.signal(caught, _disregard)
     raise SystemExit(128 + number)  # not caught by `except Exception`, and runs every `finally`
 
 
 def _disregard(number: int, frame: FrameType | None) -> None:
-    """Ignore a signal. With SIG_IGN instead, Python prints a traceback if two signals come at once."""
+    """Signal handler that does nothing.
+
+    It is used instead of SIG_IGN, with which Python prints a traceback if two signals come at once.
+    """
 
 
 def _exit_with_run(run: str, done: threading.Event) -> None:
-    """End this process when its run has ended. If compiled code blocks SIGTERM, use SIGKILL."""
+    """End this process with SIGTERM when its run has ended, and with SIGKILL if it still runs after a while.
+
+    Python cannot handle SIGTERM while compiled code runs. run: value of RUN_VARIABLE. done: set when the job
+    has ended.
+    """
     pid, _, began = run.partition(" ")
     while not done.wait(CHECK_SECONDS):
         if not _is_alive(int(pid), began):
@@ -153,7 +171,10 @@ def _exit_with_run(run: str, done: threading.Event) -> None:
 
 
 def _is_alive(pid: int, began: str) -> bool:
-    """Whether process `pid` runs and started at `began`. Another process may have got its number since."""
+    """Whether process `pid` runs and started at `began`.
+
+    The start time is compared because a new process may have got the id of one that has ended.
+    """
     try:
         os.kill(pid, 0)
     except ProcessLookupError:
@@ -166,6 +187,7 @@ def _is_alive(pid: int, began: str) -> bool:
 def _start_time(pid: int) -> str:
     """Start time of a process in clock ticks since boot; "" for a zombie, "?" if /proc does not have it."""
     try:
+        # The fields after the program's name, which is in parentheses: first the state, later the start time.
         fields = Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()
     except OSError:
         return "?"

@@ -1,8 +1,8 @@
 """Lets a run read and write its locks while another run in the same folder ends.
 
-A run of Snakemake that ends removes the whole folder of locks. Snakemake makes the folder only once, before
-it plans, and reads the files in it later. If another run removes the folder in between, Snakemake without
-this module ends with a FileNotFoundError.
+When a run of Snakemake ends, it removes the whole folder of lock files. A new run makes this folder once,
+before it plans its jobs, and reads and writes the files in it later. If another run removes the folder in
+between, the new run would end with a FileNotFoundError without this module.
 """
 
 from __future__ import annotations
@@ -14,11 +14,11 @@ from typing import Any
 
 from snakemake.persistence.file import FilePersistence
 
-_write_once = FilePersistence._write_locks
+_snakemake_write_locks = FilePersistence._write_locks  # Snakemake's own method
 
 
 def _read_locks(self: FilePersistence) -> Iterator[tuple[str, str]]:
-    """Kind ("input" or "output") and path of each locked file. Lock files that are gone are left out."""
+    """Yield ("input" or "output", path) of each locked file. Lock files that are gone are left out."""
     for kind in ("input", "output"):
         for file in Path(self._lockdir).glob(f"*.{kind}.lock"):
             with suppress(FileNotFoundError):
@@ -28,14 +28,15 @@ def _read_locks(self: FilePersistence) -> Iterator[tuple[str, str]]:
 def _write_locks(self: FilePersistence, kind: str, paths: Iterable[str]) -> None:
     """Write locks as Snakemake does, but make the folder first. If the folder is removed again, try again.
 
-    Raises OSError if the locks cannot be written in eleven tries.
+    kind: "input" or "output". paths: the files to lock. Raises FileNotFoundError if the folder was removed in
+    all eleven tries.
     """
     paths = list(paths)
     for _ in range(10):
         Path(self._lockdir).mkdir(parents=True, exist_ok=True)
         with suppress(FileNotFoundError):
-            return _write_once(self, kind, paths)
-    return _write_once(self, kind, paths)
+            return _snakemake_write_locks(self, kind, paths)
+    return _snakemake_write_locks(self, kind, paths)
 
 
 def use() -> None:

@@ -1,4 +1,7 @@
-"""Finds a job's measurement and its inputs, for the scripts of the rules `measure` and `measure_piece`."""
+"""Finds a job's measurement and its inputs, for the scripts of the rules `measure` and `measure_piece`.
+
+A job of the rule `measure_piece` does one piece of a long measurement.
+"""
 
 from __future__ import annotations
 
@@ -10,19 +13,20 @@ from hobble.measures.inputs import MeasureInputs
 from hobble.measures.measure import Measure
 from hobble.runtime.options import Runtime
 
-LIST_INPUTS = ("clips", "summaries", "pieces")  # names of inputs that have several files
+LIST_INPUTS = ("clips", "summaries", "pieces")  # names of the inputs that may have several files
 
 
 def measure_of(job: Any) -> Measure:
-    """The job's measurement.
+    """The job's measurement. job: the object that Snakemake gives to scripts.
 
-    Only its package is imported: if the script imported all measurements, a new one would re-run the others.
+    Only this measurement's package is imported. A job runs again if code that its script imports changes. So
+    if the script imported all measurements, each new one would make all others run again.
     """
     return importlib.import_module(job.params.package).MEASURE
 
 
 def inputs_of_job(job: Any) -> MeasureInputs:
-    """The inputs of a job of the rules `measure` and `measure_piece`."""
+    """The inputs of the job's measurement. job: the object that Snakemake gives to scripts."""
     lists = {name: [Path(file) for file in job.input.get(name, ())] for name in LIST_INPUTS}
     return MeasureInputs(
         job.params.configuration,

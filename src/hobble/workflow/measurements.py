@@ -1,6 +1,6 @@
-"""The inputs of each measurement, and the keys of the configuration that it depends on.
+"""Tells the rules which inputs a measurement has, and on which keys of the configuration it depends.
 
-A long measurement is split into pieces, which run as jobs of their own.
+A long measurement is split into pieces, each of which is a job of its own.
 """
 
 from __future__ import annotations
@@ -13,21 +13,24 @@ from hobble.workflow.clips import Clips, original
 from hobble.workflow.configurations import Configurations
 from hobble.workflow.package import Package
 
-NAMES = tuple(each.name for each in MEASURES)  # of all measurements
+NAMES = tuple(each.name for each in MEASURES)  # the names of all measurements
 
 
 def piece_file(configuration: str, name: str, piece: str) -> str:
-    """Path of the JSON of one piece of the measurement `name`."""
+    """Path of the JSON file with the result of one piece of the measurement `name`."""
     return f"results/{configuration}/evaluation/pieces/{name}/{piece}.json"
 
 
 def result_file(configuration: str, name: str) -> str:
-    """Path of the JSON of the measurement `name`."""
+    """Path of the JSON file with the result of the measurement `name`."""
     return f"results/{configuration}/evaluation/{name}.json"
 
 
 class Measurements:
-    """The measurements of a project's configurations."""
+    """The measurements of a project's configurations.
+
+    Arguments of the methods: configuration: name of a configuration. name: name of a measurement.
+    """
 
     def __init__(self, configurations: Configurations, clips: Clips, package: Package) -> None:
         self.configurations, self.clips, self.package = configurations, clips, package
@@ -37,7 +40,7 @@ class Measurements:
         return {item: self._input(configuration, item) for item in measure(name).inputs}
 
     def pieces(self, configuration: str, name: str) -> list[str]:
-        """Files of the measurement's pieces, each made by a job; [] if there are fewer than two pieces."""
+        """Paths of the JSON files of the measurement's pieces; [] if there are fewer than two pieces."""
         chosen = measure(name)
         if chosen.pieces is None:
             return []
@@ -47,7 +50,10 @@ class Measurements:
         return [piece_file(configuration, name, piece) for piece in pieces] if len(pieces) > 1 else []
 
     def _input(self, configuration: str, item: str) -> str | list[str]:
-        """The file or files of one input; `item` is its name, which may be that of another measurement."""
+        """The file or files of one input.
+
+        item: the input's name. If it is the name of another measurement, the input is this one's result.
+        """
         configurations = self.configurations
         if item == "weights":
             return configurations.network(configuration, "weights.npz")
@@ -62,14 +68,14 @@ class Measurements:
         return result_file(configuration, measure(item).name)
 
     def splits(self, configuration: str, name: str) -> dict[str, str]:
-        """Clip -> "train" or "held_out", if the measurement reads clips, else {}."""
+        """Clip -> "train" or "held_out"; {} if the measurement does not read clips."""
         return self.configurations.splits(configuration) if "clips" in measure(name).inputs else {}
 
     def people(self, configuration: str, name: str) -> dict[str, str]:
-        """Clip -> the person who walks in it, if the measurement needs this, else {}.
+        """Clip -> the person who walks in it; {} if the measurement does not need this.
 
-        A clip whose entry names nobody counts as a person of its own. Its mirror and its hurt versions count
-        as the same person.
+        If the data set does not name the person in a clip, the clip's name stands for one more person. The
+        mirror and the hurt versions of a clip have the clip's person.
         """
         if not measure(name).people:
             return {}
@@ -78,22 +84,23 @@ class Measurements:
         return {clip: self.clips.entry(dataset, clip).person or original(clip) for clip in splits}
 
     def options(self, configuration: str, name: str) -> dict[str, Any]:
-        """The measurement's keys of the section `evaluation`."""
+        """Key -> value of the section `evaluation`, for the keys that the measurement uses."""
         keys = measure(name).options.model_fields
         return self.configurations.section(configuration, "evaluation", *keys) if keys else {}
 
     def runtime(self, configuration: str, name: str) -> dict[str, Any]:
-        """The keys of the section `runtime` that the measurement depends on."""
+        """Key -> value of the section `runtime`, for the keys that the measurement uses."""
         keys = measure(name).runtime
         return self.configurations.section(configuration, "runtime", *keys) if keys else {}
 
     def package_of(self, name: str) -> str:
-        """Full name of the measurement's package."""
+        """Full name of the measurement's Python package."""
         return measure(name).package
 
     def code(self, name: str, *modules: str, script: str = "measure") -> str:
-        """Fingerprint of the code of measurement `name`.
+        """Hash of the code of the measurement `name`.
 
-        modules: full names of modules that it imports dynamically. script: the rule's script, without .py.
+        modules: full names of modules that the code imports dynamically. script: name of the rule's script,
+        without .py.
         """
         return self.package.code(script, measure(name).module("run"), *modules)

@@ -1,8 +1,8 @@
 """Looks up in a dictionary of paths which rule makes a file, so that Snakemake need not try every rule.
 
-The rules for batches of clips have no wildcards: they list all their files. But for each of these files
+The rules for batches of clips have no wildcards. They list all their files. But to find the rule of a file,
 Snakemake tries the patterns of many rules, one regular expression after another. With tens of thousands of
-files this is a third of the time for planning.
+files, these trials take a third of the time for planning.
 """
 
 from __future__ import annotations
@@ -19,17 +19,17 @@ if TYPE_CHECKING:
 
 
 class NamedOutputs(OutputIndex):  # type: ignore[misc]
-    """Snakemake's index of outputs, with a dictionary for the rules without wildcards."""
+    """Snakemake's index of outputs, with an added dictionary for the rules without wildcards."""
 
     def __init__(self, rules: Sequence[Rule]) -> None:
-        self._rules: dict[str, set[Rule]] = defaultdict(set)
+        self._rules: dict[str, set[Rule]] = defaultdict(set)  # path of an output -> rules that list it
         with_wildcards = []
         for rule in rules:
             if rule.has_wildcards():
                 with_wildcards.append(rule)
             else:
-                for product in rule.products():
-                    self._rules[str(product)].add(rule)
+                for path in rule.products():
+                    self._rules[str(path)].add(rule)
         super().__init__(with_wildcards)
 
     def match_producers(self, targetfile: str) -> set[Rule]:

@@ -1,4 +1,7 @@
-"""Files of the package that rules depend on: templates, scripts of the pages, published results, code."""
+"""Tells rules on which files of the package `hobble` they depend, and computes hashes of its code.
+
+The files are templates and scripts of HTML pages, and published results.
+"""
 
 from __future__ import annotations
 
@@ -9,7 +12,7 @@ from hobble.workflow.fingerprint import fingerprint
 
 
 class Package:
-    """The package `hobble` of a checkout. base: the checkout."""
+    """The package `hobble` in a checkout of the repository. base: the folder of the checkout."""
 
     def __init__(self, base: Path) -> None:
         self.base = base
@@ -17,27 +20,27 @@ class Package:
 
     @functools.cache  # noqa: B019 - one project lives as long as the process
     def code(self, script: str, *modules: str) -> str:
-        """Fingerprint of a rule's script and of everything that the script imports from the package.
+        """Hash of a rule's script and of everything that the script imports from the package.
 
-        modules: full names of modules that the script imports dynamically.
+        script: its name, without .py. modules: full names of modules that the script imports dynamically.
         """
         path = self.base / "workflow" / "scripts" / f"{script}.py"
         return fingerprint(path, self.base / "src", modules)
 
     def templates(self) -> list[str]:
-        """Templates and styles of the HTML pages, and the published results that the pages show.
+        """Paths of the HTML pages' templates and styles, and of the published results that the pages show.
 
-        If one changes, only the pages are made again.
+        If one of these files changes, only the pages are made again.
         """
         kinds = {".j2", ".css", ".js", ".yaml"}
         files = [str(path) for path in (self.folder / "report").iterdir() if path.suffix in kinds]
         return sorted([*files, self.published()])
 
     def web(self, suffix: str) -> list[str]:
-        """Files of the report's page with this suffix, such as ".js" (scripts) or ".json" (npm packages)."""
+        """Paths of the report's files with a suffix: ".js" for scripts, ".json" for lists of npm packages."""
         files = [*(self.folder / "report" / "web").iterdir(), *self.folder.glob("models/**/*.js")]
         return sorted(str(path) for path in files if path.suffix == suffix)
 
     def published(self) -> str:
-        """The file of published results, such as errors and times, with which the report compares ours."""
+        """Path of the published results, such as errors and times, with which the report compares ours."""
         return str(self.folder / "evaluation" / "published.yaml")

@@ -1,4 +1,4 @@
-"""Creates the objects that the rules use, for one checkout and one command line."""
+"""Creates the objects that the Snakefile's rules use, for one checkout and one command line."""
 
 from __future__ import annotations
 
@@ -18,16 +18,16 @@ from hobble.workflow.measurements import Measurements
 from hobble.workflow.package import Package
 
 MOCAP = "mocap"  # key of --config for the folder with the user's clips
-RESERVED = (COMPARE, "datasets", "page")  # folders of results/ that are not configurations
+RESERVED = (COMPARE, "datasets", "page")  # folders in results/ that do not belong to one configuration
 
 
 class Project:
     """The configurations and data sets of one checkout, with the overrides of one command line.
 
-    base: the folder of the Snakefile. config: Snakemake's config. Its `mocap` is the folder with the user's
-    clips, `compare` lists the configurations to compare, and all other keys override those of every
-    configuration. Raises HobbleError if a configuration has a reserved name, or if `mocap` is not the name of
-    a folder.
+    base: the folder of the Snakefile. config: Snakemake's config, which holds the values of `--config`. Its
+    key `mocap` is the folder with the user's clips (default: data), and `compare` lists the configurations to
+    compare. Every other key overrides the same key of all configurations. Raises HobbleError if a
+    configuration has a name in RESERVED, or if `mocap` is not the name of a folder.
     """
 
     def __init__(self, base: Path, config: Mapping[str, Any]) -> None:
@@ -36,9 +36,10 @@ class Project:
         self.catalogue = Catalogue(base / "config", overrides)
         for name in set(RESERVED) & set(self.catalogue.names()):
             raise HobbleError(
-                f"no configuration can be called {name}: Hobble uses results/{name} for something else"
+                f"no configuration can be called {name}: Hobble uses results/{name} for something else. "
+                f"Rename config/{name}.yaml"
             )
-        self.clips = Clips(base, _folder(config.get(MOCAP, base / "data")), self.catalogue)
+        self.clips = Clips(base, _mocap_folder(config.get(MOCAP, base / "data")), self.catalogue)
         self.batches = Batches(self.clips)
         self.datasets = Datasets(self.catalogue, self.clips)
         self.configurations = Configurations(self.catalogue, self.datasets)
@@ -47,8 +48,11 @@ class Project:
         self.measurements = Measurements(self.configurations, self.clips, self.package)
 
 
-def _folder(value: Any) -> Path:
-    """The folder given with `--config mocap=...`. YAML may have turned it into a number or a list."""
+def _mocap_folder(value: Any) -> Path:
+    """The folder with the user's clips, from the value that `--config mocap=...` has after parsing as YAML.
+
+    Raises HobbleError if the value is not text, such as a number or a list.
+    """
     if isinstance(value, str | Path) and str(value).strip():
         return Path(value)
     raise HobbleError(

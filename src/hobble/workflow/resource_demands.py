@@ -1,9 +1,9 @@
 """Computes the memory and time that jobs request from a cluster.
 
-They grow with the length of the clips and the number of joints. Both are taken from the configuration and
-the sizes of the user's files, because requests are made before any job has run. The rates (MB or seconds for
-a thousand frames) were measured on clips of 10,000 and 40,000 frames. `benchmarks/demands.py` compares the
-requests with the logs of a finished run.
+Memory and time grow with the length of the clips and the number of joints. Requests are made before any job
+has run, so the lengths are estimated from the configuration and the sizes of the user's files. The rates (MB
+or seconds for a thousand frames) were measured on clips of 10,000 and 40,000 frames with 31 joints.
+`benchmarks/demands.py` compares the requests with the logs of a finished run.
 """
 
 from __future__ import annotations
@@ -24,26 +24,29 @@ from hobble.workflow.clip_batches import ClipBatch
 from hobble.workflow.clips import original
 from hobble.workflow.project import Project
 
-ENGINE_MB = 400  # memory of Snakemake, which runs twice in a cluster job: for SLURM's step and for the script
+# Memory of Snakemake itself. It runs twice in a cluster job: for SLURM's step and for the script.
+ENGINE_MB = 400
 PYTHON_MB = 400  # memory of Python with numpy, scipy and the package
 MEMORY_MARGIN = 1.5  # requested memory / measured memory
 TIME_MARGIN = 10  # requested time / measured time, for an old and busy machine
 MEASURED_JOINTS = 31  # joints of the skeleton with which the rates were measured
-CLIP_SECONDS = 0.1  # seconds for a clip, in addition to the seconds for its frames
-ASSUMED_FRAMES = 20_000  # of a clip that is not downloaded yet
-VISITS_PER_PASS = 10  # how often a pass of training uses a row
+CLIP_SECONDS = 0.1  # seconds for each clip, in addition to the seconds for its frames
+ASSUMED_FRAMES = 20_000  # frames of a clip whose length is unknown, such as one that is not downloaded yet
+VISITS_PER_PASS = 10  # how often a pass of training uses a frame: once on each of the grounds fitted under it
 HEADER_BYTES = 1 << 20  # the motion of a BVH file begins within this many bytes
-SHARD_MB = 10  # MB for each thousand frames of the longest clip, in a job that makes a shard of a database
-ROW_BYTES = 24  # bytes for each row of the shard, in the same job: the row's position in the shuffled order
+# A shard is a part of a database that one job makes. It has one row for each frame of some of the clips.
+SHARD_MB = 10  # MB that this job needs for each thousand frames of the longest clip
+ROW_BYTES = 24  # bytes that this job needs for each row of the shard, for its position in the shuffled order
 EXCERPT_THOUSANDS = 2.0  # thousands of frames that a measurement of a sample reads at once
 WEEK_MINUTES = 7 * 24 * 60  # a job requests at most this time
 
 
 class Demands:
-    """The requests of a project's jobs.
+    """Computes what a project's jobs request.
 
-    attempt: 1 for a job's first try, 2 for the second, ... The requests grow with it, so that a killed job
-    gets more. least: the least number of minutes that is requested.
+    Arguments of the methods: dataset, configuration: names. attempt: 1 for a job's first try, 2 for the
+    second, ... The requests grow with it, so that a job that was killed for lack of memory or time gets more.
+    least: the least number of minutes that a job requests.
     """
 
     def __init__(self, project: Project) -> None:
@@ -54,20 +57,21 @@ class Demands:
         return _megabytes(rate * max(self._thousands_of(batch)), attempt)
 
     def batch_minutes(self, batch: ClipBatch, rate: float, attempt: int = 1, least: int = 1) -> int:
-        """Minutes for a batch's job that takes `rate` seconds for a thousand frames."""
-        return _minutes(sum(rate * some + CLIP_SECONDS for some in self._thousands_of(batch)), attempt, least)
+        """Minutes for a batch's job that takes `rate` seconds for a thousand frames with 31 joints."""
+        seconds = sum(rate * thousands + CLIP_SECONDS for thousands in self._thousands_of(batch))
+        return _minutes(seconds, attempt, least)
 
-    def memory_of_longest(self, dataset: str, rate: float, rows: float = 0.0, attempt: int = 1) -> int:
+    def memory_of_longest(self, dataset: str, rate: float, row_bytes: float = 0.0, attempt: int = 1) -> int:
         """MB for a job that reads one clip after another.
 
-        rate: MB for a thousand frames of the longest clip. rows: bytes that the job keeps of each frame of
-        all clips.
+        rate: MB for a thousand frames of the longest clip. row_bytes: bytes that the job keeps of each frame
+        of all clips.
         """
         longest = max(self.thousands(dataset, clip) for clip in self.project.clips.of(dataset))
-        return _megabytes(rate * longest + rows * self.all_thousands(dataset) / 1e3, attempt)
+        return _megabytes(rate * longest + row_bytes * self.all_thousands(dataset) / 1e3, attempt)
 
     def shard_memory(self, dataset: str, attempt: int = 1) -> int:
-        """MB for a job that makes a shard. It holds one clip at a time, and a few numbers of each row."""
+        """MB for a job that makes a shard. It holds one clip at a time, and a few numbers for each row."""
         longest = max(self.thousands(dataset, clip) for clip in self.project.clips.of(dataset))
         return _megabytes(SHARD_MB * longest + ROW_BYTES * self._shard_thousands(dataset) / 1e3, attempt)
 
@@ -76,7 +80,7 @@ class Demands:
         return _minutes(rate * self._shard_thousands(dataset), attempt, least=5)
 
     def _shard_thousands(self, dataset: str) -> float:
-        """Thousands of frames of the largest shard, which may have twice as many as the average shard."""
+        """Thousands of frames of the largest shard. It may have twice as many as the average shard."""
         shards = self.project.datasets.shards(dataset)
         return self.all_thousands(dataset) * min(1.0, 2 / shards if shards > 1 else 1.0)
 
@@ -85,7 +89,7 @@ class Demands:
         return _minutes(rate * self.all_thousands(dataset), attempt, least)
 
     def measure_memory(self, configuration: str, name: str, attempt: int = 1) -> int:
-        """MB for the measurement `name`."""
+        """MB for the job of the measurement `name`."""
         cost = measure(name).cost
         if self._measured_share(configuration, name) < 1:
             return _megabytes(cost.memory_mb + cost.memory_each * EXCERPT_THOUSANDS, attempt)
@@ -93,51 +97,55 @@ class Demands:
         return fixed + self.evaluation_memory(configuration, cost.memory_each, attempt)
 
     def measure_minutes(self, configuration: str, name: str, attempt: int = 1) -> int:
-        """Minutes for the measurement `name`."""
+        """Minutes for the job of the measurement `name`."""
         cost = measure(name).cost
         rate = cost.seconds_each * self._measured_share(configuration, name)
         return self.evaluation_minutes(configuration, rate, attempt, cost.minutes)
 
     def _measured_share(self, configuration: str, name: str) -> float:
-        """The share of a data set's frames that a measurement reads: 1, or less if it reads a sample."""
+        """The share of a data set's frames that the measurement `name` reads; below 1 for a sample."""
         if "sample_frames" not in measure(name).options.model_fields:
             return 1.0
         section = self.project.configurations.section(configuration, "evaluation", "sample_frames")
         dataset = self.project.configurations.dataset(configuration)
+        # `all_thousands` is scaled with the number of joints; this factor undoes it.
         frames = 1e3 * self.all_thousands(dataset) * MEASURED_JOINTS / self._joints(dataset)
         return min(1.0, section["sample_frames"] / max(frames, 1.0))
 
     def evaluation_memory(self, configuration: str, rate: float, attempt: int = 1) -> int:
-        """MB for a measurement that reads one clip after another.
+        """MB for a job that reads one clip after another of the data set that the configuration uses.
 
         rate: MB for a thousand frames of the longest clip.
         """
         return self.memory_of_longest(self.project.configurations.dataset(configuration), rate, 0.0, attempt)
 
     def evaluation_minutes(self, configuration: str, rate: float, attempt: int = 1, least: int = 1) -> int:
-        """Minutes for a measurement that takes `rate` seconds for a thousand frames of the data set."""
+        """Minutes for a job that takes `rate` seconds for a thousand frames of the configuration's data."""
         dataset = self.project.configurations.dataset(configuration)
         return self.minutes_of_all(dataset, rate, attempt, least)
 
     def training_memory(self, configuration: str, attempt: int = 1) -> int:
-        """MB on each machine for a training.
+        """MB for a training, on each of its machines.
 
-        Each process holds PyTorch, its part of the database, the weights and the optimiser's state. If the
-        network is built instead of trained, the process also holds up to three copies of all rows.
+        Each process holds PyTorch, its part of the database, the weights and the optimiser's state. Some
+        networks, such as motion matching, are built from the rows and not trained. For them, the process also
+        holds up to three copies of all rows.
         """
         training = self.project.configurations.section(configuration, "training")
+        # 500 MB for PyTorch, and 32 bytes for each parameter and its part of the optimiser's state.
         needed = 500 + training["memory_mb"] + 32e-6 * self.parameters(configuration)
         if self.project.configurations.is_built(configuration):
             layout, dataset = self.layout(configuration), self.project.configurations.dataset(configuration)
+            # A number of a row has 4 bytes, so it needs 4e-3 MB for a thousand rows.
             needed += 3 * 4e-3 * (layout.x_size + layout.y_size) * self.all_thousands(dataset)
         return _megabytes(self.machines(configuration).processes_per_node * needed, attempt)
 
     def training_minutes(self, configuration: str, attempt: int = 1) -> int:
-        """Minutes for a training, at most a week. If it is killed, it continues from its last checkpoint.
+        """Minutes for a training, at most a week. A killed training continues from its last checkpoint.
 
-        This assumes that a machine multiplies by 6.4e9 weights per second. Two cores reach this: they train a
-        PFNN with layers of 342, 512, 512 and 311 on 10,700 samples per second. A PFNN has four parameters for
-        each weight.
+        The estimate assumes that a process multiplies by 6.4e9 weights per second. Two cores reach this rate:
+        they train a PFNN with layers of 342, 512, 512 and 311 units on 10,700 samples per second. A PFNN has
+        four parameters for each weight.
         """
         training = self.project.configurations.section(configuration, "training")
         dataset = self.project.configurations.dataset(configuration)
@@ -147,20 +155,24 @@ class Demands:
         return _minutes(seconds / self.machines(configuration).count, attempt, least=60)
 
     def machines(self, configuration: str) -> Machines:
-        """The machines on which a configuration trains; one process if there is nothing to train."""
+        """The machines on which a configuration trains; one process if its network is built, not trained."""
         if self.project.configurations.is_built(configuration):
             return Machines()
         return self.project.catalogue.configuration(configuration).training
 
     def training_threads(self, configuration: str) -> int:
-        """Threads of a training job: one for each process, at least 2. With GPUs 2, in SLURM 2 per GPU."""
+        """Threads of a training job: one for each process, at least 2.
+
+        With GPUs there are 2 threads. SLURM counts threads per GPU, so there each GPU gets 2.
+        """
         machines = self.machines(configuration)
         return 2 if machines.gpus else max(2, machines.processes)
 
     def gpus(self, configuration: str) -> int:
-        """GPUs that a training on one machine requests: `gpus`, or 1 for `device: cuda`.
+        """GPUs that a training requests: the option `gpus`, or 1 for `device: cuda`.
 
-        `device: auto` may use a GPU but does not request one. Several machines request theirs with `gres`.
+        0 if several machines request GPUs, because `gres` then requests them. With `device: auto`, a training
+        may use a GPU, but it does not request one.
         """
         machines = self.machines(configuration)
         if machines.gpus:
@@ -168,21 +180,22 @@ class Demands:
         return int(self.project.configurations.section(configuration, "training")["device"] == "cuda")
 
     def gres(self, configuration: str) -> str:
-        """SLURM's `gres` for GPUs on each of several machines, else ""."""
+        """SLURM's option `gres`, such as "gpu:8", for the GPUs of each of several machines; else ""."""
         machines = self.machines(configuration)
         return f"gpu:{machines.gpus}" if machines.gpus and machines.nodes > 1 else ""
 
     # Sizes
 
     def thousands(self, dataset: str, clip: str) -> float:
-        """Thousands of frames of a clip, multiplied by its number of joints / MEASURED_JOINTS."""
+        """Thousands of frames of a clip, multiplied by (its number of joints / MEASURED_JOINTS)."""
         return self._frames(dataset, original(clip)) / 1e3 * self._joints(dataset) / MEASURED_JOINTS
 
     def _thousands_of(self, batch: ClipBatch) -> list[float]:
+        """What `thousands` returns, for each clip of a batch."""
         return [self.thousands(batch.dataset, clip) for clip in batch.clips]
 
     def parameters(self, configuration: str) -> float:
-        """Number of trained parameters."""
+        """Number of trained parameters of a configuration's network; 0 if it is not trained."""
         chosen, layout = self.project.catalogue.configuration(configuration), self.layout(configuration)
         kind = model(chosen.network.kind)
         return (
@@ -193,22 +206,24 @@ class Demands:
         """The columns of a configuration's rows."""
         chosen = self.project.catalogue.configuration(configuration)
         skeleton = self.project.catalogue.skeleton(self.project.catalogue.dataset(chosen.dataset).skeleton)
-        of_rows = self.project.datasets.options(chosen.dataset, "database", "window", "step")
+        row_options = self.project.datasets.options(chosen.dataset, "database", "window", "step")
         channels = tuple((name, len(channel(name).columns(skeleton))) for name in chosen.channels)
-        return RowLayout(joints=len(skeleton.joints), channels=channels, **of_rows)
+        return RowLayout(joints=len(skeleton.joints), channels=channels, **row_options)
 
     @functools.cache  # noqa: B019 - one project lives as long as the process
     def all_thousands(self, dataset: str) -> float:
         """Thousands of frames of all clips and mirrors, scaled like `thousands`."""
-        once = sum(self.thousands(dataset, clip) for clip in self.project.clips.of(dataset))
-        return once * (1 + self.project.catalogue.dataset(dataset).mirror)
+        without_mirrors = sum(self.thousands(dataset, clip) for clip in self.project.clips.of(dataset))
+        return without_mirrors * (1 + self.project.catalogue.dataset(dataset).mirror)
 
     @functools.cache  # noqa: B019
     def _joints(self, dataset: str) -> int:
+        """Number of joints of the data set's skeleton."""
         return len(self.project.catalogue.skeleton(self.project.catalogue.dataset(dataset).skeleton).joints)
 
     @functools.cache  # noqa: B019
     def _frames(self, dataset: str, clip: str) -> float:
+        """Estimated number of frames of a clip, after it is resampled to the data set's frame rate."""
         if self.project.catalogue.dataset(dataset).synthetic is not None:
             return self.project.datasets.frames(dataset, clip)
         seconds = bvh_seconds(Path(self.project.clips.source(dataset, clip)))
@@ -217,9 +232,10 @@ class Demands:
 
 
 def bvh_seconds(path: Path) -> float | None:
-    """Estimated length of a BVH file in seconds, from its size, frame time and first row.
+    """Estimated length of a BVH file in seconds: its frame time times its estimated number of frames.
 
-    None if it cannot be estimated. The frame count in the header is not used, because it may be wrong.
+    This number is the bytes of all frames divided by the bytes of the first frame. The number in the header
+    is not used, because it may be wrong. None if the length cannot be estimated.
     """
     try:
         size = os.path.getsize(path)
@@ -227,17 +243,19 @@ def bvh_seconds(path: Path) -> float | None:
             start = file.read(HEADER_BYTES)
     except OSError:
         return None
-    begins = re.search(rb"Frame Time:[ \t]*([0-9.eE+-]+)\s*\n([^\n]+\n)", start)
+    found = re.search(rb"Frame Time:[ \t]*([0-9.eE+-]+)\s*\n([^\n]+\n)", start)
     try:
-        seconds = min(float(begins[1]), 1.0) if begins else 0.0
+        frame_time = min(float(found[1]), 1.0) if found else 0.0  # a larger one must be a mistake
     except ValueError:
         return None
-    return seconds * (size - begins.start(2)) / len(begins[2]) if begins and seconds > 0 else None
+    return frame_time * (size - found.start(2)) / len(found[2]) if found and frame_time > 0 else None
 
 
-def _megabytes(measured: float, attempt: int) -> int:
-    return math.ceil((ENGINE_MB + PYTHON_MB + MEMORY_MARGIN * measured) * attempt)
+def _megabytes(megabytes: float, attempt: int) -> int:
+    """The requested MB of a job that is estimated to need `megabytes` besides Snakemake and Python."""
+    return math.ceil((ENGINE_MB + PYTHON_MB + MEMORY_MARGIN * megabytes) * attempt)
 
 
 def _minutes(seconds: float, attempt: int, least: int) -> int:
+    """The requested minutes of a job that is estimated to take `seconds`."""
     return min(max(least, math.ceil(TIME_MARGIN * seconds / 60)) * attempt, WEEK_MINUTES)

@@ -1,6 +1,7 @@
 """Compares the memory and time that rules request with what their jobs used.
 
-The requests come from the text of a dry run, the use from the logs and benchmarks of a finished run.
+The requests are read from the text that a dry run prints. What the jobs used is read from the logs and the
+benchmark files of a finished run.
 """
 
 from __future__ import annotations
@@ -14,7 +15,7 @@ from hobble.report.pipeline import read_benchmark
 from hobble.workflow.clip_batches import family_of
 from hobble.workflow.resource_demands import ENGINE_MB
 
-# A job in the text of a dry run: the rule and the lines `key: value`.
+# A job in the text of a dry run: the line with its rule, then indented lines `key: value`.
 JOB_BLOCK = re.compile(r"^ *(?:local)?rule ([^\n]+):\n((?: +\w+: .*\n)+)", re.M)
 MEMORY_LINE = re.compile(r"took (\d+) MB of memory at most")  # at the end of a job's log
 
@@ -23,10 +24,9 @@ MEMORY_LINE = re.compile(r"took (\d+) MB of memory at most")  # at the end of a 
 class JobResources:
     """What one job requests and, if it has run, what it used.
 
-    rule: its name without data set and batch. log: path in the folder of the run. requested_mb, used_mb:
-    memory, MB; the used memory comes from the log and does not include that of Snakemake itself.
-    requested_s, used_s: seconds; the used time comes from the benchmark file. A used amount is None if the
-    run has no record of it.
+    rule: the rule's name without data set and batch number. log: path of the job's log, relative to the
+    folder of the run. requested_mb, used_mb: memory in MB; the used memory does not include that of Snakemake
+    itself. requested_s, used_s: time in seconds. used_mb or used_s is None if the run has no record of it.
     """
 
     rule: str
@@ -48,7 +48,10 @@ class JobResources:
 
 
 def planned_jobs(plan: str) -> Iterator[JobResources]:
-    """The jobs in the text of a dry run. Raises KeyError for a job that requests no memory or time."""
+    """The jobs in the text of a dry run, with their requests.
+
+    plan: this text. Raises KeyError for a job that requests no memory or no time.
+    """
     for rule, block in JOB_BLOCK.findall(plan):
         values = dict(line.strip().split(": ", 1) for line in block.splitlines())
         requests = dict(part.split("=", 1) for part in values["resources"].split(", "))
@@ -58,7 +61,10 @@ def planned_jobs(plan: str) -> Iterator[JobResources]:
 
 
 def with_use(jobs: Iterator[JobResources], run: Path) -> Iterator[JobResources]:
-    """The same jobs with what they used. run: the folder of the run. Jobs that did not run are left out."""
+    """The same jobs, with what they used. Jobs that have no log, because they did not run, are left out.
+
+    run: the folder in which Snakemake ran.
+    """
     for job in jobs:
         log = run / job.log
         benchmark = run / job.log.replace("/logs/", "/benchmarks/", 1).removesuffix(".log")

@@ -1,4 +1,8 @@
-"""Checks the targets of a command line before Snakemake plans, and finds the data sets that they need."""
+"""Checks the targets of a command line before Snakemake plans, and finds the data sets that they need.
+
+A target is the path of a file that a run makes: results/<configuration>/<folder>/<file>,
+results/datasets/<data set>/... or results/compare/...
+"""
 
 from __future__ import annotations
 
@@ -23,7 +27,7 @@ PAGE = "page"  # the folder in results/ with the files that all reports share
 def check(project: Project, targets: Iterable[str]) -> None:
     """Validate the targets, and every configuration, data set and skeleton that they need.
 
-    Raises HobbleError for the first mistake.
+    Raises HobbleError for the first mistake that is found.
     """
     for target in targets_or_default(targets):
         _, name, folder, file, *_ = (*Path(target).parts, "", "", "")
@@ -34,20 +38,20 @@ def check(project: Project, targets: Iterable[str]) -> None:
                 _check_configuration(project, compared)
         elif name and name != PAGE:
             _check_configuration(project, name)
-            _check_possible(project, name, folder, file)
+            _check_target_possible(project, name, folder, file)
 
 
 def notes(project: Project, targets: Iterable[str]) -> list[str]:
-    """Notes on unused files in the folders of the data sets that the targets need."""
+    """Sentences about unused files in the folders of the data sets that the targets need."""
     names = datasets_of(project, targets)
     return [f"data set {name}: {note}" for name in names for note in project.clips.notes(name)]
 
 
 def needed_datasets(project: Project, arguments: Sequence[str]) -> list[str]:
-    """The data sets that a run of Snakemake needs. arguments: its command line.
+    """The names of the data sets that a run of Snakemake needs. arguments: the command line of the run.
 
-    If the run is a job on another machine, it needs only the data set of its rule, if any. If a configuration
-    uses or continues the network of another one, the other one's data set is needed, too.
+    A job on another machine is also a run of Snakemake. It needs only the data set of its rule, or none if
+    the rule has no data set. Any other run needs the data sets that `datasets_of` returns for its targets.
     """
     if rules := rules_of_job(arguments):
         return [name for name in dict.fromkeys(map(dataset_of, rules)) if name]
@@ -55,108 +59,124 @@ def needed_datasets(project: Project, arguments: Sequence[str]) -> list[str]:
 
 
 def datasets_of(project: Project, targets: Iterable[str]) -> list[str]:
-    """The data sets that the targets need."""
+    """The names of the data sets that the targets need.
+
+    If a configuration uses or continues the network of another configuration, the data set of this other one
+    is needed, too.
+    """
     names: list[str] = []
-    waiting: list[str] = []
+    configurations: list[str] = []  # those whose data sets are still to be added
     for target in targets_or_default(targets):
         _, name, folder, *_ = (*Path(target).parts, "", "")
         if name == "datasets":
             names.append(folder)
         elif name == COMPARE:
-            waiting += project.comparison.names()
+            configurations += project.comparison.names()
         elif name and name != PAGE:
-            waiting.append(name)
+            configurations.append(name)
     seen = set()
-    while waiting:
-        name = waiting.pop(0)
+    while configurations:
+        name = configurations.pop(0)
         if name not in seen:
             seen.add(name)
-            model = project.catalogue.configuration(name)
-            names.append(model.dataset)
-            waiting += filter(None, (model.network_of, model.training.continues))
+            configuration = project.catalogue.configuration(name)
+            names.append(configuration.dataset)
+            configurations += filter(None, (configuration.network_of, configuration.training.continues))
     return list(dict.fromkeys(names))
 
 
 def targets_or_default(targets: Iterable[str]) -> list[str]:
-    """The targets, or the target that Snakemake makes if none is given."""
+    """The targets as a list. If there are none, the list has the target that Snakemake makes by default."""
     return list(targets) or ["results/holden/report.html"]
 
 
 def _check_configuration(project: Project, name: str) -> None:
-    model = project.catalogue.configuration(name)
-    for other in filter(None, (model.network_of, model.training.continues)):
+    """Check a configuration, the configurations that it names, and its data set."""
+    configuration = project.catalogue.configuration(name)
+    for other in filter(None, (configuration.network_of, configuration.training.continues)):
         if other == name:
             raise HobbleError(
-                f"configuration {name} names itself in `network_of` or `training.continues`: name another"
+                f"configuration {name} names itself in `network_of` or `training.continues`. "
+                "Name another configuration there"
             )
-        project.catalogue.configuration(other)
-    if model.training.continues:
-        _check_continues(project, name, model)
-    if model.training.symmetric and not model.network_of:
-        _check_symmetric(project, name, model)
-    _check_dataset(project, model.dataset)
-    project.datasets.selected(model.dataset, model.channels)
-    refuse_copies(project.clips, project.datasets, model.dataset, tuple(model.channels))
+        project.catalogue.configuration(other)  # raises HobbleError if it does not exist or has a mistake
+    if configuration.training.continues:
+        _check_continues(project, name, configuration)
+    if configuration.training.symmetric and not configuration.network_of:
+        _check_symmetric(project, name, configuration)
+    dataset = configuration.dataset
+    _check_dataset(project, dataset)
+    project.datasets.selected(dataset, configuration.channels)  # raises HobbleError for unusable clips
+    refuse_copies(project.clips, project.datasets, dataset, tuple(configuration.channels))
 
 
-def _check_symmetric(project: Project, name: str, model: Configuration) -> None:
+def _check_symmetric(project: Project, name: str, configuration: Configuration) -> None:
     """Check that the network can be symmetric and that the data set has mirrored clips."""
-    if model.network.why_asymmetric:
+    if configuration.network.why_asymmetric:
         raise HobbleError(
-            f"configuration {name}: training.symmetric: {model.network.why_asymmetric}. "
+            f"configuration {name}: training.symmetric: {configuration.network.why_asymmetric}. "
             "Write `symmetric: false`."
         )
-    if not project.catalogue.dataset(model.dataset).mirror:
+    dataset = configuration.dataset
+    if not project.catalogue.dataset(dataset).mirror:
         raise HobbleError(
-            f"configuration {name}: training.symmetric: data set {model.dataset} has no mirrored clips, so "
-            "its left and right may differ. Write `mirror: true` there, or `symmetric: false`."
+            f"configuration {name}: training.symmetric: data set {dataset} has no mirrored clips, so its "
+            "left and right may differ. Write `mirror: true` in the data set, or `symmetric: false`."
         )
 
 
-def _check_continues(project: Project, name: str, model: Configuration) -> None:
-    """Check that a training can continue from another one.
+def _check_continues(project: Project, name: str, configuration: Configuration) -> None:
+    """Check that a training can continue from the training of another configuration.
 
-    Both must have the same channels, network and sections, and the later one must not have fewer passes.
+    Both must have the same channels, network and number of sections (parts of a pass). The later training
+    must not have fewer passes. name, configuration: those of the later training.
     """
-    earlier = model.training.continues
+    earlier = configuration.training.continues
     if project.configurations.is_built(name):
-        kind = model.network.kind
+        kind = configuration.network.kind
         raise HobbleError(
-            f"configuration {name} continues from {earlier}, but {kind} is built and not trained"
+            f"configuration {name} continues from {earlier}, but {kind} is built and not trained. "
+            "Remove `training.continues`"
         )
     assert earlier is not None
     start = project.catalogue.configuration(earlier)
-    for key, value, of_start in (
-        ("channels", list(model.channels), list(start.channels)),
-        ("network", model.network.model_dump(), start.network.model_dump()),
-        ("training.sections", model.training.sections, start.training.sections),
+    for key, value, start_value in (
+        ("channels", list(configuration.channels), list(start.channels)),
+        ("network", configuration.network.model_dump(), start.network.model_dump()),
+        ("training.sections", configuration.training.sections, start.training.sections),
     ):
-        if value != of_start:
+        if value != start_value:
             raise HobbleError(
-                f"configuration {name} continues from {earlier}, so its {key} must be {of_start}, not {value}"
+                f"configuration {name} continues from {earlier}, so its {key} must be {start_value}, "
+                f"not {value}"
             )
-    if model.training.passes < start.training.passes:
+    if configuration.training.passes < start.training.passes:
         raise HobbleError(
-            f"configuration {name} continues from {earlier}, which has {start.training.passes} passes. Its "
-            f"training.passes must not be fewer, but it is {model.training.passes}"
+            f"configuration {name} continues from {earlier}, which has training.passes: "
+            f"{start.training.passes}. Write at least this number, not {configuration.training.passes}"
         )
 
 
 def _check_dataset(project: Project, name: str) -> None:
-    model = project.catalogue.dataset(name)
-    skeleton = project.catalogue.skeleton(model.skeleton)
+    """Check a data set, its clips and its skeleton."""
+    dataset = project.catalogue.dataset(name)
+    skeleton = project.catalogue.skeleton(dataset.skeleton)
     for clip, entry in project.clips.listed(name).items():
         project.clips.rig_files(name, clip)  # raises InputError if the clip has no file
         _check_entry(f"data set {name}: clips.{clip}", entry)
-    _check_hurt(project, name, model, [f"{a}-{b}" for a, b in skeleton.links])
+    _check_hurt(project, name, dataset, [f"{a}-{b}" for a, b in skeleton.links])
     project.datasets.channel_sources.check(name)
+    # Raises HobbleError if `held_out` is wrong, or if no clip is left for training.
     project.datasets.selected(name, project.datasets.channel_sources.channels(name))
-    if model.mirror:
-        _check_mirror(model.skeleton, skeleton)
+    if dataset.mirror:
+        _check_mirror(dataset.skeleton, skeleton)
 
 
 def _check_entry(where: str, entry: ClipEntry) -> None:
-    """Check that the recipe in a clip's entry, for the synthetic walker, exists."""
+    """Check that the recipe in a clip's entry exists. A recipe says how the synthetic walker makes the clip.
+
+    where: place of the entry, for messages.
+    """
     if entry.recipe is not None:
         from hobble.synthetic.recipes import RECIPES  # imports numpy, which takes longer than all checks
 
@@ -168,32 +188,35 @@ def _check_entry(where: str, entry: ClipEntry) -> None:
             )
 
 
-def _check_hurt(project: Project, name: str, model: Dataset, links: Sequence[str]) -> None:
-    """Check that the links of a data set's section `hurt` exist."""
-    if model.hurt is None or not project.clips.hurt_versions(name):
+def _check_hurt(project: Project, name: str, dataset: Dataset, links: Sequence[str]) -> None:
+    """Check that the links of a data set's section `hurt` exist.
+
+    links: all links of the skeleton. A link is named after two joints, as in LeftUpLeg-LeftLeg.
+    """
+    if dataset.hurt is None or not project.clips.hurt_versions(name):
         return
     if not links:
         raise HobbleError(
-            f"data set {name}: hurt: skeleton {model.skeleton} has no `links`. Add them to its file."
+            f"data set {name}: hurt: skeleton {dataset.skeleton} has no `links`. Add them to its file."
         )
-    if odd := [link for link in model.hurt.links if link not in links]:
+    if unknown := [link for link in dataset.hurt.links if link not in links]:
         raise HobbleError(
-            f"data set {name}: hurt.links: no such link: {', '.join(odd)}. There are {', '.join(links)}."
+            f"data set {name}: hurt.links: no such link: {', '.join(unknown)}. There are {', '.join(links)}."
         )
 
 
-def _check_mirror(name: str, skeleton: SkeletonFile) -> None:
-    """Raise HobbleError for a skeleton that cannot be mirrored."""
+def _check_mirror(name: str, skeleton_file: SkeletonFile) -> None:
+    """Raise HobbleError for a skeleton that cannot be mirrored. name: the skeleton's name."""
     from hobble.core.skeleton import Skeleton
     from hobble.motion.mirror import mirror_skeleton
 
-    rig = Skeleton.from_dict({"name": name, **skeleton.model_dump(exclude={"maps"})})
-    mirror_skeleton(rig)
-    _ = rig.mirror_links  # raises HobbleError if a link has no counterpart
+    skeleton = Skeleton.from_dict({"name": name, **skeleton_file.model_dump(exclude={"maps"})})
+    mirror_skeleton(skeleton)
+    _ = skeleton.mirror_links  # raises HobbleError if a link has no counterpart on the other side
 
 
-def _check_possible(project: Project, name: str, folder: str, file: str) -> None:
-    """Raise HobbleError for a target that this configuration cannot have, before anything is trained."""
+def _check_target_possible(project: Project, name: str, folder: str, file: str) -> None:
+    """Raise HobbleError if the configuration `name` cannot make the target results/<name>/<folder>/<file>."""
     owner = project.catalogue.configuration(name).network_of or name
     if folder == "stimuli" and not project.catalogue.configuration(owner).channels:
         raise HobbleError(
@@ -209,6 +232,6 @@ def _check_possible(project: Project, name: str, folder: str, file: str) -> None
     stem, _, suffix = file.rpartition(".")
     if folder == "export" and suffix == "onnx" and stem not in get_args(PhaseMode):
         raise HobbleError(
-            f"results/{name}/export/{file}: the phase modes are {', '.join(get_args(PhaseMode))}, as in "
-            f"results/{name}/export/cubic.onnx"
+            f"results/{name}/export/{file}: {stem} is not a phase mode. The phase modes are "
+            f"{', '.join(get_args(PhaseMode))}, as in results/{name}/export/cubic.onnx"
         )

@@ -25,7 +25,11 @@ GRACE_SECONDS = 10.0  # time for torchrun to end its processes
 
 
 def on_machines(training: Training, machines: Machines, gpus: bool) -> Training:
-    """The training options for these machines. gpus: whether each of several processes uses a GPU."""
+    """The training options with the numbers of machines and processes, and the device, for these machines.
+
+    machines: `processes` is the number of processes of each machine, also with GPUs. gpus: whether each
+    process uses a GPU; a single process uses the device of `training` instead.
+    """
     device = training.device if machines.count == 1 else "cuda" if gpus else "cpu"
     keys = {
         "nodes": machines.nodes,
@@ -48,9 +52,10 @@ def train_together(
 ) -> None:
     """Train in `machines.count` processes. Returns when the last checkpoint is on disk.
 
-    threads: for all processes of one machine together. log: file to which the output of the processes is
-    appended. The other arguments are those of `hobble.training.train.train`. All machines must
-    see the files. Raises HobbleError with the message of the process that failed, or with its exit status.
+    threads: number of threads of all processes of one machine together. log: file to which the output of the
+    processes is appended. database, start: paths. The other arguments are those of
+    `hobble.training.train.train`. All machines must be able to read and write these files. Raises HobbleError
+    if a process fails, with its message or with the exit status.
     """
     job = {
         "database": str(database),
@@ -63,23 +68,26 @@ def train_together(
     checkpoints.mkdir(parents=True, exist_ok=True)
     with tempfile.TemporaryDirectory(prefix="processes-", dir=checkpoints) as folder:
         job_file = Path(folder, "job.json")
-        each = max(1, threads // machines.processes_per_node)
-        job_file.write_text(json.dumps({**job, "threads": each, "log": str(log)}), encoding="utf-8")
+        own_threads = max(1, threads // machines.processes_per_node)  # of each process
+        job_file.write_text(json.dumps({**job, "threads": own_threads, "log": str(log)}), encoding="utf-8")
         with open(log, "ab") as output:
-            status = _run(command(machines, job_file), _environment(machines, each), output)
+            status = _run(command(machines, job_file), _environment(machines, own_threads), output)
         errors = [file.read_text(encoding="utf-8") for file in sorted(Path(folder).glob("error-*"))]
     if errors:
         raise HobbleError(errors[0])
     if status:
         raise HobbleError(
             f"one of the {machines.count} training processes died, and the others ended with it "
-            f"(status {status}). The same command continues from the last checkpoint, also with another "
-            f"number of processes. Their output is in {log}."
+            f"(exit status {status}). The output of the processes is in {log}. The same command continues "
+            "from the last checkpoint, also with another number of processes."
         )
 
 
 def command(machines: Machines, job_file: Path) -> list[str]:
-    """The command that starts the processes. Raises HobbleError for several machines without SLURM."""
+    """The command that starts the processes. job_file: see `hobble.workflow.training_process`.
+
+    Raises HobbleError for several machines without SLURM.
+    """
     torchrun = [
         sys.executable,
         "-m",
@@ -105,22 +113,25 @@ def command(machines: Machines, job_file: Path) -> list[str]:
 
 
 def _run(command: list[str], environment: Mapping[str, str], output: IO[bytes]) -> int:
-    """Run a command and return its exit status. If this process is stopped, the command is ended too."""
-    started = subprocess.Popen(
+    """Run a command and return its exit status. If this process is stopped, the command is ended, too."""
+    process = subprocess.Popen(
         command, stdin=subprocess.DEVNULL, stdout=output, stderr=output, env=environment
     )
     try:
-        return started.wait()
+        return process.wait()
     finally:
-        if started.poll() is None:
-            started.terminate()
+        if process.poll() is None:
+            process.terminate()
             with contextlib.suppress(subprocess.TimeoutExpired):
-                started.wait(GRACE_SECONDS)
-            started.kill()
+                process.wait(GRACE_SECONDS)
+            process.kill()
 
 
 def _environment(machines: Machines, threads: int) -> dict[str, str]:
-    """Environment variables for the processes. On a single machine, the processes end when this one ends."""
+    """Environment variables for the training processes. threads: number of threads of each.
+
+    If there is only one machine, the variables make the processes end when this process ends.
+    """
     variables = {**os.environ, "OMP_NUM_THREADS": str(threads)}
     variables["PYTHONPATH"] = os.pathsep.join(path for path in sys.path if path)
     if machines.nodes == 1:
@@ -131,6 +142,7 @@ def _environment(machines: Machines, threads: int) -> dict[str, str]:
 
 
 def _free_port() -> int:
+    """A TCP port that no program on this machine uses."""
     with socket.socket() as probe:
         probe.bind(("", 0))
         return int(probe.getsockname()[1])
