@@ -160,8 +160,8 @@ def trajectory(root: RootFrames, frame: np.ndarray, seen_from: np.ndarray, offse
     """Positions and facing directions of the root around each of R frames.
 
     frame: (R,) these frames. offsets: frames from each of them to the samples. seen_from: (R,) the frames in
-    whose root coordinates the samples are given, one for each frame. Returns four arrays (R, samples): x and z of the position
-    (cm), then x and z of the facing direction.
+    whose root coordinates the samples are given, one for each frame. Returns four arrays (R, samples): x and
+    z of the position (cm), then x and z of the facing direction.
     """
     sampled = frame[:, None] + np.array(offsets)
     on_ground = np.zeros((*sampled.shape, 3))
