@@ -91,7 +91,7 @@ def advance(
     more slowly. pull: largest change of the movement at right angles to the target, as a share of the
     movement's length; 0 for no change. Recorded frames need it, because clips have only some directions and
     speeds. The idea is the adjustment of Holden et al. (2020).
-    path: the trajectories, see `hobble.runtime.trajectory.Trajectory`. phase: (C,). Both are changed in place.
+    path: the trajectories, see `hobble.runtime.trajectory.Trajectory`. phase: (C,). Both change in place.
     """
     position, direction, gait = path
     length = position.shape[1]
