@@ -13,7 +13,7 @@ from hobble.core.skeleton import Skeleton
 from hobble.models.pfnn.network import Pfnn
 from hobble.models.training_facts import TrainingFacts
 from hobble.runtime.animation import ProceduralAnimation
-from hobble.runtime.bounds import MARGIN_SHARE, SPEED_MARGIN, Bounds, clip_rows
+from hobble.runtime.bounds import MARGIN_SHARE, SPEED_MARGIN, Bounds, limit_rows
 
 
 def walked(network: Pfnn, fastest: float = 4.0) -> TrainingFacts:
@@ -97,7 +97,7 @@ def test_a_character_starts_in_the_start_frame(make_network) -> None:
 def test_rows_are_clipped_to_the_bounds() -> None:
     rows = np.array([[0, 5, -5], [np.nan, 1, np.inf]], np.float32)
     low, high, wild = np.full(3, -1, np.float32), np.full(3, 2, np.float32), np.zeros(2, bool)
-    assert clip_rows(rows, low, high, wild)
+    assert limit_rows(rows, low, high, wild)
     np.testing.assert_array_equal(rows, [[0, 2, -1], [0.5, 1, 0.5]])
     np.testing.assert_array_equal(wild, [False, True])
 

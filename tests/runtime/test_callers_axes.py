@@ -155,5 +155,5 @@ def test_left_and_right_are_correct_in_unity_and_unreal() -> None:
     np.testing.assert_array_equal(
         blender.directions_out(np.array([left, up, ahead])), [[1, 0, 0], [0, 0, 1], [0, -1, 0]]
     )
-    with pytest.raises(ValueError, match="handed is right or left"):
+    with pytest.raises(ValueError, match="handed has to be right or left"):
         Axes("both")

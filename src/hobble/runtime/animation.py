@@ -1,4 +1,4 @@
-"""The public character: load it once, then call `next_pose` every frame."""
+"""The character for games and other callers: load it once, then call `next_pose` in every frame."""
 
 from __future__ import annotations
 
@@ -27,18 +27,21 @@ from hobble.runtime.limits import SpeedLimiter
 from hobble.runtime.trajectory import target_facing
 from hobble.runtime.waypoints import Follower, Waypoint
 
-FARTHEST = 1e7  # cm, 100 km: largest start coordinate; farther from the origin, floats are imprecise
+# Largest x or z of a start position, cm (100 km). Farther from the origin, floats are imprecise.
+FARTHEST = 1e7
 
 
 @dataclass(frozen=True)
 class Pose:
-    """One frame of C characters. The caller may keep and change it. For one character there is no axis C.
+    """The pose of C characters in one frame. If there is only one character, the arrays have no axis C.
 
-    positions: (C, J, 3) world, in the caller's axes and unit. rotations: (C, J, 4) world, w first.
-    contacts: (C, 4) of left heel, left toe, right heel, right toe, from 0 to 1, as predicted; 0 while the
-    runtime makes the foot step. phase: (C,) in cycles. root: (C, 3) on the ground. yaw: (C,) radians, where
-    the root faces: 0 is +Z, growing to the left, in Hobble's axes. channels: name -> (C, columns), the values
-    that the network got.
+    The caller may keep the pose and change its arrays.
+    positions: (C, J, 3) joint positions in the world, in the caller's axes and unit. rotations: (C, J, 4)
+    joint rotations in the world, in the caller's axes, as quaternions with w first. contacts: (C, 4)
+    predicted contact of left heel, left toe, right heel and right toe, from 0 to 1; 0 while the runtime makes
+    the foot step. phase: (C,) in cycles, 0 to 1. root: (C, 3) point on the ground below the hips, in the
+    caller's axes and unit. yaw: (C,) direction that the root faces, in radians and always in Hobble's axes: 0
+    is +Z, and the angle grows to the left. channels: channel -> values (C, columns) that the network got.
     """
 
     positions: Array = field(repr=False)
@@ -56,7 +59,8 @@ class ProceduralAnimation:
         character = ProceduralAnimation.load("results/injured/network")
         pose = character.next_pose((0, 2.5), injury={"LeftUpLeg-LeftLeg": 7})
 
-    One call moves all C characters. An argument is either one value for all of them or one value for each.
+    Each call of `next_pose` moves all C characters. Each of its arguments is one value for all characters, or
+    one value for each. The options are explained in `load`.
     """
 
     def __init__(
@@ -77,7 +81,7 @@ class ProceduralAnimation:
         facing: Any = None,
     ) -> None:
         if network.skeleton is None:
-            raise ValueError("the network has no skeleton: load it with skeleton=")
+            raise ValueError("the network has no skeleton: pass skeleton= when you load it")
         for name, value, least in (
             ("characters", characters, 1),
             ("steering", steering, 0),
@@ -86,12 +90,12 @@ class ProceduralAnimation:
         ):
             if not least <= value < np.inf:
                 bound = f"{least} or more" if least in (0, 1) else "more than 0"
-                raise ValueError(f"{name} is {value!r}, but has to be {bound}")
+                raise ValueError(f"{name} is {value!r}, but has to be {bound}, and finite")
         self.network, self.skeleton = network, network.skeleton
         self.characters, self.axes = characters, axes or Axes()
         self._channel_values = ChannelValues(network, scales or {})
-        self._limited = limits
-        self._of_controller: ControllerOptions = {
+        self._limit_speed = limits
+        self._controller_options: ControllerOptions = {
             "rates": {name: channel(name).rate for name in network.channels} | dict(rates or {}),
             "foot_locking": foot_locking,
             "steering": steering,
@@ -103,27 +107,28 @@ class ProceduralAnimation:
         self._targets = CallerTargets(network.gaits, self.axes, characters)
         for waypoint in self._waypoints or ():
             self._targets.check_gait(waypoint.gait)
-        self._terrain: tuple[Any, Any] = (None, None)
+        self._terrain: tuple[Any, Any] = (None, None)  # the caller's last terrain, and its height function
         self.reset(position, facing)
 
     @classmethod
     def load(
         cls, path: str | Path, *, skeleton: Skeleton | str | Path | None = None, **options: Any
     ) -> ProceduralAnimation:
-        """Load weights.npz, its folder, or a folder with the .bin files of Holden et al. (2017).
+        """Load a network and put its characters at their start.
 
+        path: weights.npz, the folder that holds it, or a folder with the .bin files of Holden et al. (2017).
         skeleton: a Skeleton or a file of config/skeletons, for a network file that has none.
         mode: how the weights are interpolated over the phase: "constant", "linear" or "cubic".
         storage: how weights are stored in memory, "float32" or "int16"; the default depends on the kind of
             network.
-        characters: how many.
+        characters: number of characters.
         waypoints: the track to follow when `next_pose` gets no velocity.
         rates: channel -> largest change of its values per second; default: the channel's own rate.
-        scales: channel -> number by which its values are divided for the network.
-        foot_locking: hold feet in contact where they landed.
-        steering: gain of the correction when the target velocity is not reached; 0: none, as in the
-            runtime of Holden et al. (2017).
-        limits: limit the target speed to what the injured body can do.
+        scales: channel -> number by which its values are divided before the network gets them.
+        foot_locking: whether a foot in contact with the ground is held where it landed.
+        steering: how strongly the runtime corrects a velocity that differs from the target; 0: not at all, as
+            in the runtime of Holden et al. (2017).
+        limits: whether the target speed is limited to what a body with these channel values can reach.
         axes: the caller's axes and unit. position, facing: see `reset`.
 
         Raises InputError for a file that is not a usable network, ValueError for an option out of range, and
@@ -136,9 +141,13 @@ class ProceduralAnimation:
         return cls(network, **options)
 
     def reset(self, position: Any = None, facing: Any = None) -> None:
-        """Restart the characters, healthy, at `position` and facing `facing`, each (3,) or (C, 3).
+        """Restart the characters, with all channel values at 0.
 
-        By default they start at the origin facing forward, or at the start of the waypoints.
+        position: where they start, on the ground: (3,) or (C, 3), or without the height (2,) or (C, 2). By
+        default this is the origin, or the start of the track of waypoints. facing: the direction that they
+        face, with the same shapes. By default this is forward, or toward the first waypoint. Raises
+        ValueError for a wrong shape, a number that is not finite, or a position more than 100 km from the
+        origin.
         """
         count = self.characters
         self.follower = Follower(self._waypoints, count) if self._waypoints is not None else None
@@ -146,64 +155,70 @@ class ProceduralAnimation:
         places = (
             np.broadcast_to(place, (count, 2))
             if position is None
-            else self._targets.on_the_ground("position", position, self.axes.points_in)
+            else self._targets.convert_ground_vector("position", position, self.axes.points_in)
         )
         if np.abs(places).max() > FARTHEST:
             raise ValueError(f"position is further than {FARTHEST / 1e5:g} km from the origin: {position}")
         if facing is None:
             yaws = np.full(count, yaw)
         else:
-            ahead = self._targets.facing(facing)
+            ahead = self._targets.convert_facing(facing)
             yaws = np.arctan2(ahead[:, 0], ahead[:, 1])
-        self._control(start(self.network, count, np.array(places, float), yaws))
+        self._continue_from(start(self.network, count, np.array(places, float), yaws))
 
     def copies(self, of: np.ndarray) -> ProceduralAnimation:
-        """A new animation whose character i continues from character of[i] of this one. of: (C',) indices.
+        """A new animation whose character i is a copy of character of[i] of this animation.
 
-        The two animations share no state. Raises ValueError if the characters follow waypoints.
+        of: (C',) indices. The two animations share no state. Raises ValueError if the characters follow
+        waypoints.
         """
         if self.follower is not None:
             raise ValueError("characters that follow waypoints cannot be copied")
         out = copy.copy(self)
         out.characters = len(of)
         out._targets = CallerTargets(self.network.gaits, self.axes, len(of))
-        out._control(self.state.copies(of))
+        out._continue_from(self.state.copies(of))
         out._controller.take_pose(self._controller, of)
         return out
 
-    def _control(self, state: Character) -> None:
-        """Continue from `state`, with a new controller."""
+    def _continue_from(self, state: Character) -> None:
+        """Make a new controller, which continues from `state`."""
         count = self.characters
         self.state = state
-        self._controller = Controller(self._predictor, state, **self._of_controller)
+        self._controller = Controller(self._predictor, state, **self._controller_options)
+        # Written in each frame by `target_facing`.
         self._target_strafe, self._target_look = np.zeros(count), np.zeros((count, 2))
-        self._nowhere = np.zeros((count, 2))
+        self._no_facing = np.zeros((count, 2))  # zero means: face the direction of movement
         self._limiter = SpeedLimiter(self.network, self._channel_values.columns, count)
 
     @property
     def seconds(self) -> Array:
-        """(6,) seconds of the last frame's steps: prepare, input, insert, predict, output, update."""
+        """(6,) seconds of each step of the last frame: prepare, input, insert, predict, output, update."""
         return self._controller.seconds
 
     @property
     def last_inputs(self) -> Array:
-        """(C, X) inputs of the network in the last frame, in raw units. The next frame overwrites them."""
+        """(C, X) inputs of the network in the last frame, not standardised.
+
+        The next frame overwrites this array.
+        """
         return self._controller.x
 
     @property
     def predicted_rotations(self) -> Array:
-        """(C, J, 4) world rotations that the network predicted for the last frame.
+        """(C, J, 4) joint rotations in the world that the network predicted for the last frame.
 
-        Here it is not yet limited how far a joint turns in a frame. In Hobble's axes: Y up, Z forward.
+        They are in Hobble's axes (Y up, Z forward). Unlike in the pose, there is no limit on how far a joint
+        turns in a frame.
         """
         return world_rotations(*self.predicted_turns)
 
     @property
     def predicted_turns(self) -> tuple[Array, Array]:
-        """Rotations (C, J, 3) predicted for the last frame, relative to the root, and the root's yaw (C,).
+        """Joint rotations (C, J, 3) predicted in the last frame, relative to the root, and root yaw (C,).
 
-        Both are copies. Collect those of many frames and pass them to `world_rotations` at once: this is
-        faster than `predicted_rotations`.
+        Both are copies, in the form that `world_rotations` takes. For many frames, collect both and call
+        `world_rotations` once, which is faster than to read `predicted_rotations` in each frame.
         """
         controller = self._controller
         turns = controller.y[:, self.network.layout.y_joint_rotation].reshape(self.characters, -1, 3)
@@ -218,44 +233,47 @@ class ProceduralAnimation:
         terrain: Any = None,
         **channels: Mapping[str, Any] | Array | None,
     ) -> Pose:
-        """Advance by one 60 Hz frame and return the pose.
+        """Advance by one frame (1/60 s) and return the pose.
 
-        target_velocity: (2,) on the ground, (3,), or (C, 2 or 3): distance per frame, in your unit. None
-            follows the waypoints; without waypoints the character stands.
-        facing: direction to look in, same shapes, any length. None or zero: the direction of movement.
+        target_velocity: distance per frame, in your axes and unit: (3,) or (C, 3), or without the height (2,)
+            or (C, 2). None follows the waypoints; without waypoints the character stands.
+        facing: direction to look in, same shapes, any length. None or zero: the direction of movement. While
+            a character follows waypoints, their facing is used instead.
         gait: a name ("walk"), one name for each character, shares (6,) or (C, 6), or None to choose by speed.
-            Below 0.1 cm a frame the character stands, whatever the gait.
+            Below 0.1 cm a frame, a character stands instead of the named gait, or steps on the spot to turn;
+            with "crouch" it stays down. Shares are always used as they are.
         terrain: None for flat ground at 0; a function of two ground coordinates (arrays) that returns
             heights; a `ground.Heightmap`; or a 2D array of heights around the origin. Coordinates and heights
-            are in your axes and unit. Pass the same object every frame.
+            are in your axes and unit. Pass the same object in every frame, so that it is converted only once.
         channels: keywords named after channels, such as injury={"LeftUpLeg-LeftLeg": 7}. The value is a
             mapping from label (column of the channel) to value or (C,) values, or an array (L,) or (C, L) of
-            all L labels. Labels that are not named go back to 0. None, or no keyword, leaves the channel
-            unchanged.
+            all L labels. Labels that the mapping does not have go back to 0. None, or no keyword, leaves the
+            channel unchanged. The values approach their targets at the channel's rate.
 
         Raises UnknownName (a KeyError) for a label or gait that the network does not have; TypeError for a
         keyword that is no channel; ValueError for a channel that the network has no input for, for values out
-        of range (velocity above 18 m/s, gait share above 1, ground above 100 km), for values that are not
-        finite and for wrong shapes. After any error, also in the terrain function, the state is unchanged.
+        of range (velocity above 18 m/s, gait share above 1, ground more than 100 km above or below 0), for
+        values that are not finite, and for wrong shapes. After any error, also one in the terrain function,
+        the characters are as they were before the call.
         """
-        velocity, ahead, gait = self._target(target_velocity, facing, gait)
+        velocity, ahead, gait = self._choose_target(target_velocity, facing, gait)
         strafe, direction = self._target_strafe, self._target_look
         target_facing(velocity, ahead, self.state.smoothed_direction, strafe, direction)
         heading = self.state.direction[:, self.network.layout.window]
         shares = self._targets.gait_shares(velocity, direction, heading, gait)
         if terrain is not self._terrain[0]:
             self._terrain = (terrain, as_ground(terrain, self.axes))
-        targets = [
-            self._channel_values.values(name, given, self.characters)
+        channel_targets = [
+            self._channel_values.convert(name, given, self.characters)
             for name, given in channels.items()
             if given is not None
         ]
         controller = self._controller
         before = None if self._terrain[1] is None else Snapshot(self.state, controller.root, controller.yaw)
         try:
-            for columns, values in targets:
+            for columns, values in channel_targets:
                 self.state.channel_targets[:, columns] = values
-            if self._limited:
+            if self._limit_speed:
                 self._limiter.limit(self.state.channel_values, velocity, shares)
             controller.frame((velocity, direction, strafe, shares), self._terrain[1])
         except BaseException:
@@ -264,14 +282,15 @@ class ProceduralAnimation:
             raise
         return self._pose()
 
-    def _target(self, velocity: Any, facing: Any, gait: Any) -> tuple[Array, Array, Any]:
+    def _choose_target(self, velocity: Any, facing: Any, gait: Any) -> tuple[Array, Array, Any]:
         """Target velocity (C, 2), facing (C, 2) and gait, from the caller or the waypoints.
 
-        A facing of zero means: look where the character goes.
+        A facing of zero means the direction of movement. The gait is in a form that `gait_shares` of
+        `CallerTargets` takes.
         """
-        ahead = self._nowhere if facing is None else self._targets.facing(facing)
+        ahead = self._no_facing if facing is None else self._targets.convert_facing(facing)
         if velocity is not None:
-            return self._targets.velocity(velocity), ahead, gait
+            return self._targets.convert_velocity(velocity), ahead, gait
         if self.follower is None:
             return np.zeros((self.characters, 2)), ahead, gait
         middle = self.network.layout.window
@@ -285,33 +304,36 @@ class ProceduralAnimation:
         return target, ahead, [waypoint.gait for waypoint in waypoints] if gait is None else gait
 
     def _pose(self) -> Pose:
-        c, state = self._controller, self.state
-        positions, rotations, root = c.pose_position.copy(), c.pose_rotation.copy(), c.root.copy()
+        """The pose after the last frame, as copies in the caller's axes and unit."""
+        controller, state = self._controller, self.state
+        positions, rotations = controller.pose_position.copy(), controller.pose_rotation.copy()
+        root = controller.root.copy()
         if not self.axes.native:
             positions[:], root[:] = self.axes.points_out(positions), self.axes.points_out(root)
             rotations = self.axes.rotations_out(rotations)
-        contacts = np.minimum(np.maximum(c.y[:, self._contacts], 0), 1)
+        contacts = np.minimum(np.maximum(controller.y[:, self._contacts], 0), 1)
         channels = {
             name: state.channel_values[:, columns].copy()
             for name, columns in self._channel_values.columns.items()
         }
         if self.characters > 1:
-            return Pose(positions, rotations, contacts, state.phase.copy(), root, c.yaw.copy(), channels)
+            yaw = controller.yaw.copy()
+            return Pose(positions, rotations, contacts, state.phase.copy(), root, yaw, channels)
         return Pose(
             positions[0],
             rotations[0],
             contacts[0],
             float(state.phase[0]),
             root[0],
-            float(c.yaw[0]),
+            float(controller.yaw[0]),
             {name: values[0] for name, values in channels.items()},
         )
 
 
 def world_rotations(turns: Array, yaw: Array) -> Array:
-    """(..., J, 4) world rotations of joints.
+    """(..., J, 4) rotations of joints in the world, from rotations relative to the root.
 
-    turns: (..., J, 3) axis times half the angle, relative to the root. yaw: (...) radians, where the root
-    faces.
+    turns: (..., J, 3) these rotations, as axis times half the angle. yaw: (...) direction that the root
+    faces, radians.
     """
     return quat.mul(quat.yaw(yaw)[..., None, :], quat.exp(turns.astype(float)))

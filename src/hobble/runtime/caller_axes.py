@@ -1,4 +1,4 @@
-"""Converts from Hobble's axes and unit (right-handed, Y up, +Z forward, cm) to the caller's, and back."""
+"""Converts between Hobble's axes and unit (right-handed, Y up, +Z forward, cm) and those of the caller."""
 
 from __future__ import annotations
 
@@ -19,14 +19,15 @@ MATRICES = {
     # Unreal: x forward, y to the right.
     ("left", "Z"): ((0, 0, 1), (-1, 0, 0), (0, 1, 0)),
 }
-UNITS = {"cm": 1.0, "m": 0.01}  # unit of the caller -> how many of it are one centimetre
+UNITS = {"cm": 1.0, "m": 0.01}  # unit of the caller -> length of one centimetre in this unit
 
 
 @dataclass(frozen=True)
 class Axes:
     """The caller's convention: handedness, up axis, unit of length.
 
-    Velocities are per 60 Hz frame in every convention; quaternions are w first.
+    handed: whether the axes are right-handed or left-handed. In every convention, velocities are per frame at
+    60 Hz, and quaternions have w first.
     """
 
     handed: Literal["right", "left"] = "right"
@@ -35,16 +36,18 @@ class Axes:
 
     def __post_init__(self) -> None:
         if (self.handed, self.up) not in MATRICES or self.unit not in UNITS:
-            raise ValueError(f"{self}: handed is right or left, up is Y or Z, unit is cm or m")
+            raise ValueError(
+                f"{self}: handed has to be right or left, up has to be Y or Z, unit has to be cm or m"
+            )
 
     @property
     def native(self) -> bool:
-        """Whether this is Hobble's own convention, so that no conversion is needed."""
+        """Whether this is Hobble's own convention. Then no conversion is needed."""
         return (self.handed, self.up, self.unit) == ("right", "Y", "cm")
 
     @property
     def matrix(self) -> Array:
-        """(3, 3) signed permutation from Hobble's directions to the caller's."""
+        """(3, 3) matrix from Hobble's directions to the caller's. It swaps axes and changes signs."""
         return np.array(MATRICES[self.handed, self.up], float)
 
     @property
@@ -69,9 +72,10 @@ class Axes:
         return self.directions_in(p) / self.scale
 
     def rotations_out(self, q: Array) -> Array:
-        """Convert Hobble's rotations (..., 4) to the caller's: M R M^-1.
+        """Convert Hobble's rotations (..., 4) to the caller's.
 
-        If the handedness changes, the rotation axis is negated.
+        As matrices, a rotation R becomes M R M^-1, where M is `matrix`. In a quaternion, this converts the
+        axis as a direction, and negates it if the handedness changes.
         """
         out = np.array(q, float)
         out[..., 1:] = self.directions_out(out[..., 1:]) * np.linalg.det(self.matrix).round()

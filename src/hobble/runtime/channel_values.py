@@ -1,4 +1,4 @@
-"""Checks the caller's channel values and converts them to columns of the character's state."""
+"""Checks the channel values that the caller gives, and converts them for the character's state."""
 
 from __future__ import annotations
 
@@ -14,12 +14,16 @@ from hobble.models.network import Network
 
 
 class UnknownName(KeyError):
-    """The network does not have this label or gait. The message lists similar names, or else all."""
+    """The network does not have this label or gait.
+
+    what: start of the message, such as "no gait". name: what the caller gave. known: the names that exist.
+    The message lists the known names that are similar, or all of them if none is.
+    """
 
     def __init__(self, what: str, name: object, known: Iterable[str]) -> None:
         names = list(known)
-        near = difflib.get_close_matches(str(name), names, 3, 0.5)
-        hint = f"; did you mean {' or '.join(near)}?" if near else f": there are {', '.join(names)}"
+        similar = difflib.get_close_matches(str(name), names, 3, 0.5)
+        hint = f"; did you mean {' or '.join(similar)}?" if similar else f": there are {', '.join(names)}"
         super().__init__(f"{what} {name!r}{hint}")
 
     def __str__(self) -> str:
@@ -27,15 +31,17 @@ class UnknownName(KeyError):
 
 
 class ChannelValues:
-    """Converts values for the channels of a network.
+    """Checks and converts values for the channels of a network.
 
-    labels: channel -> label -> number of its column in the channel. columns: channel -> its columns in the
-    state. scales: channel -> number by which its values are divided for the network.
+    labels: channel -> label -> index of the label's column among those of the channel. columns: channel ->
+    the channel's columns in the character's state, which holds all channels side by side. scales: channel ->
+    number by which the caller's values are divided before the network gets them.
     """
 
     def __init__(self, network: Network, scales: Mapping[str, float]) -> None:
         self.labels = {
-            name: {label: i for i, label in enumerate(of)} for name, of in network.channels.items()
+            name: {label: i for i, label in enumerate(column_labels)}
+            for name, column_labels in network.channels.items()
         }
         self.scales = dict(scales)
         self.columns: dict[str, slice] = {}
@@ -44,11 +50,12 @@ class ChannelValues:
             self.columns[name] = slice(start, start + count)
             start += count
 
-    def values(self, name: str, given: Any, characters: int) -> tuple[slice, Array]:
-        """The columns of channel `name` in the state, and their new values (C, columns).
+    def convert(self, name: str, given: Any, characters: int) -> tuple[slice, Array]:
+        """The columns of channel `name` in the character's state, and their new values (C, columns).
 
-        given: label -> value or (C,) values; or an array (columns,) or (C, columns). Raises the errors listed
-        in `ProceduralAnimation.next_pose`.
+        given: label -> one value or (C,) values, where labels that are not named get 0; or an array
+        (columns,) or (C, columns). characters: C. Raises the errors listed in
+        `ProceduralAnimation.next_pose`.
         """
         if name not in NAMES:
             raise TypeError(f"next_pose() got an unexpected keyword argument {name!r}")
@@ -82,6 +89,7 @@ class ChannelValues:
         return self.columns.get(name, slice(0, 0)), values / self.scales.get(name, 1.0)
 
     def _check_label(self, name: str, label: str) -> None:
+        """Raise ValueError or UnknownName if the network has no input for this label of channel `name`."""
         labels = self.labels.get(name, {})
         if not labels:
             raise ValueError(f"{label} cannot be set: {_no_input(name)}")
@@ -90,4 +98,5 @@ class ChannelValues:
 
 
 def _no_input(name: str) -> str:
+    """The end of a message: what is wrong with channel `name`, and what to do."""
     return f"this network has no input for {name}; train a configuration with `channels: [{name}]`"

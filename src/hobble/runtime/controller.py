@@ -24,7 +24,7 @@ from hobble.models.network import Predictor
 from hobble.rows.layout import BODY
 from hobble.runtime import feet, network_rows, trajectory
 from hobble.runtime.advance import BACKWARD_LOSS, PULL, advance, advance_columns
-from hobble.runtime.bounds import Bounds, clip_rows, find_unsound
+from hobble.runtime.bounds import Bounds, limit_rows, mark_unsound
 from hobble.runtime.character import Character, start
 
 STEPS = ("prepare", "input", "insert", "predict", "output", "update")
@@ -157,17 +157,17 @@ class Controller:
         clock = perf_counter
         t0 = clock()
         c = self.character
-        if find_unsound(self._checked, self._unsound):
+        if mark_unsound(self._checked, self._unsound):
             self._restart_unsound()
         self._prepare(target, ground)
         t1 = clock()
         self._input()
-        clip_rows(self.x, self.bounds.x_low, self.bounds.x_high, self._unsound)
+        limit_rows(self.x, self.bounds.x_low, self.bounds.x_high, self._unsound)
         t2 = clock()
         self.predictor.standardise(self.x, self.z)
         t3 = clock()
         self.predictor.evaluate(self.z, c.phase, self.y, *self._memory)
-        if clip_rows(self.y, self.bounds.y_low, self.bounds.y_high, self._unsound):
+        if limit_rows(self.y, self.bounds.y_low, self.bounds.y_high, self._unsound):
             self._warn_once(
                 "the network's prediction", "such numbers are replaced by the middle of their range"
             )
