@@ -24,7 +24,7 @@ INFRASTRUCTURE = {
     "hobble.core.section": "checks the configuration before any job runs",
     "hobble.core.untrusted": "only limits what is read",
 }
-# Calls such as logger.info(...) are not hashed: the names of loggers, and of the methods that log.
+# Calls such as logger.info(...) are not hashed. LOGGERS are names of loggers, LOG_METHODS those of methods.
 LOGGERS = {"log", "logger", "logging", "warnings"}
 LOG_METHODS = {"debug", "info", "warning", "error", "exception", "critical", "warn"}
 # Lines `from MODULE import ...` with these modules are not hashed.

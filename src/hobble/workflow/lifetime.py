@@ -157,9 +157,10 @@ def _disregard(number: int, frame: FrameType | None) -> None:
 
 
 def _exit_with_run(run: str, done: threading.Event) -> None:
-    """End this process with SIGTERM when its run has ended, and with SIGKILL if it still runs after a while.
+    """End this process with SIGTERM when its run has ended.
 
-    Python cannot handle SIGTERM while compiled code runs. run: value of RUN_VARIABLE. done: set when the job
+    Python cannot handle SIGTERM while compiled code runs. So SIGKILL ends the process if it still runs after
+    GRACE_SECONDS. run: value of RUN_VARIABLE. done: set when the job
     has ended.
     """
     pid, _, began = run.partition(" ")

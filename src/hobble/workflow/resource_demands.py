@@ -37,16 +37,16 @@ HEADER_BYTES = 1 << 20  # the motion of a BVH file begins within this many bytes
 # A shard is a part of a database that one job makes. It has one row for each frame of some of the clips.
 SHARD_MB = 10  # MB that this job needs for each thousand frames of the longest clip
 ROW_BYTES = 24  # bytes that this job needs for each row of the shard, for its position in the shuffled order
-EXCERPT_THOUSANDS = 2.0  # thousands of frames that a measurement of a sample reads at once
+EXCERPT_THOUSANDS = 2.0  # thousands of frames that a measurement reads at once if it reads only a sample
 WEEK_MINUTES = 7 * 24 * 60  # a job requests at most this time
 
 
 class Demands:
     """Computes what a project's jobs request.
 
-    Arguments of the methods: dataset, configuration: names. attempt: 1 for a job's first try, 2 for the
-    second, ... The requests grow with it, so that a job that was killed for lack of memory or time gets more.
-    least: the least number of minutes that a job requests.
+    Arguments of the methods: dataset, configuration: names. batch: the clips that one job processes.
+    attempt: 1 for a job's first try, 2 for the second, ... The requests grow with it, so that a job that was
+    killed for lack of memory or time gets more. least: the least number of minutes that a job requests.
     """
 
     def __init__(self, project: Project) -> None:

@@ -21,9 +21,8 @@ PROGRESS_SECONDS = 10.0  # between lines of progress if the output goes to a fil
 WIDTH = 100  # columns of the line of progress on a terminal
 MAX_FAILURES_LISTED = 20  # the summary lists at most this many failed jobs
 TAIL_BYTES = 1 << 16  # an error message is searched for in this many bytes at the end of a job's log
-ERROR_LINE = re.compile(
-    r"^\S+ \S+ ERROR (.*)$", re.M
-)  # line of an error in a job's log; group 1: its message
+# A line of a job's log that reports an error: date, time, ERROR and the message.
+ERROR_LINE = re.compile(r"^\S+ \S+ ERROR (.*)$", re.M)
 # Snakemake's messages about a failed job and about the end of a run in which jobs failed. They are not shown,
 # because this module reports the same in fewer words.
 JOB_ENDED = re.compile(r"CalledProcessError|Command 'set -euo pipefail|returned non-zero exit status")
