@@ -13,8 +13,8 @@ from hobble.report.formats import embedded
 from hobble.report.hero import body_channel
 from hobble.report.playable import skeleton_of
 from hobble.report.provenance import commit, machine, versions
-from hobble.report.rounded_weights import has_weights, rounded
-from hobble.report.templates import FOLDER, specs, style, template, trusted
+from hobble.report.rounded_weights import has_weights, round_weights
+from hobble.report.templates import FOLDER, mark_safe, specs, style, template
 
 LARGEST_PAGE = 19_850_000  # bytes; the page must stay under 20 MB
 RESERVED = 60_000  # bytes that are kept free for the page's text, style and tables
@@ -52,7 +52,7 @@ def render_compared(
     rounded_names: list[str] = []
     if left_out:
         rounded_names = [name for name, spec in (playables or {}).items() if has_weights(spec)]
-        smaller = {name: rounded(spec) for name, spec in (playables or {}).items()}
+        smaller = {name: round_weights(spec) for name, spec in (playables or {}).items()}
         kept, left_out = fitting(smaller, LARGEST_PAGE - RESERVED - used)
     bodies = {spec["body"]: bodies[spec["body"]] for spec in kept.values()}
     data = {"name": NAME, "charts": charts, "playable": kept, "bodies": bodies}
@@ -68,7 +68,7 @@ def render_compared(
         rounding=[(name, errors[name]) for name in rounded_names if name in kept and name in errors],
         hurts=any(body_channel(spec) for spec in kept.values()),
         style=style(),
-        bundle=trusted("the bundle", bundle),
+        bundle=mark_safe("the bundle", bundle),
         provenance={"commit": commit(FOLDER), "machine": machine(), "versions": versions()},
         **sections,
     )
