@@ -28,7 +28,7 @@ from hobble.report.straight_walk import walk_straight
 from hobble.runtime.export import export_bvh, fitted_skeleton, jointed
 from hobble.runtime.options import Runtime
 
-SETTLED = 6 * 60  # frames until the gait has settled; loops begin later
+SETTLED = 6 * 60  # frames until the gait has settled; no loop begins earlier
 SHORTEST, LONGEST = 150, 300  # frames: least and greatest length of a loop
 BLEND = 12  # frames over which the end of a loop is blended into its start
 FRAME_STEP = 2  # every second frame of the motion becomes an image
@@ -218,8 +218,8 @@ def draw_frames(
     # The mean distance of the root from a point that moves from `start` by `travel` at constant speed.
     offset = loop.positions[:, 0].mean(axis=0) - loop.travel * (count - 1) / count / 2 - start
     length = float(np.linalg.norm(loop.travel))
-    # The way of the camera is longer or shorter than that of the character by this factor.
-    whole_cells = max(1, round(length / GRID)) * GRID / max(length, 1e-9)
+    # The length of the camera's way in a loop, divided by that of the character's.
+    camera_factor = max(1, round(length / GRID)) * GRID / max(length, 1e-9)
     turn = np.array([[np.cos(yaw), 0, -np.sin(yaw)], [0, 1, 0], [np.sin(yaw), 0, np.cos(yaw)]])
     rotations = quat.mul(quat.yaw(-yaw), world_rotations[:, bones])
     out = []
@@ -227,8 +227,8 @@ def draw_frames(
         travelled = loop.travel * f / count
         points = (world_positions[f, bones] - start - travelled - offset * [1, 0, 1]) @ turn.T
         points[:, 1] = world_positions[f, bones, 1]
-        moved = np.array([0.0, 0.0, length * f / count * whole_cells])
-        camera = Camera(np.array([0.0, 82.0, 0.0]) + moved, size=size)  # at the height of the hips
+        moved = np.array([0.0, 0.0, length * f / count * camera_factor])
+        camera = Camera(np.array([0.0, 82.0, 0.0]) + moved, size=size)  # about half the body's height
         out.append(renderer.draw(points + moved, rotations[f], camera, values))
     return out
 
