@@ -23,7 +23,7 @@ from hobble.report import compare_tables as tables
 from hobble.report.compare_page import render_compared
 from hobble.report.gather import PUBLISHED, ReportMaterial
 from hobble.report.playable import playable
-from hobble.report.rounded_weights import rounded
+from hobble.report.rounded_weights import round_weights
 
 
 @pytest.fixture(scope="module")
@@ -197,7 +197,7 @@ def test_networks_too_large_for_one_page_are_left_out(
     assert len(page.encode()) < alone + compare_page.RESERVED
     assert "weights have 8 bits here" in page
     assert "0.03 cm (holden)" in page
-    alone = len(render_compared(compared, {"holden": rounded(pair["holden"])}).encode())
+    alone = len(render_compared(compared, {"holden": round_weights(pair["holden"])}).encode())
     monkeypatch.setattr(compare_page, "LARGEST_PAGE", alone + compare_page.RESERVED)
     page = render_compared(compared, pair)
     assert "to keep the file small: ava" in page

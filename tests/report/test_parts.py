@@ -10,7 +10,7 @@ import pytest
 from hobble.measures.registry import MEASURES
 from hobble.report import measure_sections
 from hobble.report.charts import Chart, ChartGroup
-from hobble.report.page_parts import ChartPair, PageSection, Paragraph, SectionPart, joined
+from hobble.report.page_parts import ChartPair, PageSection, Paragraph, SectionPart, join_sections
 from hobble.report.tables import Column, Table
 from hobble.report.templates import specs, template
 
@@ -32,7 +32,7 @@ def test_sections_with_one_name_are_joined_and_their_parts_sorted() -> None:
     )
     alone = PageSection("laps", [SectionPart(0, chart("c"))], at=5)
     nothing = PageSection("none", [SectionPart(0, None)], title="None")
-    first, second = joined([guest, nothing, owner, alone])
+    first, second = join_sections([guest, nothing, owner, alone])
     assert (first.name, first.title, first.nav) == ("laps", "Laps", "Laps")
     assert (second.title, second.nav, second.at, second.long) == ("Errors", "E", 10, True)
     assert [part.kind for part in second.parts] == ["words", "chart", "table"]
@@ -40,10 +40,12 @@ def test_sections_with_one_name_are_joined_and_their_parts_sorted() -> None:
 
 def test_a_pair_without_charts_is_left_out() -> None:
     assert (
-        joined([PageSection("s", [SectionPart(0, ChartPair([None, None])), SectionPart(5, None)], title="S")])
+        join_sections(
+            [PageSection("s", [SectionPart(0, ChartPair([None, None])), SectionPart(5, None)], title="S")]
+        )
         == []
     )
-    [shown] = joined([PageSection("s", [SectionPart(0, ChartPair([None, chart("a")]))])])
+    [shown] = join_sections([PageSection("s", [SectionPart(0, ChartPair([None, chart("a")]))])])
     assert [part.kind for part in shown.parts] == ["pair"]
 
 
@@ -74,7 +76,7 @@ def test_words_are_escaped_and_every_kind_is_drawn() -> None:
         SectionPart(1, ChartPair([chart("a"), None])),
         SectionPart(2, chart("b"), tall=True),
     ]
-    section = joined([PageSection("s", parts, title="<S>")])
+    section = join_sections([PageSection("s", parts, title="<S>")])
     text = template("measured.html.j2").render(measured=section)
     assert "<p>&lt;b&gt;</p>" in text
     assert "<h2>&lt;S&gt;</h2>" in text

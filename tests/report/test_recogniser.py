@@ -17,7 +17,12 @@ from hobble.gait.limp_grade import grade, grader
 from hobble.gait.people import people
 from hobble.gait.profile import profile
 from hobble.models.network import Network
-from hobble.report.pack_recogniser import healthy_walk, learnt, playable_with_recogniser, words
+from hobble.report.pack_recogniser import (
+    healthy_walk,
+    kind_in_words,
+    packed_statistics,
+    playable_with_recogniser,
+)
 
 
 @pytest.fixture(scope="module")
@@ -74,7 +79,7 @@ def test_javascript_recognises_the_same_limps_as_python(tab: Any) -> None:
             walk = dict(zip(healthy, map(float, known.profiles[gait, person]), strict=True))
             cases += [{k: (1 - s) * healthy[k] + s * walk[k] for k in healthy} for s in (0.2, 0.6, 1.0)]
     found = tab.run(f"""(() => {{
-      const grade = Hobble.grader({json.dumps(learnt())}), healthy = {json.dumps(healthy)};
+      const grade = Hobble.grader({json.dumps(packed_statistics())}), healthy = {json.dumps(healthy)};
       return {json.dumps(cases)}.map((walk) => grade(walk, healthy));
     }})()""")
     labels = set()
@@ -90,10 +95,10 @@ def test_javascript_recognises_the_same_limps_as_python(tab: Any) -> None:
 
 
 def test_every_kind_of_limp_has_its_own_text() -> None:
-    said = [words(*kind) for kind in grader().kinds]
+    said = [kind_in_words(*kind) for kind in grader().kinds]
     assert len(set(said)) == len(said)
-    assert words("antalgic", "left") == "left thigh, shank or foot"
-    assert words("leaning_trunk", "forward") == "back, leaning forward"
+    assert kind_in_words("antalgic", "left") == "left thigh, shank or foot"
+    assert kind_in_words("leaning_trunk", "forward") == "back, leaning forward"
 
 
 def test_a_walk_is_compared_with_the_healthy_walk_of_the_same_figure(
@@ -114,7 +119,7 @@ def test_the_panel_shows_the_recognised_limp(tab: Any, walks: dict[str, Array], 
     """The recogniser in Play uses three seconds, and asks the user to walk if there is no cycle."""
     healthy = profile(measure(holden31, walks["even"], 60))
     spec = {"names": list(holden31.joints), "roles": dict(holden31.roles)}
-    spec["recogniser"] = {"learnt": learnt(), "healthy": healthy}
+    spec["recogniser"] = {"learnt": packed_statistics(), "healthy": healthy}
     said = {}
     for name in ("even", "on the spot"):
         frames = walks[name].reshape(240, -1).tolist()

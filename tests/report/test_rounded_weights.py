@@ -15,7 +15,7 @@ import pytest
 from hobble.core.quat import Array
 from hobble.models.network import Network
 from hobble.models.pfnn.network import Pfnn
-from hobble.report.rounded_weights import GROUP, has_weights, rounded, rounding_error
+from hobble.report.rounded_weights import GROUP, has_weights, round_weights, rounding_error
 from hobble.runtime.animation import ProceduralAnimation
 
 FRAMES = 60
@@ -35,7 +35,7 @@ def network_of_8_bits(network: Network, character: dict[str, Any]) -> Pfnn:
     """The network of the examples with the weights that lie in the page."""
     assert isinstance(network, Pfnn)
     kept = [w.copy() for w in network.weights]
-    small = [weights_of(layer)[0] for layer in rounded(character)["network"]["layers"]]
+    small = [weights_of(layer)[0] for layer in round_weights(character)["network"]["layers"]]
     start = network.layout.y_joint_rotation.start
     turns = start + 3 * np.asarray(character["turning"])[:, None] + np.arange(3)
     kept[0][..., character["inputColumns"]] = small[0]
@@ -50,7 +50,7 @@ def test_a_rounded_weight_errs_by_at_most_half_a_step_of_its_group(
 ) -> None:
     assert has_weights(character)
     assert isinstance(network, Pfnn)
-    layer = rounded(character)["network"]["layers"][0]
+    layer = round_weights(character)["network"]["layers"][0]
     found, factors = weights_of(layer)
     exact = network.weights[0][:, :, character["inputColumns"]]
     assert np.all(np.abs(found - exact) <= 0.505 * factors + 1e-12)
@@ -69,7 +69,7 @@ def test_the_page_moves_as_python_does_with_the_same_weights(
     animation = ProceduralAnimation(network_of_8_bits, **dict(examples.RUNTIME))
     expected = [animation.next_pose((0.4, 2.4), None, "walk").positions for _ in range(FRAMES)]
     found = tab.run(f"""(() => {{
-      const c = Hobble.character({json.dumps(rounded(character))}), out = [];
+      const c = Hobble.character({json.dumps(round_weights(character))}), out = [];
       for (let f = 0; f < {FRAMES}; f++) {{
         c.frame([.4, 2.4], null, "walk", () => 0);
         out.push(Array.from(c.posePosition));

@@ -109,7 +109,9 @@ def test_turns_speeds_and_severities_are_counted_in_seconds(
 
 
 def test_strips_show_the_injured_parts(material: ReportMaterial) -> None:
-    strips = {strip["clip"]: strip for strip in data_section.strips(material, shown_clips.shown(material))}
+    strips = {
+        strip["clip"]: strip for strip in data_section.strips(material, shown_clips.choose_clips(material))
+    }
     assert len(strips) == 8, "a mirror says the same again"
     (row,) = strips["hurt_left_knee"]["channels"]
     assert row["name"] == "left thigh"

@@ -96,7 +96,7 @@ def test_a_walk_is_cut_where_it_repeats() -> None:
     time = np.arange(stimuli.SETTLED + 60 + stimuli.LONGEST + stimuli.BLEND)
     swing = np.stack([0 * time, 90 + np.sin(2 * np.pi * time / 67), 2.0 * time], axis=1)
     leg = swing + np.stack([0 * time, -50 + 0 * time, 20 * np.sin(2 * np.pi * time / 67)], axis=1)
-    first, last, gap = stimuli.cut(np.stack([swing, leg], axis=1))
+    first, last, gap = stimuli.find_cut(np.stack([swing, leg], axis=1))
     assert (last - first) % 67 == 0
     assert gap < 1e-6
 
@@ -111,9 +111,9 @@ def test_the_distance_of_walks_ignores_start_and_heading(holden31: Skeleton) -> 
 
     walk = loop(place, (0, 0, 268))
     turned = loop(np.roll(place, 20, axis=0)[..., [2, 1, 0]] * [1, 1, -1] + [500, 0, 7], (268, 0, 0))
-    assert stimuli.apart(turned, walk) < 1e-9
+    assert stimuli.loop_distance(turned, walk) < 1e-9
     lame = place + np.where(np.arange(joints) == 5, 31.0, 0.0)[:, None] * [1, 0, 0]
-    assert stimuli.apart(loop(lame, (0, 0, 268)), walk) == pytest.approx(31 / joints)
+    assert stimuli.loop_distance(loop(lame, (0, 0, 268)), walk) == pytest.approx(31 / joints)
 
 
 def test_stimuli_without_a_visible_injury_get_a_warning() -> None:
@@ -126,8 +126,8 @@ def test_stimuli_without_a_visible_injury_get_a_warning() -> None:
         }
 
     fine = [row("healthy", "", "", 0.0), row("left-foot", "A", "", 1.5)]
-    assert stimuli.doubts(fine) == []
-    same, part, never = stimuli.doubts(
+    assert stimuli.loop_warnings(fine) == []
+    same, part, never = stimuli.loop_warnings(
         [*fine, row("left-arm", "B", "B", 0.0), row("weak", "A", "", 0.05), row("both", "A C", "C", 1.5)]
     )
     assert same.startswith("left-arm, weak: they look like the neutral walk")

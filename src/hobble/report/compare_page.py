@@ -11,8 +11,8 @@ from hobble.report.formats import embedded
 from hobble.report.hero import body_channel
 from hobble.report.playable import skeleton_of
 from hobble.report.provenance import commit, machine, versions
-from hobble.report.rounded_weights import has_weights, rounded
-from hobble.report.templates import FOLDER, specs, style, template, trusted
+from hobble.report.rounded_weights import has_weights, round_weights
+from hobble.report.templates import FOLDER, mark_safe, specs, style, template
 
 LARGEST_PAGE = 19_850_000  # bytes; the page must stay under 20 MB
 RESERVED = 60_000  # bytes of LARGEST_PAGE that are kept free for the page's text, style and tables
@@ -52,7 +52,7 @@ def render_compared(
     rounded_names: list[str] = []
     if left_out:
         rounded_names = [name for name, spec in (playables or {}).items() if has_weights(spec)]
-        smaller = {name: rounded(spec) for name, spec in (playables or {}).items()}
+        smaller = {name: round_weights(spec) for name, spec in (playables or {}).items()}
         on_page, left_out = select_fitting(smaller, LARGEST_PAGE - RESERVED - used)
     bodies = {spec["body"]: bodies[spec["body"]] for spec in on_page.values()}
     data = {"name": NAME, "charts": charts, "playable": on_page, "bodies": bodies}
@@ -68,7 +68,7 @@ def render_compared(
         rounding=[(name, errors[name]) for name in rounded_names if name in on_page and name in errors],
         hurts=any(body_channel(spec) for spec in on_page.values()),
         style=style(),
-        bundle=trusted("the bundle", bundle),
+        bundle=mark_safe("the bundle", bundle),
         provenance={"commit": commit(FOLDER), "machine": machine(), "versions": versions()},
         **sections,
     )

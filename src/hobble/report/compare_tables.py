@@ -7,7 +7,7 @@ from typing import Any
 from hobble.report.comparison_charts import Compared
 from hobble.report.formats import duration, number, size
 from hobble.report.measure_sections import OverviewColumn, compared_columns
-from hobble.report.published import cited
+from hobble.report.published import citation
 from hobble.report.tables import Column, Table
 
 # Published measure -> a longer name, if its own name is unclear.
@@ -88,7 +88,7 @@ def published_table(compared: Compared) -> Table:
         ]
         measure = LONGER_NAMES.get(row["measure"], row["measure"])
         measure += ", mean" if row["unit"] == "ms" and not measure.startswith("standard") else ""
-        rows.append([measure, row["configuration"], *texts, cited(row, sources)])
+        rows.append([measure, row["configuration"], *texts, citation(row, sources)])
     columns = [
         Column("measure"),
         Column("configuration"),

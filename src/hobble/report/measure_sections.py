@@ -1,13 +1,13 @@
-"""Collects what each measurement shows on the pages.
+"""Collects what each measurement shows in the report and on the comparison page.
 
-A measurement's `page.py` may have
+A measurement is a package, described in `hobble.measures.measure`. Its `page.py` may define
 
 - `section(found, material) -> PageSection`: its part of the report,
 - `figures(found, material) -> Iterable[KeyFigure]`: key figures for the top of the report,
 - `hints(found, material) -> Iterable[Hint]`: advice that follows from its numbers,
 
-where `found` is the measurement's JSON ({} if it was not run) and `material` is everything else that is known
-about the configuration. Its `comparison_page.py` may have
+where `found` is the measurement's JSON ({} if it was not run) and `material` has all results of the
+configuration. Its `comparison_page.py` may define
 
 - `section(compared) -> PageSection`: its part of the comparison page,
 - `columns(compared) -> Iterable[OverviewColumn]`: columns of the table of configurations at the top of that
@@ -26,7 +26,7 @@ from typing import Any
 from hobble.measures.inputs import Json
 from hobble.measures.registry import MEASURES
 from hobble.report.gather import ReportMaterial
-from hobble.report.page_parts import PageSection, joined
+from hobble.report.page_parts import PageSection, join_sections
 from hobble.report.summary import Hint, KeyFigure
 from hobble.report.tables import Column
 from hobble.report.verdicts import Verdict
@@ -34,9 +34,9 @@ from hobble.report.verdicts import Verdict
 
 @dataclass(frozen=True)
 class OverviewColumn:
-    """A column of the table of configurations.
+    """A column of the table of configurations, which has a row for each configuration.
 
-    values: configuration -> value. at: its place; columns are sorted by it.
+    values: configuration -> value in its row. at: a number; columns are sorted by it.
     """
 
     at: int
@@ -46,37 +46,43 @@ class OverviewColumn:
 
 def sections(material: ReportMaterial) -> list[PageSection]:
     """The sections of the report that show measurements."""
-    return joined(show(material.found(name), material) for name, show in _each("page", "section"))
+    return join_sections(show(material.found(name), material) for name, show in _functions("page", "section"))
 
 
 def figures(material: ReportMaterial) -> list[KeyFigure]:
-    """Key figures for the top of the report."""
-    return [f for name, show in _each("page", "figures") for f in show(material.found(name), material)]
+    """The key figures that measurements have for the top of the report."""
+    return [f for name, show in _functions("page", "figures") for f in show(material.found(name), material)]
 
 
 def hints(material: ReportMaterial) -> list[Hint]:
-    """Advice that follows from the numbers."""
-    return [h for name, show in _each("page", "hints") for h in show(material.found(name), material)]
+    """The advice that follows from the numbers of the measurements."""
+    return [h for name, show in _functions("page", "hints") for h in show(material.found(name), material)]
 
 
 def compared_sections(compared: Json) -> list[PageSection]:
     """The sections of the comparison page that show measurements."""
-    return joined(show(compared) for _, show in _each("comparison_page", "section"))
+    return join_sections(show(compared) for _, show in _functions("comparison_page", "section"))
 
 
 def compared_verdicts(compared: Json) -> list[Verdict]:
-    """Sentences on which configuration is best at something, in the order of the page."""
-    found = [verdict for _, show in _each("comparison_page", "verdicts") for verdict in show(compared)]
-    return sorted(found, key=lambda verdict: verdict.at)
+    """Sentences on which configuration is best in some respect, in the order of the page."""
+    verdicts = [
+        verdict for _, show in _functions("comparison_page", "verdicts") for verdict in show(compared)
+    ]
+    return sorted(verdicts, key=lambda verdict: verdict.at)
 
 
 def compared_columns(compared: Json) -> list[OverviewColumn]:
-    """The columns of the table of configurations."""
-    return [column for _, show in _each("comparison_page", "columns") for column in show(compared)]
+    """The columns that measurements add to the table of configurations. They are not sorted yet."""
+    return [column for _, show in _functions("comparison_page", "columns") for column in show(compared)]
 
 
-def _each(part: str, function: str) -> Iterator[tuple[str, Callable[..., Any]]]:
-    """(name of a measurement, function) for each measurement that has this function in its module `part`."""
+def _functions(module: str, name: str) -> Iterator[tuple[str, Callable[..., Any]]]:
+    """Find the function `name` in the modules of this name of all measurements.
+
+    module: "page" or "comparison_page". Yields (name of the measurement, function). A measurement without
+    the module or the function is left out.
+    """
     for measure in MEASURES:
-        if (found := getattr(measure.part(part), function, None)) is not None:
-            yield measure.name, found
+        if (function := getattr(measure.part(module), name, None)) is not None:
+            yield measure.name, function

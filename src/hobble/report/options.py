@@ -6,6 +6,6 @@ from hobble.core.section import Section
 
 
 class ReportOptions(Section):
-    """The report page. title: its heading, in place of the default one."""
+    """The report page. title: its heading, instead of the default heading."""
 
     title: str | None = None

@@ -1,7 +1,7 @@
-"""Packs the recogniser of limps for the page.
+"""Packs the data with which the report page recognises limps of the character.
 
-The page gets statistics of people's limps, and a profile of the character's healthy walk, with which the
-recogniser compares the character's present walk.
+The page compares the character's present walk with the profile of its healthy walk, and the difference with
+statistics of people's limps. A profile describes a walk by some fifty numbers.
 """
 
 from __future__ import annotations
@@ -32,22 +32,22 @@ ROLES = ("hip", "knee", "heel", "toe", "shoulder")  # joint roles that the skele
 def playable_with_recogniser(network: Network, runtime: Runtime) -> dict[str, Any]:
     """The data of `hobble.report.playable`, and under `recogniser` what the page needs to recognise a limp.
 
-    There is no `recogniser` if the network has no channel for parts of the body, if its skeleton lacks one of
-    ROLES, or if the healthy character walks no complete gait cycle.
+    There is no `recogniser` if no channel (group of inputs) of the network belongs to parts of the body, if
+    the skeleton lacks one of ROLES, or if the healthy character walks no complete gait cycle.
     """
     spec = playable(network, runtime)
     if any(channel["regions"] for channel in spec.get("channels", ())):
         assert network.skeleton is not None
         healthy = healthy_walk(network, network.skeleton, runtime)
         if healthy is not None:
-            spec["recogniser"] = {"learnt": learnt(), "healthy": healthy}
+            spec["recogniser"] = {"learnt": packed_statistics(), "healthy": healthy}
     return spec
 
 
 def healthy_walk(network: Network, skeleton: Skeleton, runtime: Runtime) -> Profile | None:
-    """The profile of the healthy character walking straight on, with joints placed as in the page.
+    """The profile of the healthy character walking straight on. Bones have constant lengths, as in the page.
 
-    None if its skeleton lacks one of ROLES, or if it walks no complete gait cycle.
+    None if the skeleton lacks one of ROLES, or if the character walks no complete gait cycle.
     """
     if not all(f"{side}_{part}" in skeleton.roles for side in SIDES for part in ROLES):
         return None
@@ -57,25 +57,29 @@ def healthy_walk(network: Network, skeleton: Skeleton, runtime: Runtime) -> Prof
     return profile(walk) if len(walk) else None
 
 
-def learnt(statistics: Grader | None = None) -> dict[str, Any]:
-    """Packs what `hobble.gait.limp_grade` learnt from people's walks with D features each.
+def packed_statistics(statistics: Grader | None = None) -> dict[str, Any]:
+    """Packs what `hobble.gait.limp_grade` learnt from people's walks. A walk has D features.
 
-    In the result, `features`: names of the features. `strengths`: the strengths of a limp that are tried.
-    `healthySpread`: (D, D) covariance of healthy walks. `kinds`: for each kind of limp (a label and a side),
-    its `words` for the page, the `mean` (D,) at strength 1, and the covariance `spread` (D, D). Arrays are
-    float64 in base64.
+    statistics: by default those learnt from all people.
+
+    In the result, `features`: names of the features. `strengths`: the strengths of a limp that are tried; 1
+    is the mean strength of people's limps. `healthySpread`: (D, D) covariance of healthy walks. `kinds`: a
+    list with an entry for each kind of limp. A kind has a `label`, such as "antalgic", and a `side`: "left",
+    "right", or the direction in which the trunk leans. An entry also has the kind in `words` for the page,
+    the `mean` (D,) of the features at strength 1, and their covariance `spread` (D, D). Arrays are float64
+    in base64.
     """
     statistics = statistics or grader()
     normal = people().normal()
     return {
-        "features": list(features(normal, normal)),
+        "features": list(features(normal, normal)),  # any two profiles do: only the names are used
         "strengths": STRENGTHS.tolist(),
         "healthySpread": packed(statistics.healthy),
         "kinds": [
             {
                 "label": label,
                 "side": side,
-                "words": words(label, side),
+                "words": kind_in_words(label, side),
                 "mean": packed(mean),
                 "spread": packed(spread),
             }
@@ -84,8 +88,11 @@ def learnt(statistics: Grader | None = None) -> dict[str, Any]:
     }
 
 
-def words(label: str, side: str) -> str:
-    """A kind of limp in words, such as "left thigh, shank or foot" or "back, leaning forward"."""
+def kind_in_words(label: str, side: str) -> str:
+    """What may hurt, such as "left thigh, shank or foot" or "back, leaning forward".
+
+    label, side: a key of `Grader.kinds`.
+    """
     parts = PARTS[label]
-    named = parts[0] if len(parts) == 1 else f"{', '.join(parts[:-1])} or {parts[-1]}"
-    return f"{named}, leaning {side}" if label == LEANING else f"{side} {named}"
+    parts_in_words = parts[0] if len(parts) == 1 else f"{', '.join(parts[:-1])} or {parts[-1]}"
+    return f"{parts_in_words}, leaning {side}" if label == LEANING else f"{side} {parts_in_words}"

@@ -26,7 +26,7 @@ from hobble.report.gather import ReportMaterial
 from hobble.report.ground_pictures import ground_pictures
 from hobble.report.hero import body_channel, first_shown, opening
 from hobble.report.provenance import commit, machine, versions
-from hobble.report.templates import FOLDER, specs, style, template, trusted
+from hobble.report.templates import FOLDER, mark_safe, specs, style, template
 
 
 def render(
@@ -40,24 +40,28 @@ def render(
     """The report as one HTML document.
 
     The arguments come from other modules of hobble.report: scenes from `scenes.scenes`; playable from
-    `playable.playable`; captured_and_predicted from `captured_and_predicted.comparisons`; bundle, the page's
-    scripts, from `bundle.bundle`; hero from `opening_walk.opening_walk`. A section without data is left out.
-    Without `hero`, the characters at the top of the page begin in the network's start frame.
+    `playable.playable`, or with a recogniser from `pack_recogniser.playable_with_recogniser`;
+    captured_and_predicted from `captured_and_predicted.comparisons`; bundle, the page's scripts, from
+    `bundle.bundle`; hero, the top of the page, from `opening_walk.opening_walk`. A section without data is
+    left out. Without `hero`, the characters at the top begin in the network's start frame.
 
-    The template escapes every value. Data for the scripts is JSON without any "<".
+    Texts from the user's files cannot become HTML: the template escapes every value, and the data for the
+    scripts is JSON without any "<".
     """
-    clips = shown_clips.shown(material)
+    clips = shown_clips.choose_clips(material)
     terrain = shown_clips.files_of(material.terrain, clips)
-    row_files = shown_clips.sampled(material.rows)
+    row_files = shown_clips.sample_files(material.rows)
+    # Seconds of data at each speed, turning speed and channel value.
     counted = coverage.seconds_of_data(row_files, material.splits, all_clips=len(material.rows))
-    sections, measured = _sections(material, counted, clips, terrain), measure_sections.sections(material)
+    sections = _sections(material, counted, clips, terrain)
+    measured_sections = measure_sections.sections(material)
     scenes, playable = dict(scenes or {}), playable or {}
     captured_and_predicted = captured_and_predicted or {}
-    strips = data_section.strips(material, clips)
+    strips = data_section.strips(material, clips)  # the labels of each clip over time
     grounds = ground_pictures(terrain, material.network["skeleton"])
     playables = {material.name: playable} if playable else {}
     data = {
-        "charts": specs([sections, measured]),
+        "charts": specs([sections, measured_sections]),
         "bodies": _bodies(material),
         "hero": hero or opening(playable, material.measured.values()),
         "scenes": scenes,
@@ -69,7 +73,7 @@ def render(
     }
     return template("page.html.j2").render(
         material=material,
-        measured=measured,
+        measured=measured_sections,
         figures=findings.key_figures(material),
         hints=findings.hints(material, counted["turns"]),
         embedded={name: embedded(part) for name, part in data.items()},
@@ -79,23 +83,27 @@ def render(
         grounds=[picture["name"] for picture in grounds["pictures"]],
         strips=[strip["clip"] for strip in strips],
         style=style(),
-        bundle=trusted("the bundle", bundle),
-        **_top(material, playable),
-        **_origin(material),
+        bundle=mark_safe("the bundle", bundle),
+        **_top_values(material, playable),
+        **_origin_values(material),
         **sections,
     )
 
 
 def _bodies(material: ReportMaterial) -> dict[str, Any]:
-    """Key of the body (`mesh_key`) -> the body to draw; {} if the network has no skeleton."""
+    """The body to draw, under its key (`mesh_key`); {} if the network has no skeleton."""
     if not material.network["skeleton"]:
         return {}
     figure = Skeleton.from_dict({"name": "", **material.network["skeleton"]})
     return {mesh_key(figure): packed_body(figure)}
 
 
-def _top(material: ReportMaterial, playable: Mapping[str, Any]) -> dict[str, Any]:
-    """Title and text above the first section, and the channel that the character there shows."""
+def _top_values(material: ReportMaterial, playable: Mapping[str, Any]) -> dict[str, Any]:
+    """The template's values for the part above the first section.
+
+    `hurts`: whether the reader can set a value for parts of the character's body. `shown_channel`: the
+    channel that the reader can set at the top, or None.
+    """
     return {
         "name": material.name,
         "title": material.title or material.name,
@@ -107,8 +115,8 @@ def _top(material: ReportMaterial, playable: Mapping[str, Any]) -> dict[str, Any
     }
 
 
-def _origin(material: ReportMaterial) -> dict[str, Any]:
-    """The configuration, and the commit, the machine and the versions with which the page was made."""
+def _origin_values(material: ReportMaterial) -> dict[str, Any]:
+    """The template's values for the last sections: the configuration, and what the page was made with."""
     resolved = plain(dict(material.resolved))
     return {
         "configuration": yaml.safe_dump(resolved, sort_keys=False, allow_unicode=True),
@@ -119,7 +127,7 @@ def _origin(material: ReportMaterial) -> dict[str, Any]:
 def _sections(
     material: ReportMaterial, counted: Mapping[str, Any], clips: frozenset[str], terrain: list[str]
 ) -> dict[str, dict[str, Any]]:
-    """Section -> name -> chart or table, None if there is nothing to show.
+    """Section -> name in the template -> chart, table or list of charts; None if there is nothing to show.
 
     counted: from `coverage.seconds_of_data`. clips: names of the clips that are shown one by one. terrain:
     files of their terrain fits.

@@ -14,7 +14,7 @@ from hobble.report.tables import Table
 
 @dataclass(frozen=True)
 class Paragraph:
-    """A paragraph. Only text that stands in the source code may be Markup; all other text is escaped."""
+    """A paragraph. Markup is not escaped, so only text from the source code may be Markup."""
 
     text: str | Markup
 
@@ -28,7 +28,7 @@ class KeyFigures:
 
 @dataclass(frozen=True)
 class ChartPair:
-    """Charts side by side, if the window is wide enough."""
+    """Charts side by side, if the window is wide enough. None: there is nothing to show in this place."""
 
     charts: Sequence[Chart | None]
 
@@ -41,7 +41,7 @@ class TemplatePart:
 
 
 Content = Chart | ChartGroup | Table | Paragraph | KeyFigures | ChartPair | TemplatePart
-# type of content -> its kind, for the template of the page
+# Type of content -> its kind, which the page's template reads.
 KINDS: dict[type, str] = {
     Chart: "chart",
     ChartGroup: "family",
@@ -55,10 +55,11 @@ KINDS: dict[type, str] = {
 
 @dataclass(frozen=True)
 class SectionPart:
-    """One part of a section. at: its place in the section, from 0 (top) to 100 (end).
+    """One part of a section.
 
-    content: None if there is nothing to show. tall: whether the content is a chart with a row for each clip.
-    open: whether a table is shown unfolded. short: whether a table needs no scroll bar.
+    at: its place in the section, from 0 (top) to 100 (end). content: None if there is nothing to show. tall:
+    whether the content is a chart with a row for each clip. open: whether the content is a table that is
+    unfolded at first. short: whether it is a table that needs no scroll bar.
     """
 
     at: int
@@ -75,11 +76,11 @@ class SectionPart:
 
 @dataclass(frozen=True)
 class PageSection:
-    """A section of a page. Sections with the same `name` are joined into one (`joined`).
+    """A section of a page. `join_sections` joins sections with the same `name` into one.
 
-    title: the heading; only one of the joined sections needs it. at: the place in the page; sections are
-    sorted by it. nav: a shorter title for the list of contents. long: whether printing may break the section
-    between pages.
+    title: the heading; only one of the joined sections needs it. at: a number; sections are sorted by it.
+    nav: a shorter title for the list of contents; by default the title. long: whether printing may break the
+    section between pages.
     """
 
     name: str
@@ -90,27 +91,29 @@ class PageSection:
     long: bool = False
 
 
-def joined(sections: Iterable[PageSection]) -> list[PageSection]:
-    """The sections of a page, in order. Sections of the same name become one; empty ones are left out.
+def join_sections(sections: Iterable[PageSection]) -> list[PageSection]:
+    """The sections of a page, in order. Sections of the same name become one; empty sections are left out.
 
-    A joined section has the parts of all its sections. All its other fields are those of the first section
-    that has a title.
+    A joined section has the parts of all its sections. Its other fields are those of its first section that
+    has a title.
     """
     by_name: dict[str, list[PageSection]] = {}
     for section in sections:
         by_name.setdefault(section.name, []).append(section)
     out = []
     for name, same_name in by_name.items():
-        parts = sorted((p for s in same_name for p in s.parts if _shows(p.content)), key=lambda part: part.at)
-        owner = next((s for s in same_name if s.title), same_name[0])
-        title = owner.title or name.replace("_", " ").capitalize()
+        parts = sorted(
+            (p for s in same_name for p in s.parts if _is_shown(p.content)), key=lambda part: part.at
+        )
+        titled = next((s for s in same_name if s.title), same_name[0])
+        title = titled.title or name.replace("_", " ").capitalize()
         if parts:
-            out.append(replace(owner, parts=parts, title=title, nav=owner.nav or title))
+            out.append(replace(titled, parts=parts, title=title, nav=titled.nav or title))
     return sorted(out, key=lambda section: section.at)
 
 
-def _shows(content: Content | None) -> bool:
-    """Whether there is anything to show."""
+def _is_shown(content: Content | None) -> bool:
+    """Whether the content has anything to show."""
     if isinstance(content, ChartPair):
         return any(chart is not None for chart in content.charts)
     return content is not None

@@ -1,4 +1,7 @@
-"""Time and disk space of each stage, from Snakemake's benchmark files and the sizes of the artefacts."""
+"""Sums up the time, memory and disk space of each stage of the workflow.
+
+Time and memory are from Snakemake's benchmark files, disk space from the sizes of the artefacts.
+"""
 
 from __future__ import annotations
 
@@ -20,43 +23,51 @@ from hobble.workflow.kept_files import recorded_seconds
 def summarise(configuration: str, stages: Mapping[str, Mapping[str, Iterable[str]]]) -> Pipeline:
     """The content of `pipeline.json`.
 
-    stages: in the order of the pipeline, stage -> {"benchmarks": tsv files or folders of them, "files":
-    artefacts or folders of them}. Stages of a data set make their clips in batches. They also have "made":
-    folders with records of finished clips, each folder named after the rule that made the clips; and
-    "batches": the names of the benchmarks of all present batches. For a rule in "made", other benchmarks do
-    not count: they are left from batches that have changed since, for example because a clip was added.
+    stages: in the order of the pipeline, stage -> a dict with the keys
 
-    A missing file is listed under `missing` and is no error: a stage may have been copied from another
-    machine without its benchmarks. If a job was stopped and called again, its Snakemake benchmark has only
-    the last call. So the time of training is taken from the history, and the time of a rule in "made" from
-    the records, if it is longer there.
+    - "benchmarks": tsv files or folders of them;
+    - "files": artefacts or folders of them;
+    - "made", only for stages that make the clips of a data set in batches: for each rule with batches, a
+      folder that is named after the rule and has a record of each finished clip (see
+      `hobble.workflow.kept_files`);
+    - "batches", only for these stages: the names of the benchmarks of all present batches. For a rule in
+      "made", other benchmarks do not count. They are left from batches that have changed since, for example
+      because a clip was added.
+
+    A missing file is listed under `missing`. It is no error, because a stage may have been copied from
+    another machine without its benchmarks.
+
+    If a job was stopped and started again, its benchmark covers only the last start. Its true time is also in
+    the history of training (history.csv), or in the records in "made". The longer of both times counts.
 
     The result has `stages` (for each stage: jobs, seconds, `longest` job in seconds, max_rss_mb, cpu_seconds,
-    files, bytes; and `rules`, the same without files and bytes for each rule), `total_seconds`,
+    files, bytes; and `rules`, which has the same for each rule, but not files and bytes), `total_seconds`,
     `total_bytes`, `database` (see `hobble.database.sizes`; None without a database), `missing`, `machine`,
     `versions`. Raises InputError for a malformed benchmark or history.
     """
     missing: list[str] = []
     entries: list[StageTotal] = []
     for stage, paths in stages.items():
-        made = {Path(folder).name: recorded_seconds(Path(folder)) for folder in paths.get("made", ())}
-        jobs = _jobs(paths.get("benchmarks", ()), missing, made, set(paths.get("batches", ())))
-        trained = _trained(paths.get("files", ()))
-        of_files = _sizes(paths.get("files", ()), missing)
+        clip_seconds = {Path(folder).name: recorded_seconds(Path(folder)) for folder in paths.get("made", ())}
+        jobs = _read_jobs(paths.get("benchmarks", ()), missing, clip_seconds, set(paths.get("batches", ())))
+        training_seconds = _training_seconds(paths.get("files", ()))
+        file_sizes = _file_sizes(paths.get("files", ()), missing)
         by_rule: dict[str, list[dict[str, float]]] = defaultdict(list)
         for rule, row in jobs:
             if rule == "training":
-                row["s"] = max(row.get("s", 0.0), trained)
+                row["s"] = max(row.get("s", 0.0), training_seconds)
             by_rule[rule].append(row)
-        for rule, seconds in made.items():
-            _add_earlier_calls(by_rule[rule], seconds)
+        for rule, seconds in clip_seconds.items():
+            _scale_times(by_rule[rule], seconds)
         entries.append(
             {
                 "stage": stage,
-                **_total([row for _, row in jobs]),
-                "files": len(of_files),
-                "bytes": sum(of_files),
-                "rules": [{"rule": rule, **_total(rows)} for rule, rows in sorted(by_rule.items()) if rows],
+                **_total_of_jobs([row for _, row in jobs]),
+                "files": len(file_sizes),
+                "bytes": sum(file_sizes),
+                "rules": [
+                    {"rule": rule, **_total_of_jobs(rows)} for rule, rows in sorted(by_rule.items()) if rows
+                ],
             }
         )
     return {
@@ -64,7 +75,7 @@ def summarise(configuration: str, stages: Mapping[str, Mapping[str, Iterable[str
         "stages": entries,
         "total_seconds": round(sum(entry["seconds"] for entry in entries), 3),
         "total_bytes": sum(entry["bytes"] for entry in entries),
-        "database": _database(stages.get("database", {}).get("files", ())),
+        "database": _database_sizes(stages.get("database", {}).get("files", ())),
         "missing": sorted(missing),
         "machine": machine(),
         "versions": versions(),
@@ -72,9 +83,9 @@ def summarise(configuration: str, stages: Mapping[str, Mapping[str, Iterable[str
 
 
 def read_benchmark(path: str | Path) -> list[dict[str, float]]:
-    """The rows of a Snakemake benchmark file. Values that were not measured ("-", "NA") are left out.
+    """The rows of a Snakemake benchmark file: column -> value. There is a row for each run of the job.
 
-    Raises InputError if the file is not a benchmark.
+    Values that were not measured ("-", "NA") are left out. Raises InputError if the file is not a benchmark.
     """
     with open(path, encoding="utf-8", newline="") as file:
         rows = list(csv.DictReader(file, delimiter="\t"))
@@ -86,21 +97,22 @@ def read_benchmark(path: str | Path) -> list[dict[str, float]]:
 
 
 def _number(text: str | None) -> float | None:
+    """The number in a cell, or None if the cell has none."""
     try:
         return float(text) if text else None
     except ValueError:
         return None
 
 
-def _jobs(
-    paths: Iterable[str], missing: list[str], made: Container[str], batches: Container[str]
+def _read_jobs(
+    paths: Iterable[str], missing: list[str], batch_rules: Container[str], batches: Container[str]
 ) -> list[tuple[str, dict[str, float]]]:
-    """(rule, row) of every benchmark in `paths`: <rule>.tsv or <rule>/<name>.tsv.
+    """(rule, row) of every benchmark in `paths`, whose files are called <rule>.tsv or <rule>/<name>.tsv.
 
-    For rules in `made`, only benchmarks whose name is in `batches` are read. Missing paths are added to
-    `missing`.
+    Of the rules in `batch_rules`, only benchmarks whose name is in `batches` are read. Missing paths are
+    added to `missing`.
     """
-    found = []
+    jobs = []
     for root in map(Path, paths):
         if root.is_dir():
             files = [
@@ -111,15 +123,16 @@ def _jobs(
         else:
             missing.append(str(root))
             continue
-        files = [(rule, path) for rule, path in files if rule not in made or path.stem in batches]
-        found += [(rule, row) for rule, path in files for row in read_benchmark(path)]
-    return found
+        files = [(rule, path) for rule, path in files if rule not in batch_rules or path.stem in batches]
+        jobs += [(rule, row) for rule, path in files for row in read_benchmark(path)]
+    return jobs
 
 
-def _add_earlier_calls(rows: list[dict[str, float]], seconds: float) -> None:
-    """Scale the times of a rule's jobs so that they add up to `seconds`, the time that all its clips took.
+def _scale_times(rows: list[dict[str, float]], seconds: float) -> None:
+    """Make the times of a rule's jobs longer, so that they add up to `seconds`, the time of all its clips.
 
-    The measured time of the jobs is shorter if earlier calls had already made some of the clips.
+    The measured time is too short if the jobs found clips that earlier starts of the workflow had made. Times
+    are never made shorter.
     """
     measured = sum(row.get("s", 0.0) for row in rows)
     if seconds > measured > 0:
@@ -127,22 +140,25 @@ def _add_earlier_calls(rows: list[dict[str, float]], seconds: float) -> None:
             row["s"] = row.get("s", 0.0) * seconds / measured
 
 
-def _sizes(paths: Iterable[str], missing: list[str]) -> list[int]:
-    """Bytes of every file in `paths`. Hidden files do not count, because they are half-written."""
-    sizes = []
+def _file_sizes(paths: Iterable[str], missing: list[str]) -> list[int]:
+    """Bytes of every file in `paths`. Missing paths are added to `missing`.
+
+    Hidden files do not count, because they are half-written.
+    """
+    out = []
     for root in map(Path, paths):
         if root.is_dir():
             files = [p for p in root.rglob("*") if p.is_file() and not p.name.startswith(".")]
-            sizes += [p.stat().st_size for p in files]
+            out += [p.stat().st_size for p in files]
         elif root.is_file():
-            sizes.append(root.stat().st_size)
+            out.append(root.stat().st_size)
         else:
             missing.append(str(root))
-    return sizes
+    return out
 
 
-def _trained(paths: Iterable[str]) -> float:
-    """Seconds of training over all calls, from the history among the artefacts."""
+def _training_seconds(paths: Iterable[str]) -> float:
+    """Seconds of training over all starts, from history.csv in one of the folders `paths`; 0 without it."""
     for path in map(Path, paths):
         if (path / "history.csv").is_file():
             seconds = read_numbers(path / "history.csv").get("seconds", [])
@@ -150,15 +166,16 @@ def _trained(paths: Iterable[str]) -> float:
     return 0.0
 
 
-def _database(paths: Iterable[str]) -> Sizes | None:
-    """The sizes of the database, if it is among the artefacts in `paths`."""
+def _database_sizes(paths: Iterable[str]) -> Sizes | None:
+    """The sizes of the database, or None if none of the folders `paths` is a database."""
     for path in map(Path, paths):
         if (path / MANIFEST).is_file():
             return sizes(Manifest.load(path))
     return None
 
 
-def _total(rows: list[dict[str, float]]) -> JobTotal:
+def _total_of_jobs(rows: list[dict[str, float]]) -> JobTotal:
+    """Totals over jobs. rows: from `read_benchmark`."""
     seconds = [row.get("s", 0.0) for row in rows]
     memory = [row["max_rss"] for row in rows if "max_rss" in row]
     return {

@@ -1,4 +1,4 @@
-"""Packs a trained network to run in the page: 16-bit weights and everything else that the runtime needs."""
+"""Packs a trained network to run in the report page: 16-bit weights, and what the page's runtime needs."""
 
 from __future__ import annotations
 
@@ -29,14 +29,14 @@ from hobble.runtime.bounds import Bounds
 from hobble.runtime.character import start
 from hobble.runtime.options import Runtime
 
-NO_EFFECT = 1e-7  # an input whose scale (1 / standard deviation) is smaller than this has no effect
+NO_EFFECT = 1e-7  # inputs are multiplied by 1 / standard deviation; below this factor they have no effect
 
 
 def playable(network: Network, runtime: Runtime) -> dict[str, Any]:
     """The data of the page's JavaScript runtime; {} if the network has no skeleton.
 
-    Inputs without effect are left out, and so are the rotations of joints that move no part of the drawn
-    body, such as fingers. In the page such a joint keeps its rest pose relative to its parent.
+    Inputs without effect are left out. So are the predicted rotations of joints that move no part of the
+    drawn body, such as fingers. In the page these joints keep their rest pose relative to their parents.
     """
     skeleton = network.skeleton
     if skeleton is None:
@@ -72,6 +72,7 @@ def playable(network: Network, runtime: Runtime) -> dict[str, Any]:
         "channels": shown_channels(network, runtime),
         "legs": legs.tolist(),
         "ahead": feet.knees_ahead(skeleton).tolist(),
+        # For each foot, all joints below the heel; `toes` has only the toe and the joints below the toe.
         "carried": [np.flatnonzero(row).tolist() for row in parts],
         "toes": [np.flatnonzero(row == feet.TOES).tolist() for row in parts],
         "sole": sole,
@@ -83,20 +84,23 @@ def playable(network: Network, runtime: Runtime) -> dict[str, Any]:
 
 
 def shown_channels(network: Network, runtime: Runtime) -> list[dict[str, Any]]:
-    """The data of each channel for the page. Columns are given as indices.
+    """The data of each channel for the page. A channel is a group of inputs (columns) of the network.
 
-    `first`: index of the channel's first column among the columns of all channels. `rate`: largest change of
-    a value in one frame. `scale`: values are divided by it before the network gets them. How a channel is
-    shown, such as `spoken`, `sliders` and `says`, comes from `hobble.channels.shown`.
+    `columns` are the labels of the inputs, `trained` the labels of those that were above 0 in training.
+    `sliders`, `presets` and `regions` refer to a column by its index in `columns`. `first`: index of the
+    channel's first column among the columns of all channels. `rate`: largest change of a value in one frame.
+    `scale`: values are divided by it before the network gets them. `limits`: speed limits, or None. Entries
+    that say how a channel is shown, such as `spoken`, `sliders` and `says`, come from
+    `hobble.channels.shown`.
     """
     skeleton, out, first = network.skeleton, [], 0
     assert skeleton is not None
     for name, columns in network.channels.items():
-        definition, wording, index = channel(name), words(name), list(columns).index
+        definition, wording, index_of = channel(name), words(name), list(columns).index
         speed_limits = network.limits.get(name)
         display = shown(name, skeleton, columns, network.trained(name))
         presets = [
-            {"name": preset, "values": [[index(column), value] for column, value in values.items()]}
+            {"name": preset, "values": [[index_of(column), value] for column, value in values.items()]}
             for preset, values in display.presets.items()
         ]
         out.append(
@@ -108,7 +112,7 @@ def shown_channels(network: Network, runtime: Runtime) -> list[dict[str, Any]]:
                 "columns": list(columns),
                 "trained": list(network.trained(name)),
                 "spoken": list(display.spoken),
-                "sliders": {label: index(column) for label, column in display.sliders.items()},
+                "sliders": {label: index_of(column) for label, column in display.sliders.items()},
                 "presets": presets,
                 "regions": [list(indices) for indices in display.regions],
                 "highest": definition.highest,
@@ -118,7 +122,7 @@ def shown_channels(network: Network, runtime: Runtime) -> list[dict[str, Any]]:
                 "headline": wording.headline,
                 "says": wording.says,
                 "on": wording.on,
-                "rate": runtime.rates.get(name, definition.rate) / 60,
+                "rate": runtime.rates.get(name, definition.rate) / 60,  # from a second to a frame
                 "scale": runtime.scales.get(name, 1.0),
                 "limits": speed_limits.to_dict() if runtime.limits and speed_limits is not None else None,
             }
@@ -128,34 +132,44 @@ def shown_channels(network: Network, runtime: Runtime) -> list[dict[str, Any]]:
 
 
 def turning_joints(skeleton: Skeleton) -> list[int]:
-    """The joints whose rotations matter: the bones of the drawn body, the legs, and all their ancestors."""
-    found: set[int] = set()
+    """Indices of the joints whose rotations the page needs.
+
+    These are the joints that move the drawn body, the joints of the legs, and all ancestors of both.
+    """
+    needed: set[int] = set()
     for joint in (*body(skeleton).bones.tolist(), *feet.leg_joints(skeleton).ravel().tolist()):
-        while joint >= 0 and joint not in found:
-            found.add(joint)
+        while joint >= 0 and joint not in needed:
+            needed.add(joint)
             joint = skeleton.parents[joint]
-    return sorted(found)
+    return sorted(needed)
 
 
 def _used_outputs(layout: RowLayout, turning: Sequence[int]) -> NDArray[np.int64]:
-    """Indices of the outputs that the page uses: all but rotations, and the rotations of `turning` joints."""
+    """Indices of the outputs that the page uses.
+
+    Of the rotations, which are the last block, only those of the joints `turning` are used. All other outputs
+    are used.
+    """
     start = layout.y_joint_rotation.start
-    turns = start + 3 * np.asarray(turning)[:, None] + np.arange(3)
-    return np.concatenate([np.arange(start), turns.ravel()])
+    rotations = start + 3 * np.asarray(turning)[:, None] + np.arange(3)
+    return np.concatenate([np.arange(start), rotations.ravel()])
 
 
 def skeleton_of(spec: Mapping[str, Any]) -> Skeleton:
-    """The skeleton of a character packed by `playable`, with what is needed to draw its body."""
+    """The skeleton of a character that `playable` packed. It has all that is needed to draw the body."""
     joints, parents = tuple(spec["names"]), tuple(spec["parents"])
     return Skeleton("", joints, parents, np.array(spec["offsets"]), spec["roles"])
 
 
 def _bounds(network: Network, outputs: NDArray[np.int64]) -> dict[str, Any]:
-    """The bounds of all inputs and of the outputs with these indices, from `hobble.runtime.bounds`."""
+    """The ranges to which the page clips inputs and outputs, from `hobble.runtime.bounds`.
+
+    outputs: indices of the outputs that the page uses. The ranges of all inputs are packed.
+    """
     bounds = Bounds.of(network)
-    low, high = bounds.y_low[outputs], bounds.y_high[outputs]
-    arrays = {"xLow": bounds.x_low, "xHigh": bounds.x_high, "yLow": low, "yHigh": high}
-    return {name: packed(a.astype(np.float32)) for name, a in arrays.items()} | {
+    y_low, y_high = bounds.y_low[outputs], bounds.y_high[outputs]
+    arrays = {"xLow": bounds.x_low, "xHigh": bounds.x_high, "yLow": y_low, "yHigh": y_high}
+    return {name: packed(array.astype(np.float32)) for name, array in arrays.items()} | {
         "fastest": bounds.fastest,
         "hips": list(bounds.hips),
     }
@@ -170,7 +184,7 @@ def _start(network: Network) -> dict[str, Any]:
 
 
 def _constants() -> dict[str, float]:
-    """The constants of the Python runtime for the page, so that they are defined in one place only."""
+    """The constants of the Python runtime, packed so that the page does not define them a second time."""
     return {
         "targetMix": trajectory.TARGET_MIX,
         "gaitMix": trajectory.GAIT_MIX,

@@ -1,4 +1,4 @@
-"""The origin of a result: versions, commit, machine."""
+"""Finds out how a result was made: with which versions and commit, and on which machine."""
 
 from __future__ import annotations
 
@@ -13,12 +13,13 @@ from typing import Any
 from hobble.core.processors import processor
 from hobble.evaluation.pipeline_results import Machine
 
-WEB = Path(__file__).parent / "web"
+WEB = Path(__file__).parent / "web"  # the page's scripts
+# The Python packages whose versions are reported.
 PACKAGES = ("hobble", "torch", "numpy", "scipy", "numba", "snakemake", "pydantic", "jinja2")
 
 
 def versions() -> dict[str, str]:
-    """Versions of Python, of the main Python packages, and of the page's npm packages."""
+    """Name -> version, for Python, the main Python packages and the page's npm packages."""
     found = {"python": platform.python_version()}
     for name in PACKAGES:
         try:
@@ -29,7 +30,7 @@ def versions() -> dict[str, str]:
 
 
 def machine() -> Machine:
-    """System, processor, cores and memory of this machine. No host or user name."""
+    """System, processor, cores and memory of this machine, but not the name of the host or the user."""
     return {
         "system": f"{platform.system()} {platform.machine()}",
         "processor": processor(),
@@ -39,7 +40,10 @@ def machine() -> Machine:
 
 
 def commit(folder: Path) -> dict[str, Any] | None:
-    """The commit of the checkout at `folder`, and whether it has uncommitted changes; None without git."""
+    """The hash of the commit that is checked out at `folder`, and whether tracked files differ from it.
+
+    None if `folder` is not in a git checkout, or if git is not installed.
+    """
     try:
         head = _git(folder, "rev-parse", "HEAD")
         return {
@@ -51,6 +55,7 @@ def commit(folder: Path) -> dict[str, Any] | None:
 
 
 def _git(folder: Path, *arguments: str) -> str:
+    """The output of a git command in `folder`."""
     command = ["git", "-C", str(folder), "--no-optional-locks", *arguments]
     done = subprocess.run(command, capture_output=True, text=True, check=True, timeout=10)
     return done.stdout.strip()

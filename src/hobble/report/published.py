@@ -1,4 +1,4 @@
-"""Citations of published numbers."""
+"""Says where a published number is from, for the tables that compare it with ours."""
 
 from __future__ import annotations
 
@@ -6,14 +6,15 @@ from collections.abc import Mapping
 from typing import Any
 
 
-def cited(row: Mapping[str, Any], sources: Mapping[str, str]) -> str:
-    """Source and table of a published number, and the other value if its publication gives two.
+def citation(row: Mapping[str, Any], sources: Mapping[str, str]) -> str:
+    """Source and table of a published number. If its publication also gives another value, this is added.
 
-    row: an entry of `hobble/evaluation/published.yaml`. sources: key of a source -> its authors and year.
+    row: the number's entry in `hobble/evaluation/published.yaml`. sources: key of a source -> its authors and
+    year.
 
-    >>> cited({"source": "a", "table": "5.2", "other_figure": "3 in Appendix A"}, {"a": "Author (2021)"})
+    >>> citation({"source": "a", "table": "5.2", "other_figure": "3 in Appendix A"}, {"a": "Author (2021)"})
     'Author (2021), Table 5.2 (but 3 in Appendix A)'
-    >>> cited({"source": "a"}, {"a": "Author (2021)"})
+    >>> citation({"source": "a"}, {"a": "Author (2021)"})
     'Author (2021)'
     """
     text = sources.get(row["source"], row["source"])

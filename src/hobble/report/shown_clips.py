@@ -9,14 +9,15 @@ from hobble.measures.stratified_sample import shuffle_key
 from hobble.report.gather import ReportMaterial
 
 MOST_SHOWN = 150  # at most this many clips have label curves, a row in the table and views of their ground
-MOST_COUNTED = 600  # the seconds of data are counted frame by frame in at most this many clips
+MOST_COUNTED = 600  # at most this many clips are read to count how many seconds of data there are
 
 
-def shown(material: ReportMaterial, most: int = MOST_SHOWN) -> frozenset[str]:
-    """Names of the clips that are shown: all of them, or `most` if there are more.
+def choose_clips(material: ReportMaterial, most: int = MOST_SHOWN) -> frozenset[str]:
+    """Names of the clips that the page shows: all clips, or `most` of them if there are more.
 
-    The clips are put into kinds by split, by main gait, and by whether a channel has a value in them. The
-    kinds take turns to give one clip each, in a random order that depends only on the names.
+    The clips are divided into kinds by split, by main gait, and by whether a channel (group of inputs of the
+    network) is above 0 in them. In each round every kind gives one clip, until there are `most`. Which clip
+    of its kind comes first is random, but depends only on the names.
     """
     with_values = {report["clip"] for report in material.channels if report.get("values")}
     kinds: dict[tuple[str, str, bool], list[str]] = {}
@@ -26,14 +27,17 @@ def shown(material: ReportMaterial, most: int = MOST_SHOWN) -> frozenset[str]:
         kinds.setdefault((material.split(clip), gait, clip in with_values), []).append(clip)
     if sum(map(len, kinds.values())) <= most:
         return frozenset(name for names in kinds.values() for name in names)
-    turns = [
+    candidates = [
         (turn, kind, name) for kind in kinds for turn, name in enumerate(sorted(kinds[kind], key=shuffle_key))
     ]
-    return frozenset(name for *_, name in sorted(turns)[:most])
+    return frozenset(name for *_, name in sorted(candidates)[:most])
 
 
-def sampled(paths: Sequence[str], most: int = MOST_COUNTED) -> list[str]:
-    """At most `most` of the clips' files, drawn at random with the same probability for each clip."""
+def sample_files(paths: Sequence[str], most: int = MOST_COUNTED) -> list[str]:
+    """At most `most` of the paths, drawn at random. paths: one file for each clip, called after the clip.
+
+    The draw depends only on the names, so it is the same each time.
+    """
     if len(paths) <= most:
         return list(paths)
     chosen = set(sorted((Path(path).stem for path in paths), key=shuffle_key)[:most])
@@ -41,5 +45,5 @@ def sampled(paths: Sequence[str], most: int = MOST_COUNTED) -> list[str]:
 
 
 def files_of(paths: Iterable[str], names: frozenset[str]) -> list[str]:
-    """Those of the clips' files that belong to the clips `names`."""
+    """Those of the paths that belong to the clips `names`. paths: files called after their clips."""
     return [path for path in paths if Path(path).stem in names]

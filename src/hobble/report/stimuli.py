@@ -1,4 +1,7 @@
-"""Short loops of the walking character, for a questionnaire or a README, as animated images and BVH files."""
+"""Makes short loops of the walking character, as animated images and BVH files.
+
+They are stimuli for a questionnaire, or pictures for a README.
+"""
 
 from __future__ import annotations
 
@@ -25,21 +28,22 @@ from hobble.report.straight_walk import walk_straight
 from hobble.runtime.export import export_bvh, fitted_skeleton, jointed
 from hobble.runtime.options import Runtime
 
-SETTLED = 6 * 60  # frames until the gait has settled
+SETTLED = 6 * 60  # frames until the gait has settled; no loop begins earlier
 SHORTEST, LONGEST = 150, 300  # frames: least and greatest length of a loop
 BLEND = 12  # frames over which the end of a loop is blended into its start
 FRAME_STEP = 2  # every second frame of the motion becomes an image
 QUALITY = 80  # of the WebP images, 0 to 100
-VISIBLE = 0.1  # cm: a loop whose distance from the neutral loop (`apart`) is smaller looks the same
+# cm: a loop that is nearer than this to the loop of the neutral walk (`loop_distance`) looks the same. In the
+# neutral walk all values of channels are 0.
+VISIBLE = 0.1
 
 
 @dataclass(frozen=True)
 class RepeatedWalk:
-    """A walk that can be repeated.
+    """A walk that can be repeated: after its last frame, its first frame follows without a jump.
 
     positions: (F, J, 3), cm. rotations: (F, J, 4). travel: (3,) cm from the start of one repetition to the
-    start of the next. gap: mean distance between the joints of the last and the first pose before blending,
-    cm.
+    start of the next. gap: mean distance by which the joints would jump without blending, cm.
     """
 
     positions: Array
@@ -51,12 +55,14 @@ class RepeatedWalk:
 def write_stimuli(
     network: Network, folder: str | Path, runtime: Runtime, size: int = 400
 ) -> list[dict[str, Any]]:
-    """Write <name>.webp and <name>.bvh of each sample walk of each channel into a folder, and stimuli.json.
+    """Write <name>.webp and <name>.bvh of each loop of `all_loops` into a folder, and stimuli.json.
 
-    The sample walks are those of `all_loops`. The files of the second channel and later ones are called
-    <channel>-<name>. stimuli.json has an entry for each walk. This also lists the walk's columns that were
-    never above 0 in training, and its distance from the neutral walk. Returns the entries. size: pixels on
-    each side. Raises HobbleError for a network without channels.
+    size: pixels on each side of the images. Raises HobbleError for a network without channels.
+
+    Returns the content of stimuli.json, a dict for each loop. `values`: column of the channel -> value.
+    `coloured`: whether the values colour the body. `untrained`: the columns of `values` that were never above
+    0 in training. `from_plain_cm`: distance from the loop of the neutral walk, see `loop_distance`. `gap_cm`:
+    see `RepeatedWalk`.
     """
     if network.skeleton is None or not network.channels:
         raise HobbleError(
@@ -66,45 +72,51 @@ def write_stimuli(
     folder = Path(folder)
     folder.mkdir(parents=True, exist_ok=True)
     skeleton = network.skeleton
-    neutral, rows = walk(network, {}, runtime), []
+    neutral, entries = make_loop(network, {}, runtime), []
     for name, channel_name, sample in all_loops(network):
         columns, trained = network.channels[channel_name], trained_columns(network, channel_name)
         renderer = BodyRenderer(body(skeleton), shown(channel_name, skeleton, columns, trained).regions)
-        loop = walk(network, {channel_name: dict(sample.values)}, runtime) if sample.values else neutral
+        loop = neutral
+        if sample.values:
+            loop = make_loop(network, {channel_name: dict(sample.values)}, runtime)
         bvh_skeleton = skeleton
-        if "skeleton" not in network.meta:
+        if "skeleton" not in network.meta:  # then the bone lengths are known only from the motion
             bvh_skeleton = fitted_skeleton(skeleton, loop.positions, loop.rotations)
         export_bvh(folder / f"{name}.bvh", name, bvh_skeleton, loop.positions, loop.rotations)
         colours = None
         if sample.coloured:
             values = np.array([sample.values.get(column, 0.0) for column in columns])
             colours = values / channel(channel_name).highest
-        save_loop(folder / f"{name}.webp", frames(renderer, skeleton, loop, colours, size))
+        save_loop(folder / f"{name}.webp", draw_frames(renderer, skeleton, loop, colours, size))
         seconds = len(loop.positions) / 60
-        rows.append(
+        entries.append(
             {
                 "name": name,
                 "channel": channel_name,
                 "values": dict(sample.values),
                 "coloured": sample.coloured,
                 "untrained": [column for column in sample.values if column not in trained],
-                "from_plain_cm": round(apart(loop, neutral), 2),
+                "from_plain_cm": round(loop_distance(loop, neutral), 2),
                 "seconds": seconds,
                 "metres_a_second": round(float(np.linalg.norm(loop.travel)) / 100 / seconds, 3),
                 "gap_cm": round(loop.gap, 2),
             }
         )
-    write_json(folder / "stimuli.json", {"stimuli": rows})
-    return rows
+    write_json(folder / "stimuli.json", {"stimuli": entries})
+    return entries
 
 
 def all_loops(network: Network) -> list[tuple[str, str, SampleWalk]]:
-    """(name of its files, channel, walk) of each loop. The neutral walk is listed once."""
+    """(name of the files, channel, walk) of each loop, as `hobble.channels.shown.loops` lists them.
+
+    The names of the first channel are used as they are. Names of later channels begin with "<channel>-", and
+    their neutral walk is left out, because the first channel has it.
+    """
     assert network.skeleton is not None
     out: list[tuple[str, str, SampleWalk]] = []
     for name, columns in network.channels.items():
         for loop in loops(name, network.skeleton, columns, network.trained(name)):
-            if not out or out[0][1] == name:
+            if not out or out[0][1] == name:  # the first channel that has loops
                 out.append((loop.name, name, loop))
             elif loop.values:
                 out.append((f"{name}-{loop.name}", name, loop))
@@ -112,129 +124,137 @@ def all_loops(network: Network) -> list[tuple[str, str, SampleWalk]]:
 
 
 def trained_columns(network: Network, name: str) -> set[str]:
-    """Columns of a channel that were above 0 somewhere in training, judged by the mean of their input."""
+    """Columns of a channel that were above 0 somewhere in training: those whose mean is above 0."""
     means = network.x_mean[network.layout.x_channel(name)]
     return {column for column, mean in zip(network.channels[name], means, strict=True) if mean > 0}
 
 
-def apart(loop: RepeatedWalk, other: RepeatedWalk) -> float:
+def loop_distance(loop: RepeatedWalk, other: RepeatedWalk) -> float:
     """Mean distance (cm, over joints and poses) from each pose of `loop` to the nearest pose of `other`.
 
-    Both are moved to the origin and turned to the same direction. The distance of a walk from itself is 0,
-    even if it starts at another moment.
+    Both loops are moved to the origin and turned to the same direction. The distance of a walk from itself is
+    0, even if the two loops start at different moments of it.
     """
-    ours, theirs = _ahead(loop), _ahead(other)
-    return float(np.mean([np.linalg.norm(theirs - pose, axis=-1).mean(axis=1).min() for pose in ours]))
+    poses, other_poses = _turned_ahead(loop), _turned_ahead(other)
+    return float(np.mean([np.linalg.norm(other_poses - pose, axis=-1).mean(axis=1).min() for pose in poses]))
 
 
-def doubts(rows: Sequence[Mapping[str, Any]]) -> list[str]:
+def loop_warnings(entries: Sequence[Mapping[str, Any]]) -> list[str]:
     """Warnings about loops that look like the neutral walk or have values without effect.
 
-    rows: from `write_stimuli`.
+    entries: from `write_stimuli`.
     """
-    unchanged = [row for row in rows if row["values"] and row["from_plain_cm"] < VISIBLE]
-    partly = [row for row in rows if row["untrained"] and row not in unchanged]
+    unchanged = [entry for entry in entries if entry["values"] and entry["from_plain_cm"] < VISIBLE]
+    partly = [entry for entry in entries if entry["untrained"] and entry not in unchanged]
     out = []
     if unchanged:
-        names = ", ".join(row["name"] for row in unchanged)
+        names = ", ".join(entry["name"] for entry in unchanged)
         out.append(
             f"{names}: they look like the neutral walk (less than {VISIBLE} cm from it). Leave them out of a "
             "questionnaire."
         )
     if partly:
-        out.append(f"{', '.join(row['name'] for row in partly)}: some of their values have no effect.")
-    if never := sorted({column for row in [*unchanged, *partly] for column in row["untrained"]}):
+        out.append(f"{', '.join(entry['name'] for entry in partly)}: some of their values have no effect.")
+    if never := sorted({column for entry in [*unchanged, *partly] for column in entry["untrained"]}):
         out.append(f"Never above 0 in training: {', '.join(never)}. Train on clips with such values.")
     return out
 
 
-def walk(network: Network, values: Mapping[str, Mapping[str, float]], runtime: Runtime) -> RepeatedWalk:
-    """A loop of the character walking straight on, cut between the two most similar poses.
+def make_loop(network: Network, values: Mapping[str, Mapping[str, float]], runtime: Runtime) -> RepeatedWalk:
+    """A loop of the character walking straight on, cut out of a longer walk by `find_cut`.
 
     values: channel -> column -> value.
     """
     count = SETTLED + 60 + LONGEST + BLEND
     poses = [pose for _, pose in walk_straight(network, runtime, count, values)]
     positions, rotations = np.array([p.positions for p in poses]), np.array([p.rotations for p in poses])
-    first, last, gap = cut(positions)
-    kept, turned = positions[first:last].copy(), rotations[first:last].copy()
-    travel = positions[last, 0] - positions[first, 0]
+    first, stop, gap = find_cut(positions)
+    loop_positions, loop_rotations = positions[first:stop].copy(), rotations[first:stop].copy()
+    travel = positions[stop, 0] - positions[first, 0]
     travel[1] = 0.0
+    # The end of the loop is blended into the frames just before its first frame, moved on by `travel`.
     for k in range(BLEND):
         share = (k + 1) / (BLEND + 1)
-        here, before = last - BLEND + k, first - BLEND + k
-        kept[here - first] = (1 - share) * positions[here] + share * (positions[before] + travel)
-        turned[here - first] = _mixed(rotations[here], rotations[before], share)
-    return RepeatedWalk(kept, turned, travel, gap)
+        here, before = stop - BLEND + k, first - BLEND + k
+        loop_positions[here - first] = (1 - share) * positions[here] + share * (positions[before] + travel)
+        loop_rotations[here - first] = _mix_rotations(rotations[here], rotations[before], share)
+    return RepeatedWalk(loop_positions, loop_rotations, travel, gap)
 
 
-def cut(positions: Array) -> tuple[int, int, float]:
-    """Where to cut a walk into a loop: at two frames whose poses and velocities are as similar as possible.
+def find_cut(positions: Array) -> tuple[int, int, float]:
+    """Find two frames of a walk, (F, J, 3), between which it can be cut out and repeated.
 
-    Returns the first frame of the loop, the frame after its last, and the mean distance (cm) of joints
-    between these two frames. First frames within a second after SETTLED and all allowed lengths are tried.
+    Their poses and velocities are as similar as possible. Returns the first frame of the loop, the frame
+    after its last, and the mean distance (cm) between the joints in these two frames. First frames within a
+    second after SETTLED and all allowed lengths are tried.
     """
-    local = positions - positions[:, :1] * np.array([1.0, 0.0, 1.0])
-    speed = np.gradient(local, axis=0)
+    local = positions - positions[:, :1] * np.array([1.0, 0.0, 1.0])  # the root stays over the origin
+    velocity = np.gradient(local, axis=0)
     best = (SETTLED, SETTLED + SHORTEST, np.inf)
     for first in range(SETTLED, SETTLED + 60, 2):
         later = np.arange(first + SHORTEST, min(first + LONGEST, len(positions) - BLEND))
-        unlike = np.linalg.norm(local[later] - local[first], axis=-1).mean(axis=1)
-        unlike += 3 * np.linalg.norm(speed[later] - speed[first], axis=-1).mean(axis=1)
-        if unlike.min() < best[2]:
-            best = (first, int(later[unlike.argmin()]), float(unlike.min()))
-    first, last, _ = best
-    return first, last, float(np.linalg.norm(local[last] - local[first], axis=-1).mean())
+        # Distance of the poses, cm, plus 3 times the difference of the velocities, cm a frame.
+        difference = np.linalg.norm(local[later] - local[first], axis=-1).mean(axis=1)
+        difference += 3 * np.linalg.norm(velocity[later] - velocity[first], axis=-1).mean(axis=1)
+        if difference.min() < best[2]:
+            best = (first, int(later[difference.argmin()]), float(difference.min()))
+    first, stop, _ = best
+    return first, stop, float(np.linalg.norm(local[stop] - local[first], axis=-1).mean())
 
 
-def frames(
+def draw_frames(
     renderer: BodyRenderer, skeleton: Skeleton, loop: RepeatedWalk, values: Array | None, size: int
 ) -> list[NDArray[np.uint8]]:
-    """The pictures of a loop.
+    """The pictures of a loop, of every FRAME_STEP-th frame. The character walks along z.
 
-    values: (columns,) from 0 to 1, drawn as colours. The camera moves at constant speed. In each
-    repetition it crosses a whole number of cells of the ground's grid, so that the ground repeats, too.
+    values: from 0 to 1, drawn as colours, see `BodyRenderer.draw`. size: pixels on each side.
+
+    The camera moves at constant speed. In each repetition it crosses a whole number of cells of the ground's
+    grid, so that the ground repeats, too.
     """
-    count, keep = len(loop.positions), body(skeleton).bones
-    world, places = jointed(skeleton, loop.positions, loop.rotations)
+    count, bones = len(loop.positions), body(skeleton).bones
+    world_rotations, world_positions = jointed(skeleton, loop.positions, loop.rotations)
     start, yaw = loop.positions[0, 0], np.arctan2(loop.travel[0], loop.travel[2])
-    middle = loop.positions[:, 0].mean(axis=0) - loop.travel * (count - 1) / count / 2 - start
+    # The mean distance of the root from a point that moves from `start` by `travel` at constant speed.
+    offset = loop.positions[:, 0].mean(axis=0) - loop.travel * (count - 1) / count / 2 - start
     length = float(np.linalg.norm(loop.travel))
-    even = max(1, round(length / GRID)) * GRID / max(length, 1e-9)
+    # The length of the camera's way in a loop, divided by that of the character's.
+    camera_factor = max(1, round(length / GRID)) * GRID / max(length, 1e-9)
     turn = np.array([[np.cos(yaw), 0, -np.sin(yaw)], [0, 1, 0], [np.sin(yaw), 0, np.cos(yaw)]])
-    turns = quat.mul(quat.yaw(-yaw), world[:, keep])
+    rotations = quat.mul(quat.yaw(-yaw), world_rotations[:, bones])
     out = []
     for f in range(0, count - count % FRAME_STEP, FRAME_STEP):
-        gone = loop.travel * f / count
-        points = (places[f, keep] - start - gone - middle * [1, 0, 1]) @ turn.T
-        points[:, 1] = places[f, keep, 1]
-        travelled = np.array([0.0, 0.0, length * f / count * even])
-        camera = Camera(np.array([0.0, 82.0, 0.0]) + travelled, size=size)
-        out.append(renderer.draw(points + travelled, turns[f], camera, values))
+        travelled = loop.travel * f / count
+        points = (world_positions[f, bones] - start - travelled - offset * [1, 0, 1]) @ turn.T
+        points[:, 1] = world_positions[f, bones, 1]
+        moved = np.array([0.0, 0.0, length * f / count * camera_factor])
+        camera = Camera(np.array([0.0, 82.0, 0.0]) + moved, size=size)  # about half the body's height
+        out.append(renderer.draw(points + moved, rotations[f], camera, values))
     return out
 
 
 def save_loop(path: Path, pictures: list[NDArray[np.uint8]]) -> None:
     """Write an animated WebP that repeats forever."""
     images = [Image.fromarray(picture) for picture in pictures]
-    times = [
+    # Whole milliseconds, rounded so that they add up to the true duration.
+    durations = [
         round(1000 * FRAME_STEP * (k + 1) / 60) - round(1000 * FRAME_STEP * k / 60)
         for k in range(len(images))
     ]
     images[0].save(
-        path, save_all=True, append_images=images[1:], duration=times, loop=0, quality=QUALITY, method=3
+        path, save_all=True, append_images=images[1:], duration=durations, loop=0, quality=QUALITY, method=3
     )
 
 
-def _ahead(loop: RepeatedWalk) -> Array:
+def _turned_ahead(loop: RepeatedWalk) -> Array:
     """Positions (F, J, 3) of a loop, with the root over the origin and the direction of travel along z."""
     yaw = np.arctan2(loop.travel[0], loop.travel[2])
     turn = np.array([[np.cos(yaw), 0, -np.sin(yaw)], [0, 1, 0], [np.sin(yaw), 0, np.cos(yaw)]])
     return (loop.positions - loop.positions[:, :1] * [1, 0, 1]) @ turn.T
 
 
-def _mixed(a: Array, b: Array, share: float) -> Array:
-    """Rotations (J, 4) interpolated between a and b, normalised. share: 0 is a, 1 is b."""
-    b = np.where((a * b).sum(-1, keepdims=True) < 0, -b, b)
+def _mix_rotations(a: Array, b: Array, share: float) -> Array:
+    """Rotations (J, 4) between a and b. share: 0 gives a, 1 gives b."""
+    b = np.where((a * b).sum(-1, keepdims=True) < 0, -b, b)  # q and -q are the same rotation
     mixed = (1 - share) * a + share * b
     return mixed / np.linalg.norm(mixed, axis=-1, keepdims=True)

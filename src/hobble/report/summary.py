@@ -1,4 +1,4 @@
-"""The top of a page: key figures, and advice that follows from the numbers."""
+"""What the summary at the top of a page shows: key figures, and advice that follows from the numbers."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 
 @dataclass(frozen=True)
 class KeyFigure:
-    """A key figure. note: the smaller text under it. at: its place; figures are sorted by it."""
+    """A number at the top of a page. note: the smaller text under it. at: figures are sorted by it."""
 
     label: str
     value: str
@@ -22,9 +22,9 @@ class Hint:
     """Advice that follows from the numbers.
 
     kind: "warn", a problem; "note", something to improve; "good", something fine; "fact", information. head:
-    the first words, in bold. text: the rest. at: its place among hints of the same kind, in the order of the
-    pipeline, because earlier problems cause later ones: data below 20, training 20, network 30, motion of the
-    character 40, channels 50, speed 60, cost of the pipeline 90.
+    the first words, in bold. text: the words after them. at: hints of the same kind are sorted by it. It
+    grows along the pipeline, because earlier problems cause later ones: data below 20, training 20, network
+    30, motion of the character 40, channels 50, speed 60, cost of the pipeline 90.
     """
 
     kind: str
@@ -34,5 +34,5 @@ class Hint:
 
 
 def placed(at: int, hints: Iterable[Hint]) -> Iterator[Hint]:
-    """`hints` with their `at` set."""
+    """The hints, each with this `at` instead of its own."""
     return (replace(hint, at=at) for hint in hints)

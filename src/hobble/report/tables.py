@@ -1,4 +1,4 @@
-"""Tables that the page can sort and save as CSV."""
+"""Tables, which the reader of a page can sort and save as CSV."""
 
 from __future__ import annotations
 
@@ -11,10 +11,10 @@ from hobble.report.formats import number
 
 @dataclass(frozen=True)
 class Column:
-    """A column.
+    """A column of a table.
 
-    label: its heading. show: gives the text for a value. kind: its CSS class; a column of the class "n" is
-    sorted by number.
+    label: its heading. show: a function from a value to the text in the cell. kind: its CSS class. Columns of
+    the class "n" are sorted as numbers, others as text.
     """
 
     label: str
@@ -34,7 +34,11 @@ class Column:
 
 @dataclass(frozen=True)
 class Table:
-    """A table. Its CSV file is called <name>.csv. title: the line that unfolds it."""
+    """A table.
+
+    name: of its CSV file, without ".csv". rows: a value for each column; None for an empty cell. title: the
+    line above the table; a click on it folds or unfolds the table.
+    """
 
     name: str
     columns: Sequence[Column]
@@ -43,7 +47,7 @@ class Table:
 
     @property
     def cells(self) -> list[list[tuple[str, str, str]]]:
-        """For each row, (kind, raw value, shown text) of each cell."""
+        """For each row, (kind of the column, whole value as text, shown text) of each cell."""
         return [
             [
                 (c.kind, "" if v is None else str(v), "–" if v is None else c.show(v))

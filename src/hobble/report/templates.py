@@ -1,4 +1,4 @@
-"""What all pages share: templates that escape values, style, scripts, specifications of charts."""
+"""What all pages share: templates that escape values, the style sheet, scripts, and the data of charts."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ FOLDER = Path(__file__).parent
 
 
 def template(name: str) -> Template:
-    """A template that escapes every value. A missing value is an error."""
+    """The template in the file `name`. It escapes every value, and a missing value is an error."""
     environment = Environment(
         loader=FileSystemLoader(FOLDER),
         autoescape=select_autoescape(default=True, default_for_string=True),
@@ -30,7 +30,10 @@ def template(name: str) -> Template:
 
 
 def specs(shown: Any) -> dict[str, Any]:
-    """Chart name -> specification for the scripts, for all charts in nested sections and collections."""
+    """Chart name -> the chart's data for the page's script.
+
+    shown: a chart, section or other part of a page, or any nesting of lists and mappings of them.
+    """
     if isinstance(shown, Chart):
         return {shown.name: shown.spec()}
     if isinstance(shown, ChartGroup | ChartPair):
@@ -46,16 +49,19 @@ def specs(shown: Any) -> dict[str, Any]:
 
 def style() -> Markup:
     """The pages' style sheet."""
-    return trusted("page.css", (FOLDER / "page.css").read_text(encoding="utf-8"))
+    return mark_safe("page.css", (FOLDER / "page.css").read_text(encoding="utf-8"))
 
 
 def questionnaire_script() -> Markup:
-    """The script of the questionnaire. It imports nothing."""
-    return trusted("questionnaire.js", (FOLDER / "questionnaire.js").read_text(encoding="utf-8"))
+    """The script of the questionnaire. Unlike the pages' scripts, it is a single file without imports."""
+    return mark_safe("questionnaire.js", (FOLDER / "questionnaire.js").read_text(encoding="utf-8"))
 
 
-def trusted(name: str, text: str) -> Markup:
-    """Our own CSS or script, marked as safe. Raises ValueError if it contains the end tag of its element."""
+def mark_safe(name: str, text: str) -> Markup:
+    """Mark our own CSS or script as safe, so that templates do not escape it. name: for the error message.
+
+    Raises ValueError if the text contains the end tag of a <script> or <style> element.
+    """
     if "</script" in text.lower() or "</style" in text.lower():
         raise ValueError(f"{name} contains </script or </style, which would end its element")
     return Markup(text)

@@ -1,4 +1,8 @@
-"""The section on training: training and held-out error over the passes."""
+"""The section on training: the errors on training clips and held-out clips over the passes.
+
+A pass goes over the training data once. It is divided into sections, and the errors are recorded after each
+section.
+"""
 
 from __future__ import annotations
 
@@ -10,25 +14,26 @@ from hobble.report.formats import number
 from hobble.report.gather import ReportMaterial
 from hobble.report.tables import Column, Table
 
-# Block of the output -> its name on the page, if the block's name does not say that it belongs to the path.
+# The network's output consists of blocks. The names of these blocks do not say that they belong to the path,
+# so the page uses other names.
 PATH_PARTS = {"position": "path position", "direction": "path direction"}
 
 
 def passes_axis(material: ReportMaterial) -> list[float]:
-    """The passes done at the end of each section (part of a pass): section 10 of 10 in pass 1 ends at 1.0."""
+    """The number of passes done at the end of each section: section 5 of 10 in pass 2 ends at 1.5."""
     passes, sections = material.history.get("pass", []), material.history.get("section", [])
     last = max((s for s in sections if s is not None), default=1) or 1
     # Passes and sections may be numbered from 1 or from 0.
-    first = min((p for p in passes if p is not None), default=1)
-    start = 1 if first >= 1 else 0
-    low = min((s for s in sections if s is not None), default=1)
-    per_pass = last if low >= 1 else last + 1
-    ends = [(s if low >= 1 else s + 1) / per_pass for s in sections if s is not None]
+    first_pass = min((p for p in passes if p is not None), default=1)
+    start = 1 if first_pass >= 1 else 0
+    first_section = min((s for s in sections if s is not None), default=1)
+    per_pass = last if first_section >= 1 else last + 1
+    ends = [(s if first_section >= 1 else s + 1) / per_pass for s in sections if s is not None]
     return [p - start + end for p, end in zip(passes, ends, strict=False) if p is not None]
 
 
 def learning_curve(material: ReportMaterial) -> Chart:
-    """Training and held-out error, on a logarithmic scale."""
+    """The training error and, if clips were held out, the held-out error, on a logarithmic scale."""
     x, history = passes_axis(material), material.history
     traces = [line("training", x, history.get("train_mse", []), "@muted")]
     held_out = any(v is not None for v in history.get("held_out_mse", ()))
@@ -40,8 +45,8 @@ def learning_curve(material: ReportMaterial) -> Chart:
         "Mean squared error of the standardised output, on a logarithmic scale. A network that always "
         "predicts the mean has error 1. The training error is measured with dropout"
         + (
-            ", so it can be above the held-out error. If the held-out line still falls, train longer. If it "
-            "rises again, the network overfits."
+            ", so it can be above the held-out error. If the held-out error still falls at the end, train "
+            "longer. If it rises again, the network overfits."
             if held_out
             else ". No clips were held out, so there is no held-out error."
         ),
@@ -54,7 +59,10 @@ def learning_curve(material: ReportMaterial) -> Chart:
 
 
 def block_curves(material: ReportMaterial) -> ChartGroup | None:
-    """The held-out error of each block of the output: small charts with one scale, largest error first."""
+    """The held-out error of each block of the output, in small charts that share a scale.
+
+    The block with the largest error comes first. None if there is no held-out error.
+    """
     x, history = passes_axis(material), material.history
     whole = [v for v in history.get("held_out_mse", ()) if v is not None]
     blocks = {
@@ -79,13 +87,14 @@ def block_curves(material: ReportMaterial) -> ChartGroup | None:
     return ChartGroup(
         "block-curves",
         "Held-out error of each part of the output",
-        "The last value of the error is in each title, and the largest comes first. Grey is the error of the "
-        "whole output. All charts have the same logarithmic scale.",
+        "Each title gives the error at the end of training, and the largest comes first. The grey line is "
+        "the error of the whole output. All charts have the same logarithmic scale.",
         charts,
     )
 
 
 def _column_in_words(name: str) -> str:
+    """A column of history.csv in words, such as "held out joint velocity"."""
     part = name.removeprefix("held_out_")
     return part_in_words(part) if part == name else f"held out {part_in_words(part)}"
 
@@ -96,10 +105,10 @@ def part_in_words(name: str) -> str:
 
 
 def _log_span(values: Sequence[float | None]) -> list[float]:
-    """Range of a logarithmic axis around the values, as exponents of ten, with a small margin."""
+    """Lowest and highest exponent of ten on a logarithmic axis that shows the values, with a small margin."""
     powers = [math.log10(v) for v in values if v is not None and v > 0] or [0.0]
-    room = 0.05 * (max(powers) - min(powers)) + 0.02
-    return [min(powers) - room, max(powers) + room]
+    margin = 0.05 * (max(powers) - min(powers)) + 0.02
+    return [min(powers) - margin, max(powers) + margin]
 
 
 def history_table(material: ReportMaterial) -> Table:

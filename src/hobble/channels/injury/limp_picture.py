@@ -17,7 +17,7 @@ from hobble.figure.mesh import body
 from hobble.figure.pack import regions
 from hobble.models.network import Network
 from hobble.report.raster import BodyRenderer
-from hobble.report.stimuli import FRAME_STEP, frames, walk
+from hobble.report.stimuli import FRAME_STEP, draw_frames, make_loop
 from hobble.runtime.options import Runtime
 
 Picture = NDArray[np.uint8]
@@ -46,8 +46,8 @@ def write_limp_picture(network: Network, path: str | Path, runtime: Runtime) -> 
     for injury in ({}, hurt):
         # A link is drawn in a colour from 0 (healthy) to 1 (severity 10).
         colours = np.array([injury.get(link, 0.0) for link in link_names]) / 10
-        loop = walk(network, {"injury": injury}, runtime)
-        halves.append(frames(renderer, network.skeleton, loop, colours, SIZE))
+        loop = make_loop(network, {"injury": injury}, runtime)
+        halves.append(draw_frames(renderer, network.skeleton, loop, colours, SIZE))
     return _save_webp(Path(path), put_side_by_side(*halves))
 
 

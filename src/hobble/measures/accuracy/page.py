@@ -16,7 +16,7 @@ from hobble.report.charts import Chart, axis, mark
 from hobble.report.formats import duration, number
 from hobble.report.gather import ReportMaterial
 from hobble.report.page_parts import PageSection, Paragraph, SectionPart, TemplatePart
-from hobble.report.published import cited
+from hobble.report.published import citation
 from hobble.report.summary import Hint, KeyFigure, placed
 from hobble.report.tables import Column, Table
 
@@ -194,7 +194,7 @@ def published_table(found: Json, material: ReportMaterial) -> Table:
             rows.append([what, part["mean"], part.get("sd"), part.get("position_error_cm"), "this report"])
     sources = material.published["sources"]
     for entry in material.published["accuracy"]:
-        rows.append([entry["label"], entry["mean"], None, None, cited(entry, sources)])
+        rows.append([entry["label"], entry["mean"], None, None, citation(entry, sources)])
     columns = [
         Column("network"),
         Column.number("mean error, as a fraction"),

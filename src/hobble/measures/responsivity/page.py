@@ -19,7 +19,7 @@ from hobble.measures.responsivity.lap_charts import (
 from hobble.report.formats import number
 from hobble.report.gather import ReportMaterial
 from hobble.report.page_parts import KeyFigures, PageSection, Paragraph, SectionPart
-from hobble.report.published import cited
+from hobble.report.published import citation
 from hobble.report.summary import Hint, KeyFigure, placed
 from hobble.report.tables import Column, Table
 from hobble.runtime.network_rows import FASTEST_TURN
@@ -160,14 +160,14 @@ def speed_table(found: Json, material: ReportMaterial) -> Table | None:
         ]
     ]
     for entry in material.published["responsivity"]:
-        rows.append([entry["label"], None, entry["milliseconds"], cited(entry, sources)])
+        rows.append([entry["label"], None, entry["milliseconds"], citation(entry, sources)])
     for entry in material.published["modes"]:
         rows.append(
             [
                 f"prediction alone, {entry['mode']} phase",
                 None,
                 entry["milliseconds"],
-                cited(entry, sources),
+                citation(entry, sources),
             ]
         )
     columns = [
