@@ -1,7 +1,7 @@
 """Creates a shard of a database, which holds the rows of some of its clips.
 
-The shard also holds the digests of its clips. By these digests, the rule `database_merge` finds clips with the
-same motion.
+The shard also holds the digests of its clips. By these digests, the rule `database_merge` finds clips
+with the same motion.
 """
 
 from pathlib import Path
