@@ -3,7 +3,7 @@ PYTHON ?= python3
 CORES ?= 2
 BIN := .venv/bin
 
-# Snakemake keeps files of its own under HOME. In a container there may be none, or one that cannot be written.
+# Snakemake writes files under HOME. In a container HOME may be unset, or a folder that cannot be written.
 ifneq ($(shell test -w "$$HOME" && echo writable),writable)
 export HOME := $(CURDIR)/.home
 endif
@@ -13,7 +13,7 @@ endif
 help:            ## list these targets
 	@grep -E '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed 's/:.*##/\t/'
 
-env: .venv/.ready  ## make the environment in .venv
+env: .venv/.ready  ## make the Python environment in .venv
 
 .venv/.ready: pyproject.toml constraints.txt
 	$(PYTHON) src/hobble/workflow/environment.py .venv
@@ -31,8 +31,8 @@ faults: env      ## test the workflow with N random faults (make faults N=200 SE
 cluster-test: env ## run the test configuration on a SLURM cluster of one node (needs root on Debian)
 	tests/cluster/run.sh
 
-# The tests that open the report need a browser. If there is none, this installs one as root on Debian. Elsewhere these tests
-# are then skipped.
+# The tests that open the report need a browser. If there is none, this target installs Chromium. That needs root on Debian;
+# otherwise the tests are skipped.
 browser:         ## find or install the browser for the tests
 	@for name in chromium chromium-browser google-chrome; do command -v $$name >/dev/null && exit 0; done; \
 	if [ "$$(id -u)" = 0 ] && command -v apt-get >/dev/null; then \

@@ -1,4 +1,5 @@
-# From motion capture to a character that can be hurt. Targets: results/<configuration>/report.html
+# This workflow turns motion-capture clips into a character that can be hurt. Its usual target is the report of a
+# configuration: results/<configuration>/report.html
 import gc
 import os
 import sys
@@ -16,38 +17,44 @@ from hobble.workflow.project import Project
 from hobble.workflow.targets import check, needed_datasets, notes
 from hobble.workflow.channel_sources import channels_of_folder
 
-# Planning makes millions of small objects that stay. If the garbage collector runs less often, planning 2,500 clips
-# takes an eighth less time.
+# While Snakemake plans, it makes millions of small objects and frees few of them. If the garbage collector runs less
+# often, planning takes an eighth less time (measured with 2,500 clips).
 gc.set_threshold(200_000, 50, 1000)
+# The next two lines replace functions of Snakemake. It then plans faster, and does not fail if another run that ends
+# removes the folder of locks.
 named_outputs.use()
 lock_files.use()
 ensure_user_name()
 try:
     if workflow.is_main_process:
         check_may_write(sys.argv[1:])
-    # The path is relative, so that nothing runs again after the checkout is moved.
+    # Params of rules contain this path. It is relative, so that no job runs again after the checkout is moved.
     project = Project(Path(os.path.relpath(workflow.basedir)), config)
     targets = [argument for argument in sys.argv[1:] if argument.startswith("results/")]
     check(project, targets)
     if workflow.is_main_process:
         for note in notes(project, targets):
             logger.warning(note)
-    # Each batch has rules of its own. Rules for data sets that no target needs would only cost time.
-    needed = needed_datasets(project, sys.argv[1:])
-    batches_of_clips = project.batches.needed(project.batches.of, needed, sys.argv[1:])
-    batches_of_versions = project.batches.needed(
-        project.batches.hurt_of, needed, sys.argv[1:]
+    # A batch is a set of clips that one job processes. Each batch has its own rules. Data sets that no target needs
+    # get no rules, because these would make planning slower.
+    datasets_needed = needed_datasets(project, sys.argv[1:])
+    batches_of_clips = project.batches.needed(
+        project.batches.of, datasets_needed, sys.argv[1:]
     )
-    batches_of_walker = project.batches.needed(
-        project.batches.of, project.datasets.walkers(needed), sys.argv[1:]
+    batches_of_hurt_versions = project.batches.needed(
+        project.batches.hurt_of, datasets_needed, sys.argv[1:]
+    )
+    batches_of_synthetic_clips = project.batches.needed(
+        project.batches.of, project.datasets.walkers(datasets_needed), sys.argv[1:]
     )
 except HobbleError as error:
     raise WorkflowError(str(error)) from None
 
+# Jobs read this variable, so that they end when this run of Snakemake ends.
 lifetime.set_run_variable()
 lifetime.clear_stale_lock()
 
-# The objects that the rules use, see hobble.workflow.project.
+# The objects that the rules use, see hobble.workflow.project. In functions of rules, `w` holds the job's wildcards.
 catalogue = project.catalogue
 clips = project.clips
 datasets = project.datasets
@@ -75,24 +82,27 @@ wildcard_constraints:
 
 
 def keep_local(files):
-    """Mark files of the checkout or the user as local, because results may be in an object store."""
+    """Mark the files that are not results as local: they stay on disk if results are in an object store.
+
+    files: a path, a list of paths, or a dictionary with such values. The return value has the same form.
+    """
     if isinstance(files, dict):
-        return {name: keep_local(some) for name, some in files.items()}
-    many = [files] if isinstance(files, str) else files
-    many = [f if f.startswith("results/") else local(f) for f in many]
-    return many[0] if isinstance(files, str) else many
+        return {name: keep_local(value) for name, value in files.items()}
+    paths = [files] if isinstance(files, str) else files
+    marked = [path if path.startswith("results/") else local(path) for path in paths]
+    return marked[0] if isinstance(files, str) else marked
 
 
-def for_each(batch, files):
-    """The files of all clips of a batch. files: function (dataset, clip) -> list of the clip's files."""
+def files_of_batch(batch, files_of_clip):
+    """The files of all clips of a batch. files_of_clip: function (dataset, clip) -> list of the clip's files."""
     return keep_local(
-        [file for clip in batch.clips for file in files(batch.dataset, clip)]
+        [file for clip in batch.clips for file in files_of_clip(batch.dataset, clip)]
     )
 
 
-def counted(batch, files):
-    """The number of files of each clip of a batch. files: as in `for_each`."""
-    return [len(files(batch.dataset, clip)) for clip in batch.clips]
+def file_counts(batch, files_of_clip):
+    """The number of files of each clip of a batch. files_of_clip: as in `files_of_batch`."""
+    return [len(files_of_clip(batch.dataset, clip)) for clip in batch.clips]
 
 
 rule all:

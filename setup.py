@@ -1,4 +1,4 @@
-"""A built package carries the skeleton files of config/skeletons; in a checkout they stay where they are."""
+"""Builds the package with the files of config/skeletons, which lie outside the package in a checkout."""
 
 from pathlib import Path
 
@@ -7,10 +7,10 @@ from setuptools.command.build_py import build_py
 
 
 class BuildWithSkeletons(build_py):
-    """Copies them beside the code, except for an editable installation."""
+    """Copies the skeleton files into the built package. An editable installation needs no copy."""
 
     def run(self) -> None:
-        """Build, then copy."""
+        """Build the package, then copy the files."""
         super().run()
         if not self.editable_mode:
             target = Path(self.build_lib, "hobble", "skeletons")

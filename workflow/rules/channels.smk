@@ -1,18 +1,28 @@
+# Objects such as `clips`, `datasets` and `demands` are made in the Snakefile.
+
+
 def channels_of(batch):
-    """The channels whose values are read for a batch. The severities of hurt versions are made with the versions."""
-    there = datasets.channel_sources.channels(batch.dataset)
-    return [name for name in there if not (batch.hurt and name == clips.hurt_channel)]
+    """The channels whose values the rule `channel_clips` reads for a batch.
+
+    A channel is a set of network inputs besides motion and ground. The channel of severities is left out for hurt
+    versions, because the rule `hurt_clips` makes its values.
+    """
+    names = datasets.channel_sources.channels(batch.dataset)
+    return [name for name in names if not (batch.hurt and name == clips.hurt_channel)]
 
 
-def of_channels(batch, paths):
-    """Paths with {channel}, for each channel of a batch."""
+def for_channels(batch, paths):
+    """All `paths` with {channel} replaced by the batch's first channel, then all with its second channel, ..."""
     return [
         path.replace("{channel}", name) for name in channels_of(batch) for path in paths
     ]
 
 
 def channel_files(batch):
-    """The files that each channel reads for each clip: one list for each channel and clip."""
+    """The files that a channel reads for a clip, as one list for each pair of channel and clip.
+
+    The pairs of the first channel with all clips come first, then those of the second channel, ...
+    """
     return [
         datasets.channel_sources.files(batch.dataset, clip, name)
         for name in channels_of(batch)
@@ -20,24 +30,27 @@ def channel_files(batch):
     ]
 
 
-for batch in filter(channels_of, [*batches_of_clips, *batches_of_versions]):
+# A batch is a set of clips that one job processes. Each batch has its own rule.
+for batch in filter(channels_of, [*batches_of_clips, *batches_of_hurt_versions]):
 
     rule:
-        """The values of the data set's channels in each frame of the clips and their mirrors."""
+        """The values of the data set's channels in each frame of clips and of their mirrors."""
         name:
             batch.rule("channel_clips")
         input:
-            clip=of_channels(batch, batch.of_clips("motion/{clip}.npz")),
-            report=of_channels(batch, batch.of_clips("motion/{clip}.json")),
-            mirror=of_channels(batch, batch.of_mirrors("motion/{clip}.npz")),
+            clip=for_channels(batch, batch.of_clips("motion/{clip}.npz")),
+            report=for_channels(batch, batch.of_clips("motion/{clip}.json")),
+            mirror=for_channels(batch, batch.of_mirrors("motion/{clip}.npz")),
             files=lambda w, batch=batch: keep_local(
                 [file for files in channel_files(batch) for file in files]
             ),
         output:
-            values=of_channels(batch, batch.of_clips("channels/{channel}/{clip}.npz")),
-            report=of_channels(batch, batch.of_clips("channels/{channel}/{clip}.json")),
-            mirror=of_channels(batch, batch.of_mirrors("channels/{channel}/{clip}.npz")),
-            mirror_report=of_channels(
+            values=for_channels(batch, batch.of_clips("channels/{channel}/{clip}.npz")),
+            report=for_channels(batch, batch.of_clips("channels/{channel}/{clip}.json")),
+            mirror=for_channels(
+                batch, batch.of_mirrors("channels/{channel}/{clip}.npz")
+            ),
+            mirror_report=for_channels(
                 batch, batch.of_mirrors("channels/{channel}/{clip}.json")
             ),
         log:
@@ -46,6 +59,7 @@ for batch in filter(channels_of, [*batches_of_clips, *batches_of_versions]):
             batch.benchmark("channels", "channel_clips")
         threads: 1
         resources:
+            # The numbers below are MB and seconds for each thousand frames.
             mem_mb=lambda w, attempt, batch=batch: demands.batch_memory(
                 batch, 4, attempt
             ),
@@ -53,6 +67,8 @@ for batch in filter(channels_of, [*batches_of_clips, *batches_of_versions]):
                 batch, 0.2 * len(channels_of(batch)), attempt
             ),
         params:
+            # One dictionary for each pair of channel and clip. A pair is a piece of the job, see
+            # hobble.workflow.batch_job.
             per_clip=lambda w, batch=batch: [
                 {
                     "clip": clip,
@@ -65,6 +81,7 @@ for batch in filter(channels_of, [*batches_of_clips, *batches_of_versions]):
                 for name in channels_of(batch)
                 for clip in batch.clips
             ],
+            # Name of an input -> the number of its files for each piece.
             files_per_clip=lambda w, batch=batch: {
                 "files": [len(files) for files in channel_files(batch)]
             },

@@ -1,9 +1,12 @@
+# Objects such as `clips`, `datasets` and `demands` are made in the Snakefile.
+
 from hobble.database.options import Merging, RowOptions
 
-for batch in [*batches_of_clips, *batches_of_versions]:
+# A batch is a set of clips that one job processes. Each batch has its own rule.
+for batch in [*batches_of_clips, *batches_of_hurt_versions]:
 
     rule:
-        """The rows of clips: inputs X, outputs Y and phase P of a network."""
+        """The rows of clips and their mirrors. A row holds the input X, output Y and phase P of one frame."""
         name:
             batch.rule("database_clips")
         input:
@@ -25,6 +28,7 @@ for batch in [*batches_of_clips, *batches_of_versions]:
             batch.benchmark("database", "database_clips")
         threads: 1
         resources:
+            # The numbers below are MB and seconds for each thousand frames.
             mem_mb=lambda w, attempt, batch=batch: demands.batch_memory(
                 batch, 22, attempt
             ),
@@ -32,7 +36,9 @@ for batch in [*batches_of_clips, *batches_of_versions]:
                 batch, 0.15 * (1 + batch.mirrored), attempt
             ),
         params:
+            # One dictionary for each clip, which is a piece of the job: see hobble.workflow.batch_job.
             per_clip=lambda w, batch=batch: [{"clip": name} for name in batch.names],
+            # Name of an input -> the number of its files for each clip.
             files_per_clip=lambda w, batch=batch: {
                 "channels": [len(datasets.channel_sources.channels(batch.dataset))]
                 * len(batch.names)
@@ -52,7 +58,10 @@ for batch in [*batches_of_clips, *batches_of_versions]:
 
 
 def clips_of(dataset, channels, file, shard=None):
-    """The path `file` for each clip of a database, or of one of its shards."""
+    """The path `file`, which contains {clip}, for each clip of a database, or of one of its shards.
+
+    A shard is the part of a database that one job makes from some of the clips. shard: its number, from 0.
+    """
     names = (
         datasets.selected(dataset, channels_of_folder(channels))
         if shard is None
@@ -61,20 +70,23 @@ def clips_of(dataset, channels, file, shard=None):
     return expand(f"results/datasets/{dataset}/{file}", clip=names)
 
 
-def compared(w, file):
-    """The path `file` for each clip that is compared with others, so that no motion is both trained on and held out.
+def compared_files(w, file):
+    """The path `file`, which contains {clip}, for each clip that is compared with the others.
 
-    If the rule makes a shard, only clips of this shard are in the list.
+    The comparison finds copies, so that no motion is both trained on and held out. If the rule makes a shard, only
+    clips of this shard are in the list.
     """
     names = datasets.compared(w.dataset, channels_of_folder(w.channels))
     if hasattr(w, "shard"):
-        own = datasets.in_shard(w.dataset, channels_of_folder(w.channels), int(w.shard))
-        names = [name for name in names if name in own]
+        in_shard = datasets.in_shard(
+            w.dataset, channels_of_folder(w.channels), int(w.shard)
+        )
+        names = [name for name in names if name in in_shard]
     return expand(f"results/datasets/{w.dataset}/{file}", clip=names)
 
 
 def shards_of(w):
-    """The folders of a database's shards; none if one job reads all clips."""
+    """The folders of a database's shards; [] if the database is not split, so that one job reads all clips."""
     count = datasets.shards(w.dataset)
     return [
         f"results/datasets/{w.dataset}/database/shards/{w.channels}/{number}"
@@ -83,13 +95,13 @@ def shards_of(w):
 
 
 rule database_shard:
-    """The rows of some clips of a database, shuffled and in chunks."""
+    """A shard of a database: the rows of some of its clips, shuffled and split into chunks."""
     input:
         clips=lambda w: clips_of(
             w.dataset, w.channels, "database/clips/{clip}.npz", w.shard
         ),
-        compared=lambda w: compared(w, "motion/{clip}.npz"),
-        reports=lambda w: compared(w, "motion/{clip}.json"),
+        compared=lambda w: compared_files(w, "motion/{clip}.npz"),
+        reports=lambda w: compared_files(w, "motion/{clip}.json"),
     output:
         shard=directory("results/datasets/{dataset}/database/shards/{channels}/{shard}"),
     log:
@@ -99,15 +111,19 @@ rule database_shard:
     threads: 1
     resources:
         mem_mb=lambda w, attempt: demands.shard_memory(w.dataset, attempt),
+        # .1 s for each thousand frames.
         runtime=lambda w, attempt: demands.shard_minutes(w.dataset, 0.1, attempt),
     params:
+        # Clip -> "train" or "held_out".
         splits=lambda w: datasets.in_shard(
             w.dataset, channels_of_folder(w.channels), int(w.shard)
         ),
         channels=lambda w: channels_of_folder(w.channels),
+        # Hurt version -> the healthy clip from which it is made.
         sources=lambda w: datasets.sources(
             datasets.in_shard(w.dataset, channels_of_folder(w.channels), int(w.shard))
         ),
+        # Training uses every n-th row of hurt versions; this is n.
         every=lambda w: datasets.hurt_row_step(w.dataset),
         options=lambda w: datasets.part(w.dataset, "database", Merging),
         code=lambda w: package.code(
@@ -118,7 +134,7 @@ rule database_shard:
 
 
 rule database_merge:
-    """The rows of all clips, shuffled and in chunks, with their statistics."""
+    """The database: the rows of all clips, shuffled and split into chunks, and statistics of their columns."""
     input:
         clips=lambda w: (
             []
@@ -126,8 +142,12 @@ rule database_merge:
             else clips_of(w.dataset, w.channels, "database/clips/{clip}.npz")
         ),
         # To check that no motion is both trained on and held out.
-        compared=lambda w: [] if shards_of(w) else compared(w, "motion/{clip}.npz"),
-        reports=lambda w: [] if shards_of(w) else compared(w, "motion/{clip}.json"),
+        compared=lambda w: (
+            [] if shards_of(w) else compared_files(w, "motion/{clip}.npz")
+        ),
+        reports=lambda w: (
+            [] if shards_of(w) else compared_files(w, "motion/{clip}.json")
+        ),
         shards=shards_of,
     output:
         database=directory("results/datasets/{dataset}/database/{channels}"),
@@ -138,14 +158,18 @@ rule database_merge:
     threads: 1
     resources:
         mem_mb=lambda w, attempt: demands.shard_memory(w.dataset, attempt),
+        # .1 s for each thousand frames.
         runtime=lambda w, attempt: demands.shard_minutes(w.dataset, 0.1, attempt),
     params:
         dataset=lambda w: w.dataset,
+        # Clip -> "train" or "held_out".
         splits=lambda w: datasets.selected(w.dataset, channels_of_folder(w.channels)),
         channels=lambda w: channels_of_folder(w.channels),
+        # Hurt version -> the healthy clip from which it is made.
         sources=lambda w: datasets.sources(
             datasets.selected(w.dataset, channels_of_folder(w.channels))
         ),
+        # Training uses every n-th row of hurt versions; this is n.
         every=lambda w: datasets.hurt_row_step(w.dataset),
         options=lambda w: datasets.part(w.dataset, "database", Merging),
         code=lambda w: package.code(

@@ -1,5 +1,8 @@
+# Objects such as `clips`, `datasets` and `demands` are made in the Snakefile.
+
+
 rule measure:
-    """One measurement of a network: its JSON and its tables as CSV. hobble.measures lists the measurements."""
+    """The results of one measurement of a network, as JSON and CSV tables. hobble.measures has the measurements."""
     input:
         unpack(lambda w: keep_local(measurements.inputs(w.configuration, w.measure))),
         pieces=lambda w: measurements.pieces(w.configuration, w.measure),
@@ -33,7 +36,7 @@ rule measure:
 
 
 rule measure_piece:
-    """A piece of a long measurement, such as the laps in one phase mode."""
+    """A piece of a long measurement, such as the laps with one phase mode. The pieces can run at the same time."""
     input:
         unpack(lambda w: keep_local(measurements.inputs(w.configuration, w.measure))),
     output:
@@ -66,7 +69,7 @@ rule measure_piece:
 
 
 rule compare:
-    """The comparison of configurations with each other and with published figures: a JSON and CSV tables."""
+    """The comparison of configurations with each other and with published results, as JSON and as CSV tables."""
     input:
         unpack(lambda w: comparison.input_files()),
         published=keep_local(package.published()),

@@ -1,7 +1,10 @@
-for batch in batches_of_versions:
+# Objects such as `clips`, `datasets` and `demands` are made in the Snakefile.
+
+# A batch is a set of clips that one job processes. Each batch has its own rule.
+for batch in batches_of_hurt_versions:
 
     rule:
-        """Hurt versions of healthy clips, with their labels and severities, and their mirrors."""
+        """Hurt versions of healthy clips, with their labels and severities, and the mirrors of these versions."""
         name:
             batch.rule("hurt_clips")
         input:
@@ -28,6 +31,7 @@ for batch in batches_of_versions:
             batch.benchmark("motion", "hurt_clips")
         threads: 1
         resources:
+            # The numbers below are MB and seconds for each thousand frames.
             mem_mb=lambda w, attempt, batch=batch: demands.batch_memory(
                 batch, 20, attempt
             ),
@@ -35,11 +39,14 @@ for batch in batches_of_versions:
                 batch, 0.7, attempt
             ),
         params:
+            # One dictionary for each clip, which is a piece of the job: see hobble.workflow.batch_job.
             per_clip=lambda w, batch=batch: [
                 {
                     "clip": clip,
+                    # The number of the version among all versions of the data set. It decides which links hurt first.
                     "turn": clips.hurt_versions(batch.dataset)[clip],
                     "ground": clips.entry(batch.dataset, clip).ground,
+                    # `every` is left out, because only the database depends on it.
                     "options": clips.hurt(batch.dataset, clip).model_dump(
                         mode="json", exclude={"every"}
                     ),

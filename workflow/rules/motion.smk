@@ -1,4 +1,7 @@
-# No `code` here: if the checksum is right, it does not matter which code downloaded the file.
+# Objects such as `clips`, `datasets` and `demands` are made in the Snakefile.
+
+
+# This rule has no param `code`: if the checksum is right, it does not matter which code downloaded the file.
 rule download_clip:
     """A clip that is not in the user's folder, downloaded from the data set's address."""
     output:
@@ -17,10 +20,11 @@ rule download_clip:
         "../scripts/download_clip.py"
 
 
+# A batch is a set of clips that one job processes. Each batch has its own rule.
 for batch in batches_of_clips:
 
     rule:
-        """Clips from their BVH files: checked, on the data set's skeleton, at 60 Hz. Also their mirrors."""
+        """Clips made from BVH files: checked, retargeted to the data set's skeleton, at 60 Hz. Also their mirrors."""
         name:
             batch.rule("motion_clips")
         input:
@@ -30,7 +34,7 @@ for batch in batches_of_clips:
             skeleton=lambda w, batch=batch: keep_local(
                 clips.skeleton_file(batch.dataset)
             ),
-            rigs=lambda w, batch=batch: for_each(batch, clips.rig_files),
+            rigs=lambda w, batch=batch: files_of_batch(batch, clips.rig_files),
         output:
             clip=batch.of_clips("motion/{clip}.npz"),
             report=batch.of_clips("motion/{clip}.json"),
@@ -42,6 +46,7 @@ for batch in batches_of_clips:
             batch.benchmark("motion", "motion_clips")
         threads: 1
         resources:
+            # The numbers below are MB and seconds for each thousand frames.
             mem_mb=lambda w, attempt, batch=batch: demands.batch_memory(
                 batch, 13, attempt
             ),
@@ -49,6 +54,7 @@ for batch in batches_of_clips:
                 batch, 0.3, attempt
             ),
         params:
+            # One dictionary for each clip, which is a piece of the job: see hobble.workflow.batch_job.
             per_clip=lambda w, batch=batch: [
                 {
                     "clip": clip,
@@ -56,12 +62,14 @@ for batch in batches_of_clips:
                 }
                 for clip in batch.clips
             ],
+            # Name of an input -> the number of its files for each clip.
             files_per_clip=lambda w, batch=batch: {
-                "rigs": counted(batch, clips.rig_files)
+                "rigs": file_counts(batch, clips.rig_files)
             },
             skeleton_name=lambda w, batch=batch: catalogue.dataset(
                 batch.dataset
             ).skeleton,
+            # The folder of skeleton files. They map the joints of one rig to those of another.
             maps=clips.skeletons,
             code=lambda w: package.code("motion_clips"),
         script:

@@ -1,5 +1,8 @@
+# Objects such as `clips`, `datasets` and `demands` are made in the Snakefile.
+
+
 rule page_packages:
-    """The page's npm packages, downloaded once, as in its lock file."""
+    """The npm packages that the pages of reports use, downloaded in the versions of the lock file."""
     input:
         keep_local(package.web(".json")),
     output:
@@ -17,7 +20,7 @@ rule page_packages:
 
 
 rule page_bundle:
-    """The page's scripts in one file, shared by all reports."""
+    """The scripts of the reports' pages and their npm packages, bundled into one file."""
     input:
         packages=rules.page_packages.output,
         scripts=keep_local(package.web(".js")),
@@ -35,7 +38,7 @@ rule page_bundle:
 
 
 rule configuration:
-    """The resolved configuration and data set, with all values that determine the results."""
+    """The configuration and its data set with every key, also those with default or inherited values."""
     output:
         yaml="results/{configuration}/configuration.yaml",
     log:
@@ -46,6 +49,7 @@ rule configuration:
     params:
         name=lambda w: w.configuration,
         base=str(project.base),
+        # A hash of all these keys, so that the rule runs again if one changes.
         digest=lambda w: configurations.digest(w.configuration),
         code=package.code("configuration"),
     script:
@@ -53,9 +57,9 @@ rule configuration:
 
 
 rule pipeline_summary:
-    """The cost of each stage: seconds and memory from its benchmark files, bytes from its artefacts."""
+    """The cost of each stage: seconds and memory from its benchmark files, bytes from its output files."""
     input:
-        # Not read: these inputs only make this rule run after all that it sums up.
+        # The script does not read these inputs. They only make this rule run after the jobs whose costs it sums up.
         expand(rules.measure.output.json, measure=MEASURES, allow_missing=True),
         rules.generate.output.scenarios,
     output:
@@ -112,6 +116,7 @@ rule report:
     benchmark:
         "results/{configuration}/benchmarks/report/report.tsv"
     resources:
+        # 12 MB and .1 s for each thousand frames.
         mem_mb=lambda w, attempt: demands.evaluation_memory(
             w.configuration, 12, attempt
         ),
@@ -134,7 +139,7 @@ rule report:
 
 
 rule report_compare:
-    """The page that compares configurations and shows two of them in the same world."""
+    """The page that compares configurations and shows the characters of two of them in the same world."""
     input:
         compared=rules.compare.output.json,
         configuration=lambda w: comparison.input_files()["configuration"],
@@ -229,7 +234,7 @@ rule export_web:
 
 
 rule limp_picture:
-    """A looping picture of the healthy and the hurt walk side by side, for the README."""
+    """A looping animation of the healthy and the hurt walk side by side, for the README."""
     input:
         weights=lambda w: configurations.network(w.configuration, "weights.npz"),
     output:

@@ -1,5 +1,8 @@
+# Objects such as `clips`, `datasets` and `demands` are made in the Snakefile.
+
+
 rule generate:
-    """Motion of the character in scripted scenarios (walk, jog, crouch, limp), as BVH files."""
+    """Motion of the character in scripted scenarios (walk, jog, crouch, limp), as one npz file and as BVH files."""
     input:
         weights=lambda w: configurations.network(w.configuration, "weights.npz"),
     output:
@@ -23,7 +26,7 @@ rule generate:
 
 
 rule export_onnx:
-    """The network as an ONNX file for one phase mode, checked with onnxruntime."""
+    """The network as an ONNX file, checked with onnxruntime. `mode`: how its weights are computed from the phase."""
     input:
         weights=lambda w: configurations.network(w.configuration, "weights.npz"),
     output:
@@ -46,7 +49,7 @@ rule export_onnx:
 
 
 rule export_release:
-    """The network as .bin files like those of the original release, for its demo and its ports."""
+    """The network as .bin files like those of Holden et al. (2017), for their demo and its ports."""
     input:
         weights=lambda w: configurations.network(w.configuration, "weights.npz"),
     output:
@@ -68,7 +71,7 @@ rule export_release:
 
 
 rule export_glb:
-    """The character for a game engine as glTF 2.0: body, skeleton and scripted walks with limps."""
+    """The character for a game engine as a glTF 2.0 file: body, skeleton and the scripted scenarios."""
     input:
         weights=lambda w: configurations.network(w.configuration, "weights.npz"),
         scenarios=rules.generate.output.scenarios,

@@ -1,7 +1,10 @@
-for batch in batches_of_walker:
+# Objects such as `clips`, `datasets` and `demands` are made in the Snakefile.
+
+# A batch is a set of clips that one job processes. Each batch has its own rule.
+for batch in batches_of_synthetic_clips:
 
     rule:
-        """Synthetic clips of a walker, in the same form as a user's clips."""
+        """Clips of a synthetic walker, as BVH and label files like those of a user."""
         name:
             batch.rule("synthetic_clips")
         input:
@@ -18,6 +21,7 @@ for batch in batches_of_walker:
             batch.benchmark("synthetic", "synthetic_clips")
         threads: 1
         resources:
+            # The numbers below are MB and seconds for each thousand frames.
             mem_mb=lambda w, attempt, batch=batch: demands.batch_memory(
                 batch, 13, attempt
             ),
@@ -25,6 +29,7 @@ for batch in batches_of_walker:
                 batch, 0.2, attempt
             ),
         params:
+            # One dictionary for each clip, which is a piece of the job: see hobble.workflow.batch_job.
             per_clip=lambda w, batch=batch: [
                 {
                     "clip": clip,

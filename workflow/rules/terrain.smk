@@ -1,8 +1,10 @@
+# Objects such as `clips`, `datasets` and `demands` are made in the Snakefile.
+
 from hobble.terrain.options import Drawing, Fitting, HeightSampling
 
 
 rule terrain_patches:
-    """Patches of ground drawn from the heightmaps."""
+    """Patches of ground, cut from random places of the heightmaps."""
     input:
         files=lambda w: keep_local(clips.heightmap_files(w.dataset)),
     output:
@@ -22,10 +24,11 @@ rule terrain_patches:
         "../scripts/terrain_patches.py"
 
 
-for batch in [*batches_of_clips, *batches_of_versions]:
+# A batch is a set of clips that one job processes. Each batch has its own rule.
+for batch in [*batches_of_clips, *batches_of_hurt_versions]:
 
     rule:
-        """The ten patches that fit each cycle of a clip best, and the heights of these patches along its path."""
+        """The patches that fit each gait cycle of a clip best, and their heights along the path of the cycle."""
         name:
             batch.rule("terrain_fits")
         input:
@@ -40,6 +43,7 @@ for batch in [*batches_of_clips, *batches_of_versions]:
             batch.benchmark("terrain", "terrain_fits")
         threads: 1
         resources:
+            # The numbers below are MB and seconds for each thousand frames.
             mem_mb=lambda w, attempt, batch=batch: demands.batch_memory(
                 batch, 15, attempt
             ),
@@ -47,6 +51,7 @@ for batch in [*batches_of_clips, *batches_of_versions]:
                 batch, 0.3 * (1 + batch.mirrored), attempt, least=3
             ),
         params:
+            # One dictionary for each clip, which is a piece of the job: see hobble.workflow.batch_job.
             per_clip=lambda w, batch=batch: [
                 {"clip": name, "ground": clips.entry(batch.dataset, name).ground}
                 for name in batch.names

@@ -1,11 +1,15 @@
+# Objects such as `clips`, `datasets` and `demands` are made in the Snakefile.
+
 from hobble.training.options import Recipe
 
 
 rule training:
-    """The network, trained on the database. After a kill, training continues from its last checkpoint."""
+    """The network, trained on the database. If the job is killed, its next run continues from the last checkpoint."""
     input:
         database=lambda w: configurations.database(w.configuration),
+        # Only if the training continues that of another configuration.
         checkpoint=lambda w: configurations.start(w.configuration),
+        # Only for a network that is built from the clips' rows instead of trained.
         clips=lambda w: configurations.rows_in_order(w.configuration),
     output:
         weights="results/{configuration}/network/weights.npz",
@@ -20,7 +24,8 @@ rule training:
         mem_mb=lambda w, attempt: demands.training_memory(w.configuration, attempt),
         runtime=lambda w, attempt: demands.training_minutes(w.configuration, attempt),
         gpu=lambda w: demands.gpus(w.configuration),
-        # `processes` on each of `nodes` machines. `tasks` (one for each machine) and `gres` are SLURM's names.
+        # The training has `processes` processes on each of `nodes` machines. `tasks` (one for each machine) and
+        # `gres` (GPUs) are SLURM's names.
         nodes=lambda w: demands.machines(w.configuration).nodes,
         tasks=lambda w: demands.machines(w.configuration).nodes,
         gres=lambda w: demands.gres(w.configuration),
@@ -28,13 +33,14 @@ rule training:
     params:
         configuration=lambda w: w.configuration,
         network=lambda w: configurations.section(w.configuration, "network"),
-        # The keys about machines are left out, because they do not change the result.
+        # Only the keys of the recipe: those about machines do not change the result.
         training=lambda w: configurations.section(
             w.configuration, "training", *Recipe.model_fields
         ),
         terrain_side=lambda w: datasets.options(
             configurations.dataset(w.configuration), "database", "terrain_side"
         )["terrain_side"],
+        # The folder in which a later run of a killed job finds its checkpoints.
         checkpoints="results/{configuration}/checkpoints",
         code=lambda w: package.code("training", configurations.kind(w.configuration)),
     script:

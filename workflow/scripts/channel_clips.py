@@ -1,4 +1,8 @@
-"""Creates the values of channels in each frame of clips and their mirrors from the data set's sources."""
+"""Creates the values of channels in each frame of clips and of their mirrors.
+
+A channel is a set of network inputs besides motion and ground. Its values come from files or
+from the data set.
+"""
 
 from hobble.channels import channel
 from hobble.channels.clip_values import clip_values, save_values, write_report
@@ -7,21 +11,24 @@ from hobble.core.files import read_json
 from hobble.workflow.batch_job import make_each
 
 
-def make(piece, log):
-    """Read the values of one channel for a clip and its mirror."""
+def make_values(piece, log):
+    """Write the values of one channel for a clip and its mirror.
+
+    piece: the channel and the clip with their params and files, a `JobPiece`.
+    """
     name, clip = piece.params["channel"], load_clip(piece.input["clip"])
     source = channel(name).source(piece.params["source"], piece.input.get("files", []))
     values, warnings = clip_values(name, clip, source, read_json(piece.input["report"]))
     for warning in warnings:
         log.warning("%s", warning)
-    labels = channel(name).columns(clip.skeleton)
-    save_values(piece.output["values"], values, labels)
-    write_report(piece.output["report"], name, clip, values, labels, warnings)
+    columns = channel(name).columns(clip.skeleton)
+    save_values(piece.output["values"], values, columns)
+    write_report(piece.output["report"], name, clip, values, columns, warnings)
     if "mirror" in piece.output:
-        clip = load_clip(piece.input["mirror"])
-        values = channel(name).mirror(values, clip.skeleton)
-        save_values(piece.output["mirror"], values, labels)
-        write_report(piece.output["mirror_report"], name, clip, values, labels, warnings)
+        mirror = load_clip(piece.input["mirror"])
+        values = channel(name).mirror(values, mirror.skeleton)
+        save_values(piece.output["mirror"], values, columns)
+        write_report(piece.output["mirror_report"], name, mirror, values, columns, warnings)
 
 
-make_each(snakemake, make)
+make_each(snakemake, make_values)

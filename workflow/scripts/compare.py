@@ -13,10 +13,11 @@ from hobble.workflow.job import job
 
 with job(snakemake):
     files = snakemake.input
-    measured = [
+    results = [
         read_results(name, {key: files[key][i] for key in snakemake.params.files})
         for i, name in enumerate(snakemake.params.configurations)
     ]
-    compared = compare(measured, yaml.safe_load(Path(files.published).read_text(encoding="utf-8")))
-    write_json(snakemake.output.json, compared)
-    write_tables(snakemake.output.tables, tables(compared))
+    published = yaml.safe_load(Path(files.published).read_text(encoding="utf-8"))
+    comparison = compare(results, published)
+    write_json(snakemake.output.json, comparison)
+    write_tables(snakemake.output.tables, tables(comparison))

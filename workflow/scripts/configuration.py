@@ -1,4 +1,7 @@
-"""Creates results/<configuration>/configuration.yaml with all resolved keys of it and of its data set."""
+"""Creates results/<configuration>/configuration.yaml: all keys of the configuration and of its data set.
+
+Keys with inherited or default values are in the file, too.
+"""
 
 from pathlib import Path
 

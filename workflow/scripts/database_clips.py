@@ -1,4 +1,7 @@
-"""Creates the rows of clips from their motion, labels, channel values and terrain fits."""
+"""Creates the rows of clips from their motion, labels, channel values and the ground fitted under them.
+
+A row holds the network's input X, output Y and phase P for one frame.
+"""
 
 from hobble.channels.clip_values import load_values
 from hobble.core.clip import load_clip
@@ -10,15 +13,18 @@ from hobble.rows.summary import save_summary, summary_of_rows
 from hobble.workflow.batch_job import make_each
 
 
-def make(piece, log):
-    """Make the rows of a clip."""
+def make_rows(piece, log):
+    """Write the rows of a clip and a summary of them.
+
+    piece: the clip or mirror with its params and files, a `JobPiece`.
+    """
     options = RowOptions.model_validate(piece.params["options"])
-    channels = zip(piece.params["channels"], piece.input.get("channels", []), strict=True)
+    files_of_channels = zip(piece.params["channels"], piece.input.get("channels", []), strict=True)
     rows = clip_rows(
         piece.name,
         load_clip(piece.input["clip"]),
         load_npz(piece.input["labels"]),
-        {name: load_values(file)[0] for name, file in channels},
+        {name: load_values(file)[0] for name, file in files_of_channels},
         load_npz(piece.input["terrain"]),
         window=options.window,
         step=options.step,
@@ -29,4 +35,4 @@ def make(piece, log):
     log.info("%d rows, %d fits", len(rows), rows.fits.sum())
 
 
-make_each(snakemake, make)
+make_each(snakemake, make_rows)

@@ -1,4 +1,7 @@
-"""Creates the database and its statistics from the rows of all clips, or from its shards."""
+"""Creates the database from the rows of all clips, or from its shards.
+
+It is refused if a clip in training and a held-out clip show the same motion.
+"""
 
 from pathlib import Path
 
@@ -12,10 +15,13 @@ from hobble.workflow.job import job
 
 with job(snakemake) as log:
     options = Merging.model_validate(snakemake.params.options)
-    database, shards = Path(snakemake.output.database), [Path(s) for s in snakemake.input.get("shards", [])]
-    files = zip(snakemake.input.compared, snakemake.input.reports, strict=True)
-    digests = [digest(load_clip(clip), read_json(report)["sha256"]) for clip, report in files]
-    digests += [one for shard in shards for one in load_digests(shard / "likenesses.npz")]
+    database = Path(snakemake.output.database)
+    shards = [Path(folder) for folder in snakemake.input.get("shards", [])]
+    # A digest holds what is compared of a clip: a few poses and the checksum of its file.
+    clips_and_reports = zip(snakemake.input.compared, snakemake.input.reports, strict=True)
+    digests = [digest(load_clip(clip), read_json(report)["sha256"]) for clip, report in clips_and_reports]
+    for shard in shards:
+        digests += load_digests(shard / "likenesses.npz")
     refuse_split_pairs(f"data set {snakemake.params.dataset}", same_pairs(digests), snakemake.params.splits)
     if shards:
         manifest = merge_shards(database, shards, joint_weight=options.joint_weight, dtype=options.dtype)
@@ -31,6 +37,8 @@ with job(snakemake) as log:
             dtype=options.dtype,
             seed=options.seed,
         )
-    part = manifest.bytes / manifest.original_bytes
+    share = manifest.bytes / manifest.original_bytes
     rows = {split: manifest.rows(split) for split in manifest.chunks}
-    log.info("%s rows, %d bytes: %.1f%% of the original layout", rows, manifest.bytes, 100 * part)
+    log.info(
+        "%s rows, %d bytes: %.1f%% of the layout of Holden et al. (2017)", rows, manifest.bytes, 100 * share
+    )

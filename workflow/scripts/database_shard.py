@@ -1,4 +1,8 @@
-"""Creates a shard of a database from the rows of its clips, with what the merge needs to find equal clips."""
+"""Creates a shard of a database, which holds the rows of some of its clips.
+
+The shard also holds the digests of its clips. By these digests, the rule `database_merge` finds clips
+with the same motion.
+"""
 
 from pathlib import Path
 
@@ -11,7 +15,8 @@ from hobble.workflow.job import job
 
 with job(snakemake) as log:
     options = Merging.model_validate(snakemake.params.options)
-    shard, clips = Path(snakemake.output.shard), {Path(file).stem: file for file in snakemake.input.clips}
+    shard = Path(snakemake.output.shard)
+    clips = {Path(file).stem: file for file in snakemake.input.clips}
     write_shard(
         shard,
         clips,
@@ -23,7 +28,7 @@ with job(snakemake) as log:
         dtype=options.dtype,
         seed=options.seed,
     )
-    files = zip(snakemake.input.compared, snakemake.input.reports, strict=True)
-    digests = [digest(load_clip(clip), read_json(report)["sha256"]) for clip, report in files]
+    clips_and_reports = zip(snakemake.input.compared, snakemake.input.reports, strict=True)
+    digests = [digest(load_clip(clip), read_json(report)["sha256"]) for clip, report in clips_and_reports]
     save_digests(shard / "likenesses.npz", digests)
     log.info("%d clips", len(clips))

@@ -1,4 +1,4 @@
-"""Downloads a clip that is not in the user's folder, and keeps it if its checksum is right."""
+"""Downloads a clip that is not in the user's folder. A file with a wrong checksum is refused."""
 
 from hobble.motion.download import download_clip
 from hobble.workflow.job import job

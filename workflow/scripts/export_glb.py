@@ -1,4 +1,4 @@
-"""Creates results/<configuration>/export/character.glb: the body, its skeleton and the scripted walks."""
+"""Creates results/<configuration>/export/character.glb: the body, its skeleton and the scripted motion."""
 
 from hobble.models.load import load_network
 from hobble.runtime.glb import export_glb

@@ -1,4 +1,7 @@
-"""Creates an ONNX file of a trained network, checked with onnxruntime."""
+"""Creates an ONNX file of a trained network in one phase mode, and checks it with onnxruntime.
+
+The phase mode says how weights are computed from the phase: constant, linear or cubic.
+"""
 
 from hobble.models.load import load_network
 from hobble.workflow.job import job

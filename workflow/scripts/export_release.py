@@ -1,4 +1,4 @@
-"""Creates a folder of .bin files, like those of the original release, from a trained network."""
+"""Creates a folder of .bin files, like those that Holden et al. (2017) released, from a trained network."""
 
 from hobble.models.load import load_network
 from hobble.workflow.job import job

@@ -1,4 +1,4 @@
-"""Creates hurt versions of healthy clips and their mirrors: motion, labels, severities and reports."""
+"""Creates hurt versions of healthy clips, and their mirrors: motion, labels, severities and reports."""
 
 from hobble.channels import channel
 from hobble.channels.clip_values import load_values, save_values
@@ -13,10 +13,13 @@ from hobble.motion.mirror import mirror_clip, mirror_report
 from hobble.workflow.batch_job import make_each
 
 
-def make(piece, log):
-    """Make a hurt version and its mirror."""
+def make_version(piece, log):
+    """Write a hurt version and its mirror.
+
+    piece: the hurt version with its params and files, a `JobPiece`.
+    """
     clip = load_clip(piece.input["clip"])
-    hurt, report = hurt_version(
+    hurt, label_report = hurt_version(
         clip,
         load_labels(piece.input["labels"]),
         LabelReport.from_dict(read_json(piece.input["label_report"])),
@@ -25,33 +28,39 @@ def make(piece, log):
         version_number=piece.params["turn"],
         ground=piece.params["ground"],
     )
-    motion = {**read_json(piece.input["report"]), "clip": hurt.clip.name, "hurt_of": clip.name}
-    save(piece.output, "", hurt.clip, motion, hurt.labels, report, hurt.severity)
+    motion_report = {**read_json(piece.input["report"]), "clip": hurt.clip.name, "hurt_of": clip.name}
+    write_files(piece.output, "", hurt.clip, motion_report, hurt.labels, label_report, hurt.severity)
     log.info("%s: %d frames from %d of %s", hurt.clip.name, len(hurt.clip), len(clip), clip.name)
     if "mirror_clip" in piece.output:
-        mirror(piece.output)
+        make_mirror(piece.output)
 
 
-def mirror(output):
-    """Make the mirror of a hurt version from its files."""
+def make_mirror(output):
+    """Write the mirror of a hurt version, whose own files are written.
+
+    output: name of each output -> its file.
+    """
     clip = load_clip(output["clip"])
     clip = mirror_clip(clip, f"{clip.name}_mirror")
-    motion = mirror_report(read_json(output["report"]), clip.name)
-    report = LabelReport.from_dict(read_json(output["label_report"]))
-    labels, report = mirror_labels(load_labels(output["labels"]), report, clip)
+    motion_report = mirror_report(read_json(output["report"]), clip.name)
+    label_report = LabelReport.from_dict(read_json(output["label_report"]))
+    labels, label_report = mirror_labels(load_labels(output["labels"]), label_report, clip)
     severity = channel(HURT_CHANNEL).mirror(load_values(output["injury"])[0], clip.skeleton)
-    save(output, "mirror_", clip, motion, labels, report, severity)
+    write_files(output, "mirror_", clip, motion_report, labels, label_report, severity)
 
 
-def save(output, prefix, clip, motion, labels, report, severity):
-    """Write all files of a hurt version, or of its mirror."""
+def write_files(output, prefix, clip, motion_report, labels, label_report, severity):
+    """Write all files of a hurt version, or of its mirror.
+
+    output: name of each output -> its file. prefix: of the names of these outputs: "" or "mirror_".
+    """
     links = clip.skeleton.link_names
     save_clip(output[f"{prefix}clip"], clip)
-    write_json(output[f"{prefix}report"], motion)
+    write_json(output[f"{prefix}report"], motion_report)
     save_labels(output[f"{prefix}labels"], labels)
-    write_report(output[f"{prefix}label_report"], report, labels, clip)
+    write_report(output[f"{prefix}label_report"], label_report, labels, clip)
     save_values(output[f"{prefix}injury"], severity, links)
     write_channel_report(output[f"{prefix}injury_report"], HURT_CHANNEL, clip, severity, links, [])
 
 
-make_each(snakemake, make)
+make_each(snakemake, make_version)

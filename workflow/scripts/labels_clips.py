@@ -1,4 +1,7 @@
-"""Creates contacts, phase and gait of clips and their mirrors, from motion and hand-made files."""
+"""Creates the labels of clips and of their mirrors: contacts, phase and gait.
+
+They are computed from the motion, or taken from hand-made label files.
+"""
 
 from hobble.core.clip import load_clip
 from hobble.core.files import read_json
@@ -8,8 +11,11 @@ from hobble.labels.options import LabelOptions
 from hobble.workflow.batch_job import make_each
 
 
-def make(piece, log):
-    """Label a clip and its mirror."""
+def make_labels(piece, log):
+    """Write the labels of a clip and of its mirror.
+
+    piece: the clip with its params and files, a `JobPiece`.
+    """
     clip = load_clip(piece.input["clip"])
     labels, report = label_clip(
         clip,
@@ -24,11 +30,11 @@ def make(piece, log):
     save_labels(piece.output["labels"], labels)
     write_report(piece.output["report"], report, labels, clip)
     if "mirror" in piece.output:
-        clip = load_clip(piece.input["mirror"])
+        mirror = load_clip(piece.input["mirror"])
         report = LabelReport.from_dict(read_json(piece.output["report"]))
-        labels, report = mirror_labels(load_labels(piece.output["labels"]), report, clip)
+        labels, report = mirror_labels(load_labels(piece.output["labels"]), report, mirror)
         save_labels(piece.output["mirror"], labels)
-        write_report(piece.output["mirror_report"], report, labels, clip)
+        write_report(piece.output["mirror_report"], report, labels, mirror)
 
 
-make_each(snakemake, make)
+make_each(snakemake, make_labels)

@@ -7,11 +7,16 @@ from hobble.motion.look_page import LABELS, look_page
 from hobble.workflow.job import job
 
 with job(snakemake):
-    given = snakemake.input
+    files = snakemake.input
+
+    def read_clip(n):
+        """Clip n and its contacts. The page calls this only for the clips that it draws."""
+        return load_clip(files.clips[n]), load_labels(files.contacts[n]).contacts
+
     page = look_page(
         snakemake.params.dataset,
-        [read_json(file) for file in given.reports],
-        [{key: labels[key] for key in LABELS} for labels in map(read_json, given.labels)],
-        lambda n: (load_clip(given.clips[n]), load_labels(given.contacts[n]).contacts),
+        [read_json(file) for file in files.reports],
+        [{key: labels[key] for key in LABELS} for labels in map(read_json, files.labels)],
+        read_clip,
     )
     write_text(snakemake.output.html, page)

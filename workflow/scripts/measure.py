@@ -1,4 +1,4 @@
-"""Creates <measure>.json and its CSV tables from the inputs of the measurement."""
+"""Creates the results of one measurement: <measure>.json and CSV tables."""
 
 from hobble.core.files import write_json
 from hobble.evaluation.csv_tables import write_tables
@@ -8,7 +8,7 @@ from hobble.workflow.measure_job import inputs_of_job, measure_of
 with job(snakemake) as log:
     measure = measure_of(snakemake)
     options = measure.options.model_validate(snakemake.params.options)
-    found = measure.part("run").run(inputs_of_job(snakemake), options)
-    write_json(snakemake.output.json, found.result)
-    write_tables(snakemake.output.tables, found.tables)
-    log.info("%s", found.says)
+    outcome = measure.part("run").run(inputs_of_job(snakemake), options)  # from run.py in its package
+    write_json(snakemake.output.json, outcome.result)
+    write_tables(snakemake.output.tables, outcome.tables)
+    log.info("%s", outcome.says)

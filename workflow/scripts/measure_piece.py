@@ -1,4 +1,4 @@
-"""Creates the JSON of one piece of a measurement."""
+"""Creates the JSON of one piece of a long measurement. The rule `measure` puts the pieces together."""
 
 from hobble.core.files import write_json
 from hobble.workflow.job import job
@@ -7,5 +7,6 @@ from hobble.workflow.measure_job import inputs_of_job, measure_of
 with job(snakemake):
     measure = measure_of(snakemake)
     options = measure.options.model_validate(snakemake.params.options)
-    found = measure.part("run").run_piece(inputs_of_job(snakemake), options, snakemake.params.piece)
-    write_json(snakemake.output.json, found)
+    module = measure.part("run")  # run.py in the package of the measurement
+    result = module.run_piece(inputs_of_job(snakemake), options, snakemake.params.piece)
+    write_json(snakemake.output.json, result)

@@ -1,4 +1,7 @@
-"""Creates checked clips on the data set's skeleton at 60 Hz, their mirrors and reports, from BVH files."""
+"""Creates clips, their mirrors and their reports from BVH files.
+
+The clips are checked, retargeted to the data set's skeleton and resampled at 60 Hz.
+"""
 
 from hobble.core.clip import load_clip, save_clip
 from hobble.core.files import write_json
@@ -8,8 +11,11 @@ from hobble.motion.options import ClipMotion
 from hobble.workflow.batch_job import make_each
 
 
-def make(piece, log):
-    """Make a clip and its mirror."""
+def make_motion(piece, log):
+    """Write a clip and its mirror.
+
+    piece: the clip with its params and files, a `JobPiece`.
+    """
     clip, report = make_clip(
         piece.input["bvh"],
         piece.input["skeleton"],
@@ -30,4 +36,4 @@ def make(piece, log):
         write_json(piece.output["mirror_report"], mirror_report(report, mirror.name))
 
 
-make_each(snakemake, make)
+make_each(snakemake, make_motion)

@@ -6,4 +6,5 @@ from hobble.report.bundle import bundle
 from hobble.workflow.job import job
 
 with job(snakemake):
-    bundle(Path(snakemake.input.packages[0]).parent, snakemake.output.js)
+    node_modules = Path(snakemake.input.packages[0]).parent
+    bundle(node_modules, snakemake.output.js)

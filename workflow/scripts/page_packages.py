@@ -6,4 +6,5 @@ from hobble.report.bundle import install
 from hobble.workflow.job import job
 
 with job(snakemake):
-    install(Path(snakemake.output[0]).parents[1])
+    node_modules = Path(snakemake.output[0]).parent
+    install(node_modules.parent)

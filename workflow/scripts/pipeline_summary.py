@@ -1,4 +1,4 @@
-"""Creates results/<configuration>/pipeline.json from each stage's benchmark files and artefact sizes."""
+"""Creates results/<configuration>/pipeline.json: the time, memory and disk space that each stage took."""
 
 from hobble.core.files import write_json
 from hobble.report.pipeline import summarise

@@ -14,29 +14,30 @@ from hobble.runtime.options import Runtime
 from hobble.workflow.job import job
 
 with job(snakemake):
-    given, params = snakemake.input, snakemake.params
+    files, params = snakemake.input, snakemake.params
     material = gather(
         name=params.configuration,
         dataset=params.dataset,
         title=params.title,
         splits=params.splits,
-        configuration=given.configuration,
-        measured=given.measured,
-        pipeline=given.pipeline,
-        history=given.history,
-        weights=given.weights,
-        motion=given.motion,
-        labels=given.labels,
-        channels=given.channels,
-        terrain=given.terrain,
-        rows=given.rows,
+        configuration=files.configuration,
+        measured=files.measured,
+        pipeline=files.pipeline,
+        history=files.history,
+        weights=files.weights,
+        motion=files.motion,
+        labels=files.labels,
+        channels=files.channels,
+        terrain=files.terrain,
+        rows=files.rows,
     )
-    network = material.network
-    play = scenes(given.scenarios, network["skeleton"], network["channels"])
-    trained = load_network(given.weights)
+    description = material.network
+    walks = scenes(files.scenarios, description["skeleton"], description["channels"])
+    network = load_network(files.weights)
     runtime = Runtime.model_validate(material.resolved["configuration"]["runtime"])
-    character = playable_with_recogniser(trained, runtime)
-    hero = opening_walk(trained, runtime, character, material.measured.values())
-    compared = comparisons(trained, given.rows, params.splits)
-    bundle = Path(given.bundle).read_text(encoding="utf-8")
-    write_text(snakemake.output.html, render(material, play, character, compared, bundle, hero))
+    character = playable_with_recogniser(network, runtime)
+    first_walk = opening_walk(network, runtime, character, material.measured.values())
+    captured_and_predicted = comparisons(network, files.rows, params.splits)
+    bundle = Path(files.bundle).read_text(encoding="utf-8")
+    page = render(material, walks, character, captured_and_predicted, bundle, first_walk)
+    write_text(snakemake.output.html, page)

@@ -13,18 +13,18 @@ from hobble.runtime.options import Runtime
 from hobble.workflow.job import job
 
 with job(snakemake):
-    given = snakemake.input
-    playables, errors, seen = {}, {}, set()
+    files = snakemake.input
+    characters, errors, seen = {}, {}, set()
     for name, weights, resolved in zip(
-        snakemake.params.configurations, given.weights, given.configuration, strict=True
+        snakemake.params.configurations, files.weights, files.configuration, strict=True
     ):
-        if weights not in seen:  # a network that two configurations read is one character
-            section = yaml.safe_load(Path(resolved).read_text(encoding="utf-8"))["configuration"]["runtime"]
-            runtime, network = Runtime.model_validate(section), load_network(weights)
-            playables[name] = playable_with_recogniser(network, runtime)
-            if playables[name] and has_weights(playables[name]):
+        if weights not in seen:  # configurations with the same weights file have the same character
+            options = yaml.safe_load(Path(resolved).read_text(encoding="utf-8"))["configuration"]["runtime"]
+            runtime, network = Runtime.model_validate(options), load_network(weights)
+            characters[name] = playable_with_recogniser(network, runtime)
+            if characters[name] and has_weights(characters[name]):
                 errors[name] = rounding_error(network, runtime)
         seen.add(weights)
-    bundle = Path(given.bundle).read_text(encoding="utf-8")
-    page = render_compared(read_json(given.compared), playables, bundle, errors)
+    bundle = Path(files.bundle).read_text(encoding="utf-8")
+    page = render_compared(read_json(files.compared), characters, bundle, errors)
     write_text(snakemake.output.html, page)

@@ -6,11 +6,11 @@ from hobble.runtime.options import Runtime
 from hobble.workflow.job import job
 
 with job(snakemake) as log:
-    made = write_stimuli(
+    loops = write_stimuli(
         load_network(snakemake.input.weights),
         snakemake.output.folder,
         Runtime.model_validate(snakemake.params.runtime),
     )
-    for warning in loop_warnings(made):
+    for warning in loop_warnings(loops):
         log.warning("%s", warning)
-    log.info("wrote %d loops to %s", len(made), snakemake.output.folder)
+    log.info("wrote %d loops to %s", len(loops), snakemake.output.folder)

@@ -1,4 +1,4 @@
-"""Creates synthetic clips (BVH, footsteps, gait) from their recipes and a skeleton."""
+"""Creates clips of a synthetic walker (BVH, footsteps, gait). A recipe says what the walker does."""
 
 from pathlib import Path
 
@@ -8,8 +8,11 @@ from hobble.synthetic.options import Synthetic
 from hobble.workflow.batch_job import make_each
 
 
-def make(piece, log):
-    """Write a clip and the files beside it."""
+def make_synthetic_clip(piece, log):
+    """Write a clip and the label files beside it.
+
+    piece: the clip with its params and files, a `JobPiece`.
+    """
     source = Path(piece.input["skeleton"])
     write_clip(
         piece.name,
@@ -23,4 +26,4 @@ def make(piece, log):
     )
 
 
-make_each(snakemake, make)
+make_each(snakemake, make_synthetic_clip)

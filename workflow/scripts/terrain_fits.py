@@ -1,4 +1,4 @@
-"""Creates the terrain under the cycles of clips from their motion, their labels and the patches."""
+"""Finds the patches of ground that fit best under each gait cycle of clips."""
 
 import functools
 
@@ -9,15 +9,18 @@ from hobble.terrain.options import Fitting, HeightSampling
 from hobble.terrain.patches import load_patches
 from hobble.workflow.batch_job import make_each
 
-patches = functools.cache(load_patches)
+read_patches = functools.cache(load_patches)  # all clips of the job use the same file
 
 
-def make(piece, log):
-    """Fit the ground under a clip."""
+def make_fits(piece, log):
+    """Write the patches of ground that fit under a clip.
+
+    piece: the clip or mirror with its params and files, a `JobPiece`.
+    """
     fits = clip_fits(
         load_clip(piece.input["clip"]),
         load_npz(piece.input["labels"]),
-        patches(piece.input["patches"]),
+        read_patches(piece.input["patches"]),
         piece.params["ground"],
         Fitting.model_validate(piece.params["options"]),
         HeightSampling.model_validate(piece.params["sampling"]),
@@ -26,4 +29,4 @@ def make(piece, log):
     log.info("%d rows in %d cycles, %d fits", len(fits.frame), len(fits.patch), len(fits.heights))
 
 
-make_each(snakemake, make)
+make_each(snakemake, make_fits)

@@ -1,4 +1,4 @@
-"""Creates patches of ground from the heightmaps of a data set."""
+"""Creates patches of ground, cut from random places of a data set's heightmaps."""
 
 from hobble.terrain.heightmaps import heightmaps
 from hobble.terrain.options import Drawing

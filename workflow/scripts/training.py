@@ -9,10 +9,10 @@ from hobble.workflow.job import job
 from hobble.workflow.training_processes import on_machines, train_together
 
 with job(snakemake):
-    recipe = Training.model_validate(snakemake.params.training)
+    options = Training.model_validate(snakemake.params.training)
     machines = Machines(nodes=snakemake.resources.tasks, processes=snakemake.resources.processes)
-    gpus = bool(snakemake.resources.get("gpu") or snakemake.resources.get("gres"))
-    training = on_machines(recipe, machines, gpus)
+    has_gpus = bool(snakemake.resources.get("gpu") or snakemake.resources.get("gres"))
+    training = on_machines(options, machines, has_gpus)
     start = Path(snakemake.input.checkpoint[0]) if snakemake.input.checkpoint else None
     arguments = {
         "database": Path(snakemake.input.database),
@@ -24,7 +24,8 @@ with job(snakemake):
     }
     if machines.count > 1:
         train_together(machines, snakemake.threads, Path(snakemake.log[0]), **arguments)
-    # With one process this trains. With several it finds their last checkpoint and writes the outputs.
+    # If several processes have trained, `run` starts at their last checkpoint and has nothing left to train.
+    # Otherwise it trains. Then it writes the outputs.
     run(
         **arguments,
         configuration=snakemake.params.configuration,
