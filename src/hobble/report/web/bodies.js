@@ -5,6 +5,7 @@ import { unpackBody } from "./skinned.js";
 
 const unpacked = new Map();
 
+// The unpacked body with a name, see `unpackBody`.
 export const bodyOf = (name) => {
   if (!unpacked.has(name)) {
     unpacked.set(name, unpackBody({ BufferAttribute, BufferGeometry, Matrix4, Quaternion, Sphere, Vector3 }, material.bodies[name]));

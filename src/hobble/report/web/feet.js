@@ -178,7 +178,8 @@ export const createFeet = (spec, c) => {
     const length = min(max(distance, abs(upper - lower) * 1.001 + 1e-6), (upper + lower) * .999);
     const cosine = min(max((upper * upper + length * length - lower * lower) / (2 * upper * length), -1), 1);
     // The knee is at least k.kneeAhead (cm) in front of the line from hip to heel. The direction in which it bends turns with the leg.
-    const along = dot(thigh, oldWay), front = dot(ahead, oldWay), forward = ahead.map((v, i) => v - front * oldWay[i]), forwardSize = max(hypot(...forward), 1e-6);
+    const along = dot(thigh, oldWay), front = dot(ahead, oldWay), forward = ahead.map((v, i) => v - front * oldWay[i]);
+    const forwardSize = max(hypot(...forward), 1e-6);
     let side = thigh.map((v, i) => v - along * oldWay[i]);
     const more = max(k.kneeAhead - dot(side, forward) / forwardSize, 0);
     if (more === 0 && abs(shift[0]) + abs(shift[1]) + abs(shift[2]) < 1e-9) return;

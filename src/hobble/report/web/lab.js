@@ -11,8 +11,8 @@ export const kneeAngle = (hip, knee, heel) => {
   return size ? Math.acos(Math.min(1, Math.max(-1, dot(a, b) / size))) * 180 / Math.PI : 0;
 };
 
-// legs: the joints [hip, knee, heel, toe] of the left leg and of the right leg. The fields have an entry for each leg. stance: whether the foot was
-// on the ground, in each frame. knees: angle of the knee in each frame. steps: length of the last step, cm, or null.
+// legs: the joints [hip, knee, heel, toe] of the left leg and of the right leg. Fields have an entry for each leg. stance: whether the foot was on the
+// ground, in each frame. knees: angle of the knee in each frame. steps: length of the last step, cm, or null.
 export const createLab = (legs) => {
   const lab = { stance: [[], []], knees: [[], []], steps: [null, null], stood: [false, false] };
   let landed = [null, null]; // where each foot landed last

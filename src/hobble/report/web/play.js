@@ -80,13 +80,13 @@ const createPlay = (stage, playables) => {
       if (Object.hasOwn(playables, name) && selects[i]) selects[i].value = name;
     });
     for (const name of ["crouch", "jog", "strafe"]) steering.toggle(name, state.get(name) === "1");
-    const angles = readCamera(state.get("camera"));
-    if (angles) { Object.assign(view.orbit, angles); chase.touch(); }
+    const linkedCamera = readCamera(state.get("camera"));
+    if (linkedCamera) { Object.assign(view.orbit, linkedCamera); chase.touch(); }
     sliders.set(sliders.channels.flatMap((channel) => readPairs(state.get(channel.key), channel.highest).map(([column, value]) => [channel, column, value])));
     return true;
   };
 
-  // A click on a part of the body hurts this part. With Shift, or while the button Heal is on, it heals it.
+  // A click on a part of the body hurts this part. With Shift, or while the button Heal is on, it heals the part.
 
   let pressed = null, heals = false;
   find("play-heal")?.addEventListener("click", (event) => {

@@ -48,8 +48,8 @@ const cholesky = (matrix, D) => {
 export const createGrader = (learnt) => {
   const D = learnt.features.length, healthy = new Float64Array(bytes(learnt.healthySpread)), densities = [];
   const numbers = (text) => new Float64Array(bytes(text));
-  // A density is a normal distribution of the features: healthy walks, or limps of one kind and strength. mean, spread (a covariance): of limps of
-  // strength 1. peak: log of the largest density times the prior probability, up to a constant.
+  // A density is a normal distribution of the features of healthy walks, or of limps of one kind and strength. mean, spread (a covariance): of
+  // limps of strength 1. peak: log of the largest density times the prior probability, up to a constant.
   const addDensity = (mean, spread, strength, kind) => {
     const factor = cholesky(healthy.map((v, i) => v + strength * strength * (spread ? spread[i] : 0)), D);
     let peak = kind ? -Math.log(learnt.kinds.length * learnt.strengths.length) : 0;
@@ -96,8 +96,8 @@ export const createGrader = (learnt) => {
   };
 };
 
-// Recognises the limp of the played character. add(places): adds a frame with the positions of all joints. say(): the answer {text, share} for the
-// last SECONDS, with its probability `share`. If there is no answer, {text} with the reason.
+// Recognises the limp of the played character. add(places): adds a frame with the positions of all joints. say(): the answer {text, share} for
+// the last SECONDS, with its probability `share`. If there is no answer, {text} with the reason.
 export const createWatch = (spec) => {
   const { learnt, healthy } = spec.recogniser, grade = createGrader(learnt), most = 60 * SECONDS;
   let frames = [];

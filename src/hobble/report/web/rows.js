@@ -54,7 +54,8 @@ export const createRows = (spec, c) => {
     }
   };
 
-  // Writes into q the world rotation of a joint. In y at index i it is an axis times half the angle, relative to the root. co, si: of half the root's yaw.
+  // Writes into q the world rotation of a joint. In y at index i it is an axis times half the angle, relative to the root. co, si: cosine
+  // and sine of half the root's yaw.
   const q = [1, 0, 0, 0];
   const readRotation = (y, i, co, si) => {
     const half = hypot(y[i], y[i + 1], y[i + 2]), scale = half > 1e-8 ? sin(half) / half : 1, w = cos(half);

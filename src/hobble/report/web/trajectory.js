@@ -7,8 +7,8 @@ export const createTrajectory = (spec, c) => {
   const { step, y: Y, gaits, constants: k } = spec, T = 2 * spec.window, M = spec.window, S = T / step, F = M / step, G = gaits.length;
   const { atan2, sin, cos, hypot, floor, min, max, abs, sqrt } = Math;
 
-  // The velocity [x, z] to ask the network for, so that the character reaches the target velocity [x, z]. As in `_ask_velocity` in Python, a share
-  // spec.steering of the velocity's error is added to the target, and a steady error is added up in `correction`. speed: of the target. goingX,
+  // The velocity [x, z] to ask the network for, so that the character reaches the target velocity [x, z]. As in `_ask_velocity` in Python, the
+  // share spec.steering of the velocity's error is added to the target, and a steady error is added up in `correction`. speed: of the target. goingX,
   // goingZ: the mean velocity over the later half of the past.
   const askVelocity = ([x, z], speed, [goingX, goingZ]) => {
     const a = x - goingX, b = z - goingZ, more = [spec.steering * a, spec.steering * b];
@@ -86,8 +86,8 @@ export const createTrajectory = (spec, c) => {
     const against = loss * min(0, a * target[0] + b * target[1]) / squared;
     return [a - against * target[0], b - against * target[1]];
   };
-  // The root's movement, changed a little toward the target. This is done with motion matching, because clips have only some directions and speeds.
-  // The change is limited: across the target to k.pull times the length of the movement, along the target to k.pullAhead times that.
+  // The root's movement, changed a little toward the target. This is done with motion matching, because clips have only some directions and
+  // speeds. The change is limited: across the target to k.pull times the length of the movement, along the target to k.pullAhead times that.
   const pulledToTarget = ([a, b], target) => {
     const most = spec.steering > 0 && spec.recordedPoses ? k.pull * hypot(a, b) : 0, size = hypot(...target);
     const ahead = size >= k.still ? target.map((v) => v / size) : [0, 0], lack = [target[0] - a, target[1] - b];
