@@ -102,7 +102,7 @@ export const createWatch = (spec) => {
   const { learnt, healthy } = spec.recogniser, grade = createGrader(learnt), most = 60 * SECONDS;
   let frames = [];
   return {
-    addDensity(places) { frames.push(Float32Array.from(places)); if (frames.length > most) frames.shift(); },
+    add(places) { frames.push(Float32Array.from(places)); if (frames.length > most) frames.shift(); },
     clear() { frames = []; },
     say() {
       if (frames.length < most) return { text: "collecting motion" };
