@@ -1,39 +1,41 @@
-// The questionnaire: films in a random order, two questions for each film, and a file with the answers.
+// The questionnaire shows films in a random order, asks two questions about each film, and saves the answers as a file.
 "use strict";
 (() => {
+  // study: the study's name. parts: names of parts of the body. films: {film: its name, webp: the film in base64}.
   const { study, parts, films } = JSON.parse(document.getElementById("study").textContent);
   const find = (id) => document.getElementById(id), NOTHING = "nothing", MARKS = { 1: "1, jerky", 2: "2", 3: "3", 4: "4", 5: "5, fluid" };
   const KEY = `hobble-study-${study}`;
+  // state: {study, person, begun, order: names of the films, answers}, or null before the start. plays: how often the present film was played.
   let state = null, plays = 0, url = null;
 
   // If the browser allows local storage, a reopened page continues with the next film.
-  const kept = () => { try { return JSON.parse(localStorage.getItem(KEY)); } catch { return null; } };
-  const keep = () => { try { localStorage.setItem(KEY, JSON.stringify(state)); } catch { /* no local storage: a reopened page starts again */ } };
+  const savedState = () => { try { return JSON.parse(localStorage.getItem(KEY)); } catch { return null; } };
+  const saveState = () => { try { localStorage.setItem(KEY, JSON.stringify(state)); } catch { /* no local storage: a reopened page starts again */ } };
 
-  const randomOrder = () => { // Fisher-Yates shuffle; rejecting large values avoids modulo bias
+  const randomOrder = () => { // Fisher-Yates shuffle. Numbers from `limit` on are drawn again, so that all remainders are equally likely.
     const order = films.map(({ film }) => film), one = new Uint32Array(1);
     for (let i = order.length - 1; i > 0; i--) {
-      const most = Math.floor(2 ** 32 / (i + 1)) * (i + 1);
-      do crypto.getRandomValues(one); while (one[0] >= most);
+      const limit = Math.floor(2 ** 32 / (i + 1)) * (i + 1);
+      do crypto.getRandomValues(one); while (one[0] >= limit);
       const j = one[0] % (i + 1);
       [order[i], order[j]] = [order[j], order[i]];
     }
     return order;
   };
-  const option = (host, type, name, value, text) => {
+  const addOption = (host, type, name, value, text) => {
     const label = document.createElement("label"), input = document.createElement("input");
     Object.assign(input, { type, name, value });
     label.append(input, text);
     host.append(label);
     return input;
   };
-  const boxes = parts.map((part) => option(find("parts"), "checkbox", "part", part, part));
-  const none = option(find("parts"), "checkbox", "part", NOTHING, "nothing hurts");
-  const marks = Object.entries(MARKS).map(([value, text]) => option(find("marks"), "radio", "fluid", value, text));
-  const ticked = () => boxes.filter((box) => box.checked).map((box) => box.value);
-  const fluid = () => Number(marks.find((mark) => mark.checked)?.value ?? 0);
+  const partBoxes = parts.map((part) => addOption(find("parts"), "checkbox", "part", part, part));
+  const nothingBox = addOption(find("parts"), "checkbox", "part", NOTHING, "nothing hurts");
+  const markButtons = Object.entries(MARKS).map(([value, text]) => addOption(find("marks"), "radio", "fluid", value, text));
+  const tickedParts = () => partBoxes.filter((box) => box.checked).map((box) => box.value);
+  const chosenMark = () => Number(markButtons.find((mark) => mark.checked)?.value ?? 0);
 
-  const play = () => {
+  const playFilm = () => {
     const { webp } = films.find(({ film }) => film === state.order[state.answers.length]);
     const raw = atob(webp), data = Uint8Array.from(raw, (c) => c.charCodeAt(0));
     if (url) URL.revokeObjectURL(url);
@@ -41,47 +43,47 @@
     find("film").src = url;
     plays++;
   };
-  const check = () => {
-    const answered = ticked().length > 0 || none.checked, marked = fluid() > 0;
+  const checkAnswers = () => {
+    const answered = tickedParts().length > 0 || nothingBox.checked, marked = chosenMark() > 0;
     find("next").disabled = !(answered && marked);
     find("missing").textContent = answered && marked ? "" : answered ? "Say how fluid the motion is." : marked ? "Tick the parts that hurt, or \"nothing hurts\"." : "";
   };
-  const show = (name) => ["welcome", "asking", "done"].forEach((id) => { find(id).hidden = id !== name; });
-  const ask = () => {
+  const showSection = (name) => ["welcome", "asking", "done"].forEach((id) => { find(id).hidden = id !== name; });
+  const askNext = () => {
     const number = state.answers.length;
     if (number === state.order.length) { finish(); return; }
-    show("asking");
+    showSection("asking");
     find("progress").value = number;
     find("which").textContent = `Film ${number + 1} of ${state.order.length}`;
     find("questions").reset();
     plays = 0;
-    check();
-    play();
+    checkAnswers();
+    playFilm();
     find("which").focus({ preventScroll: true });
     scrollTo(0, 0);
   };
   const finish = () => {
-    show("done");
+    showSection("done");
     find("text").value = JSON.stringify(state, null, 1);
     find("thanks").focus();
   };
 
   find("questions").addEventListener("change", ({ target }) => {
-    if (target === none && none.checked) boxes.forEach((box) => { box.checked = false; });
-    else if (boxes.includes(target) && target.checked) none.checked = false;
-    check();
+    if (target === nothingBox && nothingBox.checked) partBoxes.forEach((box) => { box.checked = false; });
+    else if (partBoxes.includes(target) && target.checked) nothingBox.checked = false;
+    checkAnswers();
   });
   find("questions").addEventListener("submit", (event) => {
     event.preventDefault();
-    state.answers.push({ film: state.order[state.answers.length], parts: ticked(), fluid: fluid(), plays });
-    keep();
-    ask();
+    state.answers.push({ film: state.order[state.answers.length], parts: tickedParts(), fluid: chosenMark(), plays });
+    saveState();
+    askNext();
   });
-  find("again").addEventListener("click", play);
+  find("again").addEventListener("click", playFilm);
   find("begin").addEventListener("click", () => {
     state ??= { study, person: find("person").value.trim(), begun: new Date().toISOString(), order: randomOrder(), answers: [] };
-    keep();
-    ask();
+    saveState();
+    askNext();
   });
   find("save").addEventListener("click", () => {
     const link = document.createElement("a"), file = URL.createObjectURL(new Blob([find("text").value], { type: "application/json" }));
@@ -91,11 +93,11 @@
     setTimeout(() => URL.revokeObjectURL(file), 1000);
   });
 
-  const before = kept();
-  if (before?.study === study && Array.isArray(before.answers) && before.order?.length === films.length) {
-    state = before;
+  const saved = savedState();
+  if (saved?.study === study && Array.isArray(saved.answers) && saved.order?.length === films.length) {
+    state = saved;
     find("person").value = state.person;
-    find("resumed").textContent = `You have answered ${state.answers.length} of ${films.length} films. Begin continues with the next one.`;
+    find("resumed").textContent = `You have answered ${state.answers.length} of ${films.length} films. Press Begin to continue with the next one.`;
   }
   globalThis.Study = { films, get state() { return state; } };
 })();

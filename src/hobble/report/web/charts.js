@@ -17,6 +17,7 @@ const plotly = () => {
 export let drawAll = () => {};
 
 export const startCharts = () => {
+  // The value with the colour of a token in place of each text "@token".
   const resolve = (value) => {
     if (typeof value === "string") return value[0] === "@" ? colour(value.slice(1)) : value;
     if (Array.isArray(value)) return value.map(resolve);
@@ -25,11 +26,12 @@ export const startCharts = () => {
     }
     return value;
   };
+  // A copy of `base` with the entries of `over`. Objects that are in both are merged, too.
   const merge = (base, over) => {
     const out = { ...base };
     for (const [key, value] of Object.entries(over || {})) {
-      const both = value && typeof value === "object" && !Array.isArray(value) && out[key];
-      out[key] = both ? merge(out[key], value) : value;
+      const nested = value && typeof value === "object" && !Array.isArray(value) && out[key];
+      out[key] = nested ? merge(out[key], value) : value;
     }
     return out;
   };
@@ -47,24 +49,24 @@ export const startCharts = () => {
     colorway: ["@accent", "@muted"], dragmode: narrow ? false : "zoom", bargap: 0.3,
     xaxis: axis(), yaxis: { ...axis(), automargin: true },
   }, spec.layout));
-  const drawn = new Map();
+  const chosenOptions = new Map(); // element of each drawn chart -> index of the option that the reader chose
 
   const draw = (element) => {
     const spec = material.charts[element.dataset.chart];
     if (!spec) return;
     const narrow = element.clientWidth < 520;
-    const chosen = spec.options.length ? spec.options[drawn.get(element) || 0] : null;
+    const chosen = spec.options.length ? spec.options[chosenOptions.get(element) || 0] : null;
     const config = {
       displaylogo: false, responsive: true, displayModeBar: narrow ? false : "hover",
       modeBarButtonsToRemove: ["select2d", "lasso2d", "autoScale2d", "sendChartToCloud", "sendDataToCloud"],
       toImageButtonOptions: { format: "svg", filename: spec.name },
     };
     const traces = resolve(chosen ? chosen.traces : spec.traces);
-    const shape = layout(chosen && chosen.layout ? merge(spec, { layout: chosen.layout }) : spec, narrow);
-    const first = !drawn.has(element);
-    if (first) drawn.set(element, 0);
-    plotly().react(element, traces, shape, config);
-    // A click on a point of a clip opens the clip in the viewer.
+    const fullLayout = layout(chosen && chosen.layout ? merge(spec, { layout: chosen.layout }) : spec, narrow);
+    const first = !chosenOptions.has(element);
+    if (first) chosenOptions.set(element, 0);
+    plotly().react(element, traces, fullLayout, config);
+    // A click on a point that stands for a clip opens the clip. Its name is the point's y, x or text.
     if (first) element.on("plotly_click", ({ points }) => [points[0].y, points[0].x, points[0].text].some(openClip));
   };
   drawAll = () => document.querySelectorAll("[data-chart]").forEach(draw);
@@ -73,7 +75,7 @@ export const startCharts = () => {
     select.addEventListener("change", () => {
       for (const name of select.dataset.chooses.split(" ")) {
         const element = document.querySelector(`[data-chart="${CSS.escape(name)}"]`);
-        drawn.set(element, select.selectedIndex);
+        chosenOptions.set(element, select.selectedIndex);
         draw(element);
       }
     });
@@ -84,5 +86,5 @@ export const startCharts = () => {
     }
   }, { rootMargin: "600px" });
   document.querySelectorAll("[data-chart]").forEach((element) => near.observe(element));
-  onTheme.push(() => { for (const element of drawn.keys()) draw(element); });
+  onTheme.push(() => { for (const element of chosenOptions.keys()) draw(element); });
 };

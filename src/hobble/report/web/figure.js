@@ -1,12 +1,14 @@
-// The figure: one surface, moved by the rotations of its bones and coloured frame by frame.
+// A figure: a body in a view. It is one surface. In each frame, its bones move it, and each bone gives its part of the body a colour.
 import {
   Bone, Color, DetachedBindMode, Matrix4, MeshBasicMaterial, MeshStandardMaterial, Quaternion, Skeleton, SkinnedMesh, Sphere, Vector3,
 } from "three";
 import { bodyOf } from "./bodies.js";
 import { linear } from "./paint.js";
 
-// The material: solid, or a ghost that is transparent except at its outline.
-const look = (tints, ghost) => {
+// The material of the surface: solid, or a ghost that is transparent except at its outline. tints: the colour of each bone. The colour of a
+// corner is the mean of the colours of its bones, with the weights of the skin. The attribute `shade` is 0 for a corner that the body hides
+// from the light and 1 for a free one.
+const createMaterial = (tints, ghost) => {
   const material = new MeshStandardMaterial({ roughness: .78, metalness: 0, transparent: ghost, depthWrite: !ghost });
   material.onBeforeCompile = (shader) => {
     shader.uniforms.tints = tints;
@@ -31,9 +33,10 @@ ${shader.fragmentShader}`
   return material;
 };
 
-// body: name of a body in the page. regions: for each bone the channel columns that colour it.
+// view: where it is drawn, see view.js. body: name of a body in the page. regions: for each bone, the channel columns that colour it. ghost:
+// whether it is transparent.
 export const createFigure = (view, body, regions = [], { ghost = false } = {}) => {
-  const { geometry, inverses, keep, balls } = bodyOf(body), B = keep.length, one = new Vector3(1, 1, 1);
+  const { geometry, inverses, keep, balls } = bodyOf(body), boneCount = keep.length, unscaled = new Vector3(1, 1, 1);
   const bones = keep.map(() => new Bone()), skeleton = new Skeleton(bones, inverses);
   const tints = { value: keep.map(() => new Color()) }, meshes = [];
   const add = (material) => {
@@ -47,34 +50,34 @@ export const createFigure = (view, body, regions = [], { ghost = false } = {}) =
     return mesh;
   };
   if (ghost) { // draw only the depth first, so that no part of the ghost shows through another
-    const deep = add(new MeshBasicMaterial({ colorWrite: false }));
-    deep.renderOrder = 1;
+    const depthMesh = add(new MeshBasicMaterial({ colorWrite: false }));
+    depthMesh.renderOrder = 1;
   }
-  const mesh = add(look(tints, ghost));
+  const mesh = add(createMaterial(tints, ghost));
   mesh.renderOrder = ghost ? 2 : 0;
   mesh.castShadow = !ghost;
   mesh.receiveShadow = !ghost;
 
-  const figure = { mesh, keep, places: new Float64Array(3 * B), turns: new Float64Array(4 * B) };
+  const figure = { mesh, keep, places: new Float64Array(3 * boneCount), turns: new Float64Array(4 * boneCount) };
   const spot = new Vector3(), turn = new Quaternion();
-  // Moves the bones to `figure.places` and `figure.turns`. colour(columns): returns [r, g, b], 0 to 255, of a bone.
+  // Moves the bones to `figure.places` and `figure.turns`. colour(columns): the colour [r, g, b], 0 to 255, of a bone with these channel columns.
   figure.pose = (colour) => {
     const { places: p, turns: q } = figure;
-    for (let b = 0; b < B; b++) {
+    for (let b = 0; b < boneCount; b++) {
       spot.set(p[3 * b], p[3 * b + 1], p[3 * b + 2]);
       turn.set(q[4 * b + 1], q[4 * b + 2], q[4 * b + 3], q[4 * b]);
-      bones[b].matrixWorld.compose(spot, turn, one);
+      bones[b].matrixWorld.compose(spot, turn, unscaled);
       linear(colour(regions[b] || []), tints.value[b]);
     }
   };
-  // Takes places and rotations of the bones from arrays of all joints.
-  figure.take = ({ places, turns }) => {
+  // Copies the places and rotations of the bones from arrays of all joints. They are drawn after the next `pose`.
+  figure.copyPose = ({ places, turns }) => {
     keep.forEach((j, b) => {
       for (let i = 0; i < 3; i++) figure.places[3 * b + i] = places[3 * j + i];
       for (let i = 0; i < 4; i++) figure.turns[4 * b + i] = turns[4 * j + i];
     });
   };
-  // The lowest round parts of the body in the world, [x, y, z, radius in cm]. They darken the ground.
+  // The lowest `count` of the spheres [x, y, z, radius], cm, that stand for parts of the body. They darken the ground.
   figure.balls = (count = 10) => {
     const out = balls.map(([x, y, z, r], b) => {
       spot.set(x, y, z).applyMatrix4(bones[b].matrixWorld);
@@ -82,13 +85,14 @@ export const createFigure = (view, body, regions = [], { ghost = false } = {}) =
     });
     return out.sort((a, b) => a[1] - b[1]).slice(0, count);
   };
+  // shown: whether the figure is drawn. fade: its opacity, 0 to 1.
   figure.show = (shown, fade = 1) => {
     for (const each of meshes) each.visible = shown;
     mesh.material.opacity = fade;
   };
   figure.remove = () => { for (const each of meshes) { view.scene.remove(each); each.material.dispose(); } };
 
-  // World positions of the corners, computed as the graphics card does.
+  // World positions of all corners, three numbers each, computed as the graphics card does.
   figure.corners = () => {
     const moved = inverses.map((inverse, b) => new Matrix4().multiplyMatrices(bones[b].matrixWorld, inverse).elements);
     const { position, skinIndex, skinWeight } = geometry.attributes, out = new Float64Array(position.array.length);
@@ -103,7 +107,8 @@ export const createFigure = (view, body, regions = [], { ghost = false } = {}) =
     }
     return out;
   };
-  // The channel columns of the bone at a point of the screen (`links`), and its distance; null if there is none.
+  // What is at the point (x, y) of the canvas, in pixels; null if it is not on the body. links: the channel columns of the bone. deep: the
+  // distance from the camera, cm. Each triangle is tested, with the barycentric coordinates u, w of the point.
   figure.under = (x, y) => {
     const corners = figure.corners(), n = corners.length / 3, index = geometry.index.array, seen = new Float64Array(3 * n);
     for (let v = 0; v < n; v++) seen.set(view.project([corners[3 * v], corners[3 * v + 1], corners[3 * v + 2]]), 3 * v);

@@ -1,14 +1,15 @@
-// The grounds in Play. height(x, z): cm. Grounds with `tile` consist of level tiles of this size in cm along x and z (0: unlimited)
-// and are drawn with vertical edges.
-const scattered = (i, k) => { // a random number from 0 to 1, always the same for a tile
+// The grounds in Play. height(x, z): height in cm. tile: only for grounds of level tiles, which are drawn with vertical edges. It is the size
+// [x, z] of a tile in cm, with 0 for an unlimited size.
+const randomOfTile = (i, k) => { // a random number from 0 to 1, always the same for the tile (i, k)
   const n = Math.sin(12.9898 * i + 78.233 * k) * 43758.5453;
   return n - Math.floor(n);
 };
-const box = (x, z) => {
+// About a quarter of the tiles are boxes, 6 to 28 cm high. There are none where the character starts.
+const boxHeight = (x, z) => {
   const i = Math.round(x / 80), k = Math.round(z / 80);
   if (Math.abs(i) <= 1 && Math.abs(k) <= 1) return 0;
-  const much = scattered(i, k);
-  return much > .72 ? 6 + 22 * (much - .72) / .28 : 0;
+  const random = randomOfTile(i, k);
+  return random > .72 ? 6 + 22 * (random - .72) / .28 : 0;
 };
 
 export const GROUNDS = new Map(Object.entries({
@@ -16,5 +17,5 @@ export const GROUNDS = new Map(Object.entries({
   rolling: { height: (x, z) => 14 * Math.sin(x / 170) * Math.cos(z / 140) + 8 * Math.sin((x + z) / 260) },
   slope: { height: (x, z) => .14 * z },
   steps: { height: (x, z) => 12 * Math.round(z / 110), tile: [0, 110] },
-  boxes: { height: box, tile: [80, 80] },
+  boxes: { height: boxHeight, tile: [80, 80] },
 }));

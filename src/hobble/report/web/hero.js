@@ -1,36 +1,40 @@
-// The top of the page: the walking character with a value of a channel. Next to it walks a transparent one without this value, with the
-// same controls.
+// The top of the page. A character walks with a value above 0 in one column of a channel. Next to it walks a transparent character
+// with all values 0 and the same target.
 import { createActor } from "./actor.js";
 import { find, material } from "./base.js";
 import { createDial } from "./dial.js";
-import { firstShown, keyed } from "./sliders.js";
+import { firstShown, valueKey } from "./sliders.js";
 import { createView } from "./view.js";
 
-const GHOST_OFFSET = -84; // cm from the figure to the transparent one; negative: to the right of the figure
-const MOST_AHEAD = 120; // cm that the transparent one may get ahead or behind before it is moved back
-const FADE = 24; // frames that it takes to fade out before this move, and to fade in after it
+const GHOST_OFFSET = -84; // cm from the solid character to the transparent one; negative: to the right
+const MOST_AHEAD = 120; // cm: if the transparent character is further ahead or behind, it is moved back
+const FADE = 24; // frames in which the transparent character fades out before this move, and fades in after it
 const SPEED = 2.5; // target speed, cm per frame
 
 const createHero = (spec, opening) => {
   const section = find("hero"), canvas = find("hero-view"), line = find("hero-line"), button = find("hero-walk");
-  const one = firstShown(spec), labels = one ? Object.keys(one.sliders) : [];
+  const channel = firstShown(spec), labels = channel ? Object.keys(channel.sliders) : [];
   const values = new Map(), neutralValues = new Map(), flat = () => 0, hero = { frames: 0 };
-  let drawn;
-  hero.shown = new Promise((done) => { drawn = done; }); // resolved when the figure has moved, or, if it rests, has been drawn
+  let resolveShown;
+  hero.shown = new Promise((done) => { resolveShown = done; }); // resolved when the figure has moved, or, if it rests, has been drawn
+  // part: label of the slider that the dial sets. last: time of the last picture, ms, or null. due: how many frames have to run. shown: when the
+  // speeds were last shown, ms. fade: opacity of the transparent character. leaving: whether it fades out. camera: the point [x, z] to look
+  // at and the yaw of the path, or null.
   let part = labels.includes(opening.part) ? opening.part : labels[0];
   let last = null, due = 0, shown = 0, fade = 1, leaving = false, camera = null, walks = !matchMedia("(prefers-reduced-motion: reduce)").matches;
 
-  // Both have the same target direction, which turns slowly from side to side.
+  // The target direction of both characters, as yaw in radians. It turns slowly from side to side.
   const heading = () => .5 * Math.sin(hero.frames / 700);
   const target = () => ({ velocity: [SPEED * Math.sin(heading()), SPEED * Math.cos(heading())], facing: null, gait: "walk" });
   const view = createView(canvas, { yaw: .62, pitch: .1, distance: 460, nearest: 240, furthest: 800 }, (now) => {
     if (walks) advance(now);
     draw(now);
-    if (!walks || hero.frames) drawn();
-    if (walks) view.ask();
+    if (!walks || hero.frames) resolveShown();
+    if (walks) view.requestDraw();
   });
   view.onHidden = () => { last = null; };
-  const main = createActor(view, spec), ghost = one ? createActor(view, spec, { place: [GHOST_OFFSET, 0], tint: "ghost", ghost: true }) : null;
+  const main = createActor(view, spec), ghost = channel ? createActor(view, spec, { place: [GHOST_OFFSET, 0], tint: "ghost", ghost: true }) : null;
+  // The vector [x, z] from the solid character to the place of the transparent one.
   const aside = () => [GHOST_OFFSET * Math.cos(heading()), -GHOST_OFFSET * Math.sin(heading())];
 
   const step = () => {
@@ -38,13 +42,13 @@ const createHero = (spec, opening) => {
     main.frame(target(), values);
     if (!ghost) return;
     ghost.frame(target(), neutralValues);
-    const [sin, cos] = [Math.sin(heading()), Math.cos(heading())], [a, b] = [main.character.root, ghost.character.root];
-    const [dx, dz] = [b[0] - a[0], b[2] - a[2]], along = dx * sin + dz * cos, across = dx * cos - dz * sin;
+    const [sin, cos] = [Math.sin(heading()), Math.cos(heading())], [from, to] = [main.character.root, ghost.character.root];
+    const [dx, dz] = [to[0] - from[0], to[2] - from[2]], along = dx * sin + dz * cos, across = dx * cos - dz * sin;
     if (!leaving && (Math.abs(along) > MOST_AHEAD || Math.abs(across - GHOST_OFFSET) > 70)) leaving = true;
     fade = Math.min(1, Math.max(0, fade + (leaving ? -1 : 1) / FADE));
     if (leaving && fade === 0) {
       const [x, z] = aside();
-      ghost.character.follow(ghost.character, [a[0] + x - b[0], a[2] + z - b[2]]);
+      ghost.character.follow(ghost.character, [from[0] + x - to[0], from[2] + z - to[2]]);
       ghost.rig.take(ghost.character.posePosition, ghost.character.poseRotation);
       leaving = false;
     }
@@ -56,7 +60,7 @@ const createHero = (spec, opening) => {
     for (; due >= 1; due--) step();
     glide(1 - Math.exp(-passed / 350));
   };
-  // The camera follows the path, not the hips, because the hips move up and down.
+  // Moves the camera by a share of the way to its goal. It follows the root on the path, not the hips, because the hips move up and down.
   const glide = (share) => {
     const { root } = main.character, [x, z] = ghost ? aside().map((v) => v / 2) : [0, 0], goal = [root[0] + x, root[2] + z, heading()];
     camera = camera ? camera.map((v, i) => v + share * (goal[i] - v)) : goal;
@@ -68,12 +72,13 @@ const createHero = (spec, opening) => {
     view.orbit.yaw = yaw + turn;
     view.aim([x, 84, z]);
     view.orbit.yaw = yaw;
-    view.land.around([x, 0, z]);
+    view.land.drawAround([x, 0, z]);
     main.draw(false);
     if (ghost) { ghost.draw(null); ghost.figure.show(fade > .01, fade); }
-    view.land.under(main.figure.balls(view.balls));
+    view.land.darkenUnder(main.figure.balls(view.balls));
     if (now - shown > 250) { shown = now; showPace(); }
   };
+  // The mean speed over the last 50 frames, m/s.
   const pace = ({ character: c }) => {
     const M = spec.window;
     return Math.hypot(c.px[M] - c.px[M - 50], c.pz[M] - c.pz[M - 50]) * 60 / 50 / 100;
@@ -83,23 +88,23 @@ const createHero = (spec, opening) => {
     if (ghost) find("hero-ghost").textContent = `${pace(ghost).toFixed(2)} m/s`;
   };
 
-  if (one) {
-    const [before, after] = one.says.split("{}");
+  if (channel) {
+    const [before, after] = channel.says.split("{}");
     const words = { part: document.createElement("b"), much: document.createElement("b") };
     const say = () => {
       words.part.textContent = part;
       words.much.textContent = `${dial.value} of 10`;
-      if (!one.on) find("hero-on").textContent = part;
-      const same = "One neural network moves both figures at the same target speed, "; // the whole text is one sentence
-      if (dial.value) line.replaceChildren(`${same}and the input for the solid one says ${before}`, words.part, `${after}, `, words.much, ".");
-      else line.replaceChildren(`${same}and at 0 they walk alike.`);
+      if (!channel.on) find("hero-on").textContent = part;
+      const beginning = "One neural network moves both figures at the same target speed, "; // the whole text is one sentence
+      if (dial.value) line.replaceChildren(`${beginning}and the input for the solid one says ${before}`, words.part, `${after}, `, words.much, ".");
+      else line.replaceChildren(`${beginning}and at 0 they walk alike.`);
       chips.forEach((chip) => chip.setAttribute("aria-pressed", String(chip.textContent === part)));
     };
-    const hurt = () => {
+    const applyDial = () => {
       values.clear();
-      values.set(keyed(one, one.columns[one.sliders[part]]), dial.value / 10 * one.highest);
+      values.set(valueKey(channel, channel.columns[channel.sliders[part]]), dial.value / 10 * channel.highest);
       say();
-      view.ask();
+      view.requestDraw();
     };
     const chips = labels.map((label) => {
       const chip = document.createElement("button");
@@ -108,29 +113,29 @@ const createHero = (spec, opening) => {
       chip.addEventListener("click", () => {
         part = label;
         if (!dial.value) dial.set(opening.value);
-        hurt();
+        applyDial();
       });
       find("hero-parts").append(chip);
       return chip;
     });
-    const dial = createDial(find("hero-dial"), { value: opening.value, changed: hurt });
+    const dial = createDial(find("hero-dial"), { value: opening.value, changed: applyDial });
     Object.assign(hero, { dial, chips });
-    hurt();
+    applyDial();
   }
-  const rest = () => {
+  const showButton = () => {
     button.textContent = walks ? "Pause" : "Walk";
     button.setAttribute("aria-pressed", String(!walks));
   };
-  button.addEventListener("click", () => { walks = !walks; last = null; rest(); view.ask(); });
-  rest();
+  button.addEventListener("click", () => { walks = !walks; last = null; showButton(); view.requestDraw(); });
+  showButton();
 
-  // The page contains the states of figures that already walk, because predicting their first steps here would take long.
-  const [walking, healthy] = opening.walked ?? [];
+  // The page contains the states of both characters while they walk, because predicting their first steps here would take long.
+  const [walking, neutral] = opening.walked ?? [];
   view.compile();
   main.start(flat);
   ghost?.start(flat);
   if (walking) main.character.follow(walking);
-  if (ghost && healthy) ghost.character.follow(healthy, [walking.root[0] - healthy.root[0] + GHOST_OFFSET, walking.root[2] - healthy.root[2]]);
+  if (ghost && neutral) ghost.character.follow(neutral, [walking.root[0] - neutral.root[0] + GHOST_OFFSET, walking.root[2] - neutral.root[2]]);
   for (const actor of [main, ghost]) actor?.rig.take(actor.character.posePosition, actor.character.poseRotation);
   glide(1);
   showPace();

@@ -1,6 +1,6 @@
 // Starts the parts of the page. `Hobble` gives access to them from the browser's console and from the tests.
 import { colour, material } from "./base.js";
-import { bvh } from "./bvh.js";
+import { bvhText } from "./bvh.js";
 import { openClip, startCaptured } from "./captured.js";
 import { createCharacter } from "./character.js";
 import { drawAll, startCharts } from "./charts.js";
@@ -19,7 +19,7 @@ import { csv, startTables } from "./tables.js";
 import { startWalks } from "./walking.js";
 
 globalThis.Hobble = {
-  bvh, character: createCharacter, chase: createChase, colour, csv, grader: createGrader, groundSamples, jointVelocities, lab: createLab,
+  bvh: bvhText, character: createCharacter, chase: createChase, colour, csv, grader: createGrader, groundSamples, jointVelocities, lab: createLab,
   material, measureWalk, profile, rig: createRig, watch: createWatch, ready: false,
   get drawAll() { return drawAll; },
   get hero() { return hero; },
@@ -27,20 +27,20 @@ globalThis.Hobble = {
   get player() { return player; },
 };
 
-const atOnce = [startPage, startTables, startCharts, startPlay], parts = [startWalks, startCaptured, startStrips, startFits];
-const next = () => {
-  const start = parts.shift();
-  if (start) { setTimeout(next); start(); } else Hobble.ready = true;
+const atOnce = [startPage, startTables, startCharts, startPlay], later = [startWalks, startCaptured, startStrips, startFits];
+const startNext = () => {
+  const start = later.shift();
+  if (start) { setTimeout(startNext); start(); } else Hobble.ready = true;
 };
-const rest = async () => {
+const startOthers = async () => {
   // If the address is a link to Play, do not wait for the figures at the top.
   if (hero && !location.hash.startsWith("#play")) await Promise.race([hero.shown, new Promise((done) => { setTimeout(done, 1000); })]);
-  setTimeout(next);
+  setTimeout(startNext);
   atOnce.forEach((start) => start());
 };
 
-// The figures at the top walk at once, while the browser still reads what is below. Then the other parts start one after
-// another, with time for a picture in between.
-if (document.readyState === "loading") document.addEventListener("DOMContentLoaded", rest); else queueMicrotask(rest);
+// The figures at the top walk at once, while the browser still reads the rest of the page. Then the other parts start one after
+// another. Between two of them the browser has time to draw a picture.
+if (document.readyState === "loading") document.addEventListener("DOMContentLoaded", startOthers); else queueMicrotask(startOthers);
 startHero();
 hero?.shown.then(() => performance.mark("figures-walk")); // for benchmarks/report.py

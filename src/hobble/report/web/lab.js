@@ -1,26 +1,27 @@
-// The gait of the played character over the last seconds: contacts, step lengths, knee angles.
+// The gait lab: it measures contacts, step lengths and knee angles of the played character over the last seconds, and draws them.
 import { dot, minus } from "./numbers.js";
 import { at3 } from "./turns.js";
 
-export const SHOWN = 240; // frames: four seconds
+export const SHOWN = 240; // frames that are kept and drawn: four seconds
 const SIDES = ["left", "right"];
 
-// Angle of a knee in degrees; 0 for a straight leg.
-export const bend = (hip, knee, heel) => {
+// The angle of a knee in degrees, from the positions of hip, knee and heel. It is 0 for a straight leg.
+export const kneeAngle = (hip, knee, heel) => {
   const a = minus(knee, hip), b = minus(heel, knee), size = Math.hypot(...a) * Math.hypot(...b);
   return size ? Math.acos(Math.min(1, Math.max(-1, dot(a, b) / size))) * 180 / Math.PI : 0;
 };
 
-// legs: the joints [hip, knee, heel, toe] of the left leg and of the right leg.
+// legs: the joints [hip, knee, heel, toe] of the left leg and of the right leg. Fields have an entry for each leg. stance: whether the foot was on the
+// ground, in each frame. knees: angle of the knee in each frame. steps: length of the last step, cm, or null.
 export const createLab = (legs) => {
   const lab = { stance: [[], []], knees: [[], []], steps: [null, null], stood: [false, false] };
-  let landed = [null, null];
-  const kept = (list, value) => { list.push(value); if (list.length > SHOWN) list.shift(); };
-  // places: of all joints. down: whether the left and the right foot are on the ground.
+  let landed = [null, null]; // where each foot landed last
+  const append = (list, value) => { list.push(value); if (list.length > SHOWN) list.shift(); };
+  // Adds a frame. places: positions of all joints. down: whether the left and the right foot are on the ground.
   lab.add = (places, down) => {
     legs.forEach(([hip, knee, heel], f) => {
-      kept(lab.stance[f], down[f]);
-      kept(lab.knees[f], bend(at3(places, hip), at3(places, knee), at3(places, heel)));
+      append(lab.stance[f], down[f]);
+      append(lab.knees[f], kneeAngle(at3(places, hip), at3(places, knee), at3(places, heel)));
       if (down[f] && !lab.stood[f]) {
         const other = landed[1 - f], here = at3(places, heel);
         // A step reaches from the place of the other foot to the place where this one lands.

@@ -1,11 +1,11 @@
-// The ground around the point that the camera looks at. It has a grid of one metre and a fainter one of 25 cm. It is
-// darker under bodies and fades out far away.
+// The ground around the point that the camera looks at. It has grid lines one metre apart, and fainter ones 25 cm apart. It is darker under
+// bodies and fades out far away.
 import { BufferAttribute, BufferGeometry, Color, Mesh, MeshLambertMaterial, Vector4 } from "three";
 import { linear } from "./paint.js";
 
 const REACH = 1100; // cm from the middle to the edge
 const STEP = 12.5; // cm between two heights of uneven ground
-const BALLS = 24; // most round parts of bodies that darken the ground
+const BALLS = 24; // largest number of spheres (for round parts of bodies) that darken the ground
 
 const geometryOf = (place, index) => {
   const geometry = new BufferGeometry();
@@ -13,8 +13,8 @@ const geometryOf = (place, index) => {
   geometry.setIndex(index);
   return geometry;
 };
-// A flat grid of n by n corners, to be given heights.
-const sheet = (n) => {
+// A grid of n by n corners. All coordinates are 0 until `fill` sets them.
+const flatGrid = (n) => {
   const index = [];
   for (let i = 0; i + 1 < n; i++) {
     for (let k = 0; k + 1 < n; k++) {
@@ -24,8 +24,8 @@ const sheet = (n) => {
   }
   return geometryOf(new Float32Array(3 * n * n), index);
 };
-// Level tiles between lines at `xs` and `zs`, with vertical pieces where the heights of neighbours differ.
-const pieces = (xs, zs, height) => {
+// Level tiles between lines at `xs` and `zs`, with vertical faces where the heights of neighbours differ. height(x, z): cm.
+const tileGeometry = (xs, zs, height) => {
   const place = [], index = [];
   const quad = (...corners) => {
     const a = place.length / 3;
@@ -68,7 +68,7 @@ export const createLand = (scene) => {
         vec2 drawn = (1. - smoothstep(vec2(width), vec2(width) + 1.5 * pixel, off)) * clamp(width / pixel + .35, 0., 1.);
         return max(drawn.x, drawn.y);
       }
-      // The share of the sky that the balls hide from a point of the ground (the part of each sphere above the plane).
+      // About the share of the sky that the spheres hide from a point of the ground: for each, cosine of its direction * (radius / distance)^2.
       float hidden() {
         float sum = 0.;
         for (int i = 0; i < ${BALLS}; i++) {
@@ -84,17 +84,17 @@ export const createLand = (scene) => {
         if (distance(vPlace.xz, focus) < 260.) diffuseColor.rgb *= exp(-.85 * hidden());
         diffuseColor.a *= 1. - smoothstep(.25, 1., distance(vPlace.xz, focus) / reach);`);
   };
-  const mesh = new Mesh(sheet(2), material);
+  const mesh = new Mesh(flatGrid(2), material);
   mesh.frustumCulled = false;
   mesh.receiveShadow = true;
   mesh.renderOrder = -1;
   scene.add(mesh);
 
-  let drawn = null;
-  const wear = (geometry) => { mesh.geometry.dispose(); mesh.geometry = geometry; };
-  // Fills the sheet with n by n heights over x in [x0, x1] and z in [z0, z1]; at(i, k, x, z) gives the height in cm.
+  let drawn = null; // which ground was drawn, and where
+  const replaceGeometry = (geometry) => { mesh.geometry.dispose(); mesh.geometry = geometry; };
+  // Fills the grid with n by n heights over x in [x0, x1] and z in [z0, z1]. at(i, k, x, z): the height in cm.
   const fill = (n, [x0, x1], [z0, z1], at) => {
-    if (mesh.geometry.attributes.position.count !== n * n) wear(sheet(n));
+    if (mesh.geometry.attributes.position.count !== n * n) replaceGeometry(flatGrid(n));
     const place = mesh.geometry.attributes.position;
     for (let i = 0, v = 0; i < n; i++) {
       for (let k = 0; k < n; k++) {
@@ -107,35 +107,35 @@ export const createLand = (scene) => {
     place.needsUpdate = true;
     mesh.geometry.computeVertexNormals();
   };
-  // Edges of tiles whose centres are at multiples of `size`, within `far` of `middle`.
-  const between = (size, middle, far) => {
+  // The edges of tiles along one axis, from `middle` - far to `middle` + far. The centres of tiles are at multiples of `size`.
+  const tileEdges = (size, middle, far) => {
     if (!size) return [middle - far, middle + far];
     const from = Math.floor((middle - far) / size), to = Math.ceil((middle + far) / size);
     return Array.from({ length: to - from + 1 }, (_, i) => (from + i - .5) * size);
   };
   return {
-    colour(paint) {
+    setColours(paint) {
       linear(paint.sky.map((v, i) => v + (paint.dark ? .75 : .55) * (paint.ground[i] - v)), material.color);
       linear(paint.line, ink.value);
     },
-    // Sets the round parts of bodies that darken the ground: [x, y, z, radius in cm].
-    under(parts) {
+    // Sets the spheres [x, y, z, radius], cm, that darken the ground.
+    darkenUnder(parts) {
       used.value = Math.min(BALLS, parts.length);
       for (let i = 0; i < used.value; i++) balls.value[i].set(...parts[i]);
     },
-    // Draws the ground around a point [x, y, z]. height, tile: see grounds.js. name: a different one for each ground.
-    around([x, , z], { height, tile } = { height: () => 0 }, name = "flat") {
+    // Draws the ground around a point [x, y, z]. height, tile: see grounds.js. name: each ground has its own.
+    drawAround([x, , z], { height, tile } = { height: () => 0 }, name = "flat") {
       focus.value = [x, z];
       const key = `${name} ${Math.round(x / 200)} ${Math.round(z / 200)}`;
       if (key === drawn) return;
       drawn = key;
       const [cx, cz] = [200 * Math.round(x / 200), 200 * Math.round(z / 200)], far = REACH + 200;
-      if (tile) { wear(pieces(between(tile[0], cx, far), between(tile[1], cz, far), height)); return; }
+      if (tile) { replaceGeometry(tileGeometry(tileEdges(tile[0], cx, far), tileEdges(tile[1], cz, far), height)); return; }
       const n = name === "flat" ? 2 : 2 * Math.round(far / STEP) + 1;
       fill(n, [cx - far, cx + far], [cz - far, cz + far], (i, k, u, w) => height(u, w));
     },
-    // Draws a piece of ground as a whole. heights: n by n, in rows of x, over the ranges x and z.
-    piece(n, x, z, heights) {
+    // Draws a whole piece of ground. heights: n by n, flat, row i at the i-th x. x, z: the ranges [from, to], cm.
+    drawPiece(n, x, z, heights) {
       focus.value = [(x[0] + x[1]) / 2, (z[0] + z[1]) / 2];
       reach.value = 4 * Math.max(x[1] - x[0], z[1] - z[0]);
       fill(n, x, z, (i, k) => heights[i * n + k]);

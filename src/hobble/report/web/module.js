@@ -1,47 +1,47 @@
-// The character for another page or a game: an ES module without dependencies. hobble.d.ts documents it.
-import { createCharacter as controller } from "./character.js";
+// An ES module without dependencies, with which another page or a game runs and draws a character. hobble.d.ts documents it.
+import { createCharacter as createController } from "./character.js";
 import { createRig } from "./rig.js";
 import { unpackBody } from "./skinned.js";
 
 const FLAT = () => 0;
 
-// data: content of character.json. place: [x, z] in cm, and heading: radians, where the character starts.
+// data: content of character.json. place: [x, z] in cm, and heading: yaw in radians, where the character starts.
 export const createCharacter = (data, { place = [0, 0], heading = 0 } = {}) => {
-  const { spec } = data, c = controller(spec, place, heading), rig = createRig(spec);
+  const { spec } = data, controller = createController(spec, place, heading), rig = createRig(spec);
   const character = { spec, joints: spec.names, gaits: spec.gaits, channels: {}, parts: {}, places: rig.places, turns: rig.turns };
-  for (const one of spec.channels) {
-    character.channels[one.name] = { columns: one.trained, highest: one.highest };
-    for (const [label, l] of Object.entries(one.sliders)) character.parts[label] = { channel: one.name, column: one.columns[l] };
+  for (const channel of spec.channels) {
+    character.channels[channel.name] = { columns: channel.trained, highest: channel.highest };
+    for (const [label, l] of Object.entries(channel.sliders)) character.parts[label] = { channel: channel.name, column: channel.columns[l] };
   }
-  const read = () => Object.assign(character, { contacts: [...c.contacts], phase: c.phase, root: [...c.root] });
-  rig.take(c.posePosition, c.poseRotation);
-  read();
+  const copyState = () => Object.assign(character, { contacts: [...controller.contacts], phase: controller.phase, root: [...controller.root] });
+  rig.take(controller.posePosition, controller.poseRotation);
+  copyState();
 
-  // Sets the values of a channel. values: column -> value; columns that are not named go back to 0.
+  // Sets the values of a channel. values: column -> value. Columns that are not in `values` go back to 0.
   character.setChannel = (name, values = {}) => {
-    const one = spec.channels.find((channel) => channel.name === name);
-    if (!one) throw new RangeError(`no channel ${name}; there are: ${spec.channels.map((channel) => channel.name).join(", ") || "none"}`);
-    for (const [column, much] of Object.entries(values)) {
-      if (!one.trained.includes(column)) throw new RangeError(`${name}: ${column} was not trained; there are: ${one.trained.join(", ")}`);
-      if (!(much >= 0 && much <= one.highest)) throw new RangeError(`${name}: ${column} is ${much}, but it must be a number from 0 to ${one.highest}`);
+    const channel = spec.channels.find((each) => each.name === name);
+    if (!channel) throw new RangeError(`there is no channel ${name}; the channels are: ${spec.channels.map((channel) => channel.name).join(", ") || "none"}`);
+    for (const [column, value] of Object.entries(values)) {
+      if (!channel.trained.includes(column)) throw new RangeError(`${name}: ${column} was not trained; the trained columns are: ${channel.trained.join(", ")}`);
+      if (!(value >= 0 && value <= channel.highest)) throw new RangeError(`${name}: the value of ${column} is ${value}, but it must be a number from 0 to ${channel.highest}`);
     }
-    one.columns.forEach((column, l) => { c.channelTargets[one.first + l] = (values[column] || 0) / one.scale; });
+    channel.columns.forEach((column, l) => { controller.channelTargets[channel.first + l] = (values[column] || 0) / channel.scale; });
   };
-  // Runs one frame, a sixtieth of a second.
+  // Runs one frame, a sixtieth of a second. ground(x, z): height of the ground, cm. The other arguments are the target, see targets.js.
   character.step = ({ velocity = [0, 0], facing = null, gait = null, ground = FLAT } = {}) => {
-    if (gait !== null && !spec.gaits.includes(gait)) throw new RangeError(`no gait ${gait}; there are: ${spec.gaits.join(", ")}`);
-    c.frame(velocity, facing, gait, ground);
-    rig.take(c.posePosition, c.poseRotation);
-    read();
+    if (gait !== null && !spec.gaits.includes(gait)) throw new RangeError(`there is no gait ${gait}; the gaits are: ${spec.gaits.join(", ")}`);
+    controller.frame(velocity, facing, gait, ground);
+    rig.take(controller.posePosition, controller.poseRotation);
+    copyState();
     return character;
   };
   return character;
 };
 
-// The body for three.js: {mesh, pose(character)}. THREE: the namespace of the caller's three.js.
+// The body for three.js: {mesh, pose(character)}. `pose` moves the mesh to the pose of the character. THREE: the caller's three.js.
 export const createFigure = (THREE, data, material = new THREE.MeshStandardMaterial({ color: 0xd6d6d2, roughness: .8 })) => {
   const { geometry, inverses, keep } = unpackBody(THREE, data.body), bones = keep.map(() => new THREE.Bone());
-  const mesh = new THREE.SkinnedMesh(geometry, material), spot = new THREE.Vector3(), turn = new THREE.Quaternion(), one = new THREE.Vector3(1, 1, 1);
+  const mesh = new THREE.SkinnedMesh(geometry, material), spot = new THREE.Vector3(), turn = new THREE.Quaternion(), unscaled = new THREE.Vector3(1, 1, 1);
   mesh.bindMode = THREE.DetachedBindMode;
   mesh.bind(new THREE.Skeleton(bones, inverses), new THREE.Matrix4());
   mesh.frustumCulled = false;
@@ -51,7 +51,7 @@ export const createFigure = (THREE, data, material = new THREE.MeshStandardMater
       keep.forEach((j, b) => {
         spot.fromArray(places, 3 * j);
         turn.set(turns[4 * j + 1], turns[4 * j + 2], turns[4 * j + 3], turns[4 * j]);
-        bones[b].matrixWorld.compose(spot, turn, one);
+        bones[b].matrixWorld.compose(spot, turn, unscaled);
       });
     },
   };

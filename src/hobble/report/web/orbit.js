@@ -1,5 +1,7 @@
-// A camera that moves around its target: by dragging, pinching, keys and the wheel.
+// A camera that moves around its target. The user moves it by dragging, pinching, pressing keys, or turning the wheel with Ctrl.
 
+// home: where it starts and returns to: {yaw, pitch} in radians, {distance} in cm, and the limits {nearest, furthest} of the distance.
+// changed(): called after every movement.
 export const createOrbit = (canvas, home, changed) => {
   const orbit = { ...home };
   const { nearest = 140, furthest = 1500 } = home;
@@ -14,20 +16,22 @@ export const createOrbit = (canvas, home, changed) => {
     changed();
   };
   orbit.reset = () => { Object.assign(orbit, home); changed(); };
+  // key -> what it does
   orbit.keys = {
     ArrowLeft: () => orbit.turn(-.1, 0), ArrowRight: () => orbit.turn(.1, 0), ArrowUp: () => orbit.turn(0, .07),
     ArrowDown: () => orbit.turn(0, -.07), "+": () => orbit.nearer(.9), "=": () => orbit.nearer(.9),
     "-": () => orbit.nearer(1.1),
   };
+  // Listens to the keys while `element` has the focus.
   orbit.listen = (element) => element.addEventListener("keydown", (event) => {
-    const act = orbit.keys[event.key.length === 1 ? event.key.toLowerCase() : event.key];
-    if (!act || event.target !== element || event.ctrlKey || event.metaKey || event.altKey) return;
+    const action = orbit.keys[event.key.length === 1 ? event.key.toLowerCase() : event.key];
+    if (!action || event.target !== element || event.ctrlKey || event.metaKey || event.altKey) return;
     event.preventDefault();
-    act();
+    action();
   });
 
-  const touches = new Map();
-  const spread = () => { const [p, q] = [...touches.values()]; return Math.max(1, Math.hypot(p[0] - q[0], p[1] - q[1])); };
+  const touches = new Map(); // pointer -> where it is, [x, y] in pixels
+  const fingerDistance = () => { const [p, q] = [...touches.values()]; return Math.max(1, Math.hypot(p[0] - q[0], p[1] - q[1])); };
   canvas.addEventListener("pointerdown", (event) => {
     canvas.setPointerCapture(event.pointerId);
     touches.set(event.pointerId, [event.clientX, event.clientY]);
@@ -35,9 +39,9 @@ export const createOrbit = (canvas, home, changed) => {
   canvas.addEventListener("pointermove", (event) => {
     const before = touches.get(event.pointerId);
     if (!before) return;
-    const was = touches.size === 2 ? spread() : 0;
+    const was = touches.size === 2 ? fingerDistance() : 0;
     touches.set(event.pointerId, [event.clientX, event.clientY]);
-    if (touches.size === 2) orbit.nearer(was / spread());
+    if (touches.size === 2) orbit.nearer(was / fingerDistance());
     else orbit.turn(-(event.clientX - before[0]) / 160, (event.clientY - before[1]) / 220);
   });
   for (const name of ["pointerup", "pointercancel"]) canvas.addEventListener(name, (event) => touches.delete(event.pointerId));

@@ -1,4 +1,4 @@
-// Theme, printing, and the mark of the current section in the list of contents.
+// Sets the theme, prepares the page for printing, and marks the current section in the list of contents.
 import { onTheme } from "./base.js";
 import { drawAll } from "./charts.js";
 import { views } from "./view.js";
@@ -7,7 +7,7 @@ export const startPage = () => {
   const root = document.documentElement, button = document.getElementById("theme");
   const themes = ["auto", "light", "dark"];
   const remembered = () => { try { return localStorage.getItem("hobble-theme"); } catch { return null; } };
-  const remember = (name) => { try { localStorage.setItem("hobble-theme", name); } catch { /* no storage for pages from disk */ } };
+  const remember = (name) => { try { localStorage.setItem("hobble-theme", name); } catch { /* no storage: the next visit starts with the automatic theme */ } };
   const recolour = () => onTheme.forEach((react) => react());
   const show = (name) => {
     if (name === "auto") delete root.dataset.theme; else root.dataset.theme = name;
@@ -24,7 +24,7 @@ export const startPage = () => {
   });
   matchMedia("(prefers-color-scheme: dark)").addEventListener("change", recolour);
 
-  // Printing draws all charts, opens folded tables and uses light colours.
+  // For printing, all charts and 3D views are drawn, folded tables with fewer than 120 rows are opened, and the colours are light.
   document.getElementById("print").addEventListener("click", () => print());
   let opened = [];
   addEventListener("beforeprint", () => {
@@ -41,7 +41,7 @@ export const startPage = () => {
   });
 
   const links = new Map([...document.querySelectorAll("nav a")].map((a) => [a.hash.slice(1), a]));
-  const seen = new Set();
+  const seen = new Set(); // ids of the sections on the screen
   const watch = new IntersectionObserver((entries) => {
     for (const entry of entries) seen[entry.isIntersecting ? "add" : "delete"](entry.target.id);
     const here = [...links.keys()].find((id) => seen.has(id));

@@ -1,17 +1,18 @@
-// The readings next to the played character: phase, contacts, gait, speed, milliseconds.
+// The panel with readings of the played character: speed, phase, contacts, gait, steps, recognised limp, and time per frame.
 import { drawLab } from "./lab.js";
 import { palette } from "./paint.js";
 import { createWatch, SECONDS } from "./recogniser.js";
 
 const FEET = ["left heel", "left toe", "right heel", "right toe"];
+// gait -> token of its colour
 const COLOURS = { stand: "g0", walk: "g1", jog: "g2", crouch: "g3", jump: "g4", bump: "g5" };
 const RECOGNISE_EVERY = 600; // ms between two answers of the recogniser
 const NS = "http://www.w3.org/2000/svg";
 
-// Runs when the browser is idle, so that no picture is late.
-const idle = (act) => (globalThis.requestIdleCallback ? requestIdleCallback(act, { timeout: 1000 }) : setTimeout(act));
+// Calls `run` when the browser is idle, so that no picture is late.
+const whenIdle = (run) => (globalThis.requestIdleCallback ? requestIdleCallback(run, { timeout: 1000 }) : setTimeout(run));
 
-const make = (parent, tag, className = "", text = "") => {
+const addElement = (parent, tag, className = "", text = "") => {
   const element = document.createElement(tag);
   element.className = className;
   element.textContent = text;
@@ -19,19 +20,20 @@ const make = (parent, tag, className = "", text = "") => {
   return element;
 };
 
+// host: the element to which the panel is added. actor: the character, see actor.js. title: heading of the panel, or "".
 export const createPanel = (host, actor, title = "") => {
-  const { spec } = actor, box = make(host, "div", "readings");
-  if (title) make(box, "h3", "", title);
-  const list = make(box, "dl"), row = (label) => {
-    const part = make(list, "div");
-    make(part, "dt", "", label);
-    return make(part, "dd");
+  const { spec } = actor, box = addElement(host, "div", "readings");
+  if (title) addElement(box, "h3", "", title);
+  const list = addElement(box, "dl"), addRow = (label) => {
+    const part = addElement(list, "div");
+    addElement(part, "dt", "", label);
+    return addElement(part, "dd");
   };
-  const speed = row("Speed"), phase = row("Phase"), down = row("On the ground"), gait = row("Gait"), lab = row("Contacts and knee angles, last 4 s"), steps = row("Length of the last step"), looks = spec.recogniser ? row(`Limp recognised, last ${SECONDS} s`) : null, cost = row("Time per frame");
-  const chart = make(lab, "canvas", "lab"), bends = make(lab, "span", "words"), lengths = make(steps, "span", "words");
+  const speed = addRow("Speed"), phase = addRow("Phase"), down = addRow("On the ground"), gait = addRow("Gait"), lab = addRow("Contacts and knee angles, last 4 s"), steps = addRow("Length of the last step"), limpRow = spec.recogniser ? addRow(`Limp recognised, last ${SECONDS} s`) : null, timeRow = addRow("Time per frame");
+  const chart = addElement(lab, "canvas", "lab"), bends = addElement(lab, "span", "words"), lengths = addElement(steps, "span", "words");
   chart.setAttribute("role", "img");
   chart.setAttribute("aria-label", "When each foot was on the ground, left above right, and the angle of its knee");
-  const number = make(speed, "span", "value");
+  const number = addElement(speed, "span", "value");
   const dial = document.createElementNS(NS, "svg"), hand = document.createElementNS(NS, "circle");
   dial.setAttribute("viewBox", "0 0 24 24");
   for (const circle of [document.createElementNS(NS, "circle"), hand]) {
@@ -39,26 +41,27 @@ export const createPanel = (host, actor, title = "") => {
     dial.append(circle);
   }
   phase.append(dial);
-  const turn = make(phase, "span"), feet = make(down, "span", "feet");
-  const dots = FEET.map((name) => { const dot = make(feet, "i"); dot.title = name; return dot; });
-  const standing = make(down, "span", "words"), bar = make(gait, "span", "shares"), words = make(gait, "span", "words");
+  const turn = addElement(phase, "span"), feet = addElement(down, "span", "feet");
+  const dots = FEET.map((name) => { const dot = addElement(feet, "i"); dot.title = name; return dot; });
+  const standing = addElement(down, "span", "words"), bar = addElement(gait, "span", "shares"), words = addElement(gait, "span", "words");
   const shares = spec.gaits.map((name) => {
-    const piece = make(bar, "i");
+    const piece = addElement(bar, "i");
     piece.style.background = `var(--${COLOURS[name] || "g0"})`;
     return piece;
   });
-  const note = make(box, "p", "note"), said = looks && make(looks, "span", "said"), sure = looks && make(looks, "span", "words");
-  let judged = 0;
-  if (looks) {
+  const note = addElement(box, "p", "note"), limpText = limpRow && addElement(limpRow, "span", "said"), limpShare = limpRow && addElement(limpRow, "span", "words");
+  let recognisedAt = 0;
+  if (limpRow) {
     actor.watch = createWatch(spec);
-    looks.title = "A recogniser trained on recordings of people who limp compares this walk with the healthy walk of the same figure. It is not told what hurts.";
+    limpRow.title = "A recogniser trained on recordings of people who limp compares this walk with the healthy walk of the same figure. It is not told what hurts.";
   }
 
   return {
     box,
+    // Shows the present readings. drawing: milliseconds that a picture takes.
     update(drawing) {
       const c = actor.character, M = spec.window, G = spec.gaits.length;
-      number.textContent = `${(Math.hypot(c.px[M] - c.px[M - 10], c.pz[M] - c.pz[M - 10]) * 6 / 100).toFixed(2)} m/s`;
+      number.textContent = `${(Math.hypot(c.px[M] - c.px[M - 10], c.pz[M] - c.pz[M - 10]) * 6 / 100).toFixed(2)} m/s`; // cm in 10 frames, to m/s
       hand.setAttribute("stroke-dasharray", `${c.phase.toFixed(3)} 1`);
       turn.textContent = c.phase.toFixed(2);
       FEET.forEach((name, i) => dots[i].classList.toggle("on", c.contacts[i] > .5));
@@ -69,14 +72,14 @@ export const createPanel = (host, actor, title = "") => {
       drawLab(chart, actor.lab, palette());
       bends.textContent = `knees ${knees.map((k) => `${(k.at(-1) ?? 0).toFixed(0)}°`).join(" and ")}, left and right`;
       lengths.textContent = `left ${cm(made[0])}, right ${cm(made[1])}`;
-      cost.textContent = `${actor.milliseconds.toFixed(1)} ms${drawing ? `, drawing ${drawing.toFixed(1)} ms` : ""}`;
+      timeRow.textContent = `${actor.milliseconds.toFixed(1)} ms${drawing ? `, drawing ${drawing.toFixed(1)} ms` : ""}`;
       const now = performance.now();
-      if (looks && now - judged > RECOGNISE_EVERY) {
-        judged = now;
-        idle(() => {
+      if (limpRow && now - recognisedAt > RECOGNISE_EVERY) {
+        recognisedAt = now;
+        whenIdle(() => {
           const { text, share } = actor.watch.say();
-          said.textContent = share === undefined ? "" : text;
-          sure.textContent = share === undefined ? text : `${Math.round(100 * share)} % sure`;
+          limpText.textContent = share === undefined ? "" : text;
+          limpShare.textContent = share === undefined ? text : `${Math.round(100 * share)} % sure`;
         });
       }
       note.textContent = actor.falls ? `fell ${actor.falls === 1 ? "once" : `${actor.falls} times`} and was put back on its feet` : "";

@@ -1,22 +1,24 @@
-// Curves of a walking body over time, for the recogniser, as in `hobble.gait.signals`. Units are degrees and leg lengths. Angles are
-// relative to the vertical and to the direction of travel.
+// Computes curves of a walking body over time, for the recogniser. `hobble.gait.signals` in Python does the same. Units are degrees and leg
+// lengths. Angles are relative to the vertical and to the direction of travel.
 import { cross, dot, minus } from "./numbers.js";
 
 export const SIDES = ["L", "R"];
-const NAMES = { L: "left", R: "right" };
+const SIDE_NAMES = { L: "left", R: "right" };
 export const LIMBS = ["hip_flexion", "hip_abduction", "knee_flexion", "ankle_height", "ankle_forward", "arm_forward"];
 export const MIDDLE = ["trunk_forward", "trunk_left", "pelvis_left_up"];
-export const SIGN_CHANGES = ["trunk_left", "pelvis_left_up"]; // they change their sign in a mirror
-const TRAVEL = .5; // s, sigma of the smoothing; the smoothed velocity of the hips is the direction of travel
+export const SIGN_CHANGES = ["trunk_left", "pelvis_left_up"]; // curves whose sign changes if the walk is mirrored
+const TRAVEL_SECONDS = .5; // sigma of the Gaussian that smooths the velocity of the hips, which gives the direction of travel
 
-const degrees = (a, b) => Math.atan2(a, b) * 180 / Math.PI;
-const scaled = (v, least = 1e-9) => { const n = Math.max(Math.hypot(...v), least); return v.map((x) => x / n); };
+// The angle in degrees from the two sides of a right triangle: opposite, adjacent.
+const angle = (a, b) => Math.atan2(a, b) * 180 / Math.PI;
+// The vector of length 1 in the direction of v.
+const normalised = (v, least = 1e-9) => { const n = Math.max(Math.hypot(...v), least); return v.map((x) => x / n); };
 export const median = (values) => {
   const sorted = [...values].sort((a, b) => a - b), n = sorted.length;
   return n % 2 ? sorted[(n - 1) / 2] : (sorted[n / 2 - 1] + sorted[n / 2]) / 2;
 };
 
-// Weighted mean of vectors of three with a Gaussian of `sigma` frames, cut off at 4 sigma. Past the ends the first and last value repeat.
+// Smooths vectors of three over frames with a Gaussian of `sigma` frames, cut off at 4 sigma. Past the ends, the first and last vector repeat.
 export const gaussian = (rows, sigma) => {
   const reach = Math.floor(4 * sigma + .5), n = rows.length, padded = new Float64Array(3 * (n + 2 * reach)), weights = new Float64Array(2 * reach + 1);
   let whole = 0;
@@ -34,65 +36,69 @@ export const gaussian = (rows, sigma) => {
   });
 };
 
-// Change per frame: half the difference of the frames on both sides; at the ends, the difference to the next frame.
+// The change per frame: half the difference of the frames before and after. At the ends, the difference of the last two frames there.
 const gradient = (rows) => rows.map((row, f) => {
   const a = Math.max(0, f - 1), b = Math.min(rows.length - 1, f + 1);
   return row.map((_, k) => (rows[b][k] - rows[a][k]) / (b - a));
 });
 
-const bend = (a, b, c) => {
+// Degrees by which the joint at b is bent between a and c. 0 is straight.
+const bendAngle = (a, b, c) => {
   const u = minus(b, a), v = minus(c, b);
-  return degrees(Math.hypot(...cross(u, v)), dot(u, v));
+  return angle(Math.hypot(...cross(u, v)), dot(u, v));
 };
 
-// spec: `names`, `roles`. frames: the places of all joints (3 J) of each frame, cm, Y up.
+// spec: has `names` (of joints) and `roles` (role -> joint). frames: the positions of all joints (3 J) of each frame, cm, Y up.
+// In the result, leg: leg length, cm. curves: name -> value in each frame. heading: direction of travel, degrees. ahead: cosine of the angle
+// between facing and travel. hips: path [x, z]. ankleSpeed: of each side, leg lengths a second. across: how far each ankle is to the left of
+// the hips.
 export const signals = (spec, frames, fps = 60) => {
   const joint = (role) => spec.names.indexOf(spec.roles[role]);
   const at = Object.fromEntries(Object.keys(spec.roles).map((role) => {
     const j = 3 * joint(role);
     return [role, frames.map((p) => [p[j], p[j + 1], p[j + 2]])];
   }));
-  const ahead = gaussian(gradient(at.hips), TRAVEL * fps).map(([x, , z]) => scaled([x, 0, z]));
+  const ahead = gaussian(gradient(at.hips), TRAVEL_SECONDS * fps).map(([x, , z]) => normalised([x, 0, z]));
   const left = ahead.map((a) => cross([0, 1, 0], a));
   const bone = (a, b) => median(at[a].map((p, f) => Math.hypot(...minus(p, at[b][f]))));
   const leg = ["left", "right"].reduce((sum, side) => sum + bone(`${side}_hip`, `${side}_knee`) + bone(`${side}_knee`, `${side}_heel`), 0) / 2;
-  const top = ["neck", "chest", "head"].find((role) => role in spec.roles);
-  const curves = {}, F = frames.map((_, f) => f);
+  const trunkTop = ["neck", "chest", "head"].find((role) => role in spec.roles);
+  const curves = {}, frameNumbers = frames.map((_, f) => f);
   for (const side of SIDES) {
-    const of = (part) => at[`${NAMES[side]}_${part}`], out = side === "L" ? left : left.map((v) => v.map((x) => -x));
-    const hand = of("elbow") || of("wrist"), thigh = F.map((f) => minus(of("knee")[f], of("hip")[f]));
+    const limb = (part) => at[`${SIDE_NAMES[side]}_${part}`], out = side === "L" ? left : left.map((v) => v.map((x) => -x));
+    const hand = limb("elbow") || limb("wrist"), thigh = frameNumbers.map((f) => minus(limb("knee")[f], limb("hip")[f]));
     Object.assign(curves, {
-      [`hip_flexion_${side}`]: F.map((f) => degrees(dot(thigh[f], ahead[f]), -thigh[f][1])),
-      [`hip_abduction_${side}`]: F.map((f) => degrees(dot(thigh[f], out[f]), -thigh[f][1])),
-      [`knee_flexion_${side}`]: F.map((f) => bend(of("hip")[f], of("knee")[f], of("heel")[f])),
-      [`ankle_height_${side}`]: F.map((f) => of("heel")[f][1] / leg),
-      [`ankle_forward_${side}`]: F.map((f) => dot(minus(of("heel")[f], at.hips[f]), ahead[f]) / leg),
-      [`arm_forward_${side}`]: F.map((f) => {
+      [`hip_flexion_${side}`]: frameNumbers.map((f) => angle(dot(thigh[f], ahead[f]), -thigh[f][1])),
+      [`hip_abduction_${side}`]: frameNumbers.map((f) => angle(dot(thigh[f], out[f]), -thigh[f][1])),
+      [`knee_flexion_${side}`]: frameNumbers.map((f) => bendAngle(limb("hip")[f], limb("knee")[f], limb("heel")[f])),
+      [`ankle_height_${side}`]: frameNumbers.map((f) => limb("heel")[f][1] / leg),
+      [`ankle_forward_${side}`]: frameNumbers.map((f) => dot(minus(limb("heel")[f], at.hips[f]), ahead[f]) / leg),
+      [`arm_forward_${side}`]: frameNumbers.map((f) => {
         if (!hand) return 0;
-        const arm = minus(hand[f], of("shoulder")[f]);
-        return degrees(dot(arm, ahead[f]), -arm[1]);
+        const arm = minus(hand[f], limb("shoulder")[f]);
+        return angle(dot(arm, ahead[f]), -arm[1]);
       }),
     });
   }
-  const trunk = F.map((f) => minus(at[top][f], at.hips[f]));
-  const pelvis = F.map((f) => minus(at.left_hip[f], at.right_hip[f])), shoulders = F.map((f) => minus(at.left_shoulder[f], at.right_shoulder[f]));
-  curves.trunk_forward = F.map((f) => degrees(dot(trunk[f], ahead[f]), trunk[f][1]));
-  curves.trunk_left = F.map((f) => degrees(dot(trunk[f], left[f]), trunk[f][1]));
-  curves.pelvis_left_up = F.map((f) => degrees(pelvis[f][1], Math.hypot(dot(pelvis[f], left[f]), dot(pelvis[f], ahead[f]))));
-  const across = F.map((f) => { const [a, b] = [scaled(pelvis[f]), scaled(shoulders[f])]; return a.map((v, i) => v + b[i]); });
-  const facing = gaussian(across.map((v) => cross(v, [0, 1, 0])), TRAVEL * fps).map((v) => scaled(v));
+  const trunk = frameNumbers.map((f) => minus(at[trunkTop][f], at.hips[f]));
+  const pelvis = frameNumbers.map((f) => minus(at.left_hip[f], at.right_hip[f])), shoulders = frameNumbers.map((f) => minus(at.left_shoulder[f], at.right_shoulder[f]));
+  curves.trunk_forward = frameNumbers.map((f) => angle(dot(trunk[f], ahead[f]), trunk[f][1]));
+  curves.trunk_left = frameNumbers.map((f) => angle(dot(trunk[f], left[f]), trunk[f][1]));
+  curves.pelvis_left_up = frameNumbers.map((f) => angle(pelvis[f][1], Math.hypot(dot(pelvis[f], left[f]), dot(pelvis[f], ahead[f]))));
+  const across = frameNumbers.map((f) => { const [a, b] = [normalised(pelvis[f]), normalised(shoulders[f])]; return a.map((v, i) => v + b[i]); });
+  const facing = gaussian(across.map((v) => cross(v, [0, 1, 0])), TRAVEL_SECONDS * fps).map((v) => normalised(v));
   const speed = (points) => gradient(points).map(([x, , z]) => Math.hypot(x, z) * fps / leg);
   return {
     fps, leg, curves,
     heading: unwrapped(ahead.map(([x, , z]) => Math.atan2(x, z))).map((v) => v * 180 / Math.PI),
-    ahead: F.map((f) => dot(facing[f], ahead[f])),
+    ahead: frameNumbers.map((f) => dot(facing[f], ahead[f])),
     hips: at.hips.map(([x, , z]) => [x / leg, z / leg]),
-    ankleSpeed: Object.fromEntries(SIDES.map((side) => [side, speed(at[`${NAMES[side]}_heel`])])),
-    across: Object.fromEntries(SIDES.map((side) => [side, F.map((f) => dot(minus(at[`${NAMES[side]}_heel`][f], at.hips[f]), left[f]) / leg)])),
+    ankleSpeed: Object.fromEntries(SIDES.map((side) => [side, speed(at[`${SIDE_NAMES[side]}_heel`])])),
+    across: Object.fromEntries(SIDES.map((side) => [side, frameNumbers.map((f) => dot(minus(at[`${SIDE_NAMES[side]}_heel`][f], at.hips[f]), left[f]) / leg)])),
   };
 };
 
-// Angles without jumps of a whole turn.
+// The same angles (radians), without jumps of a whole turn.
 const unwrapped = (angles) => {
   let turns = 0;
   return angles.map((angle, i) => {

@@ -1,9 +1,10 @@
-// The state of one character, which starts in a frame of the clips. Fields and units are those of `hobble.runtime.character` and
-// `hobble.runtime.controller`, with names in camel case. The path is px, pz (position) and dx, dz (direction).
+// The state of one character. It starts in the pose of a frame of the clips. Fields and units are those of `hobble.runtime.character` and
+// `hobble.runtime.controller`, with names in camel case. The path has an entry for each frame: px, pz (position) and dx, dz (direction).
 import { bytes } from "./numbers.js";
 import { at3, at4, multiply } from "./turns.js";
 
-// Sets the rotations to draw from those of the network. Joints that move no bone keep the rotation of their parent.
+// Returns a function (c) that sets the rotations to draw to those that the network predicted. The network predicts no rotations of joints
+// that move no part of the body, so such a joint gets the rotation of its parent.
 export const createDrawnTurns = (spec) => {
   const still = spec.parents.flatMap((p, j) => (p < 0 || spec.turning.includes(j) ? [] : [[j, p]]));
   return (c) => {
@@ -12,7 +13,7 @@ export const createDrawnTurns = (spec) => {
   };
 };
 
-// place: [x, z] in cm. heading: radians.
+// place: [x, z] in cm, and heading: yaw in radians, where the character starts. T: entries of the path. S: samples of it that the network gets.
 export const createState = (spec, place, heading) => {
   const { joints: J, step, gaits } = spec, T = 2 * spec.window, S = T / step, { sin, cos } = Math;
   const filled = (n, value = 0) => new Float64Array(n).fill(value), L = spec.channels.flatMap(({ columns }) => columns).length;
@@ -30,10 +31,11 @@ export const createState = (spec, place, heading) => {
   return c;
 };
 
+// Sets path, gait, phase and pose of `c` to those of spec.start, turned by `heading` and moved to `place`.
 const startInClip = (spec, c, place, heading) => {
   const T = 2 * spec.window, J = spec.joints, { sin, cos } = Math;
-  const at = (name) => new Float32Array(bytes(spec.start[name])), [si, co] = [sin(heading), cos(heading)];
-  const [path, ahead, joints, velocities] = ["position", "direction", "joint_position", "joint_velocity"].map(at);
+  const startArray = (name) => new Float32Array(bytes(spec.start[name])), [si, co] = [sin(heading), cos(heading)];
+  const [path, ahead, joints, velocities] = ["position", "direction", "joint_position", "joint_velocity"].map(startArray);
   for (let t = 0; t < T; t++) {
     c.px[t] = path[2 * t] * co + path[2 * t + 1] * si + place[0];
     c.pz[t] = path[2 * t + 1] * co - path[2 * t] * si + place[1];
@@ -45,11 +47,11 @@ const startInClip = (spec, c, place, heading) => {
     to[j + 1] = from[j + 1];
     to[j + 2] = from[j + 2] * co - from[j] * si + b;
   }
-  c.gait.set(at("gait"));
+  c.gait.set(startArray("gait"));
   c.phase = spec.start.phase;
   c.posePosition.set(c.jointPosition);
   c.legShown = spec.legs.map(([, ...below]) => below.map((j) => at3(c.jointPosition, j)));
-  const rotations = at("joint_rotation"), facing = [cos(heading / 2), 0, sin(heading / 2), 0];
+  const rotations = startArray("joint_rotation"), facing = [cos(heading / 2), 0, sin(heading / 2), 0];
   for (let j = 0; j < J; j++) c.jointRotation.set(multiply(facing, at4(rotations, j)), 4 * j);
   createDrawnTurns(spec)(c);
 };

@@ -1,15 +1,17 @@
-// The target of the character from keys, a gamepad, or a thumb on the disc.
+// Computes the target of the character from keys, a gamepad, or a thumb on the disc in the corner of the view.
 import { find } from "./base.js";
 
 // Keys are named by their place on the keyboard, not by letter, so that WASD is in the same place on every layout.
-const CODES = {
+// key -> its direction [right, ahead], as the camera sees it
+const DIRECTIONS = {
   KeyW: [0, 1], KeyS: [0, -1], KeyA: [-1, 0], KeyD: [1, 0],
   ArrowUp: [0, 1], ArrowDown: [0, -1], ArrowLeft: [-1, 0], ArrowRight: [1, 0],
 };
 const SPEED = { crouch: 2, walk: 2.5, jog: 7 }; // cm a frame
 
 export const createSteering = (stage, orbit) => {
-  const held = new Set(), stick = { x: 0, y: 0 }, on = { crouch: false, jog: false, strafe: false };
+  // pressed: codes of the keys that are down. stick: where the thumb is on the disc, -1 to 1. on: which buttons are on.
+  const pressed = new Set(), stick = { x: 0, y: 0 }, on = { crouch: false, jog: false, strafe: false };
   const steering = { on };
 
   steering.toggle = (name, value = !on[name]) => {
@@ -20,17 +22,17 @@ export const createSteering = (stage, orbit) => {
   };
   for (const name of Object.keys(on)) find(`play-${name}`).addEventListener("click", () => steering.toggle(name));
 
-  // The target now, relative to the camera: velocity [x, z], facing [x, z] or null, gait or null.
+  // The target now: velocity [x, z], facing [x, z] or null, gait or null, in the world. Keys and sticks are relative to the camera.
   steering.target = () => {
-    let [right, ahead] = [stick.x, -stick.y], fast = on.jog || held.has("ShiftLeft") || held.has("ShiftRight"), look = on.strafe;
-    for (const code of held) if (CODES[code]) { right += CODES[code][0]; ahead += CODES[code][1]; }
+    let [right, ahead] = [stick.x, -stick.y], fast = on.jog || pressed.has("ShiftLeft") || pressed.has("ShiftRight"), keepsFacing = on.strafe;
+    for (const code of pressed) if (DIRECTIONS[code]) { right += DIRECTIONS[code][0]; ahead += DIRECTIONS[code][1]; }
     const pad = [...(navigator.getGamepads ? navigator.getGamepads() : [])].find((p) => p && p.connected);
     if (pad) {
       const dead = (v) => (Math.abs(v) < .15 ? 0 : v);
       right += dead(pad.axes[0]);
       ahead -= dead(pad.axes[1]);
       fast = fast || pad.buttons[0]?.pressed;
-      look = look || pad.buttons[4]?.pressed;
+      keepsFacing = keepsFacing || pad.buttons[4]?.pressed;
       orbit.yaw -= .04 * dead(pad.axes[2] || 0);
     }
     const size = Math.hypot(right, ahead);
@@ -38,12 +40,12 @@ export const createSteering = (stage, orbit) => {
     const gait = on.crouch ? "crouch" : fast ? "jog" : "walk", { yaw } = orbit;
     const forward = [-Math.sin(yaw), -Math.cos(yaw)], side = [-forward[1], forward[0]];
     const velocity = [0, 1].map((i) => SPEED[gait] * (ahead * forward[i] + right * side[i]));
-    return { velocity, facing: look ? forward : null, gait: gait === "walk" && !size ? null : gait };
+    return { velocity, facing: keepsFacing ? forward : null, gait: gait === "walk" && !size ? null : gait };
   };
-  steering.release = () => held.clear();
+  steering.release = () => pressed.clear();
 
-  // act(event): handles all other keys. Returns true if the key did something.
-  steering.listen = (act) => {
+  // Listens to the keys. onKey(event): called for a key that steering does not use; it returns whether the key had an effect.
+  steering.listen = (onKey) => {
     stage.addEventListener("keydown", (event) => {
       if (event.target !== stage || event.ctrlKey || event.metaKey || event.altKey) return;
       if (event.code === "KeyC") { if (!event.repeat) steering.toggle("crouch"); }
@@ -52,12 +54,12 @@ export const createSteering = (stage, orbit) => {
       else if (event.code === "KeyE") orbit.turn(-.08, 0);
       else if (event.code === "Equal") orbit.nearer(.9);
       else if (event.code === "Minus") orbit.nearer(1.1);
-      else if (CODES[event.code] || event.code.startsWith("Shift")) held.add(event.code);
-      else if (!act(event)) return;
+      else if (DIRECTIONS[event.code] || event.code.startsWith("Shift")) pressed.add(event.code);
+      else if (!onKey(event)) return;
       event.preventDefault();
     });
-    stage.addEventListener("keyup", (event) => held.delete(event.code));
-    stage.addEventListener("blur", () => held.clear());
+    stage.addEventListener("keyup", (event) => pressed.delete(event.code));
+    stage.addEventListener("blur", () => pressed.clear());
   };
 
   const pad = find("play-pad");

@@ -1,4 +1,4 @@
-// Label strips: contacts, phase, gait, speed and channel values of one clip over time.
+// Draws label strips: the contacts, phase, gait, speed and channel values of one clip over time.
 import { colour, material, onTheme } from "./base.js";
 
 export const startStrips = () => {
@@ -14,6 +14,7 @@ export const startStrips = () => {
     return node;
   };
   const SHORT = { left_heel: "left heel", left_toe: "left toe", right_heel: "right heel", right_toe: "right toe" };
+  // gait -> token of its colour
   const GAITS = { stand: "g0", walk: "g1", jog: "g2", crouch: "g3", jump: "g4", bump: "g5" };
 
   const draw = () => {
@@ -25,10 +26,11 @@ export const startStrips = () => {
     const label = (text, at, size = 12) => {
       add(svg, "text", { x: left - 10, y: at, "text-anchor": "end", style: `font-size:${size}px` }, text);
     };
+    // A bar from time a to time b, s.
     const bar = (a, b, y, fill, opacity = 1) => {
       add(svg, "rect", { x: x(a), y, width: Math.max(1, x(b) - x(a)), height: 11, rx: 2, fill, opacity });
     };
-    let y = 8;
+    let y = 8; // where the next strip begins
     for (const [name, spans] of Object.entries(strip.contacts)) {
       label(SHORT[name] || name, y + 10);
       add(svg, "line", { x1: left, x2: width - right, y1: y + 5.5, y2: y + 5.5, stroke: colour("line") });
@@ -79,7 +81,8 @@ export const startStrips = () => {
     }
     svg.setAttribute("viewBox", `0 0 ${width} ${y + 22}`);
     const cursor = add(svg, "line", { x1: -9, x2: -9, y1: 4, y2: y, stroke: colour("accent") });
-    const key = (i) => {
+    // Shows the gaits with their colours and, under the pointer, the labels of sample i. i: null if the pointer is outside.
+    const showKey = (i) => {
       keys.replaceChildren();
       const item = (text, swatch) => {
         const span = document.createElement("span");
@@ -97,19 +100,19 @@ export const startStrips = () => {
       const down = Object.entries(strip.contacts).filter(([, s]) => s.some(([a, b]) => a <= times[i] && times[i] < b));
       item(down.map(([name]) => SHORT[name] || name).join(", ") || "no contact");
     };
-    key(null);
+    showKey(null);
     svg.addEventListener("pointermove", (event) => {
       const at = end * (event.clientX - svg.getBoundingClientRect().left - left) / (width - left - right);
       let i = times.findIndex((t) => t >= at);
       if (i < 0) i = times.length - 1;
       cursor.setAttribute("x1", x(times[i]));
       cursor.setAttribute("x2", x(times[i]));
-      key(i);
+      showKey(i);
     });
     svg.addEventListener("pointerleave", () => {
       cursor.setAttribute("x1", -9);
       cursor.setAttribute("x2", -9);
-      key(null);
+      showKey(null);
     });
   };
   select.addEventListener("change", draw);

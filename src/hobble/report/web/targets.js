@@ -1,19 +1,20 @@
-// Converts the targets of `ProceduralAnimation.next_pose` (velocity [x, z], facing [x, z] or null, gait or null) for the trajectory.
-// Applies the limits of a hurt body, as in `hobble.runtime.limits`: a highest speed, and a walk instead of a jog if the body cannot jog.
+// Converts the caller's target for the trajectory. A target is that of `ProceduralAnimation.next_pose` in Python: velocity ([x, z], cm a frame),
+// facing ([x, z], or null to look where the character goes) and gait (its name, or null to choose by speed). The limits of the body are those
+// of `hobble.runtime.limits`: a highest speed, and a walk instead of a jog if the body cannot jog.
 import { wrap } from "./numbers.js";
 
 export const createTargets = (spec, c) => {
   const { gaits, constants: k } = spec, M = spec.window, G = gaits.length, { atan2, hypot, min, max, abs } = Math;
 
-  // [share of strafing from 0 to 1, direction [x, z] in which to look]
-  const facing = (velocity, ahead) => {
+  // Returns [strafe, direction]: the share of strafing from 0 to 1, and the direction [x, z] in which to look. ahead: the facing of the target.
+  const chooseFacing = (velocity, ahead) => {
     const going = hypot(...velocity) >= k.still;
     if (!ahead) return [0, going ? velocity : c.smoothedDirection];
     const aside = abs(wrap(atan2(...velocity) - atan2(...ahead)));
     return [going ? min(1, aside / k.strafeFrom) : 1, ahead];
   };
-  // The share of each gait.
-  const shares = (velocity, direction, gait) => {
+  // The target share of each gait. direction: in which to look.
+  const gaitShares = (velocity, direction, gait) => {
     const out = new Array(G).fill(0), speed = hypot(...velocity), name = gait || (speed >= k.jogFrom ? "jog" : "walk");
     if (speed < k.still) {
       const [a, b] = [c.dx[M], c.dz[M]];
@@ -27,46 +28,47 @@ export const createTargets = (spec, c) => {
     return out;
   };
 
+  // The channels that limit the speed.
   const limited = spec.channels.filter((one) => one.limits);
   // The highest speed in gait g, cm a frame, under the limits of all channels, as in `combine_limits` of `hobble.channels.speed_limits`.
-  const allowed = (g) => {
+  const highestSpeed = (g) => {
     let least = Infinity, slowed = limited[0].limits.usual[g];
     const usual = slowed;
     for (const { first, limits } of limited) {
       const { levels, speeds } = limits;
-      let most = Infinity;
+      let highest = Infinity;
       for (let l = 0; l < speeds[g].length; l++) {
         const v = c.channelValues[first + l];
         if (!(v > 0)) continue;
         let i = 0;
         while (i < levels.length - 2 && levels[i + 1] <= v) i++;
         const [low, high] = [speeds[g][l][i], speeds[g][l][i + 1]];
-        most = min(most, low + (v - levels[i]) / (levels[i + 1] - levels[i]) * (high - low));
+        highest = min(highest, low + (v - levels[i]) / (levels[i + 1] - levels[i]) * (high - low));
       }
-      least = min(least, most);
-      if (usual > 0) slowed *= min(1, most / usual);
+      least = min(least, highest);
+      if (usual > 0) slowed *= min(1, highest / usual);
     }
     return least < usual ? slowed : least;
   };
-  // The velocity within the limits. Changes the shares of gaits in `gait` if the body cannot jog.
-  const hold = (velocity, gait) => {
+  // The target velocity within the limits. gait: the target share of each gait. It is changed if the body cannot jog.
+  const limitSpeed = (velocity, gait) => {
     if (!limited.some(({ first, columns: own }) => own.some((_, l) => c.channelValues[first + l] > 0))) return velocity;
-    const each = gaits.map((_, g) => allowed(g)), walk = gaits.indexOf("walk"), jog = gaits.indexOf("jog");
+    const highestSpeeds = gaits.map((_, g) => highestSpeed(g)), walk = gaits.indexOf("walk"), jog = gaits.indexOf("jog");
     let hurry = 1;
-    if (each[jog] < k.lameBelow) {
+    if (highestSpeeds[jog] < k.lameBelow) {
       hurry += (k.hurryFactor - 1) * gait[jog];
       gait[walk] += gait[jog];
       gait[jog] = 0;
     }
-    let whole = 0, most = 0;
+    let total = 0, highest = 0;
     gaits.forEach((name, g) => {
       if (name === "stand" || !(gait[g] > 0)) return;
-      whole += gait[g];
-      most += gait[g] * each[g];
+      total += gait[g];
+      highest += gait[g] * highestSpeeds[g];
     });
-    const held = whole > 0 ? min(1, hurry * most / whole / max(hypot(...velocity), 1e-9)) : 1;
+    const held = total > 0 ? min(1, hurry * highest / total / max(hypot(...velocity), 1e-9)) : 1;
     return velocity.map((v) => v * held);
   };
 
-  return { facing, shares, hold };
+  return { chooseFacing, gaitShares, limitSpeed };
 };

@@ -1,12 +1,15 @@
-// The path of the root over two seconds, half of them ahead, as in `hobble.runtime.trajectory`.
+// The path of the root over two seconds, half past and half future, as in `hobble.runtime.trajectory` and `hobble.runtime.advance`. It has T
+// entries, one for each frame; entry M is the present. The network gets S samples of it, F of them from the present on. G: number of gaits.
+// k: the constants of the Python runtime. c: the state of the character, see state.js.
 import { wrap } from "./numbers.js";
 
 export const createTrajectory = (spec, c) => {
   const { step, y: Y, gaits, constants: k } = spec, T = 2 * spec.window, M = spec.window, S = T / step, F = M / step, G = gaits.length;
   const { atan2, sin, cos, hypot, floor, min, max, abs, sqrt } = Math;
 
-  // Steering, as in `_ask_velocity` and `_ask_turn` of hobble.runtime.trajectory: the error of the velocity over half of
-  // the past is added to the target, and a steady error is added up in `correction`.
+  // The velocity [x, z] to ask the network for, so that the character reaches the target velocity [x, z]. As in `_ask_velocity` in Python, the
+  // share spec.steering of the velocity's error is added to the target, and a steady error is added up in `correction`. speed: of the target. goingX,
+  // goingZ: the mean velocity over the later half of the past.
   const askVelocity = ([x, z], speed, [goingX, goingZ]) => {
     const a = x - goingX, b = z - goingZ, more = [spec.steering * a, spec.steering * b];
     if (speed < k.still) c.correction = [0, 0];
@@ -23,7 +26,7 @@ export const createTrajectory = (spec, c) => {
     return [x + more[0] * limit, z + more[1] * limit];
   };
 
-  // Turn the path ahead toward the target.
+  // Turns the future path toward the target. direction: in which to look. strafe: share of strafing. gait: target shares of the gaits.
   const steer = (velocity, direction, strafe, gait) => {
     const speed = hypot(...velocity), span = floor(M / 2);
     let corrected = velocity, targetYaw = atan2(...direction);
@@ -43,13 +46,13 @@ export const createTrajectory = (spec, c) => {
     const biasPosition = .5 + .5 * c.strafe, biasDirection = 2 - 1.5 * c.strafe, goal = atan2(...c.smoothedDirection);
     let oldX = c.px[M], oldZ = c.pz[M];
     for (let i = M + 1; i < T; i++) {
-      const left = 1 - (i - M) / M, stepX = c.px[i] - oldX, stepZ = c.pz[i] - oldZ;
-      let share = 1 - left ** biasPosition;
+      const remaining = 1 - (i - M) / M, stepX = c.px[i] - oldX, stepZ = c.pz[i] - oldZ;
+      let share = 1 - remaining ** biasPosition;
       oldX = c.px[i];
       oldZ = c.pz[i];
       c.px[i] = c.px[i - 1] + stepX + share * (c.smoothedVelocity[0] - stepX);
       c.pz[i] = c.pz[i - 1] + stepZ + share * (c.smoothedVelocity[1] - stepZ);
-      share = 1 - left ** biasDirection;
+      share = 1 - remaining ** biasDirection;
       let yaw = atan2(c.dx[i], c.dz[i]);
       yaw += share * wrap(goal - yaw);
       c.dx[i] = sin(yaw);
@@ -58,7 +61,7 @@ export const createTrajectory = (spec, c) => {
     }
   };
 
-  // Sample the ground beside and under the path.
+  // Samples the ground under the path and to both sides of it. ground(x, z): height, cm.
   const sample = (ground) => {
     c.rootHeight = 0;
     for (let s = 0; s < S; s++) {
@@ -75,17 +78,17 @@ export const createTrajectory = (spec, c) => {
     }
   };
 
-  // The movement [a, b] of the root. With steering, and without motion matching, its part against the target is halved. While the
-  // target is to stand, the whole movement is halved.
-  const limited = (a, b, target) => {
+  // The root's movement [a, b] without a share of its component against the target. While the target is to stand, the same share of the whole
+  // movement is removed. The share is k.backwardLoss with steering; it is 0 without steering, or with motion matching (spec.recordedPoses).
+  const withoutBackward = (a, b, target) => {
     const loss = spec.steering > 0 && !spec.recordedPoses ? k.backwardLoss : 0, squared = target[0] ** 2 + target[1] ** 2;
     if (squared < k.still ** 2) return [(1 - loss) * a, (1 - loss) * b];
     const against = loss * min(0, a * target[0] + b * target[1]) / squared;
     return [a - against * target[0], b - against * target[1]];
   };
-  // With motion matching, change the movement a little toward the target, because clips have only some directions and speeds:
-  // across the target by a share of the movement, and along it by half of that.
-  const pulled = ([a, b], target) => {
+  // The root's movement, changed a little toward the target. This is done with motion matching, because clips have only some directions and
+  // speeds. The change is limited: across the target to k.pull times the length of the movement, along the target to k.pullAhead times that.
+  const pulledToTarget = ([a, b], target) => {
     const most = spec.steering > 0 && spec.recordedPoses ? k.pull * hypot(a, b) : 0, size = hypot(...target);
     const ahead = size >= k.still ? target.map((v) => v / size) : [0, 0], lack = [target[0] - a, target[1] - b];
     const along = lack[0] * ahead[0] + lack[1] * ahead[1], across = lack.map((v, i) => v - along * ahead[i]);
@@ -93,7 +96,7 @@ export const createTrajectory = (spec, c) => {
     return [a + more * ahead[0] + share * across[0], b + more * ahead[1] + share * across[1]];
   };
 
-  // Advance by a frame: the root and the path ahead move as the outputs say.
+  // Advances by a frame: the past path is shifted, and the root and the future path move as the outputs y say. target: velocity.
   const advance = (y, target) => {
     for (let i = 0; i < M; i++) {
       c.px[i] = c.px[i + 1];
@@ -104,7 +107,7 @@ export const createTrajectory = (spec, c) => {
     }
     const moving = spec.recordedPoses ? 1 : max(0, 1 - c.gait[M * G]) ** .25, [vx, vz] = [y[Y.root_velocity], y[Y.root_velocity + 1]];
     let yaw = atan2(c.dx[M], c.dz[M]);
-    const [a, b] = pulled(limited(moving * (vx * cos(yaw) + vz * sin(yaw)), moving * (vz * cos(yaw) - vx * sin(yaw)), target), target);
+    const [a, b] = pulledToTarget(withoutBackward(moving * (vx * cos(yaw) + vz * sin(yaw)), moving * (vz * cos(yaw) - vx * sin(yaw)), target), target);
     c.px[M] += a;
     c.pz[M] += b;
     yaw -= moving * y[Y.turn];

@@ -1,24 +1,28 @@
-// Rotations: quaternions, w first, four numbers at `i` of an array.
+// Computes with rotations. A rotation is a quaternion [w, x, y, z]. Flat arrays have four numbers for each rotation.
 import { cross, dot } from "./numbers.js";
 
+// The rotation that turns by the second argument first, then by the first.
 export const multiply = ([a, b, c, d], [e, f, g, h]) => [
   a * e - b * f - c * g - d * h, a * f + b * e + c * h - d * g, a * g - b * h + c * e + d * f, a * h + b * g - c * f + d * e,
 ];
+// The inverse rotation.
 export const conjugate = ([w, x, y, z]) => [w, -x, -y, -z];
+// The vector v, turned by q.
 export const rotate = (q, v) => {
   const axis = [q[1], q[2], q[3]], t = cross(axis, v).map((x) => 2 * x), more = cross(axis, t);
   return v.map((x, i) => x + q[0] * t[i] + more[i]);
 };
-// The smallest rotation from direction a to b; the identity if they are opposite.
+// The smallest rotation from direction a to direction b. If they are opposite, no rotation.
 export const between = (a, b) => {
   const w = Math.hypot(...a) * Math.hypot(...b) + dot(a, b), v = cross(a, b), n = Math.hypot(w, ...v);
   return n < 1e-9 ? [1, 0, 0, 0] : [w / n, v[0] / n, v[1] / n, v[2] / n];
 };
+// Rotation j of a flat array of rotations, and position j of a flat array of positions.
 export const at4 = (array, j) => [array[4 * j], array[4 * j + 1], array[4 * j + 2], array[4 * j + 3]];
 export const at3 = (array, j) => [array[3 * j], array[3 * j + 1], array[3 * j + 2]];
 
-// Interpolates along the shorter way from the rotation at `i` of `a` (t = 0) to the rotation at `k` of `b` (t = 1). Writes the result
-// into `out` at `o`.
+// Interpolates along the shorter way from the rotation at index `i` of `a` (t = 0) to the rotation at index `k` of `b` (t = 1). Writes the
+// result into `out` at index `o`.
 export const mixTurn = (a, i, b, k, t, out, o) => {
   const near = a[i] * b[k] + a[i + 1] * b[k + 1] + a[i + 2] * b[k + 2] + a[i + 3] * b[k + 3] < 0 ? -t : t;
   let n = 0;

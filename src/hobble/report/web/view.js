@@ -1,5 +1,5 @@
-// A lit scene on a canvas. All views of the page share one WebGL context. Each view copies its picture to its own canvas, where it can be
-// printed and saved. Centimetres, Y up.
+// A view: a 3D scene with lights on a canvas. All views of the page share one WebGL context, whose picture each view copies to its own canvas.
+// There it can be printed and saved. Units are centimetres, Y is up.
 import {
   DirectionalLight, HemisphereLight, PerspectiveCamera, Scene, VSMShadowMap, WebGLRenderer,
 } from "three";
@@ -10,22 +10,22 @@ import { cross, dot, minus, unit } from "./numbers.js";
 import { createOrbit } from "./orbit.js";
 import { palette } from "./paint.js";
 
-// For printing: functions that draw each view, even if it was never scrolled to.
+// A function for each view that draws it, even if the user never scrolled to it. They are called before printing.
 export const views = [];
 
-// Levels of quality, best first. scale: pixels drawn for each CSS pixel. shadow: size of the shadow map. balls: round parts
-// of bodies that darken the ground under them.
+// Levels of quality, best first. scale: pixels drawn for each CSS pixel, at most. shadow: size of the shadow map, or 0 for no shadows. balls: how
+// many round parts of bodies darken the ground.
 const LEVELS = [{ scale: 2, shadow: 768, balls: 24 }, { scale: 1, shadow: 512, balls: 16 }, { scale: .8, shadow: 0, balls: 12 }];
 const SLOW = 50, PATIENCE = 24; // if more than PATIENCE pictures take longer than SLOW ms, the quality goes down a level
 const requested = new URLSearchParams(location.search).get("quality");
 let level = 0, slow = 0;
 
 let renderer = null;
-// The renderer, false without WebGL. first: the canvas of the view that is drawn first; the renderer's canvas gets its size.
-const shared = (first) => {
+// The renderer that all views share; false without WebGL. firstCanvas: a canvas whose size the renderer's canvas gets when it is created.
+const getRenderer = (firstCanvas) => {
   if (renderer === null) {
     try {
-      const [width, height] = first ? [first.clientWidth, first.clientHeight] : [300, 150];
+      const [width, height] = firstCanvas ? [firstCanvas.clientWidth, firstCanvas.clientHeight] : [300, 150];
       const canvas = Object.assign(document.createElement("canvas"), { width, height });
       renderer = new WebGLRenderer({ canvas, antialias: true, alpha: true, powerPreference: "high-performance" });
       renderer.shadowMap.enabled = true;
@@ -40,7 +40,7 @@ const shared = (first) => {
   return renderer;
 };
 
-const lit = (scene) => {
+const createLights = (scene) => {
   const sky = new HemisphereLight(), key = new DirectionalLight(), rim = new DirectionalLight();
   key.shadow.mapSize.set(LEVELS[0].shadow, LEVELS[0].shadow);
   Object.assign(key.shadow, { radius: 6, blurSamples: 12, bias: -.0004, normalBias: 1, intensity: .85 });
@@ -48,14 +48,14 @@ const lit = (scene) => {
   scene.add(sky, key, key.target, rim, rim.target);
   return {
     // Changes the size of the shadow map; 0 draws no shadows.
-    fine(size) {
+    setShadowSize(size) {
       key.castShadow = size > 0;
       if (!size || key.shadow.mapSize.x === size) return;
       key.shadow.mapSize.set(size, size);
       key.shadow.map?.dispose();
       key.shadow.map = null;
     },
-    colour(paint) {
+    setColours(paint) {
       sky.color.set(paint.dark ? 0xaebfd0 : 0xffffff);
       sky.groundColor.set(paint.dark ? 0x30363c : 0xbcb8b0);
       sky.intensity = paint.dark ? 1.0 : 1.45;
@@ -64,7 +64,7 @@ const lit = (scene) => {
       rim.color.set(paint.dark ? 0x9fd4e0 : 0xdfeef5);
       rim.intensity = paint.dark ? 1.1 : .7;
     },
-    // Places the lights relative to the camera: the key light to the left of it, the rim light behind the body.
+    // Places the lights around a point: the key light to the left of the camera, the rim light behind the body. yaw: of the camera.
     aim([x, y, z], yaw) {
       const put = (light, turn, out, up) => {
         light.target.position.set(x, y, z);
@@ -77,40 +77,43 @@ const lit = (scene) => {
   };
 };
 
-// draw(now, view) is called after `view.ask()`, once the canvas can be seen.
+// home: where the camera starts, see orbit.js. draw(now, view): sets up the scene for a picture at time `now`, ms. It is called after
+// `view.requestDraw()`, if the canvas is on the screen.
 export const createView = (canvas, home, draw) => {
   const context = canvas.getContext("2d"), scene = new Scene(), camera = new PerspectiveCamera(30, 1, 10, 6000);
-  const lights = lit(scene);
+  const lights = createLights(scene);
+  // eye: position of the camera. right, up, ahead: its axes. seen: whether the canvas is on the screen. waiting: whether a picture was requested.
+  // drawnAt: time of the last picture, ms. drawnFor: level of quality for which the size was set, or -1.
   let scale = 1, eye = [0, 0, 1], right, up, ahead, seen = false, waiting = false, drawnAt = 0, drawnFor = -1;
   // framing: size of the body in the picture, and its shift as a share of the picture's width (aside) and height (up).
   const view = { scene, W: 0, H: 0, zoom: 1, paint: {}, milliseconds: 0, framing: { size: 1.75, aside: 0, up: 0 }, balls: 12, inputs: false, onHidden: () => {} };
   view.land = createLand(scene);
   view.marks = createMarks(scene);
-  view.over = createMarks(scene, { most: 400, over: true });
+  view.marksInFront = createMarks(scene, { most: 400, over: true });
 
   const paint = (now) => {
-    if (drawnFor < 0) return; // not laid out yet
+    if (drawnFor < 0) return; // the browser has not laid out the canvas yet
     if (view.W < 4 || view.H < 4) return; // the window is opening or closing
-    const gl = shared();
+    const gl = getRenderer();
     if (!gl) {
       context.fillStyle = "gray";
       context.fillText("This browser draws no 3D pictures (WebGL is off).", 16 * scale, 24 * scale);
       return;
     }
-    if (drawnFor !== level) fit();
+    if (drawnFor !== level) setSize();
     // Lower the quality if pictures keep coming slowly.
     slow = now - drawnAt > SLOW && now - drawnAt < 1000 ? slow + 1 : Math.max(0, slow - 2);
     drawnAt = now;
     if (slow > PATIENCE && level + 1 < LEVELS.length && !requested) { level++; slow = 0; }
     view.marks.clear();
-    view.over.clear();
+    view.marksInFront.clear();
     draw(now, view);
-    const before = performance.now(), [w, h] = [canvas.width, canvas.height], room = gl.domElement;
-    if (room.width < w || room.height < h) gl.setSize(Math.max(room.width, w), Math.max(room.height, h), false);
+    const before = performance.now(), [w, h] = [canvas.width, canvas.height], glCanvas = gl.domElement;
+    if (glCanvas.width < w || glCanvas.height < h) gl.setSize(Math.max(glCanvas.width, w), Math.max(glCanvas.height, h), false);
     gl.setViewport(0, 0, w, h);
     gl.setScissor(0, 0, w, h);
-    view.marks.done();
-    view.over.done();
+    view.marks.upload();
+    view.marksInFront.upload();
     gl.render(scene, camera);
     // Draw the sky first, so that saved pictures and films have one.
     const sky = context.createLinearGradient(0, 0, 0, h), [r, g, b] = view.paint.sky, [u, v, t] = view.paint.zenith;
@@ -118,15 +121,16 @@ export const createView = (canvas, home, draw) => {
     sky.addColorStop(.7, `rgb(${r},${g},${b})`);
     context.fillStyle = sky;
     context.fillRect(0, 0, w, h);
-    context.drawImage(room, 0, room.height - h, w, h, 0, 0, w, h);
+    context.drawImage(glCanvas, 0, glCanvas.height - h, w, h, 0, 0, w, h);
     view.milliseconds += .1 * (performance.now() - before - view.milliseconds);
   };
-  view.ask = () => {
+  view.requestDraw = () => {
     if (waiting || !seen) return;
     waiting = true;
     requestAnimationFrame((now) => { waiting = false; paint(now); });
   };
-  view.orbit = createOrbit(canvas, home, () => view.ask());
+  view.orbit = createOrbit(canvas, home, () => view.requestDraw());
+  // Points the camera at a target [x, y, z].
   view.aim = (target) => {
     const { yaw, pitch, distance } = view.orbit, c = Math.cos(pitch);
     const away = [c * Math.sin(yaw), Math.sin(pitch), c * Math.cos(yaw)];
@@ -143,7 +147,7 @@ export const createView = (canvas, home, draw) => {
     camera.updateProjectionMatrix();
     lights.aim(target, yaw);
   };
-  // The x and y of a point on the screen, and its distance from the camera along the view.
+  // Returns [x, y, distance]: where a point is on the canvas, in pixels, and its distance from the camera along the view, cm.
   view.project = (p) => {
     const d = minus(p, eye), z = Math.max(1, dot(d, ahead));
     const { aside, up: raised } = view.framing;
@@ -152,42 +156,42 @@ export const createView = (canvas, home, draw) => {
 
   const recolour = () => {
     view.paint = palette();
-    lights.colour(view.paint);
-    view.land.colour(view.paint);
-    view.ask();
+    lights.setColours(view.paint);
+    view.land.setColours(view.paint);
+    view.requestDraw();
   };
   onTheme.push(recolour);
   recolour();
-  const fit = () => {
+  const setSize = () => {
     drawnFor = level;
     view.W = canvas.clientWidth;
     view.H = canvas.clientHeight;
     scale = Math.min(LEVELS[level].scale, level ? 1 : devicePixelRatio || 1);
     [canvas.width, canvas.height] = [Math.round(view.W * scale), Math.round(view.H * scale)];
-    lights.fine(LEVELS[level].shadow);
+    lights.setShadowSize(LEVELS[level].shadow);
     view.balls = LEVELS[level].balls;
   };
   // Begins to compile the shaders of the scene. The graphics card does this while the scripts continue.
   view.compile = () => {
-    const gl = shared(canvas);
+    const gl = getRenderer(canvas);
     if (!gl) return;
-    fit();
+    setSize();
     gl.compile(scene, camera);
   };
-  const fits = () => drawnFor >= 0 && view.W === canvas.clientWidth && view.H === canvas.clientHeight;
-  // Setting the size of a canvas clears it. For printing, the size is set first and then the picture is drawn. The observer
-  // is told of this size afterwards and must not clear the picture again, hence `fits`.
+  const hasRightSize = () => drawnFor >= 0 && view.W === canvas.clientWidth && view.H === canvas.clientHeight;
+  // Setting the size of a canvas clears it. For printing, the size is set first, and then the picture is drawn. Afterwards the observer below is
+  // told of this size. It must not clear the picture again, so it first checks `hasRightSize`.
   views.push(() => {
-    shared(canvas);
-    if (!fits()) fit();
+    getRenderer(canvas);
+    if (!hasRightSize()) setSize();
     paint(performance.now());
   });
   new ResizeObserver(() => {
-    shared(canvas);
-    if (fits()) return;
-    fit();
-    if (seen) paint(performance.now()); // at once
+    getRenderer(canvas);
+    if (hasRightSize()) return;
+    setSize();
+    if (seen) paint(performance.now()); // at once, because the canvas is empty now
   }).observe(canvas);
-  new IntersectionObserver((entries) => { seen = entries.at(-1).isIntersecting; if (!seen) view.onHidden(); view.ask(); }).observe(canvas);
+  new IntersectionObserver((entries) => { seen = entries.at(-1).isIntersecting; if (!seen) view.onHidden(); view.requestDraw(); }).observe(canvas);
   return view;
 };

@@ -1,4 +1,5 @@
-// Plays the scripted walks, with footprints, readings and a time slider.
+// Plays the scripted walks (scenarios), with footprints, readings and a time slider. In a sweep, a column of a channel rises during the walk.
+// A scene, or `s`, is a scenario whose data are unpacked.
 import { find, material } from "./base.js";
 import { createFigure } from "./figure.js";
 import { createMotion } from "./motion.js";
@@ -10,25 +11,25 @@ export const startWalks = () => {
   const scenes = material.scenes, stage = document.getElementById("stage");
   if (!stage || !scenes.scenarios || !scenes.scenarios.length) return;
   const slider = find("time"), clock = find("clock"), reading = find("reading"), choice = find("scenario");
-  const J = scenes.joints, fps = scenes.fps, unpacked = new Map();
+  const boneCount = scenes.joints, fps = scenes.fps, unpacked = new Map();
 
   const unpack = (index) => {
     if (!unpacked.has(index)) {
-      const s = scenes.scenarios[index], octets = (text) => text && new Uint8Array(bytes(text));
+      const stored = scenes.scenarios[index], unpackBytes = (text) => text && new Uint8Array(bytes(text));
       const scene = {
-        ...s, motion: createMotion(s, J, scenes.unit),
-        contacts: octets(s.contacts), phase: octets(s.phase), values: octets(s.swept?.values),
+        ...stored, motion: createMotion(stored, boneCount, scenes.unit),
+        contacts: unpackBytes(stored.contacts), phase: unpackBytes(stored.phase), values: unpackBytes(stored.swept?.values),
       };
-      scene.focus = followed(scene);
-      scene.prints = footprints(scene);
+      scene.focus = cameraTargets(scene);
+      scene.prints = findFootprints(scene);
       unpacked.set(index, scene);
     }
     return unpacked.get(index);
   };
-  const joint = (s, frame, b) => s.motion.at(frame, b);
-  // The target of the camera: the mean position of the root over a second around the frame. So the camera moves smoothly, and a frame
-  // always looks the same.
-  const followed = (s) => {
+  const placeOf = (s, frame, b) => s.motion.at(frame, b);
+  // The point that the camera looks at in each frame, three numbers each: the mean position of the root over a second around the frame. So the
+  // camera moves smoothly, and a frame always looks the same.
+  const cameraTargets = (s) => {
     const half = Math.round(fps / 2), { roots } = s.motion, out = new Float32Array(roots.length);
     for (let f = 0; f < s.frames; f++) {
       const a = Math.max(0, f - half), b = Math.min(s.frames - 1, f + half);
@@ -41,19 +42,19 @@ export const startWalks = () => {
     return out;
   };
   // {frame, heel, toe} of each standing foot in every second frame. A sliding foot leaves overlapping prints.
-  const footprints = (s) => {
+  const findFootprints = (s) => {
     const out = [];
     if (!s.contacts || !scenes.feet.length) return out;
     for (const [heel, toe, bit] of [[scenes.feet[0], scenes.feet[1], 1], [scenes.feet[2], scenes.feet[3], 3]]) {
       for (let f = 0; f < s.frames; f += 2) {
-        if (s.contacts[f] >> bit & 1) out.push({ frame: f, heel: flat(joint(s, f, heel)), toe: flat(joint(s, f, toe)) });
+        if (s.contacts[f] >> bit & 1) out.push({ frame: f, heel: onGround(placeOf(s, f, heel)), toe: onGround(placeOf(s, f, toe)) });
       }
     }
     return out;
   };
-  const flat = ([x, , z]) => [x, 0, z];
-  // The value of the swept column, which rises during the walk, as a share of its highest value.
-  const share = (s, frame) => (s.values ? s.values[frame] / 250 : 0);
+  const onGround = ([x, , z]) => [x, 0, z];
+  // The value of the swept column as a share of its highest value. The page has it as an integer from 0 to 250.
+  const sweptShare = (s, frame) => (s.values ? s.values[frame] / 250 : 0);
 
   // Drawing
 
@@ -63,30 +64,31 @@ export const startWalks = () => {
     last = playing ? now : null;
     slider.value = time;
     drawScene(scene, time);
-    if (playing) view.ask();
+    if (playing) view.requestDraw();
   });
   const figure = createFigure(view, scenes.body, scenes.regions);
-  const near = ([x, , z], focus) => Math.max(0, 1 - Math.hypot(x - focus[0], z - focus[2]) / 800);
+  // How near a point on the ground is to the focus: 1 at the focus, 0 from 8 m on. Marks further away are fainter.
+  const nearness = ([x, , z], focus) => Math.max(0, 1 - Math.hypot(x - focus[0], z - focus[2]) / 800);
   const drawPath = (s, focus, frame) => {
     for (let f = 3; f < s.frames; f += 3) {
       const [a, b] = [f - 3, f].map((k) => [s.motion.roots[3 * k], 0, s.motion.roots[3 * k + 2]]);
-      view.marks.strip(a, b, 1.6, view.paint.accent, (f <= frame ? .6 : .25) * near(b, focus));
+      view.marks.addStrip(a, b, 1.6, view.paint.accent, (f <= frame ? .6 : .25) * nearness(b, focus));
     }
   };
   const drawPrints = (s, focus, frame) => {
     for (const { frame: f, heel, toe } of s.prints) {
-      if (f <= frame) view.marks.print(heel, toe, view.paint.ink, .1 * near(toe, focus));
+      if (f <= frame) view.marks.addPrint(heel, toe, view.paint.ink, .1 * nearness(toe, focus));
     }
   };
   const drawScene = (s, at) => {
     const frame = Math.min(s.frames - 1, Math.floor(at)), next = Math.min(s.frames - 1, frame + 1), t = at - frame;
     const focus = [0, 1, 2].map((i) => s.focus[3 * frame + i] * (1 - t) + s.focus[3 * next + i] * t);
     view.aim([focus[0], focus[1] - 8, focus[2]]);
-    view.land.around(focus);
+    view.land.drawAround(focus);
     if (trails) { drawPath(s, focus, at); drawPrints(s, focus, at); }
     s.motion.show(figure, at);
-    figure.pose((columns) => channelColour(view.paint, s.swept?.placed && columns.includes(s.swept.column) ? share(s, frame) : 0));
-    view.land.under(figure.balls(view.balls));
+    figure.pose((columns) => channelColour(view.paint, s.swept?.placed && columns.includes(s.swept.column) ? sweptShare(s, frame) : 0));
+    view.land.darkenUnder(figure.balls(view.balls));
     showReadings(s, frame);
   };
 
@@ -100,7 +102,7 @@ export const startWalks = () => {
     if (s.phase) moment.push(`phase ${(s.phase[frame] / 255).toFixed(2)}`);
     const lines = [moment.join(" · ")];
     if (s.contacts) lines.push(FEET.filter((_, i) => s.contacts[frame] >> i & 1).join(", ") || "no foot on the ground");
-    if (share(s, frame) > 0) lines.push(`${s.swept.spoken}: ${(share(s, frame) * s.swept.highest).toFixed(s.swept.highest < 5 ? 2 : 1)} of ${s.swept.highest}`);
+    if (sweptShare(s, frame) > 0) lines.push(`${s.swept.spoken}: ${(sweptShare(s, frame) * s.swept.highest).toFixed(s.swept.highest < 5 ? 2 : 1)} of ${s.swept.highest}`);
     const title = document.createElement("b");
     title.textContent = s.description || s.name;
     reading.replaceChildren(title, ...lines.flatMap((text) => [document.createElement("br"), text]));
@@ -115,7 +117,7 @@ export const startWalks = () => {
     playing = on;
     last = null;
     find("pause").textContent = on ? "Pause" : "Play";
-    view.ask();
+    view.requestDraw();
   };
   const choose = (index) => {
     scene = unpack(index);
@@ -123,16 +125,16 @@ export const startWalks = () => {
     time = 0;
     slider.max = scene.frames - 1;
     find("legend").hidden = !(scene.values && scene.swept.placed);
-    view.ask();
+    view.requestDraw();
   };
-  const seek = (to) => { play(false); time = Math.min(scene.frames - 1, Math.max(0, to)); view.ask(); };
+  const seek = (to) => { play(false); time = Math.min(scene.frames - 1, Math.max(0, to)); view.requestDraw(); };
   const toggle = (event, on) => event.currentTarget.setAttribute("aria-pressed", String(on));
 
   choice.addEventListener("change", () => choose(choice.selectedIndex));
   slider.addEventListener("input", () => seek(Number(slider.value)));
   find("pause").addEventListener("click", () => play(!playing));
   find("slow").addEventListener("click", (event) => { rate = rate === 1 ? .25 : 1; toggle(event, rate !== 1); });
-  find("trails").addEventListener("click", (event) => { trails = !trails; toggle(event, trails); view.ask(); });
+  find("trails").addEventListener("click", (event) => { trails = !trails; toggle(event, trails); view.requestDraw(); });
   find("view-reset").addEventListener("click", view.orbit.reset);
   Object.assign(view.orbit.keys, {
     " ": () => play(!playing), ",": () => seek(Math.ceil(time) - 1), ".": () => seek(Math.floor(time) + 1),
