@@ -19,8 +19,8 @@ from hobble.workflow.channel_sources import channels_of_folder
 # Planning makes millions of small objects that stay. If the garbage collector runs less often, planning 2,500 clips
 # takes an eighth less time.
 gc.set_threshold(200_000, 50, 1000)
-named_outputs.use()
-lock_files.use()
+named_outputs.use_named_outputs()
+lock_files.tolerate_removed_folder()
 ensure_user_name()
 try:
     if workflow.is_main_process:
@@ -36,7 +36,7 @@ try:
     needed = needed_datasets(project, sys.argv[1:])
     batches_of_clips = project.batches.needed(project.batches.of, needed, sys.argv[1:])
     batches_of_versions = project.batches.needed(
-        project.batches.hurt_of, needed, sys.argv[1:]
+        project.batches.of_hurt_versions, needed, sys.argv[1:]
     )
     batches_of_walker = project.batches.needed(
         project.batches.of, project.datasets.walkers(needed), sys.argv[1:]

@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from hobble.core import quat
 from hobble.core.ik import two_bone_knee
 from hobble.core.skeleton import Skeleton
-from hobble.runtime.feet import knees_ahead, leg_joints
+from hobble.runtime.feet import leg_joints, rest_facing
 from hobble.runtime.leg_reach import MOST_ADDED, bend, reach
 from tests.runtime.one_figure import Feet, crouched
 
@@ -26,7 +26,7 @@ def test_reaching_with_a_leg_equals_two_bone_ik(holden31: Skeleton, x: float, y:
     added, leg = np.tile([1.0, 0, 0, 0], (2, 1)), leg_joints(holden31)[0]
     for _ in range(12):  # enough frames to reach any of the targets
         position, rotation = before.copy(), turned.copy()
-        bend(position, rotation, leg, shift, knees_ahead(holden31), added, (before[leg[1:]], 0.0, 1e8))
+        bend(position, rotation, leg, shift, rest_facing(holden31), added, (before[leg[1:]], 0.0, 1e8))
     upper, lower = (
         np.linalg.norm(before[knee] - before[hip]),
         np.linalg.norm(before[heel] - before[knee]),

@@ -1,4 +1,4 @@
-from hobble.terrain.options import Drawing, Fitting, HeightSampling
+from hobble.terrain.options import PatchOptions, FitOptions, HeightSampling
 
 
 rule terrain_patches:
@@ -16,7 +16,7 @@ rule terrain_patches:
         mem_mb=2000,
         runtime=10,
     params:
-        options=lambda w: datasets.part(w.dataset, "terrain", Drawing),
+        options=lambda w: datasets.part(w.dataset, "terrain", PatchOptions),
         code=package.code("terrain_patches"),
     script:
         "../scripts/terrain_patches.py"
@@ -52,7 +52,7 @@ for batch in [*batches_of_clips, *batches_of_versions]:
                 for name in batch.names
             ],
             options=lambda w, batch=batch: datasets.part(
-                batch.dataset, "terrain", Fitting
+                batch.dataset, "terrain", FitOptions
             ),
             sampling=lambda w, batch=batch: datasets.part(
                 batch.dataset, "database", HeightSampling

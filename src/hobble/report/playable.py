@@ -71,7 +71,7 @@ def playable(network: Network, runtime: Runtime) -> dict[str, Any]:
         "gaits": list(network.gaits),
         "channels": shown_channels(network, runtime),
         "legs": legs.tolist(),
-        "ahead": feet.knees_ahead(skeleton).tolist(),
+        "ahead": feet.rest_facing(skeleton).tolist(),
         # For each foot, all joints below the heel; `toes` has only the toe and the joints below the toe.
         "carried": [np.flatnonzero(row).tolist() for row in parts],
         "toes": [np.flatnonzero(row == feet.TOES).tolist() for row in parts],

@@ -178,7 +178,7 @@ class ProceduralAnimation:
         out.characters = len(of)
         out._targets = CallerTargets(self.network.gaits, self.axes, len(of))
         out._continue_from(self.state.copies(of))
-        out._controller.take_pose(self._controller, of)
+        out._controller.copy_drawn_pose(self._controller, of)
         return out
 
     def _continue_from(self, state: Character) -> None:

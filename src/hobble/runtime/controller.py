@@ -123,7 +123,7 @@ class Controller:
             legs,
             feet.foot_parts(network.skeleton, legs),
             feet.sole_heights(network, legs),
-            feet.knees_ahead(network.skeleton),
+            feet.rest_facing(network.skeleton),
             self.bounds.fastest,
         )
         self._hips = network.skeleton.role("hips")
@@ -133,7 +133,7 @@ class Controller:
         self._warned = False
         self._group_arrays(character)
 
-    def take_pose(self, other: Controller, of: np.ndarray) -> None:
+    def copy_drawn_pose(self, other: Controller, of: np.ndarray) -> None:
         """Copy the pose of character i from character of[i] of the controller `other`. of: (C,) indices."""
         for name in ("root", "yaw", "pose_position", "pose_rotation"):
             getattr(self, name)[:] = getattr(other, name)[of]

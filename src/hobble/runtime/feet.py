@@ -41,7 +41,7 @@ FOOT, TOES = 1, 2  # the part of a foot to which a joint belongs, see `foot_part
 # Groups of arrays for compiled functions, which unpack them into names.
 #
 # joints (2, 4), see `leg_joints`; parts (2, J), see `foot_parts`; sole (2,), see `sole_heights`; ahead (3,),
-# see `knees_ahead`; fastest: a drawn joint of a leg may move at most this many cm in a frame.
+# see `rest_facing`; fastest: a drawn joint of a leg may move at most this many cm in a frame.
 Legs = tuple[Any, Any, Any, Any, float]
 # The state of the feet between frames: held, see `Hold`; lift (C, 2), the foot lift; added (C, 2, 2, 4),
 # rotations added to thigh and shank of each leg; shown (C, 2, 3, 3), knee, heel and toe of each leg as they
@@ -67,7 +67,7 @@ def sole_heights(network: Network, legs: np.ndarray) -> np.ndarray:
     return np.minimum(SOLE, 0.6 * height[legs[:, 2:]].mean(axis=0).astype(float))
 
 
-def knees_ahead(skeleton: Skeleton) -> np.ndarray:
+def rest_facing(skeleton: Skeleton) -> np.ndarray:
     """(3,) the direction in which the body faces in the rest pose. Straight knees bend in this direction."""
     rest, legs = rest_positions(skeleton), leg_joints(skeleton)
     left, down = rest[legs[0, 0]] - rest[legs[1, 0]], (rest[legs[:, 2]] - rest[legs[:, 0]]).sum(axis=0)

@@ -21,9 +21,9 @@ from hobble.core.quat import Array
 from hobble.motion.root import RootFrames, extend_root, root_frames
 from hobble.terrain.cycle_ground import Ground, fit_cycle, flat_ground
 from hobble.terrain.fit_picture import FitPicture, cycles_to_picture, make_picture
-from hobble.terrain.options import Fitting, HeightSampling
+from hobble.terrain.options import FitOptions, HeightSampling
 from hobble.terrain.patches import Patches
-from hobble.terrain.soles import Feet, Mask, find_soles, held_above_other
+from hobble.terrain.soles import Feet, Mask, find_soles, is_above_other_joint
 
 log = logging.getLogger("hobble.terrain")
 REMAKE = "Delete the motion and the labels of this clip; the next run makes both again from the same file."
@@ -63,7 +63,7 @@ def clip_fits(
     labels: Mapping[str, Array],
     patches: Patches,
     ground: str,
-    options: Fitting,
+    options: FitOptions,
     sampling: HeightSampling,
 ) -> ClipFits:
     """Fit the ground under every cycle of a clip.
@@ -128,7 +128,7 @@ def _warn_if_off_ground(name: str, fits: ClipFits, deepest: float | None) -> Non
 
 
 def _standing_feet(
-    clip: Clip, contacts: Mask, cycles: np.ndarray, window: int, flat: bool, options: Fitting
+    clip: Clip, contacts: Mask, cycles: np.ndarray, window: int, flat: bool, options: FitOptions
 ) -> Feet:
     """The soles of a clip, and which of them stand on the ground.
 
@@ -151,7 +151,7 @@ def _standing_feet(
     )
     contacts = feet.contacts.copy()
     if flat and options.held_up is not None:
-        contacts &= ~held_above_other(feet, options.held_up)
+        contacts &= ~is_above_other_joint(feet, options.held_up)
     for start, end in cycles:
         around = _fitted_frames(start, end, window, len(clip))
         if not contacts[around].any():
@@ -171,7 +171,7 @@ def _fitted_frames(start: int, end: int, window: int, frames: int) -> slice:
 
 
 def _fit_ground(
-    feet: Feet, around: slice, samples: Array, patches: Patches, kind: str, options: Fitting
+    feet: Feet, around: slice, samples: Array, patches: Patches, kind: str, options: FitOptions
 ) -> Ground:
     """The ground of one cycle, with all its fits.
 

@@ -18,7 +18,7 @@ from typing import Any
 from hobble.core.errors import InputError
 from hobble.workflow import checksums
 from hobble.workflow.clip_batches import family_of
-from hobble.workflow.job import JobLog, checked, reporting
+from hobble.workflow.job import JobLog, check_and_record, log_job
 from hobble.workflow.kept_files import KeptFiles, fingerprint
 
 # The disk is full, a quota is used up, or the disk is read-only. Every other clip would fail, too.
@@ -84,8 +84,8 @@ def make_each(snakemake: Any, make: Callable[[JobPiece, logging.Logger], None]) 
 
     snakemake: the object that Snakemake gives to scripts. make: function that makes the files of a piece.
     """
-    with reporting(snakemake) as report:
-        checksums.forget(snakemake.output)
+    with log_job(snakemake) as report:
+        checksums.delete(snakemake.output)
         # Each data set and each batch has a rule of its own. The rules that make the same kind of file are a
         # family, and share the kept files.
         kept, digests = KeptFiles(family_of(snakemake.rule)), _Digests()
@@ -116,7 +116,7 @@ def _make_piece(
 ) -> bool:
     """Make a piece, or use its kept files. Returns whether kept files were used."""
     outputs, began = list(piece.output.values()), time.monotonic()
-    with checked(piece.files, outputs):
+    with check_and_record(piece.files, outputs):
         key = fingerprint(piece.params, digests.of(piece.files), outputs)
         if kept.restore(key, outputs):
             return True

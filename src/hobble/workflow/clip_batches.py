@@ -21,7 +21,9 @@ from hobble.workflow.clips import DATASETS, MIRROR_SUFFIX, Clips, original
 LEAST_BATCHES = 12  # a data set with more clips than this has at least this many batches
 MOST_CLIPS_OF_A_BATCH = 32  # a batch holds at most this many clips on average
 JOB_OPTION = "--target-jobs"  # in the command line of a job that Snakemake starts on another machine
-MARK = "__"  # separates family, data set and number in the name of a batch's rule: motion_clips__cmu__3
+RULE_NAME_SEPARATOR = (
+    "__"  # separates family, data set and number in the name of a batch's rule: motion_clips__cmu__3
+)
 
 
 @dataclass(frozen=True)
@@ -47,7 +49,7 @@ class ClipBatch:
 
     def rule(self, family: str) -> str:
         """The name of the batch's rule, such as motion_clips__cmu__3 or hurt_clips__cmu__3_hurt."""
-        return MARK.join((family, self.dataset, f"{self.number}{'_hurt' * self.hurt}"))
+        return RULE_NAME_SEPARATOR.join((family, self.dataset, f"{self.number}{'_hurt' * self.hurt}"))
 
     def log(self, stage: str, family: str) -> str:
         """Path of the log of the batch's job."""
@@ -88,13 +90,13 @@ def family_of(rule: str) -> str:
 
     Other names are returned unchanged.
     """
-    return rule.partition(MARK)[0]
+    return rule.partition(RULE_NAME_SEPARATOR)[0]
 
 
 def dataset_of(rule: str) -> str:
     """The data set of a batch's rule, or "" for other rules."""
-    _, mark, rest = rule.partition(MARK)
-    return rest.rpartition(MARK)[0] if mark else ""
+    _, mark, rest = rule.partition(RULE_NAME_SEPARATOR)
+    return rest.rpartition(RULE_NAME_SEPARATOR)[0] if mark else ""
 
 
 class Batches:
@@ -121,7 +123,7 @@ class Batches:
         )
 
     @functools.cache  # noqa: B019
-    def hurt_of(self, dataset: str) -> tuple[ClipBatch, ...]:
+    def of_hurt_versions(self, dataset: str) -> tuple[ClipBatch, ...]:
         """The batches of hurt versions, one for each batch of `of` in which clips have hurt versions."""
         versions = defaultdict(list)
         for version in self.clips.hurt_versions(dataset):
@@ -134,9 +136,9 @@ class Batches:
                 batches.append(ClipBatch(dataset, batch.number, label, members, batch.mirrored, hurt=True))
         return tuple(batches)
 
-    def all_of(self, dataset: str) -> tuple[ClipBatch, ...]:
+    def of_clips_and_hurt_versions(self, dataset: str) -> tuple[ClipBatch, ...]:
         """The batches of clips, then the batches of hurt versions."""
-        return (*self.of(dataset), *self.hurt_of(dataset))
+        return (*self.of(dataset), *self.of_hurt_versions(dataset))
 
     def needed(
         self,

@@ -27,7 +27,7 @@ from hobble.core.clip_files import (
 from hobble.core.errors import HobbleError, InputError
 from hobble.core.untrusted import check_regular
 from hobble.hurt.options import HURT_CHANNEL, Hurt
-from hobble.synthetic.options import WRITES
+from hobble.synthetic.options import WRITTEN_LABEL_SUFFIXES
 from hobble.workflow.channel_sources import ChannelSources
 from hobble.workflow.sources import joint_names, nearest_rig, read_checksums
 
@@ -211,7 +211,7 @@ class Clips:
         """
         synthetic = self.catalogue.dataset(dataset).synthetic is not None
         if synthetic:
-            suffixes = [suffix for suffix in suffixes if suffix in WRITES]
+            suffixes = [suffix for suffix in suffixes if suffix in WRITTEN_LABEL_SUFFIXES]
         stem = self.folder(dataset) / clip  # the path without suffix
         if not synthetic and clip in (files := self._files(dataset)):
             stem = files[clip][0].with_suffix("")

@@ -54,7 +54,7 @@ def _places_in_dataset(batches: Batches, dataset: str, stage: str) -> Places:
     root = Path(DATASETS, dataset)
     return {
         **_places(root, stage, stage),
-        "batches": [batch.label for batch in batches.all_of(dataset)],
+        "batches": [batch.label for batch in batches.of_clips_and_hurt_versions(dataset)],
         "made": [str(root / FOLDER / rule) for rule in BATCH_RULES[stage]],
     }
 

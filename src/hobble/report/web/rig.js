@@ -1,5 +1,5 @@
 // Places joints on bones of constant length, from predicted rotations. Legs bend so that toes are where they were predicted. It computes
-// the same as `hobble.runtime.export.jointed` in Python.
+// the same as `hobble.runtime.export.restore_bone_lengths` in Python.
 import { dot, minus } from "./numbers.js";
 import { at3, at4, between, multiply } from "./turns.js";
 
