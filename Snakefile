@@ -13,7 +13,7 @@ from hobble.workflow.costs import stages
 from hobble.workflow.resource_demands import Demands
 from hobble.workflow.measurements import NAMES as MEASURES
 from hobble.workflow.project import Project
-from hobble.workflow.targets import check, needed_datasets, notes
+from hobble.workflow.targets import check_targets, needed_datasets, notes_on_unused_files
 from hobble.workflow.channel_sources import channels_of_folder
 
 # Planning makes millions of small objects that stay. If the garbage collector runs less often, planning 2,500 clips
@@ -28,18 +28,18 @@ try:
     # The path is relative, so that nothing runs again after the checkout is moved.
     project = Project(Path(os.path.relpath(workflow.basedir)), config)
     targets = [argument for argument in sys.argv[1:] if argument.startswith("results/")]
-    check(project, targets)
+    check_targets(project, targets)
     if workflow.is_main_process:
-        for note in notes(project, targets):
+        for note in notes_on_unused_files(project, targets):
             logger.warning(note)
     # Each batch has rules of its own. Rules for data sets that no target needs would only cost time.
     needed = needed_datasets(project, sys.argv[1:])
-    batches_of_clips = project.batches.needed(project.batches.of, needed, sys.argv[1:])
+    batches_of_clips = project.batches.needed(project.batches.of_listed_clips, needed, sys.argv[1:])
     batches_of_versions = project.batches.needed(
         project.batches.of_hurt_versions, needed, sys.argv[1:]
     )
     batches_of_walker = project.batches.needed(
-        project.batches.of, project.datasets.walkers(needed), sys.argv[1:]
+        project.batches.of_listed_clips, project.datasets.walkers(needed), sys.argv[1:]
     )
 except HobbleError as error:
     raise WorkflowError(str(error)) from None

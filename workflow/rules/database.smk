@@ -40,7 +40,7 @@ for batch in [*batches_of_clips, *batches_of_versions]:
             channels=lambda w, batch=batch: datasets.channel_sources.channels(
                 batch.dataset
             ),
-            options=lambda w, batch=batch: datasets.part(
+            options=lambda w, batch=batch: datasets.options_of_class(
                 batch.dataset, "database", RowOptions
             ),
             code=lambda w, batch=batch: package.code(
@@ -54,9 +54,9 @@ for batch in [*batches_of_clips, *batches_of_versions]:
 def clips_of(dataset, channels, file, shard=None):
     """The path `file` for each clip of a database, or of one of its shards."""
     names = (
-        datasets.selected(dataset, channels_of_folder(channels))
+        datasets.splits(dataset, channels_of_folder(channels))
         if shard is None
-        else datasets.in_shard(dataset, channels_of_folder(channels), int(shard))
+        else datasets.splits_in_shard(dataset, channels_of_folder(channels), int(shard))
     )
     return expand(f"results/datasets/{dataset}/{file}", clip=names)
 
@@ -66,9 +66,9 @@ def compared(w, file):
 
     If the rule makes a shard, only clips of this shard are in the list.
     """
-    names = datasets.compared(w.dataset, channels_of_folder(w.channels))
+    names = datasets.clips_to_compare(w.dataset, channels_of_folder(w.channels))
     if hasattr(w, "shard"):
-        own = datasets.in_shard(w.dataset, channels_of_folder(w.channels), int(w.shard))
+        own = datasets.splits_in_shard(w.dataset, channels_of_folder(w.channels), int(w.shard))
         names = [name for name in names if name in own]
     return expand(f"results/datasets/{w.dataset}/{file}", clip=names)
 
@@ -101,15 +101,15 @@ rule database_shard:
         mem_mb=lambda w, attempt: demands.shard_memory(w.dataset, attempt),
         runtime=lambda w, attempt: demands.shard_minutes(w.dataset, 0.1, attempt),
     params:
-        splits=lambda w: datasets.in_shard(
+        splits=lambda w: datasets.splits_in_shard(
             w.dataset, channels_of_folder(w.channels), int(w.shard)
         ),
         channels=lambda w: channels_of_folder(w.channels),
         sources=lambda w: datasets.sources(
-            datasets.in_shard(w.dataset, channels_of_folder(w.channels), int(w.shard))
+            datasets.splits_in_shard(w.dataset, channels_of_folder(w.channels), int(w.shard))
         ),
         every=lambda w: datasets.hurt_row_step(w.dataset),
-        options=lambda w: datasets.part(w.dataset, "database", Merging),
+        options=lambda w: datasets.options_of_class(w.dataset, "database", Merging),
         code=lambda w: package.code(
             "database_shard", *modules_of(channels_of_folder(w.channels))
         ),
@@ -141,13 +141,13 @@ rule database_merge:
         runtime=lambda w, attempt: demands.shard_minutes(w.dataset, 0.1, attempt),
     params:
         dataset=lambda w: w.dataset,
-        splits=lambda w: datasets.selected(w.dataset, channels_of_folder(w.channels)),
+        splits=lambda w: datasets.splits(w.dataset, channels_of_folder(w.channels)),
         channels=lambda w: channels_of_folder(w.channels),
         sources=lambda w: datasets.sources(
-            datasets.selected(w.dataset, channels_of_folder(w.channels))
+            datasets.splits(w.dataset, channels_of_folder(w.channels))
         ),
         every=lambda w: datasets.hurt_row_step(w.dataset),
-        options=lambda w: datasets.part(w.dataset, "database", Merging),
+        options=lambda w: datasets.options_of_class(w.dataset, "database", Merging),
         code=lambda w: package.code(
             "database_merge", *modules_of(channels_of_folder(w.channels))
         ),

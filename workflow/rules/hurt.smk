@@ -40,7 +40,7 @@ for batch in batches_of_versions:
                     "clip": clip,
                     "turn": clips.hurt_versions(batch.dataset)[clip],
                     "ground": clips.entry(batch.dataset, clip).ground,
-                    "options": clips.hurt(batch.dataset, clip).model_dump(
+                    "options": clips.hurt_options(batch.dataset, clip).model_dump(
                         mode="json", exclude={"every"}
                     ),
                 }

@@ -2,7 +2,7 @@ def for_listed_clips(dataset, file):
     """The path `file` for each clip that the data set lists or that is in its folder."""
     return [
         f"results/datasets/{dataset}/{file}".format(clip=clip)
-        for clip in clips.listed(dataset)
+        for clip in clips.listed_entries(dataset)
     ]
 
 

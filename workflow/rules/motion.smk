@@ -2,7 +2,7 @@
 rule download_clip:
     """A clip that is not in the user's folder, downloaded from the data set's address."""
     output:
-        bvh=local(clips.downloaded("{dataset}", "{clip}")),
+        bvh=local(clips.download_path("{dataset}", "{clip}")),
     log:
         "results/datasets/{dataset}/logs/motion/download_clip/{clip}.log",
     localrule: True
@@ -62,7 +62,7 @@ for batch in batches_of_clips:
             skeleton_name=lambda w, batch=batch: catalogue.dataset(
                 batch.dataset
             ).skeleton,
-            maps=clips.skeletons,
+            maps=clips.skeleton_folder,
             code=lambda w: package.code("motion_clips"),
         script:
             "../scripts/motion_clips.py"

@@ -5,8 +5,8 @@ rule training:
     """The network, trained on the database. After a kill, training continues from its last checkpoint."""
     input:
         database=lambda w: configurations.database(w.configuration),
-        checkpoint=lambda w: configurations.start(w.configuration),
-        clips=lambda w: configurations.rows_in_order(w.configuration),
+        checkpoint=lambda w: configurations.start_checkpoint(w.configuration),
+        clips=lambda w: configurations.training_row_files(w.configuration),
     output:
         weights="results/{configuration}/network/weights.npz",
         history="results/{configuration}/network/history.csv",
@@ -36,6 +36,6 @@ rule training:
             configurations.dataset(w.configuration), "database", "terrain_side"
         )["terrain_side"],
         checkpoints="results/{configuration}/checkpoints",
-        code=lambda w: package.code("training", configurations.kind(w.configuration)),
+        code=lambda w: package.code("training", configurations.model_package(w.configuration)),
     script:
         "../scripts/training.py"

@@ -14,7 +14,7 @@ from hobble.core.compiled import njit
 from hobble.core.skeleton import Skeleton, rest_positions
 from hobble.models.network import Network
 from hobble.runtime.foot_lock import Hold, hold_foot, note_missed, step_rise
-from hobble.runtime.leg_reach import MOST_ADDED, LastFrame, bend, hold_back, turn_rotation, turn_vector
+from hobble.runtime.leg_reach import MOST_ADDED, LastFrame, bend_leg, hold_back, turn_rotation, turn_vector
 
 HEIGHT_MIX = 0.5  # each frame changes the foot lift by this share of the change that is still missing
 # Largest change of the foot lift, cm a frame. It is needed because a network may predict contact while the
@@ -264,7 +264,7 @@ def place_feet(
                 roll[0], roll[1], roll[2], roll[3] = 1.0, 0.0, 0.0, 0.0
             old_heel = position[c, heel, 0], position[c, heel, 1], position[c, heel, 2]
             last = shown[c, f], base, fastest
-            bend(position[c], rotation[c], joints[f], shift, ahead, added[c, f], last)
+            bend_leg(position[c], rotation[c], joints[f], shift, ahead, added[c, f], last)
             carry_foot(position[c], rotation[c], parts[f], heel, toe, old_heel, roll)
             hold_toes_back(position[c], parts[f], toe, last)
             note_missed(c, f, position[c, toe, 0], position[c, toe, 2], held)

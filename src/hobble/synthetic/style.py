@@ -70,8 +70,8 @@ SIDE_SIGN = (1.0, -1.0)  # sign of X on the left and on the right side: +X is th
 class Style:
     """How the figure moves in each of F frames.
 
-    VALUES_BY_GAIT describes all fields but `frequency`. Arrays are (F,). For names in SIDED they are (F, 2), left
-    and right. frequency: (F,) cycles a second. The left foot lands half a cycle after the right foot.
+    VALUES_BY_GAIT describes all fields but `frequency`. Arrays are (F,). For names in SIDED they are (F, 2),
+    left and right. frequency: (F,) cycles a second. The left foot lands half a cycle after the right foot.
     """
 
     duty: Array

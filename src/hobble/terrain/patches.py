@@ -61,7 +61,7 @@ class Patches:
         cells = (np.asarray(points) - centre) / self.cell
         return np.clip(cells, -half, self.size - 1 - half).astype(np.float32)
 
-    def at(self, chosen: Sequence[int] | np.ndarray, cells: Array) -> Array:
+    def heights_at(self, chosen: Sequence[int] | np.ndarray, cells: Array) -> Array:
         """Heights (K, N), cm above the mean of the patch, of K patches at cells (N, 2) from their middle.
 
         chosen: (K,) indices of the patches.

@@ -30,7 +30,7 @@ class JobPiece:
     """A piece of a job's work: usually one clip, or one clip and its mirror.
 
     name: the clip's name. params: Snakemake's params, those of the rule and those of this clip. input: name
-    of each input -> the piece's file, or a list of files for an input in `files_per_clip` (see `pieces`).
+    of each input -> the piece's file, or a list of files for an input in `files_per_clip` (see `job_pieces`).
     output: name of each output -> the piece's file.
     """
 
@@ -45,7 +45,7 @@ class JobPiece:
         return [file for _, files in sorted(self.input.items()) for file in _as_list(files)]
 
 
-def pieces(snakemake: Any) -> list[JobPiece]:
+def job_pieces(snakemake: Any) -> list[JobPiece]:
     """The pieces of a job. snakemake: the object that Snakemake gives to scripts.
 
     params.per_clip: a list with the params of each piece; the param `clip` is the piece's name.
@@ -89,7 +89,7 @@ def make_each(snakemake: Any, make: Callable[[JobPiece, logging.Logger], None]) 
         # Each data set and each batch has a rule of its own. The rules that make the same kind of file are a
         # family, and share the kept files.
         kept, digests = KeptFiles(family_of(snakemake.rule)), _Digests()
-        all_pieces = pieces(snakemake)
+        all_pieces = job_pieces(snakemake)
         reused = failed = 0
         for piece in all_pieces:
             try:

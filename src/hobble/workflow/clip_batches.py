@@ -21,9 +21,8 @@ from hobble.workflow.clips import DATASETS, MIRROR_SUFFIX, Clips, original
 LEAST_BATCHES = 12  # a data set with more clips than this has at least this many batches
 MOST_CLIPS_OF_A_BATCH = 32  # a batch holds at most this many clips on average
 JOB_OPTION = "--target-jobs"  # in the command line of a job that Snakemake starts on another machine
-RULE_NAME_SEPARATOR = (
-    "__"  # separates family, data set and number in the name of a batch's rule: motion_clips__cmu__3
-)
+# Separates family, data set and number in the name of a batch's rule: motion_clips__cmu__3.
+RULE_NAME_SEPARATOR = "__"
 
 
 @dataclass(frozen=True)
@@ -106,9 +105,9 @@ class Batches:
         self.clips = clips
 
     @functools.cache  # noqa: B019 - one project lives as long as the process
-    def of(self, dataset: str) -> tuple[ClipBatch, ...]:
+    def of_listed_clips(self, dataset: str) -> tuple[ClipBatch, ...]:
         """The batches of a data set's clips, without hurt versions."""
-        listed = list(self.clips.listed(dataset))  # names of the clips
+        listed = list(self.clips.listed_entries(dataset))  # names of the clips
         mirrored = self.clips.catalogue.dataset(dataset).mirror
         count = batch_count(len(listed))
         if count == len(listed):
@@ -124,12 +123,12 @@ class Batches:
 
     @functools.cache  # noqa: B019
     def of_hurt_versions(self, dataset: str) -> tuple[ClipBatch, ...]:
-        """The batches of hurt versions, one for each batch of `of` in which clips have hurt versions."""
+        """The batches of hurt versions: one for each batch whose clips have hurt versions."""
         versions = defaultdict(list)
         for version in self.clips.hurt_versions(dataset):
             versions[original(version)].append(version)
         batches = []
-        for batch in self.of(dataset):
+        for batch in self.of_listed_clips(dataset):
             members = tuple(version for clip in batch.clips for version in versions[clip])
             if members:
                 label = f"{batch.label}_hurt"
@@ -138,7 +137,7 @@ class Batches:
 
     def of_clips_and_hurt_versions(self, dataset: str) -> tuple[ClipBatch, ...]:
         """The batches of clips, then the batches of hurt versions."""
-        return (*self.of(dataset), *self.of_hurt_versions(dataset))
+        return (*self.of_listed_clips(dataset), *self.of_hurt_versions(dataset))
 
     def needed(
         self,
@@ -148,9 +147,9 @@ class Batches:
     ) -> list[ClipBatch]:
         """The batches of these data sets that a run of Snakemake needs.
 
-        batches_of: returns the batches of a data set, such as `self.of`. arguments: the command line of the
-        run. A job on another machine is a run whose command line names the rule. It needs only the batch of
-        this rule.
+        batches_of: returns the batches of a data set, such as `self.of_listed_clips`. arguments: the command
+        line of the run. A job on another machine is a run whose command line names the rule. It needs only
+        the batch of this rule.
         """
         rules = rules_of_job(arguments)
         batches = [batch for dataset in datasets for batch in batches_of(dataset)]

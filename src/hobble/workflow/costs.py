@@ -44,7 +44,7 @@ def stages(configurations: Configurations, batches: Batches, name: str) -> dict[
     }
     out["database"]["files"] = [f"{DATASETS}/{dataset}/database/clips", configurations.database(name)]
     results = Path("results", name)
-    out["training"] = _places(Path("results", configurations.owner(name)), "training", "network")
+    out["training"] = _places(Path("results", configurations.network_owner(name)), "training", "network")
     out["runtime"] = _places(results, "runtime", "runtime")
     out["evaluation"] = _places(results, "evaluation", "evaluation")
     return out

@@ -67,12 +67,12 @@ class Demands:
         rate: MB for a thousand frames of the longest clip. row_bytes: bytes that the job keeps of each frame
         of all clips.
         """
-        longest = max(self.thousands_of_frames(dataset, clip) for clip in self.project.clips.of(dataset))
+        longest = max(self.thousands_of_frames(dataset, clip) for clip in self.project.clips.entries(dataset))
         return _megabytes(rate * longest + row_bytes * self.all_thousands_of_frames(dataset) / 1e3, attempt)
 
     def shard_memory(self, dataset: str, attempt: int = 1) -> int:
         """MB for a job that makes a shard. It holds one clip at a time, and a few numbers for each row."""
-        longest = max(self.thousands_of_frames(dataset, clip) for clip in self.project.clips.of(dataset))
+        longest = max(self.thousands_of_frames(dataset, clip) for clip in self.project.clips.entries(dataset))
         return _megabytes(SHARD_MB * longest + ROW_BYTES * self._shard_thousands(dataset) / 1e3, attempt)
 
     def shard_minutes(self, dataset: str, rate: float, attempt: int = 1) -> int:
@@ -214,7 +214,7 @@ class Demands:
     def all_thousands_of_frames(self, dataset: str) -> float:
         """Thousands of frames of all clips and mirrors, scaled like `thousands_of_frames`."""
         without_mirrors = sum(
-            self.thousands_of_frames(dataset, clip) for clip in self.project.clips.of(dataset)
+            self.thousands_of_frames(dataset, clip) for clip in self.project.clips.entries(dataset)
         )
         return without_mirrors * (1 + self.project.catalogue.dataset(dataset).mirror)
 
