@@ -83,7 +83,7 @@ def test_heights_are_ordered_left_centre_right_from_past_to_future() -> None:
     left = np.stack([np.cos(angle), -np.sin(angle)], axis=-1)  # +X of the facing frame
     assert np.allclose(samples[0], position + 25 * left)
     assert np.allclose(samples[2], position - 25 * left)
-    ground = SimpleNamespace(at=lambda points: np.stack([points[:, 0], 7 + points[:, 1]]))
+    ground = SimpleNamespace(heights_at=lambda points: np.stack([points[:, 0], 7 + points[:, 1]]))
     heights = heights_under(ground, samples, 70, 72, np.arange(-60, 60, 10)).reshape(3, 2, 3, 12)
     for row in range(3):
         for side in range(3):
