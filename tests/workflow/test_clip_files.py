@@ -143,7 +143,7 @@ def test_a_pipe_is_refused_as_a_clip(base: Path, name: str) -> None:
     os.mkfifo(base / f"data/mine/{name}")
     clips = Project(base, {}).clips
     with pytest.raises(HobbleError, match=f"mine/{name}: a device or a pipe, not a file"):
-        (clips.of if name == "a.bvh" else clips.heightmap_files)("mine")
+        (clips.entries if name == "a.bvh" else clips.heightmap_files)("mine")
     listed = text + "clips: {a: , b: }\n"
     (base / "config/datasets/mine.yaml").write_text(listed)
     if name == "a.bvh":
