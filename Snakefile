@@ -14,7 +14,7 @@ from hobble.workflow.costs import stages
 from hobble.workflow.resource_demands import Demands
 from hobble.workflow.measurements import NAMES as MEASURES
 from hobble.workflow.project import Project
-from hobble.workflow.targets import check, needed_datasets, notes
+from hobble.workflow.targets import check_targets, needed_datasets, notes_on_unused_files
 from hobble.workflow.channel_sources import channels_of_folder
 
 # While Snakemake plans, it makes millions of small objects and frees few of them. If the garbage collector runs less
@@ -22,8 +22,8 @@ from hobble.workflow.channel_sources import channels_of_folder
 gc.set_threshold(200_000, 50, 1000)
 # The next two lines replace functions of Snakemake. It then plans faster, and does not fail if another run that ends
 # removes the folder of locks.
-named_outputs.use()
-lock_files.use()
+named_outputs.use_named_outputs()
+lock_files.tolerate_removed_folder()
 ensure_user_name()
 try:
     if workflow.is_main_process:
@@ -31,21 +31,21 @@ try:
     # Params of rules contain this path. It is relative, so that no job runs again after the checkout is moved.
     project = Project(Path(os.path.relpath(workflow.basedir)), config)
     targets = [argument for argument in sys.argv[1:] if argument.startswith("results/")]
-    check(project, targets)
+    check_targets(project, targets)
     if workflow.is_main_process:
-        for note in notes(project, targets):
+        for note in notes_on_unused_files(project, targets):
             logger.warning(note)
     # A batch is a set of clips that one job processes. Each batch has its own rules. Data sets that no target needs
     # get no rules, because these would make planning slower.
     datasets_needed = needed_datasets(project, sys.argv[1:])
     batches_of_clips = project.batches.needed(
-        project.batches.of, datasets_needed, sys.argv[1:]
+        project.batches.of_listed_clips, datasets_needed, sys.argv[1:]
     )
     batches_of_hurt_versions = project.batches.needed(
-        project.batches.hurt_of, datasets_needed, sys.argv[1:]
+        project.batches.of_hurt_versions, datasets_needed, sys.argv[1:]
     )
     batches_of_synthetic_clips = project.batches.needed(
-        project.batches.of, project.datasets.walkers(datasets_needed), sys.argv[1:]
+        project.batches.of_listed_clips, project.datasets.walkers(datasets_needed), sys.argv[1:]
     )
 except HobbleError as error:
     raise WorkflowError(str(error)) from None

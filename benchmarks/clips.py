@@ -50,7 +50,7 @@ def main() -> None:
     print(processor())
     mocap = arguments.mocap.resolve()
     project = Project(ROOT, {"mocap": str(mocap)})
-    clips = sorted(project.clips.listed(arguments.dataset))
+    clips = sorted(project.clips.listed_entries(arguments.dataset))
     files = [Path(project.clips.source(arguments.dataset, clip)) for clip in clips]
     size = sum(path.stat().st_size for path in files) / 1e6
     start = time.process_time()

@@ -16,7 +16,7 @@ from collections import defaultdict
 from pathlib import Path
 
 from hobble.workflow.resource_demands import ENGINE_MB
-from hobble.workflow.resource_use import JobResources, planned_jobs, with_use
+from hobble.workflow.resource_use import JobResources, planned_jobs, with_measured_use
 
 ROOT = Path(__file__).resolve().parents[1]
 
@@ -55,7 +55,7 @@ def main() -> None:
     if "--" in own:
         own, more = own[: own.index("--")], own[own.index("--") + 1 :]
     options = parser.parse_args(own)
-    jobs = list(with_use(planned_jobs(plan(options.folder, options.targets, more)), options.folder))
+    jobs = list(with_measured_use(planned_jobs(plan(options.folder, options.targets, more)), options.folder))
     if not any(job.used_mb for job in jobs):
         sys.exit(f"{options.folder}: no run whose logs say what its jobs took")
     print(table(jobs))

@@ -108,7 +108,7 @@ def found(job: Job) -> list[Found]:
     """The fits of one clip and its mirror."""
     project = Project(BASE, {"mocap": str(job.mocap)})
     options = project.catalogue.dataset(job.dataset).terrain
-    sampling = HeightSampling(**project.datasets.part(job.dataset, "database", HeightSampling))
+    sampling = HeightSampling(**project.datasets.options_of_class(job.dataset, "database", HeightSampling))
     out = []
     with tempfile.TemporaryDirectory() as folder:
         try:
@@ -138,7 +138,7 @@ def main() -> None:
     jobs = [
         Job(d, clip, tuple(arguments.kinds), arguments.mocap)
         for d in arguments.datasets
-        for clip in project.clips.of(d)
+        for clip in project.clips.entries(d)
     ]
     with ProcessPoolExecutor(arguments.workers) as pool:
         results = [one for some in pool.map(found, jobs) for one in some]

@@ -40,7 +40,7 @@ def test_hips_stay_above_the_ground_under_them(hurtable: Pfnn) -> None:
 def test_hips_without_ground_under_them_are_found(hurtable: Pfnn, monkeypatch: pytest.MonkeyPatch) -> None:
     still = {
         name: getattr(feet, name)
-        for name in ("leg_joints", "sole_heights", "foot_parts", "knees_ahead", "place_feet")
+        for name in ("leg_joints", "sole_heights", "foot_parts", "rest_facing", "place_feet")
     }
     monkeypatch.setattr(controller, "feet", SimpleNamespace(**still, carry_body=lambda *_: None))
     found = soak(on_its_feet(hurtable), 20, 150)
@@ -59,7 +59,7 @@ def test_a_leg_that_snaps_is_found(hurtable: Pfnn, monkeypatch: pytest.MonkeyPat
 
     still = {
         name: getattr(feet, name)
-        for name in ("leg_joints", "sole_heights", "foot_parts", "knees_ahead", "carry_body")
+        for name in ("leg_joints", "sole_heights", "foot_parts", "rest_facing", "carry_body")
     }
     turns = iter(range(10**6))
     monkeypatch.setattr(

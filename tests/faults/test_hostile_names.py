@@ -14,7 +14,7 @@ from hobble.config.load_configuration import Catalogue
 from hobble.core.errors import HobbleError, InputError
 from hobble.motion.rig import load_skeleton
 from hobble.workflow.project import Project
-from hobble.workflow.targets import check
+from hobble.workflow.targets import check_targets
 
 from .refusals import refused, write
 from .texts import SKELETON
@@ -43,7 +43,7 @@ def test_a_configuration_names_nothing_outside_its_folder(catalogue: Path, key: 
     write(catalogue / "mine.yaml", json.dumps(value))
     write(catalogue / "datasets/synthetic.yaml", "skeleton: holden31\nfolder: x\n")
     with pytest.raises(HobbleError, match="mine") as refusal:
-        check(Project(catalogue.parent, {}), ["results/mine/report.html"])
+        check_targets(Project(catalogue.parent, {}), ["results/mine/report.html"])
     assert "secret" not in str(refusal.value)
 
 
@@ -125,7 +125,7 @@ def test_unsafe_clip_names_are_refused_with_their_folder(catalogue: Path, tmp_pa
     folder.mkdir(parents=True)
     write(folder / f"{name}.bvh", "HIERARCHY")
     with pytest.raises(InputError, match="mocap/mine: a clip is called") as refusal:
-        Project(catalogue.parent, {"mocap": tmp_path / "mocap"}).clips.of("mine")
+        Project(catalogue.parent, {"mocap": tmp_path / "mocap"}).clips.entries("mine")
     assert str(refusal.value).isprintable()
 
 

@@ -11,7 +11,7 @@ import pytest
 
 from hobble.core.errors import HobbleError
 from hobble.workflow.project import Project
-from hobble.workflow.targets import check
+from hobble.workflow.targets import check_targets
 
 from .judging import TRACEBACK
 from .lab import Lab
@@ -122,8 +122,8 @@ def test_an_unreadable_file_that_planning_needs_is_named(reachable: Path, closed
 
     def read() -> object:
         project = Project(reachable, {"mocap": reachable / "mocap"})
-        check(project, ["results/test/report.html"])
-        return project.datasets.selected("mine", [])
+        check_targets(project, ["results/test/report.html"])
+        return project.datasets.splits("mine", [])
 
     read()  # imports the modules first, because the user `nobody` may not
     assert as_nobody(read).startswith("read: ")

@@ -33,13 +33,13 @@ def test_hurt_versions_of_the_synthetic_clips_hurt_all_thirty_links(root, holden
     project = Project(root, {})
     held_out = project.catalogue.dataset("synthetic").held_out
     clips = project.clips
-    frames = {clip: project.datasets.frames("synthetic", clip) for clip in clips.listed("synthetic")}
+    frames = {clip: project.datasets.frames("synthetic", clip) for clip in clips.listed_entries("synthetic")}
     versions = {
         name: turn
         for name, turn in clips.hurt_versions("synthetic").items()
         if name.rpartition("_hurt")[0] not in held_out
     }
-    seconds = seconds_hurt(holden31, versions, frames, lambda clip: clips.hurt("synthetic", clip))
+    seconds = seconds_hurt(holden31, versions, frames, lambda clip: clips.hurt_options("synthetic", clip))
     seconds = seconds + seconds[list(holden31.mirror_links)]  # the data set has mirrors
     assert seconds.min() > 2
     legs = [

@@ -15,7 +15,7 @@ from hobble.figure.mesh import body
 from hobble.models.network import Network
 from hobble.report import opening_walk, straight_walk
 from hobble.runtime.animation import ProceduralAnimation
-from hobble.runtime.export import jointed
+from hobble.runtime.export import restore_bone_lengths
 from tests.report.example_motion import hills
 
 FRAMES = 120
@@ -47,7 +47,7 @@ def test_the_page_moves_as_python_does(
         pose = animation.next_pose(
             target["velocity"], target["facing"], target["gait"], injury=injury, terrain=hills
         )
-        world, places = jointed(network.skeleton, pose.positions[None], pose.rotations[None])
+        world, places = restore_bone_lengths(network.skeleton, pose.positions[None], pose.rotations[None])
         expected.append(
             (pose.positions, pose.phase, pose.channels["injury"], pose.rotations, places[0], world[0])
         )

@@ -21,7 +21,7 @@ from hobble.report.bundle import WEB
 from hobble.report.playable import playable
 from hobble.report.web_export import export_web
 from hobble.runtime.animation import ProceduralAnimation
-from hobble.runtime.export import jointed
+from hobble.runtime.export import restore_bone_lengths
 
 WALK = """
 import { readFileSync } from "fs";
@@ -98,7 +98,7 @@ def test_the_module_moves_as_python_does(
     for f, (places, turns, phase) in enumerate(walked["frames"]):
         injury = {"LeftUpLeg-LeftLeg": 7.0} if f >= 20 else {}
         pose = animation.next_pose((0.02 * f, 2.5), None, None if f < 50 else "crouch", injury=injury)
-        world, at = jointed(network.skeleton, pose.positions[None], pose.rotations[None])
+        world, at = restore_bone_lengths(network.skeleton, pose.positions[None], pose.rotations[None])
         assert np.abs(np.reshape(places, (-1, 3)) - at[0])[turning].max() < 1e-2, f
         assert np.degrees(quat.angle(np.reshape(turns, (-1, 4)), world[0]))[turning].max() < 0.02, f
         assert phase == pytest.approx(pose.phase, abs=1e-6)
@@ -134,7 +134,7 @@ def test_limits_of_two_channels_are_those_of_python(
     for values, found in zip(wanted, in_node(script, tmp_path / "web"), strict=True):
         for _ in range(90):
             pose = animation.next_pose((0.0, 2.4), **values)
-        _, at = jointed(network.skeleton, pose.positions[None], pose.rotations[None])
+        _, at = restore_bone_lengths(network.skeleton, pose.positions[None], pose.rotations[None])
         assert np.abs(np.reshape(found, (-1, 3)) - at[0])[turning].max() < 1e-2
         now = animation.state.channel_values
         alone = [both.limits[name].highest_speeds(now[:, part])[0, 1] for name, part in PARTS]

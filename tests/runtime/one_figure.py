@@ -6,7 +6,7 @@ import numpy as np
 
 from hobble.core import quat
 from hobble.core.skeleton import Skeleton, forward_kinematics
-from hobble.runtime.feet import foot_parts, knees_ahead, leg_joints, place_feet
+from hobble.runtime.feet import foot_parts, leg_joints, place_feet, rest_facing
 
 
 def crouched(skeleton: Skeleton, thigh: float = 0.5, knee: float = 0.9) -> tuple[np.ndarray, np.ndarray]:
@@ -28,7 +28,7 @@ class Feet:
         self.lock, self.hold, self.lift = np.zeros((1, 2)), np.zeros((1, 2, 2)), np.zeros((1, 2))
         self.step, self.missed = np.zeros((1, 2)), np.zeros((1, 2))
         self.added = np.tile([1.0, 0, 0, 0], (1, 2, 2, 1))
-        self.ahead, self.fastest = knees_ahead(skeleton), 1e8
+        self.ahead, self.fastest = rest_facing(skeleton), 1e8
         self.base = crouched(skeleton, *bent)
         self.shown, self.height = self.base[0][None, self.legs[:, 1:]], np.zeros(1)
 

@@ -16,7 +16,7 @@ from hobble.runtime import ProceduralAnimation
 from hobble.runtime.export import export_bvh, fitted_skeleton, motion_clip
 from hobble.runtime.feet import leg_joints
 from hobble.runtime.options import Runtime
-from hobble.runtime.scenarios import generate, scenarios, swept_columns
+from hobble.runtime.scenarios import generate_scenarios, scenarios, swept_columns
 
 
 def motion(skeleton, frames: int = 20) -> tuple[np.ndarray, np.ndarray]:
@@ -98,7 +98,7 @@ def test_bvh_round_trip(tmp_path: Path, holden31) -> None:
 
 
 def test_every_scenario_is_written(tmp_path: Path, hurtable) -> None:
-    generate(hurtable, tmp_path / "scenarios.npz", tmp_path / "bvh", Runtime())
+    generate_scenarios(hurtable, tmp_path / "scenarios.npz", tmp_path / "bvh", Runtime())
     data = np.load(tmp_path / "scenarios.npz")
     names = [str(name) for name in data["names"]]
     assert names[:3] == ["walk", "jog", "crouch"]

@@ -19,8 +19,8 @@ from hobble.runtime.feet import (
     TOES,
     carry_body,
     foot_parts,
-    knees_ahead,
     leg_joints,
+    rest_facing,
 )
 from tests.runtime.one_figure import Feet, crouched
 
@@ -134,7 +134,7 @@ def test_standing_feet_raise_and_lower_the_body(holden31: Skeleton) -> None:
         lift = np.zeros(1)
         for _ in range(80):
             position = base[None].copy()
-            both = legs, foot_parts(holden31, legs), sole, knees_ahead(holden31), far
+            both = legs, foot_parts(holden31, legs), sole, rest_facing(holden31), far
             carry_body(np.array([contacts], np.float32), ground, hips, (low, high), both, lift, position)
         moved = position[0] - base
         np.testing.assert_allclose(moved[:, 1], moved[0, 1], atol=1e-12)

@@ -9,8 +9,8 @@ from hypothesis import strategies as st
 from hobble.core import quat
 from hobble.core.ik import two_bone_knee
 from hobble.core.skeleton import Skeleton
-from hobble.runtime.feet import knees_ahead, leg_joints
-from hobble.runtime.leg_reach import MOST_ADDED, bend, reach
+from hobble.runtime.feet import leg_joints, rest_facing
+from hobble.runtime.leg_reach import MOST_ADDED, bend_leg, move_heel
 from tests.runtime.one_figure import Feet, crouched
 
 coordinate = st.floats(-25, 25)
@@ -26,7 +26,7 @@ def test_reaching_with_a_leg_equals_two_bone_ik(holden31: Skeleton, x: float, y:
     added, leg = np.tile([1.0, 0, 0, 0], (2, 1)), leg_joints(holden31)[0]
     for _ in range(12):  # enough frames to reach any of the targets
         position, rotation = before.copy(), turned.copy()
-        bend(position, rotation, leg, shift, knees_ahead(holden31), added, (before[leg[1:]], 0.0, 1e8))
+        bend_leg(position, rotation, leg, shift, rest_facing(holden31), added, (before[leg[1:]], 0.0, 1e8))
     upper, lower = (
         np.linalg.norm(before[knee] - before[hip]),
         np.linalg.norm(before[heel] - before[knee]),
@@ -51,7 +51,7 @@ def test_the_knee_stays_on_its_side(holden31: Skeleton) -> None:
     knees = []
     for z in np.linspace(-70, 90, 321):
         position, _ = crouched(holden31)
-        reach(position, hip, knee, heel, np.array([0.0, 0.0, z]), (0.0, 0.0, 1.0))
+        move_heel(position, hip, knee, heel, np.array([0.0, 0.0, z]), (0.0, 0.0, 1.0))
         knees.append(position[knee] - position[hip])
     assert np.linalg.norm(np.diff(knees, axis=0), axis=1).max() < 2
 
@@ -72,7 +72,7 @@ def test_no_leg_turns_too_fast_for_any_foot_target(holden31: Skeleton) -> None:
             np.linalg.norm(np.diff(position[[hip, knee, heel]], axis=0), axis=1), lengths, rtol=1e-6
         )
         straight = feet.base[0] + moved
-        reach(straight, hip, knee, heel, rng.uniform(-30, 30, 3), tuple(feet.ahead))
+        move_heel(straight, hip, knee, heel, rng.uniform(-30, 30, 3), tuple(feet.ahead))
         leg, base = straight[knee] - straight[hip], feet.base[0][knee] - feet.base[0][hip]
         plain = max(plain, float(np.arccos(leg @ base / lengths[0] ** 2)))
         last = feet.rotation

@@ -74,7 +74,9 @@ def test_severities_of_another_shape_are_refused(hurtable, network) -> None:
         crowd.next_pose((0, 1), injury=injury)
     with pytest.raises(ValueError, match=r"injury has to have shape \(30,\) or \(3, 30\), not \(29,\)"):
         crowd.next_pose((0, 1), injury=np.ones(29))
-    with pytest.raises(ValueError, match=rf"{KNEE} has to be one severity or 3, not of shape \(2,\)"):
+    with pytest.raises(
+        ValueError, match=rf"{KNEE} has to be one severity for all .* 3, one for each; its shape is \(2,\)"
+    ):
         crowd.next_pose((0, 1), injury={KNEE: [1, 2]})
     with pytest.raises(
         ValueError, match="30 numbers given for injury, but this network has no input for injury"

@@ -42,7 +42,7 @@ def test_patch_and_feet_have_the_same_mean_height(made: SimpleNamespace, patches
     sides = np.tile([1.0, 0.0], (len(path), 1))
     ground = fit_cycle(patches, soles, contacts, path, sides, "rocky", fits=5, smoothing=0.1, deepest=1.0)
     patch = replace(ground, surfaces=(), pits=())
-    assert np.allclose(patch.above(soles)[:, contacts].mean(axis=1), 0, atol=1e-3)
+    assert np.allclose(patch.height_above_soles(soles)[:, contacts].mean(axis=1), 0, atol=1e-3)
     assert np.allclose(ground.centre, soles[contacts][:, [0, 2]].mean(axis=0))
 
 
@@ -83,7 +83,7 @@ def test_heights_are_ordered_left_centre_right_from_past_to_future() -> None:
     left = np.stack([np.cos(angle), -np.sin(angle)], axis=-1)  # +X of the facing frame
     assert np.allclose(samples[0], position + 25 * left)
     assert np.allclose(samples[2], position - 25 * left)
-    ground = SimpleNamespace(at=lambda points: np.stack([points[:, 0], 7 + points[:, 1]]))
+    ground = SimpleNamespace(heights_at=lambda points: np.stack([points[:, 0], 7 + points[:, 1]]))
     heights = heights_under(ground, samples, 70, 72, np.arange(-60, 60, 10)).reshape(3, 2, 3, 12)
     for row in range(3):
         for side in range(3):
@@ -198,7 +198,7 @@ def honest_over(heightmap: dict, files: list[Path], made: SimpleNamespace) -> No
     patches = draw_patches(maps, count=100, **drawn)
     walk = made.walk(GROUNDS["waves"])
     fits = clip_fits(walk.clip, walk.labels, patches, "rocky", options, made.database())
-    assert np.ptp(patches.at(range(100), np.zeros((1, 2), np.float32))) > 1  # it has hills
+    assert np.ptp(patches.heights_at(range(100), np.zeros((1, 2), np.float32))) > 1  # it has hills
     assert fits.foot_error[..., 0].max() < 1
     assert fits.foot_below.max() <= 1
 

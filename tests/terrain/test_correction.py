@@ -28,7 +28,7 @@ def points(seed: int, count: int = 12) -> tuple[Stances, np.ndarray]:
 def test_without_smoothing_the_surface_goes_through_every_point(seed: int) -> None:
     at, residual = points(seed)
     for surface, wanted in zip(fit_surfaces(at, residual, 0.0), residual, strict=True):
-        assert np.allclose(surface.at(at.place), wanted, atol=1e-6)
+        assert np.allclose(surface.heights_at(at.place), wanted, atol=1e-6)
 
 
 def test_the_surface_solves_the_regularised_system_of_the_original() -> None:
@@ -38,7 +38,7 @@ def test_the_surface_solves_the_regularised_system_of_the_original() -> None:
     weights = np.linalg.solve(phi - 0.1 * np.eye(12), residual[0])
     elsewhere = np.random.default_rng(5).uniform(-300, 300, (40, 2))
     expected = distances(elsewhere, at.place) / spread @ weights
-    assert np.allclose(fit_surfaces(at, residual, 0.1)[0].at(elsewhere), expected)
+    assert np.allclose(fit_surfaces(at, residual, 0.1)[0].heights_at(elsewhere), expected)
 
 
 def test_a_point_with_weight_m_equals_m_points_at_one_place() -> None:
@@ -50,7 +50,7 @@ def test_a_point_with_weight_m_equals_m_points_at_one_place() -> None:
     one = fit_surfaces(many, np.repeat(residual, count, axis=1), 0.1)
     other = fit_surfaces(few, residual, 0.1)
     for a, b in zip(one, other, strict=True):
-        assert np.allclose(a.at(elsewhere), b.at(elsewhere), atol=1e-9)
+        assert np.allclose(a.heights_at(elsewhere), b.heights_at(elsewhere), atol=1e-9)
 
 
 @settings(max_examples=20, deadline=None)
@@ -62,16 +62,19 @@ def test_only_large_residuals_are_fitted_more_closely_than_in_the_original(seed:
     at = Stances(place, np.zeros(40), rng.integers(1, 9, 40).astype(float))
     residual = np.stack([rng.normal(0, 0.1, 40), rng.choice([0.0, 50.0], 40)])
     once, met = fit_surfaces(at, residual, 0.1), fit_surfaces(at, residual, 0.1, 0.5)
-    left = [np.abs(r - s.at(place)) @ at.count / at.count.sum() for r, s in zip(residual, met, strict=True)]
+    left = [
+        np.abs(r - s.heights_at(place)) @ at.count / at.count.sum()
+        for r, s in zip(residual, met, strict=True)
+    ]
     assert max(left) <= 0.5 + 1e-9
-    assert np.abs(residual[1] - once[1].at(place)) @ at.count / at.count.sum() > 0.5
+    assert np.abs(residual[1] - once[1].heights_at(place)) @ at.count / at.count.sum() > 0.5
     assert np.array_equal(once[0].weights, met[0].weights)
 
 
 def test_points_at_one_place_give_a_flat_surface() -> None:
     at = Stances(np.full((3, 2), 7.0), np.zeros(3), np.ones(3))
     (surface,) = fit_surfaces(at, np.ones((1, 3)), 0.1)
-    assert np.all(surface.at(np.zeros((4, 2))) == 0)
+    assert np.all(surface.heights_at(np.zeros((4, 2))) == 0)
 
 
 def test_stances_are_runs_of_one_joint_of_limited_length() -> None:

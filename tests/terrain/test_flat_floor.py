@@ -9,7 +9,7 @@ import pytest
 
 from hobble.terrain.clip_fits import clip_fits
 from hobble.terrain.patches import Patches
-from hobble.terrain.soles import Feet, held_above_other
+from hobble.terrain.soles import Feet, is_above_other_joint
 from tests.terrain.grounds import GROUNDS
 
 
@@ -71,7 +71,7 @@ def test_a_heel_is_held_up_only_over_a_toe_that_stands() -> None:
     soles = np.zeros((2, 4, 3))
     soles[:, 0, 1] = 5.0
     contacts = np.array([[True, True, True, True], [True, False, True, True]])
-    up = held_above_other(Feet(soles, contacts, 0.0, 0.0), 2.0)
+    up = is_above_other_joint(Feet(soles, contacts, 0.0, 0.0), 2.0)
     assert up.tolist() == [[True, False, False, False], [False] * 4]
 
 

@@ -38,13 +38,13 @@ def test_patches_of_a_plane_are_planes_of_mean_zero(a: float, b: float, seed: in
     slope = np.einsum("i,pij->pj", [a, b], turn)
     middle = np.array([-0.5, -0.5])  # of the cells -64 .. 63
     expected = np.einsum("pj,nj->pn", slope, points - middle)
-    assert np.allclose(patches.at(range(5), points), expected, atol=1e-3)
+    assert np.allclose(patches.heights_at(range(5), points), expected, atol=1e-3)
 
 
 def test_heights_between_cells_are_bilinear(patches: Patches) -> None:
     k = np.arange(0, len(patches), 23)
     points = np.random.default_rng(0).uniform(-64, 63, (200, 2)).astype(np.float32)
-    for p, heights in zip(k, patches.at(k, points), strict=True):
+    for p, heights in zip(k, patches.heights_at(k, points), strict=True):
         m = patches.which[p]
         rows, columns = patches.shapes[m]
         start = patches.starts[m]
@@ -56,7 +56,7 @@ def test_heights_between_cells_are_bilinear(patches: Patches) -> None:
 
 
 def test_every_patch_has_mean_zero_and_no_cell_beyond_the_limit(patches: Patches) -> None:
-    heights = patches.at(np.arange(len(patches)), CELLS)
+    heights = patches.heights_at(np.arange(len(patches)), CELLS)
     assert np.abs(heights.mean(axis=1)).max() < 1e-3
     assert np.abs(heights).max() <= 50.001
 
@@ -65,7 +65,7 @@ def test_every_valid_view_can_be_drawn() -> None:
     """On a cliff only views that pass are drawn, whatever part of the cliff they contain."""
     cliff = np.zeros((400, 400))
     cliff[200:] = 60.0
-    heights = draw(TerrainMap("cliff", cliff, CELL), count=200).at(range(200), CELLS)
+    heights = draw(TerrainMap("cliff", cliff, CELL), count=200).heights_at(range(200), CELLS)
     share = (heights > heights.min(axis=1, keepdims=True) + 30).mean(axis=1)
     spread = np.ptp(heights, axis=1)
     assert np.abs(heights).max() <= 50.001
@@ -92,7 +92,7 @@ def test_a_map_with_wider_cells_keeps_its_scale() -> None:
     wide = plane(0.2, 0.0, rows=100, columns=100, cell=4 * CELL)
     patches = draw(wide, count=5)
     slope = np.linalg.norm(patches.affine[:, 0, :2], axis=1) * 0.2
-    heights = patches.at(range(5), CELLS)
+    heights = patches.heights_at(range(5), CELLS)
     assert np.allclose(slope, 0.2 / 4, atol=1e-5)
     assert np.all(np.ptp(heights, axis=1) < 0.2 / 4 * 128 * 1.5)
 
@@ -124,7 +124,7 @@ def test_the_same_seed_draws_the_same_and_another_does_not(tmp_path: Path) -> No
 def test_patches_round_trip_and_are_small(tmp_path: Path, patches: Patches) -> None:
     save_patches(tmp_path / "p.npz", patches)
     back = load_patches(tmp_path / "p.npz")
-    assert np.array_equal(back.at(range(9), CELLS), patches.at(range(9), CELLS))
+    assert np.array_equal(back.heights_at(range(9), CELLS), patches.heights_at(range(9), CELLS))
     views = sum(getattr(patches, n).nbytes for n in ("which", "affine", "mean"))
     assert views / len(patches) * 20_000 < 1e6
 
@@ -149,7 +149,7 @@ def test_a_damaged_file_is_refused(tmp_path: Path, patches: Patches) -> None:
 
 def test_outside_a_patch_the_height_is_that_of_its_edge(patches: Patches) -> None:
     world = np.array([[400.0, 0.0], [63 * CELL, 0.0], [0.0, -400.0], [0.0, -64 * CELL]])
-    heights = patches.at([3], patches.cells(world, np.zeros(2)))[0]
+    heights = patches.heights_at([3], patches.cells(world, np.zeros(2)))[0]
     assert heights[0] == heights[1]
     assert heights[2] == heights[3]
     moved = replace(patches).cells(world + 5.0, np.array([5.0, 5.0]))

@@ -21,7 +21,7 @@ def plain_errors(patches: Patches, footing: FootPoints) -> np.ndarray:
     every = np.arange(len(patches))
 
     def at(points: np.ndarray) -> np.ndarray:
-        return patches.at(every, points.astype(np.float32)).astype(float)
+        return patches.heights_at(every, points.astype(np.float32)).astype(float)
 
     down, up, points_beside = footing.down, footing.up, footing.beam_sides
     under = at(down[:, :2])
@@ -77,7 +77,7 @@ def test_feet_on_a_plane_have_no_error_and_feet_below_it_their_depth() -> None:
     rng = np.random.default_rng(0)
     place = rng.uniform(-60, 60, (90, 2)).astype(np.float32)
     for p in range(4):
-        height = patches.at([p], place)[0]
+        height = patches.heights_at([p], place)[0]
         height = height - height[:40].mean()
         table = np.column_stack([place, height])
         exact = FootPoints(table[:40], table[40:])

@@ -75,7 +75,7 @@ def main(jobs: list[dict[str, Any]]) -> None:
 
 def one(job: dict[str, Any], processes: Processes) -> None:
     """on_device: rows shuffled as on an accelerator. window: chunks held at a time, 0 for all."""
-    module.rows_for = DeviceRows if job["on_device"] else HostRows  # type: ignore[assignment]
+    module.rows_on_device_or_host = DeviceRows if job["on_device"] else HostRows  # type: ignore[assignment]
     window = job["window"]
     Database.window = (lambda *_: window) if window else WINDOW  # type: ignore[method-assign]
     training = Training.model_validate(job["training"])

@@ -20,7 +20,7 @@ from hobble.models.pfnn.trainable import initialise
 from hobble.training import checkpoint, start, train
 from hobble.training.batches import HostRows
 from hobble.training.checkpoint import State
-from hobble.training.device_rows import DeviceRows, gpu_has_room, rows_for
+from hobble.training.device_rows import DeviceRows, gpu_has_room, rows_on_device_or_host
 from hobble.training.held_out import HeldOut
 from hobble.training.history import columns, write_history
 
@@ -95,7 +95,7 @@ def test_rows_on_a_device_are_those_of_the_reader(tmp_path: Path, dtype: str) ->
 
 
 def test_rows_stay_with_the_host_where_there_is_no_accelerator(data: Database) -> None:
-    assert type(rows_for(data, torch.device("cpu"))) is HostRows
+    assert type(rows_on_device_or_host(data, torch.device("cpu"))) is HostRows
 
 
 def test_training_twice_gives_the_same_bits(run: Run) -> None:

@@ -13,7 +13,7 @@ import pytest
 
 from hobble.core.errors import InputError
 from hobble.core.files import write_text
-from hobble.workflow.batch_job import make_each, pieces
+from hobble.workflow.batch_job import job_pieces, make_each
 from hobble.workflow.clip_batches import (
     LEAST_BATCHES,
     MOST_CLIPS_OF_A_BATCH,
@@ -145,7 +145,7 @@ def test_each_clip_of_a_job_gets_its_files() -> None:
             per_clip=[{"clip": "a", "k": 1}, {"clip": "b", "k": 2}], files_per_clip={"some": [0, 3]}, code="c"
         ),
     )
-    first, second = pieces(job)
+    first, second = job_pieces(job)
     assert first.input == {"one": "a", "shared": "s", "some": []}
     assert second.input == {"one": "b", "shared": "s", "some": ["x", "y", "z"]}
     assert (second.output, second.params) == ({"out": "B"}, {"clip": "b", "k": 2, "code": "c"})

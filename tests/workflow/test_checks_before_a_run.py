@@ -9,7 +9,7 @@ import pytest
 from hobble.core.errors import HobbleError
 from hobble.workflow import targets
 from hobble.workflow.project import Project
-from hobble.workflow.targets import check
+from hobble.workflow.targets import check_targets
 from tests.workflow.small_project import DATASET
 
 
@@ -55,14 +55,14 @@ def test_impossible_targets_are_reported_before_training(
     (base / "config/eyes.yaml").write_text("extends: hurt\nnetwork_of: one\n")
     monkeypatch.setattr(targets, "_check_dataset", lambda *_: None)
     with pytest.raises(HobbleError, match=message):
-        check(Project(base, {}), [target])
+        check_targets(Project(base, {}), [target])
     fine = (
         "results/hurt/stimuli",
         "results/hurt/questionnaire/questionnaire.html",
         "results/one/export/pfnn",
         "results/one/export/cubic.onnx",
     )
-    check(Project(base, {}), fine)
+    check_targets(Project(base, {}), fine)
 
 
 @pytest.mark.parametrize(
@@ -82,10 +82,10 @@ def test_a_symmetric_training_without_mirrors_is_refused(
     (base / "config/lame.yaml").write_text(f"extends: hurt\ntraining: {{symmetric: true}}\n{text}\n")
     project = Project(base, {})
     if not message:
-        check(project, ["results/lame/report.html"])
+        check_targets(project, ["results/lame/report.html"])
         return
     with pytest.raises(HobbleError, match=message):
-        check(project, ["results/lame/report.html"])
+        check_targets(project, ["results/lame/report.html"])
 
 
 LISTED = "skeleton: s\nfolder: mine\nclips: {a: , b: {%s}}\n"
@@ -115,7 +115,7 @@ def test_wrong_names_in_clip_entries_are_reported_before_anything_runs(
 ) -> None:
     (complete / "config/datasets/mine.yaml").write_text(text)
     with pytest.raises(HobbleError, match=f"data set mine: .*{message}"):
-        check(Project(complete, {}), ["results/one/report.html"])
+        check_targets(Project(complete, {}), ["results/one/report.html"])
 
 
 def test_a_file_in_both_splits_is_refused_before_anything_runs(complete: Path) -> None:
@@ -123,12 +123,12 @@ def test_a_file_in_both_splits_is_refused_before_anything_runs(complete: Path) -
         (complete / f"data/mine/{name}.bvh").write_text(text)
     message = r'data set mine: b and a are the same file\. The first .* to held_out: \["a"\]'
     with pytest.raises(HobbleError, match=message):
-        check(Project(complete, {}), ["results/one/report.html"])
-    check(Project(complete, {}), ["results/datasets/mine/look.html"])
+        check_targets(Project(complete, {}), ["results/one/report.html"])
+    check_targets(Project(complete, {}), ["results/datasets/mine/look.html"])
     data = complete / "config/datasets/mine.yaml"
     data.write_text(DATASET.replace("[b]", "[a, b]").replace("mirror: true", ""))
     (complete / "data/mine/a_mirror.bvh").unlink()
-    check(Project(complete, {}), ["results/hurt/report.html"])
+    check_targets(Project(complete, {}), ["results/hurt/report.html"])
 
 
 def test_a_skeleton_that_cannot_be_mirrored_is_reported_before_anything_runs(complete: Path) -> None:
@@ -138,11 +138,11 @@ def test_a_skeleton_that_cannot_be_mirrored_is_reported_before_anything_runs(com
         text = DATASET.replace("mirror: true", f"mirror: {str(mirror).lower()}") + "clips: {a: , b: }\n"
         (complete / "config/datasets/mine.yaml").write_text(text)
         if not mirror:
-            check(Project(complete, {}), ["results/one/report.html"])
+            check_targets(Project(complete, {}), ["results/one/report.html"])
     with pytest.raises(
         HobbleError, match="skeleton s cannot be mirrored: LeftFoot is the left heel and OtherF"
     ):
-        check(Project(complete, {}), ["results/one/report.html"])
+        check_targets(Project(complete, {}), ["results/one/report.html"])
 
 
 @pytest.mark.parametrize(
@@ -167,12 +167,12 @@ def test_an_impossible_continuation_is_reported_before_anything_runs(
     (complete / "config/other.yaml").write_text(f"extends: more\n{text}\n")
     project = Project(complete, {})
     if message is None:
-        return check(project, ["results/other/report.html"])
+        return check_targets(project, ["results/other/report.html"])
     with pytest.raises(HobbleError, match=f"configuration other continues from one, .*{message}"):
-        check(project, ["results/other/report.html"])
+        check_targets(project, ["results/other/report.html"])
 
 
 def test_every_shipped_data_set_passes(root: Path) -> None:
     project = Project(root, {"mocap": "nowhere"})
     names = ("synthetic", "synthetic-ava", "tiny", "cmu")
-    check(project, [f"results/datasets/{name}/x" for name in names])
+    check_targets(project, [f"results/datasets/{name}/x" for name in names])

@@ -29,9 +29,9 @@ def test_checksums_are_in_the_results_folder_of_their_files() -> None:
         "/data/datasets/results/test/report.html": "/data/datasets/results/test/checksums/report.html.crc32",
     }
     for path, record in where.items():
-        assert checksums.record_of(Path(path)) == Path(record)
+        assert checksums.checksum_path(Path(path)) == Path(record)
     for other in ("data/mine/walk.bvh", "config/test.yaml", "results/test/network/weights.npz", "results/x"):
-        assert checksums.record_of(Path(other)) is None
+        assert checksums.checksum_path(Path(other)) is None
 
 
 def test_every_flipped_bit_is_detected(made: Path) -> None:
@@ -47,7 +47,7 @@ def test_every_flipped_bit_is_detected(made: Path) -> None:
 
 
 def test_damaged_checksums_are_detected_and_missing_ones_accepted(made: Path) -> None:
-    record = checksums.record_of(made)
+    record = checksums.checksum_path(made)
     record.write_bytes(b"\xff\0")
     with pytest.raises(InputError, match="damaged"):
         checksums.verify([str(made)])
@@ -87,7 +87,7 @@ def test_a_job_refuses_a_damaged_input_and_writes_checksums(made: Path, capsys) 
         done.append(output)
 
     run(made, work)
-    assert checksums.record_of(done[0]).is_file()
+    assert checksums.checksum_path(done[0]).is_file()
     made.write_text(json.dumps({"source_fps": 121.0}))
     with pytest.raises(SystemExit):
         run(made, work)

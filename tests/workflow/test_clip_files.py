@@ -12,7 +12,7 @@ import pytest
 from hobble.core.errors import HobbleError
 from hobble.motion.options import ClipMotion
 from hobble.workflow.project import Project
-from hobble.workflow.targets import notes
+from hobble.workflow.targets import notes_on_unused_files
 from tests.workflow.small_project import DATASET
 
 
@@ -40,7 +40,7 @@ def test_clips_are_found_in_subfolders_and_whatever_the_case_of_their_suffix(bas
     (base / "data/mine/.trash").mkdir()
     (base / "data/mine/.trash/e.bvh").write_text("")
     project = Project(base, {})
-    assert list(project.clips.of("mine")) == ["a", "b", "c", "d"]
+    assert list(project.clips.entries("mine")) == ["a", "b", "c", "d"]
     assert project.clips.source("mine", "d") == str(below / "d.BVH")
     assert project.clips.label_files("mine", "d") == [str(below / "d_gait.txt")]
     assert project.datasets.channel_sources.files("mine", "d", "injury") == [str(below / "d_injuries.txt")]
@@ -57,7 +57,7 @@ def test_a_clip_in_linked_folders_is_found_once(base: Path) -> None:
         (base / f"data/mine/{name}").symlink_to(base / "kept")
     (base / "data/mine/gone").symlink_to(base / "nowhere")
     project = Project(base, {})
-    assert list(project.clips.of("mine")) == ["a", "b", "c", "d"]
+    assert list(project.clips.entries("mine")) == ["a", "b", "c", "d"]
     assert project.clips.source("mine", "d") == str(base / "data/mine/first/day 1/d.bvh")
     assert project.datasets.channel_sources.files("mine", "d", "injury") == [
         str(base / "data/mine/first/day 1/d_injuries.txt")
@@ -70,18 +70,23 @@ def test_a_mirror_beside_its_original_is_left_out(base: Path, mirror: bool) -> N
     (base / "config/datasets/mine.yaml").write_text(text)
     (base / "data/mine/a_mirror_footsteps.txt").write_text("1 2\n")
     clips = Project(base, {}).clips
-    assert list(clips.of("mine")) == ["a", "b", "c"]
+    assert list(clips.entries("mine")) == ["a", "b", "c"]
     said = [] if mirror else ["1 files in .* are mirrors of other clips .a_mirror.*`mirror: true` Hobble m"]
-    assert all(re.search(wanted, note) for wanted, note in zip(said, clips.notes("mine"), strict=True))
+    assert all(
+        re.search(wanted, note)
+        for wanted, note in zip(said, clips.notes_on_unused_files("mine"), strict=True)
+    )
     (base / "data/mine/a_mirror.bvh").rename(base / "data/mine/z_mirror.bvh")
     with pytest.raises(HobbleError, match=r"z_mirror: names that end in _mirror are .* `mirror: true` makes"):
-        Project(base, {}).clips.of("mine")
+        Project(base, {}).clips.entries("mine")
 
 
 def test_a_status_file_without_a_clip_is_reported_with_the_nearest_name(base: Path) -> None:
     (base / "data/mine/orphan.bvh").write_text("")
     (base / "data/mine/orphn_injuries.txt").write_text("frames:9\n1-9 LeftLeg-LeftFoot[4];\n")
-    (note,) = notes(Project(base, {}), ["results/one/report.html", "results/hurt/report.html"])
+    (note,) = notes_on_unused_files(
+        Project(base, {}), ["results/one/report.html", "results/hurt/report.html"]
+    )
     assert note.startswith("data set mine: ")
     assert (
         "orphn_injuries.txt belongs to no clip and is not read. If it belongs to orphan, rename it." in note
@@ -92,7 +97,7 @@ def test_two_files_of_one_clip_are_refused_with_both(base: Path) -> None:
     (base / "data/mine/old").mkdir()
     (base / "data/mine/old/a.BVH").write_text("")
     with pytest.raises(HobbleError, match=r"old/a\.BVH: a second file of clip a; the first is .*mine/a\.bvh"):
-        Project(base, {}).clips.of("mine")
+        Project(base, {}).clips.entries("mine")
     (base / "config/datasets/mine.yaml").write_text(DATASET + "clips: {a: , b: , c: }\n")
     with pytest.raises(HobbleError, match="a second file of clip a"):
         Project(base, {}).clips.source("mine", "a")
@@ -138,7 +143,7 @@ def test_a_pipe_is_refused_as_a_clip(base: Path, name: str) -> None:
     os.mkfifo(base / f"data/mine/{name}")
     clips = Project(base, {}).clips
     with pytest.raises(HobbleError, match=f"mine/{name}: a device or a pipe, not a file"):
-        (clips.of if name == "a.bvh" else clips.heightmap_files)("mine")
+        (clips.entries if name == "a.bvh" else clips.heightmap_files)("mine")
     listed = text + "clips: {a: , b: }\n"
     (base / "config/datasets/mine.yaml").write_text(listed)
     if name == "a.bvh":

@@ -11,7 +11,7 @@ import yaml
 from hobble.workflow.clip_batches import LEAST_BATCHES, ClipBatch, batch_of
 from hobble.workflow.project import Project
 from hobble.workflow.resource_demands import ENGINE_MB, WEEK_MINUTES, Demands, bvh_seconds
-from hobble.workflow.resource_use import planned_jobs, with_use
+from hobble.workflow.resource_use import planned_jobs, with_measured_use
 
 CLIPS = 40
 MANY = "skeleton: holden31\nfolder: many\nmirror: true\nheld_out: [clip-00]\n"
@@ -142,7 +142,7 @@ def test_used_and_requested_resources_of_a_job(tmp_path) -> None:
     for path, text in ((log, "took 500 MB of memory at most\n"), (benchmark, "s\tmax_rss\n30.0\t7.1\n")):
         path.parent.mkdir(parents=True)
         path.write_text(text)
-    (job,) = with_use(planned_jobs(plan), tmp_path)
+    (job,) = with_measured_use(planned_jobs(plan), tmp_path)
     assert job.rule == "motion_clips"
     assert job.memory_share == pytest.approx((500 + ENGINE_MB) / 1000)
     assert job.time_share == pytest.approx(0.25)

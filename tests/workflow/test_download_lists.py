@@ -8,7 +8,7 @@ import pytest
 
 from hobble.core.errors import HobbleError
 from hobble.workflow.project import Project
-from hobble.workflow.targets import check
+from hobble.workflow.targets import check_targets
 
 FAR = """
 skeleton: s
@@ -72,12 +72,13 @@ def test_a_bad_checksum_list_is_reported_with_its_line(base: Path) -> None:
 
 def test_every_clip_of_the_cmu_set_has_a_checksum_and_an_address(root: Path) -> None:
     project = Project(root, {"mocap": "nowhere"})
-    check(project, ["results/datasets/cmu/motion/02_01.npz"])
-    assert len(project.clips.listed("cmu")) == 68
+    check_targets(project, ["results/datasets/cmu/motion/02_01.npz"])
+    assert len(project.clips.listed_entries("cmu")) == 68
     assert project.clips.download("cmu", "02_01")["url"].endswith("/cmu-mocap/master/data/002/02_01.bvh")
     assert project.clips.download("cmu", "105_16")["url"].endswith("/105/105_16.bvh")
     assert all(
-        len(project.clips.download("cmu", clip)["sha256"]) == 64 for clip in project.clips.listed("cmu")
+        len(project.clips.download("cmu", clip)["sha256"]) == 64
+        for clip in project.clips.listed_entries("cmu")
     )
 
 
@@ -86,6 +87,6 @@ def test_the_checksums_are_those_of_the_files(root: Path, shared: Path) -> None:
     import hashlib
 
     project = Project(root, {})
-    for clip in project.clips.listed("cmu"):
+    for clip in project.clips.listed_entries("cmu"):
         data = (shared / f"mocap/cmu/{clip}.bvh").read_bytes()
         assert project.clips.download("cmu", clip)["sha256"] == hashlib.sha256(data).hexdigest()

@@ -24,7 +24,7 @@ def runs(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> tuple[Locks, Locks]
     """Two runs in one folder."""
     for name in ("_read_locks", "_write_locks"):
         monkeypatch.setattr(FilePersistence, name, getattr(FilePersistence, name))
-    lock_files.use()
+    lock_files.tolerate_removed_folder()
     return Locks(tmp_path / "locks"), Locks(tmp_path / "locks")
 
 

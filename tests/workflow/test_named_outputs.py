@@ -67,5 +67,5 @@ def test_rules_with_fixed_output_names_are_looked_up_directly(monkeypatch):
 
 def test_snakemake_plans_with_it(monkeypatch):
     monkeypatch.setattr(named_outputs.dag, "OutputIndex", OutputIndex)
-    named_outputs.use()
+    named_outputs.use_named_outputs()
     assert named_outputs.dag.OutputIndex is NamedOutputs

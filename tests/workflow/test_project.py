@@ -11,7 +11,7 @@ import pytest
 from hobble.channels import channel
 from hobble.core.errors import HobbleError
 from hobble.workflow.project import RESERVED, Project
-from hobble.workflow.targets import check
+from hobble.workflow.targets import check_targets
 from tests.workflow.small_project import DATASET
 
 
@@ -103,21 +103,23 @@ def test_a_clip_with_any_file_name_can_have_an_entry(base: Path, name: str) -> N
 
 def test_the_frames_of_the_synthetic_data_set_are_divided_among_its_clips(root: Path) -> None:
     project = Project(root, {})
-    total = sum(project.datasets.frames("synthetic", clip) for clip in project.clips.listed("synthetic"))
+    total = sum(
+        project.datasets.frames("synthetic", clip) for clip in project.clips.listed_entries("synthetic")
+    )
     assert abs(total - 11_412) < 20
 
 
 def test_network_of_reads_the_other_configurations_files(root: Path) -> None:
     project = Project(root, {})
     assert project.configurations.network("ava-m", "weights.npz") == "results/ava/network/weights.npz"
-    assert project.configurations.start("holden-xt") == ["results/holden/network/checkpoint.npz"]
-    assert project.configurations.start("holden") == []
+    assert project.configurations.start_checkpoint("holden-xt") == ["results/holden/network/checkpoint.npz"]
+    assert project.configurations.start_checkpoint("holden") == []
 
 
 def test_a_comparison_reads_the_files_of_its_configurations(complete: Path) -> None:
     base = complete
     project = Project(base, {"compare": ["one", "hurt"]})
-    check(project, ["results/compare/compare.json"])
+    check_targets(project, ["results/compare/compare.json"])
     assert project.comparison.input_files()["accuracy"] == [
         f"results/{n}/evaluation/accuracy.json" for n in ("one", "hurt")
     ]
@@ -143,9 +145,9 @@ def test_configurations_that_cannot_be_compared_are_refused(
     complete: Path, names: object, message: str
 ) -> None:
     project = Project(complete, {"compare": names})
-    check(project, ["results/one/report.html"])
+    check_targets(project, ["results/one/report.html"])
     with pytest.raises(HobbleError, match=message):
-        check(project, ["results/compare/report.html"])
+        check_targets(project, ["results/compare/report.html"])
 
 
 def test_the_folders_that_rules_name_are_reserved(root: Path) -> None:

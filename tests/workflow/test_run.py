@@ -14,7 +14,7 @@ import numpy as np
 import pytest
 
 from hobble.measures.registry import MEASURES
-from hobble.workflow.resource_use import planned_jobs, with_use
+from hobble.workflow.resource_use import planned_jobs, with_measured_use
 
 pytestmark = pytest.mark.workflow
 
@@ -151,7 +151,7 @@ def test_a_configuration_that_continues_another_starts_at_its_end(copied) -> Non
 
 
 def test_no_job_uses_more_than_its_rule_requests(finished) -> None:
-    jobs = list(with_use(planned_jobs(finished.run("-np", "-F", TARGET)), finished.folder))
+    jobs = list(with_measured_use(planned_jobs(finished.run("-np", "-F", TARGET)), finished.folder))
     assert {"motion_clips", "terrain_fits", "training", "report"} <= {job.rule for job in jobs if job.used_mb}
     assert [
         (job.log, job.memory_share, job.time_share)

@@ -46,7 +46,7 @@ for batch in [*batches_of_clips, *batches_of_hurt_versions]:
             channels=lambda w, batch=batch: datasets.channel_sources.channels(
                 batch.dataset
             ),
-            options=lambda w, batch=batch: datasets.part(
+            options=lambda w, batch=batch: datasets.options_of_class(
                 batch.dataset, "database", RowOptions
             ),
             code=lambda w, batch=batch: package.code(
@@ -63,9 +63,9 @@ def clips_of(dataset, channels, file, shard=None):
     A shard is the part of a database that one job makes from some of the clips. shard: its number, from 0.
     """
     names = (
-        datasets.selected(dataset, channels_of_folder(channels))
+        datasets.splits(dataset, channels_of_folder(channels))
         if shard is None
-        else datasets.in_shard(dataset, channels_of_folder(channels), int(shard))
+        else datasets.splits_in_shard(dataset, channels_of_folder(channels), int(shard))
     )
     return expand(f"results/datasets/{dataset}/{file}", clip=names)
 
@@ -76,9 +76,9 @@ def compared_files(w, file):
     The comparison finds copies, so that no motion is both trained on and held out. If the rule makes a shard, only
     clips of this shard are in the list.
     """
-    names = datasets.compared(w.dataset, channels_of_folder(w.channels))
+    names = datasets.clips_to_compare(w.dataset, channels_of_folder(w.channels))
     if hasattr(w, "shard"):
-        in_shard = datasets.in_shard(
+        in_shard = datasets.splits_in_shard(
             w.dataset, channels_of_folder(w.channels), int(w.shard)
         )
         names = [name for name in names if name in in_shard]
@@ -115,17 +115,17 @@ rule database_shard:
         runtime=lambda w, attempt: demands.shard_minutes(w.dataset, 0.1, attempt),
     params:
         # Clip -> "train" or "held_out".
-        splits=lambda w: datasets.in_shard(
+        splits=lambda w: datasets.splits_in_shard(
             w.dataset, channels_of_folder(w.channels), int(w.shard)
         ),
         channels=lambda w: channels_of_folder(w.channels),
         # Hurt version -> the healthy clip from which it is made.
         sources=lambda w: datasets.sources(
-            datasets.in_shard(w.dataset, channels_of_folder(w.channels), int(w.shard))
+            datasets.splits_in_shard(w.dataset, channels_of_folder(w.channels), int(w.shard))
         ),
         # Training uses every n-th row of hurt versions; this is n.
         every=lambda w: datasets.hurt_row_step(w.dataset),
-        options=lambda w: datasets.part(w.dataset, "database", Merging),
+        options=lambda w: datasets.options_of_class(w.dataset, "database", Merging),
         code=lambda w: package.code(
             "database_shard", *modules_of(channels_of_folder(w.channels))
         ),
@@ -163,15 +163,15 @@ rule database_merge:
     params:
         dataset=lambda w: w.dataset,
         # Clip -> "train" or "held_out".
-        splits=lambda w: datasets.selected(w.dataset, channels_of_folder(w.channels)),
+        splits=lambda w: datasets.splits(w.dataset, channels_of_folder(w.channels)),
         channels=lambda w: channels_of_folder(w.channels),
         # Hurt version -> the healthy clip from which it is made.
         sources=lambda w: datasets.sources(
-            datasets.selected(w.dataset, channels_of_folder(w.channels))
+            datasets.splits(w.dataset, channels_of_folder(w.channels))
         ),
         # Training uses every n-th row of hurt versions; this is n.
         every=lambda w: datasets.hurt_row_step(w.dataset),
-        options=lambda w: datasets.part(w.dataset, "database", Merging),
+        options=lambda w: datasets.options_of_class(w.dataset, "database", Merging),
         code=lambda w: package.code(
             "database_merge", *modules_of(channels_of_folder(w.channels))
         ),

@@ -29,7 +29,7 @@ rule measure:
         runtime=lambda w: measurements.runtime(w.configuration, w.measure),
         options=lambda w: measurements.options(w.configuration, w.measure),
         code=lambda w: measurements.code(
-            w.measure, configurations.kind(w.configuration)
+            w.measure, configurations.model_package(w.configuration)
         ),
     script:
         "../scripts/measure.py"
@@ -62,7 +62,7 @@ rule measure_piece:
         runtime=lambda w: measurements.runtime(w.configuration, w.measure),
         options=lambda w: measurements.options(w.configuration, w.measure),
         code=lambda w: measurements.code(
-            w.measure, configurations.kind(w.configuration), script="measure_piece"
+            w.measure, configurations.model_package(w.configuration), script="measure_piece"
         ),
     script:
         "../scripts/measure_piece.py"
@@ -72,7 +72,7 @@ rule compare:
     """The comparison of configurations with each other and with published results, as JSON and as CSV tables."""
     input:
         unpack(lambda w: comparison.input_files()),
-        published=keep_local(package.published()),
+        published=keep_local(package.published_file()),
     output:
         json="results/compare/compare.json",
         tables=directory("results/compare/tables"),

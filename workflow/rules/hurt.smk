@@ -47,7 +47,7 @@ for batch in batches_of_hurt_versions:
                     "turn": clips.hurt_versions(batch.dataset)[clip],
                     "ground": clips.entry(batch.dataset, clip).ground,
                     # `every` is left out, because only the database depends on it.
-                    "options": clips.hurt(batch.dataset, clip).model_dump(
+                    "options": clips.hurt_options(batch.dataset, clip).model_dump(
                         mode="json", exclude={"every"}
                     ),
                 }

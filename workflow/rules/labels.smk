@@ -8,7 +8,7 @@ def for_listed_clips(dataset, file):
     """
     return [
         f"results/datasets/{dataset}/{file}".format(clip=clip)
-        for clip in clips.listed(dataset)
+        for clip in clips.listed_entries(dataset)
     ]
 
 

@@ -5,7 +5,7 @@
 rule download_clip:
     """A clip that is not in the user's folder, downloaded from the data set's address."""
     output:
-        bvh=local(clips.downloaded("{dataset}", "{clip}")),
+        bvh=local(clips.download_path("{dataset}", "{clip}")),
     log:
         "results/datasets/{dataset}/logs/motion/download_clip/{clip}.log",
     localrule: True
@@ -70,7 +70,7 @@ for batch in batches_of_clips:
                 batch.dataset
             ).skeleton,
             # The folder of skeleton files. They map the joints of one rig to those of another.
-            maps=clips.skeletons,
+            maps=clips.skeleton_folder,
             code=lambda w: package.code("motion_clips"),
         script:
             "../scripts/motion_clips.py"

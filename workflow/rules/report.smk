@@ -4,7 +4,7 @@
 rule page_packages:
     """The npm packages that the pages of reports use, downloaded in the versions of the lock file."""
     input:
-        keep_local(package.web(".json")),
+        keep_local(package.web_files(".json")),
     output:
         "results/page/node_modules/.package-lock.json",
     log:
@@ -23,7 +23,7 @@ rule page_bundle:
     """The scripts of the reports' pages and their npm packages, bundled into one file."""
     input:
         packages=rules.page_packages.output,
-        scripts=keep_local(package.web(".js")),
+        scripts=keep_local(package.web_files(".js")),
     output:
         js="results/page/bundle.js",
     log:
@@ -86,10 +86,10 @@ rule report:
         configuration=rules.configuration.output.yaml,
         weights=lambda w: configurations.network(w.configuration, "weights.npz"),
         history=lambda w: configurations.network(w.configuration, "history.csv"),
-        motion=lambda w: configurations.of_dataset(
+        motion=lambda w: configurations.dataset_files(
             w.configuration, "motion/{clip}.json"
         ),
-        labels=lambda w: configurations.of_dataset(
+        labels=lambda w: configurations.dataset_files(
             w.configuration, "labels/{clip}.json"
         ),
         channels=lambda w: [
@@ -97,17 +97,17 @@ rule report:
             for channel in datasets.channel_sources.channels(
                 configurations.dataset(w.configuration)
             )
-            for file in configurations.of_dataset(
+            for file in configurations.dataset_files(
                 w.configuration, f"channels/{channel}/{{clip}}.json"
             )
         ],
-        rows=lambda w: configurations.of_dataset(
+        rows=lambda w: configurations.dataset_files(
             w.configuration, "database/clips/{clip}.npz"
         ),
-        terrain=lambda w: configurations.of_dataset(
+        terrain=lambda w: configurations.dataset_files(
             w.configuration, "terrain/clips/{clip}.npz"
         ),
-        template=keep_local(package.templates()),
+        template=keep_local(package.template_files()),
         bundle=rules.page_bundle.output.js,
     output:
         html="results/{configuration}/report.html",
@@ -130,7 +130,7 @@ rule report:
         title=lambda w: catalogue.configuration(w.configuration).report.title,
         code=lambda w: package.code(
             "report",
-            configurations.kind(w.configuration),
+            configurations.model_package(w.configuration),
             *part_modules("page"),
             *shown_modules(),
         ),
@@ -146,7 +146,7 @@ rule report_compare:
         weights=lambda w: [
             configurations.network(name, "weights.npz") for name in comparison.names()
         ],
-        template=keep_local(package.templates()),
+        template=keep_local(package.template_files()),
         bundle=rules.page_bundle.output.js,
     output:
         html="results/compare/report.html",
@@ -178,7 +178,7 @@ rule stimuli:
     params:
         runtime=lambda w: configurations.section(w.configuration, "runtime"),
         code=lambda w: package.code(
-            "stimuli", configurations.kind(w.configuration), *shown_modules()
+            "stimuli", configurations.model_package(w.configuration), *shown_modules()
         ),
     script:
         "../scripts/stimuli.py"
@@ -188,7 +188,7 @@ rule questionnaire:
     """A page that shows thirteen films of the character and asks what hurts. The right answers are in films.json."""
     input:
         weights=lambda w: configurations.network(w.configuration, "weights.npz"),
-        template=keep_local(package.templates()),
+        template=keep_local(package.template_files()),
     output:
         page="results/{configuration}/questionnaire/questionnaire.html",
         films="results/{configuration}/questionnaire/films.json",
@@ -204,7 +204,7 @@ rule questionnaire:
         configuration=lambda w: w.configuration,
         runtime=lambda w: configurations.section(w.configuration, "runtime"),
         code=lambda w: package.code(
-            "questionnaire", configurations.kind(w.configuration), *shown_modules()
+            "questionnaire", configurations.model_package(w.configuration), *shown_modules()
         ),
     script:
         "../scripts/questionnaire.py"
@@ -216,7 +216,7 @@ rule export_web:
         weights=lambda w: configurations.network(w.configuration, "weights.npz"),
         packages=rules.page_packages.output,
         scripts=rules.page_bundle.input.scripts,
-        files=keep_local([*package.web(".ts"), *package.web(".html")]),
+        files=keep_local([*package.web_files(".ts"), *package.web_files(".html")]),
     output:
         folder=directory("results/{configuration}/export/web"),
     log:
@@ -228,7 +228,7 @@ rule export_web:
         runtime=10,
     params:
         runtime=lambda w: configurations.section(w.configuration, "runtime"),
-        code=lambda w: package.code("export_web", configurations.kind(w.configuration)),
+        code=lambda w: package.code("export_web", configurations.model_package(w.configuration)),
     script:
         "../scripts/export_web.py"
 
@@ -249,7 +249,7 @@ rule limp_picture:
     params:
         runtime=lambda w: configurations.section(w.configuration, "runtime"),
         code=lambda w: package.code(
-            "limp_picture", configurations.kind(w.configuration)
+            "limp_picture", configurations.model_package(w.configuration)
         ),
     script:
         "../scripts/limp_picture.py"

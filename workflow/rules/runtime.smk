@@ -19,7 +19,7 @@ rule generate:
     params:
         runtime=lambda w: configurations.section(w.configuration, "runtime"),
         code=lambda w: package.code(
-            "generate", configurations.kind(w.configuration), *shown_modules()
+            "generate", configurations.model_package(w.configuration), *shown_modules()
         ),
     script:
         "../scripts/generate.py"
@@ -43,7 +43,7 @@ rule export_onnx:
         runtime=10,
     params:
         mode=lambda w: w.mode,
-        code=lambda w: package.code("export_onnx", configurations.kind(w.configuration)),
+        code=lambda w: package.code("export_onnx", configurations.model_package(w.configuration)),
     script:
         "../scripts/export_onnx.py"
 
@@ -64,7 +64,7 @@ rule export_release:
         runtime=10,
     params:
         code=lambda w: package.code(
-            "export_release", configurations.kind(w.configuration)
+            "export_release", configurations.model_package(w.configuration)
         ),
     script:
         "../scripts/export_release.py"
@@ -86,6 +86,6 @@ rule export_glb:
         mem_mb=1500,
         runtime=10,
     params:
-        code=lambda w: package.code("export_glb", configurations.kind(w.configuration)),
+        code=lambda w: package.code("export_glb", configurations.model_package(w.configuration)),
     script:
         "../scripts/export_glb.py"

@@ -1,6 +1,6 @@
 # Objects such as `clips`, `datasets` and `demands` are made in the Snakefile.
 
-from hobble.terrain.options import Drawing, Fitting, HeightSampling
+from hobble.terrain.options import PatchOptions, FitOptions, HeightSampling
 
 
 rule terrain_patches:
@@ -18,7 +18,7 @@ rule terrain_patches:
         mem_mb=2000,
         runtime=10,
     params:
-        options=lambda w: datasets.part(w.dataset, "terrain", Drawing),
+        options=lambda w: datasets.options_of_class(w.dataset, "terrain", PatchOptions),
         code=package.code("terrain_patches"),
     script:
         "../scripts/terrain_patches.py"
@@ -56,10 +56,10 @@ for batch in [*batches_of_clips, *batches_of_hurt_versions]:
                 {"clip": name, "ground": clips.entry(batch.dataset, name).ground}
                 for name in batch.names
             ],
-            options=lambda w, batch=batch: datasets.part(
-                batch.dataset, "terrain", Fitting
+            options=lambda w, batch=batch: datasets.options_of_class(
+                batch.dataset, "terrain", FitOptions
             ),
-            sampling=lambda w, batch=batch: datasets.part(
+            sampling=lambda w, batch=batch: datasets.options_of_class(
                 batch.dataset, "database", HeightSampling
             ),
             code=lambda w: package.code("terrain_fits"),

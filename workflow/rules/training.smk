@@ -8,9 +8,9 @@ rule training:
     input:
         database=lambda w: configurations.database(w.configuration),
         # Only if the training continues that of another configuration.
-        checkpoint=lambda w: configurations.start(w.configuration),
+        checkpoint=lambda w: configurations.start_checkpoint(w.configuration),
         # Only for a network that is built from the clips' rows instead of trained.
-        clips=lambda w: configurations.rows_in_order(w.configuration),
+        clips=lambda w: configurations.training_row_files(w.configuration),
     output:
         weights="results/{configuration}/network/weights.npz",
         history="results/{configuration}/network/history.csv",
@@ -42,6 +42,6 @@ rule training:
         )["terrain_side"],
         # The folder in which a later run of a killed job finds its checkpoints.
         checkpoints="results/{configuration}/checkpoints",
-        code=lambda w: package.code("training", configurations.kind(w.configuration)),
+        code=lambda w: package.code("training", configurations.model_package(w.configuration)),
     script:
         "../scripts/training.py"

@@ -2,11 +2,11 @@
 
 from hobble.models.load import load_network
 from hobble.runtime.options import Runtime
-from hobble.runtime.scenarios import generate
+from hobble.runtime.scenarios import generate_scenarios
 from hobble.workflow.job import job
 
 with job(snakemake) as log:
-    generate(
+    generate_scenarios(
         load_network(snakemake.input.weights),
         snakemake.output.scenarios,
         snakemake.output.bvh,

@@ -5,7 +5,7 @@ import functools
 from hobble.core.clip import load_clip
 from hobble.core.files import load_npz
 from hobble.terrain.clip_fits import clip_fits, save_fits
-from hobble.terrain.options import Fitting, HeightSampling
+from hobble.terrain.options import FitOptions, HeightSampling
 from hobble.terrain.patches import load_patches
 from hobble.workflow.batch_job import make_each
 
@@ -22,7 +22,7 @@ def make_fits(piece, log):
         load_npz(piece.input["labels"]),
         read_patches(piece.input["patches"]),
         piece.params["ground"],
-        Fitting.model_validate(piece.params["options"]),
+        FitOptions.model_validate(piece.params["options"]),
         HeightSampling.model_validate(piece.params["sampling"]),
     )
     save_fits(piece.output["fits"], fits)

@@ -1,12 +1,12 @@
 """Creates patches of ground, cut from random places of a data set's heightmaps."""
 
 from hobble.terrain.heightmaps import heightmaps
-from hobble.terrain.options import Drawing
+from hobble.terrain.options import PatchOptions
 from hobble.terrain.patches import draw_patches, save_patches
 from hobble.workflow.job import job
 
 with job(snakemake) as log:
-    options = Drawing.model_validate(snakemake.params.options)
+    options = PatchOptions.model_validate(snakemake.params.options)
     maps = heightmaps(
         options.heightmaps,
         snakemake.input.get("files", []),

@@ -21,7 +21,7 @@ from hobble.models.network import Network
 from hobble.models.packing import packed
 from hobble.report.playable import playable
 from hobble.report.straight_walk import walk_straight
-from hobble.runtime.export import jointed
+from hobble.runtime.export import restore_bone_lengths
 from hobble.runtime.options import Runtime
 
 FPS = 60
@@ -53,7 +53,7 @@ def healthy_walk(network: Network, skeleton: Skeleton, runtime: Runtime) -> Prof
         return None
     poses = [pose for _, pose in walk_straight(network, runtime, WARM_UP + MEASURED, {})][WARM_UP:]
     positions, rotations = np.array([p.positions for p in poses]), np.array([p.rotations for p in poses])
-    walk = measure(skeleton, jointed(skeleton, positions, rotations)[1], FPS)
+    walk = measure(skeleton, restore_bone_lengths(skeleton, positions, rotations)[1], FPS)
     return profile(walk) if len(walk) else None
 
 

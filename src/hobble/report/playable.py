@@ -26,7 +26,7 @@ from hobble.runtime import (
     trajectory,
 )
 from hobble.runtime.bounds import Bounds
-from hobble.runtime.character import start
+from hobble.runtime.character import start_characters
 from hobble.runtime.options import Runtime
 
 NO_EFFECT = 1e-7  # inputs are multiplied by 1 / standard deviation; below this factor they have no effect
@@ -71,7 +71,7 @@ def playable(network: Network, runtime: Runtime) -> dict[str, Any]:
         "gaits": list(network.gaits),
         "channels": shown_channels(network, runtime),
         "legs": legs.tolist(),
-        "ahead": feet.knees_ahead(skeleton).tolist(),
+        "ahead": feet.rest_facing(skeleton).tolist(),
         # For each foot, all joints below the heel; `toes` has only the toe and the joints below the toe.
         "carried": [np.flatnonzero(row).tolist() for row in parts],
         "toes": [np.flatnonzero(row == feet.TOES).tolist() for row in parts],
@@ -177,7 +177,7 @@ def _bounds(network: Network, outputs: NDArray[np.int64]) -> dict[str, Any]:
 
 def _start(network: Network) -> dict[str, Any]:
     """The state in which a character begins, at the origin and facing ahead."""
-    state = start(network, 1, np.zeros((1, 2)), np.zeros(1))
+    state = start_characters(network, 1, np.zeros((1, 2)), np.zeros(1))
     names = ("position", "direction", "gait", "joint_position", "joint_velocity", "joint_rotation")
     arrays = {name: packed(getattr(state, name)[0].astype(np.float32)) for name in names}
     return {**arrays, "phase": float(state.phase[0])}

@@ -17,7 +17,7 @@ from hobble.figure.fit_rotations import fitted_rotations
 from hobble.figure.mesh import body, mesh_key
 from hobble.figure.pack import packed_turns
 from hobble.models.packing import packed
-from hobble.runtime.export import jointed
+from hobble.runtime.export import restore_bone_lengths
 
 FPS = 30  # frame rate of the motion in the page
 UNIT = 0.01  # joint positions are stored as 16-bit integers in steps of this many cm
@@ -133,7 +133,7 @@ def packed_motion(
     keep: the joints to store. In the result, `root` and `pose` are from `pack_positions`. `turn` has the
     joints' rotations, from `hobble.figure.pack.packed_turns`.
     """
-    world_rotations, world_positions = jointed(figure, positions, rotations)
+    world_rotations, world_positions = restore_bone_lengths(figure, positions, rotations)
     return {**pack_positions(world_positions, keep), "turn": packed_turns(world_rotations[:, keep])}
 
 

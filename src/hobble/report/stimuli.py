@@ -25,7 +25,7 @@ from hobble.figure.mesh import body
 from hobble.models.network import Network
 from hobble.report.raster import GRID, BodyRenderer, Camera
 from hobble.report.straight_walk import walk_straight
-from hobble.runtime.export import export_bvh, fitted_skeleton, jointed
+from hobble.runtime.export import export_bvh, fitted_skeleton, restore_bone_lengths
 from hobble.runtime.options import Runtime
 
 SETTLED = 6 * 60  # frames until the gait has settled; no loop begins earlier
@@ -213,7 +213,7 @@ def draw_frames(
     grid, so that the ground repeats, too.
     """
     count, bones = len(loop.positions), body(skeleton).bones
-    world_rotations, world_positions = jointed(skeleton, loop.positions, loop.rotations)
+    world_rotations, world_positions = restore_bone_lengths(skeleton, loop.positions, loop.rotations)
     start, yaw = loop.positions[0, 0], np.arctan2(loop.travel[0], loop.travel[2])
     # The mean distance of the root from a point that moves from `start` by `travel` at constant speed.
     offset = loop.positions[:, 0].mean(axis=0) - loop.travel * (count - 1) / count / 2 - start

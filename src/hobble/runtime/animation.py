@@ -20,7 +20,7 @@ from hobble.models.network import Network
 from hobble.runtime.caller_axes import Axes
 from hobble.runtime.caller_targets import CallerTargets
 from hobble.runtime.channel_values import ChannelValues
-from hobble.runtime.character import Character, Snapshot, start
+from hobble.runtime.character import Character, Snapshot, start_characters
 from hobble.runtime.controller import Controller, ControllerOptions
 from hobble.runtime.ground import as_ground
 from hobble.runtime.limits import SpeedLimiter
@@ -164,7 +164,7 @@ class ProceduralAnimation:
         else:
             ahead = self._targets.convert_facing(facing)
             yaws = np.arctan2(ahead[:, 0], ahead[:, 1])
-        self._continue_from(start(self.network, count, np.array(places, float), yaws))
+        self._continue_from(start_characters(self.network, count, np.array(places, float), yaws))
 
     def copies(self, of: np.ndarray) -> ProceduralAnimation:
         """A new animation whose character i is a copy of character of[i] of this animation.
@@ -178,7 +178,7 @@ class ProceduralAnimation:
         out.characters = len(of)
         out._targets = CallerTargets(self.network.gaits, self.axes, len(of))
         out._continue_from(self.state.copies(of))
-        out._controller.take_pose(self._controller, of)
+        out._controller.copy_drawn_pose(self._controller, of)
         return out
 
     def _continue_from(self, state: Character) -> None:
@@ -275,7 +275,7 @@ class ProceduralAnimation:
                 self.state.channel_targets[:, columns] = values
             if self._limit_speed:
                 self._limiter.limit(self.state.channel_values, velocity, shares)
-            controller.frame((velocity, direction, strafe, shares), self._terrain[1])
+            controller.advance_frame((velocity, direction, strafe, shares), self._terrain[1])
         except BaseException:
             if before is not None:  # on flat ground nothing in a frame can fail
                 before.restore()

@@ -67,7 +67,8 @@ class ChannelValues:
                 if np.shape(value) not in ((), (1,), (characters,)):
                     shape = np.shape(value)
                     raise ValueError(
-                        f"{label} has to be one {definition.value} or {characters}, not of shape {shape}"
+                        f"{label} has to be one {definition.value} for all characters, or an array of "
+                        f"{characters}, one for each; its shape is {shape}"
                     )
                 values[:, labels[label]] = value
         else:

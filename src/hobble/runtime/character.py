@@ -83,7 +83,7 @@ class Snapshot:
             array[...] = saved
 
 
-def start(network: Network, count: int, position: Array, yaw: Array) -> Character:
+def start_characters(network: Network, count: int, position: Array, yaw: Array) -> Character:
     """The states of `count` healthy characters at ground positions (C, 2), facing `yaw` (C,) in radians.
 
     They start in the start frame of the network's file. It is a standing pose, unless the training clips

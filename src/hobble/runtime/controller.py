@@ -25,7 +25,7 @@ from hobble.rows.layout import BODY
 from hobble.runtime import feet, network_rows, trajectory
 from hobble.runtime.advance import BACKWARD_LOSS, PULL, advance, advance_columns
 from hobble.runtime.bounds import Bounds, limit_rows, mark_unsound
-from hobble.runtime.character import Character, start
+from hobble.runtime.character import Character, start_characters
 
 STEPS = ("prepare", "input", "insert", "predict", "output", "update")
 FPS = 60
@@ -73,8 +73,8 @@ class Controller:
     corrected while the character does not reach it; 0: no correction. side: cm from the path to the points at
     its sides where the ground is looked up.
 
-    After `frame`, these are the pose for the caller: root (C, 3), yaw (C,), pose_position (C, J, 3) and
-    pose_rotation (C, J, 4). The attributes x, z and y are the rows of inputs, of
+    After `advance_frame`, these are the pose for the caller: root (C, 3), yaw (C,), pose_position (C, J, 3)
+    and pose_rotation (C, J, 4). The attributes x, z and y are the rows of inputs, of
     standardised inputs and of outputs. seconds: (6,) how long each of STEPS took.
     """
 
@@ -123,7 +123,7 @@ class Controller:
             legs,
             feet.foot_parts(network.skeleton, legs),
             feet.sole_heights(network, legs),
-            feet.knees_ahead(network.skeleton),
+            feet.rest_facing(network.skeleton),
             self.bounds.fastest,
         )
         self._hips = network.skeleton.role("hips")
@@ -133,7 +133,7 @@ class Controller:
         self._warned = False
         self._group_arrays(character)
 
-    def take_pose(self, other: Controller, of: np.ndarray) -> None:
+    def copy_drawn_pose(self, other: Controller, of: np.ndarray) -> None:
         """Copy the pose of character i from character of[i] of the controller `other`. of: (C,) indices."""
         for name in ("root", "yaw", "pose_position", "pose_rotation"):
             getattr(self, name)[:] = getattr(other, name)[of]
@@ -152,7 +152,7 @@ class Controller:
         self._contacts = self.y[:, self.layout.y_contacts]
         self._checked = tuple(getattr(c, name).reshape(len(c.phase), -1) for name in CHECKED)
 
-    def frame(self, target: trajectory.Target, ground: Ground | None) -> None:
+    def advance_frame(self, target: trajectory.Target, ground: Ground | None) -> None:
         """Run one frame. ground: function from x, z (N,) to heights (N,), cm; None: flat at 0."""
         clock = perf_counter
         t0 = clock()
@@ -182,7 +182,9 @@ class Controller:
         """Restart the characters marked in `_unsound` where they are, with the same channel targets."""
         self._warn_once("the state", "they restart where they were, in the start pose")
         marked = np.flatnonzero(self._unsound)
-        fresh = start(self.predictor.network, len(marked), self.root[marked][:, ::2], self.yaw[marked])
+        fresh = start_characters(
+            self.predictor.network, len(marked), self.root[marked][:, ::2], self.yaw[marked]
+        )
         for field in fields(fresh):
             if field.name != "channel_targets":
                 getattr(self.character, field.name)[marked] = getattr(fresh, field.name)

@@ -25,12 +25,12 @@ def motion_clip(name: str, skeleton: Skeleton, positions: Array, rotations: Arra
     lead to the predicted positions. Feet that are off by some millimetres would seem to slide. So the legs
     are bent until the toes are where they were predicted.
     """
-    world_rotations, _ = jointed(skeleton, positions, rotations)
+    world_rotations, _ = restore_bone_lengths(skeleton, positions, rotations)
     local = quat.continuous(local_rotations(skeleton, world_rotations))
     return Clip(name, skeleton, FPS, local, np.asarray(positions[:, 0], float))
 
 
-def jointed(skeleton: Skeleton, positions: Array, rotations: Array) -> tuple[Array, Array]:
+def restore_bone_lengths(skeleton: Skeleton, positions: Array, rotations: Array) -> tuple[Array, Array]:
     """World rotations (F, J, 4) and positions (F, J, 3) of the skeleton in a predicted motion.
 
     Its bones keep their lengths, while those of a predicted pose change. positions (F, J, 3), rotations

@@ -14,7 +14,7 @@ from hobble.core.compiled import njit
 from hobble.core.skeleton import Skeleton, rest_positions
 from hobble.models.network import Network
 from hobble.runtime.foot_lock import Hold, hold_foot, note_missed, step_rise
-from hobble.runtime.leg_reach import MOST_ADDED, LastFrame, bend, hold_back, turn_rotation, turn_vector
+from hobble.runtime.leg_reach import MOST_ADDED, LastFrame, bend_leg, hold_back, turn_rotation, turn_vector
 
 HEIGHT_MIX = 0.5  # each frame changes the foot lift by this share of the change that is still missing
 # Largest change of the foot lift, cm a frame. It is needed because a network may predict contact while the
@@ -41,7 +41,7 @@ FOOT, TOES = 1, 2  # the part of a foot to which a joint belongs, see `foot_part
 # Groups of arrays for compiled functions, which unpack them into names.
 #
 # joints (2, 4), see `leg_joints`; parts (2, J), see `foot_parts`; sole (2,), see `sole_heights`; ahead (3,),
-# see `knees_ahead`; fastest: a drawn joint of a leg may move at most this many cm in a frame.
+# see `rest_facing`; fastest: a drawn joint of a leg may move at most this many cm in a frame.
 Legs = tuple[Any, Any, Any, Any, float]
 # The state of the feet between frames: held, see `Hold`; lift (C, 2), the foot lift; added (C, 2, 2, 4),
 # rotations added to thigh and shank of each leg; shown (C, 2, 3, 3), knee, heel and toe of each leg as they
@@ -67,7 +67,7 @@ def sole_heights(network: Network, legs: np.ndarray) -> np.ndarray:
     return np.minimum(SOLE, 0.6 * height[legs[:, 2:]].mean(axis=0).astype(float))
 
 
-def knees_ahead(skeleton: Skeleton) -> np.ndarray:
+def rest_facing(skeleton: Skeleton) -> np.ndarray:
     """(3,) the direction in which the body faces in the rest pose. Straight knees bend in this direction."""
     rest, legs = rest_positions(skeleton), leg_joints(skeleton)
     left, down = rest[legs[0, 0]] - rest[legs[1, 0]], (rest[legs[:, 2]] - rest[legs[:, 0]]).sum(axis=0)
@@ -264,7 +264,7 @@ def place_feet(
                 roll[0], roll[1], roll[2], roll[3] = 1.0, 0.0, 0.0, 0.0
             old_heel = position[c, heel, 0], position[c, heel, 1], position[c, heel, 2]
             last = shown[c, f], base, fastest
-            bend(position[c], rotation[c], joints[f], shift, ahead, added[c, f], last)
+            bend_leg(position[c], rotation[c], joints[f], shift, ahead, added[c, f], last)
             carry_foot(position[c], rotation[c], parts[f], heel, toe, old_heel, roll)
             hold_toes_back(position[c], parts[f], toe, last)
             note_missed(c, f, position[c, toe, 0], position[c, toe, 2], held)

@@ -17,7 +17,7 @@ from hobble.core.skeleton import Skeleton, local_rotations
 from hobble.figure.fit_rotations import fitted_rotations
 from hobble.figure.gltf import BodyMotion, write_glb
 from hobble.models.network import Network
-from hobble.runtime.export import fitted_skeleton, jointed
+from hobble.runtime.export import fitted_skeleton, restore_bone_lengths
 
 FPS = 30.0  # poses a second in the file; viewers interpolate between them
 
@@ -58,6 +58,6 @@ def _motions(data: Mapping[str, Array], skeleton: Skeleton) -> Iterator[BodyMoti
     """The motion of each scenario, thinned to FPS, with constant bone lengths."""
     frame_step = max(1, round(float(data["fps"]) / FPS))
     for name in map(str, data["names"]):
-        world_rotations, positions = jointed(skeleton, *_motion(data, name, skeleton))
+        world_rotations, positions = restore_bone_lengths(skeleton, *_motion(data, name, skeleton))
         local = local_rotations(skeleton, world_rotations)
         yield BodyMotion(name, positions[:, 0], local, float(data["fps"]) / frame_step)

@@ -27,7 +27,7 @@ LastFrame = tuple[Any, float, float]
 
 
 @njit
-def between(ax: float, ay: float, az: float, bx: float, by: float, bz: float) -> Any:
+def rotation_between(ax: float, ay: float, az: float, bx: float, by: float, bz: float) -> Any:
     """The smallest rotation (w, x, y, z) from direction a to b; the identity if they are opposite."""
     # It is the quaternion (|a| |b| + a . b, a x b), normalised.
     w = np.sqrt((ax * ax + ay * ay + az * az) * (bx * bx + by * by + bz * bz)) + ax * bx + ay * by + az * bz
@@ -79,7 +79,7 @@ def turn_rotation(by: Any, rotation: Any) -> None:
 
 
 @njit
-def reach(
+def move_heel(
     position: Any, hip: int, knee: int, heel: int, shift: Any, ahead: tuple[float, float, float]
 ) -> None:
     """Move the heel of a pose by `shift` (3,), by bending the knee.
@@ -151,7 +151,7 @@ def hold_back(at: Any, shown: Any, base: float, fastest: float) -> bool:
 
 
 @njit
-def bend(
+def bend_leg(
     position: Any,
     rotation: Any,
     leg: Any,
@@ -160,7 +160,7 @@ def bend(
     added: Any,
     last: LastFrame,
 ) -> None:
-    """Move the heel by `shift` (3,), see `reach`, but change the rotations `added` by MOST_ADDED at most.
+    """Move the heel by `shift` (3,), see `move_heel`, but change the rotations `added` by MOST_ADDED at most.
 
     leg: (4,) hip, knee, heel and toe joint. ahead: (3,) the direction in which a straight knee bends in the
     rest pose. added: (2, 4) rotations that the last frame added to the network's thigh and shank. Those of
@@ -174,11 +174,13 @@ def bend(
     kx, ky, kz = position[knee, 0], position[knee, 1], position[knee, 2]
     tx, ty, tz = kx - hx, ky - hy, kz - hz
     lx, ly, lz = position[heel, 0] - kx, position[heel, 1] - ky, position[heel, 2] - kz
-    reach(position, hip, knee, heel, shift, turn_vector(rotation[hip], ahead[0], ahead[1], ahead[2]))
+    move_heel(position, hip, knee, heel, shift, turn_vector(rotation[hip], ahead[0], ahead[1], ahead[2]))
     kx, ky, kz = position[knee, 0], position[knee, 1], position[knee, 2]
-    w, x, y, z = between(tx, ty, tz, kx - hx, ky - hy, kz - hz)
+    w, x, y, z = rotation_between(tx, ty, tz, kx - hx, ky - hy, kz - hz)
     limited = turn_toward(added[0], w, x, y, z)
-    w, x, y, z = between(lx, ly, lz, position[heel, 0] - kx, position[heel, 1] - ky, position[heel, 2] - kz)
+    w, x, y, z = rotation_between(
+        lx, ly, lz, position[heel, 0] - kx, position[heel, 1] - ky, position[heel, 2] - kz
+    )
     limited |= turn_toward(added[1], w, x, y, z)
     if limited:
         x, y, z = turn_vector(added[0], tx, ty, tz)
@@ -192,7 +194,7 @@ def bend(
         kx, ky, kz = position[knee, 0], position[knee, 1], position[knee, 2]
         sx, sy, sz = position[heel, 0] - kx, position[heel, 1] - ky, position[heel, 2] - kz
         kx, ky, kz = kx - hx, ky - hy, kz - hz
-        added[0, 0], added[0, 1], added[0, 2], added[0, 3] = between(tx, ty, tz, kx, ky, kz)
-        added[1, 0], added[1, 1], added[1, 2], added[1, 3] = between(lx, ly, lz, sx, sy, sz)
+        added[0, 0], added[0, 1], added[0, 2], added[0, 3] = rotation_between(tx, ty, tz, kx, ky, kz)
+        added[1, 0], added[1, 1], added[1, 2], added[1, 3] = rotation_between(lx, ly, lz, sx, sy, sz)
     turn_rotation(added[0], rotation[hip])
     turn_rotation(added[1], rotation[knee])

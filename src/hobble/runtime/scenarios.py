@@ -137,7 +137,7 @@ def write_motions(network: Network, bvh: str | Path, options: Runtime) -> Iterat
         yield track
 
 
-def generate(network: Network, npz: str | Path, bvh: str | Path, options: Runtime) -> None:
+def generate_scenarios(network: Network, npz: str | Path, bvh: str | Path, options: Runtime) -> None:
     """Run every scenario; write all of them to the file `npz`, and each to a BVH file in the folder `bvh`.
 
     The file has names (N,) of the scenarios, joints (J,) names, parents (J,) and fps. For each scenario it

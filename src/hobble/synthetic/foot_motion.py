@@ -14,7 +14,7 @@ from hobble.core import quat
 from hobble.core.curve_value import value_at
 from hobble.core.quat import Array
 from hobble.core.smooth import smooth_above
-from hobble.synthetic.footsteps import FOOT, PlannedStance
+from hobble.synthetic.footsteps import ANKLE_TO_TOE, PlannedStance
 from hobble.synthetic.planned_ground import Ground
 from hobble.synthetic.style import Style
 
@@ -128,7 +128,7 @@ class _Roll:
         up.
         """
         rotation = quat.mul(self.stance.turn, quat.from_axis_angle(X_AXIS, -np.maximum(pitch, 0.0)))
-        return self.stance.ankle + quat.rotate(rotation, FOOT)
+        return self.stance.ankle + quat.rotate(rotation, ANKLE_TO_TOE)
 
     def ankle(self, pitch: Array) -> Array:
         """(..., 3) position of the ankle at pitches (...).
@@ -138,7 +138,7 @@ class _Roll:
         """
         stance = self.stance
         rotation = quat.mul(stance.turn, quat.from_axis_angle(X_AXIS, -np.minimum(pitch, 0)))
-        return stance.ankle + quat.rotate(stance.turn, FOOT) - quat.rotate(rotation, FOOT)
+        return stance.ankle + quat.rotate(stance.turn, ANKLE_TO_TOE) - quat.rotate(rotation, ANKLE_TO_TOE)
 
 
 def _stand(foot: FootPoses, t: np.ndarray, roll: _Roll, pitch: Array) -> None:
@@ -179,7 +179,7 @@ def _swing(foot: FootPoses, here: _Roll, there: _Roll, style: Style, side: int, 
         * _ease(u / RISE)
         * _ease((1 - u) / SETTLE)
     )
-    foot.ankle[t], foot.foot[t], foot.toes[t] = toe - quat.rotate(rotation, FOOT), rotation, toes
+    foot.ankle[t], foot.foot[t], foot.toes[t] = toe - quat.rotate(rotation, ANKLE_TO_TOE), rotation, toes
 
 
 def _missing_height(toe: Array, rotation: Array, toes: Array, clearance: Array, ground: Ground) -> Array:
@@ -189,7 +189,7 @@ def _missing_height(toe: Array, rotation: Array, toes: Array, clearance: Array, 
     the ground that is wanted, cm.
     """
     tip = toe + quat.rotate(toes, np.array([0.0, 0.0, 6.0]))  # 6 cm in front of the toe joint
-    heel = toe + quat.rotate(rotation, HEEL - FOOT)
+    heel = toe + quat.rotate(rotation, HEEL - ANKLE_TO_TOE)
     missing = np.zeros(len(toe))
     for point in (toe, tip, heel):
         lowest = ground(point[:, 0], point[:, 2]) + SOLE_HEIGHT + clearance

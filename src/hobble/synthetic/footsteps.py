@@ -14,7 +14,7 @@ from hobble.synthetic.planned_path import PlannedPath
 from hobble.synthetic.style import LEFT, RIGHT, SIDE_SIGN, Style
 
 ANKLE_HEIGHT = 7.0  # cm from the sole up to the ankle joint
-FOOT = np.array([0.0, -4.5, 13.5])  # x, y, z from the ankle joint to the toe joint of a flat foot, cm
+ANKLE_TO_TOE = np.array([0.0, -4.5, 13.5])  # x, y, z from the ankle joint to the toe joint of a flat foot, cm
 # cm and radians: a standing figure keeps a foot in place if it would move and turn by less than these.
 SMALLEST_STEP = (7.0, np.radians(12.0))
 MIN_ANKLE_DISTANCE = 8.0  # cm: least sideways distance between the ankles
@@ -137,9 +137,9 @@ def _plant_foot(ground: Ground, place: Array, yaw: float) -> tuple[Array, Array]
         # difference is less than 4 cm.
         if np.max(np.abs(np.diff(sole))) < 4.0:
             break
-    under_ankle, under_toe = heights(shift + np.array([0.0, 13.5]))
+    under_ankle, under_toe = heights(shift + np.array([0.0, ANKLE_TO_TOE[2]]))
     x, z = place + shift * ahead
-    pitch = np.arctan2(under_toe - under_ankle, 13.5)
+    pitch = np.arctan2(under_toe - under_ankle, ANKLE_TO_TOE[2])
     turn = quat.mul(quat.yaw(yaw), quat.from_axis_angle([1.0, 0.0, 0.0], -pitch))
     return np.array([x, under_ankle + ANKLE_HEIGHT, z]), turn
 

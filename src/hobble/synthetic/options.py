@@ -8,7 +8,7 @@ from pydantic import Field
 
 from hobble.core.section import Section
 
-WRITES = ("_footsteps.txt", "_gait.txt")  # endings of the label files that each clip gets
+WRITTEN_LABEL_SUFFIXES = ("_footsteps.txt", "_gait.txt")  # endings of the label files that each clip gets
 
 
 class Synthetic(Section):

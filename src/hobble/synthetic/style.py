@@ -19,7 +19,7 @@ LEFT, RIGHT = 0, 1  # sides of the body, also as indices
 REFERENCE_SPEED = (0.0, 1.3, 2.8, 0.8)  # m/s, for each gait of GAITS
 # name -> for each gait of GAITS: (value at the gait's reference speed, change per m/s). The values are angles
 # in degrees, lengths in cm, and shares. An amplitude is half the range of a movement in a cycle.
-TABLE: dict[str, tuple[tuple[float, float], ...]] = {
+VALUES_BY_GAIT: dict[str, tuple[tuple[float, float], ...]] = {
     "duty": ((0.64, 0), (0.604, -0.06), (0.365, -0.05), (0.64, -0.06)),  # share of the cycle on the ground
     "land_pitch": ((0, 0), (16, 6), (15, 2), (-24, 0)),  # pitch of the foot as it lands, + toe up
     "off_pitch": ((-15, 0), (-53, -13), (-49, -1), (-58, -8)),  # pitch of the foot as it leaves the ground
@@ -50,7 +50,7 @@ TABLE: dict[str, tuple[tuple[float, float], ...]] = {
     "elbow_swing": ((0.5, 0), (9, 5), (11, 0), (5, 0)),  # amplitude of the bend of the elbow
     "abduction": ((9, 0), (9, 0), (13, 0), (14, 0)),  # angle of the upper arm, away from the body
 }
-# The names in TABLE whose curves have a value for each side of the body.
+# The names in VALUES_BY_GAIT whose curves have a value for each side of the body.
 SIDED: tuple[str, ...] = (
     "duty",
     "land_pitch",
@@ -70,8 +70,8 @@ SIDE_SIGN = (1.0, -1.0)  # sign of X on the left and on the right side: +X is th
 class Style:
     """How the figure moves in each of F frames.
 
-    TABLE describes all fields but `frequency`. Arrays are (F,). For names in SIDED they are (F, 2), left and
-    right. frequency: (F,) cycles a second. The left foot lands half a cycle after the right foot.
+    VALUES_BY_GAIT describes all fields but `frequency`. Arrays are (F,). For names in SIDED they are (F, 2),
+    left and right. frequency: (F,) cycles a second. The left foot lands half a cycle after the right foot.
     """
 
     duty: Array
@@ -113,13 +113,13 @@ def healthy_style(path: PlannedPath) -> Style:
     """
     speed = path.speed / 100
     values = {}
-    for name, row in TABLE.items():
+    for name, row in VALUES_BY_GAIT.items():
         base = np.array([value for value, _ in row])
         slope = np.array([change for _, change in row])
         values_of_gaits = base + slope * (speed[:, None] - np.array(REFERENCE_SPEED))  # (F, 4)
         mixed = np.sum(path.gait * values_of_gaits, axis=1)
         values[name] = np.repeat(mixed[:, None], 2, axis=1) if name in SIDED else mixed
-    # Far from the reference speed, the straight lines of TABLE leave the range of possible values.
+    # Far from the reference speed, the straight lines of VALUES_BY_GAIT leave the range of possible values.
     values["duty"] = np.clip(values["duty"], 0.28, 0.82)
     values["heel_off"] = np.clip(values["heel_off"], 0.3, 0.75)
     style = Style(**values, frequency=np.sum(path.gait * _cadences(speed), axis=1))

@@ -19,11 +19,11 @@ from hobble.core.errors import InputError
 from hobble.core.files import save_npz
 from hobble.core.quat import Array
 from hobble.motion.root import RootFrames, extend_root, root_frames
-from hobble.terrain.cycle_ground import Ground, fit_cycle, flat_ground
+from hobble.terrain.cycle_ground import CycleGround, fit_cycle, flat_ground
 from hobble.terrain.fit_picture import FitPicture, cycles_to_picture, make_picture
-from hobble.terrain.options import Fitting, HeightSampling
+from hobble.terrain.options import FitOptions, HeightSampling
 from hobble.terrain.patches import Patches
-from hobble.terrain.soles import Feet, Mask, find_soles, held_above_other
+from hobble.terrain.soles import Feet, Mask, find_soles, is_above_other_joint
 
 log = logging.getLogger("hobble.terrain")
 REMAKE = "Delete the motion and the labels of this clip; the next run makes both again from the same file."
@@ -63,7 +63,7 @@ def clip_fits(
     labels: Mapping[str, Array],
     patches: Patches,
     ground: str,
-    options: Fitting,
+    options: FitOptions,
     sampling: HeightSampling,
 ) -> ClipFits:
     """Fit the ground under every cycle of a clip.
@@ -128,7 +128,7 @@ def _warn_if_off_ground(name: str, fits: ClipFits, deepest: float | None) -> Non
 
 
 def _standing_feet(
-    clip: Clip, contacts: Mask, cycles: np.ndarray, window: int, flat: bool, options: Fitting
+    clip: Clip, contacts: Mask, cycles: np.ndarray, window: int, flat: bool, options: FitOptions
 ) -> Feet:
     """The soles of a clip, and which of them stand on the ground.
 
@@ -151,7 +151,7 @@ def _standing_feet(
     )
     contacts = feet.contacts.copy()
     if flat and options.held_up is not None:
-        contacts &= ~held_above_other(feet, options.held_up)
+        contacts &= ~is_above_other_joint(feet, options.held_up)
     for start, end in cycles:
         around = _fitted_frames(start, end, window, len(clip))
         if not contacts[around].any():
@@ -171,8 +171,8 @@ def _fitted_frames(start: int, end: int, window: int, frames: int) -> slice:
 
 
 def _fit_ground(
-    feet: Feet, around: slice, samples: Array, patches: Patches, kind: str, options: Fitting
-) -> Ground:
+    feet: Feet, around: slice, samples: Array, patches: Patches, kind: str, options: FitOptions
+) -> CycleGround:
     """The ground of one cycle, with all its fits.
 
     around: the frames to fit to. samples: (3, F, 2) as from `sample_points`, for the F frames of the clip.
@@ -205,7 +205,7 @@ def _fit_ground(
     )
 
 
-def _fit_statistics(fitted: Sequence[tuple[Ground, Array, Mask]], fits: int) -> dict[str, Any]:
+def _fit_statistics(fitted: Sequence[tuple[CycleGround, Array, Mask]], fits: int) -> dict[str, Any]:
     """The fields patch, error, foot_error and foot_below of `ClipFits`.
 
     fitted: for each cycle, its ground, and the soles and contacts in its frames and window. fits: number of
@@ -214,7 +214,7 @@ def _fit_statistics(fitted: Sequence[tuple[Ground, Array, Mask]], fits: int) -> 
     patch, error = np.zeros((len(fitted), fits), np.int32), np.zeros((len(fitted), fits), np.float32)
     foot_error, foot_below = np.zeros((*error.shape, 2), np.float32), np.zeros_like(error)
     for c, (ground, soles, contacts) in enumerate(fitted):
-        above = ground.above(soles)
+        above = ground.height_above_soles(soles)
         distance = np.abs(above[:, contacts])
         patch[c], error[c] = ground.chosen, ground.error
         foot_error[c] = np.stack([distance.mean(axis=1), distance.max(axis=1)], axis=-1)
@@ -228,8 +228,8 @@ def sample_points(root: RootFrames, side: float) -> Array:
     return np.stack([root.position + side * left, root.position, root.position - side * left])
 
 
-def heights_under(ground: Ground, samples: Array, start: int, end: int, offsets: np.ndarray) -> Array:
-    """Ground heights (rows * fits, 3 * len(offsets)), cm, for the rows of one cycle, as in `ClipFits`.
+def heights_under(ground: CycleGround, samples: Array, start: int, end: int, offsets: np.ndarray) -> Array:
+    """CycleGround heights (rows * fits, 3 * len(offsets)), cm, for the rows of one cycle, as in `ClipFits`.
 
     Neighbouring rows share points. Each point is looked up only once.
 
@@ -238,7 +238,7 @@ def heights_under(ground: Ground, samples: Array, start: int, end: int, offsets:
     """
     first, last = start + offsets[0], end + offsets[-1]
     points = samples[:, first : last + 1]
-    heights = ground.at(points.reshape(-1, 2)).reshape(-1, 3, points.shape[1])
+    heights = ground.heights_at(points.reshape(-1, 2)).reshape(-1, 3, points.shape[1])
     point_of_row = np.arange(start, end + 1)[:, None] + offsets - first
     return np.moveaxis(heights[:, :, point_of_row], 2, 0).reshape(-1, 3 * len(offsets))
 

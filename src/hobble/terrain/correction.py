@@ -74,7 +74,7 @@ class Surface:
     weights: Array = field(repr=False)
     spread: float
 
-    def at(self, points: Array) -> Array:
+    def heights_at(self, points: Array) -> Array:
         """Heights (M,) at points (M, 2)."""
         from hobble.terrain.kernels import distance_sum
 

@@ -30,7 +30,7 @@ PATH_CLEARANCE_CM = 25.0
 
 
 @dataclass(frozen=True)
-class Ground:
+class CycleGround:
     """The ground of K fits of one cycle.
 
     patches: all patches; None for flat ground. chosen, error: (K,) indices of the fitted patches and their
@@ -47,20 +47,20 @@ class Ground:
     surfaces: Sequence[Surface] = field(default=(), repr=False)
     pits: Sequence[Pits] = field(default=(), repr=False)
 
-    def at(self, points: Array) -> Array:
+    def heights_at(self, points: Array) -> Array:
         """Heights (K, M), cm, at world points (M, 2), x and z."""
         heights = np.tile(self.level[:, None], len(points))
         if self.patches is not None:
-            heights += self.patches.at(self.chosen, self.patches.cells(points, self.centre))
+            heights += self.patches.heights_at(self.chosen, self.patches.cells(points, self.centre))
         for k, surface in enumerate(self.surfaces):
-            heights[k] += surface.at(points)
+            heights[k] += surface.heights_at(points)
         for k, pit in enumerate(self.pits):
             heights[k] = pit.lower(heights[k], points)
         return heights
 
-    def above(self, soles: Array) -> Array:
+    def height_above_soles(self, soles: Array) -> Array:
         """(K, ...) height of the ground above each sole (..., 3), cm; negative if the ground is lower."""
-        heights = self.at(soles[..., [0, 2]].reshape(-1, 2))
+        heights = self.heights_at(soles[..., [0, 2]].reshape(-1, 2))
         return heights.reshape(-1, *soles.shape[:-1]) - soles[..., 1]
 
 
@@ -75,7 +75,7 @@ def fit_cycle(
     fits: int,
     smoothing: float,
     deepest: float | None,
-) -> Ground:
+) -> CycleGround:
     """Fit the ground under one cycle and the frames around it, T frames together.
 
     soles: (T, 4, 3) positions of the soles at heels and toes, cm. contacts: (T, 4) bool, at least one true.
@@ -97,14 +97,14 @@ def fit_cycle(
     footing = FootPoints(foot_points[contacts], foot_points[~contacts], kind == "jumpy", beam_sides)
     chosen, error = best_patches(patches, footing, fits)
     # Mean height of each patch under the feet in contact, subtracted to make the patch level with the feet.
-    patch_level = patches.at(chosen, cells[contacts]).mean(axis=1, dtype=float)
-    uncorrected = Ground(patches, chosen, error, centre, level - patch_level)
+    patch_level = patches.heights_at(chosen, cells[contacts]).mean(axis=1, dtype=float)
+    uncorrected = CycleGround(patches, chosen, error, centre, level - patch_level)
     return meet_feet(uncorrected, soles, contacts, smoothing, deepest)
 
 
 def flat_ground(
     soles: Array, contacts: Mask, level: str, *, smoothing: float, deepest: float | None, correct: bool
-) -> Ground:
+) -> CycleGround:
     """Flat ground, with one fit.
 
     soles, contacts, smoothing, deepest: see `fit_cycle`. level: "zero", or "feet" for the mean height of the
@@ -119,7 +119,7 @@ def flat_ground(
     heights = soles[..., 1]
     by_velocity = np.concatenate([contacts[:-1], contacts[-2:-1]])
     height = heights[by_velocity if by_velocity.any() else contacts].mean() if level == "feet" else 0.0
-    uncorrected = Ground(None, np.array([-1]), np.zeros(1), np.zeros(2), np.array([height]))
+    uncorrected = CycleGround(None, np.array([-1]), np.zeros(1), np.zeros(2), np.array([height]))
     if deepest is None or not correct:
         return uncorrected
     if np.abs(heights[contacts] - height).mean() > deepest:
@@ -133,8 +133,8 @@ def flat_ground(
 
 
 def meet_feet(
-    uncorrected: Ground, soles: Array, contacts: Mask, smoothing: float, deepest: float | None
-) -> Ground:
+    uncorrected: CycleGround, soles: Array, contacts: Mask, smoothing: float, deepest: float | None
+) -> CycleGround:
     """Correct the ground so that it meets the feet in contact.
 
     A smooth surface is fitted to the residual, the heights of feet in contact above the ground. At most
@@ -143,7 +143,7 @@ def meet_feet(
     `deepest` below the ground. If `deepest` is None, one surface is fitted, without a limit.
     """
     standing = gather_stances(soles, contacts, STANCE_FRAMES)
-    residual = standing.height - uncorrected.at(standing.place)
+    residual = standing.height - uncorrected.heights_at(standing.place)
     most = None if deepest is None else deepest / 2
     ground = replace(uncorrected, surfaces=fit_surfaces(standing, residual, smoothing, most))
     if deepest is None:
@@ -160,27 +160,37 @@ def meet_feet(
         if covered.any()
         else surface
         for k, (covered, surface) in enumerate(
-            zip(ground.above(soles) > deepest / 2, ground.surfaces, strict=True)
+            zip(ground.height_above_soles(soles) > deepest / 2, ground.surfaces, strict=True)
         )
     ]
     ground = replace(uncorrected, surfaces=surfaces)
     return replace(ground, pits=_dig_pits_for_each_fit(ground, soles, standing, deepest))
 
 
-def _dig_pits_for_each_fit(ground: Ground, soles: Array, standing: Stances, deepest: float) -> list[Pits]:
+def _dig_pits_for_each_fit(
+    ground: CycleGround, soles: Array, standing: Stances, deepest: float
+) -> list[Pits]:
     """For each fit, pits for the feet that are more than `deepest` below the ground.
 
     In a pit the ground is lowered until the foot is only deepest / 2 below it.
     """
-    return [dig_pits(soles[covered], standing, deepest / 2) for covered in ground.above(soles) > deepest]
+    return [
+        dig_pits(soles[covered], standing, deepest / 2)
+        for covered in ground.height_above_soles(soles) > deepest
+    ]
 
 
 def _refit_surface(
-    uncorrected: Ground, k: int, standing: Stances, covered: Stances, smoothing: float, most: float | None
+    uncorrected: CycleGround,
+    k: int,
+    standing: Stances,
+    covered: Stances,
+    smoothing: float,
+    most: float | None,
 ) -> Surface:
     """The surface of fit k, fitted to feet in contact, `standing`, and feet below the ground, `covered`."""
     points = join_points(standing, covered)
-    residual = points.height - uncorrected.at(points.place)[k]
+    residual = points.height - uncorrected.heights_at(points.place)[k]
     return fit_surfaces(points, residual[None], smoothing, most, len(standing.count))[0]
 
 

@@ -8,7 +8,7 @@ import numpy as np
 
 from hobble.core.clip import Clip
 from hobble.core.quat import Array
-from hobble.terrain.cycle_ground import Ground
+from hobble.terrain.cycle_ground import CycleGround
 from hobble.terrain.soles import Feet, Mask
 
 GRID_POINTS = 24  # points of the ground's grid along x and along z
@@ -40,7 +40,7 @@ def cycles_to_picture(count: int) -> set[int]:
     return {count // 4, (3 * count) // 4} if count > 1 else set(range(count))
 
 
-def make_picture(clip: Clip, cycle: int, ground: Ground, feet: Feet, around: slice) -> FitPicture:
+def make_picture(clip: Clip, cycle: int, ground: CycleGround, feet: Feet, around: slice) -> FitPicture:
     """The picture of the best fit of a cycle. around: the frames that the ground was fitted to."""
     soles = feet.soles[around]
     low, high = (
@@ -49,7 +49,7 @@ def make_picture(clip: Clip, cycle: int, ground: Ground, feet: Feet, around: sli
     )
     x, z = np.linspace(low[0], high[0], GRID_POINTS), np.linspace(low[1], high[1], GRID_POINTS)
     points = np.stack(np.meshgrid(x, z, indexing="ij"), axis=-1).reshape(-1, 2)
-    heights = ground.at(points)[0].reshape(GRID_POINTS, GRID_POINTS)
+    heights = ground.heights_at(points)[0].reshape(GRID_POINTS, GRID_POINTS)
     frames = np.linspace(around.start, around.stop - 1, 5).astype(int)[1:4]
     return FitPicture(
         cycle,

@@ -68,7 +68,7 @@ def view_heights(heights, starts, shapes, which, affine, mean, points):
 
 
 @njit
-def view_extents(heights, starts, shapes, which, affine, size, highest):
+def check_views(heights, starts, shapes, which, affine, size, highest):
     """Mean height (P,) of P views of `size` x `size` cells, and whether (P,) each view stays near its mean.
 
     A view passes if all its cells are within `highest` cm of the mean. First only every eighth row and column

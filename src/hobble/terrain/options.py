@@ -32,7 +32,7 @@ class HeightmapOptions(Section):
         return self
 
 
-class Drawing(Section):
+class PatchOptions(Section):
     """How patches are drawn from heightmaps, for the rule `terrain_patches`."""
 
     heightmaps: tuple[HeightmapOptions, ...] = Field(
@@ -55,13 +55,13 @@ class Drawing(Section):
     seed: int = 1
 
     @model_validator(mode="after")
-    def _check_heightmaps(self) -> Drawing:
+    def _check_heightmaps(self) -> PatchOptions:
         if not self.heightmaps:
             raise ValueError("`heightmaps` is empty: list at least one, as ground to draw patches from")
         return self
 
 
-class Fitting(Section):
+class FitOptions(Section):
     """How patches are fitted under the gait cycles of a clip, for the rule `terrain_fits`.
 
     A fit is a patch that suits the footsteps of a cycle, corrected to meet the feet.
@@ -111,7 +111,7 @@ class Fitting(Section):
     )
 
 
-class Terrain(Drawing, Fitting):
+class Terrain(PatchOptions, FitOptions):
     """Patches of ground and their fits under the clips."""
 
     @model_validator(mode="after")

@@ -61,7 +61,7 @@ class Patches:
         cells = (np.asarray(points) - centre) / self.cell
         return np.clip(cells, -half, self.size - 1 - half).astype(np.float32)
 
-    def at(self, chosen: Sequence[int] | np.ndarray, cells: Array) -> Array:
+    def heights_at(self, chosen: Sequence[int] | np.ndarray, cells: Array) -> Array:
         """Heights (K, N), cm above the mean of the patch, of K patches at cells (N, 2) from their middle.
 
         chosen: (K,) indices of the patches.
@@ -110,7 +110,7 @@ def _draw_views(
 
     All heights of these views are within `highest` cm of their mean.
     """
-    from hobble.terrain.kernels import view_extents
+    from hobble.terrain.kernels import check_views
 
     heights = _with_holes_marked(heightmap, cell).astype(np.float32)
     only_map = heights.ravel(), np.zeros(1, np.int64), np.array([heights.shape], np.int64)
@@ -118,7 +118,7 @@ def _draw_views(
     found, tried = 0, 0
     while found < count:
         affine = _random_views(rng, heightmap, cell, size)
-        mean, passes = view_extents(*only_map, np.zeros(len(affine), np.int32), affine, size, highest)
+        mean, passes = check_views(*only_map, np.zeros(len(affine), np.int32), affine, size, highest)
         kept = np.flatnonzero(passes)[: count - found]
         affines.append(affine[kept])
         means.append(mean[kept])

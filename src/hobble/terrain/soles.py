@@ -68,7 +68,7 @@ def find_soles(
     return Feet(joints, contacts, *above_sole)
 
 
-def held_above_other(feet: Feet, least: float) -> Mask:
+def is_above_other_joint(feet: Feet, least: float) -> Mask:
     """(F, 4) whether the other joint of the same foot is in contact and more than `least` cm lower."""
     height = feet.soles[..., 1]
     return (height - height[:, OTHER_OF_FOOT] > least) & feet.contacts[:, OTHER_OF_FOOT]

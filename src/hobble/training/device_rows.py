@@ -143,7 +143,7 @@ class DeviceRows(TrainingRows):
         return x, y, self.phase[rows]
 
 
-def rows_for(
+def rows_on_device_or_host(
     database: Database, device: torch.device, processes: Processes = ALONE, stretches: int | None = None
 ) -> HostRows | DeviceRows:
     """The training rows: in the memory of the GPU if it is large enough, else read by the host.

@@ -20,7 +20,7 @@ from hobble.database.reader import Database
 from hobble.models.options import Options
 from hobble.training.batches import TRAIN, LossWatch
 from hobble.training.checkpoint import Saver, State, pack
-from hobble.training.device_rows import rows_for
+from hobble.training.device_rows import rows_on_device_or_host
 from hobble.training.held_out import SPLIT, HeldOut
 from hobble.training.history import duration
 from hobble.training.options import Training
@@ -101,7 +101,7 @@ def _run(
     symmetry = Symmetry(state.network, database) if training.symmetric else None
     if symmetry and not state.adam.steps:  # no step yet, so the weights are new
         symmetry.start()
-    rows = rows_for(database, device, processes, training.stretches)
+    rows = rows_on_device_or_host(database, device, processes, training.stretches)
     places = processes.places(batch_size)  # the places in each batch that this process fills
     other_poses = OtherPoses(database, training.other_poses, len(places), device, places.start)
     version_poses = VersionPoses(database, training.version_poses, len(places), device, places.start)

@@ -18,7 +18,7 @@ from typing import Any
 from hobble.core.errors import InputError
 from hobble.workflow import checksums
 from hobble.workflow.clip_batches import family_of
-from hobble.workflow.job import JobLog, checked, reporting
+from hobble.workflow.job import JobLog, check_and_record, log_job
 from hobble.workflow.kept_files import KeptFiles, fingerprint
 
 # The disk is full, a quota is used up, or the disk is read-only. Every other clip would fail, too.
@@ -30,7 +30,7 @@ class JobPiece:
     """A piece of a job's work: usually one clip, or one clip and its mirror.
 
     name: the clip's name. params: Snakemake's params, those of the rule and those of this clip. input: name
-    of each input -> the piece's file, or a list of files for an input in `files_per_clip` (see `pieces`).
+    of each input -> the piece's file, or a list of files for an input in `files_per_clip` (see `job_pieces`).
     output: name of each output -> the piece's file.
     """
 
@@ -45,7 +45,7 @@ class JobPiece:
         return [file for _, files in sorted(self.input.items()) for file in _as_list(files)]
 
 
-def pieces(snakemake: Any) -> list[JobPiece]:
+def job_pieces(snakemake: Any) -> list[JobPiece]:
     """The pieces of a job. snakemake: the object that Snakemake gives to scripts.
 
     params.per_clip: a list with the params of each piece; the param `clip` is the piece's name.
@@ -84,12 +84,12 @@ def make_each(snakemake: Any, make: Callable[[JobPiece, logging.Logger], None]) 
 
     snakemake: the object that Snakemake gives to scripts. make: function that makes the files of a piece.
     """
-    with reporting(snakemake) as report:
-        checksums.forget(snakemake.output)
+    with log_job(snakemake) as report:
+        checksums.delete(snakemake.output)
         # Each data set and each batch has a rule of its own. The rules that make the same kind of file are a
         # family, and share the kept files.
         kept, digests = KeptFiles(family_of(snakemake.rule)), _Digests()
-        all_pieces = pieces(snakemake)
+        all_pieces = job_pieces(snakemake)
         reused = failed = 0
         for piece in all_pieces:
             try:
@@ -116,7 +116,7 @@ def _make_piece(
 ) -> bool:
     """Make a piece, or use its kept files. Returns whether kept files were used."""
     outputs, began = list(piece.output.values()), time.monotonic()
-    with checked(piece.files, outputs):
+    with check_and_record(piece.files, outputs):
         key = fingerprint(piece.params, digests.of(piece.files), outputs)
         if kept.restore(key, outputs):
             return True

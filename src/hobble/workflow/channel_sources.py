@@ -69,7 +69,7 @@ class ChannelSources:
         """Raise HobbleError if the data set's clip entries or options are wrong about channels."""
         settings = self.catalogue.dataset(dataset)
         rig = self.catalogue.skeleton(settings.skeleton)
-        for clip, entry in self.clips.listed(dataset).items():
+        for clip, entry in self.clips.listed_entries(dataset).items():
             if unknown := set(entry.channels) - set(self.channels(dataset)):
                 raise HobbleError(
                     f"data set {dataset}: clips.{clip}.channels: the data set has no channel "

@@ -26,7 +26,7 @@ CLOCK_TICK = 0.02  # seconds; two writes that are this far apart get different m
 Stamp = tuple[int, int, int]
 
 
-def record_of(path: Path) -> Path | None:
+def checksum_path(path: Path) -> Path | None:
     """The path of a file's checksum file. None for files without one, such as an npz or a user's clip."""
     parts = path.parts
     if "results" not in parts:
@@ -40,9 +40,9 @@ def record_of(path: Path) -> Path | None:
     return Path(*parts[:to_folder], "checksums", *parts[to_folder:-1], f"{path.name}.crc32")
 
 
-def forget(paths: Iterable[str]) -> None:
+def delete(paths: Iterable[str]) -> None:
     """Delete the checksums of files that are about to be made again."""
-    for checksum_file in filter(None, map(record_of, map(Path, paths))):
+    for checksum_file in filter(None, map(checksum_path, map(Path, paths))):
         checksum_file.unlink(missing_ok=True)
 
 
@@ -52,7 +52,7 @@ def record(paths: Iterable[str]) -> None:
     The checksum file of a folder holds the checksums of the files directly in it.
     """
     for path in map(Path, paths):
-        if (checksum_file := record_of(path)) is not None and path.exists():
+        if (checksum_file := checksum_path(path)) is not None and path.exists():
             lines = [f"{_checksum(file):08x} {file.name}" for file in _files(path)]
             write_text(checksum_file, "\n".join(lines) + "\n")
 
@@ -63,7 +63,7 @@ def verify(paths: Iterable[str]) -> None:
     A file without a recorded checksum is not checked.
     """
     for path in map(Path, paths):
-        checksum_file = record_of(path)
+        checksum_file = checksum_path(path)
         if checksum_file is None or not checksum_file.is_file() or not path.exists():
             continue
         lines = checksum_file.read_text(encoding="utf-8", errors="replace").splitlines()

@@ -21,7 +21,8 @@ from hobble.workflow.clips import DATASETS, MIRROR_SUFFIX, Clips, original
 LEAST_BATCHES = 12  # a data set with more clips than this has at least this many batches
 MOST_CLIPS_OF_A_BATCH = 32  # a batch holds at most this many clips on average
 JOB_OPTION = "--target-jobs"  # in the command line of a job that Snakemake starts on another machine
-MARK = "__"  # separates family, data set and number in the name of a batch's rule: motion_clips__cmu__3
+# Separates family, data set and number in the name of a batch's rule: motion_clips__cmu__3.
+RULE_NAME_SEPARATOR = "__"
 
 
 @dataclass(frozen=True)
@@ -47,7 +48,7 @@ class ClipBatch:
 
     def rule(self, family: str) -> str:
         """The name of the batch's rule, such as motion_clips__cmu__3 or hurt_clips__cmu__3_hurt."""
-        return MARK.join((family, self.dataset, f"{self.number}{'_hurt' * self.hurt}"))
+        return RULE_NAME_SEPARATOR.join((family, self.dataset, f"{self.number}{'_hurt' * self.hurt}"))
 
     def log(self, stage: str, family: str) -> str:
         """Path of the log of the batch's job."""
@@ -88,13 +89,13 @@ def family_of(rule: str) -> str:
 
     Other names are returned unchanged.
     """
-    return rule.partition(MARK)[0]
+    return rule.partition(RULE_NAME_SEPARATOR)[0]
 
 
 def dataset_of(rule: str) -> str:
     """The data set of a batch's rule, or "" for other rules."""
-    _, mark, rest = rule.partition(MARK)
-    return rest.rpartition(MARK)[0] if mark else ""
+    _, mark, rest = rule.partition(RULE_NAME_SEPARATOR)
+    return rest.rpartition(RULE_NAME_SEPARATOR)[0] if mark else ""
 
 
 class Batches:
@@ -104,9 +105,9 @@ class Batches:
         self.clips = clips
 
     @functools.cache  # noqa: B019 - one project lives as long as the process
-    def of(self, dataset: str) -> tuple[ClipBatch, ...]:
+    def of_listed_clips(self, dataset: str) -> tuple[ClipBatch, ...]:
         """The batches of a data set's clips, without hurt versions."""
-        listed = list(self.clips.listed(dataset))  # names of the clips
+        listed = list(self.clips.listed_entries(dataset))  # names of the clips
         mirrored = self.clips.catalogue.dataset(dataset).mirror
         count = batch_count(len(listed))
         if count == len(listed):
@@ -121,22 +122,22 @@ class Batches:
         )
 
     @functools.cache  # noqa: B019
-    def hurt_of(self, dataset: str) -> tuple[ClipBatch, ...]:
-        """The batches of hurt versions, one for each batch of `of` in which clips have hurt versions."""
+    def of_hurt_versions(self, dataset: str) -> tuple[ClipBatch, ...]:
+        """The batches of hurt versions: one for each batch whose clips have hurt versions."""
         versions = defaultdict(list)
         for version in self.clips.hurt_versions(dataset):
             versions[original(version)].append(version)
         batches = []
-        for batch in self.of(dataset):
+        for batch in self.of_listed_clips(dataset):
             members = tuple(version for clip in batch.clips for version in versions[clip])
             if members:
                 label = f"{batch.label}_hurt"
                 batches.append(ClipBatch(dataset, batch.number, label, members, batch.mirrored, hurt=True))
         return tuple(batches)
 
-    def all_of(self, dataset: str) -> tuple[ClipBatch, ...]:
+    def of_clips_and_hurt_versions(self, dataset: str) -> tuple[ClipBatch, ...]:
         """The batches of clips, then the batches of hurt versions."""
-        return (*self.of(dataset), *self.hurt_of(dataset))
+        return (*self.of_listed_clips(dataset), *self.of_hurt_versions(dataset))
 
     def needed(
         self,
@@ -146,9 +147,9 @@ class Batches:
     ) -> list[ClipBatch]:
         """The batches of these data sets that a run of Snakemake needs.
 
-        batches_of: returns the batches of a data set, such as `self.of`. arguments: the command line of the
-        run. A job on another machine is a run whose command line names the rule. It needs only the batch of
-        this rule.
+        batches_of: returns the batches of a data set, such as `self.of_listed_clips`. arguments: the command
+        line of the run. A job on another machine is a run whose command line names the rule. It needs only
+        the batch of this rule.
         """
         rules = rules_of_job(arguments)
         batches = [batch for dataset in datasets for batch in batches_of(dataset)]

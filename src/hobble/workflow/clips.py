@@ -27,7 +27,7 @@ from hobble.core.clip_files import (
 from hobble.core.errors import HobbleError, InputError
 from hobble.core.untrusted import check_regular
 from hobble.hurt.options import HURT_CHANNEL, Hurt
-from hobble.synthetic.options import WRITES
+from hobble.synthetic.options import WRITTEN_LABEL_SUFFIXES
 from hobble.workflow.channel_sources import ChannelSources
 from hobble.workflow.sources import joint_names, nearest_rig, read_checksums
 
@@ -55,16 +55,16 @@ class Clips:
         self.channel_sources = ChannelSources(catalogue, self)
 
     @functools.cache  # noqa: B019 - one project lives as long as the process
-    def of(self, dataset: str) -> dict[str, ClipEntry]:
+    def entries(self, dataset: str) -> dict[str, ClipEntry]:
         """Name -> entry of the clips and hurt versions of a data set, without mirrors.
 
         Raises HobbleError if a name is reserved, InputError if there are no clips.
         """
-        entries = self.listed(dataset)
+        entries = self.listed_entries(dataset)
         return {**entries, **{version: entries[original(version)] for version in self.hurt_versions(dataset)}}
 
     @functools.cache  # noqa: B019
-    def listed(self, dataset: str) -> dict[str, ClipEntry]:
+    def listed_entries(self, dataset: str) -> dict[str, ClipEntry]:
         """Name -> entry of the data set's listed clips or, if it lists none, of those in its folder."""
         listed = self.catalogue.dataset(dataset).clips or dict.fromkeys(self._scanned(dataset))
         if reserved := [name for name in listed if name.endswith(MIRROR_SUFFIX)]:
@@ -102,13 +102,13 @@ class Clips:
         healthy = (
             [
                 clip
-                for clip in self.listed(dataset)
+                for clip in self.listed_entries(dataset)
                 if self.channel_sources.is_neutral(dataset, clip, HURT_CHANNEL)
             ]
             if options
             else []
         )
-        counts = {clip: self.hurt(dataset, clip).versions for clip in healthy}
+        counts = {clip: self.hurt_options(dataset, clip).versions for clip in healthy}
         names = [
             f"{clip}_hurt{version + 1}"
             for version in range(max(counts.values(), default=0))
@@ -117,7 +117,7 @@ class Clips:
         ]
         return {name: number for number, name in enumerate(names)}
 
-    def hurt(self, dataset: str, clip: str) -> Hurt:
+    def hurt_options(self, dataset: str, clip: str) -> Hurt:
         """Options of a clip's hurt versions: the data set's section `hurt`, changed by the clip's entry."""
         options, amount = self.catalogue.dataset(dataset).hurt, self.entry(dataset, clip).hurt
         assert options is not None
@@ -130,7 +130,7 @@ class Clips:
 
     def entry(self, dataset: str, clip: str) -> ClipEntry:
         """The entry of a clip. For a mirror or a hurt version it is the entry of its original."""
-        clips = self.listed(dataset)
+        clips = self.listed_entries(dataset)
         name = original(clip)
         if name not in clips:
             raise HobbleError(f"data set {dataset} has no clip {name!r}; it has: {', '.join(clips)}")
@@ -167,7 +167,7 @@ class Clips:
         if clip in (files := self._files(dataset)):
             return str(only_file(clip, files[clip]))
         if clip in (downloads := self._checksums(dataset)):
-            return self.downloaded(settings.source or dataset, clip)
+            return self.download_path(settings.source or dataset, clip)
         path = self.folder(dataset) / f"{clip}.bvh"
         nor = f", and it is not in the download list {self._download_list(dataset)}" if downloads else ""
         raise InputError(
@@ -176,7 +176,7 @@ class Clips:
             fix="Put the file there, or take the clip out of the data set.",
         )
 
-    def downloaded(self, dataset: str, clip: str) -> str:
+    def download_path(self, dataset: str, clip: str) -> str:
         """Path to which a clip is downloaded."""
         return str(self.base / "data" / "downloaded" / dataset / f"{clip}.bvh")
 
@@ -211,7 +211,7 @@ class Clips:
         """
         synthetic = self.catalogue.dataset(dataset).synthetic is not None
         if synthetic:
-            suffixes = [suffix for suffix in suffixes if suffix in WRITES]
+            suffixes = [suffix for suffix in suffixes if suffix in WRITTEN_LABEL_SUFFIXES]
         stem = self.folder(dataset) / clip  # the path without suffix
         if not synthetic and clip in (files := self._files(dataset)):
             stem = files[clip][0].with_suffix("")
@@ -240,18 +240,18 @@ class Clips:
         if settings.synthetic is not None:
             name: str | None = self.catalogue.dataset(settings.source or dataset).skeleton
         else:
-            rigs = sorted(path.stem for path in Path(self.skeletons).glob("*.yaml"))
+            rigs = sorted(path.stem for path in Path(self.skeleton_folder).glob("*.yaml"))
             known = {rig: self.catalogue.skeleton(rig).joints for rig in rigs}
             name = nearest_rig(joint_names(Path(self.source(dataset, clip))), known, settings.skeleton)
         return [self._skeleton(name)] if name is not None and name != settings.skeleton else []
 
     @property
-    def skeletons(self) -> str:
+    def skeleton_folder(self) -> str:
         """The folder of the skeletons."""
         return str(self.base / "config" / "skeletons")
 
     def _skeleton(self, name: str) -> str:
-        return str(Path(self.skeletons) / f"{name}.yaml")
+        return str(Path(self.skeleton_folder) / f"{name}.yaml")
 
     def _reads_labels(self, dataset: str) -> bool:
         return self.catalogue.dataset(dataset).labels.files
@@ -277,7 +277,7 @@ class Clips:
         files = self._files(dataset)
         return sorted(name + MIRROR_SUFFIX for name in files if name + MIRROR_SUFFIX in files)
 
-    def notes(self, dataset: str) -> list[str]:
+    def notes_on_unused_files(self, dataset: str) -> list[str]:
         """Sentences that say which files in the user's folder are not used, and why."""
         settings = self.catalogue.dataset(dataset)
         if settings.synthetic is not None or not (folder := self.folder(dataset)).is_dir():

@@ -49,10 +49,13 @@ class Configurations:
         return self.catalogue.configuration(configuration).channels
 
     def splits(self, configuration: str) -> dict[str, str]:
-        """Clip -> "train" or "held_out", for the clips that the network can learn from."""
-        return self.datasets.selected(self.dataset(configuration), self.channels(configuration))
+        """Clip -> "train" or "held_out", for the clips that suit the network.
 
-    def of_dataset(self, configuration: str, pattern: str) -> list[str]:
+        Clips in which a channel that the network lacks is not 0 are left out.
+        """
+        return self.datasets.splits(self.dataset(configuration), self.channels(configuration))
+
+    def dataset_files(self, configuration: str, pattern: str) -> list[str]:
         """Paths of files in the data set's folder.
 
         pattern: a path in this folder. If it contains {clip}, there is a path for each clip of `splits`, else
@@ -63,21 +66,21 @@ class Configurations:
             return [f"{root}/{pattern}"]
         return [f"{root}/{pattern.format(clip=clip)}" for clip in self.splits(configuration)]
 
-    def owner(self, configuration: str) -> str:
+    def network_owner(self, configuration: str) -> str:
         """Name of the configuration that trains the network: `network_of`, or this one if it is not set."""
         return self.catalogue.configuration(configuration).network_of or configuration
 
-    def kind(self, configuration: str) -> str:
-        """Name of the package for the kind of network, such as hobble.models.pfnn."""
-        return f"hobble.models.{self.catalogue.configuration(self.owner(configuration)).network.kind}"
+    def model_package(self, configuration: str) -> str:
+        """Full name of the Python package for the kind of network, such as hobble.models.pfnn."""
+        return f"hobble.models.{self.catalogue.configuration(self.network_owner(configuration)).network.kind}"
 
     def model(self, configuration: str) -> Model:
-        """The kind of network, an object of `hobble.models`."""
-        return model(self.catalogue.configuration(self.owner(configuration)).network.kind)
+        """The object MODEL of the package `model_package`, which describes the kind of network."""
+        return model(self.catalogue.configuration(self.network_owner(configuration)).network.kind)
 
     def network(self, configuration: str, file: str) -> str:
         """Path of `file` in the folder of the configuration's network."""
-        return f"results/{self.owner(configuration)}/network/{file}"
+        return f"results/{self.network_owner(configuration)}/network/{file}"
 
     def database(self, configuration: str) -> str:
         """Path of the database that the configuration learns from."""
@@ -88,7 +91,7 @@ class Configurations:
         """Whether the network is built directly from rows of the database instead of trained."""
         return isinstance(model(self.catalogue.configuration(configuration).network.kind), Built)
 
-    def rows_in_order(self, configuration: str) -> list[str]:
+    def training_row_files(self, configuration: str) -> list[str]:
         """If the network is built: files with the rows of the training clips, in order of frames. Else []."""
         if not self.is_built(configuration):
             return []
@@ -97,7 +100,7 @@ class Configurations:
             f"{root}/{clip}.npz" for clip, split in self.splits(configuration).items() if split == "train"
         ]
 
-    def start(self, configuration: str) -> list[str]:
+    def start_checkpoint(self, configuration: str) -> list[str]:
         """Path of the checkpoint from which the training continues, in a list; [] if there is none."""
         other = self.catalogue.configuration(configuration).training.continues
         return [f"results/{other}/network/checkpoint.npz"] if other else []

@@ -44,7 +44,7 @@ def stages(configurations: Configurations, batches: Batches, name: str) -> dict[
     }
     out["database"]["files"] = [f"{DATASETS}/{dataset}/database/clips", configurations.database(name)]
     results = Path("results", name)
-    out["training"] = _places(Path("results", configurations.owner(name)), "training", "network")
+    out["training"] = _places(Path("results", configurations.network_owner(name)), "training", "network")
     out["runtime"] = _places(results, "runtime", "runtime")
     out["evaluation"] = _places(results, "evaluation", "evaluation")
     return out
@@ -54,7 +54,7 @@ def _places_in_dataset(batches: Batches, dataset: str, stage: str) -> Places:
     root = Path(DATASETS, dataset)
     return {
         **_places(root, stage, stage),
-        "batches": [batch.label for batch in batches.all_of(dataset)],
+        "batches": [batch.label for batch in batches.of_clips_and_hurt_versions(dataset)],
         "made": [str(root / FOLDER / rule) for rule in BATCH_RULES[stage]],
     }
 

@@ -34,7 +34,7 @@ class Datasets:
         values = getattr(self.catalogue.dataset(dataset), section).model_dump(mode="json")
         return {key: values[key] for key in keys} if keys else values
 
-    def part(self, dataset: str, section: str, options_class: type[Section]) -> dict[str, Any]:
+    def options_of_class(self, dataset: str, section: str, options_class: type[Section]) -> dict[str, Any]:
         """Key -> value of a section as plain data, only for keys that are fields of `options_class`."""
         return self.options(dataset, section, *options_class.model_fields)
 
@@ -48,7 +48,7 @@ class Datasets:
         """Number of frames, at 60 Hz, of a synthetic clip: its share of the frames of the data set."""
         synthetic = self.catalogue.dataset(dataset).synthetic
         assert synthetic is not None
-        all_shares = sum(entry.share for entry in self.clips.listed(dataset).values())
+        all_shares = sum(entry.share for entry in self.clips.listed_entries(dataset).values())
         return round(synthetic.frames * self.clips.entry(dataset, clip).share / all_shares)
 
     def walkers(self, names: Iterable[str]) -> list[str]:
@@ -61,7 +61,7 @@ class Datasets:
         walkers = [each.source or name for name, each in settings.items() if each.synthetic is not None]
         return list(dict.fromkeys(walkers))
 
-    def selected(self, dataset: str, channels: Sequence[str]) -> dict[str, str]:
+    def splits(self, dataset: str, channels: Sequence[str]) -> dict[str, str]:
         """Clip -> "train" or "held_out", for the clips that a network can learn from.
 
         channels: the channels of the network. If the network lacks a channel of the data set, it cannot learn
@@ -76,9 +76,9 @@ class Datasets:
                 f"`channels: {{{lacking[0]}: ...}}`, or use another data set"
             )
         unused = [name for name in available if name not in channels]
-        settings, clips = self.catalogue.dataset(dataset), self.clips.of(dataset)
+        settings, clips = self.catalogue.dataset(dataset), self.clips.entries(dataset)
         held_out = set(settings.held_out)
-        if missing := held_out - set(self.clips.listed(dataset)):
+        if missing := held_out - set(self.clips.listed_entries(dataset)):
             missing_names = ", ".join(sorted(missing))
             raise HobbleError(
                 f"data set {dataset}: held_out names clips that do not exist: {missing_names}. Correct the "
@@ -97,7 +97,7 @@ class Datasets:
             )
         return splits
 
-    def compared(self, dataset: str, channels: Sequence[str]) -> list[str]:
+    def clips_to_compare(self, dataset: str, channels: Sequence[str]) -> list[str]:
         """The clips that a job compares to find copies, so that no motion is both trained on and held out.
 
         Mirrors and hurt versions are not compared. The list is empty if no clip is held out, or if the clips
@@ -105,7 +105,7 @@ class Datasets:
         """
         if self.catalogue.dataset(dataset).synthetic is not None:
             return []
-        splits = self.selected(dataset, channels)
+        splits = self.splits(dataset, channels)
         if len(set(splits.values())) < 2:
             return []
         return [clip for clip in splits if clip == original(clip)]
@@ -118,12 +118,12 @@ class Datasets:
     def _splits_by_shard(self, dataset: str, channels: tuple[str, ...]) -> list[dict[str, str]]:
         count = self.shards(dataset)
         splits: list[dict[str, str]] = [{} for _ in range(count)]
-        for clip, split in self.selected(dataset, channels).items():
+        for clip, split in self.splits(dataset, channels).items():
             splits[shard_of(clip, count)][clip] = split
         return splits
 
-    def in_shard(self, dataset: str, channels: Sequence[str], shard: int) -> dict[str, str]:
-        """The part of what `selected` returns for the clips of one shard. shard: its number, from 0."""
+    def splits_in_shard(self, dataset: str, channels: Sequence[str], shard: int) -> dict[str, str]:
+        """The part of what `splits` returns for the clips of one shard. shard: its number, from 0."""
         return self._splits_by_shard(dataset, tuple(channels))[shard]
 
     def hurt_row_step(self, dataset: str) -> int:

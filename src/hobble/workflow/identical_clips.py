@@ -19,7 +19,7 @@ def find_identical_pairs(clips: Clips, dataset: str) -> list[tuple[str, str, str
     ignored.
     """
     clips_by_size: dict[int, list[tuple[str, Path]]] = defaultdict(list)
-    for clip in clips.listed(dataset):
+    for clip in clips.listed_entries(dataset):
         path = Path(clips.source(dataset, clip))
         if path.is_file() and (size := path.stat().st_size):
             clips_by_size[size].append((clip, path))
@@ -39,5 +39,5 @@ def refuse_copies(clips: Clips, datasets: Datasets, dataset: str, channels: tupl
     """
     options = datasets.catalogue.dataset(dataset)
     if options.synthetic is None and options.held_out:
-        splits = {original(name): split for name, split in datasets.selected(dataset, channels).items()}
+        splits = {original(name): split for name, split in datasets.splits(dataset, channels).items()}
         refuse_split_pairs(f"data set {dataset}", find_identical_pairs(clips, dataset), splits)

@@ -24,16 +24,16 @@ def job(snakemake: Any) -> Iterator[logging.Logger]:
     """Run a script with logging, checks of its files, and clear errors. Yields the logger.
 
     snakemake: the object that Snakemake gives to scripts. An input causes an error if it has changed since
-    its own job wrote it, or if it changes while this job runs. `reporting` logs messages and errors.
+    its own job wrote it, or if it changes while this job runs. `log_job` logs messages and errors.
     """
-    with reporting(snakemake) as report:
-        checksums.forget(getattr(snakemake, "output", ()))
-        with checked(getattr(snakemake, "input", ()), getattr(snakemake, "output", ())):
+    with log_job(snakemake) as report:
+        checksums.delete(getattr(snakemake, "output", ()))
+        with check_and_record(getattr(snakemake, "input", ()), getattr(snakemake, "output", ())):
             yield report.logger
 
 
 @contextlib.contextmanager
-def checked(inputs: Any, outputs: Any) -> Iterator[None]:
+def check_and_record(inputs: Any, outputs: Any) -> Iterator[None]:
     """Check the inputs before and after the work in this context, then write the outputs' checksums.
 
     inputs, outputs: paths. Raises InputError for an input that is damaged or has changed.
@@ -46,7 +46,7 @@ def checked(inputs: Any, outputs: Any) -> Iterator[None]:
 
 
 @contextlib.contextmanager
-def reporting(snakemake: Any) -> Iterator[JobLog]:
+def log_job(snakemake: Any) -> Iterator[JobLog]:
     """Run a script with logging and clear errors. If the run of Snakemake ends, the script ends, too.
 
     Every message goes to the job's log file. Warnings and errors also go to the terminal. Every error ends

@@ -39,7 +39,7 @@ def _write_locks(self: FilePersistence, kind: str, paths: Iterable[str]) -> None
     return _snakemake_write_locks(self, kind, paths)
 
 
-def use() -> None:
+def tolerate_removed_folder() -> None:
     """Make Snakemake read and write its locks with `_read_locks` and `_write_locks`."""
     persistence: Any = FilePersistence
     persistence._read_locks, persistence._write_locks = _read_locks, _write_locks

@@ -58,13 +58,13 @@ class Measurements:
         if item == "weights":
             return configurations.network(configuration, "weights.npz")
         if item == "clips":
-            return configurations.of_dataset(configuration, "database/clips/{clip}.npz")
+            return configurations.dataset_files(configuration, "database/clips/{clip}.npz")
         if item == "summaries":
-            return configurations.of_dataset(configuration, "database/clips/{clip}.json")
+            return configurations.dataset_files(configuration, "database/clips/{clip}.json")
         if item == "skeleton":
             return self.clips.skeleton_file(configurations.dataset(configuration))
         if item == "published":
-            return self.package.published()
+            return self.package.published_file()
         return result_file(configuration, measure(item).name)
 
     def splits(self, configuration: str, name: str) -> dict[str, str]:

@@ -37,6 +37,6 @@ class NamedOutputs(OutputIndex):  # type: ignore[misc]
         return self._rules.get(str(targetfile)) or super().match_producers(targetfile)
 
 
-def use() -> None:
+def use_named_outputs() -> None:
     """Make Snakemake plan with `NamedOutputs`."""
     dag.OutputIndex = NamedOutputs

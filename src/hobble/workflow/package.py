@@ -27,20 +27,20 @@ class Package:
         path = self.base / "workflow" / "scripts" / f"{script}.py"
         return fingerprint(path, self.base / "src", modules)
 
-    def templates(self) -> list[str]:
+    def template_files(self) -> list[str]:
         """Paths of the HTML pages' templates and styles, and of the published results that the pages show.
 
         If one of these files changes, only the pages are made again.
         """
         kinds = {".j2", ".css", ".js", ".yaml"}
         files = [str(path) for path in (self.folder / "report").iterdir() if path.suffix in kinds]
-        return sorted([*files, self.published()])
+        return sorted([*files, self.published_file()])
 
-    def web(self, suffix: str) -> list[str]:
+    def web_files(self, suffix: str) -> list[str]:
         """Paths of the report's files with a suffix: ".js" for scripts, ".json" for lists of npm packages."""
         files = [*(self.folder / "report" / "web").iterdir(), *self.folder.glob("models/**/*.js")]
         return sorted(str(path) for path in files if path.suffix == suffix)
 
-    def published(self) -> str:
+    def published_file(self) -> str:
         """Path of the published results, such as errors and times, with which the report compares ours."""
         return str(self.folder / "evaluation" / "published.yaml")

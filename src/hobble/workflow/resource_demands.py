@@ -54,11 +54,11 @@ class Demands:
 
     def batch_memory(self, batch: ClipBatch, rate: float, attempt: int = 1) -> int:
         """MB for a batch's job. rate: MB for a thousand frames of its longest clip, with 31 joints."""
-        return _megabytes(rate * max(self._thousands_of(batch)), attempt)
+        return _megabytes(rate * max(self._thousands_of_frames(batch)), attempt)
 
     def batch_minutes(self, batch: ClipBatch, rate: float, attempt: int = 1, least: int = 1) -> int:
         """Minutes for a batch's job that takes `rate` seconds for a thousand frames with 31 joints."""
-        seconds = sum(rate * thousands + CLIP_SECONDS for thousands in self._thousands_of(batch))
+        seconds = sum(rate * thousands + CLIP_SECONDS for thousands in self._thousands_of_frames(batch))
         return _minutes(seconds, attempt, least)
 
     def memory_of_longest(self, dataset: str, rate: float, row_bytes: float = 0.0, attempt: int = 1) -> int:
@@ -67,12 +67,12 @@ class Demands:
         rate: MB for a thousand frames of the longest clip. row_bytes: bytes that the job keeps of each frame
         of all clips.
         """
-        longest = max(self.thousands(dataset, clip) for clip in self.project.clips.of(dataset))
-        return _megabytes(rate * longest + row_bytes * self.all_thousands(dataset) / 1e3, attempt)
+        longest = max(self.thousands_of_frames(dataset, clip) for clip in self.project.clips.entries(dataset))
+        return _megabytes(rate * longest + row_bytes * self.all_thousands_of_frames(dataset) / 1e3, attempt)
 
     def shard_memory(self, dataset: str, attempt: int = 1) -> int:
         """MB for a job that makes a shard. It holds one clip at a time, and a few numbers for each row."""
-        longest = max(self.thousands(dataset, clip) for clip in self.project.clips.of(dataset))
+        longest = max(self.thousands_of_frames(dataset, clip) for clip in self.project.clips.entries(dataset))
         return _megabytes(SHARD_MB * longest + ROW_BYTES * self._shard_thousands(dataset) / 1e3, attempt)
 
     def shard_minutes(self, dataset: str, rate: float, attempt: int = 1) -> int:
@@ -82,11 +82,11 @@ class Demands:
     def _shard_thousands(self, dataset: str) -> float:
         """Thousands of frames of the largest shard. It may have twice as many as the average shard."""
         shards = self.project.datasets.shards(dataset)
-        return self.all_thousands(dataset) * min(1.0, 2 / shards if shards > 1 else 1.0)
+        return self.all_thousands_of_frames(dataset) * min(1.0, 2 / shards if shards > 1 else 1.0)
 
     def minutes_of_all(self, dataset: str, rate: float, attempt: int = 1, least: int = 1) -> int:
         """Minutes for a job that takes `rate` seconds for a thousand frames of all clips and mirrors."""
-        return _minutes(rate * self.all_thousands(dataset), attempt, least)
+        return _minutes(rate * self.all_thousands_of_frames(dataset), attempt, least)
 
     def measure_memory(self, configuration: str, name: str, attempt: int = 1) -> int:
         """MB for the job of the measurement `name`."""
@@ -108,8 +108,8 @@ class Demands:
             return 1.0
         section = self.project.configurations.section(configuration, "evaluation", "sample_frames")
         dataset = self.project.configurations.dataset(configuration)
-        # `all_thousands` is scaled with the number of joints; this factor undoes it.
-        frames = 1e3 * self.all_thousands(dataset) * MEASURED_JOINTS / self._joints(dataset)
+        # `all_thousands_of_frames` is scaled with the number of joints; this factor undoes it.
+        frames = 1e3 * self.all_thousands_of_frames(dataset) * MEASURED_JOINTS / self._joints(dataset)
         return min(1.0, section["sample_frames"] / max(frames, 1.0))
 
     def evaluation_memory(self, configuration: str, rate: float, attempt: int = 1) -> int:
@@ -137,7 +137,7 @@ class Demands:
         if self.project.configurations.is_built(configuration):
             layout, dataset = self.layout(configuration), self.project.configurations.dataset(configuration)
             # A number of a row has 4 bytes, so it needs 4e-3 MB for a thousand rows.
-            needed += 3 * 4e-3 * (layout.x_size + layout.y_size) * self.all_thousands(dataset)
+            needed += 3 * 4e-3 * (layout.x_size + layout.y_size) * self.all_thousands_of_frames(dataset)
         return _megabytes(self.machines(configuration).processes_per_node * needed, attempt)
 
     def training_minutes(self, configuration: str, attempt: int = 1) -> int:
@@ -149,7 +149,7 @@ class Demands:
         """
         training = self.project.configurations.section(configuration, "training")
         dataset = self.project.configurations.dataset(configuration)
-        frames = 1e3 * self.all_thousands(dataset) * MEASURED_JOINTS / self._joints(dataset)
+        frames = 1e3 * self.all_thousands_of_frames(dataset) * MEASURED_JOINTS / self._joints(dataset)
         samples = frames * VISITS_PER_PASS * training["passes"]
         seconds = samples * self.parameters(configuration) / 4 / 6.4e9
         return _minutes(seconds / self.machines(configuration).count, attempt, least=60)
@@ -186,13 +186,13 @@ class Demands:
 
     # Sizes
 
-    def thousands(self, dataset: str, clip: str) -> float:
+    def thousands_of_frames(self, dataset: str, clip: str) -> float:
         """Thousands of frames of a clip, multiplied by (its number of joints / MEASURED_JOINTS)."""
         return self._frames(dataset, original(clip)) / 1e3 * self._joints(dataset) / MEASURED_JOINTS
 
-    def _thousands_of(self, batch: ClipBatch) -> list[float]:
-        """What `thousands` returns, for each clip of a batch."""
-        return [self.thousands(batch.dataset, clip) for clip in batch.clips]
+    def _thousands_of_frames(self, batch: ClipBatch) -> list[float]:
+        """What `thousands_of_frames` returns, for each clip of a batch."""
+        return [self.thousands_of_frames(batch.dataset, clip) for clip in batch.clips]
 
     def parameters(self, configuration: str) -> float:
         """Number of trained parameters of a configuration's network; 0 if it is not trained."""
@@ -211,9 +211,11 @@ class Demands:
         return RowLayout(joints=len(skeleton.joints), channels=channels, **row_options)
 
     @functools.cache  # noqa: B019 - one project lives as long as the process
-    def all_thousands(self, dataset: str) -> float:
-        """Thousands of frames of all clips and mirrors, scaled like `thousands`."""
-        without_mirrors = sum(self.thousands(dataset, clip) for clip in self.project.clips.of(dataset))
+    def all_thousands_of_frames(self, dataset: str) -> float:
+        """Thousands of frames of all clips and mirrors, scaled like `thousands_of_frames`."""
+        without_mirrors = sum(
+            self.thousands_of_frames(dataset, clip) for clip in self.project.clips.entries(dataset)
+        )
         return without_mirrors * (1 + self.project.catalogue.dataset(dataset).mirror)
 
     @functools.cache  # noqa: B019

@@ -60,7 +60,7 @@ def planned_jobs(plan: str) -> Iterator[JobResources]:
         )
 
 
-def with_use(jobs: Iterator[JobResources], run: Path) -> Iterator[JobResources]:
+def with_measured_use(jobs: Iterator[JobResources], run: Path) -> Iterator[JobResources]:
     """The same jobs, with what they used. Jobs that have no log, because they did not run, are left out.
 
     run: the folder in which Snakemake ran.

@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 PAGE = "page"  # the folder in results/ with the files that all reports share
 
 
-def check(project: Project, targets: Iterable[str]) -> None:
+def check_targets(project: Project, targets: Iterable[str]) -> None:
     """Validate the targets, and every configuration, data set and skeleton that they need.
 
     Raises HobbleError for the first mistake that is found.
@@ -41,10 +41,12 @@ def check(project: Project, targets: Iterable[str]) -> None:
             _check_target_possible(project, name, folder, file)
 
 
-def notes(project: Project, targets: Iterable[str]) -> list[str]:
+def notes_on_unused_files(project: Project, targets: Iterable[str]) -> list[str]:
     """Sentences about unused files in the folders of the data sets that the targets need."""
     names = datasets_of(project, targets)
-    return [f"data set {name}: {note}" for name in names for note in project.clips.notes(name)]
+    return [
+        f"data set {name}: {note}" for name in names for note in project.clips.notes_on_unused_files(name)
+    ]
 
 
 def needed_datasets(project: Project, arguments: Sequence[str]) -> list[str]:
@@ -106,7 +108,7 @@ def _check_configuration(project: Project, name: str) -> None:
         _check_symmetric(project, name, configuration)
     dataset = configuration.dataset
     _check_dataset(project, dataset)
-    project.datasets.selected(dataset, configuration.channels)  # raises HobbleError for unusable clips
+    project.datasets.splits(dataset, configuration.channels)  # raises HobbleError for unusable clips
     refuse_copies(project.clips, project.datasets, dataset, tuple(configuration.channels))
 
 
@@ -161,13 +163,13 @@ def _check_dataset(project: Project, name: str) -> None:
     """Check a data set, its clips and its skeleton."""
     dataset = project.catalogue.dataset(name)
     skeleton = project.catalogue.skeleton(dataset.skeleton)
-    for clip, entry in project.clips.listed(name).items():
+    for clip, entry in project.clips.listed_entries(name).items():
         project.clips.rig_files(name, clip)  # raises InputError if the clip has no file
         _check_entry(f"data set {name}: clips.{clip}", entry)
     _check_hurt(project, name, dataset, [f"{a}-{b}" for a, b in skeleton.links])
     project.datasets.channel_sources.check(name)
     # Raises HobbleError if `held_out` is wrong, or if no clip is left for training.
-    project.datasets.selected(name, project.datasets.channel_sources.channels(name))
+    project.datasets.splits(name, project.datasets.channel_sources.channels(name))
     if dataset.mirror:
         _check_mirror(dataset.skeleton, skeleton)
 

@@ -15,7 +15,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, TextIO
 
-from hobble.workflow.clip_batches import MARK, dataset_of, family_of
+from hobble.workflow.clip_batches import RULE_NAME_SEPARATOR, dataset_of, family_of
 
 PROGRESS_SECONDS = 10.0  # between lines of progress if the output goes to a file
 WIDTH = 100  # columns of the line of progress on a terminal
@@ -32,7 +32,7 @@ SUPERFLUOUS = re.compile(
 )
 # A line with names of rules, indented by eight spaces, in Snakemake's message about why it runs jobs. A rule
 # for a batch of clips is called <name>__<data set>__<number>.
-RULE_LIST = re.compile(rf"(?<=^        )\w+(?:{MARK}[^,\n]+)?(?:, [^,\n]+)*$", re.M)
+RULE_LIST = re.compile(rf"(?<=^        )\w+(?:{RULE_NAME_SEPARATOR}[^,\n]+)?(?:, [^,\n]+)*$", re.M)
 # Snakemake's messages that are shown although they are no warnings.
 SHOWN_MESSAGES = re.compile(r"^Nothing to be done|^Reasons:|^This was a dry-run|^Unlocking|^Touching|^Error")
 STOP_MESSAGE = "Terminating processes on user request"  # Snakemake prints this when the user stops the run

@@ -1,5 +1,5 @@
 // Places joints on bones of constant length, from predicted rotations. Legs are bent so that the toes are where the network predicted them.
-// `hobble.runtime.export.jointed` in Python computes the same.
+// `hobble.runtime.export.restore_bone_lengths` in Python computes the same.
 import { dot, minus } from "./numbers.js";
 import { at3, at4, between, multiply } from "./turns.js";
 

@@ -38,7 +38,7 @@ from hobble.report.formats import embedded
 from hobble.report.raster import BodyRenderer, Camera
 from hobble.report.stimuli import VISIBLE
 from hobble.report.templates import questionnaire_script, style, template
-from hobble.runtime.export import jointed
+from hobble.runtime.export import restore_bone_lengths
 from hobble.runtime.options import Runtime
 
 FRAME_STEP = 2  # every second frame of the motion is shown
@@ -138,7 +138,7 @@ def draw_pictures(
     The character has one colour, so that people have to judge by its motion what hurts.
     """
     bones = body(skeleton).bones  # indices of the joints that move the body's mesh
-    rotations, positions = jointed(skeleton, motion.positions, motion.rotations)
+    rotations, positions = restore_bone_lengths(skeleton, motion.positions, motion.rotations)
     path = gaussian(motion.positions[:, 0], CAMERA_SMOOTHING)  # the points that the camera looks at
     path[:, 1] = LOOK_AT
     return [
