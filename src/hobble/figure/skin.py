@@ -23,7 +23,7 @@ def nearest_joints(solids: Sequence[Solid], points: Array, bone_of: Mapping[str,
     nearest, owner = np.full(len(points), np.inf), np.zeros(len(points), np.int64)
     x, y, z = points.T
     for solid in solids:
-        if solid.cut:
+        if solid.is_subtracted:
             continue
         low, high = (corner.reshape(3, 1) for corner in solid.bounds())
         # Points more than 4 cm from the box around a solid are nearer to other solids.

@@ -17,7 +17,7 @@ from typing import Any
 import numpy as np
 
 from hobble.core.clip import Clip
-from hobble.core.clip_files import find_clips, only_file, unused_file_notes
+from hobble.core.clip_files import find_clips, require_single_file, unused_file_notes
 from hobble.core.errors import HobbleError, InputError
 from hobble.core.quat import Array
 from hobble.motion.check_retarget import most_different
@@ -92,7 +92,11 @@ def summarise_clips(
     maps: the folder of the skeleton files. options: how the files are read (the section `motion` of a data
     set).
     """
-    files = [folder] if folder.is_file() else [only_file(n, f) for n, f in sorted(find_clips(folder).items())]
+    files = (
+        [folder]
+        if folder.is_file()
+        else [require_single_file(n, f) for n, f in sorted(find_clips(folder).items())]
+    )
     if not files:
         raise InputError(folder, "no .bvh files here")
     clips = tuple(_summary_of_file(file, skeleton, maps, options or ClipMotion()) for file in files)

@@ -19,7 +19,7 @@ import numpy as np
 from hobble.core import quat
 from hobble.core.clip import Clip
 from hobble.core.errors import HobbleError
-from hobble.core.ik import aim, two_bone_knee
+from hobble.core.ik import aim_bone, two_bone_knee
 from hobble.core.quat import Array
 from hobble.core.skeleton import Skeleton, local_rotations, rest_positions
 from hobble.motion.axes import rest_frame
@@ -301,8 +301,8 @@ class _Leg:
         pole = _knee_direction(upper, lower, self.thigh, self.shank, self.forward)
         lengths = float(np.linalg.norm(self.thigh)), float(np.linalg.norm(self.shank))
         knee_at, ankle_at = two_bone_knee(start, self.ankle, pole, *lengths)
-        self.rotations[..., self.hip, :] = aim(upper, self.thigh, knee_at - start)
-        self.rotations[..., self.knee, :] = aim(lower, self.shank, ankle_at - knee_at)
+        self.rotations[..., self.hip, :] = aim_bone(upper, self.thigh, knee_at - start)
+        self.rotations[..., self.knee, :] = aim_bone(lower, self.shank, ankle_at - knee_at)
 
 
 def _knee_direction(hip: Array, knee: Array, thigh: Array, shank: Array, ahead: Array) -> Array:
