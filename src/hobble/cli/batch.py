@@ -11,7 +11,7 @@ from tqdm import tqdm
 
 from hobble.core.clip_files import find_clips, require_single_file
 from hobble.core.errors import HobbleError, InputError
-from hobble.motion.rig import TargetSkeleton, load_skeleton
+from hobble.motion.rig import KnownSkeleton, load_skeleton
 
 
 def add_folders(parser: argparse.ArgumentParser, out: str) -> None:
@@ -79,7 +79,7 @@ def skeleton_file(name: str) -> Path:
     return path
 
 
-def read_skeleton(name: str) -> TargetSkeleton:
+def read_skeleton(name: str) -> KnownSkeleton:
     """Read a skeleton, and which of its joints are which joints of other skeletons.
 
     name: a skeleton's name, or a path to a YAML file. Raises InputError if the file is missing or wrong.

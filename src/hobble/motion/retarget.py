@@ -74,14 +74,16 @@ class Retarget:
     lift: float
 
 
-def plan(source: Skeleton, target: Skeleton, sources: Mapping[str, str]) -> Retarget:
+def plan(source: Skeleton, target: Skeleton, followed_joints: Mapping[str, str]) -> Retarget:
     """Plan how `target` follows `source`.
 
-    sources: name of a target joint -> name of the source joint that it follows. Both skeletons need the roles
-    hips and head, and on both sides shoulder, hip, knee, heel and toe. Raises HobbleError if the target's
-    hips, or a hip, knee or heel, follows nothing, or if a bone of a leg has no length.
+    followed_joints: name of a target joint -> name of the source joint that it follows. Both skeletons need
+    the roles hips and head, and on both sides shoulder, hip, knee, heel and toe. Raises HobbleError if the
+    target's hips, or a hip, knee or heel, follows nothing, or if a bone of a leg has no length.
     """
-    pairs = sorted((target.index(follower), source.index(leader)) for follower, leader in sources.items())
+    pairs = sorted(
+        (target.index(follower), source.index(leader)) for follower, leader in followed_joints.items()
+    )
     joints, follows = (np.array(column) for column in zip(*pairs, strict=True))
     for role in ("hips", *(f"{s}_{part}" for s in SIDES for part in ("hip", "knee", "heel"))):
         if target.role(role) not in joints:
