@@ -36,8 +36,8 @@ def picture_of_file(bvh: Path, skeleton: Path, skeleton_folder: Path, options: C
     It is drawn even if the workflow refuses the result because it differs too much from the source.
 
     skeleton: the file of the skeleton that gets the motion. skeleton_folder: the folder with all skeleton
-    files, with which the rig of the BVH file is recognised. Raises InputError for a BVH file that cannot be read or
-    that has this skeleton's bones already.
+    files, with which the rig of the BVH file is recognised. Raises InputError for a BVH file that cannot be
+    read or that has this skeleton's bones already.
     """
     target = load_skeleton(skeleton, skeleton.stem)
     source = load_source(read_bvh(bvh), target, skeleton_folder, options)
