@@ -16,7 +16,7 @@ import hobble.training  # noqa: F401 - first, since it says how threads wait
 import torch
 from products import least
 
-from hobble.core.processors import multiplies_bfloat16, processor
+from hobble.core.processors import multiplies_bfloat16, processor_name
 from hobble.models.pfnn.fused import FusedPfnnStep
 from hobble.models.pfnn.trainable import initialise
 from hobble.training.optimiser import Adam, l1_slopes
@@ -79,7 +79,7 @@ def main() -> None:
     use_threads(options.threads)
     torch.manual_seed(1)
     sizes = tuple(int(size) for size in options.sizes.split(","))
-    print(f"{processor()}, {options.threads} threads, {options.sizes}; milliseconds")
+    print(f"{processor_name()}, {options.threads} threads, {options.sizes}; milliseconds")
     print("batch factors        ours   PyTorch   ratio  the step  whole step")
     for rows in map(int, options.batches.split(",")):
         compare(rows, sizes, False)

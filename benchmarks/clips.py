@@ -17,7 +17,7 @@ import tempfile
 import time
 from pathlib import Path
 
-from hobble.core.processors import processor
+from hobble.core.processors import processor_name
 from hobble.motion.read import read_bvh
 from hobble.workflow.project import Project
 
@@ -47,7 +47,7 @@ def main() -> None:
     parser.add_argument("--dataset", default="cmu")
     parser.add_argument("--cores", type=int, default=2)
     arguments = parser.parse_args()
-    print(processor())
+    print(processor_name())
     mocap = arguments.mocap.resolve()
     project = Project(ROOT, {"mocap": str(mocap)})
     clips = sorted(project.clips.listed_entries(arguments.dataset))

@@ -24,7 +24,7 @@ from typing import Any
 import numpy as np
 from own_process import cold
 
-from hobble.core.processors import processor
+from hobble.core.processors import processor_name
 from hobble.database.chunks import read_chunk, write_chunk
 
 COLUMNS = 683  # X and Y of 31 joints, without the terrain
@@ -220,7 +220,7 @@ def main() -> None:
     parser.add_argument("--rounds", type=int, default=3)
     parser.add_argument("--folder", type=Path)
     arguments = parser.parse_args()
-    print(processor())
+    print(processor_name())
     base = Path(tempfile.mkdtemp(prefix="hobble-containers-", dir=arguments.folder))
     table = rows(arguments.size_mb << 20)
     count, room = len(table) // BLOCK, np.empty((BLOCK, COLUMNS), np.float32)

@@ -18,7 +18,7 @@ from time import perf_counter
 
 import numpy as np
 
-from hobble.core.processors import processor
+from hobble.core.processors import processor_name
 from hobble.database.manifest import Manifest
 from hobble.evaluation.stability import random_targets, stability
 from hobble.measures.responsivity.run import responsivity
@@ -73,7 +73,7 @@ def main() -> None:
     parser.add_argument("--rollouts", action="store_true")
     parser.add_argument("--no-times", action="store_true", help="leave out the frame times")
     options = parser.parse_args()
-    print(processor())
+    print(processor_name())
     paths = {name: Path(path) for name, _, path in (one.partition("=") for one in options.networks)}
     networks = {name: load_network(path) for name, path in paths.items()}
     for count, turns in () if options.no_times else ((1, TURNS), (CROWD, 4)):

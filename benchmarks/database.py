@@ -22,7 +22,7 @@ from pathlib import Path
 import numpy as np
 from own_process import arguments, child, cold, status
 
-from hobble.core.processors import processor
+from hobble.core.processors import processor_name
 from hobble.database.merge import write_database
 from hobble.database.reader import Database
 from hobble.rows.clip_rows import ClipRows, save_clip_rows
@@ -259,7 +259,7 @@ def main() -> None:
     if args.task:
         globals()[f"task_{args.task}"](args.folder, args.argument)
         return
-    print(processor())
+    print(processor_name())
     folder = Path(tempfile.mkdtemp(prefix="hobble-database-", dir=args.folder))
     try:
         small = made_up(folder / "one", 1, args.joints)

@@ -16,7 +16,7 @@ import numpy as np
 from runtime import SKELETON, load_skeleton, random_network
 
 from hobble.channels.injury.crowd_severities import severities
-from hobble.core.processors import processor
+from hobble.core.processors import processor_name
 from hobble.evaluation.crowd import CrowdTarget, run
 from hobble.measures.rollouts.roll_outs import Crowd, RollOutInputs, RollOuts
 from hobble.models.load import load_network
@@ -85,7 +85,7 @@ def main() -> None:
     )
     parser.add_argument("network", nargs="?", type=Path, help="weights.npz, or a folder with one")
     path = parser.parse_args().network
-    print(processor())
+    print(processor_name())
     network = load_network(path) if path else random_network(load_skeleton(SKELETON))
     print("microseconds of CPU a frame       at once  one by one  ratio")
     for name, (together, apart) in (("injury sweep", sweep(network)), ("roll-outs", roll_outs(network))):

@@ -32,7 +32,7 @@ from runtime import SKELETON, load_skeleton
 from torch import Tensor
 from training import L1, PART, RATE, Batch, seconds
 
-from hobble.core.processors import multiplies_bfloat16, processor
+from hobble.core.processors import multiplies_bfloat16, processor_name
 from hobble.models import model
 from hobble.models.load import network_from_arrays
 from hobble.models.mann.forward import GATE_INPUTS
@@ -204,7 +204,7 @@ def main() -> None:
     parser.add_argument("--threads", type=int, default=2)
     parser.add_argument("--turns", type=int, default=5)
     options = parser.parse_args()
-    print(processor())
+    print(processor_name())
     predictions()
     use_threads(options.threads)
     torch.manual_seed(1)

@@ -15,7 +15,7 @@ import argparse
 import csv
 from pathlib import Path
 
-from hobble.core.processors import processor
+from hobble.core.processors import processor_name
 from hobble.database.reader import Database
 from hobble.evaluation.stability import stability
 from hobble.measures.accuracy.run import measure
@@ -67,7 +67,7 @@ def main() -> None:
     parser.add_argument("database", type=Path, help="the database of healthy clips")
     parser.add_argument("--minutes", type=float, default=10.0)
     arguments = parser.parse_args()
-    print(processor())
+    print(processor_name())
     database = Database.open(arguments.database, Training().memory_mb)
     splits = {c["clip"]: c["split"] for c in database.manifest.clips if c["rows"]}
     files = {name: arguments.database.parent / "clips" / f"{name}.npz" for name in splits}

@@ -16,7 +16,7 @@ import yaml
 
 from hobble.config.sections import LabelOptions, Synthetic
 from hobble.core.clip import Clip, load_clip
-from hobble.core.processors import processor
+from hobble.core.processors import processor_name
 from hobble.labels.contacts import contacts, stance
 from hobble.labels.footfall import find_landings, find_swings
 from hobble.labels.gait import automatic_gait
@@ -59,7 +59,7 @@ def main() -> None:
         "folder", nargs="?", type=Path, help="motion clips: results/datasets/<dataset>/motion"
     )
     folder = parser.parse_args().folder
-    print(processor())
+    print(processor_name())
     clips = [load_clip(p) for p in sorted(folder.glob("*.npz"))] if folder else [synthetic_minute()]
     options = LabelOptions()
     frames = sum(map(len, clips))

@@ -23,7 +23,7 @@ from database import BATCH, PROGRAM_MB, made_up
 from database import SECONDS as READING_SECONDS
 from own_process import arguments, child, cold, status
 
-from hobble.core.processors import processor
+from hobble.core.processors import processor_name
 from hobble.database import chunk_window, chunks, order, reader
 from hobble.database.chunk_window import empty_buffers
 from hobble.database.merge import write_database
@@ -181,7 +181,7 @@ def main() -> None:
     if args.task:
         globals()[f"task_{args.task}"](args.folder, args.argument)
         return
-    print(processor())
+    print(processor_name())
     folder = Path(tempfile.mkdtemp(prefix="hobble-maps-", dir=args.folder))
     try:
         files = made_up(folder / "clips", args.size_mb << 20, 31)

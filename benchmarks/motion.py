@@ -18,7 +18,7 @@ import numpy as np
 from hobble.core import quat
 from hobble.core.bvh import write_bvh
 from hobble.core.clip import Clip
-from hobble.core.processors import processor
+from hobble.core.processors import processor_name
 from hobble.motion.make import make_clip
 from hobble.motion.options import ClipMotion
 from hobble.motion.read import read_bvh
@@ -65,7 +65,7 @@ def main() -> None:
     parser.add_argument("folder", nargs="?", type=Path)
     parser.add_argument("--megabytes", type=float, default=4.0)
     arguments = parser.parse_args()
-    print(processor())
+    print(processor_name())
     options = ClipMotion()
     with tempfile.TemporaryDirectory() as temporary:
         files = sorted(arguments.folder.rglob("*.bvh")) if arguments.folder else []

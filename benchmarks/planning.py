@@ -19,7 +19,7 @@ from pathlib import Path
 import numpy as np
 import yaml
 
-from hobble.core.processors import processor
+from hobble.core.processors import processor_name
 
 ROOT = Path(__file__).resolve().parents[1]
 FRAMES = 5
@@ -71,7 +71,7 @@ def main() -> None:
     parser.add_argument("--mirror", action="store_true")
     parser.add_argument("--hurt", action="store_true", help="with a hurt version of each clip")
     options = parser.parse_args()
-    print(processor())
+    print(processor_name())
     with tempfile.TemporaryDirectory() as scratch:
         checkout = rules_copy(Path(scratch))
         write_clips(Path(scratch, "many"), options.clips)

@@ -24,7 +24,7 @@ import hobble.training  # noqa: F401 - first, since it says how threads wait
 import torch
 from torch import Tensor
 
-from hobble.core.processors import processor
+from hobble.core.processors import processor_name
 from hobble.models import products
 from hobble.models.pfnn.fused import FusedPfnnStep
 from hobble.models.pfnn.trainable import initialise
@@ -102,7 +102,7 @@ def main() -> None:
     sizes = tuple(int(size) for size in options.sizes.split(","))
     dtype = torch.bfloat16 if options.half else torch.float32
     names = products.working_ways(dtype)
-    print(f"{processor()}, PyTorch's loops for {torch.backends.cpu.get_cpu_capability()}")
+    print(f"{processor_name()}, PyTorch's loops for {torch.backends.cpu.get_cpu_capability()}")
     print(f"{'-'.join(map(str, sizes))}, {options.threads} threads, {str(dtype).removeprefix('torch.')}")
     for rows in map(int, options.batches.split(",")):
         print(f"\nbatch {rows:<28}" + "".join(f"{name:>9} us" for name in names) + "  chosen")

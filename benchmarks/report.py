@@ -17,7 +17,7 @@ import time
 from pathlib import Path
 from types import ModuleType
 
-from hobble.core.processors import processor
+from hobble.core.processors import processor_name
 
 FRAME = 1000 / 60
 ROOT = Path(__file__).resolve().parents[1]
@@ -90,7 +90,7 @@ def main() -> None:
     parser.add_argument("--width", type=int, default=1280, help="of the window, pixels")
     parser.add_argument("--python", type=Path, help="folder of the same network, to compare with")
     arguments = parser.parse_args()
-    print(processor())
+    print(processor_name())
     tools = browser_module()
     path = tools.executable()
     if path is None:

@@ -18,7 +18,7 @@ import time
 from pathlib import Path
 
 from hobble.core.files import read_json
-from hobble.core.processors import processor
+from hobble.core.processors import processor_name
 from hobble.models.load import load_network
 from hobble.report.captured_and_predicted import comparisons
 from hobble.report.gather import gather
@@ -93,7 +93,7 @@ def main() -> None:
     parser.add_argument("dataset", type=Path, help="results of its data set")
     parser.add_argument("--clips", type=int, default=10_000)
     arguments = parser.parse_args()
-    print(processor())
+    print(processor_name())
     few = len(list((arguments.dataset / "database/clips").glob("*.npz")))
     before = rendered(arguments.results, arguments.dataset, few)
     after = rendered(arguments.results, arguments.dataset, arguments.clips)

@@ -25,7 +25,7 @@ import numpy as np
 import yaml
 from numba import njit
 
-from hobble.core.processors import processor
+from hobble.core.processors import processor_name
 from hobble.core.quat import Array
 from hobble.core.skeleton import Skeleton, forward_kinematics
 from hobble.models.load import load_network
@@ -95,7 +95,7 @@ def read(values: Any) -> Any:
 def cpu() -> str:
     """The kind of processor, and which of its registers are used."""
     wide = PANELS_FOR_3_ROWS == PANELS_FOR_6_ROWS
-    return f"{processor()}, {'AVX-512' if wide else 'no AVX-512'}"
+    return f"{processor_name()}, {'AVX-512' if wide else 'no AVX-512'}"
 
 
 def predictions(network: Pfnn) -> None:

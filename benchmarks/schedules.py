@@ -18,7 +18,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 import hobble.training  # noqa: F401 - first, since it says how threads wait
-from hobble.core.processors import processor
+from hobble.core.processors import processor_name
 
 # isort: split
 import matplotlib
@@ -111,7 +111,7 @@ def main() -> None:
     parser.add_argument("--plot", type=Path)
     parser.add_argument("--threads", type=int, default=2)
     options = parser.parse_args()
-    print(processor())
+    print(processor_name())
     curves = [trained(name, options.database, options.threads) for name in options.configurations.split(",")]
     first = curves[0]
     for curve in curves[1:]:

@@ -22,7 +22,7 @@ import numpy as np
 from database import made_up
 
 from hobble.config.sections import Training
-from hobble.core.processors import processor
+from hobble.core.processors import processor_name
 from hobble.database.merge import merge_shards, write_database
 from hobble.database.reader import Database
 from hobble.database.shard import write_shard
@@ -107,7 +107,7 @@ def main() -> None:
     parser.add_argument("--rounds", type=int, default=5)
     parser.add_argument("--folder", type=Path)
     arguments = parser.parse_args()
-    print(processor())
+    print(processor_name())
     use_threads(int(os.environ.get("OMP_NUM_THREADS", "2")))
     folder = Path(tempfile.mkdtemp(prefix="hobble-shards-", dir=arguments.folder))
     try:

@@ -12,7 +12,7 @@ from pathlib import Path
 import yaml
 
 from hobble.core.bvh import write_bvh
-from hobble.core.processors import processor
+from hobble.core.processors import processor_name
 from hobble.core.skeleton import Skeleton
 from hobble.synthetic.generate_clip import generate_walk
 
@@ -20,7 +20,7 @@ ROOT = Path(__file__).resolve().parents[1]
 
 
 def main() -> None:
-    print(processor())
+    print(processor_name())
     data = yaml.safe_load((ROOT / "config/skeletons/holden31.yaml").read_text())
     skeleton = Skeleton.from_dict({"name": "holden31", **data})
     frames = 1000

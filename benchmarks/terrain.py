@@ -26,7 +26,7 @@ from scipy.ndimage import map_coordinates
 from hobble.config.sections import DatabaseOptions, LabelOptions, Synthetic, Terrain
 from hobble.core.clip import Clip
 from hobble.core.errors import HobbleError
-from hobble.core.processors import processor
+from hobble.core.processors import processor_name
 from hobble.labels.clip_labels import Labels as ClipLabels
 from hobble.labels.label import label_clip, mirror_labels
 from hobble.motion.make import make_clip
@@ -213,7 +213,7 @@ def main() -> None:
     parser.add_argument("--flat", type=float, default=0.48, help="share of them on flat ground")
     parser.add_argument("--workers", type=int, default=2)
     arguments = parser.parse_args()
-    print(processor())
+    print(processor_name())
     clips = synthetic()
     if arguments.folder:
         clips = [c for path in sorted(arguments.folder.glob("*.bvh")) for c in made(path, "rocky")]

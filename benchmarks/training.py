@@ -28,7 +28,7 @@ import hobble.training  # noqa: F401 - first, since it says how threads wait
 import torch
 from torch import Tensor
 
-from hobble.core.processors import multiplies_bfloat16, processor
+from hobble.core.processors import multiplies_bfloat16, processor_name
 from hobble.models.pfnn.fused import FusedPfnnStep
 from hobble.models.pfnn.step import PfnnStep
 from hobble.models.pfnn.trainable import coefficients, initialise
@@ -127,7 +127,7 @@ def main() -> None:
     parser.add_argument("--threads", type=int, default=2)
     parser.add_argument("--turns", type=int, default=7)
     options = parser.parse_args()
-    print(processor())
+    print(processor_name())
     use_threads(options.threads)
     torch.manual_seed(1)
     sizes = tuple(int(size) for size in options.sizes.split(","))

@@ -18,7 +18,7 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import hobble.training  # noqa: F401 - first, since it says how threads wait
-from hobble.core.processors import processor
+from hobble.core.processors import processor_name
 
 # isort: split
 import torch
@@ -78,7 +78,7 @@ def main() -> None:
     parser.add_argument("--device", default="cuda")
     parser.add_argument("--size-mb", type=int, default=300, help="of the database")
     options = parser.parse_args()
-    print(processor())
+    print(processor_name())
     device = torch.device(options.device)
     use_threads(2)
     network = PfnnOptions()

@@ -19,7 +19,7 @@ import sys
 import time
 
 import hobble.training  # noqa: F401 - first, since it says how threads wait
-from hobble.core.processors import processor
+from hobble.core.processors import processor_name
 
 # isort: split
 import torch
@@ -95,7 +95,7 @@ def main() -> None:
     parser.add_argument("--turns", type=int, default=3)
     parser.add_argument("--work", action="store_true", help="be one of the processes")
     options = parser.parse_args()
-    print(processor())
+    print(processor_name())
     sizes = tuple(int(size) for size in options.sizes.split(","))
     batches = [int(batch) for batch in options.batches.split(",")]
     if options.work:

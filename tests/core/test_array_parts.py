@@ -29,10 +29,10 @@ def test_rows_are_those_of_the_whole_array(path):
     assert parts.shape("x") == (50, 3, 2)
     for first, stop in ((0, 50), (7, 9), (49, 50), (20, 20), (48, 60)):
         for name in ("x", "frame"):
-            found = parts.rows(name, first, stop)
+            found = parts.read_rows(name, first, stop)
             assert found.dtype == whole[name].dtype
             np.testing.assert_array_equal(found, whole[name][first:stop])
-    assert str(parts.whole("name")) == "walk"
+    assert str(parts.read_whole("name")) == "walk"
     assert "x" in parts
     assert "y" not in parts
 
@@ -40,9 +40,9 @@ def test_rows_are_those_of_the_whole_array(path):
 def test_what_is_not_there_is_named(path, tmp_path):
     parts = ArrayParts(path)
     with pytest.raises(InputError, match=r"a\.npz: holds no array 'y'"):
-        parts.rows("y", 0, 1)
+        parts.read_rows("y", 0, 1)
     with pytest.raises(InputError, match="name has no rows"):
-        parts.rows("name", 0, 1)
+        parts.read_rows("name", 0, 1)
     with pytest.raises(InputError, match="no such file"):
         ArrayParts(tmp_path / "b.npz")
 
@@ -51,7 +51,7 @@ def test_a_file_that_became_shorter_is_refused(path):
     parts = ArrayParts(path)
     path.write_bytes(path.read_bytes()[:900])
     with pytest.raises(InputError, match="x does not fit into the file"):
-        parts.rows("x", 0, 50)
+        parts.read_rows("x", 0, 50)
     with pytest.raises(InputError, match="damaged or not an npz file"):
         ArrayParts(path)
 

@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
 from hobble.core import quat
-from hobble.core.ik import aim, two_bone_knee
+from hobble.core.ik import aim_bone, two_bone_knee
 
 FEW = settings(max_examples=60, deadline=None)
 points = arrays(float, 3, elements=st.floats(-60, 60, allow_subnormal=False))
@@ -63,7 +63,7 @@ def test_aim_points_the_bone_by_the_smallest_turn(direction, q):
     if np.linalg.norm(direction) < 1 or np.linalg.norm(q) < 0.1:
         return
     q, bone = quat.normalize(q), np.array([0.0, -40.0, 0.0])
-    aimed = aim(q, bone, direction)
+    aimed = aim_bone(q, bone, direction)
     unit = direction / np.linalg.norm(direction)
     np.testing.assert_allclose(quat.rotate(aimed, bone) / 40.0, unit, atol=1e-5)
     before = quat.rotate(q, bone) / 40.0

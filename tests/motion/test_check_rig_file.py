@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 
 from hobble.core.errors import InputError
-from hobble.motion.draft import draft, guess_roles
-from hobble.motion.file_motion import rig_of
+from hobble.motion.draft import draft_skeleton_file, guess_roles
+from hobble.motion.file_motion import rig_in_file
 from hobble.motion.read import read_bvh
 from hobble.motion.rig import load_skeleton
 
@@ -139,8 +139,8 @@ def test_a_joint_of_a_wrong_role_shows_in_the_motion(shared, root, tmp_path, par
     from hobble.motion.options import ClipMotion
 
     clip, folder = shared / "mocap/patients/SubjectA1_Cycle1.bvh", tmp_path / "skeletons"
-    rig = rig_of(read_bvh(clip))
-    text = draft(rig, guess_roles(rig))
+    rig = rig_in_file(read_bvh(clip))
+    text = draft_skeleton_file(rig, guess_roles(rig))
     for part, joint in parts.items():
         if joint is None:
             text = re.sub(rf"^  (left|right)_{part}: .*\n", "", text, flags=re.MULTILINE)

@@ -10,7 +10,7 @@ import pytest
 from hobble.core.errors import HobbleError
 from hobble.database.split_check import refuse_split_pairs
 from hobble.motion.axes import turned_about_vertical
-from hobble.motion.duplicates import digest, load_digests, same_pairs, save_digests
+from hobble.motion.duplicates import clip_digest, duplicate_pairs, load_digests, save_digests
 from hobble.motion.mirror import mirror_clip
 
 
@@ -29,7 +29,7 @@ def test_turned_shortened_and_mirrored_copies_are_found(walker, holden31):
         "longer": other,
         "lower": bent,
     }
-    pairs = same_pairs([digest(replace(one, name=name), name) for name, one in named.items()])
+    pairs = duplicate_pairs([clip_digest(replace(one, name=name), name) for name, one in named.items()])
     assert {pair[:2] for pair in pairs if pair[2] == "the same motion"} == {
         ("a", "b"),
         ("a", "c"),
@@ -47,12 +47,14 @@ def test_a_mirrored_file_of_the_original_release_is_found(shared, make):
     """Its mirror program exchanged the angles of the two sides, whose bones differ by some millimetres."""
     names = ("LocomotionFlat09_000", "LocomotionFlat09_000_mirror")
     clips = [make(shared / f"mocap/pfnn/{name}.bvh")[0] for name in names]
-    assert same_pairs([digest(clip, clip.name) for clip in clips]) == [(*names, "mirrors of each other")]
+    assert duplicate_pairs([clip_digest(clip, clip.name) for clip in clips]) == [
+        (*names, "mirrors of each other")
+    ]
 
 
 def test_the_data_for_comparing_clips_survives_its_file(walker, holden31, tmp_path):
     clip = walker(holden31, 120, 60.0)
-    found = [digest(replace(clip, name=name), name) for name in "ab"]
+    found = [clip_digest(replace(clip, name=name), name) for name in "ab"]
     found.append(replace(found[0], name="c", mirrored=None))
     save_digests(tmp_path / "some.npz", found)
     back = load_digests(tmp_path / "some.npz")
@@ -63,13 +65,13 @@ def test_the_data_for_comparing_clips_survives_its_file(walker, holden31, tmp_pa
         np.testing.assert_array_equal(one.poses, other.poses)
     np.testing.assert_array_equal(back[1].mirrored, found[1].mirrored)
     assert back[2].mirrored is None
-    assert same_pairs(back) == same_pairs(found)
+    assert duplicate_pairs(back) == duplicate_pairs(found)
 
 
 def test_files_with_one_digest_are_the_same_file(walker, holden31):
     clip = walker(holden31, 120, 60.0)
-    same = [digest(replace(clip, name=name), "aa") for name in "yx"]
-    assert same_pairs(same) == [("x", "y", "the same file")]
+    same = [clip_digest(replace(clip, name=name), "aa") for name in "yx"]
+    assert duplicate_pairs(same) == [("x", "y", "the same file")]
 
 
 def test_a_motion_in_both_splits_is_refused_with_both_names():
@@ -98,6 +100,6 @@ def test_no_two_patients_walks_are_equal_except_for_known_copies(root, shared):
             made = make_clip(
                 file, skeletons / "holden31.yaml", skeletons, file.stem, "holden31", ClipMotion()
             )
-            found.append(digest(made[0], made[1]["sha256"]))
+            found.append(clip_digest(made[0], made[1]["sha256"]))
     assert np.isfinite([one.poses for one in found]).all()
-    assert [pair for pair in same_pairs(found) if pair[2] != "the same file"] == []
+    assert [pair for pair in duplicate_pairs(found) if pair[2] != "the same file"] == []

@@ -253,7 +253,7 @@ def test_a_real_walk_keeps_knee_bend_lean_and_stride(shared, root, rigs, options
     bvh, keys = read_bvh(shared / "mocap/cmu/02_01.bvh"), ClipMotion(**options)
     source = load_source(bvh, target, root / "config/skeletons", keys)
     clip = resample(source.clip, 60.0)
-    made = retarget_clip(clip, plan(clip.skeleton, target.skeleton, source.match.sources))
+    made = retarget_clip(clip, plan(clip.skeleton, target.skeleton, source.match.followed_joints))
 
     def knee(of):
         p = {r: of.positions[:, of.skeleton.role(f"left_{r}")] for r in ("hip", "knee", "heel")}

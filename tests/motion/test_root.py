@@ -13,7 +13,7 @@ from hobble.core import quat
 from hobble.motion.root import (
     RootFrames,
     extend_root,
-    facing,
+    facing_directions,
     local_pose,
     points_to_root,
     root_frames,
@@ -75,7 +75,7 @@ def test_turning_left_is_positive(walk):
 def test_the_facing_direction_is_smoothed_by_the_documented_gaussian(walk):
     from scipy.ndimage import gaussian_filter1d
 
-    raw = facing(walk.skeleton, walk.positions, 0)
+    raw = facing_directions(walk.skeleton, walk.positions, 0)
     smooth = gaussian_filter1d(raw, 20, axis=0, mode="nearest")
     smooth /= np.linalg.norm(smooth, axis=1, keepdims=True)
     np.testing.assert_allclose(root_frames(walk, 20).direction, smooth, atol=1e-12)

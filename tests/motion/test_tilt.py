@@ -10,7 +10,7 @@ import pytest
 from hobble.core import quat
 from hobble.core.clip import Clip
 from hobble.core.errors import InputError
-from hobble.motion.balance import balance
+from hobble.motion.balance import find_balance
 from hobble.motion.tilt import world_tilt
 
 X, Z = np.eye(3)[0], np.eye(3)[2]
@@ -62,15 +62,15 @@ def test_a_tilt_to_the_side_shows_in_the_balance_alone(walk, degrees):
 
 
 def test_balance_turns_with_the_world_and_stays_on_a_slope(walk):
-    plain = balance(walk)
+    plain = find_balance(walk)
     assert abs(plain.aside) < 0.5
-    assert balance(turned(walk, Z, 6.0)).aside == pytest.approx(plain.aside - 6.0, abs=0.5)
-    assert balance(sloped(walk, 6.0)).up == pytest.approx(plain.up, abs=0.02)
+    assert find_balance(turned(walk, Z, 6.0)).aside == pytest.approx(plain.aside - 6.0, abs=0.5)
+    assert find_balance(sloped(walk, 6.0)).up == pytest.approx(plain.up, abs=0.02)
 
 
 def test_a_figure_that_does_not_step_shows_no_balance(walk):
     still = replace(walk, rotations=walk.rotations[:1].repeat(60, 0), root=walk.root[:1].repeat(60, 0))
-    assert balance(still) is None
+    assert find_balance(still) is None
 
 
 @pytest.mark.shared

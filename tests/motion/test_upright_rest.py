@@ -13,7 +13,7 @@ from hobble.core.bvh import write_bvh
 from hobble.core.clip import Clip
 from hobble.core.errors import InputError
 from hobble.core.skeleton import Skeleton, forward_kinematics, rest_positions
-from hobble.motion.decode import decode
+from hobble.motion.decode import decode_channels
 from hobble.motion.file_motion import load_source
 from hobble.motion.options import ClipMotion
 from hobble.motion.read import read_bvh
@@ -31,7 +31,7 @@ LIMBS = {"arm": ("shoulder", "elbow", "wrist"), "leg": ("hip", "knee", "heel")}
 def seen(path) -> dict[str, np.ndarray]:
     """Positions of the file's own joints at its own rate, computed without our reader."""
     file = read_bvh(path)
-    decoded = decode(file, 1e-3)
+    decoded = decode_channels(file, 1e-3)
     skeleton = Skeleton("seen", file.names, file.parents, decoded.offsets)
     _, places = forward_kinematics(skeleton, decoded.rotations, decoded.root, decoded.translations)
     return {name: places[:, j] for j, name in enumerate(file.names)}

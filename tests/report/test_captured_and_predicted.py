@@ -9,7 +9,7 @@ import pytest
 
 from hobble.core.skeleton import Skeleton
 from hobble.evaluation.captured import headings, root_path
-from hobble.figure.mesh import body
+from hobble.figure.mesh import body_mesh
 from hobble.models.network import Network
 from hobble.report.captured_and_predicted import in_world
 from hobble.report.scenes import UNIT
@@ -49,7 +49,7 @@ def test_captured_motion_is_recovered_from_the_page(
 
 
 def _drawn(made: np.ndarray, compared: dict[str, Any], skeleton: Skeleton) -> np.ndarray:
-    keep = body(skeleton).bones
+    keep = body_mesh(skeleton).bones
     assert len(keep) == compared["joints"]
     return made[:, keep]
 

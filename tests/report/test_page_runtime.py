@@ -11,7 +11,7 @@ import pytest
 
 from hobble.core import quat
 from hobble.core.skeleton import Skeleton
-from hobble.figure.mesh import body
+from hobble.figure.mesh import body_mesh
 from hobble.models.network import Network
 from hobble.report import opening_walk, straight_walk
 from hobble.runtime.animation import ProceduralAnimation
@@ -104,7 +104,7 @@ def test_the_page_moves_the_body_as_python_does(tab: Any, holden31: Skeleton) ->
     """Corners of the body for random rotations of the bones, equal to a tenth, because the page stores
     integers.
     """
-    mesh, rng = body(holden31), np.random.default_rng(3)
+    mesh, rng = body_mesh(holden31), np.random.default_rng(3)
     places = mesh.positions + rng.normal(0, 2, mesh.positions.shape)
     turns = quat.normalize(mesh.rotations + rng.normal(0, 0.2, mesh.rotations.shape))
     script = f"""(() => {{

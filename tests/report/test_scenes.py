@@ -10,7 +10,7 @@ import pytest
 from hobble.channels.injury.shown import spoken_links
 from hobble.core import quat
 from hobble.core.skeleton import Skeleton
-from hobble.figure.mesh import body
+from hobble.figure.mesh import body_mesh
 from hobble.figure.pack import TURN
 from hobble.report.scenes import UNIT, pack_positions, scenes
 
@@ -46,7 +46,7 @@ def test_every_scenario_is_thinned_to_thirty_hertz(play: dict[str, Any]) -> None
 
 def test_packed_rotations_give_the_bones_and_their_lengths(play: dict[str, Any], holden31: Skeleton) -> None:
     walk, count = play["scenarios"][0], play["joints"]
-    keep = body(holden31).bones.tolist()
+    keep = body_mesh(holden31).bones.tolist()
     pose = UNIT * unpacked(walk["pose"], "<i2").reshape(-1, count, 3)
     turn = unpacked(walk["turn"], "<i2").reshape(-1, count, 4) / TURN
     assert np.abs(np.linalg.norm(turn, axis=-1) - 1).max() < 1e-3

@@ -15,8 +15,8 @@ from hobble.channels.injury import shown as injury_shown
 from hobble.core import quat
 from hobble.core.errors import HobbleError
 from hobble.core.skeleton import Skeleton
-from hobble.figure.mesh import body
-from hobble.figure.pack import regions
+from hobble.figure.mesh import body_mesh
+from hobble.figure.pack import links_of_bones
 from hobble.models.load import load_network
 from hobble.models.network import Network
 from hobble.motion.read import read_bvh
@@ -28,7 +28,7 @@ UPRIGHT = np.tile(quat.IDENTITY, (19, 1))
 
 @pytest.fixture(scope="module")
 def studio(holden31: Skeleton) -> BodyRenderer:
-    return BodyRenderer(body(holden31), regions(holden31, holden31.link_names))
+    return BodyRenderer(body_mesh(holden31), links_of_bones(holden31, holden31.link_names))
 
 
 @pytest.fixture(scope="module")
@@ -36,7 +36,7 @@ def standing(holden31: Skeleton) -> np.ndarray:
     place = np.zeros((len(holden31.joints), 3))
     for j, p in enumerate(holden31.parents):
         place[j] = holden31.offsets[j] + (place[p] if p >= 0 else 0)
-    return place[body(holden31).bones] - [0, place[:, 1].min() - 2.7, 0]
+    return place[body_mesh(holden31).bones] - [0, place[:, 1].min() - 2.7, 0]
 
 
 def test_there_are_thirteen_walks_of_the_study_and_one_for_each_preset(network: Network) -> None:
@@ -75,7 +75,7 @@ def test_the_injured_part_is_coloured_if_requested(
     )
     rows, columns = np.nonzero((shown[..., 0] - shown[..., 2] > 50) & (plain[..., 0] - plain[..., 2] <= 20))
     assert len(rows) > 50
-    keep = body(holden31).bones.tolist()
+    keep = body_mesh(holden31).bones.tolist()
     x, y, _ = camera.project(standing).T
     knee, heel = (keep.index(holden31.joints.index(name)) for name in ("LeftLeg", "LeftFoot"))
     assert y[knee] - 10 < rows.min() <= rows.max() < y[heel] + 10

@@ -10,7 +10,7 @@ from hobble.core.files import read_json
 from hobble.database.merge import merge_shards, write_database
 from hobble.database.options import Merging
 from hobble.database.split_check import refuse_split_pairs
-from hobble.motion.duplicates import digest, load_digests, same_pairs
+from hobble.motion.duplicates import clip_digest, duplicate_pairs, load_digests
 from hobble.workflow.job import job
 
 with job(snakemake) as log:
@@ -19,10 +19,12 @@ with job(snakemake) as log:
     shards = [Path(folder) for folder in snakemake.input.get("shards", [])]
     # A digest holds what is compared of a clip: a few poses and the checksum of its file.
     clips_and_reports = zip(snakemake.input.compared, snakemake.input.reports, strict=True)
-    digests = [digest(load_clip(clip), read_json(report)["sha256"]) for clip, report in clips_and_reports]
+    digests = [clip_digest(load_clip(clip), read_json(report)["sha256"]) for clip, report in clips_and_reports]
     for shard in shards:
         digests += load_digests(shard / "likenesses.npz")
-    refuse_split_pairs(f"data set {snakemake.params.dataset}", same_pairs(digests), snakemake.params.splits)
+    refuse_split_pairs(
+        f"data set {snakemake.params.dataset}", duplicate_pairs(digests), snakemake.params.splits
+    )
     if shards:
         manifest = merge_shards(database, shards, joint_weight=options.joint_weight, dtype=options.dtype)
     else:

@@ -10,7 +10,7 @@ from hobble.core.clip import load_clip
 from hobble.core.files import read_json
 from hobble.database.options import Merging
 from hobble.database.shard import write_shard
-from hobble.motion.duplicates import digest, save_digests
+from hobble.motion.duplicates import clip_digest, save_digests
 from hobble.workflow.job import job
 
 with job(snakemake) as log:
@@ -29,6 +29,6 @@ with job(snakemake) as log:
         seed=options.seed,
     )
     clips_and_reports = zip(snakemake.input.compared, snakemake.input.reports, strict=True)
-    digests = [digest(load_clip(clip), read_json(report)["sha256"]) for clip, report in clips_and_reports]
+    digests = [clip_digest(load_clip(clip), read_json(report)["sha256"]) for clip, report in clips_and_reports]
     save_digests(shard / "likenesses.npz", digests)
     log.info("%d clips", len(clips))

@@ -9,9 +9,9 @@ from pathlib import Path
 
 from tqdm import tqdm
 
-from hobble.core.clip_files import find_clips, only_file
+from hobble.core.clip_files import find_clips, require_single_file
 from hobble.core.errors import HobbleError, InputError
-from hobble.motion.rig import TargetSkeleton, load_skeleton
+from hobble.motion.rig import KnownSkeleton, load_skeleton
 
 
 def add_folders(parser: argparse.ArgumentParser, out: str) -> None:
@@ -29,7 +29,7 @@ def clips_in(folder: Path) -> dict[str, Path]:
         return {folder.stem: folder}
     if not folder.is_dir():
         raise InputError(folder, "no such file or folder")
-    found = {name: only_file(name, files) for name, files in sorted(find_clips(folder).items())}
+    found = {name: require_single_file(name, files) for name, files in sorted(find_clips(folder).items())}
     if not found:
         raise InputError(folder, "no .bvh files here")
     return found
@@ -79,7 +79,7 @@ def skeleton_file(name: str) -> Path:
     return path
 
 
-def read_skeleton(name: str) -> TargetSkeleton:
+def read_skeleton(name: str) -> KnownSkeleton:
     """Read a skeleton, and which of its joints are which joints of other skeletons.
 
     name: a skeleton's name, or a path to a YAML file. Raises InputError if the file is missing or wrong.

@@ -57,12 +57,12 @@ class ArrayParts:
         """The shape of a whole array."""
         return self._place_of(name)[1]
 
-    def whole(self, name: str) -> np.ndarray:
+    def read_whole(self, name: str) -> np.ndarray:
         """A whole array. A scalar has no rows, so it can only be read with this method."""
         start, shape, dtype = self._place_of(name)
         return self._read(name, start, shape, dtype)
 
-    def rows(self, name: str, first: int, stop: int) -> np.ndarray:
+    def read_rows(self, name: str, first: int, stop: int) -> np.ndarray:
         """The rows `first:stop` of an array. As with a slice, rows that do not exist are left out."""
         start, shape, dtype = self._place_of(name)
         if not shape:

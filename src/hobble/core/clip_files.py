@@ -60,7 +60,7 @@ def find_clips(folder: Path) -> dict[str, list[Path]]:
     return found
 
 
-def only_file(clip: str, files: list[Path]) -> Path:
+def require_single_file(clip: str, files: list[Path]) -> Path:
     """The only file in `files`, the BVH files of a clip.
 
     Raises InputError if there is more than one, or if the file is a device or a pipe.

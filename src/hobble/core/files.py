@@ -64,7 +64,7 @@ def atomic_path(path: str | Path) -> Iterator[Path]:
         os.replace(temporary, path)
         sync_folder(path.parent)
     except OSError as error:
-        raise write_error(error, path) from error
+        raise failed_write_error(error, path) from error
     finally:
         with contextlib.suppress(OSError):
             temporary.unlink(missing_ok=True)
@@ -92,7 +92,7 @@ def _remove_leftovers(path: Path) -> None:
             continue  # not one of our files, or another user's process
 
 
-def write_error(error: OSError, path: Path) -> HobbleError:
+def failed_write_error(error: OSError, path: Path) -> HobbleError:
     """The error to raise for a failed write; its message says what the user can do."""
     reasons = {
         errno.ENOSPC: ("the disk is full", "Free some space and run the same command again."),

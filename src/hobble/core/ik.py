@@ -30,7 +30,7 @@ def two_bone_knee(hip: Array, target: Array, pole: Array, upper: float, lower: f
     return knee, hip + along * distance
 
 
-def aim(rotation: Array, bone: Array, direction: Array) -> Array:
+def aim_bone(rotation: Array, bone: Array, direction: Array) -> Array:
     """Turn a joint, by the smallest possible angle, so that its bone points in a given direction.
 
     rotation: (..., 4) of the joint in the world. bone: (..., 3) vector from the joint to the end of the bone,

@@ -52,7 +52,7 @@ def multiplies_bfloat16(cpuinfo: Path = CPUINFO, environment: Mapping[str, str] 
     return "avx512_bf16" in flags or "amx_bf16" in flags
 
 
-def processor(cpuinfo: Path = CPUINFO) -> str:
+def processor_name(cpuinfo: Path = CPUINFO) -> str:
     """The name of this machine's processor model, or "unknown"."""
     try:
         lines = cpuinfo.read_text(encoding="utf-8", errors="replace").splitlines()

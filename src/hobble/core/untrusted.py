@@ -17,8 +17,8 @@ MB = 1 << 20  # bytes
 MAX_TEXT_BYTES = 64 * MB  # enough for a label file of ten minutes at 100 Hz with 1 kB for each frame
 MAX_YAML_BYTES = 4 * MB  # enough for a data set of 20,000 clips with five keys each
 MAX_YAML_DEPTH = 100  # levels of lists and mappings within each other
-# At most this many values in a file, counted after each alias (`*name`) is replaced by what it stands for. So
-# many values take about 100 MB of memory.
+# At most this many values in a file, counted after each alias (`*name`) is replaced by what it stands for.
+# This number of values takes about 100 MB of memory.
 MAX_YAML_NODES = 1_000_000
 
 

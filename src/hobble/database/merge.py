@@ -20,7 +20,7 @@ from pathlib import Path
 import numpy as np
 
 from hobble.core.errors import HobbleError, InputError
-from hobble.core.files import save_npz, sync_folder, write_error
+from hobble.core.files import failed_write_error, save_npz, sync_folder
 from hobble.database.chunks import Chunk
 from hobble.database.learn_limits import make_limit_learners
 from hobble.database.manifest import FILE, SCALES, SPLITS, STATISTICS, Manifest, ShardCounts
@@ -94,7 +94,7 @@ def _work_folder(path: Path) -> Iterator[Path]:
     try:
         yield work
     except OSError as error:
-        raise write_error(error, path) from error
+        raise failed_write_error(error, path) from error
     finally:
         shutil.rmtree(work, ignore_errors=True)
 

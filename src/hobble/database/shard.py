@@ -17,7 +17,7 @@ import numpy as np
 
 from hobble.channels.speed_limits import LimitLearner
 from hobble.core.errors import InputError
-from hobble.core.files import load_npz, read_json, save_npz, write_error, write_json
+from hobble.core.files import failed_write_error, load_npz, read_json, save_npz, write_json
 from hobble.database.chunks import HINT, Chunk
 from hobble.database.learn_limits import add_rows, make_limit_learners
 from hobble.database.manifest import SPLITS
@@ -81,7 +81,7 @@ def write_shard(
         chunk_entries = {split: [asdict(chunk) for chunk in chunks[split]] for split in SPLITS}
         write_json(folder / INDEX, {"plan": plan.to_dict(), "chunks": chunk_entries})
     except OSError as error:
-        raise write_error(error, folder) from error
+        raise failed_write_error(error, folder) from error
 
 
 def add_moments(one: MomentsXY, other: MomentsXY) -> MomentsXY:

@@ -17,7 +17,7 @@ from hobble.core.files import atomic_path
 from hobble.core.quat import Array
 from hobble.core.skeleton import Skeleton, local_rotations
 from hobble.figure.bind import bind_pose
-from hobble.figure.mesh import NEEDED, Mesh, body
+from hobble.figure.mesh import NEEDED, Mesh, body_mesh
 from hobble.figure.pack import whole_weights
 
 METRES = 0.01  # metres per centimetre
@@ -94,7 +94,7 @@ def write_glb(path: str | Path, skeleton: Skeleton, motions: Iterable[BodyMotion
 
     In the bind pose, the body stands on the ground (height 0).
     """
-    mesh, buffer = body(skeleton), _Buffer()
+    mesh, buffer = body_mesh(skeleton), _Buffer()
     nodes = _nodes(skeleton, mesh)
     document: dict[str, object] = {
         "asset": {"version": "2.0", "generator": "Hobble"},

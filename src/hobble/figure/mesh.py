@@ -17,10 +17,10 @@ from hobble.core.compiled import njit
 from hobble.core.quat import Array
 from hobble.core.skeleton import Skeleton
 from hobble.figure.bind import SIDES, BindPose, bind_pose
-from hobble.figure.shape import body_scale, person
+from hobble.figure.shape import body_scale, solids_of_person
 from hobble.figure.skin import nearest_joints, skin_weights
 from hobble.figure.solids import Rod, Solid
-from hobble.figure.surface import LARGEST_DISTANCE, FineBox, distances, slopes, surface_mesh
+from hobble.figure.surface import LARGEST_DISTANCE, FineBox, distance_slopes, surface_distances, surface_mesh
 
 # For a body in the shape of a person, these lengths are multiplied by `body_scale`.
 CORNER_SPACING = 1.9  # cm between corners of the mesh on trunk and limbs
@@ -80,7 +80,7 @@ def _skinned(
     return out
 
 
-def body(skeleton: Skeleton) -> Mesh:
+def body_mesh(skeleton: Skeleton) -> Mesh:
     """The body of a skeleton: a person if the skeleton has the roles NEEDED, else a rod for every bone.
 
     The mesh depends only on the joints (with their parents and offsets) and the roles. Skeletons that agree
@@ -107,13 +107,13 @@ def _build_mesh(joints_and_roles: str) -> Mesh:
     is_person = all(skeleton.roles.get(role) in skeleton.joints for role in NEEDED)
     if is_person:
         pose = bind_pose(skeleton)
-        solids, scale, fine = list(person(pose)), body_scale(pose), _fine_boxes(pose)
+        solids, scale, fine = list(solids_of_person(pose)), body_scale(pose), _fine_boxes(pose)
         bone_of = pose.bone_of
     else:
         pose, solids, bone_of = _sticks(skeleton)
         scale, fine = 1.0, []
     corners, faces = surface_mesh(solids, CORNER_SPACING * scale, fine)
-    slope, _ = slopes(solids, corners)
+    slope, _ = distance_slopes(solids, corners)
     normals = slope / np.maximum(np.linalg.norm(slope, axis=1, keepdims=True), 1e-9)
     owner = nearest_joints(solids, corners, bone_of)
     blend_width = _blend_widths(owner, pose, scale) if is_person else 2.0
@@ -174,7 +174,9 @@ def _shade(solids: Sequence[Solid], corners: Array, normals: Array, scale: float
     for away, weight in OCCLUSION_SAMPLES:
         height = scale * away
         # If nothing else is near, the distance of the point from the body is its height above the corner.
-        free = np.clip(distances(solids, corners + height * normals), 0, min(height, LARGEST_DISTANCE))
+        free = np.clip(
+            surface_distances(solids, corners + height * normals), 0, min(height, LARGEST_DISTANCE)
+        )
         shade -= weight * (1 - free / height)
     return np.clip(shade, 0, 1)
 

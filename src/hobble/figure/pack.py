@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from hobble.core import quat
 from hobble.core.quat import Array
 from hobble.core.skeleton import Skeleton
-from hobble.figure.mesh import Mesh, body
+from hobble.figure.mesh import Mesh, body_mesh
 from hobble.models.packing import packed
 
 UNIT = 0.01  # cm; positions of corners are stored as multiples of this
@@ -30,7 +30,7 @@ def packed_body(skeleton: Skeleton) -> dict[str, Any]:
     `places`, `turns`: positions and rotations of these joints in the bind pose. `balls`: result of
     `part_spheres`.
     """
-    mesh = body(skeleton)
+    mesh = body_mesh(skeleton)
     index_type = np.uint16 if len(mesh.corners) < 1 << 16 else np.uint32
     return {
         "unit": UNIT,
@@ -77,14 +77,14 @@ def whole_weights(weights: Array) -> NDArray[np.uint8]:
     return whole.astype(np.uint8)
 
 
-def regions(skeleton: Skeleton, links: Sequence[str]) -> list[list[int]]:
+def links_of_bones(skeleton: Skeleton, links: Sequence[str]) -> list[list[int]]:
     """For each bone of the body, the indices of the `links` that move with it.
 
     links: names such as "LeftUpLeg-LeftLeg", upper joint first. A link belongs to the bone that moves its
     upper joint. But the body branches at the hips and the chest. A link that starts there belongs to the bone
     to which it leads, such as that of a thigh.
     """
-    bones = body(skeleton).bones.tolist()
+    bones = body_mesh(skeleton).bones.tolist()
     branching = {
         skeleton.role(role) for role in ("hips", "chest") if skeleton.roles.get(role) in skeleton.joints
     }

@@ -105,7 +105,7 @@ FOOT = (
 )
 
 
-def person(pose: BindPose) -> Iterator[Solid]:
+def solids_of_person(pose: BindPose) -> Iterator[Solid]:
     """The solids of a person, in the order in which they are added to the body or cut from it."""
     position_of = pose.position_of
     legs = [np.linalg.norm(position_of[f"{s}_heel"] - position_of[f"{s}_knee"]) for s in SIDES]
@@ -275,7 +275,7 @@ def _foot(position_of: dict[str, Array], side: str, sign: float, scale: float) -
     # Cut off what is below the sole.
     owner = ((-np.inf, f"{side}_heel"),)
     middle_of_sole = start + ahead * (0.6 * length)
-    yield Floor(1.0 * scale, owner, middle_of_sole, up, (length + 12.0) * scale, cut=True)
+    yield Floor(1.0 * scale, owner, middle_of_sole, up, (length + 12.0) * scale, is_subtracted=True)
 
 
 def _hand(position_of: dict[str, Array], side: str, sign: float, scale: float) -> Iterator[Solid]:
@@ -314,8 +314,14 @@ def _head(position_of: dict[str, Array], scale: float) -> Iterator[Solid]:
     """The solids of the head. Their places are (x, y, z) from the head joint, cm before scaling."""
     base, owner = position_of["head"], ((-np.inf, "head"),)
 
-    def ball(blend: float, centre: tuple, radii: tuple, cut: bool = False) -> Ball:
-        return Ball(scale * blend, owner, base + scale * np.array(centre), scale * np.array(radii), cut=cut)
+    def ball(blend: float, centre: tuple, radii: tuple, is_subtracted: bool = False) -> Ball:
+        return Ball(
+            scale * blend,
+            owner,
+            base + scale * np.array(centre),
+            scale * np.array(radii),
+            is_subtracted=is_subtracted,
+        )
 
     def rod(blend: float, a: tuple, b: tuple, thick: float, thin: float) -> Rod:
         return Rod(
@@ -331,7 +337,7 @@ def _head(position_of: dict[str, Array], scale: float) -> Iterator[Solid]:
         yield ball(4.0, (sign * 3.3, 3.6, 5.9), (1.9, 2.4, 1.8))  # cheek
         yield rod(3.0, (sign * 0.8, 8.9, 8.6), (sign * 4.2, 8.8, 7.2), 0.85, 0.7)  # brow
     for sign in (1.0, -1.0):
-        yield ball(2.6, (sign * 2.9, 6.6, 10.9), (2.1, 1.1, 2.0), cut=True)  # eye socket
+        yield ball(2.6, (sign * 2.9, 6.6, 10.9), (2.1, 1.1, 2.0), is_subtracted=True)  # eye socket
         yield ball(1.0, (sign * 7.0, 6.2, -0.2), (0.8, 2.7, 1.6))  # ear
     yield rod(1.8, (0, 8.0, 8.8), (0, 4.2, 10.9), 0.8, 1.1)  # nose
     yield ball(3.0, (0, 0.7, 7.4), (2.6, 1.9, 1.5))  # mouth

@@ -23,7 +23,7 @@ def nearest_joints(solids: Sequence[Solid], points: Array, bone_of: Mapping[str,
     nearest, owner = np.full(len(points), np.inf), np.zeros(len(points), np.int64)
     x, y, z = points.T
     for solid in solids:
-        if solid.cut:
+        if solid.is_subtracted:  # such a solid is cut from the body, so it has no part of the surface to move
             continue
         low, high = (corner.reshape(3, 1) for corner in solid.bounds())
         # Points more than 4 cm from the box around a solid are nearer to other solids.
@@ -49,7 +49,7 @@ def skin_weights(
     for each corner). They spread only along the surface, and so never from a thigh to a hand beside it.
     """
     joints = np.unique(owner)
-    # (V, number of joints), at the end the weights of all joints
+    # (V, number of joints): 1 for the owner of a corner, else 0. The loop below turns them into weights.
     shares = (owner[:, None] == joints).astype(float)
     edges = np.unique(
         np.sort(np.concatenate([faces[:, [0, 1]], faces[:, [1, 2]], faces[:, [2, 0]]]), axis=1), axis=0
@@ -71,6 +71,7 @@ def skin_weights(
     if weights.shape[1] < MOST_BONES:
         pad = MOST_BONES - weights.shape[1]
         weights, order = np.pad(weights, ((0, 0), (0, pad))), np.pad(order, ((0, 0), (0, pad)))
-    # Lower all weights by 0.01. Where another bone replaces the fourth, both then have weight 0.
+    # Lower all weights by 0.01. Along the surface, another bone may become the fourth largest. If the weights
+    # of both are at most 0.01 there, they become 0, and nothing jumps.
     weights = np.maximum(weights - 0.01, 0)
     return joints[order], weights / weights.sum(axis=1, keepdims=True)

@@ -21,12 +21,13 @@ class Solid:
     """A part of a body. Solids are added one after another; each is blended with the body so far.
 
     blend: how wide the zone is in which the solid blends with the body, cm. owners: the bones that move the
-    solid, in order along its length. cut: whether the solid is cut from the body instead of added to it.
+    solid, in order along its length. is_subtracted: whether the solid is cut from the body instead of added
+    to it.
     """
 
     blend: float
     owners: tuple[Owner, ...]
-    cut: bool = field(default=False, kw_only=True)
+    is_subtracted: bool = field(default=False, kw_only=True)
 
     def distance(self, x: Any, y: Any, z: Any) -> Array:
         """Signed distances of the points (x, y, z), cm. The three arrays broadcast."""

@@ -21,7 +21,7 @@ EDGES = [(a, b) for a in range(8) for b in range(a + 1, 8) if (CORNERS[a] != COR
 FineBox = tuple[Array, Array, float]
 
 
-def distances(solids: Sequence[Solid], points: Array) -> Array:
+def surface_distances(solids: Sequence[Solid], points: Array) -> Array:
     """(N,) signed distance of points (N, 3) from the surface of the blended solids, cm.
 
     It is negative inside and at most LARGEST_DISTANCE.
@@ -35,7 +35,7 @@ def distances(solids: Sequence[Solid], points: Array) -> Array:
         chosen = np.flatnonzero(near)
         if len(chosen):
             found = solid.distance(x[chosen], y[chosen], z[chosen])
-            combine = smooth_difference if solid.cut else smooth_union
+            combine = smooth_difference if solid.is_subtracted else smooth_union
             out[chosen] = combine(out[chosen], found, solid.blend)
     return out
 
@@ -78,7 +78,7 @@ def distance_grid(solids: Sequence[Solid], axes: Sequence[Array]) -> Array:
         grid = np.meshgrid(
             *(axis[part] for axis, part in zip(axes, parts, strict=True)), indexing="ij", sparse=True
         )
-        combine = smooth_difference if solid.cut else smooth_union
+        combine = smooth_difference if solid.is_subtracted else smooth_union
         out[parts] = combine(out[parts], solid.distance(*grid), solid.blend)
     return out
 
@@ -90,7 +90,7 @@ def surface_mesh(
 
     spacing: cm between points of the grid on which the surface is found. fine: boxes with a finer grid.
     """
-    added = [solid for solid in solids if not solid.cut]
+    added = [solid for solid in solids if not solid.is_subtracted]
     low = np.min([solid.bounds()[0] for solid in added], axis=0) - 3 * spacing
     high = np.max([solid.bounds()[1] for solid in added], axis=0) + 3 * spacing
     axes = [grid_lines(low[i], high[i], spacing, [(a[i], b[i], s) for a, b, s in fine]) for i in range(3)]
@@ -106,14 +106,14 @@ def vectors_from_surface(solids: Sequence[Solid], points: Array, longest: float)
 
     Vectors longer than `longest` cm are shortened to this length.
     """
-    slope, distance = slopes(solids, points)
+    slope, distance = distance_slopes(solids, points)
     squared_slope = (slope * slope).sum(axis=1)
     vectors = (distance / np.maximum(squared_slope, 0.25))[:, None] * slope
     length = np.linalg.norm(vectors, axis=1, keepdims=True)
     return vectors * np.minimum(1.0, longest / np.maximum(length, 1e-9))
 
 
-def slopes(solids: Sequence[Solid], points: Array, h: float = 0.06) -> tuple[Array, Array]:
+def distance_slopes(solids: Sequence[Solid], points: Array, h: float = 0.06) -> tuple[Array, Array]:
     """Slope (N, 3) of the distance from the surface at points (N, 3), and the distance (N,) itself.
 
     The slope points away from the surface. Both are estimated from the distances at the corners of a
@@ -121,7 +121,7 @@ def slopes(solids: Sequence[Solid], points: Array, h: float = 0.06) -> tuple[Arr
     """
     slope, away = np.zeros_like(points), np.zeros(len(points))
     for corner in np.array([[1.0, -1, -1], [-1, -1, 1], [-1, 1, -1], [1, 1, 1]]):
-        found = distances(solids, points + h * corner)
+        found = surface_distances(solids, points + h * corner)
         slope += found[:, None] * corner / (4 * h)
         away += found / 4
     return slope, away

@@ -11,7 +11,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from hobble.core import quat
-from hobble.core.curve_value import value_at
+from hobble.core.curve_value import interpolate_curve
 from hobble.core.quat import Array
 from hobble.core.smooth import gaussian, smooth_above
 from hobble.hurt.body_parts import SIDES
@@ -207,9 +207,9 @@ def _new_footprint(
         np.gradient(source.path[near], axis=0)[nearest - near.start] if len(source) > 1 else np.zeros(2)
     )
     step = effects.sided["step"][near] * (1 - JOGGING * source.jog[near])[:, None]
-    change = value_at(step[:, side] - step[:, 1 - side], when - near.start)
+    change = interpolate_curve(step[:, side] - step[:, 1 - side], when - near.start)
     # A step lasts half a cycle. Half of its change is made by this foot, the other half by the other foot.
     ahead = change / 2 * velocity * source.cycle[nearest] / 2
-    width = value_at(effects.sided["width"][near].max(axis=1), when - near.start) * source.leg / 2
+    width = interpolate_curve(effects.sided["width"][near].max(axis=1), when - near.start) * source.leg / 2
     outward = quat.rotate(source.heading[nearest], np.array([SIGN[side] * width, 0.0, 0.0]))
     return path.move_point(old, when) + np.array([ahead[0], 0.0, ahead[1]]) + outward

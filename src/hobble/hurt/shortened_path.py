@@ -6,7 +6,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from hobble.core.curve_value import value_at
+from hobble.core.curve_value import interpolate_curve
 from hobble.core.quat import Array
 from hobble.core.smooth import gaussian
 from hobble.hurt.effects import Effects
@@ -35,7 +35,7 @@ class ShortenedPath:
         near = slice(first, first + 2)  # two frames; to read all frames for each footprint would take long
         shift = self.new[near] - self.old[near]
         curves = shift[:, 0], self.new_ground[near] - self.old_ground[near], shift[:, 1]
-        return point + np.array([value_at(curve, when - first) for curve in curves])
+        return point + np.array([interpolate_curve(curve, when - first) for curve in curves])
 
 
 def shorten(

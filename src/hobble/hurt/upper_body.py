@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from hobble.core import quat
-from hobble.core.ik import aim
+from hobble.core.ik import aim_bone
 from hobble.core.quat import Array
 from hobble.core.skeleton import Skeleton
 from hobble.core.smooth import gaussian
@@ -174,7 +174,7 @@ def _hold_arm(source: HealthyClip, effects: Effects, world: Array, side: int) ->
             direction += (weights[name] / total)[:, None] * np.array([left, up, forward]) * mirror
         direction = quat.rotate(source.heading, direction)
         rest_bone = skeleton.offsets[end]
-        fully_held = aim(world[:, joint], np.broadcast_to(rest_bone, direction.shape), direction)
+        fully_held = aim_bone(world[:, joint], np.broadcast_to(rest_bone, direction.shape), direction)
         turn = quat.mul(quat.slerp(world[:, joint], fully_held, held), quat.inv(world[:, joint]))
         for j in range(len(skeleton.joints)):
             if joint in ancestors(skeleton, j):

@@ -25,7 +25,7 @@ import torch
 
 from hobble.core.errors import HobbleError
 from hobble.core.files import read_json, write_json
-from hobble.core.processors import processor
+from hobble.core.processors import processor_name
 
 # Environment variables that limit which processor instructions the libraries use. They change speed and
 # rounding.
@@ -94,7 +94,7 @@ def fastest_way(ways: Mapping[str, Callable[[], object]], clock: Callable[[], fl
 def machine() -> dict[str, str]:
     """What a choice depends on: the processor, the version of PyTorch, and those of SETTINGS that are set."""
     settings = {name: os.environ[name] for name in SETTINGS if name in os.environ}
-    return {"processor": processor(), "torch": str(torch.__version__), **settings}
+    return {"processor": processor_name(), "torch": str(torch.__version__), **settings}
 
 
 def choices_file() -> Path:

@@ -9,8 +9,8 @@ from pathlib import Path
 from hobble.core.errors import HobbleError
 from hobble.core.files import write_text
 from hobble.motion.doubt import Doubt
-from hobble.motion.draft import draft, guess_roles
-from hobble.motion.file_motion import raw_clip, rig_of
+from hobble.motion.draft import draft_skeleton_file, guess_roles
+from hobble.motion.file_motion import raw_clip, rig_in_file
 from hobble.motion.find_body import find_body
 from hobble.motion.look import format_table, summarise_clips
 from hobble.motion.options import ClipMotion
@@ -23,14 +23,14 @@ SKELETONS = Path("config/skeletons")  # the folder of the skeleton files
 def skeleton_draft(file: Path) -> str:
     """A draft of a skeleton file for the rig of a BVH file, with `?` for roles whose joint is not known."""
     bvh = read_bvh(file)
-    skeleton = rig_of(bvh)
+    skeleton = rig_in_file(bvh)
     try:
         body = find_body(skeleton.joints, skeleton.parents, raw_clip(bvh).positions).body
         roles = body.roles(skeleton.joints)
     except Doubt as doubt:
         print(f"{file}: {doubt}. The roles are guessed from the names of the joints.", file=sys.stderr)
         roles = guess_roles(skeleton)
-    return draft(skeleton, roles)
+    return draft_skeleton_file(skeleton, roles)
 
 
 def main() -> int:

@@ -5,8 +5,9 @@ arms and the neck. The rotation of this joint is taken to be that of the limbs, 
 may point in another direction. So a second joint is added at the same place, which follows the bone. The
 spine of the target, the skeleton to which the clip will be retargeted, can then follow the second joint.
 
-In this module, the frame of a joint is not a moment of the clip. It is a rotation (4,), the same at all
-times: from the axes of a figure that stands facing +Z with its arms out sideways, to the joint's own axes.
+In this module, the frame of a joint is a rotation (4,) that is the same at all times, not a moment of the
+clip. It converts vectors from the axes of a figure that stands facing +Z with its arms out sideways to the
+joint's own axes.
 """
 
 from __future__ import annotations

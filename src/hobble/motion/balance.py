@@ -18,7 +18,7 @@ from hobble.core.quat import Array
 from hobble.core.smooth import gaussian
 from hobble.motion.body import SIDES
 from hobble.motion.rig import leg_length
-from hobble.motion.root import facing
+from hobble.motion.root import facing_directions
 
 GRAVITY = 981.0  # cm / s2
 # TRUNK, HEAD: shares of the body's mass (de Leva 1996). TRUNK_CENTRE: where the trunk's centre of mass is,
@@ -88,14 +88,14 @@ class _BodyMotion(NamedTuple):
     push: Array
 
 
-def balance(clip: Clip) -> Balance | None:
+def find_balance(clip: Clip) -> Balance | None:
     """The direction against gravity, or None if the body does not stand long enough on each foot alone."""
     fps, leg = clip.fps, leg_length(clip.skeleton)
     reach = max(1, round(fps / 20))  # frames: speeds of feet are measured over 50 ms before and after
     if len(clip) < 4 * reach + 3:  # no frame would be left without its ends, where speeds are not reliable
         return None
     at = {role: clip.positions[:, clip.skeleton.role(role)] for role in clip.skeleton.roles}
-    ahead, centre = facing(clip.skeleton, clip.positions, fps / 3), centre_of_mass(at)
+    ahead, centre = facing_directions(clip.skeleton, clip.positions, fps / 3), centre_of_mass(at)
     velocity = np.gradient(gaussian(at["hips"], 0.1 * fps), axis=0) * fps
     acceleration = np.gradient(np.gradient(gaussian(centre, SMOOTH * fps), axis=0), axis=0) * fps * fps
     forward_speed = np.sum(velocity * ahead, axis=-1) / np.sqrt(GRAVITY * leg)

@@ -10,7 +10,7 @@ import numpy as np
 from hobble.core.quat import Array
 from hobble.core.skeleton import Skeleton
 from hobble.motion.fingers import pointing_fingers
-from hobble.motion.tree import common, path
+from hobble.motion.tree import lowest_common_ancestor, path_between
 
 SIDES = ("left", "right")
 TRUNK = ("hips", "spine", "chest", "neck", "head")  # roles of the joints from the hips to the head
@@ -105,13 +105,19 @@ def body_of(parents: Sequence[int], roles: Mapping[str, int]) -> Body:
     """
     hips = roles["hips"]
     shoulders = [roles[f"{side}_shoulder"] for side in SIDES]
-    chest = roles.get("chest", common(parents, shoulders))
-    trunk = [j for j in path(parents, hips, chest) if j != hips]
-    neck = [j for j in path(parents, chest, roles["head"]) if j not in (chest, roles["head"], hips, *trunk)]
+    chest = roles.get("chest", lowest_common_ancestor(parents, shoulders))
+    trunk = [j for j in path_between(parents, hips, chest) if j != hips]
+    neck = [
+        j
+        for j in path_between(parents, chest, roles["head"])
+        if j not in (chest, roles["head"], hips, *trunk)
+    ]
     arms: dict[str, tuple[int | None, int, int, int]] = {}
     legs: dict[str, tuple[int, int, int, int | None]] = {}
     for side, shoulder in zip(SIDES, shoulders, strict=True):
-        between = [j for j in path(parents, chest, shoulder) if j not in (chest, shoulder, *trunk, *neck)]
+        between = [
+            j for j in path_between(parents, chest, shoulder) if j not in (chest, shoulder, *trunk, *neck)
+        ]
         clavicle = between[-1] if between else None
         arms[side] = (clavicle, shoulder, roles[f"{side}_elbow"], roles[f"{side}_wrist"])
         hip, knee, heel = (roles[f"{side}_{part}"] for part in ("hip", "knee", "heel"))

@@ -12,9 +12,9 @@ from numpy.typing import NDArray
 from hobble.core import quat
 from hobble.core.quat import Array
 from hobble.motion.body import Body
-from hobble.motion.orient import pointed_along, robust_mean, unit
+from hobble.motion.orient import robust_mean, rotation_pointing_along, unit_vectors
 from hobble.motion.spine import SHORT
-from hobble.motion.target_build import TargetBuild
+from hobble.motion.target_build import TargetProportions
 
 LEFT = np.array([1.0, 0.0, 0.0])  # the left of a figure that faces +Z
 # A knee or elbow shows the axis about which it bends if the mean sine of its bend is larger than this.
@@ -24,16 +24,16 @@ FLEXED = 0.05
 class BodySample:
     """S moments of a clip, chosen to show how the axes of a rig's joints are turned relative to its body.
 
-    In this class, the frame of a joint is not a moment of the clip. It is a rotation (4,), the same at all
-    times: from the axes of a figure that stands facing +Z with its arms out sideways, to the joint's own
-    axes. The joint's rotation in the world, multiplied by its frame, is the rotation of the body part from
-    this stance.
+    In this class, the frame of a joint is a rotation (4,) that is the same at all times, not a moment of the
+    clip. It converts vectors from the axes of a figure that stands facing +Z with its arms out sideways to
+    the joint's own axes. The joint's rotation in the world, multiplied by its frame, is the rotation of the
+    body part from this stance.
 
-    body: which joint is which part. positions: (S, J, 3) cm, in the field `at`. rotations: (S, J, 4) in the
-    world, in the field `turned`. speeds: (S, J) cm a second. rest: (J, 3) positions in the zero pose, in
-    which all rotations are 0. ends: side -> (3,) offset from the ankle to the end site of its bone, or None
-    if it has none. target: the build of the skeleton to which the clip will be retargeted. seconds: length of
-    the clip.
+    body: which joint is which part. positions: (S, J, 3) cm. rotations: (S, J, 4) in the world. speeds:
+    (S, J) cm a second. zero_positions: (J, 3) in the zero pose, in which all rotations are 0.
+    ankle_end_sites: side -> (3,) offset from the ankle to the end site of its bone, or None if it has none.
+    target_proportions: those of the skeleton to which the clip will be retargeted. seconds: length of the
+    clip.
 
     Other fields: hips_left, (S, 3) unit vectors from the right hip to the left hip; chest_left, the same for
     the shoulders.
@@ -45,57 +45,62 @@ class BodySample:
         positions: Array,
         rotations: Array,
         speeds: Array,
-        rest: Array,
-        ends: Mapping[str, tuple[float, float, float] | None],
-        target: TargetBuild,
+        zero_positions: Array,
+        ankle_end_sites: Mapping[str, tuple[float, float, float] | None],
+        target_proportions: TargetProportions,
         seconds: float,
     ) -> None:
-        self.body, self.at, self.turned, self.speeds = body, positions, rotations, speeds
-        self.rest, self.ends, self.target, self.seconds = rest, ends, target, seconds
-        self.hips_left = self.line(body.legs["right"][0], body.legs["left"][0])
-        self.chest_left = self.line(body.arms["right"][1], body.arms["left"][1])
+        self.body, self.positions, self.rotations, self.speeds = body, positions, rotations, speeds
+        self.zero_positions, self.ankle_end_sites = zero_positions, ankle_end_sites
+        self.target_proportions, self.seconds = target_proportions, seconds
+        self.hips_left = self.directions(body.legs["right"][0], body.legs["left"][0])
+        self.chest_left = self.directions(body.arms["right"][1], body.arms["left"][1])
 
-    def part(self, moments: NDArray[np.bool_]) -> BodySample:
+    def at_moments(self, moments: NDArray[np.bool_]) -> BodySample:
         """The sample with only some of its moments. moments: (S,), True for each moment to keep."""
         out = copy(self)
-        out.at, out.turned, out.speeds = self.at[moments], self.turned[moments], self.speeds[moments]
+        out.positions, out.rotations = self.positions[moments], self.rotations[moments]
+        out.speeds = self.speeds[moments]
         out.hips_left, out.chest_left = self.hips_left[moments], self.chest_left[moments]
         return out
 
     def in_zero_pose(self) -> BodySample:
-        """The zero pose as a sample of one moment. `speeds` keeps those of the first moment of the clip."""
-        out = self.part(np.arange(len(self.at)) == 0)
-        out.at, out.turned = self.rest[None], np.broadcast_to(quat.IDENTITY, out.turned.shape)
+        """The zero pose as a sample of one moment. Its `speeds` are those of this sample's first moment."""
+        out = self.at_moments(np.arange(len(self.positions)) == 0)
+        out.positions = self.zero_positions[None]
+        out.rotations = np.broadcast_to(quat.IDENTITY, out.rotations.shape)
         body = self.body
-        out.hips_left = out.line(body.legs["right"][0], body.legs["left"][0])
-        out.chest_left = out.line(body.arms["right"][1], body.arms["left"][1])
+        out.hips_left = out.directions(body.legs["right"][0], body.legs["left"][0])
+        out.chest_left = out.directions(body.arms["right"][1], body.arms["left"][1])
         return out
 
-    def line(self, start: int, end: int) -> Array:
+    def directions(self, start: int, end: int) -> Array:
         """(S, 3) unit vectors from the joint `start` to the joint `end`."""
-        return unit(self.at[:, end] - self.at[:, start])
+        return unit_vectors(self.positions[:, end] - self.positions[:, start])
 
-    def local(self, joint: int, vectors: Array) -> Array:
+    def mean_in_joint_axes(self, joint: int, vectors: Array) -> Array:
         """(3,) mean of `vectors` without outliers, along the joint's own axes.
 
         vectors: (S, 3) along the axes of the world.
         """
-        along_own_axes = quat.rotate(quat.inv(self.turned[:, joint]), vectors)
+        along_own_axes = quat.rotate(quat.inv(self.rotations[:, joint]), vectors)
         return robust_mean(along_own_axes)
 
     def bone(self, start: int, end: int) -> Array:
         """(3,) mean vector from the joint `start` to the joint `end`, along the own axes of `start`."""
-        return self.local(start, self.at[:, end] - self.at[:, start])
+        return self.mean_in_joint_axes(start, self.positions[:, end] - self.positions[:, start])
 
     def length(self, *joints: int) -> float:
         """Length of a chain of joints, cm: the sum of the distances from each joint to the next.
 
         Each distance is the median over the sample.
         """
-        vectors = (self.at[:, b] - self.at[:, a] for a, b in pairwise(joints))
+        vectors = (self.positions[:, b] - self.positions[:, a] for a, b in pairwise(joints))
         return sum(float(np.median(np.linalg.norm(vector, axis=-1))) for vector in vectors)
 
-    def first_long(self, joint: int, following: Sequence[int], least: float = SHORT) -> tuple[Array, int]:
+    def first_long_bone(
+        self, joint: int, following: Sequence[int], least: float = SHORT
+    ) -> tuple[Array, int]:
         """Find the first joint of `following` that is over `least` cm away from `joint`, or else its last.
 
         Returns the (3,) `bone` from `joint` to the joint found, and the joint found.
@@ -103,27 +108,27 @@ class BodySample:
         bones = [(self.bone(joint, end), end) for end in following]
         return next((found for found in bones if np.linalg.norm(found[0]) > least), bones[-1])
 
-    def hinge(self, start: int, middle: int, end: int, otherwise: Array) -> Array:
+    def hinge_axes(self, start: int, middle: int, end: int, otherwise: Array) -> Array:
         """(S, 3) axis about which a limb of three joints bends, along the axes of the world.
 
         The axis turns with the joint `start`. For a leg it points to the body's left. otherwise: (S, 3), is
         returned if the limb hardly bends.
         """
-        axis = np.cross(self.line(start, middle), self.line(middle, end))
-        mean_axis = self.local(start, axis)
+        axis = np.cross(self.directions(start, middle), self.directions(middle, end))
+        mean_axis = self.mean_in_joint_axes(start, axis)
         if np.linalg.norm(mean_axis) < FLEXED:
             return otherwise
-        return quat.rotate(self.turned[:, start], np.broadcast_to(unit(mean_axis), axis.shape))
+        return quat.rotate(self.rotations[:, start], np.broadcast_to(unit_vectors(mean_axis), axis.shape))
 
-    def hand(self, side: str, straight: Array, sign: float) -> Array:
-        """(4,) the frame of a hand, which points to the base of its finger (`Body.fingers`).
+    def hand_frame(self, side: str, straight: Array, sign: float) -> Array:
+        """(4,) the frame of a hand, which points to the base of one finger (the joint in `Body.fingers`).
 
         straight: (4,) the frame of a hand that is in line with its forearm. It is turned to the finger, or
-        returned unchanged for a hand without a finger. sign: 1 for the left hand, whose arm points to +X in
-        the stance, and -1 for the right hand.
+        returned unchanged if `Body.fingers` has no joint for this hand. sign: 1 for the left hand, whose arm
+        points to +X in the stance, and -1 for the right hand.
         """
         if side not in self.body.fingers:
             return straight
-        return pointed_along(
+        return rotation_pointing_along(
             straight, sign * LEFT, self.bone(self.body.arms[side][3], self.body.fingers[side])
         )

@@ -46,7 +46,7 @@ KNEE_BACKWARD = -0.3  # a knee bends backward if the same cosine is less than th
 BENT = 20.0  # degrees: a knee that bends less does not show where it points
 
 
-def compare(source: Clip, result: Clip, scale: float) -> dict[str, Any]:
+def compare_motions(source: Clip, result: Clip, scale: float) -> dict[str, Any]:
     """How much the result of retargeting differs from its source, frame by frame.
 
     scale: leg length of the result / leg length of the source.
@@ -82,11 +82,11 @@ def compare(source: Clip, result: Clip, scale: float) -> dict[str, Any]:
     }
 
 
-def check(path: Path, differences: dict[str, Any], rig: str) -> None:
+def check_difference(path: Path, differences: dict[str, Any], rig: str) -> None:
     """Raise InputError if a result does not move like its source.
 
-    The error names the joint or limb that differs most. path: the source's file. differences: what `compare`
-    returns. rig: name of the source's rig.
+    The error names the joint or limb that differs most. path: the source's file. differences: what
+    `compare_motions` returns. rig: name of the source's rig.
     """
     name, degrees = most_different(differences)
     fix = (
@@ -120,7 +120,7 @@ def check_knees(path: Path, clip: Clip, leave: bool) -> None:
 def most_different(differences: dict[str, Any]) -> tuple[str, float]:
     """The joint or limb that differs most, and by how many degrees on average.
 
-    differences: what `compare` returns.
+    differences: what `compare_motions` returns.
     """
     apart = {name: each["apart"] for name, each in differences["angles"].items()} | differences["directions"]
     name = max(apart, key=lambda part: apart[part])
@@ -135,7 +135,10 @@ def _positions_by_role(clip: Clip, frames: int) -> dict[str, Array]:
 def _compare_angle(
     source_at: dict[str, Array], result_at: dict[str, Array], side: str, name: str
 ) -> dict[str, Any]:
-    """What `compare` returns in `angles` for one joint. source_at, result_at: role -> (F, 3) positions."""
+    """What `compare_motions` returns in `angles` for one joint.
+
+    source_at, result_at: role -> (F, 3) positions.
+    """
     source, result = (_bend(at, side, ANGLES[name]) for at in (source_at, result_at))
     difference = result - source
     constant = float(np.median(difference)) if name in SHAPE_DEPENDENT else 0.0
@@ -170,7 +173,7 @@ def _compare_direction(
 def _compare_foot(
     source_at: dict[str, Array], result_at: dict[str, Array], side: str, scale: float, fps: float
 ) -> dict[str, float | None]:
-    """What `compare` returns in `feet` for one side."""
+    """What `compare_motions` returns in `feet` for one side."""
     source, result = source_at[f"{side}_toe"] * scale, result_at[f"{side}_toe"]
     speeds = [np.linalg.norm(np.diff(at[:, [0, 2]], axis=0), axis=-1) for at in (source, result)]
     stance = np.linalg.norm(np.diff(source, axis=0), axis=-1) * fps / 60.0 < STANCE_SPEED

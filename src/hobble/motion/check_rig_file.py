@@ -19,7 +19,7 @@ from hobble.core.errors import InputError
 from hobble.core.untrusted import printable
 from hobble.motion.body import SIDES, TRUNK
 from hobble.motion.names import side_of
-from hobble.motion.tree import above, common, path
+from hobble.motion.tree import lowest_common_ancestor, path_between, path_to_root
 
 FARTHEST = 1e5  # cm: each component of a joint's offset from its parent is at most this large
 # The roles of one arm and one leg, from the trunk outward.
@@ -153,10 +153,10 @@ def _check_order(file: RigFile, roles: Mapping[str, str], parents: Mapping[str, 
     for chain in (*LIMBS, TRUNK[1:]):
         for first, second in pairwise(role for role in chain if role in roles):
             higher, lower = roles[first], roles[second]
-            if higher not in (names[j] for j in above(tree, names.index(lower))):
+            if higher not in (names[j] for j in path_to_root(tree, names.index(lower))):
                 problem = f"{second} is {lower}, which does not hang from {higher}, the {first}"
                 file.refuse(problem, "roles", second, ORDER)
-    above_hips = {names[j] for j in above(tree, names.index(roles["hips"]))[1:]}
+    above_hips = {names[j] for j in path_to_root(tree, names.index(roles["hips"]))[1:]}
     for role, joint in roles.items():
         if joint in above_hips:
             problem = f"hips is {roles['hips']}, which hangs from {joint}, the {role}"
@@ -169,14 +169,14 @@ def _check_hubs(file: RigFile, roles: Mapping[str, str], parents: Mapping[str, i
 
     def hub(part: str) -> int:
         # The joint from which the left and the right joint of this role both hang.
-        return common(tree, [names.index(roles[f"{side}_{part}"]) for side in SIDES])
+        return lowest_common_ancestor(tree, [names.index(roles[f"{side}_{part}"]) for side in SIDES])
 
     arms_hub, legs_hub = hub("shoulder"), hub("hip")
     chest_and_neck = [names.index(roles[role]) for role in ("chest", "neck") if role in roles]
     if "chest" in roles and arms_hub not in chest_and_neck:
         file.refuse(f"chest is {roles['chest']}, but the arms hang from {names[arms_hub]}", "roles", "chest")
     offsets = {name: np.array(joint["offset"], float) for name, joint in file.data["joints"].items()}
-    from_hips = path(tree, names.index(roles["hips"]), legs_hub)
+    from_hips = path_between(tree, names.index(roles["hips"]), legs_hub)
     # A bone's length is the offset of its lower joint, which may be either end, because the path may go up.
     lower = [a if tree[a] == b else b for a, b in pairwise(from_hips)]
     distance = sum(float(np.linalg.norm(offsets[names[j]])) for j in lower)

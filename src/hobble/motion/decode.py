@@ -80,7 +80,7 @@ def check_angles(bvh: Bvh) -> None:
         )
 
 
-def decode(bvh: Bvh, still: float) -> Decoded:
+def decode_channels(bvh: Bvh, still: float) -> Decoded:
     """Rotations and positions of a BVH file.
 
     A position channel replaces its component of the joint's OFFSET, as all current programs intend. If the
@@ -131,7 +131,7 @@ def _notes_on_wraps(bvh: Bvh, starts: Array) -> list[str]:
 def _decode_positions(bvh: Bvh, starts: Array, still: float) -> tuple[Array, Array, Array | None, list[str]]:
     """The fields `root`, `offsets`, `translations` and `repairs` of `Decoded`.
 
-    starts: the first column of each joint's channels. still: as in `decode`.
+    starts: the first column of each joint's channels. still: as in `decode_channels`.
     """
     root = np.broadcast_to(bvh.offsets[0], (len(bvh), 3)).copy()
     below_root = []
@@ -160,7 +160,7 @@ def _judge_channels(
 
     Returns the fields `offsets`, `translations` and `repairs` of `Decoded`. local: (F, J, 3) positions
     relative to the parents; where channels must be added to the OFFSETs, this array is changed. has_channel:
-    (J, 3) bool, which components of the positions come from channels. still: as in `decode`.
+    (J, 3) bool, which components of the positions come from channels. still: as in `decode_channels`.
     """
     joints = np.flatnonzero(has_channel.any(axis=1)).tolist()
     median = np.median(local, axis=0)

@@ -52,23 +52,23 @@ class Repaired:
 
 @dataclass(frozen=True)
 class Jump:
-    """A jump between frame `after` and the next.
+    """A jump between the frame `frame_before` (from 0) and the next.
 
     size: by how many cm the step of the worst joint differs from its neighbouring steps. joint: name of
     this joint. root_size: by how many cm the root's step differs.
     """
 
-    after: int
+    frame_before: int
     size: float
     joint: str
     root_size: float = field(default=0.0)
 
     def __str__(self) -> str:
-        between = f"between frames {self.after + 1} and {self.after + 2}"
+        between = f"between frames {self.frame_before + 1} and {self.frame_before + 2}"
         return f"{self.joint} jumps by {self.size:.0f} cm {between}"
 
 
-def repair(clip: Clip) -> Repaired:
+def repair_defects(clip: Clip) -> Repaired:
     """Find broken frames and repair them if possible. A sound clip is returned unchanged."""
     glitches = _find_glitches(clip)
     without_glitches = _copy(clip) if glitches else clip
@@ -84,7 +84,11 @@ def repair(clip: Clip) -> Repaired:
         return Repaired(without_glitches, 0, sentences)
     first, last = _cut_short_ends(len(clip), clip.fps, unpaired)
     # Teleports divide the clip. Only the longest part remains.
-    teleports = [jump.after for jump in unpaired if jump.root_size > TELEPORT and first <= jump.after < last]
+    teleports = [
+        jump.frame_before
+        for jump in unpaired
+        if jump.root_size > TELEPORT and first <= jump.frame_before < last
+    ]
     ends = [first - 1, *teleports, last]
     first, last = max(((a + 1, b) for a, b in pairwise(ends)), key=lambda part: part[1] - part[0])
     mended = _copy(without_glitches)
@@ -93,8 +97,8 @@ def repair(clip: Clip) -> Repaired:
         if first <= start <= end <= last:
             sentences.append(f"{jump}; {_number_frames(start, end)} were bridged by interpolation.")
     for jump in unpaired:
-        if first <= jump.after < last:
-            _smooth(mended, jump.after)
+        if first <= jump.frame_before < last:
+            _smooth(mended, jump.frame_before)
             sentences.append(f"{jump}; the motion was smoothed over {BLEND:g} s on each side.")
     if first > 0:
         sentences.append(_cut_sentence(clip, 0, first - 1, unpaired, first - 1))
@@ -184,10 +188,18 @@ def _cut_short_ends(frames: int, fps: float, jumps: list[Jump]) -> tuple[int, in
     the clip's frames.
     """
     first, last = 0, frames - 1
-    head = [j.after for j in jumps if j.after + 1 <= HEAD * fps and 2 * (j.after + 1) <= frames]
+    head = [
+        j.frame_before
+        for j in jumps
+        if j.frame_before + 1 <= HEAD * fps and 2 * (j.frame_before + 1) <= frames
+    ]
     if head:
         first = head[-1] + 1
-    tail = [j.after for j in jumps if last - j.after <= TAIL * fps and j.after - first > frames // 2]
+    tail = [
+        j.frame_before
+        for j in jumps
+        if last - j.frame_before <= TAIL * fps and j.frame_before - first > frames // 2
+    ]
     return first, tail[0] if tail else last
 
 
@@ -198,7 +210,7 @@ def _number_frames(start: int, end: int) -> str:
 
 def _cut_sentence(clip: Clip, start: int, end: int, jumps: list[Jump], after: int) -> str:
     """Says in words that the frames `start` to `end` were cut off, at the jump that follows frame `after`."""
-    jump = next(j for j in jumps if j.after == after)
+    jump = next(j for j in jumps if j.frame_before == after)
     unrotated = np.abs(quat.positive(clip.rotations[start : end + 1]) - quat.IDENTITY).max(axis=-1) < 1e-6
     what = " (no pose)" if unrotated.mean() > NO_POSE else ""
     return f"{_number_frames(start, end).capitalize()}{what} cut off: {jump}."
@@ -216,8 +228,8 @@ def _pair_jumps(clip: Clip, jumps: list[Jump]) -> tuple[list[Jump], list[tuple[i
     usual = float(np.median(step)) if len(step) else 0.0
     i = 0
     while i < len(jumps):
-        before = jumps[i].after
-        last_broken = jumps[i + 1].after if i + 1 < len(jumps) else len(clip)
+        before = jumps[i].frame_before
+        last_broken = jumps[i + 1].frame_before if i + 1 < len(jumps) else len(clip)
         after = last_broken + 1
         if last_broken - before <= BRIDGE * clip.fps and after < len(clip):
             apart = np.linalg.norm(clip.positions[after] - clip.positions[before], axis=-1).max()

@@ -18,7 +18,7 @@ from pathlib import Path
 from typing import BinaryIO, NoReturn
 
 from hobble.core.errors import HobbleError, InputError
-from hobble.core.files import sync_folder, write_error
+from hobble.core.files import failed_write_error, sync_folder
 from hobble.core.untrusted import printable
 from hobble.motion.read import MOST_BYTES
 
@@ -102,7 +102,7 @@ def download_clip(
     except _TooLate:
         last_failure = _Failed(f"not done within {deadline:g} seconds")
     except OSError as error:
-        raise write_error(error, path) from error
+        raise failed_write_error(error, path) from error
     raise _download_error(url, path, folder, str(last_failure), attempt + 1)
 
 

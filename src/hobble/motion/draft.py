@@ -28,7 +28,7 @@ def doubt_error(file: Bvh, rig: Skeleton, doubt: Doubt) -> InputError:
     It shows a draft of the skeleton file, or only the beginning of a long draft. rig: the joints of the file.
     """
     roles = guess_roles(rig) | {role: rig.joints[j] for role, j in doubt.certain_roles.items()}
-    text, name, hidden = draft(rig, roles), file.path.name, len(rig.joints) - MOST_SHOWN
+    text, name, hidden = draft_skeleton_file(rig, roles), file.path.name, len(rig.joints) - MOST_SHOWN
     if hidden > 0:
         # The draft ends with one line for each joint.
         shown = "\n".join(text.rstrip("\n").split("\n")[:-hidden])
@@ -46,7 +46,7 @@ def doubt_error(file: Bvh, rig: Skeleton, doubt: Doubt) -> InputError:
     return InputError(file.path, problem, fix=f"{fix}\n\n{text}")
 
 
-def draft(rig: Skeleton, roles: Mapping[str, str]) -> str:
+def draft_skeleton_file(rig: Skeleton, roles: Mapping[str, str]) -> str:
     """The text of a skeleton file (YAML): the rig's joints and their roles.
 
     roles: role -> name of its joint. The roles that are not in `roles` are left out if they are optional.

@@ -12,7 +12,7 @@ from hobble.core.clip import Clip
 from hobble.core.errors import HobbleError
 from hobble.core.files import load_npz, save_npz
 from hobble.core.quat import Array
-from hobble.motion.root import facing
+from hobble.motion.root import facing_directions
 
 # cm: two clips show the same motion if their joints are on average less than this apart. The release of
 # Holden et al. (2017) contains two mirrored clips, which are 1.2 and 1.3 cm from the mirror images of their
@@ -40,13 +40,13 @@ class ClipDigest:
     mirrored: Array | None = field(default=None, repr=False)
 
 
-def digest(clip: Clip, sha256: str) -> ClipDigest:
+def clip_digest(clip: Clip, sha256: str) -> ClipDigest:
     """The data by which a clip is compared with others. sha256: checksum of its file."""
     sampled = np.linspace(0, len(clip) - 1, POSES).round().astype(int)
     moved = None if clip.translations is None else clip.translations[sampled]
     sample = replace(clip, rotations=clip.rotations[sampled], root=clip.root[sampled], translations=moved)
     poses = sample.positions - sample.positions[:, :1] * [1.0, 0.0, 1.0]
-    ahead = facing(clip.skeleton, sample.positions[:1], 0.0)[0]
+    ahead = facing_directions(clip.skeleton, sample.positions[:1], 0.0)[0]
     # Turn about the vertical axis, so that the facing direction (x, z) becomes (0, 1).
     x, z = ahead[[0, 2]] / max(float(np.hypot(ahead[0], ahead[2])), 1e-9)
     poses = poses @ np.array([[z, 0.0, x], [0.0, 1.0, 0.0], [-x, 0.0, z]])
@@ -83,7 +83,7 @@ def load_digests(path: Path) -> list[ClipDigest]:
     ]
 
 
-def same_pairs(clips: Sequence[ClipDigest]) -> list[tuple[str, str, str]]:
+def duplicate_pairs(clips: Sequence[ClipDigest]) -> list[tuple[str, str, str]]:
     """Pairs of duplicates.
 
     Each pair is given as the names of the two clips and what they have in common: "the same file", "the same
@@ -101,7 +101,7 @@ def same_pairs(clips: Sequence[ClipDigest]) -> list[tuple[str, str, str]]:
 
 
 def _why_equal(a: ClipDigest, b: ClipDigest) -> str:
-    """What two clips have in common, in the words of `same_pairs`, or "" if they are no duplicates."""
+    """What two clips have in common, in the words of `duplicate_pairs`, or "" if they are no duplicates."""
     if a.sha256 == b.sha256:
         return "the same file"
     if a.poses.shape != b.poses.shape:

@@ -19,8 +19,8 @@ from hobble.core.skeleton import Skeleton, rest_positions
 from hobble.motion.axes import RigAxes, straighten
 from hobble.motion.body import Body, body_by_roles, match_joints
 from hobble.motion.body_in_file import body_in_file, notes_on_names
-from hobble.motion.decode import Decoded, check_angles, decode, frame_rate
-from hobble.motion.defects import Repaired, notes_on_flips, repair
+from hobble.motion.decode import Decoded, check_angles, decode_channels, frame_rate
+from hobble.motion.defects import Repaired, notes_on_flips, repair_defects
 from hobble.motion.doubt import check_height
 from hobble.motion.floor import put_on_floor
 from hobble.motion.four_legs import on_four_legs
@@ -28,14 +28,14 @@ from hobble.motion.hips_root import below_hips, decode_below
 from hobble.motion.options import ClipMotion
 from hobble.motion.read import Bvh
 from hobble.motion.rig import (
+    KnownSkeleton,
     RigMatch,
-    TargetSkeleton,
     clean_names,
     find_hips,
     leg_length,
+    likely_unit,
     match_rig,
     missing_bone,
-    unit_of,
 )
 from hobble.motion.standing import why_not_standing
 from hobble.motion.upright_rest import with_upright_rest
@@ -48,15 +48,15 @@ FOUND = "found"  # stands in reports instead of the rig's name if the rig is no 
 class FileMotion:
     """A file's motion at the file's own frame rate.
 
-    It is on the file's own rig, or, if `straightened`, on a rig that has only the joints of the body and a
-    standing rest pose.
+    It is on the file's own rig, or, if `has_standing_rig`, on a rig that has only the joints of the body and
+    a standing rest pose.
 
     match: which known skeleton the rig is, if any, and which of the rig's joints each joint of the target
     follows. unit, unit_name: cm per unit of the file, and the unit in words. axes: which of the file's axes
     points up, and where the figure faces. first_frame: the file's frame (from 0) at which the clip begins.
     repairs, notes: sentences on what was repaired, and on what else users should know. stance: where the rest
-    pose comes from, in words. moving: whether any joint of the body except the hips moves relative to its
-    parent. unsure: sentences on what is uncertain about the rest pose.
+    pose comes from, in words. has_moving_joints: whether any joint of the body except the hips moves relative
+    to its parent. unsure: sentences on what is uncertain about the rest pose.
     """
 
     clip: Clip
@@ -68,16 +68,18 @@ class FileMotion:
     repairs: list[str]
     notes: list[str]
     stance: str
-    moving: bool
-    straightened: bool
+    has_moving_joints: bool
+    has_standing_rig: bool
     unsure: list[str] = field(default_factory=list)
 
 
-def load_source(file: Bvh, target: TargetSkeleton, maps: str | Path, options: ClipMotion) -> FileMotion:
+def load_source(
+    file: Bvh, target: KnownSkeleton, skeleton_folder: str | Path, options: ClipMotion
+) -> FileMotion:
     """A file's motion, checked and, if allowed, repaired.
 
-    target: the skeleton to which the motion will be retargeted. maps: the folder of the skeleton files.
-    options: the data set's options for this clip.
+    target: the skeleton to which the motion will be retargeted. skeleton_folder: the folder of the skeleton
+    files. options: the data set's options for this clip.
 
     A rig counts as a known skeleton if it has the joint names and the rest pose of its file. On other rigs
     the parts of the body and a standing rest pose are found. Raises InputError if the parts cannot be found,
@@ -85,10 +87,10 @@ def load_source(file: Bvh, target: TargetSkeleton, maps: str | Path, options: Cl
     """
     check_angles(file)
     repairs = _check_frame_count(file, options.defects)
-    hips = find_hips(clean_names(file.names), target, maps)
-    known = match_rig(rig_of(below_hips(file, hips)), target, maps)
-    # `alike`: the rest pose is that of the known skeleton. `sources`: a map leads from it to the target.
-    if known is not None and known.alike and known.sources:
+    hips = find_hips(clean_names(file.names), target, skeleton_folder)
+    known = match_rig(rig_in_file(below_hips(file, hips)), target, skeleton_folder)
+    # The match has `followed_joints` if a map leads from the known skeleton to the target.
+    if known is not None and known.has_known_rest_pose and known.followed_joints:
         return _load_known_rig(file, hips, known, repairs, options)
     return _load_unknown_rig(file, target, known, repairs, options)
 
@@ -101,7 +103,7 @@ def _load_known_rig(
     hips: index of the hips in the file. match: the known skeleton. repairs: sentences on what was repaired so
     far.
     """
-    rig = replace(rig_of(below_hips(file, hips)), roles=match.roles)
+    rig = replace(rig_in_file(below_hips(file, hips)), roles=match.roles)
     unit, unit_name = _unit(file.path, leg_length(rig), options.unit)
     decoded = decode_below(file, hips, STILL / unit)
     clip = _scaled(file, rig, decoded, unit, options)
@@ -119,15 +121,15 @@ def _load_known_rig(
         repairs=repairs + decoded.repairs,
         notes=decoded.notes + straight.notes,
         stance="its zero pose",
-        moving=moving,
-        straightened=False,
+        has_moving_joints=moving,
+        has_standing_rig=False,
         unsure=straight.unsure,
     )
     return _repair_and_ground(file, source, options)
 
 
 def _load_unknown_rig(
-    file: Bvh, target: TargetSkeleton, known: RigMatch | None, repairs: list[str], options: ClipMotion
+    file: Bvh, target: KnownSkeleton, known: RigMatch | None, repairs: list[str], options: ClipMotion
 ) -> FileMotion:
     """The motion of a file whose rig is no known skeleton, or has another rest pose than the known one.
 
@@ -135,7 +137,7 @@ def _load_unknown_rig(
     joint names, if there is one. It tells the parts of the body. repairs: sentences on what was repaired so
     far.
     """
-    rig = rig_of(file)
+    rig = rig_in_file(file)
     decoded = _decode(file)
     # In the file's unit and axes. The frame rate does not matter here.
     raw = Clip(file.path.stem, rig, 1.0, decoded.rotations, decoded.root, decoded.translations)
@@ -163,7 +165,7 @@ def _load_unknown_rig(
     target_body = body_by_roles(target.skeleton)
     # A rig with the target's own joint names is matched with the target by these names, and any other rig by
     # the parts of the body.
-    named = known.sources if known is not None and known.rig == target.skeleton.name else {}
+    named = known.followed_joints if known is not None and known.rig == target.skeleton.name else {}
     named_joints = [rig.index(joint) for joint in named.values()]
     standing_clip = with_upright_rest(straight.clip, body, target.skeleton, named_joints)
     check_height(file.path, standing_clip.height_error, standing_clip.notes, options.accept_doubt)
@@ -183,9 +185,9 @@ def _load_unknown_rig(
         first_frame=0,
         repairs=repairs + decoded.repairs,
         notes=notes,
-        stance=standing_clip.rest,
-        moving=_has_moving_joints(decoded, body, unit),
-        straightened=True,
+        stance=standing_clip.rest_source,
+        has_moving_joints=_has_moving_joints(decoded, body, unit),
+        has_standing_rig=True,
         unsure=straight.unsure + standing_clip.notes,
     )
     return _repair_and_ground(file, source, options)
@@ -197,7 +199,7 @@ def _repair_and_ground(file: Bvh, source: FileMotion, options: ClipMotion) -> Fi
     If the option `defects` is "leave", both stay as they are.
     """
     leave = options.defects == "leave"
-    repaired = Repaired(source.clip, 0, []) if leave else repair(source.clip)
+    repaired = Repaired(source.clip, 0, []) if leave else repair_defects(source.clip)
     flat = options.ground == "flat" and not leave
     clip, floor_repairs, floor_notes = put_on_floor(repaired.clip) if flat else (repaired.clip, [], [])
     repairs = repaired.sentences + floor_repairs
@@ -215,7 +217,7 @@ def _repair_and_ground(file: Bvh, source: FileMotion, options: ClipMotion) -> Fi
 def raw_clip(file: Bvh) -> Clip:
     """A file's motion in its own unit and axes, for uses in which the frame rate does not matter: it is 1."""
     decoded = _decode(file)
-    return Clip(file.path.stem, rig_of(file), 1.0, decoded.rotations, decoded.root, decoded.translations)
+    return Clip(file.path.stem, rig_in_file(file), 1.0, decoded.rotations, decoded.root, decoded.translations)
 
 
 def _decode(file: Bvh) -> Decoded:
@@ -225,10 +227,10 @@ def _decode(file: Bvh) -> Decoded:
     thousandth of the longest bone.
     """
     longest = float(np.linalg.norm(file.offsets[1:], axis=-1).max(initial=0.0))
-    return decode(file, 1e-3 * longest)
+    return decode_channels(file, 1e-3 * longest)
 
 
-def rig_of(file: Bvh) -> Skeleton:
+def rig_in_file(file: Bvh) -> Skeleton:
     """The joints of a file as a skeleton, in the file's unit. Prefixes like "mixamorig:" are left out."""
     names = clean_names(file.names)
     new_name = dict(zip(file.names, names, strict=True))
@@ -282,7 +284,7 @@ def _unit(path: Path, leg: float, unit: str | float) -> tuple[float, str]:
     """
     if unit != "auto":
         return float(unit), f"{float(unit):g} cm (given)"
-    found = unit_of(leg)
+    found = likely_unit(leg)
     if found is None:
         raise InputError(
             path,

@@ -19,7 +19,7 @@ from hobble.motion.find_limbs import find_clavicle, find_limbs, find_toe, limb_j
 from hobble.motion.find_sides import find_left_arm, find_left_leg
 from hobble.motion.moving_rig import MovingRig
 from hobble.motion.names import part_of
-from hobble.motion.tree import above, common, path
+from hobble.motion.tree import lowest_common_ancestor, path_between, path_to_root
 
 
 @dataclass(frozen=True)
@@ -38,7 +38,7 @@ def find_body(names: Sequence[str], parents: Sequence[int], positions: Array) ->
     motion do not determine the parts.
     """
     rig = MovingRig(tuple(names), tuple(parents), positions)
-    pairs = rig.pairs()
+    pairs = rig.limb_pairs()
     if len(pairs) < 2:
         raise Doubt("its joints do not contain two equal legs and two equal arms")
     legs, arms = find_limbs(rig, pairs)
@@ -48,9 +48,13 @@ def find_body(names: Sequence[str], parents: Sequence[int], positions: Array) ->
     left_leg, sided = find_left_leg(rig, legs, leg_joints, head)
     left_arm = find_left_arm(rig, leg_joints, left_leg, arm_joints, arms)
     # The body's hips are the joint from which both hip joints (the tops of the thighs) hang.
-    hips = common(parents, [leg_joints[0][0], leg_joints[1][0]])
+    hips = lowest_common_ancestor(parents, [leg_joints[0][0], leg_joints[1][0]])
     hips = parents[hips] if hips in (leg_joints[0][0], leg_joints[1][0]) else hips
-    trunk = [j for j in path(parents, hips, arms.hub) if j != hips and (j not in above(parents, hips))]
+    trunk = [
+        j
+        for j in path_between(parents, hips, arms.hub)
+        if j != hips and (j not in path_to_root(parents, hips))
+    ]
     if len(trunk) > 1 and part_of(names[trunk[-1]]) == "neck" and head != trunk[-1]:
         neck = (trunk.pop(), *neck)  # in rigs of 3ds Max the neck carries the arms
     # Side -> index (0 or 1) of the chain in its pair.
@@ -76,11 +80,11 @@ def _find_second_figure(
 
     hips: index of the first figure's hips. A second figure hangs from a joint above them, on another branch.
     """
-    above_hips = above(parents, hips)  # the first of them is the hips
+    above_hips = path_to_root(parents, hips)  # the first of them is the hips
     for top in range(len(parents)):
         if parents[top] not in above_hips[1:] or top in above_hips:
             continue
-        branch = [j for j in range(len(parents)) if top in above(parents, j)]
+        branch = [j for j in range(len(parents)) if top in path_to_root(parents, j)]
         new = {old: i for i, old in enumerate(branch)}  # joint -> its index in the branch
         branch_parents = [new.get(parents[j], -1) for j in branch]
         try:

@@ -14,7 +14,7 @@ import numpy as np
 from hobble.motion.doubt import Doubt
 from hobble.motion.moving_rig import LimbPair, MovingRig
 from hobble.motion.names import is_control, limb_parts, part_of
-from hobble.motion.orient import unit
+from hobble.motion.orient import unit_vectors
 
 RIGID = 0.03  # two joints can be the ends of one bone if their distance varies by at most this share
 RATIOS = {"leg": (0.6, 1.6), "arm": (0.48, 1.6)}  # range of shank / thigh, and of forearm / upper arm
@@ -74,15 +74,18 @@ def _legs_along_trunk(rig: MovingRig, legs: LimbPair, places: tuple[int, int, in
 
     places: of the legs.
     """
-    trunk = rig.at[:, arms.hub] - rig.at[:, legs.hub]
-    feet = sum(rig.at[:, chain[places[2]]] for chain in legs.chains) / 2 - rig.at[:, legs.hub]
-    return float(np.mean(np.sum(unit(trunk) * unit(feet), axis=-1)))
+    trunk = rig.sampled_positions[:, arms.hub] - rig.sampled_positions[:, legs.hub]
+    feet = (
+        sum(rig.sampled_positions[:, chain[places[2]]] for chain in legs.chains) / 2
+        - rig.sampled_positions[:, legs.hub]
+    )
+    return float(np.mean(np.sum(unit_vectors(trunk) * unit_vectors(feet), axis=-1)))
 
 
 def _limb_length(rig: MovingRig, pair: LimbPair, places: tuple[int, int, int]) -> float:
     """Length of the two bones between the places, in the first chain of a pair."""
     a, b, c = (pair.chains[0][place] for place in places)
-    return rig.chord(a, b)[0] + rig.chord(b, c)[0]
+    return rig.distance_and_variation(a, b)[0] + rig.distance_and_variation(b, c)[0]
 
 
 def _swing_score(rig: MovingRig, pair: LimbPair, places: tuple[int, int, int]) -> float:
@@ -90,7 +93,7 @@ def _swing_score(rig: MovingRig, pair: LimbPair, places: tuple[int, int, int]) -
 
     Hair, skirts and wings often keep one angle.
     """
-    ranges = [np.ptp(np.percentile(rig.bend(chain, *places), [3, 97])) for chain in pair.chains]
+    ranges = [np.ptp(np.percentile(rig.bend_degrees(chain, *places), [3, 97])) for chain in pair.chains]
     return float(np.minimum(np.mean(ranges) / SWING, 1.0))
 
 
@@ -131,7 +134,10 @@ def find_places(rig: MovingRig, pair: LimbPair, kind: str) -> tuple[int, int, in
                     continue
                 if _changes_length(rig, pair, j, k) or not _bends(rig, pair, i, j, k):
                     continue
-                total = rig.chord(chain[i], chain[j])[0] + rig.chord(chain[j], chain[k])[0]
+                total = (
+                    rig.distance_and_variation(chain[i], chain[j])[0]
+                    + rig.distance_and_variation(chain[j], chain[k])[0]
+                )
                 if total > best * 1.0001:  # of equal lengths the first counts, whatever their rounding errors
                     best, where = total, (i, j, k)
                 break  # the lower bone ends at the first joint that fits
@@ -141,7 +147,7 @@ def find_places(rig: MovingRig, pair: LimbPair, kind: str) -> tuple[int, int, in
 def _fits(rig: MovingRig, chain: Sequence[int], places: Sequence[int], kind: str) -> bool:
     """Whether the two bones between the places have the proportions of a leg or an arm, and are not tiny."""
     i, j, k = (chain[p] for p in places)
-    upper, lower = rig.chord(i, j)[0], rig.chord(j, k)[0]
+    upper, lower = rig.distance_and_variation(i, j)[0], rig.distance_and_variation(j, k)[0]
     low, high = RATIOS[kind]
     return min(upper, lower) > 0.03 * rig.size and low <= lower / max(upper, 1e-9) <= high
 
@@ -151,7 +157,7 @@ def _changes_length(rig: MovingRig, pair: LimbPair, i: int, j: int) -> bool:
 
     i, j: indices of the two joints in both chains.
     """
-    return any(rig.chord(chain[i], chain[j])[1] > RIGID for chain in pair.chains)
+    return any(rig.distance_and_variation(chain[i], chain[j])[1] > RIGID for chain in pair.chains)
 
 
 def _begin_apart(rig: MovingRig, pair: LimbPair, i: int, j: int, kind: str) -> bool:
@@ -160,7 +166,7 @@ def _begin_apart(rig: MovingRig, pair: LimbPair, i: int, j: int, kind: str) -> b
     i, j: indices in both chains of the joints that may be shoulder and elbow, or hip and knee.
     """
     at_beginning, at_middle = (
-        np.median(np.linalg.norm(rig.at[:, a] - rig.at[:, b], axis=-1))
+        np.median(np.linalg.norm(rig.sampled_positions[:, a] - rig.sampled_positions[:, b], axis=-1))
         for a, b in ((pair.chains[0][i], pair.chains[1][i]), (pair.chains[0][j], pair.chains[1][j]))
     )
     return bool(at_beginning >= APART[kind] * at_middle)
@@ -172,7 +178,7 @@ def _bends(rig: MovingRig, pair: LimbPair, i: int, j: int, k: int) -> bool:
     i, j, k: indices in both chains.
     """
     for chain in pair.chains:
-        angle = rig.bend(chain, i, j, k)
+        angle = rig.bend_degrees(chain, i, j, k)
         if np.percentile(angle, 97) > 6:
             return True
     return False
@@ -200,14 +206,18 @@ def find_toe(rig: MovingRig, pair: LimbPair, k: int, heel: int) -> int | None:
     after_heel = chain[chain.index(heel) + 1 :]
     place = limb_parts([rig.names[j] for j in chain]).get("toe")
     named = None if place is None else chain[place]
-    if named is not None and named in after_heel and rig.chord(heel, named)[0] > 0.03 * leg_length:
+    if (
+        named is not None
+        and named in after_heel
+        and rig.distance_and_variation(heel, named)[0] > 0.03 * leg_length
+    ):
         return named
-    found = next((j for j in after_heel if rig.chord(heel, j)[0] > 0.06 * leg_length), None)
+    found = next((j for j in after_heel if rig.distance_and_variation(heel, j)[0] > 0.06 * leg_length), None)
     if found is None or part_of(rig.names[found]) != "ankle":
         return found
     # A second joint is named as ankle: this chain goes to the back of the heel, and another one to the toe.
     toes = (j for j in rig.children[heel] if part_of(rig.names[j]) == "toe")
-    return next((j for j in toes if rig.chord(heel, j)[0] > 0.03 * leg_length), None)
+    return next((j for j in toes if rig.distance_and_variation(heel, j)[0] > 0.03 * leg_length), None)
 
 
 def find_clavicle(rig: MovingRig, pair: LimbPair, k: int, shoulder: int) -> int | None:
@@ -217,5 +227,5 @@ def find_clavicle(rig: MovingRig, pair: LimbPair, k: int, shoulder: int) -> int 
     """
     chain = pair.chains[k]
     before_shoulder = chain[: chain.index(shoulder)]
-    away = [j for j in before_shoulder if rig.chord(j, shoulder)[0] > 0.01 * rig.size]
+    away = [j for j in before_shoulder if rig.distance_and_variation(j, shoulder)[0] > 0.01 * rig.size]
     return away[-1] if away else None

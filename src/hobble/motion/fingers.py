@@ -10,7 +10,7 @@ import numpy as np
 from hobble.core.quat import Array
 from hobble.core.skeleton import Skeleton
 from hobble.motion.names import part_of
-from hobble.motion.tree import above
+from hobble.motion.tree import path_to_root
 
 AWAY = (0.1, 0.7)  # range of the distance from the wrist to the base of a finger, in forearm lengths
 # Forearm lengths. A finger that is shorter than the longest finger by less than this counts as equally long.
@@ -70,7 +70,7 @@ def _chains(parents: Sequence[int], wrist: int) -> list[list[int]]:
     """For each joint below the wrist, the chain of joints from the wrist's child to that joint."""
     out = []
     for end in range(len(parents)):
-        chain = above(parents, end)
+        chain = path_to_root(parents, end)
         if wrist in chain[1:]:
             out.append(chain[: chain.index(wrist)][::-1])
     return out

@@ -21,7 +21,7 @@ from hobble.core import quat
 from hobble.core.quat import Array
 from hobble.motion.body import SIDES
 from hobble.motion.body_sample import BodySample
-from hobble.motion.orient import degrees_between, mean_rotation, unit
+from hobble.motion.orient import degrees_between, mean_rotation, unit_vectors
 from hobble.motion.spine import SHORT
 from hobble.motion.target_build import limb_bones
 
@@ -100,10 +100,10 @@ def frames_of_feet(sample: BodySample) -> dict[int, Array]:
         correction = quat.from_axis_angle(LEFT, np.array(steeper_by))
         flat = flat_moments(sample, side)
         # The rotations from a figure that faces +Z to one that faces where the foot points.
-        heading = quat.between(AHEAD, unit(_ahead(sample, side)[flat] * [1, 0, 1]))
+        heading = quat.between(AHEAD, unit_vectors(_ahead(sample, side)[flat] * [1, 0, 1]))
         for joint in sample.body.legs[side][2:]:
             if joint is not None:
-                as_measured = mean_rotation(quat.mul(quat.inv(sample.turned[flat, joint]), heading))
+                as_measured = mean_rotation(quat.mul(quat.inv(sample.rotations[flat, joint]), heading))
                 frames[joint] = quat.mul(as_measured, quat.inv(correction))
     return frames
 
@@ -121,12 +121,12 @@ def feet_tilt(sample: BodySample) -> Tilt:
         alike = len(zero_tilts) == len(SIDES) and np.ptp(zero_tilts) < SAME
         if alike and 0 < np.mean(zero_tilts) < np.mean(measured_tilts):
             return Tilt(by_side, zero, CAPTURED_ERROR)
-        return Tilt(by_side, _around_mean(by_side, sample.target.tilt), BRIEF_ERROR)
+        return Tilt(by_side, _around_mean(by_side, sample.target_proportions.foot_tilt), BRIEF_ERROR)
     if exact := [
         tilt for side, tilt in by_side.items() if tilt is not None and _has_exact_tilt(sample, side)
     ]:
         return Tilt(by_side, _around_mean(by_side, float(np.mean(exact))), EXACT_ERROR)
-    raised = RAISED if runs(sample) else 0.0
+    raised = RAISED if figure_runs(sample) else 0.0
     measured = float(np.mean(measured_tilts)) - raised
     if len(zero_tilts) == len(SIDES) and np.ptp(zero_tilts) < AGREE:
         # A foot that limps or stands on a slope may never come down. So it is enough if one foot agrees, to
@@ -135,7 +135,7 @@ def feet_tilt(sample: BodySample) -> Tilt:
         if min(abs(np.mean(zero_tilts) - measured), 2 * best_foot) < AGREE:
             return Tilt(by_side, zero, EXACT_ERROR)
     if _is_target(sample):
-        return Tilt(by_side, _around_mean(by_side, sample.target.tilt), EXACT_ERROR)
+        return Tilt(by_side, _around_mean(by_side, sample.target_proportions.foot_tilt), EXACT_ERROR)
     # The more the two feet differ, the less certain is their mean.
     error = float(np.hypot(CAPTURED_ERROR, 0.25 * np.ptp(measured_tilts)))
     angle, error = _expected_tilt(measured, error)
@@ -145,13 +145,13 @@ def feet_tilt(sample: BodySample) -> Tilt:
 def _is_target(sample: BodySample) -> bool:
     """Whether the rig has the target's proportions. Then its feet are taken to be built like the target's."""
     bones = limb_bones(sample.body)
-    return sample.target.is_built_like(np.array([sample.length(*bone) for bone in bones]))
+    return sample.target_proportions.matches_limb_lengths(np.array([sample.length(*bone) for bone in bones]))
 
 
 def _on_tiptoe(sample: BodySample, measured_tilts: Sequence[float]) -> bool:
     """Whether the body squats on feet that are much steeper than the target's flat ones."""
     low = not any(upright_while_flat(sample, side) for side in SIDES)
-    return low and bool(np.mean(measured_tilts) > sample.target.tilt + TIPTOE)
+    return low and bool(np.mean(measured_tilts) > sample.target_proportions.foot_tilt + TIPTOE)
 
 
 def _around_mean(by_side: dict[str, float | None], angle: float) -> dict[str, float | None]:
@@ -226,7 +226,7 @@ def feet_doubt(sample: BodySample, zero: bool) -> str | None:
     )
 
 
-def runs(sample: BodySample) -> bool:
+def figure_runs(sample: BodySample) -> bool:
     """Whether the figure runs. The feet of a runner hardly stand."""
     slow = [
         sample.speeds[:, _ball(sample, side)] < SLOW * sample.length(*sample.body.legs[side][:3])
@@ -248,7 +248,7 @@ def upright_while_flat(sample: BodySample, side: str) -> bool:
     """Whether the body is upright while the foot on this side is flat."""
     hip, knee, heel, _ = sample.body.legs[side]
     flat = flat_moments(sample, side)
-    height = np.median(sample.at[flat, hip, 1] - sample.at[flat, heel, 1])
+    height = np.median(sample.positions[flat, hip, 1] - sample.positions[flat, heel, 1])
     return bool(height > UPRIGHT * sample.length(hip, knee, heel))
 
 
@@ -258,7 +258,7 @@ def _measured_tilt(sample: BodySample, side: str) -> float | None:
     if toe is None:
         return None
     flat = flat_moments(sample, side)
-    return float(np.median(_tilt_of(sample.at[flat, toe] - sample.at[flat, heel])))
+    return float(np.median(_tilt_of(sample.positions[flat, toe] - sample.positions[flat, heel])))
 
 
 def _has_exact_tilt(sample: BodySample, side: str) -> bool:
@@ -274,7 +274,7 @@ def _stance_moments(sample: BodySample, side: str) -> NDArray[np.integer]:
     The most certain moments come first.
     """
     ball = _ball(sample, side)
-    order = _rank(sample.speeds[:, ball]) + _rank(sample.at[:, ball, 1])
+    order = _rank(sample.speeds[:, ball]) + _rank(sample.positions[:, ball, 1])
     return np.argsort(order)[: max(FEWEST + 2, round(STANCE * len(order)))]
 
 
@@ -289,12 +289,13 @@ def _zero_tilt(sample: BodySample, side: str) -> float | None:
     if toe is None:
         return None
     thigh, shank, foot = (
-        unit(sample.rest[b] - sample.rest[a]) for a, b in ((hip, knee), (knee, heel), (heel, toe))
+        unit_vectors(sample.zero_positions[b] - sample.zero_positions[a])
+        for a, b in ((hip, knee), (knee, heel), (heel, toe))
     )
-    left = sample.local(knee, sample.hinge(hip, knee, heel, sample.hips_left))
-    forward = unit(np.cross(shank, unit(left)))
+    left = sample.mean_in_joint_axes(knee, sample.hinge_axes(hip, knee, heel, sample.hips_left))
+    forward = unit_vectors(np.cross(shank, unit_vectors(left)))
     # Where the foot points, seen along the shank.
-    toe_direction = unit(foot - shank * (shank @ foot))
+    toe_direction = unit_vectors(foot - shank * (shank @ foot))
     if degrees_between(toe_direction, forward) > FORWARD and degrees_between(thigh, shank) > STRAIGHT:
         return None
     return float(np.arcsin(np.clip(foot @ shank, -1.0, 1.0)))
@@ -314,11 +315,11 @@ def _ahead(sample: BodySample, side: str) -> Array:
     """
     heel, toe = sample.body.legs[side][2:]
     if toe is not None:
-        return sample.at[:, toe] - sample.at[:, heel]
-    if (site := sample.ends[side]) is not None and np.linalg.norm(site) > SHORT:
-        return quat.rotate(sample.turned[:, heel], np.array(site))
+        return sample.positions[:, toe] - sample.positions[:, heel]
+    if (site := sample.ankle_end_sites[side]) is not None and np.linalg.norm(site) > SHORT:
+        return quat.rotate(sample.rotations[:, heel], np.array(site))
     ahead = np.cross(sample.hips_left, UP)
-    return quat.rotate(sample.turned[:, heel], sample.local(heel, ahead))
+    return quat.rotate(sample.rotations[:, heel], sample.mean_in_joint_axes(heel, ahead))
 
 
 def _tilt_of(ahead: Array) -> Array:

@@ -6,7 +6,7 @@ import numpy as np
 
 from hobble.core.quat import Array
 from hobble.motion.body import SIDES, Body
-from hobble.motion.orient import unit
+from hobble.motion.orient import unit_vectors
 
 # A figure counts as four-legged if three things hold in more than the share NEARLY_ALL of the frames:
 # - Hips and feet are further apart than STRETCHED, in leg lengths. In a person who crawls on the knees they
@@ -36,8 +36,8 @@ def on_four_legs(body: Body, positions: Array) -> bool:
             bone = positions[:, body.legs[side][b]] - positions[:, body.legs[side][a]]
             leg_length += 0.5 * np.linalg.norm(bone, axis=-1)
     # No axis needs to point up, because down is the direction from the hips to the feet.
-    down = unit(feet - hips)
+    down = unit_vectors(feet - hips)
     depth = np.linalg.norm(feet - hips, axis=-1)
-    trunk_level = np.sum(unit(chest - hips) * down, axis=-1) > LEVEL
+    trunk_level = np.sum(unit_vectors(chest - hips) * down, axis=-1) > LEVEL
     hands_low = np.sum((hands - hips) * down, axis=-1) > REACH * depth
     return bool(np.mean(trunk_level & hands_low & (depth > STRETCHED * leg_length)) > NEARLY_ALL)

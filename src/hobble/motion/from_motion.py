@@ -18,7 +18,7 @@ from hobble.motion.added_joints import Bend
 from hobble.motion.body_sample import LEFT, BodySample
 from hobble.motion.flat_feet import frames_of_feet
 from hobble.motion.no_neck import lacks_neck, neck_bone
-from hobble.motion.orient import frame, mean_rotation, unit
+from hobble.motion.orient import mean_rotation, rotation_aligning, unit_vectors
 from hobble.motion.spine import SHORT, spine_shares
 
 UP, AHEAD = np.array([0.0, 1.0, 0.0]), np.array([0.0, 0.0, 1.0])
@@ -50,7 +50,9 @@ def find_bends(sample: BodySample) -> dict[int, Bend]:
     for joint, following in ((body.hips, body.trunk), (body.chest, above_chest)):
         if following and sample.length(joint, following[0]) > SHORT:
             bone, axis, left = _trunk_bone(sample, joint)
-            out[joint] = Bend(following[0], sample.bone(joint, following[0]), frame(bone, axis, left, LEFT))
+            out[joint] = Bend(
+                following[0], sample.bone(joint, following[0]), rotation_aligning(bone, axis, left, LEFT)
+            )
     return out
 
 
@@ -64,12 +66,16 @@ def trunk_frames(sample: BodySample, zero: Array | None) -> dict[int, Array]:
     for joint in chain:
         bone, axis, left = _trunk_bone(sample, joint)
         if body.trunk and joint == body.chest and lacks_neck(sample):
-            bone, axis = neck_bone(sample, left, zero), sample.target.spine.neck_direction
-        # `frame` fits its first direction exactly and its second one as nearly as possible. For hips and
-        # chest, the direction to the left is more reliable than the bone: hips and shoulders are level, but
-        # spines of captured rigs bend sideways by some degrees.
+            bone, axis = neck_bone(sample, left, zero), sample.target_proportions.spine.neck_direction
+        # `rotation_aligning` fits its first direction exactly and its second one as nearly as possible. For
+        # hips and chest, the direction to the left is more reliable than the bone: hips and shoulders are
+        # level, but spines of captured rigs bend sideways by some degrees.
         carries_limbs = joint in (body.hips, body.chest)
-        frames[joint] = frame(left, LEFT, bone, axis) if carries_limbs else frame(bone, axis, left, LEFT)
+        frames[joint] = (
+            rotation_aligning(left, LEFT, bone, axis)
+            if carries_limbs
+            else rotation_aligning(bone, axis, left, LEFT)
+        )
     frames[body.head] = _head_frame(sample, frames, chain)
     return frames
 
@@ -89,17 +95,23 @@ def _trunk_bone(sample: BodySample, joint: int) -> tuple[Array, Array, Array]:
     following = chain[chain.index(joint) + 1 :]
     # A chain of many short bones is not straight. If one bone of the target is as long as several bones of
     # the rig, the direction is measured from the start of the first of these bones to the end of the last.
-    within_bone = [j for j in following if share[j] <= sample.target.spine.bone_end(share[joint]) + 1e-6]
+    within_bone = [
+        j for j in following if share[j] <= sample.target_proportions.spine.bone_end(share[joint]) + 1e-6
+    ]
     # The chest is stiff up to the shoulders. A very short bone above it does not show how it is turned.
     leg = sample.length(*body.legs["left"][:3])
     least = max(SHORT, KINK * leg) if joint == body.chest else SHORT
-    bone, end = sample.first_long(joint, [*within_bone[-1:], *following], least)
+    bone, end = sample.first_long_bone(joint, [*within_bone[-1:], *following], least)
     left = sample.chest_left
     if joint == body.hips:
         left = sample.hips_left
     elif joint in trunk and joint != body.chest:
-        left = unit(sample.hips_left + sample.chest_left)
-    return bone, sample.target.spine.direction(share[joint], share[end]), sample.local(joint, left)
+        left = unit_vectors(sample.hips_left + sample.chest_left)
+    return (
+        bone,
+        sample.target_proportions.spine.direction(share[joint], share[end]),
+        sample.mean_in_joint_axes(joint, left),
+    )
 
 
 def _head_frame(sample: BodySample, frames: dict[int, Array], chain: Sequence[int]) -> Array:
@@ -111,9 +123,9 @@ def _head_frame(sample: BodySample, frames: dict[int, Array], chain: Sequence[in
     chest = frames[sample.body.chest]
     if len(chain) > 2 and max(float(quat.angle(frames[j], chest)) for j in chain) < AGREE:
         return chest
-    ahead = unit(np.cross(sample.chest_left + sample.hips_left, UP) * [1, 0, 1])
-    up = sample.local(sample.body.head, np.broadcast_to(UP, ahead.shape))
-    return frame(up, UP, sample.local(sample.body.head, ahead), AHEAD)
+    ahead = unit_vectors(np.cross(sample.chest_left + sample.hips_left, UP) * [1, 0, 1])
+    up = sample.mean_in_joint_axes(sample.body.head, np.broadcast_to(UP, ahead.shape))
+    return rotation_aligning(up, UP, sample.mean_in_joint_axes(sample.body.head, ahead), AHEAD)
 
 
 def _add_arm(sample: BodySample, frames: dict[int, Array], side: str, sign: float) -> None:
@@ -122,21 +134,25 @@ def _add_arm(sample: BodySample, frames: dict[int, Array], side: str, sign: floa
     In the stance, the arm points to sign * LEFT. Its elbow bends forward, about the axis -sign * UP.
     """
     clavicle, shoulder, elbow, wrist = sample.body.arms[side]
-    chest = quat.mul(sample.turned[:, sample.body.chest], frames[sample.body.chest])
+    chest = quat.mul(sample.rotations[:, sample.body.chest], frames[sample.body.chest])
     if clavicle is not None:
-        frames[clavicle] = mean_rotation(quat.mul(quat.inv(sample.turned[:, clavicle]), chest))
-    hinge = sample.hinge(shoulder, elbow, wrist, -sample.chest_left)
+        frames[clavicle] = mean_rotation(quat.mul(quat.inv(sample.rotations[:, clavicle]), chest))
+    hinge = sample.hinge_axes(shoulder, elbow, wrist, -sample.chest_left)
     for start, end in ((shoulder, elbow), (elbow, wrist)):
-        frames[start] = frame(sample.bone(start, end), sign * LEFT, sample.local(start, hinge), -sign * UP)
-    forearm = quat.mul(sample.turned[:, elbow], frames[elbow])
-    frames[wrist] = sample.hand(
-        side, mean_rotation(quat.mul(quat.inv(sample.turned[:, wrist]), forearm)), sign
+        frames[start] = rotation_aligning(
+            sample.bone(start, end), sign * LEFT, sample.mean_in_joint_axes(start, hinge), -sign * UP
+        )
+    forearm = quat.mul(sample.rotations[:, elbow], frames[elbow])
+    frames[wrist] = sample.hand_frame(
+        side, mean_rotation(quat.mul(quat.inv(sample.rotations[:, wrist]), forearm)), sign
     )
 
 
 def _add_leg(sample: BodySample, frames: dict[int, Array], side: str) -> None:
     """Add the frames of hip and knee. In the stance, the leg points down and its knee bends about LEFT."""
     hip, knee, heel, _ = sample.body.legs[side]
-    hinge = sample.hinge(hip, knee, heel, sample.hips_left)
+    hinge = sample.hinge_axes(hip, knee, heel, sample.hips_left)
     for start, end in ((hip, knee), (knee, heel)):
-        frames[start] = frame(sample.bone(start, end), -UP, sample.local(start, hinge), LEFT)
+        frames[start] = rotation_aligning(
+            sample.bone(start, end), -UP, sample.mean_in_joint_axes(start, hinge), LEFT
+        )

@@ -15,14 +15,14 @@ from hobble.core import quat
 from hobble.core.quat import Array
 from hobble.motion.body import SIDES
 from hobble.motion.body_sample import LEFT, BodySample
-from hobble.motion.flat_feet import RAISED, feet_tilt, flat_moments, runs, upright_while_flat
+from hobble.motion.flat_feet import RAISED, feet_tilt, figure_runs, flat_moments, upright_while_flat
 from hobble.motion.orient import (
     degrees_between,
     degrees_between_rotations,
-    frame,
-    pointed_along,
+    rotation_aligning,
+    rotation_pointing_along,
     snapped_to_axes,
-    unit,
+    unit_vectors,
 )
 
 UP = np.array([0.0, 1.0, 0.0])
@@ -46,30 +46,30 @@ def frames_from_rest(sample: BodySample) -> dict[int, Array]:
     same frame. Arms and legs may point in other directions than in the stance. Their bones in the zero pose
     show how they are turned.
     """
-    body, rest = sample.body, sample.rest
+    body, rest = sample.body, sample.zero_positions
     # A Body lists hip, knee, heel and toe of a leg, and clavicle, shoulder, elbow and wrist of an arm.
     across = [
         rest[limbs["left"][k]] - rest[limbs["right"][k]] for limbs, k in ((body.legs, 0), (body.arms, 1))
     ]
-    left = unit(unit(across[0]) + unit(across[1]))
+    left = unit_vectors(unit_vectors(across[0]) + unit_vectors(across[1]))
     hips_middle, shoulders_middle = [
         0.5 * (rest[limbs["left"][k]] + rest[limbs["right"][k]])
         for limbs, k in ((body.legs, 0), (body.arms, 1))
     ]
     trunk = shoulders_middle - hips_middle
     upward = rest[body.head] - rest[body.hips]
-    common_frame = snapped_to_axes(frame(upward if upward @ trunk > 0 else trunk, UP, left, LEFT))
+    common_frame = snapped_to_axes(rotation_aligning(upward if upward @ trunk > 0 else trunk, UP, left, LEFT))
     frames = dict.fromkeys((body.hips, *body.trunk, *body.neck, body.head), common_frame)
     for side, sign in (("left", 1.0), ("right", -1.0)):
         clavicle, shoulder, elbow, wrist = body.arms[side]
         if clavicle is not None:
             frames[clavicle] = common_frame
         for start, end in ((shoulder, elbow), (elbow, wrist)):
-            frames[start] = pointed_along(common_frame, sign * LEFT, sample.bone(start, end))
-        frames[wrist] = sample.hand(side, frames[elbow], sign)
+            frames[start] = rotation_pointing_along(common_frame, sign * LEFT, sample.bone(start, end))
+        frames[wrist] = sample.hand_frame(side, frames[elbow], sign)
         hip, knee, heel, toe = body.legs[side]
         for start, end in ((hip, knee), (knee, heel)):
-            frames[start] = pointed_along(common_frame, -UP, sample.bone(start, end))
+            frames[start] = rotation_pointing_along(common_frame, -UP, sample.bone(start, end))
         frames[heel] = common_frame
         if toe is not None:
             frames[toe] = common_frame
@@ -110,9 +110,11 @@ def zero_doubt(sample: BodySample, zero: dict[int, Array]) -> str | None:
             x, y, z = quat.rotate(quat.inv(zero[heel]), sample.bone(heel, toe))
             # Radians by which a foot points further down while it stands than in the zero pose. A runner's
             # foot is steeper than flat by RAISED.
-            differences.append(tilt - (RAISED if runs(sample) else 0.0) - np.arctan2(-y, np.hypot(x, z)))
+            differences.append(
+                tilt - (RAISED if figure_runs(sample) else 0.0) - np.arctan2(-y, np.hypot(x, z))
+            )
             lengths.append(sample.length(heel, toe))
-            heights.append(sample.at[flat_moments(sample, side), toe, 1])
+            heights.append(sample.positions[flat_moments(sample, side), toe, 1])
     if not differences or np.ptp(np.percentile(np.concatenate(heights), [5, 95])) > UNEVEN:
         return None
     if abs(np.mean(differences)) < UNLIKE_ZERO:

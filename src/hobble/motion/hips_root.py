@@ -10,7 +10,7 @@ from dataclasses import replace
 import numpy as np
 
 from hobble.core import quat
-from hobble.motion.decode import Decoded, decode
+from hobble.motion.decode import Decoded, decode_channels
 from hobble.motion.read import Bvh
 
 
@@ -34,7 +34,7 @@ def decode_below(file: Bvh, hips: int, still: float) -> Decoded:
     hips: index of the hips. still: a joint whose position stays this close to its offset (in the file's
     unit) does not move relative to its parent.
     """
-    decoded = decode(below_hips(file, hips), still)
+    decoded = decode_channels(below_hips(file, hips), still)
     if hips == 0:
         return decoded
     above: list[int] = []
@@ -42,7 +42,7 @@ def decode_below(file: Bvh, hips: int, still: float) -> Decoded:
     while joint >= 0:
         above.insert(0, joint)
         joint = file.parents[joint]
-    chain = decode(_with_joints(file, above), 0.0)
+    chain = decode_channels(_with_joints(file, above), 0.0)
     # World position and rotation of the joint directly above the hips, added up from the root downward.
     place, turn = chain.root, chain.rotations[:, 0]
     for i in range(1, len(above)):

@@ -17,11 +17,11 @@ from typing import Any
 import numpy as np
 
 from hobble.core.clip import Clip
-from hobble.core.clip_files import find_clips, only_file, unused_file_notes
+from hobble.core.clip_files import find_clips, require_single_file, unused_file_notes
 from hobble.core.errors import HobbleError, InputError
 from hobble.core.quat import Array
 from hobble.motion.check_retarget import most_different
-from hobble.motion.duplicates import ClipDigest, digest, same_pairs
+from hobble.motion.duplicates import ClipDigest, clip_digest, duplicate_pairs
 from hobble.motion.make import make_clip
 from hobble.motion.options import ClipMotion
 from hobble.motion.rig import leg_length
@@ -42,8 +42,8 @@ STANDING = 0.5  # seconds: a figure that rests for a shorter time does not count
 # Leg lengths. A step is counted if one ankle moves from half of this behind the other to half of this ahead.
 LEAST_STEP = 0.25
 MANY = 5  # a warning that at least this many clips get is printed once for all of them
-# In what way two clips are duplicates (as `same_pairs` says it) -> what to do. To hold a clip out is to keep
-# it from training, for tests.
+# In what way two clips are duplicates (as `duplicate_pairs` says it) -> what to do. To hold a clip out is to
+# keep it from training, for tests.
 ADVICE = {"mirrors of each other": "hold both out or neither"}
 USUAL_ADVICE = "one of them is enough"
 
@@ -84,18 +84,24 @@ class FolderSummary:
 
 
 def summarise_clips(
-    folder: Path, skeleton: Path, maps: Path, options: ClipMotion | None = None
+    folder: Path, skeleton: Path, skeleton_folder: Path, options: ClipMotion | None = None
 ) -> FolderSummary:
     """Summarise each BVH file of a folder. Raises InputError if there is none.
 
     folder: the folder, or one BVH file. skeleton: file of the skeleton to which the clips are retargeted.
-    maps: the folder of the skeleton files. options: how the files are read (the section `motion` of a data
-    set).
+    skeleton_folder: the folder of the skeleton files. options: how the files are read (the section `motion`
+    of a data set).
     """
-    files = [folder] if folder.is_file() else [only_file(n, f) for n, f in sorted(find_clips(folder).items())]
+    files = (
+        [folder]
+        if folder.is_file()
+        else [require_single_file(n, f) for n, f in sorted(find_clips(folder).items())]
+    )
     if not files:
         raise InputError(folder, "no .bvh files here")
-    clips = tuple(_summary_of_file(file, skeleton, maps, options or ClipMotion()) for file in files)
+    clips = tuple(
+        _summary_of_file(file, skeleton, skeleton_folder, options or ClipMotion()) for file in files
+    )
     unused = () if folder.is_file() else tuple(unused_file_notes(folder, [file.stem for file in files]))
     short, common = shared_warnings(clips)
     return FolderSummary(tuple(short), (*common, *duplicate_notes(clips), *standing_notes(clips), *unused))
@@ -113,9 +119,9 @@ def shared_warnings(clips: Sequence[ClipSummary]) -> tuple[list[ClipSummary], li
     return short, [f"{times} of {len(clips)} clips: {warning}" for warning, times in common.items()]
 
 
-def _summary_of_file(file: Path, skeleton: Path, maps: Path, options: ClipMotion) -> ClipSummary:
+def _summary_of_file(file: Path, skeleton: Path, skeleton_folder: Path, options: ClipMotion) -> ClipSummary:
     try:
-        clip, report = make_clip(file, skeleton, maps, file.stem, skeleton.stem, options)
+        clip, report = make_clip(file, skeleton, skeleton_folder, file.stem, skeleton.stem, options)
     except HobbleError as error:
         return ClipSummary(file.stem, refused=_without_path(str(error).split("\n")[0], file))
     return summary_of_clip(clip, report)
@@ -161,7 +167,7 @@ def summary_of_clip(clip: Clip, report: Mapping[str, Any]) -> ClipSummary:
         cadence=60.0 * steps / seconds,
         standing=standing,
         warnings=(*rate_warnings(steps, moving, distance, clip, report), *summary.warnings),
-        digest=digest(clip, report["sha256"]),
+        digest=clip_digest(clip, report["sha256"]),
     )
 
 
@@ -248,7 +254,7 @@ def _usual_rate(ideal: float, fps: float) -> int:
 
 def duplicate_notes(clips: Sequence[ClipSummary]) -> list[str]:
     """A sentence for each pair of duplicate clips: which clips they are, and what to do."""
-    pairs = same_pairs([clip.digest for clip in clips if clip.digest is not None])
+    pairs = duplicate_pairs([clip.digest for clip in clips if clip.digest is not None])
     return [f"{a} and {b} are {what}: {ADVICE.get(what, USUAL_ADVICE)}." for a, b, what in pairs]
 
 

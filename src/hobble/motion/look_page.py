@@ -24,7 +24,7 @@ from hobble.motion.look import (
     summary_of_clip,
     summary_of_report,
 )
-from hobble.motion.root import facing
+from hobble.motion.root import facing_directions
 
 FRAMES, SECONDS = 40, 4.0  # the small figure shows up to 40 frames from the middle 4 seconds of its clip
 # Limits for the clips that are read: how many, and their length in seconds. Clips at these limits make a page
@@ -75,7 +75,7 @@ def make_figure(clip: Clip) -> dict[str, Any]:
     first = (len(clip) - shown) // 2
     frames = np.linspace(first, first + shown - 1, min(FRAMES, shown)).round().astype(int)
     p = clip.positions[frames]
-    ahead = facing(clip.skeleton, p, 0.0)
+    ahead = facing_directions(clip.skeleton, p, 0.0)
     # How far each joint is ahead of the hips, cm.
     along = np.sum((p - p[:, :1]) * ahead[:, None], axis=-1)
     height = max(float(np.percentile(p[..., 1].max(axis=1), 90)), 1.0)

@@ -11,7 +11,7 @@ from hobble.core.clip import Clip
 from hobble.core.errors import HobbleError
 from hobble.core.quat import Array
 from hobble.motion.axes import turned_about_vertical
-from hobble.motion.root import facing
+from hobble.motion.root import facing_directions
 
 BLEND = 0.2  # seconds before and after a seam over which it is blended; doubled until the seam is smooth
 FASTEST = 1.3  # a seam is smooth if no joint is faster than this times the highest speed in the clip
@@ -64,7 +64,7 @@ def _mean_distance(a: Array, b: Array) -> float:
 
 def _yaw(clip: Clip, frame: int) -> float:
     """The facing direction in a frame, radians from +Z towards +X."""
-    ahead = facing(clip.skeleton, clip.positions[[frame]], 0.0)[0]
+    ahead = facing_directions(clip.skeleton, clip.positions[[frame]], 0.0)[0]
     return float(np.arctan2(ahead[0], ahead[2]))
 
 

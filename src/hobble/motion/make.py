@@ -17,7 +17,7 @@ from hobble.core.quat import Array
 from hobble.core.skeleton import Skeleton
 from hobble.motion.axes import turned_about_vertical
 from hobble.motion.body import body_by_roles
-from hobble.motion.check_retarget import check, check_knees, compare
+from hobble.motion.check_retarget import check_difference, check_knees, compare_motions
 from hobble.motion.file_motion import FOUND, FileMotion, load_source
 from hobble.motion.loop import loop_clip
 from hobble.motion.options import ClipMotion
@@ -26,11 +26,11 @@ from hobble.motion.read import MOST_POSES, Bvh, read_bvh
 from hobble.motion.resample import sample_positions, sample_rotations, sample_times
 from hobble.motion.retarget import plan, retarget_clip
 from hobble.motion.rig import load_skeleton
-from hobble.motion.root import facing
+from hobble.motion.root import facing_directions
 from hobble.motion.tilt import check_tilt
 from hobble.motion.upright_rest import with_upright_rest
 
-SAME = 1e-3  # cm: offsets that differ from the target skeleton's by no more than this count as equal
+SAME = 1e-3  # cm: offsets count as equal if they differ from the target skeleton's by at most this much
 
 # Sentences for the report of a file in which joints other than the root have position channels that move.
 KEPT = "Movements of joints relative to their parents were kept."
@@ -40,16 +40,16 @@ DROPPED = "Movements of joints relative to their parents were dropped, because t
 def make_clip(
     bvh: str | Path,
     skeleton: str | Path,
-    maps: str | Path,
+    skeleton_folder: str | Path,
     clip: str,
     skeleton_name: str,
     options: ClipMotion,
 ) -> tuple[Clip, dict[str, Any]]:
     """Read a BVH file, check it, and convert it to the skeleton at the frame rate of `options`.
 
-    skeleton: file of the target skeleton. maps: the folder of the skeleton files. clip: name of the new clip.
-    skeleton_name: name of the target skeleton. options: the section `motion` of the data set. The values in
-    the clip's own entry come first.
+    skeleton: file of the target skeleton. skeleton_folder: the folder of the skeleton files. clip: name of
+    the new clip. skeleton_name: name of the target skeleton. options: those of the data set's section
+    `motion`, already overridden by those of the clip's own entry.
 
     Returns the clip and its report (the content of `motion/<clip>.json`). Raises InputError for a file
     that cannot be read, for an unsuitable skeleton, and for defects that cannot be repaired; with
@@ -57,13 +57,14 @@ def make_clip(
     """
     target = load_skeleton(skeleton, skeleton_name)
     file = read_bvh(bvh)
-    source = load_source(file, target, maps, options)
+    source = load_source(file, target, skeleton_folder, options)
     _check_length(file, source.clip, target.skeleton, options)
     resampled = resample(source.clip, options.fps)
     fitted = fit_skeleton(resampled, source, target.skeleton, options.proportions)
     if fitted.difference is not None:
-        check(file.path, fitted.difference, source.match.rig)
-    # With `defects: leave`, or if the user has set what a check would doubt, the check accepts any clip.
+        check_difference(file.path, fitted.difference, source.match.rig)
+    # `defects: leave` switches these three checks off. The check of the knees is also off if the user has set
+    # the handedness, and the check of the tilt if the user has set the axis that points up.
     leave = options.defects == "leave"
     check_knees(file.path, fitted.clip, leave or options.handedness != "auto")
     doubtful_pace = check_pace(file.path, fitted.clip, leave)
@@ -122,7 +123,7 @@ def _check_finite(file: Bvh, clip: Clip) -> None:
 
 def first_facing(clip: Clip) -> float:
     """Facing direction in the first frame, radians from +Z towards +X."""
-    ahead = facing(clip.skeleton, clip.positions[:1], 0.0)[0]
+    ahead = facing_directions(clip.skeleton, clip.positions[:1], 0.0)[0]
     return float(np.arctan2(ahead[0], ahead[2]))
 
 
@@ -145,8 +146,8 @@ class Fitted:
     """The result of `fit_skeleton`: a clip on the joints of the target.
 
     scale: length of the clip's path / length of the source's path. repairs: sentences on what was changed.
-    difference: how the clip differs from the source (see `hobble.motion.check_retarget.compare`), or None if
-    it was not retargeted. unsure: sentences on what is uncertain.
+    difference: how the clip differs from the source (see `hobble.motion.check_retarget.compare_motions`), or
+    None if it was not retargeted. unsure: sentences on what is uncertain.
     """
 
     clip: Clip
@@ -164,27 +165,37 @@ def fit_skeleton(clip: Clip, source: FileMotion, target: Skeleton, proportions: 
     equal rest pose.
     """
     match = source.match
-    if match.same:
+    if match.is_target_skeleton:
         reordered = _reordered(clip, np.array([clip.skeleton.index(name) for name in target.joints]), target)
-        same = np.abs(reordered.skeleton.offsets - target.offsets).max() <= SAME
-        if same or proportions == "clip":
-            reordered = replace(reordered, skeleton=target) if same else reordered
-            return Fitted(reordered, 1.0, [KEPT] if source.moving else [])
-    sources, unsure = match.sources, source.unsure
-    if not source.straightened:
-        followed_joints = {clip.skeleton.index(name) for name in sources.values()}
-        standing = with_upright_rest(clip, body_by_roles(clip.skeleton), target, followed_joints)
+        has_equal_offsets = np.abs(reordered.skeleton.offsets - target.offsets).max() <= SAME
+        if has_equal_offsets or proportions == "clip":
+            reordered = replace(reordered, skeleton=target) if has_equal_offsets else reordered
+            return Fitted(reordered, 1.0, [KEPT] if source.has_moving_joints else [])
+    followed_joints, unsure = match.followed_joints, source.unsure
+    if not source.has_standing_rig:
+        joints_to_keep = {clip.skeleton.index(name) for name in followed_joints.values()}
+        standing = with_upright_rest(clip, body_by_roles(clip.skeleton), target, joints_to_keep)
         clip, unsure = standing.clip, unsure + standing.notes
-        sources = {joint: followed for joint, followed in sources.items() if followed in clip.skeleton.joints}
-    retargeting = plan(clip.skeleton, target, sources)
-    repairs = [DROPPED] if source.moving else []
+        followed_joints = {
+            joint: followed for joint, followed in followed_joints.items() if followed in clip.skeleton.joints
+        }
+    retargeting = plan(clip.skeleton, target, followed_joints)
+    repairs = [DROPPED] if source.has_moving_joints else []
     if proportions == "clip":
-        rig = "unknown" if match.rig == FOUND else match.rig
-        why = f"Its rig is {rig}, so it could not keep its own bone lengths"
-        repairs.append(f"{why}. It got the bone lengths of {target.name}.")
+        if match.rig == target.name:
+            why = f"Its joints or its rest pose are not those of {target.name}"
+        else:
+            why = f"Its rig is {'unknown' if match.rig == FOUND else match.rig}"
+        repairs.append(
+            f"{why}, so it could not keep its own bone lengths. It got the bone lengths of {target.name}."
+        )
     new_clip = retarget_clip(clip, retargeting)
     return Fitted(
-        new_clip, round(retargeting.scale, 6), repairs, compare(clip, new_clip, retargeting.scale), unsure
+        new_clip,
+        round(retargeting.scale, 6),
+        repairs,
+        compare_motions(clip, new_clip, retargeting.scale),
+        unsure,
     )
 
 

@@ -11,7 +11,7 @@ import numpy as np
 from hobble.core import quat
 from hobble.core.quat import Array
 from hobble.motion.body_sample import BodySample
-from hobble.motion.orient import unit
+from hobble.motion.orient import unit_vectors
 from hobble.motion.spine import SHORT
 
 # Radians by which the first bone of a person's neck leans forward. AHEAD: from the vertical, in a standing
@@ -26,7 +26,7 @@ def lacks_neck(sample: BodySample) -> bool:
 
     A joint at the same place as the chest is no neck.
     """
-    body, target = sample.body, sample.target.spine
+    body, target = sample.body, sample.target_proportions.spine
     return target.has_neck and all(sample.length(body.chest, joint) <= SHORT for joint in body.neck)
 
 
@@ -40,7 +40,7 @@ def neck_bone(sample: BodySample, left: Array, zero: Array | None) -> Array:
     if zero is not None:
         return quat.rotate(zero, np.array([0.0, np.cos(AHEAD), np.sin(AHEAD)]))
     head = sample.bone(sample.body.chest, sample.body.head)
-    return quat.rotate(quat.from_axis_angle(unit(left), np.array(AHEAD_OF_HEAD)), unit(head))
+    return quat.rotate(quat.from_axis_angle(unit_vectors(left), np.array(AHEAD_OF_HEAD)), unit_vectors(head))
 
 
 def lean_doubt(sample: BodySample, zero: bool) -> str | None:

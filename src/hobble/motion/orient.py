@@ -8,17 +8,17 @@ from hobble.core import quat
 from hobble.core.quat import Array
 
 
-def unit(vectors: Array) -> Array:
+def unit_vectors(vectors: Array) -> Array:
     """The vectors (..., 3), scaled to length 1. A zero vector stays zero."""
     return vectors / np.maximum(np.linalg.norm(vectors, axis=-1, keepdims=True), 1e-9)
 
 
 def degrees_between(a: Array, b: Array) -> float:
     """Angle in degrees between two vectors (3,) of any length."""
-    return float(np.degrees(np.arccos(np.clip(unit(a) @ unit(b), -1.0, 1.0))))
+    return float(np.degrees(np.arccos(np.clip(unit_vectors(a) @ unit_vectors(b), -1.0, 1.0))))
 
 
-def frame(first: Array, from_first: Array, second: Array, from_second: Array) -> Array:
+def rotation_aligning(first: Array, from_first: Array, second: Array, from_second: Array) -> Array:
     """The rotation (4,) that turns one direction exactly, and a second one as nearly as possible.
 
     It turns `from_first` to `first`. Among the rotations that do this, it is the one that turns `from_second`
@@ -29,10 +29,10 @@ def frame(first: Array, from_first: Array, second: Array, from_second: Array) ->
 
 def _axes(first: Array, second: Array) -> Array:
     """(3, 3) matrix whose columns are unit vectors at right angles: x along `first`, y towards `second`."""
-    x = unit(first)
-    y = unit(second - x * (second @ x))
+    x = unit_vectors(first)
+    y = unit_vectors(second - x * (second @ x))
     if np.linalg.norm(y) < 0.5:  # zero, because the two are parallel: take any y at right angles to x
-        y = unit(np.eye(3)[int(np.argmin(np.abs(x)))] - x * x[int(np.argmin(np.abs(x)))])
+        y = unit_vectors(np.eye(3)[int(np.argmin(np.abs(x)))] - x * x[int(np.argmin(np.abs(x)))])
     return np.stack([x, y, np.cross(x, y)], axis=1)
 
 
@@ -50,7 +50,7 @@ def snapped_to_axes(rotation: Array) -> Array:
     return rotation
 
 
-def pointed_along(rotation: Array, axis: Array, bone: Array) -> Array:
+def rotation_pointing_along(rotation: Array, axis: Array, bone: Array) -> Array:
     """The rotation (4,), changed as little as possible so that it turns `axis` to the direction of `bone`.
 
     axis, bone: vectors (3,).

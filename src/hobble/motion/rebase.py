@@ -12,7 +12,7 @@ from hobble.core.quat import Array
 from hobble.core.skeleton import Skeleton, local_rotations
 from hobble.motion.body import SIDES, Body
 from hobble.motion.body_sample import LEFT
-from hobble.motion.tree import above
+from hobble.motion.tree import path_to_root
 
 # cm: if the offset of a joint from its parent changes by more than this during the clip, the new clip stores
 # the offsets of every frame.
@@ -82,4 +82,4 @@ def _new_parent(parents: Sequence[int], body: Body, joint: int, among: Collectio
             parts = (start, *(j for j in limb if j is not None))
             if joint in parts[1:]:
                 return parts[parts.index(joint) - 1]
-    return next((j for j in above(parents, joint)[1:] if j in among), body.hips)
+    return next((j for j in path_to_root(parents, joint)[1:] if j in among), body.hips)

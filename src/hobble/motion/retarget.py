@@ -19,7 +19,7 @@ import numpy as np
 from hobble.core import quat
 from hobble.core.clip import Clip
 from hobble.core.errors import HobbleError
-from hobble.core.ik import aim, two_bone_knee
+from hobble.core.ik import aim_bone, two_bone_knee
 from hobble.core.quat import Array
 from hobble.core.skeleton import Skeleton, local_rotations, rest_positions
 from hobble.motion.axes import rest_frame
@@ -74,14 +74,16 @@ class Retarget:
     lift: float
 
 
-def plan(source: Skeleton, target: Skeleton, sources: Mapping[str, str]) -> Retarget:
+def plan(source: Skeleton, target: Skeleton, followed_joints: Mapping[str, str]) -> Retarget:
     """Plan how `target` follows `source`.
 
-    sources: name of a target joint -> name of the source joint that it follows. Both skeletons need the roles
-    hips and head, and on both sides shoulder, hip, knee, heel and toe. Raises HobbleError if the target's
-    hips, or a hip, knee or heel, follows nothing, or if a bone of a leg has no length.
+    followed_joints: name of a target joint -> name of the source joint that it follows. Both skeletons need
+    the roles hips and head, and on both sides shoulder, hip, knee, heel and toe. Raises HobbleError if the
+    target's hips, or a hip, knee or heel, follows nothing, or if a bone of a leg has no length.
     """
-    pairs = sorted((target.index(follower), source.index(leader)) for follower, leader in sources.items())
+    pairs = sorted(
+        (target.index(follower), source.index(leader)) for follower, leader in followed_joints.items()
+    )
     joints, follows = (np.array(column) for column in zip(*pairs, strict=True))
     for role in ("hips", *(f"{s}_{part}" for s in SIDES for part in ("hip", "knee", "heel"))):
         if target.role(role) not in joints:
@@ -301,8 +303,8 @@ class _Leg:
         pole = _knee_direction(upper, lower, self.thigh, self.shank, self.forward)
         lengths = float(np.linalg.norm(self.thigh)), float(np.linalg.norm(self.shank))
         knee_at, ankle_at = two_bone_knee(start, self.ankle, pole, *lengths)
-        self.rotations[..., self.hip, :] = aim(upper, self.thigh, knee_at - start)
-        self.rotations[..., self.knee, :] = aim(lower, self.shank, ankle_at - knee_at)
+        self.rotations[..., self.hip, :] = aim_bone(upper, self.thigh, knee_at - start)
+        self.rotations[..., self.knee, :] = aim_bone(lower, self.shank, ankle_at - knee_at)
 
 
 def _knee_direction(hip: Array, knee: Array, thigh: Array, shank: Array, ahead: Array) -> Array:

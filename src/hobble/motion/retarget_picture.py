@@ -20,7 +20,7 @@ from hobble.motion.make import fit_skeleton, resample
 from hobble.motion.options import ClipMotion
 from hobble.motion.read import read_bvh
 from hobble.motion.rig import load_skeleton
-from hobble.motion.root import facing
+from hobble.motion.root import facing_directions
 
 # Roles of the joints along a leg and along an arm.
 LIMBS = (("hips", "hip", "knee", "heel", "toe"), ("chest", "shoulder", "elbow", "wrist"))
@@ -30,17 +30,17 @@ COLOURS = {"left": "#2b6cb0", "right": "#8a8a8a", "": "#333333"}  # of the limbs
 WRONG = "#d62828"  # colour of the bones that differ most
 
 
-def picture_of_file(bvh: Path, skeleton: Path, maps: Path, options: ClipMotion) -> str:
+def picture_of_file(bvh: Path, skeleton: Path, skeleton_folder: Path, options: ClipMotion) -> str:
     """The picture (SVG) of a BVH file's motion and of the result of retargeting.
 
     It is drawn even if the workflow refuses the result because it differs too much from the source.
 
-    skeleton: the file of the skeleton that gets the motion. maps: the folder with all skeleton files, with
-    which the rig of the BVH file is recognised. Raises InputError for a BVH file that cannot be read or that
-    has this skeleton's bones already.
+    skeleton: the file of the skeleton that gets the motion. skeleton_folder: the folder with all skeleton
+    files, with which the rig of the BVH file is recognised. Raises InputError for a BVH file that cannot be
+    read or that has this skeleton's bones already.
     """
     target = load_skeleton(skeleton, skeleton.stem)
-    source = load_source(read_bvh(bvh), target, maps, options)
+    source = load_source(read_bvh(bvh), target, skeleton_folder, options)
     before = resample(source.clip, options.fps)
     before = replace(before, skeleton=replace(before.skeleton, roles=source.match.roles))
     fitted = fit_skeleton(before, source, target.skeleton, options.proportions)
@@ -93,7 +93,7 @@ def _draw_figures(clip: Clip, frames: Array, part: str, view: str) -> list[str]:
     "side" or "front".
     """
     at = {role: clip.positions[frames, clip.skeleton.role(role)] for role in clip.skeleton.roles}
-    ahead = facing(clip.skeleton, clip.positions[frames], 0.0)
+    ahead = facing_directions(clip.skeleton, clip.positions[frames], 0.0)
     across = np.cross([0.0, 1.0, 0.0], ahead)
     rightward = ahead if view == "side" else across  # what points to the right in the picture
     places = {  # role -> (POSES, 2) distance to the right of the hips, and height; cm

@@ -21,12 +21,12 @@ from hobble.core.quat import Array
 from hobble.core.skeleton import Skeleton, rest_positions
 from hobble.core.untrusted import printable, read_text, read_yaml
 from hobble.motion.check_rig_file import check_rig_file
-from hobble.motion.tree import path
+from hobble.motion.tree import path_between
 
 # Name of a unit of length -> centimetres. The unit of CMU files is an inch / 0.45.
 UNITS = {"cm": 1.0, "inch": 2.54, "m": 100.0, "mm": 0.1, "CMU": 5.6444, "foot": 30.48}
 LEG = 80.0  # cm: length of thigh plus shank of an average adult
-KNOWN = 0.75  # a rig can be a known skeleton if that has at least this share of the rig's joint names
+KNOWN = 0.75  # a rig can be a known skeleton that has at least this share of the rig's joint names
 # Finds the names of joints (and other indented keys) in the text of a skeleton file.
 NAME = re.compile(r"^ +['\"]?([^\s'\":{}][^'\":{}]*)['\"]?\s*:", re.MULTILINE)
 # Role at the end of a bone, without the side -> degrees. Two rest poses count as equal if no bone's direction
@@ -39,7 +39,7 @@ MANDATORY = ("hips", "head", *(f"{side}_{part}" for side in ("left", "right") fo
 
 
 @dataclass(frozen=True)
-class TargetSkeleton:
+class KnownSkeleton:
     """A known skeleton, read from its file, with its maps to other skeletons.
 
     maps: name of another skeleton -> {joint of this skeleton: joint of the other}.
@@ -54,19 +54,20 @@ class RigMatch:
     """Which known skeleton a clip's rig is, and how it maps to the target.
 
     rig: name of the known skeleton, or "found" if the joints' roles were found without one. roles: role ->
-    name of the clip's joint. same: whether the clip has the target's own joints and an equal rest pose.
-    sources: name of a target joint -> name of the clip's joint that it follows. alike: whether the clip's
-    rest pose equals that of the known skeleton (as `rest_alike` compares them).
+    name of the clip's joint. is_target_skeleton: whether the clip has the target's own joints and an equal
+    rest pose. followed_joints: name of a target joint -> name of the clip's joint that it follows.
+    has_known_rest_pose: whether the clip's rest pose equals that of the known skeleton (as
+    `has_equal_rest_pose` compares them).
     """
 
     rig: str
     roles: Mapping[str, str]
-    same: bool
-    sources: Mapping[str, str]
-    alike: bool = True
+    is_target_skeleton: bool
+    followed_joints: Mapping[str, str]
+    has_known_rest_pose: bool = True
 
 
-def load_skeleton(path: str | Path, name: str | None = None) -> TargetSkeleton:
+def load_skeleton(path: str | Path, name: str | None = None) -> KnownSkeleton:
     """Read a skeleton file (`config/skeletons/<name>.yaml`). Raises InputError if it is missing or wrong."""
     if not Path(path).is_file():
         raise InputError(path, "no such skeleton file")
@@ -75,7 +76,7 @@ def load_skeleton(path: str | Path, name: str | None = None) -> TargetSkeleton:
 
 
 @lru_cache(maxsize=32)
-def _load_cached(path: Path, name: str, changed: int, size: int) -> TargetSkeleton:
+def _load_cached(path: Path, name: str, changed: int, size: int) -> KnownSkeleton:
     """Read a skeleton file, or return what was read before.
 
     changed, size: time of the last change and size of the file. They are part of the cache's key, so that a
@@ -86,16 +87,16 @@ def _load_cached(path: Path, name: str, changed: int, size: int) -> TargetSkelet
     try:
         maps = data.pop("maps", None) or {}
         skeleton = Skeleton.from_dict({**data, "name": name})
-        return TargetSkeleton(skeleton, maps)
+        return KnownSkeleton(skeleton, maps)
     except (AttributeError, KeyError, TypeError, ValueError, OverflowError) as error:
         raise InputError(path, f"not a skeleton file: {printable(error)}") from None
 
 
-def nearest_skeleton(names: Collection[str], target: TargetSkeleton, folder: str | Path) -> TargetSkeleton:
+def nearest_skeleton(names: Collection[str], target: KnownSkeleton, folder: str | Path) -> KnownSkeleton:
     """The skeleton in `folder` that has the most of these joint names; the target if none has more.
 
-    A skeleton file is not parsed if its text shows that it has no more of these names, because parsing YAML
-    takes longer than reading most clips.
+    A skeleton file is not parsed if its text shows that it has no more of these names than the best skeleton
+    so far, because parsing YAML takes longer than reading most clips.
     """
     best, found = len(set(names) & set(target.skeleton.joints)), target
     for file in sorted(Path(folder).glob("*.yaml")):
@@ -114,8 +115,8 @@ def clean_names(names: Sequence[str]) -> tuple[str, ...]:
     return short if len(set(short)) == len(short) and all(short) else tuple(names)
 
 
-def find_hips(names: Sequence[str], target: TargetSkeleton, folder: str | Path) -> int:
-    """Index of the hips among a clip's joints. It may not be 0, because some programs export a joint above.
+def find_hips(names: Sequence[str], target: KnownSkeleton, folder: str | Path) -> int:
+    """Index of the hips among a clip's joints: not always 0, as some programs export a joint above the hips.
 
     names: of the clip's joints, the root first. folder: the folder of the skeleton files. The name of the
     hips is taken from the known skeleton that has the most of the clip's joint names. If the clip has no
@@ -127,18 +128,24 @@ def find_hips(names: Sequence[str], target: TargetSkeleton, folder: str | Path) 
     return names.index(hips) if hips in names else 0
 
 
-def match_rig(rig: Skeleton, target: TargetSkeleton, folder: str | Path) -> RigMatch | None:
+def match_rig(rig: Skeleton, target: KnownSkeleton, folder: str | Path) -> RigMatch | None:
     """Find which known skeleton a clip's rig is, and how it maps to the target.
 
     rig: the clip's skeleton. folder: the folder of the skeleton files. Returns None if no known skeleton has
-    enough of the rig's joint names in the same hierarchy. The match has roles but no sources if no map leads
-    to the target, or if the rig has other joints between hips and head than the known skeleton.
+    enough of the rig's joint names in the same hierarchy. The match has roles but no `followed_joints` if no
+    map leads to the target, or if the rig has other joints between hips and head than the known skeleton.
     """
     if not _differences(rig, target.skeleton):
         roles = target.skeleton.roles
-        alike = rest_alike(replace(rig, roles=roles), target.skeleton)
+        alike = has_equal_rest_pose(replace(rig, roles=roles), target.skeleton)
         itself = {name: name for name in target.skeleton.joints}
-        return RigMatch(target.skeleton.name, roles, same=alike, sources=itself, alike=alike)
+        return RigMatch(
+            target.skeleton.name,
+            roles,
+            is_target_skeleton=alike,
+            followed_joints=itself,
+            has_known_rest_pose=alike,
+        )
     known = nearest_skeleton(rig.joints, target, folder)
     if _share_of_names(rig, known.skeleton) < KNOWN or _misfits(rig, known.skeleton):
         return None
@@ -146,13 +153,25 @@ def match_rig(rig: Skeleton, target: TargetSkeleton, folder: str | Path) -> RigM
     if _trunk_joints(rig, roles) != _trunk_joints(known.skeleton, known.skeleton.roles):
         # With another number of joints in the spine, a name such as Neck may mean another joint than in the
         # skeleton file.
-        return RigMatch(known.skeleton.name, roles, same=False, sources={}, alike=False)
-    sources = {a: b for a, b in joint_pairs(known, target).items() if b in rig.joints}
-    alike = rest_alike(replace(rig, roles=roles), known.skeleton)
-    return RigMatch(known.skeleton.name, roles, same=False, sources=sources, alike=alike)
+        return RigMatch(
+            known.skeleton.name,
+            roles,
+            is_target_skeleton=False,
+            followed_joints={},
+            has_known_rest_pose=False,
+        )
+    followed_joints = {a: b for a, b in joint_pairs(known, target).items() if b in rig.joints}
+    alike = has_equal_rest_pose(replace(rig, roles=roles), known.skeleton)
+    return RigMatch(
+        known.skeleton.name,
+        roles,
+        is_target_skeleton=False,
+        followed_joints=followed_joints,
+        has_known_rest_pose=alike,
+    )
 
 
-def rest_alike(rig: Skeleton, known: Skeleton) -> bool:
+def has_equal_rest_pose(rig: Skeleton, known: Skeleton) -> bool:
     """Whether the limb bones of two rest poses have equal directions, to within MOST_APART.
 
     Directions are measured along the body's own axes, so turned or mirrored bodies count as equal. A rig
@@ -225,7 +244,7 @@ def _roles_in_rig(rig: Skeleton, known: Skeleton) -> dict[str, str]:
 def _trunk_joints(skeleton: Skeleton, roles: Mapping[str, str]) -> list[str]:
     """The names of the joints from the hips to the head."""
     ends = (skeleton.index(roles[role]) for role in ("hips", "head"))
-    return [skeleton.joints[j] for j in path(skeleton.parents, *ends)]
+    return [skeleton.joints[j] for j in path_between(skeleton.parents, *ends)]
 
 
 def _misfits(rig: Skeleton, known: Skeleton) -> list[str]:
@@ -253,7 +272,7 @@ def _common_parents(skeleton: Skeleton, other: Skeleton) -> dict[str, str | None
     return {name: up for name, up in above.items() if name in other.joints}
 
 
-def joint_pairs(source: TargetSkeleton, target: TargetSkeleton) -> dict[str, str]:
+def joint_pairs(source: KnownSkeleton, target: KnownSkeleton) -> dict[str, str]:
     """Name of a target joint -> name of the source joint that it follows.
 
     The pairs come from a map of one skeleton to the other, or from maps of both to a third skeleton. Without
@@ -301,7 +320,7 @@ def missing_bone(skeleton: Skeleton) -> str | None:
     return None
 
 
-def unit_of(leg: float) -> tuple[float, str] | None:
+def likely_unit(leg: float) -> tuple[float, str] | None:
     """The likely unit of a file: centimetres per unit, and the name of the unit.
 
     leg: length of thigh plus shank in the file's unit. The unit is the one that brings this length

@@ -52,7 +52,7 @@ def across_body(skeleton: Skeleton, positions: Array) -> Array:
     return across / np.maximum(np.linalg.norm(across, axis=-1, keepdims=True), 1e-9)
 
 
-def facing(skeleton: Skeleton, positions: Array, sigma: float) -> Array:
+def facing_directions(skeleton: Skeleton, positions: Array, sigma: float) -> Array:
     """Facing direction (F, 3), unit and horizontal, of joint positions (F, J, 3).
 
     It is the cross product of `across_body` and up, smoothed over time by a Gaussian and normalised again.
@@ -66,8 +66,8 @@ def facing(skeleton: Skeleton, positions: Array, sigma: float) -> Array:
 
 
 def root_frames(clip: Clip, sigma: float) -> RootFrames:
-    """The root of every frame of a clip. sigma: as for `facing`; usually 20 frames at 60 Hz."""
-    direction = facing(clip.skeleton, clip.positions, sigma)
+    """The root of every frame of a clip. sigma: as for `facing_directions`; usually 20 frames at 60 Hz."""
+    direction = facing_directions(clip.skeleton, clip.positions, sigma)
     rotation = quat.yaw(-np.arctan2(direction[:, 0], direction[:, 2]))
     change = quat.rotate(quat.mul(rotation[1:], quat.inv(rotation[:-1])), np.array([0.0, 0.0, 1.0]))
     turn = np.arctan2(change[:, 0], change[:, 2])

@@ -11,7 +11,7 @@ from hobble.core.quat import Array
 from hobble.core.skeleton import Skeleton, rest_positions
 from hobble.motion.axes import rest_frame
 from hobble.motion.body import REACH, Body
-from hobble.motion.orient import unit
+from hobble.motion.orient import unit_vectors
 
 SHORT = 2.0  # cm: a bone shorter than this does not show a direction
 
@@ -28,7 +28,7 @@ class Spine:
     points: Array
 
     @classmethod
-    def of(cls, skeleton: Skeleton, body: Body) -> Spine:
+    def from_skeleton(cls, skeleton: Skeleton, body: Body) -> Spine:
         """The spine of a skeleton with a standing rest pose. body: which joint is which part.
 
         The skeleton is the target of retargeting. In the new rest pose of another rig, the bones of trunk and
@@ -50,7 +50,7 @@ class Spine:
         chest, first = int(np.searchsorted(self.shares, 1.0 - 1e-6)), self._first_point(start)
         # A bone that ends at the chest or below does not reach into the neck.
         last = min(self._last_point(end), chest if end <= 1 else len(self.shares) - 1)
-        return unit(self.points[max(last, first + 1)] - self.points[first])
+        return unit_vectors(self.points[max(last, first + 1)] - self.points[first])
 
     def bone_end(self, start: float) -> float:
         """Position along the body of the upper end of a bone of this spine. start: that of its lower end."""
@@ -60,7 +60,7 @@ class Spine:
     def neck_direction(self) -> Array:
         """(3,) unit direction from the chest to the next point: the neck, or the head if there is no neck."""
         chest = min(int(np.searchsorted(self.shares, 1.0 - 1e-6)), len(self.shares) - 2)
-        return unit(self.points[chest + 1] - self.points[chest])
+        return unit_vectors(self.points[chest + 1] - self.points[chest])
 
     @property
     def has_neck(self) -> bool:

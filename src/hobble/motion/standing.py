@@ -8,7 +8,7 @@ import numpy as np
 
 from hobble.core.quat import Array
 from hobble.motion.body import SIDES, Body
-from hobble.motion.orient import degrees_between, unit
+from hobble.motion.orient import degrees_between, unit_vectors
 from hobble.motion.spine import SHORT
 
 # Largest angles, in degrees, by which parts of a standing person differ from a direction. Legs are compared
@@ -25,14 +25,14 @@ def why_not_standing(body: Body, rest: Array) -> str | None:
     """
     hips = 0.5 * (rest[body.legs["left"][0]] + rest[body.legs["right"][0]])
     shoulders = 0.5 * (rest[body.arms["left"][1]] + rest[body.arms["right"][1]])
-    up = unit(shoulders - hips)
+    up = unit_vectors(shoulders - hips)
     hips_left = rest[body.legs["left"][0]] - rest[body.legs["right"][0]]
     shoulders_left = rest[body.arms["left"][1]] - rest[body.arms["right"][1]]
     if degrees_between(hips_left, shoulders_left) > 30 or abs(degrees_between(hips_left, up) - 90) > 25:
         return "hips and shoulders point in different directions"
     if degrees_between(rest[body.head] - shoulders, up) > HEAD:
         return "the head is not above the shoulders"
-    ahead = np.cross(unit(hips_left), up)  # straight back in left-handed coordinates
+    ahead = np.cross(unit_vectors(hips_left), up)  # straight back in left-handed coordinates
     forward = []  # for each foot, how far it reaches along `ahead`
     for side in SIDES:
         hip, knee, heel, toe = body.legs[side]

@@ -1,4 +1,4 @@
-"""Measures the build of the skeleton to which a motion will be retargeted: spine, tilt of the feet, limbs."""
+"""Measures the skeleton to which a motion will be retargeted: spine, tilt of the feet, lengths of limbs."""
 
 from __future__ import annotations
 
@@ -20,35 +20,35 @@ SAME = 0.01
 
 
 @dataclass(frozen=True)
-class TargetBuild:
-    """The build of a skeleton with a standing rest pose.
+class TargetProportions:
+    """The proportions of a skeleton with a standing rest pose.
 
-    spine: the shape of its trunk and neck in that pose. tilt: angle in radians by which the bone from ankle
-    to ball of the foot points below the horizontal, mean of both feet. limbs: (B,) lengths of the B bones
-    that `limb_bones` returns, cm.
+    spine: the shape of its trunk and neck in that pose. foot_tilt: angle in radians by which the bone from
+    ankle to ball of the foot points below the horizontal, mean of both feet. limb_lengths: (B,) lengths of
+    the B bones that `limb_bones` returns, cm.
     """
 
     spine: Spine
-    tilt: float
-    limbs: Array
+    foot_tilt: float
+    limb_lengths: Array
 
     @classmethod
-    def of(cls, skeleton: Skeleton, body: Body) -> TargetBuild:
-        """The build of a skeleton. body: which joint is which part."""
+    def from_skeleton(cls, skeleton: Skeleton, body: Body) -> TargetProportions:
+        """The proportions of a skeleton. body: which joint is which part."""
         rest = quat.rotate(quat.inv(rest_frame(skeleton)), rest_positions(skeleton))
         feet = np.array([rest[toe] - rest[heel] for *_, heel, toe in body.legs.values() if toe is not None])
         tilt = float(np.mean(np.arctan2(-feet[:, 1], np.linalg.norm(feet[:, [0, 2]], axis=-1))))
         limbs = np.array([float(np.linalg.norm(rest[b] - rest[a])) for a, b in limb_bones(body)])
-        return cls(Spine.of(skeleton, body), tilt, limbs)
+        return cls(Spine.from_skeleton(skeleton, body), tilt, limbs)
 
-    def is_built_like(self, limbs: Array) -> bool:
-        """Whether a rig has the proportions of this build.
+    def matches_limb_lengths(self, limbs: Array) -> bool:
+        """Whether the limbs of a rig have these proportions.
 
         limbs: lengths of the bones that `limb_bones` returns for the rig, in any unit.
         """
-        if len(limbs) != len(self.limbs):
+        if len(limbs) != len(self.limb_lengths):
             return False
-        quotients = np.maximum(limbs, 1e-9) / self.limbs
+        quotients = np.maximum(limbs, 1e-9) / self.limb_lengths
         return bool(quotients.max() < (1 + SAME) * quotients.min())
 
 

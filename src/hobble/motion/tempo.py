@@ -19,7 +19,7 @@ from hobble.core.smooth import gaussian
 from hobble.motion.balance import GRAVITY, centre_of_mass
 from hobble.motion.body import SIDES
 from hobble.motion.rig import leg_length
-from hobble.motion.root import facing
+from hobble.motion.root import facing_directions
 
 FEWEST = 3  # steps; with fewer, nothing is estimated
 BRIEFEST = 4  # frames; shorter steps show no accelerations
@@ -111,7 +111,7 @@ def measure_accelerations(clip: Clip, steps: int, gravity: float = GRAVITY) -> A
     used[:edge] = used[-edge:] = False
     if not used.any():
         return None
-    ahead = facing(clip.skeleton, clip.positions, step_frames)
+    ahead = facing_directions(clip.skeleton, clip.positions, step_frames)
     values = acceleration[used]
     return Accelerations(
         level=float(np.sqrt(np.mean(np.sum(values[:, [0, 2]] ** 2, axis=-1)))),

@@ -14,8 +14,8 @@ from hobble.core.clip import Clip
 from hobble.core.errors import InputError
 from hobble.core.quat import Array
 from hobble.core.skeleton import Skeleton
-from hobble.motion.balance import Balance, balance
-from hobble.motion.orient import unit
+from hobble.motion.balance import Balance, find_balance
+from hobble.motion.orient import unit_vectors
 from hobble.motion.rig import leg_length
 
 # A plane, called the ground, is fitted to the balls of standing feet. Its axes are the horizontal direction
@@ -55,7 +55,7 @@ FITS = 12
 def world_tilt(clip: Clip) -> float | None:
     """Degrees by which the world is tilted, or None if nothing shows a tilt."""
     leg = leg_length(clip.skeleton)
-    body, is_level = balance(clip), False
+    body, is_level = find_balance(clip), False
     up = _up_from_posture(clip.skeleton, clip.positions) if body is None else body.up
     feet = standing_ball_positions(clip)
     if len(feet) >= FEWEST:
@@ -134,7 +134,7 @@ def _body_directions(skeleton: Skeleton, p: Array) -> tuple[Array, Array, Array]
     at = {role: p[:, skeleton.role(role)] for role in skeleton.roles}
     across = at["left_hip"] - at["right_hip"] + at["left_shoulder"] - at["right_shoulder"]
     legs = at["hips"] - 0.5 * (at["left_heel"] + at["right_heel"])
-    return unit(at["head"] - at["hips"]), unit(legs), unit(across)
+    return unit_vectors(at["head"] - at["hips"]), unit_vectors(legs), unit_vectors(across)
 
 
 def _up_from_posture(skeleton: Skeleton, p: Array) -> Array:
@@ -143,8 +143,10 @@ def _up_from_posture(skeleton: Skeleton, p: Array) -> Array:
     p: (F, J, 3) positions of the joints.
     """
     trunk, legs, across = _body_directions(skeleton, p)
-    ahead = unit(np.cross(across, [0.0, 1.0, 0.0]))
-    return np.asarray((unit(trunk + legs) - np.sin(np.radians(FORWARD_LEAN)) * ahead)[:, [0, 2]].mean(axis=0))
+    ahead = unit_vectors(np.cross(across, [0.0, 1.0, 0.0]))
+    return np.asarray(
+        (unit_vectors(trunk + legs) - np.sin(np.radians(FORWARD_LEAN)) * ahead)[:, [0, 2]].mean(axis=0)
+    )
 
 
 def _least_sideways_lean(skeleton: Skeleton, p: Array) -> float:
@@ -153,7 +155,7 @@ def _least_sideways_lean(skeleton: Skeleton, p: Array) -> float:
     0 if they do not all lean to the same side. p: (F, J, 3) positions of the joints.
     """
     trunk, legs, across = _body_directions(skeleton, p)
-    left = unit(across * [1.0, 0.0, 1.0])
+    left = unit_vectors(across * [1.0, 0.0, 1.0])
     # Sines of the leans, positive to the left.
     leans = [float(np.mean(np.sum(part * left, axis=-1))) for part in (trunk, legs)]
     leans.append(-float(np.mean(across[:, 1])))

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 
 
-def above(parents: Sequence[int], joint: int) -> list[int]:
+def path_to_root(parents: Sequence[int], joint: int) -> list[int]:
     """The joint and all its ancestors, the root last."""
     chain = [joint]
     while parents[chain[-1]] >= 0:
@@ -13,15 +13,15 @@ def above(parents: Sequence[int], joint: int) -> list[int]:
     return chain
 
 
-def common(parents: Sequence[int], joints: Iterable[int]) -> int:
+def lowest_common_ancestor(parents: Sequence[int], joints: Iterable[int]) -> int:
     """The lowest common ancestor of `joints`. A joint counts as its own ancestor here."""
-    first, *others = (above(parents, j) for j in joints)
+    first, *others = (path_to_root(parents, j) for j in joints)
     return next(j for j in first if all(j in other for other in others))
 
 
-def path(parents: Sequence[int], start: int, end: int) -> list[int]:
+def path_between(parents: Sequence[int], start: int, end: int) -> list[int]:
     """The joints from `start` to `end`, both included: up to their lowest common ancestor, then down."""
-    meet = common(parents, (start, end))
-    up = above(parents, start)
-    down = above(parents, end)
+    meet = lowest_common_ancestor(parents, (start, end))
+    up = path_to_root(parents, start)
+    down = path_to_root(parents, end)
     return up[: up.index(meet) + 1] + down[: down.index(meet)][::-1]

@@ -13,7 +13,7 @@ import numpy as np
 from hobble.core.quat import Array
 from hobble.motion.body import SIDES
 from hobble.motion.body_sample import BodySample
-from hobble.motion.orient import unit
+from hobble.motion.orient import unit_vectors
 
 # A leg is stretched if the distance from hip to ankle is more than this share of the leg's length. An upright
 # figure has at least one stretched leg.
@@ -35,7 +35,7 @@ def trunk_sample(sample: BodySample, stands_in_zero: bool) -> BodySample:
     """
     leans = _leans(sample)
     if np.mean(leans < UPRIGHT_LEAN) >= FEWEST:
-        return sample.part(leans < np.quantile(leans, FEWEST) + SPREAD)
+        return sample.at_moments(leans < np.quantile(leans, FEWEST) + SPREAD)
     return sample.in_zero_pose() if stands_in_zero else sample
 
 
@@ -56,15 +56,15 @@ def _leans(sample: BodySample) -> Array:
     """(S,) degrees between the trunk and the vertical; 180 in moments in which no leg is stretched."""
     body = sample.body
     shoulders, hips = (
-        sample.at[:, limbs["left"][k]] + sample.at[:, limbs["right"][k]]
+        sample.positions[:, limbs["left"][k]] + sample.positions[:, limbs["right"][k]]
         for limbs, k in ((body.arms, 1), (body.legs, 0))
     )
-    leans = np.degrees(np.arccos(np.clip(unit(shoulders - hips)[:, 1], -1.0, 1.0)))
+    leans = np.degrees(np.arccos(np.clip(unit_vectors(shoulders - hips)[:, 1], -1.0, 1.0)))
     stretch = np.max([_leg_stretch(sample, *body.legs[side][:3]) for side in SIDES], axis=0)
     return np.where(stretch > STRETCHED, leans, 180.0)
 
 
 def _leg_stretch(sample: BodySample, hip: int, knee: int, ankle: int) -> Array:
     """(S,) distance from hip to ankle, as a share of the leg's length. The joints are given by index."""
-    reach = np.linalg.norm(sample.at[:, ankle] - sample.at[:, hip], axis=-1)
+    reach = np.linalg.norm(sample.positions[:, ankle] - sample.positions[:, hip], axis=-1)
     return reach / max(sample.length(hip, knee, ankle), 1e-9)

@@ -25,12 +25,12 @@ from hobble.motion.flat_feet import feet_doubt, height_error
 from hobble.motion.from_motion import find_bends, frames_from_motion, trunk_frames
 from hobble.motion.from_rest import TRUSTED, frames_from_rest, use_zero_pose, zero_doubt
 from hobble.motion.no_neck import lean_doubt
-from hobble.motion.orient import degrees_between, mean_rotation, pointed_along
+from hobble.motion.orient import degrees_between, mean_rotation, rotation_pointing_along
 from hobble.motion.rebase import with_new_rest_pose
 from hobble.motion.spine import SHORT
 from hobble.motion.standing import why_not_standing
-from hobble.motion.target_build import TargetBuild
-from hobble.motion.tree import above
+from hobble.motion.target_build import TargetProportions
+from hobble.motion.tree import path_to_root
 from hobble.motion.trunk_sample import stoop_doubt, trunk_sample
 
 SAMPLES = 400  # at most this many frames of the clip are measured
@@ -41,13 +41,13 @@ class UprightMotion:
     """A clip with a standing rest pose that faces +Z with the arms out.
 
     clip: has the joints of the body, and the further joints that `with_upright_rest` was told to keep. body:
-    which joint is which part of the body. rest: where the rest pose comes from, in words. notes: sentences on
-    what is uncertain. height_error: cm by which the figure may stand too high or too low.
+    which joint is which part of the body. rest_source: where the rest pose comes from, in words. notes:
+    sentences on what is uncertain. height_error: cm by which the figure may stand too high or too low.
     """
 
     clip: Clip = field(repr=False)
     body: Body
-    rest: str
+    rest_source: str
     notes: list[str] = field(default_factory=list)
     height_error: float = 0.0
 
@@ -79,7 +79,7 @@ def with_upright_rest(
         speeds,
         rest,
         ends,
-        TargetBuild.of(target, body_by_roles(target)),
+        TargetProportions.from_skeleton(target, body_by_roles(target)),
         len(clip) / clip.fps,
     )
     # Two dicts, joint -> (4,) rotation of its axes in the rest pose. `zero` is what the zero pose shows, None
@@ -109,7 +109,7 @@ def _arms_on_neck(clip: Clip, body: Body) -> bool:
     """Whether the arms hang from the first joint of the neck, and this joint lies below the shoulders."""
     shoulders = [arm[1] for arm in body.arms.values()]
     parents, p = clip.skeleton.parents, clip.positions
-    if not body.neck or any(body.neck[0] not in above(parents, joint) for joint in shoulders):
+    if not body.neck or any(body.neck[0] not in path_to_root(parents, joint) for joint in shoulders):
         return False
     to_shoulders = np.mean([p[:, joint] for joint in shoulders], axis=0) - p[:, body.neck[0]]
     return bool(np.median(np.sum(to_shoulders * (p[:, body.head] - p[:, body.hips]), axis=-1)) > 0)
@@ -146,15 +146,15 @@ def _add_further_joints(
     body, parents = sample.body, clip.skeleton.parents
     added = []
     for joint in sorted(set(others) - set(body.joints)):
-        carrier = next((j for j in above(parents, joint)[1:] if j in body.joints), None)
+        carrier = next((j for j in path_to_root(parents, joint)[1:] if j in body.joints), None)
         if carrier is None:
             continue
-        part = quat.mul(sample.turned[:, carrier], axes[carrier])
-        axes[joint] = mean_rotation(quat.mul(quat.inv(sample.turned[:, joint]), part))
+        part = quat.mul(sample.rotations[:, carrier], axes[carrier])
+        axes[joint] = mean_rotation(quat.mul(quat.inv(sample.rotations[:, joint]), part))
         for side, sign in (("left", 1.0), ("right", -1.0)):
-            tips = [j for j in others if joint in above(parents, j)[1:]]
+            tips = [j for j in others if joint in path_to_root(parents, j)[1:]]
             bones = [bone for j in tips if np.linalg.norm(bone := sample.bone(joint, j)) > SHORT]
             if carrier == body.arms[side][3] and bones:
-                axes[joint] = pointed_along(axes[joint], sign * LEFT, bones[0])
+                axes[joint] = rotation_pointing_along(axes[joint], sign * LEFT, bones[0])
         added.append(joint)
     return added

@@ -12,7 +12,7 @@ from hobble.core import quat
 from hobble.core.array_parts import ArrayParts
 from hobble.core.quat import Array
 from hobble.evaluation.captured import headings, root_path, rotate_by_yaw, unbroken_stretches
-from hobble.figure.mesh import body, mesh_key
+from hobble.figure.mesh import body_mesh, mesh_key
 from hobble.models.network import Network
 from hobble.report.scenes import FPS, UNIT, packed_motion
 from hobble.rows.clip_rows import ClipRows, load_clip_rows, pairs
@@ -36,7 +36,7 @@ def comparisons(network: Network, paths: Iterable[str | Path], splits: Mapping[s
     """
     if network.skeleton is None:
         return {}
-    drawn_joints = body(network.skeleton).bones.tolist()
+    drawn_joints = body_mesh(network.skeleton).bones.tolist()
     order = sorted(paths, key=lambda path: (splits.get(Path(path).stem) != "held_out", Path(path).stem))
     clips = []
     held_out = sum(splits.get(Path(path).stem) == "held_out" for path in order)
@@ -56,7 +56,7 @@ def longest_stretch(path: str | Path) -> tuple[int, int]:
 
     The stretch is cut to LONGEST frames. Both numbers are 0 if the clip has no rows.
     """
-    stretches = unbroken_stretches(ArrayParts(path).whole("frame"))
+    stretches = unbroken_stretches(ArrayParts(path).read_whole("frame"))
     if not stretches:
         return 0, 0
     longest = max(stretches, key=len)[:LONGEST]

@@ -16,7 +16,7 @@ from hobble.core.array_parts import ArrayParts
 from hobble.core.quat import Array
 from hobble.core.skeleton import Skeleton
 from hobble.figure.fit_rotations import fitted_rotations
-from hobble.figure.mesh import body, mesh_key
+from hobble.figure.mesh import body_mesh, mesh_key
 from hobble.figure.pack import packed_turns
 from hobble.models.packing import packed
 
@@ -38,14 +38,14 @@ def ground_pictures(paths: Iterable[str | Path], skeleton: Mapping[str, Any]) ->
     if not skeleton:
         return {"joints": 0, "body": "", "pictures": pictures}
     figure = Skeleton.from_dict({"name": "", **skeleton})
-    drawn_joints = body(figure).bones
+    drawn_joints = body_mesh(figure).bones
     for path in paths:
         if len(pictures) == MOST_VIEWS:
             break
         file = ArrayParts(path)
-        count = int(file.whole("pictures")) if "pictures" in file else 0
+        count = int(file.read_whole("pictures")) if "pictures" in file else 0
         for i in range(min(count, MOST_VIEWS - len(pictures))):
-            view = {array: file.whole(f"picture{i}_{array}") for array in ARRAYS}
+            view = {array: file.read_whole(f"picture{i}_{array}") for array in ARRAYS}
             if view["pose"].shape[1] == len(figure.joints):
                 name = f"{Path(path).stem}, cycle {int(view['cycle']) + 1}"
                 turns = fitted_rotations(figure, np.asarray(view["pose"], float))[:, drawn_joints]

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from hobble.channels import channel
 from hobble.channels.shown import shown, words
 from hobble.core.skeleton import Skeleton
-from hobble.figure.mesh import body, mesh_key
+from hobble.figure.mesh import body_mesh, mesh_key
 from hobble.models.network import Network, inverse
 from hobble.models.packing import packed
 from hobble.rows.layout import RowLayout
@@ -137,7 +137,7 @@ def turning_joints(skeleton: Skeleton) -> list[int]:
     These are the joints that move the drawn body, the joints of the legs, and all ancestors of both.
     """
     needed: set[int] = set()
-    for joint in (*body(skeleton).bones.tolist(), *feet.leg_joints(skeleton).ravel().tolist()):
+    for joint in (*body_mesh(skeleton).bones.tolist(), *feet.leg_joints(skeleton).ravel().tolist()):
         while joint >= 0 and joint not in needed:
             needed.add(joint)
             joint = skeleton.parents[joint]

@@ -10,7 +10,7 @@ from importlib import metadata
 from pathlib import Path
 from typing import Any
 
-from hobble.core.processors import processor
+from hobble.core.processors import processor_name
 from hobble.evaluation.pipeline_results import Machine
 
 WEB = Path(__file__).parent / "web"  # the page's scripts
@@ -33,7 +33,7 @@ def machine() -> Machine:
     """System, processor, cores and memory of this machine, but not the name of the host or the user."""
     return {
         "system": f"{platform.system()} {platform.machine()}",
-        "processor": processor(),
+        "processor": processor_name(),
         "cores": os.cpu_count(),
         "memory_gb": _memory_gb(),
     }

@@ -14,7 +14,7 @@ from hobble.core.files import load_npz
 from hobble.core.quat import Array
 from hobble.core.skeleton import Skeleton
 from hobble.figure.fit_rotations import fitted_rotations
-from hobble.figure.mesh import body, mesh_key
+from hobble.figure.mesh import body_mesh, mesh_key
 from hobble.figure.pack import packed_turns
 from hobble.models.packing import packed
 from hobble.runtime.export import restore_bone_lengths
@@ -55,7 +55,7 @@ def scenes(
     displays = {name: shown(name, figure, columns, columns) for name, columns in (channels or {}).items()}
     frame_step = max(1, round(float(data["fps"]) / FPS))
     names = [str(name) for name in data["names"]]
-    bones = body(figure).bones.tolist()  # the joints that move the drawn body
+    bones = body_mesh(figure).bones.tolist()  # the joints that move the drawn body
     feet = [figure.role(role) if figure.roles.get(role) in figure.joints else -1 for role in FEET]
     return {
         "fps": float(data["fps"]) / frame_step,

@@ -21,7 +21,7 @@ from hobble.core.errors import HobbleError
 from hobble.core.files import write_json
 from hobble.core.quat import Array
 from hobble.core.skeleton import Skeleton
-from hobble.figure.mesh import body
+from hobble.figure.mesh import body_mesh
 from hobble.models.network import Network
 from hobble.report.raster import GRID, BodyRenderer, Camera
 from hobble.report.straight_walk import walk_straight
@@ -75,7 +75,7 @@ def write_stimuli(
     neutral, entries = make_loop(network, {}, runtime), []
     for name, channel_name, sample in all_loops(network):
         columns, trained = network.channels[channel_name], trained_columns(network, channel_name)
-        renderer = BodyRenderer(body(skeleton), shown(channel_name, skeleton, columns, trained).regions)
+        renderer = BodyRenderer(body_mesh(skeleton), shown(channel_name, skeleton, columns, trained).regions)
         loop = neutral
         if sample.values:
             loop = make_loop(network, {channel_name: dict(sample.values)}, runtime)
@@ -212,7 +212,7 @@ def draw_frames(
     The camera moves at constant speed. In each repetition it crosses a whole number of cells of the ground's
     grid, so that the ground repeats, too.
     """
-    count, bones = len(loop.positions), body(skeleton).bones
+    count, bones = len(loop.positions), body_mesh(skeleton).bones
     world_rotations, world_positions = restore_bone_lengths(skeleton, loop.positions, loop.rotations)
     start, yaw = loop.positions[0, 0], np.arctan2(loop.travel[0], loop.travel[2])
     # The mean distance of the root from a point that moves from `start` by `travel` at constant speed.

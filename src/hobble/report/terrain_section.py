@@ -54,14 +54,14 @@ def read_fits(path: str | Path) -> ShownFits:
     """
     try:
         file = ArrayParts(path)
-        fits, frame = file.whole("fits"), file.rows("frame", 0, MOST_ROWS)
+        fits, frame = file.read_whole("fits"), file.read_rows("frame", 0, MOST_ROWS)
         fewest = int(fits.min()) if len(fits) else 1
         first = (np.cumsum(fits) - fits)[:MOST_ROWS:FRAME_STEP]  # row of each frame's first fit in `heights`
-        heights = file.rows("heights", 0, int(first[-1]) + fewest if len(fits) else 0)
+        heights = file.read_rows("heights", 0, int(first[-1]) + fewest if len(fits) else 0)
         # Columns: heights along the path on its left, on it, and on its right. The middle one is at the root.
         present = heights.shape[1] // 3 + heights.shape[1] // 6
         profile = heights[:, present][first[:, None] + np.arange(fewest)] if len(fits) else np.zeros((0, 1))
-        errors = file.whole("foot_error"), file.whole("error")
+        errors = file.read_whole("foot_error"), file.read_whole("error")
         return ShownFits(Path(path).stem, *errors, frame[::FRAME_STEP], profile)
     except (ValueError, IndexError) as error:
         raise InputError(

@@ -223,8 +223,8 @@ def row_count(path: str | Path) -> int:
 def _read_part(file: ArrayParts, first: int, stop: int) -> dict[str, Any]:
     """Read all arrays of a file, but only for the rows from `first` up to `stop`, which is not included."""
     of_fits = ("heights", "mean")
-    whole = {name: file.whole(name) for name in ("clip", "layout", "skeleton", "visits")}
-    rows = {name: file.rows(name, first, stop) for name in file.names if name not in (*whole, *of_fits)}
-    first_fit = int(file.rows("fits", 0, first).sum())  # number of fits of the rows before `first`
+    whole = {name: file.read_whole(name) for name in ("clip", "layout", "skeleton", "visits")}
+    rows = {name: file.read_rows(name, first, stop) for name in file.names if name not in (*whole, *of_fits)}
+    first_fit = int(file.read_rows("fits", 0, first).sum())  # number of fits of the rows before `first`
     stop_fit = first_fit + int(rows["fits"].sum())
-    return {**whole, **rows, **{name: file.rows(name, first_fit, stop_fit) for name in of_fits}}
+    return {**whole, **rows, **{name: file.read_rows(name, first_fit, stop_fit) for name in of_fits}}

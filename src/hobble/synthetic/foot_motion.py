@@ -11,7 +11,7 @@ from itertools import pairwise
 import numpy as np
 
 from hobble.core import quat
-from hobble.core.curve_value import value_at
+from hobble.core.curve_value import interpolate_curve
 from hobble.core.quat import Array
 from hobble.core.smooth import smooth_above
 from hobble.synthetic.footsteps import ANKLE_TO_TOE, PlannedStance
@@ -92,10 +92,10 @@ class _Roll:
     @classmethod
     def of(cls, stance: PlannedStance, style: Style, side: int, rest_pitch: Array) -> _Roll:
         """The roll of a stance, with the values that the style has during it."""
-        land = value_at(style.land_pitch[:, side], stance.land)
-        off = value_at(style.off_pitch[:, side], stance.leave)
-        flat = value_at(style.flat, stance.land)
-        heel_off = value_at(style.heel_off[:, side], (stance.land + stance.leave) / 2)
+        land = interpolate_curve(style.land_pitch[:, side], stance.land)
+        off = interpolate_curve(style.off_pitch[:, side], stance.leave)
+        flat = interpolate_curve(style.flat, stance.land)
+        heel_off = interpolate_curve(style.heel_off[:, side], (stance.land + stance.leave) / 2)
         return cls(
             stance,
             float(np.radians(land)),
@@ -103,7 +103,7 @@ class _Roll:
             rest_pitch,
             float(flat),
             float(heel_off),
-            float(value_at(style.roll, stance.leave)),
+            float(interpolate_curve(style.roll, stance.leave)),
         )
 
     def pitch(self, t: Array | float, lands: bool = True, leaves: bool = True) -> Array:
@@ -116,7 +116,7 @@ class _Roll:
         share = (np.asarray(t, float) - stance.land) / (stance.leave - stance.land)  # of the stance
         down = share / self.flat
         rise = np.clip((share - self.heel_off) / (1 - self.heel_off), 0, None)
-        rest = value_at(self.rest_pitch, t)
+        rest = interpolate_curve(self.rest_pitch, t)
         landing = (self.land_pitch - rest) * (1 - _ease(down)) if lands else 0.0
         leaving = (self.off_pitch - rest) * rise**self.power if leaves else 0.0
         return np.asarray(rest + landing + leaving)

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from hobble.core import quat
-from hobble.core.curve_value import value_at
+from hobble.core.curve_value import interpolate_curve
 from hobble.core.quat import Array
 from hobble.synthetic.planned_ground import Ground
 from hobble.synthetic.planned_path import PlannedPath
@@ -71,14 +71,14 @@ def plan_stances(
     events = [(land, side) for side in (LEFT, RIGHT) for land in landing_frames(phase, side)[:-1]]
     planned: tuple[list[PlannedStance], list[PlannedStance]] = ([], [])
     for land, side in sorted(events):
-        landing_phase = value_at(phase, land)
+        landing_phase = interpolate_curve(phase, land)
         # Here the duty is that of the frame in which the foot leaves, not of the landing. So a walker who has
         # become faster since the landing lifts the foot sooner.
         leave = np.interp(landing_phase, phase_less_duty[side], frames)
-        mid_stance = np.interp((landing_phase + value_at(phase, leave)) / 2, phase, frames)
+        mid_stance = np.interp((landing_phase + interpolate_curve(phase, leave)) / 2, phase, frames)
         previous, other_foot = (planned[s][-1] if planned[s] else None for s in (side, 1 - side))
         ankle, turn = _place_foot(path, style, ground, side, mid_stance, other_foot, rng)
-        standing = value_at(speed, mid_stance) < STANDING_SPEED
+        standing = interpolate_curve(speed, mid_stance) < STANDING_SPEED
         if previous and standing and _is_same_place(previous, ankle, turn):
             planned[side].append(PlannedStance(land, leave, previous.ankle, previous.turn, swings=False))
         else:
@@ -102,7 +102,7 @@ def _place_foot(
     """
 
     def in_mid_stance(curve: Array) -> float:
-        return float(value_at(curve, mid_stance))
+        return float(interpolate_curve(curve, mid_stance))
 
     moving = 1 - in_mid_stance(path.gait[:, 0])  # column 0 is the share of standing
     facing = in_mid_stance(path.facing)

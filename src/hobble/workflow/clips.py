@@ -21,7 +21,7 @@ from hobble.core.clip_files import (
     CLIP_NAME_RULE,
     find_clips,
     is_valid_clip_name,
-    only_file,
+    require_single_file,
     unused_file_notes,
 )
 from hobble.core.errors import HobbleError, InputError
@@ -165,7 +165,7 @@ class Clips:
         if settings.synthetic is not None:
             return str(self.folder(dataset) / f"{clip}.bvh")
         if clip in (files := self._files(dataset)):
-            return str(only_file(clip, files[clip]))
+            return str(require_single_file(clip, files[clip]))
         if clip in (downloads := self._checksums(dataset)):
             return self.download_path(settings.source or dataset, clip)
         path = self.folder(dataset) / f"{clip}.bvh"
@@ -267,7 +267,7 @@ class Clips:
             if not is_valid_clip_name(name):
                 fix = f"Rename it. Allowed: {CLIP_NAME_RULE}."
                 raise InputError(folder, f"a clip is called {name!a:.80}", fix=fix)
-            only_file(name, files[name])
+            require_single_file(name, files[name])
         if not files:
             raise InputError(folder, "no .bvh files here", fix="Put clips there.")
         return sorted(set(files) - set(self._mirrors(dataset)))

@@ -18,7 +18,7 @@ from collections.abc import Iterable, Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
-from hobble.core.files import write_error
+from hobble.core.files import failed_write_error
 from hobble.workflow.checksums import file_crc32
 
 FOLDER = ".made"  # in the folder of a data set
@@ -56,7 +56,7 @@ class KeptFiles:
                     try:
                         _link(kept, path)
                     except OSError as error:
-                        raise write_error(error, path) from error
+                        raise failed_write_error(error, path) from error
                 return True
         return False
 

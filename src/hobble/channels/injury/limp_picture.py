@@ -13,8 +13,8 @@ from hobble.channels.injury.crowd_severities import hurt_links, links
 from hobble.channels.injury.shown import body_parts
 from hobble.core.errors import HobbleError
 from hobble.core.files import atomic_path
-from hobble.figure.mesh import body
-from hobble.figure.pack import regions
+from hobble.figure.mesh import body_mesh
+from hobble.figure.pack import links_of_bones
 from hobble.models.network import Network
 from hobble.report.raster import BodyRenderer
 from hobble.report.stimuli import FRAME_STEP, draw_frames, make_loop
@@ -41,7 +41,7 @@ def write_limp_picture(network: Network, path: str | Path, runtime: Runtime) -> 
     # name of a part of the body -> index of its link
     link_of_part = body_parts(network.skeleton, link_names, hurt_links(network))
     hurt = {link_names[link_of_part[part]]: severity for part, severity in INJURIES.items()}
-    renderer = BodyRenderer(body(network.skeleton), regions(network.skeleton, link_names))
+    renderer = BodyRenderer(body_mesh(network.skeleton), links_of_bones(network.skeleton, link_names))
     halves = []
     for injury in ({}, hurt):
         # A link is drawn in a colour from 0 (healthy) to 1 (severity 10).

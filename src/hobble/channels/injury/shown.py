@@ -12,7 +12,7 @@ from itertools import pairwise
 
 from hobble.channels.shown import ChannelDisplay, ChannelWords, SampleWalk
 from hobble.core.skeleton import Skeleton
-from hobble.figure.pack import link_ends, regions
+from hobble.figure.pack import link_ends, links_of_bones
 
 # Words on the report page; `ChannelWords` explains them. {} stands for the name of a link.
 WORDS = ChannelWords(
@@ -98,7 +98,7 @@ def shown(skeleton: Skeleton, links: Sequence[str], trained: Collection[str]) ->
         if all(label in trained_parts for label in values)
     }
     return ChannelDisplay(
-        tuple(spoken_links(skeleton, links)), trained_parts, presets, regions(skeleton, links)
+        tuple(spoken_links(skeleton, links)), trained_parts, presets, links_of_bones(skeleton, links)
     )
 
 

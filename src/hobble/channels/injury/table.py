@@ -20,7 +20,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from hobble.channels.injury.status import InjurySpell, Status, check_link, check_severity, write_status
-from hobble.core.clip_files import find_clips, only_file
+from hobble.core.clip_files import find_clips, require_single_file
 from hobble.core.errors import InputError
 from hobble.core.untrusted import read_text, read_yaml
 
@@ -130,7 +130,9 @@ def write_statuses(table: str | Path, folder: str | Path, links: Sequence[str]) 
     rows = read_table(table, links)
     folder = Path(folder)
     in_folder = find_clips(folder)
-    files = {row.clip: only_file(row.clip, in_folder[row.clip]) for row in rows if row.clip in in_folder}
+    files = {
+        row.clip: require_single_file(row.clip, in_folder[row.clip]) for row in rows if row.clip in in_folder
+    }
     frames = {clip: bvh_frames(file) for clip, file in files.items()}
     written = []
     for clip, status in statuses(rows, frames, table).items():

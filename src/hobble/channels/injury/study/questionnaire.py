@@ -32,7 +32,7 @@ from hobble.channels.injury.study.films import (
 from hobble.core.files import write_json, write_text
 from hobble.core.skeleton import Skeleton
 from hobble.core.smooth import gaussian
-from hobble.figure.mesh import body
+from hobble.figure.mesh import body_mesh
 from hobble.models.network import Network
 from hobble.report.formats import embedded
 from hobble.report.raster import BodyRenderer, Camera
@@ -71,7 +71,7 @@ def write_questionnaire(
         part_links(network, film.parts)  # raises an error before anything is drawn or written
     assert network.skeleton is not None
     folder.mkdir(parents=True, exist_ok=True)
-    renderer, skeleton = BodyRenderer(body(network.skeleton)), network.skeleton
+    renderer, skeleton = BodyRenderer(body_mesh(network.skeleton)), network.skeleton
 
     def draw_film(film: Film) -> tuple[dict[str, Any], dict[str, Any]]:
         """The film's entry in films.json, and its entry in the data of the page."""
@@ -137,7 +137,7 @@ def draw_pictures(
 
     The character has one colour, so that people have to judge by its motion what hurts.
     """
-    bones = body(skeleton).bones  # indices of the joints that move the body's mesh
+    bones = body_mesh(skeleton).bones  # indices of the joints that move the body's mesh
     rotations, positions = restore_bone_lengths(skeleton, motion.positions, motion.rotations)
     path = gaussian(motion.positions[:, 0], CAMERA_SMOOTHING)  # the points that the camera looks at
     path[:, 1] = LOOK_AT
