@@ -1,7 +1,7 @@
 """Creates the values of channels in each frame of clips and their mirrors from the data set's sources."""
 
 from hobble.channels import channel
-from hobble.channels.clip_values import clip_values, save_values, write_report
+from hobble.channels.clip_values import read_clip_values, save_values, write_report
 from hobble.core.clip import load_clip
 from hobble.core.files import read_json
 from hobble.workflow.batch_job import make_each
@@ -10,8 +10,8 @@ from hobble.workflow.batch_job import make_each
 def make(piece, log):
     """Read the values of one channel for a clip and its mirror."""
     name, clip = piece.params["channel"], load_clip(piece.input["clip"])
-    source = channel(name).source(piece.params["source"], piece.input.get("files", []))
-    values, warnings = clip_values(name, clip, source, read_json(piece.input["report"]))
+    source = channel(name).make_source(piece.params["source"], piece.input.get("files", []))
+    values, warnings = read_clip_values(name, clip, source, read_json(piece.input["report"]))
     for warning in warnings:
         log.warning("%s", warning)
     labels = channel(name).columns(clip.skeleton)

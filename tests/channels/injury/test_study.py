@@ -11,7 +11,7 @@ from typing import Any
 
 import pytest
 
-from hobble.channels.injury.study.answer_tables import NUMERALS, tables
+from hobble.channels.injury.study.answer_tables import NUMERALS, answer_rows_by_numeral
 from hobble.channels.injury.study.answers import FilmAnswer, Study, read_answers, read_study
 from hobble.channels.injury.study.films import FILMS, FPS, GAIT, ONE, PARTS, SEVERAL, hurts_and_gait
 from hobble.cli.__main__ import main
@@ -80,7 +80,7 @@ def back(film) -> tuple[list[str], int]:
 def test_known_answers_give_known_tables(folder: Path, study: Study) -> None:
     """Of three people one names all parts, one confuses the sides, and one always says the back."""
     people = [read_answers(write(folder, says.__name__, says), study) for says in (right, mirrored, back)]
-    made = tables(study, people)
+    made = answer_rows_by_numeral(study, people)
     assert tuple(made) == NUMERALS
     for numeral, film in zip(NUMERALS, FILMS, strict=False):
         rows = {row["part"]: row for row in made[numeral]}
@@ -112,7 +112,7 @@ def test_naming_one_of_three_hurt_parts_counts_a_third(study: Study) -> None:
     """
     first = [FilmAnswer(f.number, f.parts[:1] if f.number == 9 else f.parts, 4) for f in FILMS]
     second = [FilmAnswer(f.number, () if f.number == 9 else f.parts, 2) for f in FILMS]
-    rows = {row["film"]: row for row in tables(study, [first, second])["XVI"][:13]}
+    rows = {row["film"]: row for row in answer_rows_by_numeral(study, [first, second])["XVI"][:13]}
     assert rows["9"]["seen"] == pytest.approx(1 / 6, abs=1e-5)
     assert rows["9"]["exact"] == 0
     assert rows["9"]["wrong"] == 0

@@ -10,7 +10,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from hobble.channels.injury.crowd_severities import severities
+from hobble.channels.injury.crowd_severities import severity_inputs
 from hobble.core.quat import Array
 from hobble.evaluation.crowd import FPS, channel_values
 from hobble.gait.cycles import WalkCycles, measure
@@ -55,7 +55,7 @@ def walk_figures(
     animation = ProceduralAnimation(network, characters=count, **dict(runtime))
     velocity = np.zeros((count, 2))
     velocity[:, 1] = speeds
-    channels = severities(network, injuries)
+    channels = severity_inputs(network, injuries)
     for name, values in (other_channels or {}).items():
         channels |= channel_values(network, name, values)
     shares = np.tile([float(name == gait) for name in network.gaits], (count, 1))

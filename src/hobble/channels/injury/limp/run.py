@@ -15,8 +15,7 @@ from typing import Any
 
 import numpy as np
 
-from hobble.channels.injury.crowd_severities import hurt_links
-from hobble.channels.injury.crowd_severities import links as links_of
+from hobble.channels.injury.crowd_severities import injury_links, links_hurt_in_training
 from hobble.channels.injury.limp import Options
 from hobble.channels.injury.limp.captured_limps import (
     CapturedWalk,
@@ -79,9 +78,9 @@ def measure_limps(
     `hobble.channels.injury.limp.with_other_channel`.
     """
     head: dict[str, Any] = {"configuration": configuration}
-    if not links_of(network) or network.skeleton is None:
+    if not injury_links(network) or network.skeleton is None:
         return {**head, "applies": False, "reason": NO_SEVERITIES}
-    links = list(links or links_of(network))
+    links = list(links or injury_links(network))
     rows = _size_rows(network, links, seconds, runtime)
     if rows is None:
         return {**head, "applies": False, "reason": NO_CYCLE}
@@ -91,7 +90,7 @@ def measure_limps(
         "asked_cm_per_second": {gait: 60 * speed for gait, speed in SPEEDS.items()},
         "seconds": seconds,
         "effects": EFFECTS,
-        "trained": [link for link in links if link in hurt_links(network)],
+        "trained": [link for link in links if link in links_hurt_in_training(network)],
         "hurt_seconds": {"captured": hurt_seconds.captured, "made": hurt_seconds.generated},
         "sizes": rows,
         "trends": _trend_rows(rows),
@@ -355,8 +354,8 @@ def run(inputs: MeasureInputs, options: Options) -> Outcome:
         raise HobbleError(f"{inputs.weights}: this network file has no skeleton, so limps cannot be measured")
     sample = sample_of(inputs, options)
     # A network without severities has no limps, so no clips are read.
-    parts = clip_parts(inputs.clips, sample) if links_of(network) else ()
-    captured, hurt_seconds = captured_walks(parts, inputs.splits, links_of(network), network.skeleton)
+    parts = clip_parts(inputs.clips, sample) if injury_links(network) else ()
+    captured, hurt_seconds = captured_walks(parts, inputs.splits, injury_links(network), network.skeleton)
     result = measure_limps(
         network,
         captured,

@@ -15,8 +15,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from hobble.channels.injury.crowd_severities import INJURY, hurt_links
-from hobble.channels.injury.crowd_severities import links as links_of
+from hobble.channels.injury.crowd_severities import INJURY, injury_links, links_hurt_in_training
 from hobble.channels.injury.shown import OTHER_PARTS as PARTS_WITHOUT_SLIDER
 from hobble.channels.injury.shown import PARTS as PARTS_WITH_SLIDER
 from hobble.channels.injury.shown import links_between
@@ -103,7 +102,7 @@ def part_links(network: Network, parts: Sequence[str]) -> list[str]:
     uppermost link is taken. Raises HobbleError if the network has no injury channel, or if the skeleton has
     no such part.
     """
-    links, trained = links_of(network), hurt_links(network)
+    links, trained = injury_links(network), links_hurt_in_training(network)
     if network.skeleton is None or not links:
         raise HobbleError("this network has no injury channel. Use a configuration with `channels: [injury]`")
     # Part -> roles of the joints at its two ends.
