@@ -16,7 +16,7 @@ from hobble.channels.injury.limp.captured_limps import CapturedWalk
 from hobble.channels.injury.limp.run import compare_held_out
 from hobble.channels.injury.status import read_status
 from hobble.core.errors import InputError
-from hobble.gait.cycles import measure
+from hobble.gait.cycles import measure_cycles
 from hobble.gait.profile import NO_CYCLE
 from hobble.gait.read_clip import read_clip
 from hobble.models.load import load_network
@@ -29,7 +29,7 @@ def captured_limp(path: Path, network: Network) -> CapturedWalk:
     spells = read_status(path.with_name(f"{path.stem}_injuries.txt"), injury_links(network)).spells
     if len({spell.links for spell in spells}) != 1:
         raise InputError(path, "its severities change, so no single limp can be compared")
-    walk = measure(clip.skeleton, clip.positions, clip.fps)
+    walk = measure_cycles(clip.skeleton, clip.positions, clip.fps)
     if not len(walk):
         raise InputError(path, NO_CYCLE)
     return CapturedWalk(path.stem, dict(spells[0].links), walk, 0.0)

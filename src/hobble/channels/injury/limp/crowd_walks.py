@@ -13,8 +13,8 @@ import numpy as np
 from hobble.channels.injury.crowd_severities import severity_inputs
 from hobble.core.quat import Array
 from hobble.evaluation.crowd import FPS, channel_values
-from hobble.gait.cycles import WalkCycles, measure
-from hobble.gait.profile import Profile, profile
+from hobble.gait.cycles import WalkCycles, measure_cycles
+from hobble.gait.profile import Profile, profile_of_walk
 from hobble.models.network import Network
 from hobble.runtime.animation import ProceduralAnimation
 from hobble.runtime.options import Runtime
@@ -73,5 +73,5 @@ def _figure_walk(network: Network, positions: Array) -> FigureWalk:
     hips = network.skeleton.role("hips")
     # Distance on the ground between the first and the last position, divided by the frames between them.
     speed = float(np.linalg.norm((positions[-1, hips] - positions[0, hips])[::2])) / (len(positions) - 1)
-    walk = measure(network.skeleton, positions, FPS)
-    return FigureWalk(walk, profile(walk) if len(walk) else None, speed, len(positions))
+    walk = measure_cycles(network.skeleton, positions, FPS)
+    return FigureWalk(walk, profile_of_walk(walk) if len(walk) else None, speed, len(positions))

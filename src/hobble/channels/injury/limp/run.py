@@ -29,11 +29,11 @@ from hobble.core.errors import HobbleError
 from hobble.core.skeleton import Skeleton
 from hobble.evaluation.spearman import spearman
 from hobble.gait.comparison import compare_walk
-from hobble.gait.effect_sizes import EFFECTS, effects, effects_of_people
+from hobble.gait.effect_sizes import EFFECTS, effects_of_people, measure_effects
 from hobble.gait.features import features
-from hobble.gait.people import people
-from hobble.gait.profile import Profile, profile
-from hobble.gait.recogniser import RIGHT, SIDES, examples
+from hobble.gait.people import read_people
+from hobble.gait.profile import Profile, profile_of_walk
+from hobble.gait.recogniser import RIGHT, SIDES, examples_of_people
 from hobble.hurt.body_parts import part_of_link
 from hobble.measures.clip_parts import clip_parts, sample_of, with_sample
 from hobble.measures.inputs import MeasureInputs, Outcome
@@ -97,7 +97,7 @@ def measure_limps(
         "named": _recognition_by_severity(rows),
         "people": {
             gait: {name: [round(v, 5) for v in mean_and_sd] for name, mean_and_sd in of_gait.items()}
-            for gait, of_gait in effects_of_people(people()).items()
+            for gait, of_gait in effects_of_people(read_people()).items()
         },
         "captured": [_row_of_clip(network.skeleton, clip, captured) for clip in captured if clip.hurt],
         "held_out_limps": compare_held_out(network, captured, splits, seconds, runtime),
@@ -185,17 +185,17 @@ def _row_of_walk(
             **dict.fromkeys(EFFECTS),
             **dict.fromkeys(("called", "graded", "impaired", "named", "wrong_side")),
         }
-    row |= _rounded_values(effects(figure.profile, healthy.profile, side))
+    row |= _rounded_values(measure_effects(figure.profile, healthy.profile, side))
     found = compare_walk(figure.walk, figure.frames, healthy.profile, WINDOW)
-    answers = [answer for _, answer in found.windows]  # of the linear recogniser, for each window
-    grades = [grade for _, grade in found.grades]  # of the graded recogniser, for each window
+    answers = [answer for _, answer in found.window_answers]  # of the linear recogniser, for each window
+    grades = [grade for _, grade in found.window_grades]  # of the graded recogniser, for each window
     wrong_side = SIDES[1 - SIDES.index(side)]
     row["called"] = " ".join(filter(None, (found.answer.label, found.answer.side)))
     row["graded"] = " ".join(filter(None, (found.grade.label, found.grade.side)))
-    row["impaired"] = _share([a.impaired for a in answers])
-    row["named"] = _share([g.impaired and g.side != wrong_side for g in grades])
+    row["impaired"] = _share([a.is_impaired for a in answers])
+    row["named"] = _share([g.is_impaired and g.side != wrong_side for g in grades])
     row["wrong_side"] = (
-        _share([g.impaired and g.side == wrong_side for g in grades]) if part.side is not None else None
+        _share([g.is_impaired and g.side == wrong_side for g in grades]) if part.side is not None else None
     )
     return row
 
@@ -244,7 +244,7 @@ def _row_of_clip(skeleton: Skeleton, clip: CapturedWalk, captured: Sequence[Capt
     """
     healthy, whose = healthy_reference(clip, captured)
     side = hurt_side(skeleton, max(clip.hurt, key=lambda link: clip.hurt[link]))
-    sizes = _rounded_values(effects(profile(clip.walk), healthy, side))
+    sizes = _rounded_values(measure_effects(profile_of_walk(clip.walk), healthy, side))
     return {"clip": clip.clip, "hurt": dict(clip.hurt), "side": side, "healthy": whose, **sizes}
 
 
@@ -255,7 +255,7 @@ def limp_distance(walk: Profile, healthy: Profile, other: Profile, other_healthy
     is the root mean square of the differences of all features of the limps. Each difference is divided by the
     standard deviation of its feature over people's walks.
     """
-    features_of_people = examples(people(), range(people().count))[0]
+    features_of_people = examples_of_people(read_people(), range(read_people().count))[0]
     spread = features_of_people.std(axis=0)
     a, b = (np.array(list(features(*pair).values())) for pair in ((walk, healthy), (other, other_healthy)))
     return float(np.sqrt(np.mean(((a - b) / spread) ** 2)))
@@ -290,7 +290,7 @@ def compare_held_out(
         if healthy_figure is None or figure.profile is None:
             out.append({**row, "healthy": None, "hurt": None, "nearer": False})
             continue
-        walk_of_clip = profile(clip.walk)
+        walk_of_clip = profile_of_walk(clip.walk)
         from_healthy, from_hurt = (
             limp_distance(walk_of_clip, healthy, walk, healthy_figure)
             for walk in (healthy_figure, figure.profile)

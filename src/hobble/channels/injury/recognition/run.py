@@ -253,7 +253,9 @@ def _cross_validate(windows: Sequence[InjuryWindow], parts_of_class: PartsOfClas
         others = [w for w in windows if w.quarter != quarter]
         of_quarter = [w for w in windows if w.quarter == quarter]
         if of_quarter and len({w.hurt for w in others}) > 1:
-            named += learn(feature_table(others), [w.hurt for w in others]).names(feature_table(of_quarter))
+            named += learn(feature_table(others), [w.hurt for w in others]).likeliest_classes(
+                feature_table(of_quarter)
+            )
             judged += of_quarter
     return _count_answers(sorted({w.hurt for w in windows}), judged, named, parts_of_class)
 
@@ -262,7 +264,7 @@ def _judge_windows(
     classifier: Discriminant, windows: Sequence[InjuryWindow], parts_of_class: PartsOfClass
 ) -> RecognisedWindows:
     """How the classifier recognises windows."""
-    named = classifier.names(feature_table(windows)) if windows else []
+    named = classifier.likeliest_classes(feature_table(windows)) if windows else []
     return _count_answers(classifier.classes, windows, named, parts_of_class)
 
 
