@@ -27,20 +27,21 @@ from hobble.core.skeleton import Skeleton
 class ChannelWords:
     """Texts of a channel for the report page. {} stands for the name of a column.
 
-    rest: label of the button that sets all values to 0. step: step of a slider. key: name of the values in
-    the address of the page, by default the channel's name. grows: description of a sweep. never: note on a
-    column that is not trained. headline: headline of the page. says: what the network is told if the column
-    is above 0. on: a word for a character with a value above 0; if it is empty, the column's name is used.
+    neutral_button: label of the button that sets all values to 0. slider_step: step of a slider. address_key:
+    name of the values in the address of the page, by default the channel's name. sweep_description:
+    description of a sweep. untrained_note: note on a column that is not trained. headline: headline of the
+    page. network_told: what the network is told if the column is above 0. active_word: a word for a character
+    with a value above 0; if it is empty, the column's name is used.
     """
 
-    rest: str = "Neutral"
-    step: float = 0.05
-    key: str | None = None
-    grows: str = "Walks {} more and more"
-    never: str = "always 0 in training, so it has no effect"
+    neutral_button: str = "Neutral"
+    slider_step: float = 0.05
+    address_key: str | None = None
+    sweep_description: str = "Walks {} more and more"
+    untrained_note: str = "always 0 in training, so it has no effect"
     headline: str = "Say how it walks."
-    says: str = "{}"
-    on: str = ""
+    network_told: str = "{}"
+    active_word: str = ""
 
 
 @dataclass(frozen=True)
@@ -111,7 +112,7 @@ def loops(
         return own_loops(skeleton, columns, trained)
     chosen, highest = [column for column in columns if column in trained], channel(name).highest
     return [
-        SampleWalk(words(name).rest.lower(), {}),
+        SampleWalk(words(name).neutral_button.lower(), {}),
         *(SampleWalk(c.replace(" ", "-"), {c: highest}) for c in chosen),
     ]
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from hobble.hurt.body_parts import LEFT, RIGHT
-from hobble.hurt.interpolate import at_frames
+from hobble.hurt.interpolate import interpolate_values
 from hobble.hurt.timing import Timing
 from hobble.labels.clip_labels import Labels
 from hobble.labels.phase import dropped_frames, find_cycles, phase_of_footsteps
@@ -34,7 +34,7 @@ def relabel(labels: Labels, timing: Timing, zero: str, margins: str) -> Labels:
         contacts=contacts,
         phase=phase if zero == "right" else (phase + 0.5) % 1.0,
         phase_known=known & labels.phase_known[body],
-        gait=at_frames(labels.gait, timing.body),
+        gait=interpolate_values(labels.gait, timing.body),
         footsteps=footsteps,
         cycles=cycles,
     )

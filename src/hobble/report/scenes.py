@@ -121,7 +121,7 @@ def _packed_walk(
             # 0 to 250 stands for 0 to the highest value.
             "values": packed(np.clip(np.round(250 * share), 0, 250).astype(np.uint8)),
         }
-        out["description"] = words(swept_channel).grows.format(word)
+        out["description"] = words(swept_channel).sweep_description.format(word)
     return out
 
 

@@ -16,14 +16,14 @@ from hobble.figure.pack import link_ends, regions
 
 # Words on the report page; `ChannelWords` explains them. {} stands for the name of a link.
 WORDS = ChannelWords(
-    rest="Healthy",
-    step=1,
-    key="hurt",
-    grows="Walks while the {} hurts more and more",
-    never="never hurt in training, so it has no effect",
+    neutral_button="Healthy",
+    slider_step=1,
+    address_key="hurt",
+    sweep_description="Walks while the {} hurts more and more",
+    untrained_note="never hurt in training, so it has no effect",
     headline="Say where it hurts.",
-    says="that its {} hurts",
-    on="hurt",
+    network_told="that its {} hurts",
+    active_word="hurt",
 )
 # Parts of the body that have a slider on the page: label, roles of the joints at the upper and the lower end.
 PARTS = (

@@ -19,7 +19,7 @@ from hobble.models.network import Network
 from hobble.runtime.animation import ProceduralAnimation
 from hobble.runtime.options import Runtime
 
-WARM_UP = 5 * FPS  # frames that are not measured, while figures reach their speed and begin to limp
+WARM_UP_FRAMES = 5 * FPS  # frames that are not measured, while figures reach their speed and begin to limp
 
 
 @dataclass(frozen=True)
@@ -60,7 +60,7 @@ def walk_figures(
         channels |= channel_values(network, name, values)
     shares = np.tile([float(name == gait) for name in network.gaits], (count, 1))
     positions = np.zeros((frames, count, len(network.skeleton.joints), 3), np.float32)
-    for frame in range(-WARM_UP, frames):
+    for frame in range(-WARM_UP_FRAMES, frames):
         pose = animation.next_pose(velocity, gait=shares.copy(), **channels)
         if frame >= 0:
             positions[frame] = pose.positions.reshape(count, -1, 3)

@@ -48,7 +48,9 @@ SPEEDS = {"walk": 2.0, "jog": 7.0}  # target speeds, cm a frame; 2 is 1.2 m/s, a
 FIRST_SEVERITIES = (5.0, 10.0)  # of the first injury in walks with two injuries
 SECOND_SEVERITIES = (5.0, 10.0)  # of the second injury in these walks
 LEG = ("hip", "thigh", "shank", "foot")  # parts of the body that belong to a leg
-WINDOW = 4.0  # seconds; length of the stretches (windows) of a walk that a recogniser judges one by one
+WINDOW_SECONDS = (
+    4.0  # seconds; length of the stretches (windows) of a walk that a recogniser judges one by one
+)
 
 
 def measure_limps(
@@ -186,7 +188,7 @@ def _row_of_walk(
             **dict.fromkeys(("called", "graded", "impaired", "named", "wrong_side")),
         }
     row |= _rounded_values(measure_effects(figure.profile, healthy.profile, side))
-    found = compare_walk(figure.walk, figure.frames, healthy.profile, WINDOW)
+    found = compare_walk(figure.walk, figure.frames, healthy.profile, WINDOW_SECONDS)
     answers = [answer for _, answer in found.window_answers]  # of the linear recogniser, for each window
     grades = [grade for _, grade in found.window_grades]  # of the graded recogniser, for each window
     wrong_side = SIDES[1 - SIDES.index(side)]

@@ -115,11 +115,11 @@ def _solution_of(network: Network, film: Film, motion: FilmMotion) -> dict[str, 
         "links": links,
         "untrained": [link for link in links if link not in links_hurt_in_training(network)],
         "seconds": film.seconds,
-        "from_healthy_cm": round(motion.from_healthy, 2),
+        "from_healthy_cm": round(motion.cm_from_healthy, 2),
     }
 
 
-def doubts(solution: dict[str, Any]) -> list[str]:
+def list_doubts(solution: dict[str, Any]) -> list[str]:
     """Warnings: films in which nobody can see the injury, and hurt links that were never hurt in training.
 
     solution: the content of films.json.
