@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from hurt_gait import measures
 
-from hobble.hurt.effects import POWER
+from hobble.hurt.effects import STRENGTH_POWER
 from hobble.hurt.hurt_clip import hurt_clip
 from hobble.hurt.options import Hurt
 from hobble.hurt.version import SEVERITY_TOLERANCE, hurt_version
@@ -47,7 +47,7 @@ def test_a_change_of_severity_sets_in_over_a_second_like_the_motion(changing, ho
     at = int(
         np.argmin(np.abs(hurt.source_frames - 299.5))
     )  # the moment of the change: half of the strength of 10
-    assert severity[at] == pytest.approx(10 * 0.5 ** (1 / POWER), abs=0.25)
+    assert severity[at] == pytest.approx(10 * 0.5 ** (1 / STRENGTH_POWER), abs=0.25)
 
 
 def test_frames_with_a_severity_are_as_fast_as_a_clip_with_it_throughout(changing, made, hurting) -> None:

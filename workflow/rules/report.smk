@@ -127,7 +127,7 @@ rule report:
             "report",
             configurations.kind(w.configuration),
             *part_modules("page"),
-            *shown_modules(),
+            *display_modules(),
         ),
     script:
         "../scripts/report.py"
@@ -173,7 +173,7 @@ rule stimuli:
     params:
         runtime=lambda w: configurations.section(w.configuration, "runtime"),
         code=lambda w: package.code(
-            "stimuli", configurations.kind(w.configuration), *shown_modules()
+            "stimuli", configurations.kind(w.configuration), *display_modules()
         ),
     script:
         "../scripts/stimuli.py"
@@ -199,7 +199,7 @@ rule questionnaire:
         configuration=lambda w: w.configuration,
         runtime=lambda w: configurations.section(w.configuration, "runtime"),
         code=lambda w: package.code(
-            "questionnaire", configurations.kind(w.configuration), *shown_modules()
+            "questionnaire", configurations.kind(w.configuration), *display_modules()
         ),
     script:
         "../scripts/questionnaire.py"

@@ -16,7 +16,7 @@ rule generate:
     params:
         runtime=lambda w: configurations.section(w.configuration, "runtime"),
         code=lambda w: package.code(
-            "generate", configurations.kind(w.configuration), *shown_modules()
+            "generate", configurations.kind(w.configuration), *display_modules()
         ),
     script:
         "../scripts/generate.py"

@@ -17,7 +17,7 @@ __all__ = [
     "channel",
     "channel_of_old_key",
     "channel_packages",
-    "shown_modules",
+    "display_modules",
 ]
 
 # The names of all channels. Each is also a package in this folder, whose CHANNEL is an instance of `Channel`.
@@ -49,7 +49,7 @@ def channel_packages(names: Iterable[str]) -> list[str]:
     return [f"{__name__}.{name}" for name in names]
 
 
-def shown_modules() -> list[str]:
+def display_modules() -> list[str]:
     """Full names of the modules channels.<name>.shown that exist.
 
     Such a module says how a page shows the channel. A channel without it is shown in the default way.

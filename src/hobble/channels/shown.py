@@ -48,13 +48,13 @@ class ChannelWords:
 class ChannelDisplay:
     """How a channel is shown.
 
-    spoken: for each column, the name that readers see. sliders: label of a slider -> its column, for the
-    sliders that are there at the start. presets: label of a button -> {column: value}. regions: for each bone
-    of the body, the indices of the columns whose values colour the part that this bone moves; empty if
+    spoken_names: for each column, the name that readers see. sliders: label of a slider -> its column, for
+    the sliders that are there at the start. presets: label of a button -> {column: value}. regions: for each
+    bone of the body, the indices of the columns whose values colour the part that this bone moves; empty if
     columns do not belong to parts of the body.
     """
 
-    spoken: Sequence[str]
+    spoken_names: Sequence[str]
     sliders: Mapping[str, str]
     presets: Mapping[str, Mapping[str, float]] = field(default_factory=dict)
     regions: Sequence[Sequence[int]] = ()
@@ -72,13 +72,15 @@ class SampleWalk:
     coloured: bool = False
 
 
-def words(name: str) -> ChannelWords:
+def channel_words(name: str) -> ChannelWords:
     """The texts of the channel `name`."""
     own_words = _from_module(name, "WORDS")
     return own_words if isinstance(own_words, ChannelWords) else ChannelWords()
 
 
-def shown(name: str, skeleton: Skeleton, columns: Sequence[str], trained: Collection[str]) -> ChannelDisplay:
+def channel_display(
+    name: str, skeleton: Skeleton, columns: Sequence[str], trained: Collection[str]
+) -> ChannelDisplay:
     """How the channel `name` is shown. By default there is a slider for each trained column.
 
     columns: the labels of all columns. trained: the labels of the trained columns.
@@ -88,31 +90,31 @@ def shown(name: str, skeleton: Skeleton, columns: Sequence[str], trained: Collec
     return ChannelDisplay(tuple(columns), {column: column for column in columns if column in trained})
 
 
-def sweeps(
+def channel_sweeps(
     name: str, skeleton: Skeleton, columns: Sequence[str], trained: Collection[str]
 ) -> Mapping[str, str]:
     """Name of each sweep -> the column that rises. By default there is a sweep for each trained column.
 
-    columns, trained: as in `shown`.
+    columns, trained: as in `channel_display`.
     """
     if own_sweeps := _from_module(name, "sweeps"):
         return own_sweeps(skeleton, columns, trained)
     return {column.replace(" ", "_"): column for column in columns if column in trained}
 
 
-def loops(
+def channel_loops(
     name: str, skeleton: Skeleton, columns: Sequence[str], trained: Collection[str]
 ) -> list[SampleWalk]:
     """Walks for looping pictures.
 
     By default there is a walk with all values 0, then one for each trained column with its highest value.
-    columns, trained: as in `shown`.
+    columns, trained: as in `channel_display`.
     """
     if own_loops := _from_module(name, "loops"):
         return own_loops(skeleton, columns, trained)
     chosen, highest = [column for column in columns if column in trained], channel(name).highest
     return [
-        SampleWalk(words(name).neutral_button.lower(), {}),
+        SampleWalk(channel_words(name).neutral_button.lower(), {}),
         *(SampleWalk(c.replace(" ", "-"), {c: highest}) for c in chosen),
     ]
 
@@ -128,7 +130,9 @@ def shown_names(skeleton: Mapping[str, Any]) -> Callable[[str], str]:
     names: dict[str, str] = {}  # label of a column of any channel -> the name that readers see
     for each in all_channels():
         columns = each.columns(rig)
-        names |= dict(zip(columns, shown(each.name, rig, columns, columns).spoken, strict=True))
+        names |= dict(
+            zip(columns, channel_display(each.name, rig, columns, columns).spoken_names, strict=True)
+        )
     return lambda column: names.get(column, column)
 
 

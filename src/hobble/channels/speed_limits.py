@@ -44,13 +44,13 @@ class Limits:
     """Speed limits of a channel with L labels in G gaits.
 
     levels: (K,) ascending values from 0 to the channel's highest. speeds: (G, L, K) highest speeds, cm a
-    frame, for each gait, label and level; they never rise with the level. usual: (G,) usual speeds of a
+    frame, for each gait, label and level; they never rise with the level. usual_speeds: (G,) of a
     healthy body, cm a frame.
     """
 
     levels: Array = field(repr=False)
     speeds: Array = field(repr=False)
-    usual: Array = field(repr=False)
+    usual_speeds: Array = field(repr=False)
 
     def highest_speeds(self, values: Array) -> Array:
         """(C, G) highest speeds of C characters in each gait, cm a frame, interpolated between the levels.
@@ -68,7 +68,7 @@ class Limits:
 
     def to_dict(self) -> dict[str, Any]:
         """Plain data for a file."""
-        speeds, usual = (np.round(values, 4).tolist() for values in (self.speeds, self.usual))
+        speeds, usual = (np.round(values, 4).tolist() for values in (self.speeds, self.usual_speeds))
         return {"levels": self.levels.tolist(), "speeds": speeds, "usual": usual}
 
     @classmethod
@@ -133,12 +133,12 @@ class _Cycles:
 class LimitLearner:
     """Collects the gait cycles of clips, one clip at a time, and learns the limits of one channel from them.
 
-    highest: the channel's highest value. across: (L,) for each label, the index of its counterpart on the
-    other side of the body, or its own index. Both sides get the same limits. gaits: number of gaits.
+    highest: the channel's highest value. counterparts: (L,) for each label, the index of its counterpart on
+    the other side of the body, or its own index. Both sides get the same limits. gaits: number of gaits.
     """
 
-    def __init__(self, highest: float, across: np.ndarray, gaits: int) -> None:
-        self.highest, self.across, self.gaits = highest, across, gaits
+    def __init__(self, highest: float, counterparts: np.ndarray, gaits: int) -> None:
+        self.highest, self.counterparts, self.gaits = highest, counterparts, gaits
         # Name of a clip -> name of its source (as in `add`) or None, and the cycles of the clip.
         self._clips: dict[str, tuple[str | None, _Cycles]] = {}
 
@@ -219,7 +219,7 @@ class LimitLearner:
         labels = values.shape[1]
         speeds = np.repeat(top[:, None, None], labels, axis=1).repeat(LEVELS, axis=2)
         for label in range(labels):
-            both_sides = _cycles_of_label(label, values, self.across)
+            both_sides = _cycles_of_label(label, values, self.counterparts)
             value, shares, gaits = (
                 np.concatenate(part)
                 for part in zip(*((v, share[i], gait[i]) for i, v in both_sides), strict=True)
@@ -267,7 +267,7 @@ class LimitLearner:
             share = np.clip(cycles.speed[kept] / healthy_speed[kept], SLOWEST, 1.0)
             parts.append((cycles.gait[kept], share, cycles.values[kept]))
         if not parts:
-            return np.zeros(0, int), np.zeros(0), np.zeros((0, len(self.across)))
+            return np.zeros(0, int), np.zeros(0), np.zeros((0, len(self.counterparts)))
         gait, share, values = (np.concatenate(column) for column in zip(*parts, strict=True))
         return gait, share, values
 

@@ -13,7 +13,7 @@ from hobble.hurt.amounts import changes_of_hurt_part
 from hobble.hurt.body_parts import LEFT, RIGHT, part_of_link
 
 HIGHEST_SEVERITY = 10.0
-POWER = 0.82  # strength = (severity / 10) ** POWER: .37 at 3, .57 at 5, .75 at 7
+STRENGTH_POWER = 0.82  # strength = (severity / 10) ** STRENGTH_POWER: .37 at 3, .57 at 5, .75 at 7
 # Changes of the times at which a foot lands and leaves (`land`, `off`) grow with strength ** TIMING_POWER.
 # With the power 1, a character driven by a network limps nearly as unevenly at severity 5 as at 10.
 TIMING_POWER = 1.3
@@ -59,8 +59,8 @@ class Effects:
 
     body_changes: name -> (F,). side_changes: name -> (F, 2), left and right. curves: (F, 5, 5) factors of
     CURVES, as in `Profile` of `hobble.hurt.impairment_profiles`. strength: (F,) of the worst link, 0 to
-    1 (see POWER). shown_severity: (F, L) severities of the L links, as the motion shows them: after a change
-    of the requested severity they follow over about a second.
+    1 (see STRENGTH_POWER). shown_severity: (F, L) severities of the L links, as the motion shows them: after
+    a change of the requested severity they follow over about a second.
     """
 
     body_changes: dict[str, Array] = field(repr=False)
@@ -84,7 +84,7 @@ def effects_of_severities(skeleton: Skeleton, severity: Array, fps: float) -> Ef
     """
     frames = len(severity)
     strength = gaussian(
-        (np.clip(severity, 0, HIGHEST_SEVERITY) / HIGHEST_SEVERITY) ** POWER, SETTLING_SECONDS * fps
+        (np.clip(severity, 0, HIGHEST_SEVERITY) / HIGHEST_SEVERITY) ** STRENGTH_POWER, SETTLING_SECONDS * fps
     )
     body = {name: _Sum(np.zeros(frames)) for name in WHOLE_BODY}
     sided = {name: _Sum(np.zeros((frames, 2))) for name in SIDED}
@@ -120,7 +120,7 @@ def effects_of_severities(skeleton: Skeleton, severity: Array, fps: float) -> Ef
 
 def _shown_severity(strength: Array) -> Array:
     """The severities (F, L) of strengths (F, L). Severities below LEAST_SEVERITY become 0."""
-    severity = np.round(HIGHEST_SEVERITY * np.clip(strength, 0.0, 1.0) ** (1 / POWER), 3)
+    severity = np.round(HIGHEST_SEVERITY * np.clip(strength, 0.0, 1.0) ** (1 / STRENGTH_POWER), 3)
     return np.where(severity < LEAST_SEVERITY, 0.0, severity)
 
 

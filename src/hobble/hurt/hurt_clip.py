@@ -26,7 +26,7 @@ from hobble.labels.clip_labels import Labels
 
 # Radians of knee flexion: a knee that straightens to lift the hips stops here. In the recordings of
 # impaired walks, the sound knee is bent by 8 to 10 degrees while a stiff leg swings.
-STRAIGHT = np.radians(9.0)
+STRAIGHT_KNEE = np.radians(9.0)
 
 
 @dataclass(frozen=True)
@@ -89,9 +89,9 @@ def hurt_clip(
     path = shorten(source, changes, timing.stride_ratio, None if flat else _ground_heights(source, feet))
     feet = [move_foot(source, changes, path, feet[side], side) for side in (LEFT, RIGHT)]
     out = _assemble(source, changes, timing, path, feet, name)
-    source_frame = np.clip(np.floor(timing.body + 1e-6).astype(int), 0, len(clip) - 1)
+    source_frame = np.clip(np.floor(timing.body_frames + 1e-6).astype(int), 0, len(clip) - 1)
     return HurtClip(
-        out, changes.shown_severity[source_frame], relabel(labels, timing, zero, margins), timing.body
+        out, changes.shown_severity[source_frame], relabel(labels, timing, zero, margins), timing.body_frames
     )
 
 
@@ -123,25 +123,25 @@ def _assemble(
     Body and legs are sampled at their own times in `timing`.
     """
     clip, skeleton = source.clip, source.clip.skeleton
-    world = interpolate_rotations(change_body(source, changes), timing.body)
+    world = interpolate_rotations(change_body(source, changes), timing.body_frames)
     shift = np.stack(
         [path.new[:, 0] - path.old[:, 0], path.new_ground - path.old_ground, path.new[:, 1] - path.old[:, 1]],
         axis=1,
     )
-    root = interpolate_values(clip.root + shift, timing.body)
+    root = interpolate_values(clip.root + shift, timing.body_frames)
     legs = [read_leg(clip, side) for side in (LEFT, RIGHT)]
     pelvis = world[:, skeleton.role("hips")]
     hips = [_hip_from_root(source, world, side) for side in (LEFT, RIGHT)]
-    ankles = [interpolate_values(feet[side].ankle, timing.legs[:, side]) for side in (LEFT, RIGHT)]
+    ankles = [interpolate_values(feet[side].ankle, timing.leg_frames[:, side]) for side in (LEFT, RIGHT)]
     stands = [
-        interpolate_values(gaussian(1.0 - source.swinging[:, side], 2.0), timing.legs[:, side])
+        interpolate_values(gaussian(1.0 - source.swinging[:, side], 2.0), timing.leg_frames[:, side])
         for side in (LEFT, RIGHT)
     ]
     reaches = [_desired_reach(legs[side], changes, source, timing, side) for side in (LEFT, RIGHT)]
     root[:, 1] = hips_height(root, hips, ankles, reaches, stands, [leg.longest_reach for leg in legs])
     for side in (LEFT, RIGHT):
         thigh, knee, heel, toe = (skeleton.role(f"{SIDES[side]}_{r}") for r in ("hip", "knee", "heel", "toe"))
-        when = timing.legs[:, side]
+        when = timing.leg_frames[:, side]
         world[:, thigh], world[:, knee] = place_leg(
             skeleton, side, legs[side], when, pelvis, root + hips[side], ankles[side]
         )
@@ -166,12 +166,12 @@ def _desired_reach(leg: Leg, changes: Effects, source: HealthyClip, timing: Timi
     The knee bends more if the leg is spared (`crouch`). It bends less while the other leg swings stiffly
     (`vault`), which lifts the hips.
     """
-    when, other_when = timing.legs[:, side], timing.legs[:, 1 - side]
+    when, other_when = timing.leg_frames[:, side], timing.leg_frames[:, 1 - side]
     crouch = np.radians(changes.side_changes["crouch"][:, side]) * (1 - source.swing_curve[:, side])
     bend = interpolate_values(knee_flexion(leg.reach, leg.thigh_length, leg.shank_length) + crouch, when)
     source_vault = np.clip(changes.side_changes["vault"][:, side], 0.0, 1.0) * source.swing_curve[:, 1 - side]
     vault = interpolate_values(source_vault, other_when)
-    bend = bend - vault * np.maximum(bend - STRAIGHT, 0.0)
+    bend = bend - vault * np.maximum(bend - STRAIGHT_KNEE, 0.0)
     changed = (interpolate_values(crouch, when) > 0) | (vault > 0)
     return np.where(
         changed,

@@ -28,25 +28,26 @@ MOST_SHIFT = 0.3  # cycles: shifts of landing and leaving stay below this
 class Timing:
     """Which of F source frames is shown in each of N new frames. Frames have fractions.
 
-    body: (N,) source frame that the body shows in each new frame. legs: (N, 2) the same for the left and the
-    right leg. cadence_times: (F,) the new frame that would show each source frame if the cadence changed, but
-    no landing or leaving was shifted. stride_ratio: (F,) new duration of a stride / old duration.
+    body_frames: (N,) source frame that the body shows in each new frame. leg_frames: (N, 2) the same for the
+    left and the right leg. cadence_times: (F,) the new frame that would show each source frame if the cadence
+    changed, but no landing or leaving was shifted. stride_ratio: (F,) new duration of a stride / old
+    duration.
     """
 
-    body: Array = field(repr=False)
-    legs: Array = field(repr=False)
+    body_frames: Array = field(repr=False)
+    leg_frames: Array = field(repr=False)
     cadence_times: Array = field(repr=False)
     stride_ratio: Array = field(repr=False)
 
     def __len__(self) -> int:
-        return len(self.body)
+        return len(self.body_frames)
 
     def new_frames(self, when: Array, leg: int | None = None) -> Array:
         """The new frames, with fractions, in which the body or a leg shows the source frames `when`.
 
         leg: LEFT or RIGHT; None: the body.
         """
-        shown = self.body if leg is None else self.legs[:, leg]
+        shown = self.body_frames if leg is None else self.leg_frames[:, leg]
         return np.interp(when, shown, np.arange(len(shown)))
 
 

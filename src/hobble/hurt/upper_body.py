@@ -9,7 +9,7 @@ from hobble.core.ik import aim
 from hobble.core.quat import Array
 from hobble.core.skeleton import Skeleton
 from hobble.core.smooth import gaussian
-from hobble.hurt.body_parts import LEFT, RIGHT, SIDES, ancestors
+from hobble.hurt.body_parts import LEFT, RIGHT, SIDES, joint_and_ancestors
 from hobble.hurt.effects import Effects
 from hobble.hurt.healthy_clip import HealthyClip
 from hobble.hurt.impairment_profiles import HARMONICS
@@ -91,7 +91,7 @@ def _between(skeleton: Skeleton, role: str, above: str) -> list[int]:
 
     The first of these two joints is included, the second is not.
     """
-    path = ancestors(skeleton, skeleton.role(role))
+    path = joint_and_ancestors(skeleton, skeleton.role(role))
     return path[: path.index(skeleton.role(above))]
 
 
@@ -181,5 +181,5 @@ def _hold_arm(source: HealthyClip, effects: Effects, world: Array, side: int) ->
         fully_held = aim(world[:, joint], np.broadcast_to(rest_bone, direction.shape), direction)
         turn = quat.mul(quat.slerp(world[:, joint], fully_held, held), quat.inv(world[:, joint]))
         for j in range(len(skeleton.joints)):
-            if joint in ancestors(skeleton, j):
+            if joint in joint_and_ancestors(skeleton, j):
                 world[:, j] = quat.mul(turn, world[:, j])

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hobble.channels import channel
-from hobble.channels.shown import shown, words
+from hobble.channels.shown import channel_display, channel_words
 from hobble.core.skeleton import Skeleton
 from hobble.figure.mesh import body, mesh_key
 from hobble.models.network import Network, inverse
@@ -96,9 +96,9 @@ def shown_channels(network: Network, runtime: Runtime) -> list[dict[str, Any]]:
     skeleton, out, first = network.skeleton, [], 0
     assert skeleton is not None
     for name, columns in network.channels.items():
-        definition, wording, index_of = channel(name), words(name), list(columns).index
+        definition, wording, index_of = channel(name), channel_words(name), list(columns).index
         speed_limits = network.limits.get(name)
-        display = shown(name, skeleton, columns, network.trained(name))
+        display = channel_display(name, skeleton, columns, network.trained(name))
         presets = [
             {"name": preset, "values": [[index_of(column), value] for column, value in values.items()]}
             for preset, values in display.presets.items()
@@ -111,7 +111,7 @@ def shown_channels(network: Network, runtime: Runtime) -> list[dict[str, Any]]:
                 "first": first,
                 "columns": list(columns),
                 "trained": list(network.trained(name)),
-                "spoken": list(display.spoken),
+                "spoken": list(display.spoken_names),
                 "sliders": {label: index_of(column) for label, column in display.sliders.items()},
                 "presets": presets,
                 "regions": [list(indices) for indices in display.regions],

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from PIL import Image, ImageDraw, ImageFont
 
 from hobble.channels.injury.crowd_severities import injury_links, links_hurt_in_training
-from hobble.channels.injury.shown import body_parts
+from hobble.channels.injury.shown import link_index_by_part
 from hobble.core.errors import HobbleError
 from hobble.core.files import atomic_path
 from hobble.figure.mesh import body
@@ -39,7 +39,7 @@ def write_limp_picture(network: Network, path: str | Path, runtime: Runtime) -> 
     if network.skeleton is None or not link_names:
         raise HobbleError("this network has no injury channel. Use a configuration with `channels: [injury]`")
     # name of a part of the body -> index of its link
-    link_of_part = body_parts(network.skeleton, link_names, links_hurt_in_training(network))
+    link_of_part = link_index_by_part(network.skeleton, link_names, links_hurt_in_training(network))
     hurt = {link_names[link_of_part[part]]: severity for part, severity in INJURIES.items()}
     renderer = BodyRenderer(body(network.skeleton), regions(network.skeleton, link_names))
     halves = []

@@ -33,12 +33,12 @@ PERFORMER = re.compile(r"^([^_]+)_")  # the performer in a clip's name, such as 
 class CapturedWalk:
     """The walk in one captured clip. The severities are the same in all its frames.
 
-    clip: name of the clip. hurt: link -> severity, for the links that hurt. walk: the gait cycles. speed:
-    mean speed, cm a frame.
+    clip: name of the clip. severity_by_link: those of the links that hurt. walk: the gait cycles. speed: mean
+    speed, cm a frame.
     """
 
     clip: str
-    hurt: Mapping[str, float]
+    severity_by_link: Mapping[str, float]
     walk: WalkCycles = field(repr=False)
     speed: float
 
@@ -108,7 +108,7 @@ def healthy_reference(captured_walk: CapturedWalk, walks: Sequence[CapturedWalk]
     healthy clip, it is measured over all healthy clips. "people": if there is no healthy clip at all, it is
     the mean normal walk in `hobble.gait.people`. walks: all captured walks.
     """
-    healthy = [other for other in walks if not other.hurt and len(other.walk)]
+    healthy = [other for other in walks if not other.severity_by_link and len(other.walk)]
     of_performer = [other for other in healthy if other.performer == captured_walk.performer]
     for chosen, whose in ((of_performer, "performer"), (healthy, "data set")):
         if chosen:

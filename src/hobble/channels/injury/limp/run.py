@@ -48,9 +48,7 @@ SPEEDS = {"walk": 2.0, "jog": 7.0}  # target speeds, cm a frame; 2 is 1.2 m/s, a
 FIRST_SEVERITIES = (5.0, 10.0)  # of the first injury in walks with two injuries
 SECOND_SEVERITIES = (5.0, 10.0)  # of the second injury in these walks
 LEG = ("hip", "thigh", "shank", "foot")  # parts of the body that belong to a leg
-WINDOW_SECONDS = (
-    4.0  # seconds; length of the stretches (windows) of a walk that a recogniser judges one by one
-)
+WINDOW_SECONDS = 4.0  # length of the stretches (windows) of a walk that a recogniser judges one by one
 
 
 def measure_limps(
@@ -101,7 +99,9 @@ def measure_limps(
             gait: {name: [round(v, 5) for v in mean_and_sd] for name, mean_and_sd in of_gait.items()}
             for gait, of_gait in effects_of_people(read_people()).items()
         },
-        "captured": [_row_of_clip(network.skeleton, clip, captured) for clip in captured if clip.hurt],
+        "captured": [
+            _row_of_clip(network.skeleton, clip, captured) for clip in captured if clip.severity_by_link
+        ],
         "held_out_limps": compare_held_out(network, captured, splits, seconds, runtime),
         "second": second_injuries(network, links, seconds, runtime),
         **_limps_with_other_channel(network, links, seconds, runtime),
@@ -245,9 +245,9 @@ def _row_of_clip(skeleton: Skeleton, clip: CapturedWalk, captured: Sequence[Capt
     side of the one with the highest severity counts as hurt.
     """
     healthy, whose = healthy_reference(clip, captured)
-    side = hurt_side(skeleton, max(clip.hurt, key=lambda link: clip.hurt[link]))
+    side = hurt_side(skeleton, max(clip.severity_by_link, key=lambda link: clip.severity_by_link[link]))
     sizes = _rounded_values(measure_effects(profile_of_walk(clip.walk), healthy, side))
-    return {"clip": clip.clip, "hurt": dict(clip.hurt), "side": side, "healthy": whose, **sizes}
+    return {"clip": clip.clip, "hurt": dict(clip.severity_by_link), "side": side, "healthy": whose, **sizes}
 
 
 def limp_distance(walk: Profile, healthy: Profile, other: Profile, other_healthy: Profile) -> float:
@@ -278,17 +278,21 @@ def compare_held_out(
     character; None if either of them does not walk a whole cycle. `nearer`: whether the hurt character is
     nearer, as it should be; False without distances.
     """
-    limps = [clip for clip in captured if clip.hurt and splits.get(clip.clip) == "held_out"]
+    limps = [clip for clip in captured if clip.severity_by_link and splits.get(clip.clip) == "held_out"]
     if not limps:
         return []
     figures = walk_figures(
-        network, [{}, *(clip.hurt for clip in limps)], SPEEDS["walk"], "walk", seconds, runtime
+        network, [{}, *(clip.severity_by_link for clip in limps)], SPEEDS["walk"], "walk", seconds, runtime
     )
     healthy_figure = figures[0].profile
     out = []
     for clip, figure in zip(limps, figures[1:], strict=True):
         healthy, whose = healthy_reference(clip, captured)
-        row: dict[str, Any] = {"clip": clip.clip, "hurt_links": dict(clip.hurt), "compared_with": whose}
+        row: dict[str, Any] = {
+            "clip": clip.clip,
+            "hurt_links": dict(clip.severity_by_link),
+            "compared_with": whose,
+        }
         if healthy_figure is None or figure.profile is None:
             out.append({**row, "healthy": None, "hurt": None, "nearer": False})
             continue

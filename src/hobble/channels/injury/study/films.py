@@ -16,9 +16,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from hobble.channels.injury.crowd_severities import INJURY, injury_links, links_hurt_in_training
-from hobble.channels.injury.shown import OTHER_PARTS as PARTS_WITHOUT_SLIDER
-from hobble.channels.injury.shown import PARTS as PARTS_WITH_SLIDER
-from hobble.channels.injury.shown import links_between
+from hobble.channels.injury.shown import PARTS_WITH_SLIDER, PARTS_WITHOUT_SLIDER, links_between
 from hobble.core.errors import HobbleError
 from hobble.core.quat import Array
 from hobble.models.network import Network
