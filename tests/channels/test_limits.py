@@ -19,7 +19,7 @@ from hobble.channels.speed_limits import (
 
 WALK, JOG, GAITS = 1, 2, 6
 LIMITS = Limits(
-    np.array([0.0, 5.0, 10.0]), np.array([[[4.0, 3.0, 1.0], [4.0, 4.0, 2.0]]]), usual_speeds=np.array([3.5])
+    np.array([0.0, 5.0, 10.0]), np.array([[[4.0, 3.0, 1.0], [4.0, 4.0, 2.0]]]), usual=np.array([3.5])
 )
 
 
@@ -129,7 +129,7 @@ def test_the_slowness_of_one_channel_is_not_learnt_for_another() -> None:
     found = [one.learn() for one in (mood, injury)]
     for limits, expected in zip(found, (1.0, 1.2), strict=True):
         assert limits is not None
-        assert limits.usual_speeds[WALK] == 2.0
+        assert limits.usual[WALK] == 2.0
         assert limits.speeds[WALK, 0, -1] == pytest.approx(expected, rel=0.02)
 
 
@@ -161,4 +161,4 @@ def test_a_malformed_table_of_limits_is_refused(changes, says: str) -> None:
 
 def test_without_usual_speeds_the_highest_speed_is_the_usual_one() -> None:
     data = {"levels": LIMITS.levels.tolist(), "speeds": LIMITS.speeds.tolist()}
-    assert Limits.from_dict(data, 1, 2, 10.0).usual_speeds.tolist() == [4.0]
+    assert Limits.from_dict(data, 1, 2, 10.0).usual.tolist() == [4.0]

@@ -44,13 +44,13 @@ class Limits:
     """Speed limits of a channel with L labels in G gaits.
 
     levels: (K,) ascending values from 0 to the channel's highest. speeds: (G, L, K) highest speeds, cm a
-    frame, for each gait, label and level; they never rise with the level. usual_speeds: (G,) of a
+    frame, for each gait, label and level; they never rise with the level. usual: (G,) usual speeds of a
     healthy body, cm a frame.
     """
 
     levels: Array = field(repr=False)
     speeds: Array = field(repr=False)
-    usual_speeds: Array = field(repr=False)
+    usual: Array = field(repr=False)
 
     def highest_speeds(self, values: Array) -> Array:
         """(C, G) highest speeds of C characters in each gait, cm a frame, interpolated between the levels.
@@ -68,7 +68,7 @@ class Limits:
 
     def to_dict(self) -> dict[str, Any]:
         """Plain data for a file."""
-        speeds, usual = (np.round(values, 4).tolist() for values in (self.speeds, self.usual_speeds))
+        speeds, usual = (np.round(values, 4).tolist() for values in (self.speeds, self.usual))
         return {"levels": self.levels.tolist(), "speeds": speeds, "usual": usual}
 
     @classmethod

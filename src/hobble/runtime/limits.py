@@ -45,7 +45,7 @@ class SpeedLimiter:
         if self._values is None or not np.array_equal(values, self._values):
             self._values = values.copy()
             of_each = [limits.highest_speeds(values[:, columns]) for columns, limits in self._channel_limits]
-            self._allowed[:] = combine_limits(of_each, self._channel_limits[0][1].usual_speeds)
+            self._allowed[:] = combine_limits(of_each, self._channel_limits[0][1].usual)
         if not np.isfinite(self._allowed).any():
             return
         walk, jog = self._gaits["walk"], self._gaits["jog"]
