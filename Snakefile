@@ -5,7 +5,7 @@ import os
 import sys
 from pathlib import Path
 
-from hobble.channels import modules_of, shown_modules
+from hobble.channels import channel_packages, display_modules
 from hobble.core.errors import HobbleError
 from hobble.measures.registry import part_modules
 from hobble.workflow import lifetime, lock_files, named_outputs

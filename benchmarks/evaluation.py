@@ -15,7 +15,7 @@ from time import process_time
 import numpy as np
 from runtime import SKELETON, load_skeleton, random_network
 
-from hobble.channels.injury.crowd_severities import severities
+from hobble.channels.injury.crowd_severities import severity_inputs
 from hobble.core.processors import processor_name
 from hobble.evaluation.crowd import CrowdTarget, run
 from hobble.measures.rollouts.roll_outs import Crowd, RollOutInputs, RollOuts
@@ -39,7 +39,7 @@ def seconds(work: Callable[[], object]) -> float:
 def sweep(network: Network) -> tuple[float, float]:
     """CPU microseconds for a frame of one figure: a figure for each link at once, and one after another."""
     links = network.channels.get("injury") or ("",) * 30
-    hurt = severities(network, [{link: 5.0} if link else {} for link in links])
+    hurt = severity_inputs(network, [{link: 5.0} if link else {} for link in links])
 
     def walk(which: slice) -> None:
         channels = {name: rows[which] for name, rows in hurt.items()}

@@ -17,7 +17,7 @@ import yaml
 from hobble.config.sections import LabelOptions, Synthetic
 from hobble.core.clip import Clip, load_clip
 from hobble.core.processors import processor_name
-from hobble.labels.contacts import contacts, stance
+from hobble.labels.contacts import find_contacts, find_stance_contacts
 from hobble.labels.footfall import find_landings, find_swings
 from hobble.labels.gait import automatic_gait
 from hobble.labels.label import label_clip
@@ -66,11 +66,13 @@ def main() -> None:
     kinematics = best_of(1, lambda: [clip.positions for clip in clips])
     parts = {
         "world positions, once": kinematics,
-        "contacts": best_of(3, lambda: [contacts(c, options) for c in clips]),
+        "contacts": best_of(3, lambda: [find_contacts(c, options) for c in clips]),
         "swings and landings": best_of(
             3, lambda: [find_landings(find_swings(c, options), len(c), options.shortest_step) for c in clips]
         ),
-        "gait": best_of(3, lambda: [automatic_gait(c, stance(c, options), None) for c in clips]),
+        "gait": best_of(
+            3, lambda: [automatic_gait(c, find_stance_contacts(c, options), None) for c in clips]
+        ),
     }
     motion = {"source_frames": 0, "source_fps": 60.0}
     whole = best_of(3, lambda: [label_clip(c, [], motion, None, "flat", options) for c in clips])

@@ -21,14 +21,14 @@ from hobble.channels.injury.status import parse_links
 from hobble.core.clip import Clip
 from hobble.core.errors import HobbleError
 from hobble.core.files import load_npz
-from hobble.gait.comparison import compare, healthy_profile
-from hobble.gait.cycles import join_walks, measure
+from hobble.gait.comparison import compare_clip, healthy_profile
+from hobble.gait.cycles import join_walks, measure_cycles
 from hobble.gait.derive_healthy import REFERENCE, healthy_windows
-from hobble.gait.limp_grade import HEALTHY, Grader, grade, healthy_covariance, learn_grader
-from hobble.gait.people import GAITS, NORMAL, people
-from hobble.gait.profile import NAMES, Profile, mirrored, profile
+from hobble.gait.limp_grade import HEALTHY_FILE, Grader, grade_walk, healthy_covariance, learn_grader
+from hobble.gait.people import GAITS, NORMAL, read_people
+from hobble.gait.profile import PROFILE_NAMES, Profile, mirror_profile, profile_of_walk
 from hobble.gait.read_clip import read_clip
-from hobble.gait.recogniser import SHRINKAGE, examples, learn, recognise
+from hobble.gait.recogniser import SHRINKAGE, examples_of_people, learn, recognise
 from hobble.hurt.hurt_clip import hurt_clip
 from hobble.labels.clip_labels import Labels
 from hobble.labels.label import label_clip
@@ -45,21 +45,21 @@ HEALTHY_WALKS = ("105_29", "105_36")  # hurt to be compared with captured limps
 
 def left_out() -> Iterator[tuple[int, list[int]]]:
     """Each person, and all other people."""
-    everyone = range(people().count)
+    everyone = range(read_people().count)
     return ((person, [other for other in everyone if other != person]) for person in everyone)
 
 
 def half_way(a: Profile, b: Profile, share: float) -> dict[str, float]:
-    return {name: a[name] + share * (b[name] - a[name]) for name in NAMES}
+    return {name: a[name] + share * (b[name] - a[name]) for name in PROFILE_NAMES}
 
 
 def limps(person: int, strength: float) -> Iterator[tuple[str, str, Profile, Profile]]:
     """(gait, side, walk, healthy walk) of one person, each leg in turn."""
-    healthy = people().profile(NORMAL, person)
+    healthy = read_people().profile(NORMAL, person)
     for gait in GAITS[1:]:
-        walk = half_way(healthy, people().profile(gait, person), strength)
+        walk = half_way(healthy, read_people().profile(gait, person), strength)
         yield gait, "right", walk, healthy
-        yield gait, "left", mirrored(walk), mirrored(healthy)
+        yield gait, "left", mirror_profile(walk), mirror_profile(healthy)
 
 
 def people_left_out(name: str, judges: dict[int, Callable]) -> None:
@@ -75,7 +75,7 @@ def people_left_out(name: str, judges: dict[int, Callable]) -> None:
             for gait, side, walk, healthy in limps(person, strength):
                 said = judge(walk, healthy)
                 right = said.label == gait and said.side == side
-                outcomes[gait].append((said.impaired, right, said.side in (None, side)))
+                outcomes[gait].append((said.is_impaired, right, said.side in (None, side)))
                 if strength == 1.0:
                     confusion[gait, said.label] += 1
         for gait, rows in outcomes.items():
@@ -93,23 +93,24 @@ def people_left_out(name: str, judges: dict[int, Callable]) -> None:
 def healthy_walks(folder: Path) -> None:
     print("\nhealthy walks of the CMU database, windows: share called impaired")
     print("performer, windows, by the linear one, the graded one, the graded one without the performer")
-    known = load_npz(HEALTHY)
+    known = load_npz(HEALTHY_FILE)
     for i, performer in enumerate(REFERENCE):
         own = [pair for _, *pair in healthy_windows(folder, performer)]
         rest = np.arange(len(REFERENCE)) != i
         others = np.average(known["covariances"][rest], axis=0, weights=known["clips"][rest])
-        stranger = learn_grader(people(), range(people().count), others)
+        stranger = learn_grader(read_people(), range(read_people().count), others)
         said = [
-            np.mean([judge(*pair).impaired for pair in own]) for judge in (recognise, grade, stranger.grade)
+            np.mean([judge(*pair).is_impaired for pair in own])
+            for judge in (recognise, grade_walk, stranger.grade)
         ]
         print(f"  {performer:4}{len(own):4}" + "".join(f"{share:6.2f}" for share in said))
 
 
 def strangers() -> None:
-    everyone, normal = range(people().count), lambda person: people().profile(NORMAL, person)
+    everyone, normal = range(read_people().count), lambda person: read_people().profile(NORMAL, person)
     pairs = [(normal(a), normal(b)) for a in everyone for b in everyone if a != b]
-    for name, judge in (("linear", recognise), ("graded", grade)):
-        wrong = np.mean([judge(*pair).impaired for pair in pairs])
+    for name, judge in (("linear", recognise), ("graded", grade_walk)):
+        wrong = np.mean([judge(*pair).is_impaired for pair in pairs])
         print(f"\none person's normal walk beside another's: {name} calls {wrong:.2f} impaired")
 
 
@@ -122,7 +123,7 @@ def captured(folder: Path, clips: list[str]) -> None:
     print("\ncaptured impaired walks, beside the healthy walks of CMU 105")
     for path in [*(folder / f"{name}.bvh" for name in EXAM), *map(Path, clips)]:
         try:
-            compared = compare(read_clip(path), healthy)
+            compared = compare_clip(read_clip(path), healthy)
         except HobbleError as error:
             print(f"  {path.stem}: {error}")
             continue
@@ -143,7 +144,9 @@ def made(folder: Path) -> None:
         return clip, label_clip(clip, [], source, "walk", "flat", LabelOptions())[0]
 
     def walks(clips: list[Clip]) -> Profile:
-        return profile(join_walks(measure(clip.skeleton, clip.positions, clip.fps) for clip in clips))
+        return profile_of_walk(
+            join_walks(measure_cycles(clip.skeleton, clip.positions, clip.fps) for clip in clips)
+        )
 
     sources = [read(name) for name in HEALTHY_WALKS]
     healthy = walks([clip for clip, _ in sources])
@@ -170,10 +173,12 @@ def main() -> None:
     parser.add_argument("folder", type=Path, metavar="CMU_FOLDER", help="folder of the CMU clips, as .bvh")
     parser.add_argument("clips", nargs="*", metavar="CLIP.bvh", help="more captured impaired walks")
     options = parser.parse_args()
-    linear = {p: learn(*examples(people(), rest), shrinkage=SHRINKAGE) for p, rest in left_out()}
+    linear = {
+        p: learn(*examples_of_people(read_people(), rest), shrinkage=SHRINKAGE) for p, rest in left_out()
+    }
     people_left_out("linear", {p: lambda w, h, j=j: recognise(w, h, j) for p, j in linear.items()})
     healthy = healthy_covariance()
-    graders: dict[int, Grader] = {p: learn_grader(people(), rest, healthy) for p, rest in left_out()}
+    graders: dict[int, Grader] = {p: learn_grader(read_people(), rest, healthy) for p, rest in left_out()}
     people_left_out("graded", {p: g.grade for p, g in graders.items()})
     strangers()
     healthy_walks(options.folder)

@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from hobble.channels import NAMES
+from hobble.channels import CHANNEL_NAMES
 
 SRC = Path(__file__).parents[2] / "src" / "hobble"
 # The list of channels, and the generators of hurt motion, which write what one channel reads.
@@ -48,7 +48,7 @@ def naming(name: str, folder: Path = SRC) -> list[str]:
     return found
 
 
-@pytest.mark.parametrize("name", NAMES)
+@pytest.mark.parametrize("name", CHANNEL_NAMES)
 def test_no_file_outside_its_folder_names_a_channel(name: str) -> None:
     assert naming(name) == []
 

@@ -110,9 +110,9 @@ def test_a_gait_without_rows_has_the_deviation_of_its_group(layout):
 
 
 def test_severities_share_one_deviation_and_unused_ones_are_scaled_to_0():
-    out = channel("injury").deviation(np.array([3.0, 0.0, 4.0]))
+    out = channel("injury").divisors(np.array([3.0, 0.0, 4.0]))
     np.testing.assert_allclose(out, [5.0, SILENT, 5.0])
-    np.testing.assert_allclose(channel("injury").deviation(np.array([0.01, 0.0])), [1.0, SILENT])
+    np.testing.assert_allclose(channel("injury").divisors(np.array([0.01, 0.0])), [1.0, SILENT])
 
 
 def test_without_the_channel_severities_change_no_statistics(rows_of, layout):

@@ -12,8 +12,8 @@ from hobble.core.clip import Clip
 from hobble.core.files import load_npz, save_npz
 from hobble.gait import derive_healthy, derive_people
 from hobble.gait.__main__ import main
-from hobble.gait.comparison import compare, healthy_profile
-from hobble.gait.limp_grade import HEALTHY
+from hobble.gait.comparison import compare_clip, healthy_profile
+from hobble.gait.limp_grade import HEALTHY_FILE
 from hobble.motion.mirror import mirror_clip
 from hobble.synthetic.generate_clip import walk_from_plan
 from hobble.synthetic.recipes import WALK, Segment
@@ -47,15 +47,15 @@ def at_the_checkout(monkeypatch, root):
 
 @pytest.mark.parametrize("speed", [65, 80, 100, 150])
 def test_the_procedural_walker_is_healthy_at_any_speed(walker, speed):
-    seen = compare(walker(speed), healthy_profile([walker(125)]))
-    assert seen.windows
+    seen = compare_clip(walker(speed), healthy_profile([walker(125)]))
+    assert seen.window_answers
     assert seen.answer_shares() == {"normal": 1.0}
     assert seen.effects["right"]["speed"] == pytest.approx(speed / 125, abs=0.03)
 
 
 def test_a_mirrored_healthy_walk_is_healthy(walker):
     clip = walker(120)
-    seen = compare(mirror_clip(clip, "mirrored"), healthy_profile([clip]))
+    seen = compare_clip(mirror_clip(clip, "mirrored"), healthy_profile([clip]))
     assert seen.answer.label == "normal"
 
 
@@ -108,7 +108,7 @@ def test_a_file_of_walks_with_unknown_curves_is_refused(tmp_path, capsys):
 @pytest.mark.shared
 def test_the_spread_of_healthy_walks_is_derived_from_the_database(shared):
     made, clips = derive_healthy.covariance(derive_healthy.healthy_windows(shared / "mocap" / "cmu", "07"))
-    known = load_npz(HEALTHY)
+    known = load_npz(HEALTHY_FILE)
     at = list(known["performers"]).index("07")
     assert clips == known["clips"][at] == 8
     np.testing.assert_allclose(made, known["covariances"][at], rtol=1e-6, atol=1e-9)

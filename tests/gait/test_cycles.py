@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from hobble.gait.cycles import SAMPLES, join_walks, landings, measure
+from hobble.gait.cycles import SAMPLES, find_landings, join_walks, measure_cycles
 from hobble.gait.signals import CURVES
 
 CYCLE, LEG = 60, 81.0
@@ -13,7 +13,7 @@ CYCLE, LEG = 60, 81.0
 
 def test_landings_stances_and_steps_of_a_made_walk_are_found(holden31, stepper):
     made = stepper(stance_right=30, stance_left=42, ahead_right=10, ahead_left=30, left_lands=24)
-    walk = measure(holden31, made.positions(holden31))
+    walk = measure_cycles(holden31, made.positions(holden31))
     # the ends of a clip are no landings: what the ankle did beyond is not known
     assert [cycle.start for cycle in walk.right] == [60, 120, 180, 240]
     assert [cycle.start for cycle in walk.left] == [24, 84, 144, 204, 264]
@@ -35,7 +35,7 @@ def test_landings_stances_and_steps_of_a_made_walk_are_found(holden31, stepper):
 
 def test_a_left_cycle_is_the_right_one_of_the_mirrored_walk(holden31, stepper):
     made = stepper(stance_right=30, stance_left=42, ahead_right=10, ahead_left=30, left_lands=24)
-    cycle = measure(holden31, made.positions(holden31)).left[0]
+    cycle = measure_cycles(holden31, made.positions(holden31)).left[0]
     assert cycle.scalars["left_strike_phase"] == pytest.approx(36 / 60)
     assert cycle.scalars["stance_share_R"] == pytest.approx(41 / 60)
     assert cycle.scalars["stance_share_L"] == pytest.approx(29 / 60)
@@ -43,7 +43,7 @@ def test_a_left_cycle_is_the_right_one_of_the_mirrored_walk(holden31, stepper):
 
 def test_a_foot_that_never_passes_the_other_still_lands(holden31, stepper):
     made = stepper(ahead_right=-8, ahead_left=40, stance_right=24, stance_left=40, speed=0.8)
-    cycles = measure(holden31, made.positions(holden31)).right
+    cycles = measure_cycles(holden31, made.positions(holden31)).right
     assert len(cycles) == 4
     assert cycles[0].scalars["step_R"] < 0
 
@@ -55,7 +55,7 @@ def swinging(holden31, swinger):
         knee={"right": 16.0, "left": 40.0},
         arm={"right": (1.0, 5.0), "left": (-4.0, 17.0)},
     )
-    return measure(holden31, made.positions(holden31))
+    return measure_cycles(holden31, made.positions(holden31))
 
 
 @pytest.mark.parametrize(
@@ -97,7 +97,9 @@ def test_cycles_do_not_depend_on_place_size_and_direction(holden31, stepper):
     turn = np.radians(130)
     rotation = np.array([[np.cos(turn), 0, np.sin(turn)], [0, 1, 0], [-np.sin(turn), 0, np.cos(turn)]])
     moved = 1.3 * positions @ rotation.T + [500, 0, -300]
-    for a, b in zip(measure(holden31, positions).right, measure(holden31, moved).right, strict=True):
+    for a, b in zip(
+        measure_cycles(holden31, positions).right, measure_cycles(holden31, moved).right, strict=True
+    ):
         assert (a.start, a.end) == (b.start, b.end)
         assert a.scalars == pytest.approx(b.scalars)
         np.testing.assert_allclose(a.curves, b.curves, atol=1e-6)
@@ -108,7 +110,7 @@ def test_cycles_hardly_depend_on_the_frame_rate(holden31, stepper):
     at = np.arange(2 * len(positions) - 1) / 2
     low, share = np.floor(at).astype(int), (at % 1)[:, None, None]
     twice = (1 - share) * positions[low] + share * positions[np.minimum(low + 1, len(positions) - 1)]
-    a, b = (measure(holden31, p, fps).right[1].scalars for p, fps in ((positions, 60), (twice, 120)))
+    a, b = (measure_cycles(holden31, p, fps).right[1].scalars for p, fps in ((positions, 60), (twice, 120)))
     assert a == pytest.approx(b, abs=1.01 / CYCLE)
 
 
@@ -129,7 +131,7 @@ def on_a_circle(positions):
 
 @pytest.mark.parametrize("change", [standing, backward, on_a_circle, lambda p: p[:20], lambda p: p[:1]])
 def test_only_straight_walking_has_cycles(holden31, stepper, change):
-    assert len(measure(holden31, change(stepper().positions(holden31)))) == 0
+    assert len(measure_cycles(holden31, change(stepper().positions(holden31)))) == 0
 
 
 def test_a_wide_curve_has_cycles(holden31, stepper):
@@ -137,19 +139,19 @@ def test_a_wide_curve_has_cycles(holden31, stepper):
     radius = 90 * 360 / 15 / (2 * np.pi)  # 15 degrees a cycle
     angle, out = positions[..., 2] / radius, positions[..., 0] + radius
     curved = np.stack([out * np.cos(angle) - radius, positions[..., 1], out * np.sin(angle)], axis=-1)
-    assert len(measure(holden31, curved).right) >= 5
+    assert len(measure_cycles(holden31, curved).right) >= 5
 
 
 def test_landings_need_a_real_step():
     wave = 0.3 * np.cos(2 * np.pi * np.arange(300) / 60)
-    assert landings(wave, 60.0) == [60, 120, 180, 240]
+    assert find_landings(wave, 60.0) == [60, 120, 180, 240]
     small = wave + 0.02 * np.cos(2 * np.pi * np.arange(300) / 7)
-    assert len(landings(small, 60.0)) == len(landings(wave, 60.0))
-    assert landings(0.01 * wave, 60.0) == []
+    assert len(find_landings(small, 60.0)) == len(find_landings(wave, 60.0))
+    assert find_landings(0.01 * wave, 60.0) == []
 
 
 def test_windows_hold_whole_cycles_and_walks_join(holden31, stepper):
-    walk = measure(holden31, stepper().positions(holden31))
+    walk = measure_cycles(holden31, stepper().positions(holden31))
     part = walk.within(60, 185)
     assert [cycle.start for cycle in part.right] == [60, 120]
     assert [cycle.start for cycle in part.left] == [90]

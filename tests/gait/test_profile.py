@@ -6,12 +6,12 @@ import numpy as np
 import pytest
 
 from hobble.core.errors import HobbleError
-from hobble.gait.cycles import WalkCycles, measure
-from hobble.gait.effect_sizes import effects
+from hobble.gait.cycles import WalkCycles, measure_cycles
+from hobble.gait.effect_sizes import measure_effects
 from hobble.gait.features import features
-from hobble.gait.limp_grade import grade
-from hobble.gait.profile import NAMES, mirrored, profile
-from hobble.gait.recogniser import recognise, windows
+from hobble.gait.limp_grade import grade_walk
+from hobble.gait.profile import PROFILE_NAMES, mirror_profile, profile_of_walk
+from hobble.gait.recogniser import recognise, windows_with_cycles
 
 
 @pytest.fixture(scope="module")
@@ -32,35 +32,37 @@ def uneven(holden31, swinger):
 def healthy(holden31, swinger):
     even = {"left": (3.0, 20.0), "right": (3.0, 20.0)}
     made = swinger(hip=even, knee={"left": 40.0, "right": 40.0}, arm=even, pelvis_left_up=0.0)
-    return profile(measure(holden31, made.positions(holden31)))
+    return profile_of_walk(measure_cycles(holden31, made.positions(holden31)))
 
 
 def test_the_mirrored_clip_has_the_mirrored_profile(holden31, uneven, mirror):
-    own = profile(measure(holden31, uneven))
-    other = profile(measure(holden31, mirror(holden31, uneven)))
-    assert other == pytest.approx(mirrored(own), abs=1e-9)
+    own = profile_of_walk(measure_cycles(holden31, uneven))
+    other = profile_of_walk(measure_cycles(holden31, mirror(holden31, uneven)))
+    assert other == pytest.approx(mirror_profile(own), abs=1e-9)
     assert other["range knee_flexion_L"] == pytest.approx(own["range knee_flexion_R"])
     assert other["range knee_flexion_L"] < 0.6 * other["range knee_flexion_R"]
-    assert mirrored(mirrored(own)) == pytest.approx(own)
+    assert mirror_profile(mirror_profile(own)) == pytest.approx(own)
 
 
 def test_effects_of_a_mirrored_clip_are_those_of_the_other_side(holden31, uneven, mirror, healthy):
-    own = profile(measure(holden31, uneven))
-    other = profile(measure(holden31, mirror(holden31, uneven)))
-    mirrored_healthy = mirrored(healthy)
-    assert effects(own, healthy, "right") == pytest.approx(effects(other, mirrored_healthy, "left"))
-    for judge in (recognise, grade):
+    own = profile_of_walk(measure_cycles(holden31, uneven))
+    other = profile_of_walk(measure_cycles(holden31, mirror(holden31, uneven)))
+    mirrored_healthy = mirror_profile(healthy)
+    assert measure_effects(own, healthy, "right") == pytest.approx(
+        measure_effects(other, mirrored_healthy, "left")
+    )
+    for judge in (recognise, grade_walk):
         one, two = judge(own, healthy), judge(other, mirrored_healthy)
         assert (one.label, one.side, two.side) == (two.label, "right", "left")
         assert two.probabilities == pytest.approx(one.probabilities, abs=1e-6)
 
 
 def test_a_walk_compared_with_itself_has_no_effects(holden31, uneven):
-    own = profile(measure(holden31, uneven))
+    own = profile_of_walk(measure_cycles(holden31, uneven))
     assert set(features(own, own).values()) == {0.0}
     assert recognise(own, own).label == "normal"
-    assert grade(own, own).label == "normal"
-    sizes = effects(own, own)
+    assert grade_walk(own, own).label == "normal"
+    sizes = measure_effects(own, own)
     assert all(sizes[name] == 1.0 for name in ("speed", "step_hurt", "knee_hurt", "hip_sound", "arm_hurt"))
     assert all(sizes[name] == 0.0 for name in ("stance", "lean", "lean_hurt", "pelvis_drop", "sway_forward"))
 
@@ -75,7 +77,7 @@ def test_effects_of_a_made_limp_are_found(holden31, swinger, healthy):
         trunk_left=(0.0, 4.0),
         pelvis_left_up=-2.0,
     )
-    sizes = effects(profile(measure(holden31, made.positions(holden31))), healthy)
+    sizes = measure_effects(profile_of_walk(measure_cycles(holden31, made.positions(holden31))), healthy)
     assert sizes["knee_hurt"] == pytest.approx(0.25)
     assert sizes["knee_sound"] == pytest.approx(1.0)
     assert sizes["hip_hurt"] == pytest.approx(0.75)
@@ -89,8 +91,10 @@ def test_effects_of_a_made_limp_are_found(holden31, swinger, healthy):
 
 def test_a_shorter_stance_and_step_belong_to_the_hurt_leg(holden31, stepper):
     even, limp = stepper(), stepper(stance_right=30, stance_left=42, ahead_right=10)
-    walk, healthy = (profile(measure(holden31, made.positions(holden31))) for made in (limp, even))
-    right, left = effects(walk, healthy, "right"), effects(walk, healthy, "left")
+    walk, healthy = (
+        profile_of_walk(measure_cycles(holden31, made.positions(holden31))) for made in (limp, even)
+    )
+    right, left = measure_effects(walk, healthy, "right"), measure_effects(walk, healthy, "left")
     assert right["stance"] == pytest.approx(12 / 60)
     assert left["stance"] == pytest.approx(-12 / 60)
     # The right ankle lands 10 instead of 25 cm ahead of the hips; the left one is 20 cm behind them then.
@@ -100,21 +104,23 @@ def test_a_shorter_stance_and_step_belong_to_the_hurt_leg(holden31, stepper):
 
 def test_a_profile_without_cycles_is_refused():
     with pytest.raises(HobbleError, match="no whole cycle"):
-        profile(WalkCycles(60.0, (), ()))
+        profile_of_walk(WalkCycles(60.0, (), ()))
 
 
 def test_names_are_unique():
-    assert len(set(NAMES)) == len(NAMES) == 52
+    assert len(set(PROFILE_NAMES)) == len(PROFILE_NAMES) == 52
 
 
 def test_each_feature_is_the_difference_that_its_name_says(holden31, stepper):
     even, limp = stepper(), stepper(stance_right=30, stance_left=42, ahead_right=10)
-    found = features(*(profile(measure(holden31, made.positions(holden31))) for made in (limp, even)))
+    found = features(
+        *(profile_of_walk(measure_cycles(holden31, made.positions(holden31))) for made in (limp, even))
+    )
     assert found["stance L - R"] == pytest.approx(12 / 60)
     assert found["step R - L"] == pytest.approx(-30 / 81)  # 30 and 60 cm, where both were 45
     assert found["left landing"] == pytest.approx(0)
     assert found["step width"] == pytest.approx(0)
-    healthy = profile(measure(holden31, even.positions(holden31)))
+    healthy = profile_of_walk(measure_cycles(holden31, even.positions(holden31)))
     walk = healthy | {"range knee_flexion_R": 0.4 * healthy["range knee_flexion_R"]}
     walk["range arm_forward_L"] = 100.0  # of nothing: five times, the most that is said
     found = features(walk, healthy)
@@ -125,11 +131,11 @@ def test_each_feature_is_the_difference_that_its_name_says(holden31, stepper):
 def test_windows_begin_every_second_and_hold_three_cycles(holden31, stepper):
     """Right cycles begin at frames 60, 120, .. 240, left ones at 30, 90, .. 270; each has 60 frames."""
     positions = stepper().positions(holden31)
-    walk = measure(holden31, positions)
-    found = windows(walk, len(positions), seconds=2.5)
+    walk = measure_cycles(holden31, positions)
+    found = windows_with_cycles(walk, len(positions), seconds=2.5)
     assert [start for start, _ in found] == [0, 60, 120, 180]
     right, left = ([[c.start for c in getattr(part, s)] for _, part in found] for s in ("right", "left"))
     assert right == [[60], [60, 120], [120, 180], [180, 240]]
     assert left == [[30, 90], [90, 150], [150, 210], [210, 270]]
-    short = windows(walk, len(positions), seconds=2.0)
+    short = windows_with_cycles(walk, len(positions), seconds=2.0)
     assert short[0][0] == 60  # the first two seconds hold one cycle of each leg

@@ -100,10 +100,10 @@ def test_hurting_the_mirrored_clip_on_the_other_side_is_the_mirror_of_the_hurt_c
 def test_labels_are_those_of_the_source_at_the_new_times(made, hurting) -> None:
     clip, labels, flat = made("straight")
     hurt = hurt_clip(clip, labels, hurting(len(clip), {"RightUpLeg-RightLeg": 10.0}), flat=flat)
-    assert len(hurt.labels) == len(hurt.clip) == len(hurt.severity) == len(hurt.when)
+    assert len(hurt.labels) == len(hurt.clip) == len(hurt.severity) == len(hurt.source_frames)
     assert np.isfinite(hurt.labels.footsteps[:, 0]).sum() == np.isfinite(labels.footsteps[:, 0]).sum()
     assert hurt.labels.gait[:, 1].mean() > 0.99  # a limping walk stays a walk
-    assert np.all(np.diff(hurt.when) > 0)
+    assert np.all(np.diff(hurt.source_frames) > 0)
     assert len(hurt.labels.cycles) >= len(labels.cycles) - 1
     moved = np.abs(hurt.clip.positions[hurt.labels.footsteps[2:-2, 0].astype(int)])
     assert np.isfinite(moved).all()

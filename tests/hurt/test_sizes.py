@@ -7,7 +7,7 @@ import pytest
 from hurt_gait import effects, measures
 
 from hobble.core.skeleton import other_side
-from hobble.gait.cycles import measure
+from hobble.gait.cycles import measure_cycles
 from hobble.gait.signals import CURVES
 from hobble.hurt.hurt_clip import hurt_clip
 
@@ -89,7 +89,7 @@ def test_a_stiff_back_does_not_make_the_trunk_sway(captured, hurting) -> None:
 
 def mean_curves(clip):
     """Name -> (50,) mean over the cycles of the right leg."""
-    cycles = measure(clip.skeleton, clip.positions, clip.fps).right
+    cycles = measure_cycles(clip.skeleton, clip.positions, clip.fps).right
     return dict(zip(CURVES, np.mean([cycle.curves for cycle in cycles], axis=0), strict=True))
 
 

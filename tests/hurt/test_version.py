@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from hurt_gait import measures
 
-from hobble.hurt.effects import POWER
+from hobble.hurt.effects import STRENGTH_POWER
 from hobble.hurt.hurt_clip import hurt_clip
 from hobble.hurt.options import Hurt
 from hobble.hurt.version import SEVERITY_TOLERANCE, hurt_version
@@ -33,7 +33,7 @@ def changing(made, hurting):
 def test_severities_far_from_a_change_are_the_requested_ones(changing, holden31) -> None:
     wanted, hurt = changing
     column = holden31.link_names.index(THIGH)
-    when = np.clip(hurt.when.astype(int), 0, len(wanted) - 1)
+    when = np.clip(hurt.source_frames.astype(int), 0, len(wanted) - 1)
     calm = np.ptp([wanted[np.clip(when + d, 0, len(wanted) - 1), column] for d in (-80, 0, 80)], axis=0) == 0
     assert calm.mean() > 0.6
     np.testing.assert_allclose(hurt.severity[calm], wanted[when][calm], atol=0.01)
@@ -44,8 +44,10 @@ def test_a_change_of_severity_sets_in_over_a_second_like_the_motion(changing, ho
     _, hurt = changing
     severity = hurt.severity[:, holden31.link_names.index(THIGH)]
     assert np.abs(np.diff(severity)).max() < 0.6
-    at = int(np.argmin(np.abs(hurt.when - 299.5)))  # the moment of the change: half of the strength of 10
-    assert severity[at] == pytest.approx(10 * 0.5 ** (1 / POWER), abs=0.25)
+    at = int(
+        np.argmin(np.abs(hurt.source_frames - 299.5))
+    )  # the moment of the change: half of the strength of 10
+    assert severity[at] == pytest.approx(10 * 0.5 ** (1 / STRENGTH_POWER), abs=0.25)
 
 
 def test_frames_with_a_severity_are_as_fast_as_a_clip_with_it_throughout(changing, made, hurting) -> None:
@@ -53,7 +55,7 @@ def test_frames_with_a_severity_are_as_fast_as_a_clip_with_it_throughout(changin
     clip, labels, flat = made("straight")
     throughout = hurt_clip(clip, labels, hurting(len(clip), {THIGH: 10.0}), flat=flat)
     inside = np.flatnonzero(hurt.severity.max(axis=1) > 9.9)
-    other = np.searchsorted(throughout.when, hurt.when[inside])
+    other = np.searchsorted(throughout.source_frames, hurt.source_frames[inside])
     hips = clip.skeleton.role("hips")
 
     def speed(one, frames):

@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from hobble.labels.contacts import contacts, stance, still_joints
+from hobble.labels.contacts import find_contacts, find_stance_contacts, find_still_joints
 from hobble.labels.options import LabelOptions
 
 
@@ -21,7 +21,7 @@ def truth(half: int, swing: int, frames: int, start: int) -> np.ndarray:
 @pytest.mark.parametrize(("half", "swing", "stride"), [(30, 24, 120.0), (20, 16, 160.0), (45, 40, 60.0)])
 def test_stances_of_a_made_walk_begin_and_end_at_the_right_frames(walker, half, swing, stride):
     """Swings begin and end slowly, so that their first and last frames look like a stance."""
-    found = stance(walker(half=half, swing=swing, stride=stride), LabelOptions())
+    found = find_stance_contacts(walker(half=half, swing=swing, stride=stride), LabelOptions())
     expected = truth(half, swing, 600, 40)
     assert found[expected][:, 2].all()
     assert (found[:, 2] != expected).mean() < 0.1
@@ -32,28 +32,30 @@ def test_contacts_do_not_depend_on_body_size(walker, size):
     clip = walker()
     skeleton = replace(clip.skeleton, offsets=size * clip.skeleton.offsets)
     other = replace(clip, skeleton=skeleton, root=size * clip.root, translations=size * clip.translations)
-    assert (stance(other, LabelOptions()) == stance(clip, LabelOptions())).all()
+    assert (find_stance_contacts(other, LabelOptions()) == find_stance_contacts(clip, LabelOptions())).all()
 
 
 @pytest.mark.parametrize("height", [-40.0, 100.0])
 def test_contacts_do_not_depend_on_the_height_of_the_floor(walker, height):
     clip = walker()
     raised = replace(clip, root=clip.root + np.array([0.0, height, 0.0]))
-    assert (stance(raised, LabelOptions()) == stance(clip, LabelOptions())).all()
+    assert (find_stance_contacts(raised, LabelOptions()) == find_stance_contacts(clip, LabelOptions())).all()
 
 
 def test_a_sliding_foot_keeps_its_contact(walker):
     """As on a treadmill, the foot moves half a centimetre a frame; the original's rule calls that a swing."""
     clip = walker()
     sliding = replace(clip, root=clip.root + np.outer(np.arange(len(clip)), [0.0, 0.0, 0.5]))
-    assert (stance(sliding, LabelOptions()) == stance(clip, LabelOptions()))[:, [0, 2]].mean() > 0.95
-    assert not still_joints(sliding, 0.02)[100:500].any()
+    assert (find_stance_contacts(sliding, LabelOptions()) == find_stance_contacts(clip, LabelOptions()))[
+        :, [0, 2]
+    ].mean() > 0.95
+    assert not find_still_joints(sliding, 0.02)[100:500].any()
 
 
 def test_the_option_contacts_selects_the_rule(walker):
     clip = walker()
-    assert (contacts(clip, LabelOptions()) == stance(clip, LabelOptions())).all()
-    assert (contacts(clip, LabelOptions(contacts="original")) == still_joints(clip, 0.02)).all()
+    assert (find_contacts(clip, LabelOptions()) == find_stance_contacts(clip, LabelOptions())).all()
+    assert (find_contacts(clip, LabelOptions(contacts="original")) == find_still_joints(clip, 0.02)).all()
 
 
 def test_a_foot_held_in_the_air_has_no_contact(walker):
@@ -62,7 +64,7 @@ def test_a_foot_held_in_the_air_has_no_contact(walker):
     translations = clip.translations.copy()
     up = 50.0 * np.clip((np.arange(len(clip)) - 100) / 30, 0, 1)
     translations[:, heel, 1] += up
-    found = stance(replace(clip, translations=translations), LabelOptions())
+    found = find_stance_contacts(replace(clip, translations=translations), LabelOptions())
     assert found[:90].all()
     assert not found[150:, 2:].any()
     assert found[150:, :2].all()
@@ -77,16 +79,16 @@ def test_contacts_of_very_short_clips_have_the_right_shape(walker, frames):
         rotations=clip.rotations[:frames],
         translations=clip.translations[:frames],
     )
-    assert contacts(short, LabelOptions()).shape == (frames, 4)
+    assert find_contacts(short, LabelOptions()).shape == (frames, 4)
 
 
 def test_a_dip_does_not_end_the_rest_of_a_stance(walker):
     """A captured foot that pushes off may dip some centimetres below the floor."""
     clip = walker()
-    standing = np.flatnonzero(stance(clip, LabelOptions())[:, 2])
+    standing = np.flatnonzero(find_stance_contacts(clip, LabelOptions())[:, 2])
     middle = standing[len(standing) // 2]
     away = np.abs(np.arange(len(clip)) - middle)
     moved = clip.translations.copy()
     moved[:, clip.skeleton.role("right_heel"), 1] -= 3.0 * np.exp(-0.5 * (away / 4.0) ** 2)
-    found = stance(replace(clip, translations=moved), LabelOptions())
+    found = find_stance_contacts(replace(clip, translations=moved), LabelOptions())
     assert found[(away > 8) & (away < 18), 2].all()

@@ -27,13 +27,13 @@ AT_120 = SourceTime(240, 120.0)
 @given(st.integers(1, 10_000))
 @settings(max_examples=100, deadline=None)
 def test_a_cycle_starts_at_half_the_frame_number_of_a_120_hz_file(number):
-    assert whole_frame(SourceTime(20_000, 120.0).to_clip(number)) == number // 2
+    assert whole_frame(SourceTime(20_000, 120.0).to_clip_frame(number)) == number // 2
 
 
 @pytest.mark.parametrize(("fps", "number", "frame"), [(60, 31, 30), (30, 16, 30), (24, 13, 30), (50, 26, 30)])
 def test_frames_of_files_at_other_rates_keep_their_time(fps, number, frame):
-    assert SourceTime(500, fps).to_clip(number) == pytest.approx(frame)
-    assert SourceTime(500, fps, first=number - 1).to_clip(number) == 0
+    assert SourceTime(500, fps).to_clip_frame(number) == pytest.approx(frame)
+    assert SourceTime(500, fps, first=number - 1).to_clip_frame(number) == 0
 
 
 @pytest.mark.parametrize("fps", [23.976, 1 / 0.00833, 1 / 0.01667])
@@ -41,8 +41,8 @@ def test_a_frame_rate_that_is_not_whole_is_not_rounded(fps):
     """Labels and frames are at the same moments even after ten minutes."""
     times = sample_times(72_000, fps, 60.0)
     time = SourceTime(72_000, fps)
-    np.testing.assert_allclose(time.at_clip_frames(len(times)), times, atol=1e-6)
-    np.testing.assert_allclose(time.to_clip(times[-1] + 1), len(times) - 1, atol=1e-6)
+    np.testing.assert_allclose(time.source_frames_of_clip(len(times)), times, atol=1e-6)
+    np.testing.assert_allclose(time.to_clip_frame(times[-1] + 1), len(times) - 1, atol=1e-6)
 
 
 def test_footsteps_count_from_one(write):

@@ -9,12 +9,12 @@ import pytest
 
 from hobble.labels import gait as g
 from hobble.labels.clip_labels import GAITS
-from hobble.labels.contacts import stance
+from hobble.labels.contacts import find_stance_contacts
 from hobble.labels.options import LabelOptions
 
 
 def automatic(clip, dominant=None):
-    return g.automatic_gait(clip, stance(clip, LabelOptions()), dominant)
+    return g.automatic_gait(clip, find_stance_contacts(clip, LabelOptions()), dominant)
 
 
 def clearly(gait):

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 import yaml
 
-from hobble.channels.injury.shown import PARTS, body_parts
+from hobble.channels.injury.shown import PARTS_WITH_SLIDER, link_index_by_part
 from hobble.core.skeleton import Skeleton
 from hobble.models.load import load_network
 from hobble.models.network import Network
@@ -20,14 +20,17 @@ from hobble.report.playable import playable
 
 
 def test_parts_are_the_links_of_their_roles(holden31: Skeleton) -> None:
-    names = {label: holden31.link_names[i] for label, i in body_parts(holden31, holden31.link_names).items()}
+    names = {
+        label: holden31.link_names[i]
+        for label, i in link_index_by_part(holden31, holden31.link_names).items()
+    }
     assert names["left thigh"] == "LeftUpLeg-LeftLeg"
     assert names["right foot"] == "RightFoot-RightToeBase"
     assert names["lower back"] == "Hips-LowerBack"
-    assert set(names) == {label for label, *_ in PARTS}
-    assert body_parts(holden31, ()) == {}
+    assert set(names) == {label for label, *_ in PARTS_WITH_SLIDER}
+    assert link_index_by_part(holden31, ()) == {}
     links = holden31.link_names
-    back = body_parts(holden31, links, {"LowerBack-Spine", "Spine1-Neck"})["lower back"]
+    back = link_index_by_part(holden31, links, {"LowerBack-Spine", "Spine1-Neck"})["lower back"]
     assert links[back] == "LowerBack-Spine", "the one that was hurt in training"
 
 

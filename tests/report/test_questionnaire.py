@@ -15,7 +15,7 @@ import pytest
 from hobble.channels.injury.study import films
 from hobble.channels.injury.study.answers import read_answers, read_study
 from hobble.channels.injury.study.films import FILMS, PARTS, part_links
-from hobble.channels.injury.study.questionnaire import doubts, write_questionnaire
+from hobble.channels.injury.study.questionnaire import list_doubts, write_questionnaire
 from hobble.core.errors import HobbleError
 from hobble.core.skeleton import Skeleton
 from hobble.models.load import load_network
@@ -31,7 +31,7 @@ def made(
     """The page with four small and short films."""
     folder = tmp_path_factory.mktemp("questionnaire")
     with pytest.MonkeyPatch.context() as patch:
-        for name, seconds in (("WARM_UP", 0.1), ("HEALTHY", 0.1), ("HURT", 0.3)):
+        for name, seconds in (("WARM_UP_SECONDS", 0.1), ("HEALTHY_SECONDS", 0.1), ("HURT_SECONDS", 0.3)):
             patch.setattr(films, name, seconds)
         return folder, write_questionnaire(network, folder, examples.RUNTIME, "example", SHORT, size=48)
 
@@ -43,7 +43,7 @@ def test_films_drawn_at_once_are_those_drawn_one_by_one(
     tmp_path: Path,
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    for name, seconds in (("WARM_UP", 0.1), ("HEALTHY", 0.1), ("HURT", 0.3)):
+    for name, seconds in (("WARM_UP_SECONDS", 0.1), ("HEALTHY_SECONDS", 0.1), ("HURT_SECONDS", 0.3)):
         monkeypatch.setattr(films, name, seconds)
     again = write_questionnaire(network, tmp_path, examples.RUNTIME, "example", SHORT, size=48, threads=3)
     assert again == made[1]
@@ -153,8 +153,8 @@ def test_films_without_a_visible_injury_get_a_warning() -> None:
         {"film": 1, "from_healthy_cm": 3.0, "untrained": []},
         {"film": 2, "from_healthy_cm": 0.01, "untrained": ["A-B"]},
     ]
-    assert doubts({"films": rows[:1]}) == []
-    same, never = doubts({"films": rows})
+    assert list_doubts({"films": rows[:1]}) == []
+    same, never = list_doubts({"films": rows})
     assert same.startswith("film 2: nobody can see the injury")
     assert never == "Never hurt in training: A-B."
 

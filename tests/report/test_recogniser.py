@@ -12,10 +12,10 @@ import pytest
 
 from hobble.core.quat import Array
 from hobble.core.skeleton import Skeleton
-from hobble.gait.cycles import measure
-from hobble.gait.limp_grade import grade, grader
-from hobble.gait.people import people
-from hobble.gait.profile import profile
+from hobble.gait.cycles import measure_cycles
+from hobble.gait.limp_grade import grade_walk, grader_of_all_people
+from hobble.gait.people import read_people
+from hobble.gait.profile import profile_of_walk
 from hobble.models.network import Network
 from hobble.report.pack_recogniser import (
     healthy_walk,
@@ -58,13 +58,13 @@ def test_cycles_and_their_measurements_equal_those_of_python(
 ) -> None:
     measured = 0
     for name, places in walks.items():
-        walk, found = measure(holden31, places, 60), in_page(tab, holden31, places)
+        walk, found = measure_cycles(holden31, places, 60), in_page(tab, holden31, places)
         assert found["spans"] == [[[c.start, c.end] for c in side] for side in (walk.right, walk.left)], name
         if not len(walk):
             assert found["profile"] is None
             continue
         measured += 1
-        expected = profile(walk)
+        expected = profile_of_walk(walk)
         for key, value in found["profile"].items():
             assert value == pytest.approx(expected[key], abs=1e-6), (name, key)
     assert measured >= 3, "three of the walks have cycles"
@@ -72,8 +72,8 @@ def test_cycles_and_their_measurements_equal_those_of_python(
 
 def test_javascript_recognises_the_same_limps_as_python(tab: Any) -> None:
     """People's impaired walks at several strengths, compared with their healthy walks."""
-    known = people()
-    healthy, cases = known.normal(), []
+    known = read_people()
+    healthy, cases = known.normal_profile(), []
     for gait in range(len(known.profiles)):
         for person in (0, 3, 7):
             walk = dict(zip(healthy, map(float, known.profiles[gait, person]), strict=True))
@@ -84,18 +84,18 @@ def test_javascript_recognises_the_same_limps_as_python(tab: Any) -> None:
     }})()""")
     labels = set()
     for case, answer in zip(cases, found, strict=True):
-        expected = grade(case, healthy)
+        expected = grade_walk(case, healthy)
         labels.add(expected.label)
         assert answer["label"] == expected.label
         assert answer["strength"] == pytest.approx(expected.strength, abs=1e-6)
         assert answer["distance"] == pytest.approx(expected.distance, abs=1e-6)
         assert answer["probabilities"] == pytest.approx(dict(expected.probabilities), abs=1e-6)
-        assert answer["sides"] == pytest.approx(list(expected.sides.values()), abs=1e-6)
+        assert answer["sides"] == pytest.approx(list(expected.probability_by_side.values()), abs=1e-6)
     assert len(labels) >= 4, "the cases are called different things"
 
 
 def test_every_kind_of_limp_has_its_own_text() -> None:
-    said = [kind_in_words(*kind) for kind in grader().kinds]
+    said = [kind_in_words(*kind) for kind in grader_of_all_people().kinds]
     assert len(set(said)) == len(said)
     assert kind_in_words("antalgic", "left") == "left thigh, shank or foot"
     assert kind_in_words("leaning_trunk", "forward") == "back, leaning forward"
@@ -117,7 +117,7 @@ def test_a_walk_is_compared_with_the_healthy_walk_of_the_same_figure(
 
 def test_the_panel_shows_the_recognised_limp(tab: Any, walks: dict[str, Array], holden31: Skeleton) -> None:
     """The recogniser in Play uses three seconds, and asks the user to walk if there is no cycle."""
-    healthy = profile(measure(holden31, walks["even"], 60))
+    healthy = profile_of_walk(measure_cycles(holden31, walks["even"], 60))
     spec = {"names": list(holden31.joints), "roles": dict(holden31.roles)}
     spec["recogniser"] = {"learnt": packed_statistics(), "healthy": healthy}
     said = {}
@@ -128,7 +128,7 @@ def test_the_panel_shows_the_recognised_limp(tab: Any, walks: dict[str, Array], 
           {json.dumps(frames)}.forEach((places) => watch.add(places));
           return watch.say();
         }})()""")
-    last = grade(profile(measure(holden31, walks["even"][-180:], 60)), healthy)
+    last = grade_walk(profile_of_walk(measure_cycles(holden31, walks["even"][-180:], 60)), healthy)
     assert said["even"]["text"] == "nothing hurts"
     assert said["even"]["share"] == pytest.approx(last.probabilities["normal"], abs=1e-4)
     assert said["on the spot"] == {"text": "no answer: walk straight ahead"}

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from hobble.channels import NAMES
+from hobble.channels import CHANNEL_NAMES
 from hobble.measures.measure import Measure
 from hobble.measures.registry import MEASURES
 from hobble.workflow import fingerprint as fp
@@ -139,7 +139,7 @@ def test_no_stage_imports_a_later_one(root: Path) -> None:
     order.insert(order.index("training"), "character")
     order.insert(order.index("channels"), "gait")  # how a walk is measured; no rule is its own
     # A channel's folder also holds how it is shown and measured, which comes after all stages.
-    channels = [f"hobble.channels.{name}" for name in NAMES]
+    channels = [f"hobble.channels.{name}" for name in CHANNEL_NAMES]
     of_stage = fp.imported_files(root / "workflow/scripts/channel_clips.py", root / "src", channels)
     assert any("injury" in module.parts for module in of_stage)
     for rank, stage in enumerate(order):

@@ -39,7 +39,7 @@ def test_a_hurt_version_has_the_mood_of_its_clip(base: Path) -> None:
     project = Project(base, {})
     values = project.datasets.channel_sources
     assert [values.is_neutral("mine", clip, "mood") for clip in ("a_hurt1", "b_hurt1")] == [True, False]
-    source = channel("mood").source(values.source("mine", "b_hurt1", "mood"))
+    source = channel("mood").make_source(values.source("mine", "b_hurt1", "mood"))
     assert not channel("mood").is_neutral(source)
     plain, moods = ("a", "a_mirror"), ("a", "a_mirror", "b", "b_mirror")
     both = {*moods, *(f"{v}{m}" for v in ("a_hurt1", "b_hurt1", "c") for m in ("", "_mirror"))}

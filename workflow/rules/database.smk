@@ -51,7 +51,7 @@ for batch in [*batches_of_clips, *batches_of_hurt_versions]:
             ),
             code=lambda w, batch=batch: package.code(
                 "database_clips",
-                *modules_of(datasets.channel_sources.channels(batch.dataset)),
+                *channel_packages(datasets.channel_sources.channels(batch.dataset)),
             ),
         script:
             "../scripts/database_clips.py"
@@ -127,7 +127,7 @@ rule database_shard:
         every=lambda w: datasets.hurt_row_step(w.dataset),
         options=lambda w: datasets.options_of_class(w.dataset, "database", Merging),
         code=lambda w: package.code(
-            "database_shard", *modules_of(channels_of_folder(w.channels))
+            "database_shard", *channel_packages(channels_of_folder(w.channels))
         ),
     script:
         "../scripts/database_shard.py"
@@ -173,7 +173,7 @@ rule database_merge:
         every=lambda w: datasets.hurt_row_step(w.dataset),
         options=lambda w: datasets.options_of_class(w.dataset, "database", Merging),
         code=lambda w: package.code(
-            "database_merge", *modules_of(channels_of_folder(w.channels))
+            "database_merge", *channel_packages(channels_of_folder(w.channels))
         ),
     script:
         "../scripts/database_merge.py"

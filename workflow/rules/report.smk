@@ -132,7 +132,7 @@ rule report:
             "report",
             configurations.model_package(w.configuration),
             *part_modules("page"),
-            *shown_modules(),
+            *display_modules(),
         ),
     script:
         "../scripts/report.py"
@@ -178,7 +178,7 @@ rule stimuli:
     params:
         runtime=lambda w: configurations.section(w.configuration, "runtime"),
         code=lambda w: package.code(
-            "stimuli", configurations.model_package(w.configuration), *shown_modules()
+            "stimuli", configurations.model_package(w.configuration), *display_modules()
         ),
     script:
         "../scripts/stimuli.py"
@@ -204,7 +204,7 @@ rule questionnaire:
         configuration=lambda w: w.configuration,
         runtime=lambda w: configurations.section(w.configuration, "runtime"),
         code=lambda w: package.code(
-            "questionnaire", configurations.model_package(w.configuration), *shown_modules()
+            "questionnaire", configurations.model_package(w.configuration), *display_modules()
         ),
     script:
         "../scripts/questionnaire.py"

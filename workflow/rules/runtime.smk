@@ -19,7 +19,7 @@ rule generate:
     params:
         runtime=lambda w: configurations.section(w.configuration, "runtime"),
         code=lambda w: package.code(
-            "generate", configurations.model_package(w.configuration), *shown_modules()
+            "generate", configurations.model_package(w.configuration), *display_modules()
         ),
     script:
         "../scripts/generate.py"

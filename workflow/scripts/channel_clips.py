@@ -5,7 +5,7 @@ from the data set.
 """
 
 from hobble.channels import channel
-from hobble.channels.clip_values import clip_values, save_values, write_report
+from hobble.channels.clip_values import read_clip_values, save_values, write_report
 from hobble.core.clip import load_clip
 from hobble.core.files import read_json
 from hobble.workflow.batch_job import make_each
@@ -17,8 +17,8 @@ def make_values(piece, log):
     piece: the channel and the clip with their params and files, a `JobPiece`.
     """
     name, clip = piece.params["channel"], load_clip(piece.input["clip"])
-    source = channel(name).source(piece.params["source"], piece.input.get("files", []))
-    values, warnings = clip_values(name, clip, source, read_json(piece.input["report"]))
+    source = channel(name).make_source(piece.params["source"], piece.input.get("files", []))
+    values, warnings = read_clip_values(name, clip, source, read_json(piece.input["report"]))
     for warning in warnings:
         log.warning("%s", warning)
     columns = channel(name).columns(clip.skeleton)

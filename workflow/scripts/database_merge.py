@@ -18,8 +18,8 @@ with job(snakemake) as log:
     database = Path(snakemake.output.database)
     shards = [Path(folder) for folder in snakemake.input.get("shards", [])]
     # A digest holds what is compared of a clip: a few poses and the checksum of its file.
-    clips_and_reports = zip(snakemake.input.compared, snakemake.input.reports, strict=True)
-    digests = [clip_digest(load_clip(clip), read_json(report)["sha256"]) for clip, report in clips_and_reports]
+    files = zip(snakemake.input.compared, snakemake.input.reports, strict=True)
+    digests = [clip_digest(load_clip(clip), read_json(report)["sha256"]) for clip, report in files]
     for shard in shards:
         digests += load_digests(shard / "likenesses.npz")
     refuse_split_pairs(

@@ -28,7 +28,7 @@ with job(snakemake) as log:
         dtype=options.dtype,
         seed=options.seed,
     )
-    clips_and_reports = zip(snakemake.input.compared, snakemake.input.reports, strict=True)
-    digests = [clip_digest(load_clip(clip), read_json(report)["sha256"]) for clip, report in clips_and_reports]
+    files = zip(snakemake.input.compared, snakemake.input.reports, strict=True)
+    digests = [clip_digest(load_clip(clip), read_json(report)["sha256"]) for clip, report in files]
     save_digests(shard / "likenesses.npz", digests)
     log.info("%d clips", len(clips))

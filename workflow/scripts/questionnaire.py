@@ -2,7 +2,7 @@
 
 from pathlib import Path
 
-from hobble.channels.injury.study.questionnaire import doubts, write_questionnaire
+from hobble.channels.injury.study.questionnaire import list_doubts, write_questionnaire
 from hobble.models.load import load_network
 from hobble.runtime.options import Runtime
 from hobble.workflow.job import job
@@ -16,6 +16,6 @@ with job(snakemake) as log:
         snakemake.params.configuration,
         threads=snakemake.threads,
     )
-    for doubt in doubts(solution):
+    for doubt in list_doubts(solution):
         log.warning("%s", doubt)
     log.info("wrote %d films to %s", len(solution["films"]), folder)

@@ -10,18 +10,18 @@ from collections.abc import Iterable
 from hobble.channels.channel import Channel, ClipSource
 
 __all__ = [
-    "NAMES",
+    "CHANNEL_NAMES",
     "Channel",
     "ClipSource",
     "all_channels",
     "channel",
     "channel_of_old_key",
-    "modules_of",
-    "shown_modules",
+    "channel_packages",
+    "display_modules",
 ]
 
 # The names of all channels. Each is also a package in this folder, whose CHANNEL is an instance of `Channel`.
-NAMES = ("injury", "mood", "diagnosis")
+CHANNEL_NAMES = ("injury", "mood", "diagnosis")
 
 
 @functools.cache
@@ -31,8 +31,8 @@ def channel(name: str) -> Channel:
     The channel's package is imported only here. So a job of the workflow depends only on the code of the
     channels that it uses.
     """
-    if name not in NAMES:
-        raise KeyError(f"there is no channel {name!r}. The channels are {', '.join(NAMES)}")
+    if name not in CHANNEL_NAMES:
+        raise KeyError(f"there is no channel {name!r}. The channels are {', '.join(CHANNEL_NAMES)}")
     definition = importlib.import_module(f"{__name__}.{name}").CHANNEL
     assert isinstance(definition, Channel)
     assert definition.name == name
@@ -40,21 +40,21 @@ def channel(name: str) -> Channel:
 
 
 def all_channels() -> tuple[Channel, ...]:
-    """All channels, in the order of NAMES."""
-    return tuple(channel(name) for name in NAMES)
+    """All channels, in the order of CHANNEL_NAMES."""
+    return tuple(channel(name) for name in CHANNEL_NAMES)
 
 
-def modules_of(names: Iterable[str]) -> list[str]:
+def channel_packages(names: Iterable[str]) -> list[str]:
     """Full names of the packages of these channels. The workflow runs a job again if their code changes."""
     return [f"{__name__}.{name}" for name in names]
 
 
-def shown_modules() -> list[str]:
+def display_modules() -> list[str]:
     """Full names of the modules channels.<name>.shown that exist.
 
     Such a module says how a page shows the channel. A channel without it is shown in the default way.
     """
-    modules = (f"{__name__}.{name}.shown" for name in NAMES)
+    modules = (f"{__name__}.{name}.shown" for name in CHANNEL_NAMES)
     return [module for module in modules if importlib.util.find_spec(module) is not None]
 
 

@@ -38,7 +38,7 @@ class ClipSource:
     clip: the clip's name; for a mirrored clip, the name of its original. entry: the clip's entry in the data
     set. value: what the entry says for this channel; None if it says nothing. options: the data set's section
     `channels.<name>`, read by the channel's `Options`. files: the channel's file beside the clip, if it
-    exists, and the channel's tables (`Channel.tables`).
+    exists, and the channel's tables (`Channel.table_files`).
     """
 
     clip: str
@@ -52,7 +52,7 @@ class Channel(ABC):
     """A channel. Each channel is a subclass in channels/<name>/.
 
     name: the name of the channel's folder. It is also used in configurations and as a keyword argument of
-    `next_pose`. title: the page's word for the channel. value: the page's word for one of its values.
+    `next_pose`. title: the page's word for the channel. value_word: the page's word for one of its values.
     highest: the highest value. rate: how much a value may change in a second at run time, unless the
     configuration says otherwise. suffix: a file <clip><suffix> beside a clip holds the clip's values; None if
     the channel has no such files. old_keys: keys that stand for this channel in old configurations and
@@ -66,7 +66,7 @@ class Channel(ABC):
 
     name: str
     title: str
-    value: str = "value"
+    value_word: str = "value"
     highest: float = 1.0
     rate: float = 1.0
     suffix: str | None = None
@@ -99,7 +99,7 @@ class Channel(ABC):
     def check(self, source: ClipSource, rig: HasLinks) -> None:  # noqa: B027 - most channels check nothing
         """Raise InputError if the clip's entry or the options are wrong. Called before any job runs."""
 
-    def source(self, fields: Mapping[str, Any], files: Sequence[str | Path] = ()) -> ClipSource:
+    def make_source(self, fields: Mapping[str, Any], files: Sequence[str | Path] = ()) -> ClipSource:
         """A `ClipSource` from plain data.
 
         fields: the fields of `ClipSource` without `files`; its `options` are a plain mapping. Raises
@@ -111,7 +111,7 @@ class Channel(ABC):
         """The data set's section for this channel, read by `Options`; None without section or `Options`."""
         return self.Options.model_validate(section) if self.Options is not None and section else None
 
-    def tables(self, options: Section | None) -> Sequence[str]:
+    def table_files(self, options: Section | None) -> Sequence[str]:
         """Names of files in the mocap folder that the options refer to, such as a table of all clips."""
         return ()
 
@@ -119,7 +119,7 @@ class Channel(ABC):
         """Values (F, C) of the mirrored clip. By default they stay the same."""
         return values
 
-    def deviation(self, std: Array) -> Array:
+    def divisors(self, std: Array) -> Array:
         """The divisors (C,) by which the channel's columns are divided before the network reads them.
 
         std: (C,) standard deviations of the columns over the training rows.

@@ -18,7 +18,7 @@ from hobble.core.files import load_npz, save_npz, write_json
 from hobble.core.quat import Array
 
 
-def clip_values(
+def read_clip_values(
     name: str, clip: Clip, source: ClipSource, motion: Mapping[str, Any]
 ) -> tuple[Array, list[str]]:
     """Values (F, C) float32 of channel `name` for a clip, and warnings.
@@ -38,7 +38,7 @@ def clip_values(
     wrong = ~((values >= 0) & (values <= definition.highest))
     if wrong.any():
         frame, column = (int(i) for i in np.argwhere(wrong)[0])
-        value = f"{definition.value} {values[frame, column]:g} of {labels[column]}"
+        value = f"{definition.value_word} {values[frame, column]:g} of {labels[column]}"
         problem = f"{value} is not between 0 and {definition.highest:g}"
         raise InputError(clip.name, problem, frame=frame)
     return values, warnings

@@ -6,7 +6,7 @@ import importlib
 import importlib.util
 from types import ModuleType
 
-from hobble.channels import NAMES
+from hobble.channels import CHANNEL_NAMES
 
 
 def channel_commands() -> dict[str, ModuleType]:
@@ -16,7 +16,7 @@ def channel_commands() -> dict[str, ModuleType]:
     `run(options)`.
     """
     found: dict[str, ModuleType] = {}
-    for name in NAMES:
+    for name in CHANNEL_NAMES:
         module = f"hobble.channels.{name}.commands"
         if importlib.util.find_spec(module) is not None:
             found |= importlib.import_module(module).COMMANDS

@@ -27,33 +27,34 @@ from hobble.core.skeleton import Skeleton
 class ChannelWords:
     """Texts of a channel for the report page. {} stands for the name of a column.
 
-    rest: label of the button that sets all values to 0. step: step of a slider. key: name of the values in
-    the address of the page, by default the channel's name. grows: description of a sweep. never: note on a
-    column that is not trained. headline: headline of the page. says: what the network is told if the column
-    is above 0. on: a word for a character with a value above 0; if it is empty, the column's name is used.
+    neutral_button: label of the button that sets all values to 0. slider_step: step of a slider. address_key:
+    name of the values in the address of the page, by default the channel's name. sweep_description:
+    description of a sweep. untrained_note: note on a column that is not trained. headline: headline of the
+    page. network_told: what the network is told if the column is above 0. active_word: a word for a character
+    with a value above 0; if it is empty, the column's name is used.
     """
 
-    rest: str = "Neutral"
-    step: float = 0.05
-    key: str | None = None
-    grows: str = "Walks {} more and more"
-    never: str = "always 0 in training, so it has no effect"
+    neutral_button: str = "Neutral"
+    slider_step: float = 0.05
+    address_key: str | None = None
+    sweep_description: str = "Walks {} more and more"
+    untrained_note: str = "always 0 in training, so it has no effect"
     headline: str = "Say how it walks."
-    says: str = "{}"
-    on: str = ""
+    network_told: str = "{}"
+    active_word: str = ""
 
 
 @dataclass(frozen=True)
 class ChannelDisplay:
     """How a channel is shown.
 
-    spoken: for each column, the name that readers see. sliders: label of a slider -> its column, for the
-    sliders that are there at the start. presets: label of a button -> {column: value}. regions: for each bone
-    of the body, the indices of the columns whose values colour the part that this bone moves; empty if
+    spoken_names: for each column, the name that readers see. sliders: label of a slider -> its column, for
+    the sliders that are there at the start. presets: label of a button -> {column: value}. regions: for each
+    bone of the body, the indices of the columns whose values colour the part that this bone moves; empty if
     columns do not belong to parts of the body.
     """
 
-    spoken: Sequence[str]
+    spoken_names: Sequence[str]
     sliders: Mapping[str, str]
     presets: Mapping[str, Mapping[str, float]] = field(default_factory=dict)
     regions: Sequence[Sequence[int]] = ()
@@ -71,13 +72,15 @@ class SampleWalk:
     coloured: bool = False
 
 
-def words(name: str) -> ChannelWords:
+def channel_words(name: str) -> ChannelWords:
     """The texts of the channel `name`."""
     own_words = _from_module(name, "WORDS")
     return own_words if isinstance(own_words, ChannelWords) else ChannelWords()
 
 
-def shown(name: str, skeleton: Skeleton, columns: Sequence[str], trained: Collection[str]) -> ChannelDisplay:
+def channel_display(
+    name: str, skeleton: Skeleton, columns: Sequence[str], trained: Collection[str]
+) -> ChannelDisplay:
     """How the channel `name` is shown. By default there is a slider for each trained column.
 
     columns: the labels of all columns. trained: the labels of the trained columns.
@@ -87,31 +90,31 @@ def shown(name: str, skeleton: Skeleton, columns: Sequence[str], trained: Collec
     return ChannelDisplay(tuple(columns), {column: column for column in columns if column in trained})
 
 
-def sweeps(
+def channel_sweeps(
     name: str, skeleton: Skeleton, columns: Sequence[str], trained: Collection[str]
 ) -> Mapping[str, str]:
     """Name of each sweep -> the column that rises. By default there is a sweep for each trained column.
 
-    columns, trained: as in `shown`.
+    columns, trained: as in `channel_display`.
     """
     if own_sweeps := _from_module(name, "sweeps"):
         return own_sweeps(skeleton, columns, trained)
     return {column.replace(" ", "_"): column for column in columns if column in trained}
 
 
-def loops(
+def channel_loops(
     name: str, skeleton: Skeleton, columns: Sequence[str], trained: Collection[str]
 ) -> list[SampleWalk]:
     """Walks for looping pictures.
 
     By default there is a walk with all values 0, then one for each trained column with its highest value.
-    columns, trained: as in `shown`.
+    columns, trained: as in `channel_display`.
     """
     if own_loops := _from_module(name, "loops"):
         return own_loops(skeleton, columns, trained)
     chosen, highest = [column for column in columns if column in trained], channel(name).highest
     return [
-        SampleWalk(words(name).rest.lower(), {}),
+        SampleWalk(channel_words(name).neutral_button.lower(), {}),
         *(SampleWalk(c.replace(" ", "-"), {c: highest}) for c in chosen),
     ]
 
@@ -127,7 +130,9 @@ def shown_names(skeleton: Mapping[str, Any]) -> Callable[[str], str]:
     names: dict[str, str] = {}  # label of a column of any channel -> the name that readers see
     for each in all_channels():
         columns = each.columns(rig)
-        names |= dict(zip(columns, shown(each.name, rig, columns, columns).spoken, strict=True))
+        names |= dict(
+            zip(columns, channel_display(each.name, rig, columns, columns).spoken_names, strict=True)
+        )
     return lambda column: names.get(column, column)
 
 

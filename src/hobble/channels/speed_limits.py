@@ -133,12 +133,12 @@ class _Cycles:
 class LimitLearner:
     """Collects the gait cycles of clips, one clip at a time, and learns the limits of one channel from them.
 
-    highest: the channel's highest value. across: (L,) for each label, the index of its counterpart on the
-    other side of the body, or its own index. Both sides get the same limits. gaits: number of gaits.
+    highest: the channel's highest value. counterparts: (L,) for each label, the index of its counterpart on
+    the other side of the body, or its own index. Both sides get the same limits. gaits: number of gaits.
     """
 
-    def __init__(self, highest: float, across: np.ndarray, gaits: int) -> None:
-        self.highest, self.across, self.gaits = highest, across, gaits
+    def __init__(self, highest: float, counterparts: np.ndarray, gaits: int) -> None:
+        self.highest, self.counterparts, self.gaits = highest, counterparts, gaits
         # Name of a clip -> name of its source (as in `add`) or None, and the cycles of the clip.
         self._clips: dict[str, tuple[str | None, _Cycles]] = {}
 
@@ -219,7 +219,7 @@ class LimitLearner:
         labels = values.shape[1]
         speeds = np.repeat(top[:, None, None], labels, axis=1).repeat(LEVELS, axis=2)
         for label in range(labels):
-            both_sides = _cycles_of_label(label, values, self.across)
+            both_sides = _cycles_of_label(label, values, self.counterparts)
             value, shares, gaits = (
                 np.concatenate(part)
                 for part in zip(*((v, share[i], gait[i]) for i, v in both_sides), strict=True)
@@ -267,7 +267,7 @@ class LimitLearner:
             share = np.clip(cycles.speed[kept] / healthy_speed[kept], SLOWEST, 1.0)
             parts.append((cycles.gait[kept], share, cycles.values[kept]))
         if not parts:
-            return np.zeros(0, int), np.zeros(0), np.zeros((0, len(self.across)))
+            return np.zeros(0, int), np.zeros(0), np.zeros((0, len(self.counterparts)))
         gait, share, values = (np.concatenate(column) for column in zip(*parts, strict=True))
         return gait, share, values
 

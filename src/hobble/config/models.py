@@ -7,8 +7,7 @@ from typing import Annotated, Any
 
 from pydantic import AfterValidator, Field, create_model, field_validator, model_validator
 
-from hobble.channels import NAMES as NAMES_OF_CHANNELS
-from hobble.channels import all_channels, channel
+from hobble.channels import CHANNEL_NAMES, all_channels, channel
 from hobble.config import sections as s
 from hobble.core.clip_files import CLIP_NAME_RULE, is_valid_clip_name
 from hobble.models import DEFAULT, model
@@ -34,8 +33,8 @@ def _refuse_old_keys(values: Any, model: type[s.Section], how: str) -> Any:
 
 
 def _check_channel_name(name: str) -> str:
-    if name not in NAMES_OF_CHANNELS:
-        raise ValueError(f"must be a channel ({', '.join(NAMES_OF_CHANNELS)})")
+    if name not in CHANNEL_NAMES:
+        raise ValueError(f"must be a channel ({', '.join(CHANNEL_NAMES)})")
     return name
 
 
@@ -177,11 +176,11 @@ class Configuration(s.Section):
     @field_validator("channels")
     @classmethod
     def _sort_channels(cls, names: tuple[str, ...]) -> tuple[str, ...]:
-        """Each channel once, in the order of `hobble.channels.NAMES`.
+        """Each channel once, in the order of `hobble.channels.CHANNEL_NAMES`.
 
         So configurations that name the same channels in different orders share a database.
         """
-        return tuple(name for name in NAMES_OF_CHANNELS if name in names)
+        return tuple(name for name in CHANNEL_NAMES if name in names)
 
 
 @functools.cache

@@ -187,7 +187,7 @@ def statistics_of_moments(
         x_std[block] = np.minimum(x_std[block] / np.repeat(w * joint_weight, 3), 1e30)
     for name, _ in layout.channels:
         block = layout.x_channel(name)
-        x_std[block] = channel(name).deviation(x.std[block])
+        x_std[block] = channel(name).divisors(x.std[block])
     y_std = share_in_groups(y.std, y_groups(layout), 1.0)
     return Statistics(*(np.asarray(v, np.float32) for v in (x.mean, x_std, y.mean, y_std)))
 

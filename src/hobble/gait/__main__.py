@@ -12,9 +12,9 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 from hobble.core.errors import HobbleError, InputError
-from hobble.gait.comparison import WalkComparison, compare, healthy_profile, measure_clip
+from hobble.gait.comparison import WalkComparison, compare_clip, healthy_profile, measure_clip
 from hobble.gait.effect_sizes import EFFECTS, effects_of_people
-from hobble.gait.people import GAITS, SOURCE, people
+from hobble.gait.people import GAITS, SOURCE, read_people
 from hobble.gait.profile import NO_CYCLE, Profile
 from hobble.gait.read_clip import SKELETONS, read_clip
 from hobble.gait.recogniser import RIGHT
@@ -89,7 +89,7 @@ def _compare_clip(path: str, options: argparse.Namespace, healthy: Profile) -> W
     clip = read_clip(path, options.skeletons)
     if not len(measure_clip(clip)):
         raise InputError(path, NO_CYCLE, fix=FIX_NO_CYCLE)
-    return compare(clip, healthy, options.window)
+    return compare_clip(clip, healthy, options.window)
 
 
 def describe(name: str, compared: WalkComparison, side: str | None = None) -> str:
@@ -104,7 +104,7 @@ def describe(name: str, compared: WalkComparison, side: str | None = None) -> st
     lines = [
         f"{name}: {answer.label} {answer.side or ''} ({len(compared.walk)} cycles)",
         f"  probabilities: {likely}",
-        f"  share of the {len(compared.windows)} windows with each answer: "
+        f"  share of the {len(compared.window_answers)} windows with each answer: "
         f"{_list_shares(compared.answer_shares())}",
         f"  graded recogniser, also for mild limps: {grade.label} {grade.side or ''}, "
         f"strength {grade.strength:.2f} (mean of people with this limp: 1), "
@@ -120,7 +120,7 @@ def describe(name: str, compared: WalkComparison, side: str | None = None) -> st
 
 def _effect_lines(sizes: Mapping[str, float]) -> list[str]:
     """A table with a line for each effect. sizes: name of EFFECTS -> size of the effect in the clip."""
-    of_people = effects_of_people(people())
+    of_people = effects_of_people(read_people())
     lines = [" " * 60 + "".join(f"{gait[:13]:>15}" for gait in of_people)]
     for key, text in EFFECTS.items():
         columns = "".join("{:9.2f} ±{:4.2f}".format(*of_people[gait][key]) for gait in of_people)

@@ -15,7 +15,7 @@ import numpy as np
 
 from hobble.core.quat import Array
 from hobble.core.skeleton import Skeleton
-from hobble.gait.signals import CURVES, Signals, mirrored, signals
+from hobble.gait.signals import CURVES, Signals, measure_signals, mirror_signals
 
 SAMPLES = 50  # number of samples of each curve in a cycle
 SCALARS = (
@@ -83,7 +83,7 @@ class WalkCycles:
         return WalkCycles(self.fps, self.left, self.right)
 
 
-def measure(skeleton: Skeleton, positions: Array, fps: float = 60.0) -> WalkCycles:
+def measure_cycles(skeleton: Skeleton, positions: Array, fps: float = 60.0) -> WalkCycles:
     """Find and measure the cycles in which a figure walks straight ahead.
 
     positions: (F, J, 3) in the world, cm, Y up. Frames of standing, turning, and walking backward or sideways
@@ -92,8 +92,8 @@ def measure(skeleton: Skeleton, positions: Array, fps: float = 60.0) -> WalkCycl
     """
     if len(positions) < SHORTEST_CYCLE * fps:
         return WalkCycles(fps, (), ())
-    walk = signals(skeleton, positions, fps)
-    return WalkCycles(fps, tuple(_cycles(walk)), tuple(_cycles(mirrored(walk))))
+    walk = measure_signals(skeleton, positions, fps)
+    return WalkCycles(fps, tuple(_cycles(walk)), tuple(_cycles(mirror_signals(walk))))
 
 
 def join_walks(walks: Iterable[WalkCycles]) -> WalkCycles:
@@ -105,7 +105,7 @@ def join_walks(walks: Iterable[WalkCycles]) -> WalkCycles:
     return WalkCycles(walks[0].fps, right, left)
 
 
-def landings(forward: Array, fps: float) -> list[int]:
+def find_landings(forward: Array, fps: float) -> list[int]:
     """Frames in which an ankle is furthest ahead of the hips.
 
     forward: (F,) how far the ankle is ahead of the hips, leg lengths. After a landing the ankle must go back,
@@ -139,7 +139,7 @@ def _ranges(values: Array, reach: int) -> Array:
 
 def _cycles(walk: Signals) -> Iterable[Cycle]:
     """The cycles of the right leg that pass all limits above."""
-    right, left = (landings(walk.curves[f"ankle_forward_{side}"], walk.fps) for side in "RL")
+    right, left = (find_landings(walk.curves[f"ankle_forward_{side}"], walk.fps) for side in "RL")
     for start, end in itertools.pairwise(right):
         left_landings = [i for i in left if start < i < end]
         plausible_length = SHORTEST_CYCLE * walk.fps <= end - start <= LONGEST_CYCLE * walk.fps

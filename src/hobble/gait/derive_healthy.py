@@ -22,10 +22,10 @@ from hobble.core.quat import Array
 from hobble.gait.comparison import healthy_profile, measure_clip
 from hobble.gait.cycles import WalkCycles
 from hobble.gait.features import features
-from hobble.gait.limp_grade import HEALTHY
-from hobble.gait.profile import Profile, mirrored, profile
+from hobble.gait.limp_grade import HEALTHY_FILE
+from hobble.gait.profile import Profile, mirror_profile, profile_of_walk
 from hobble.gait.read_clip import SKELETONS, read_clip
-from hobble.gait.recogniser import windows
+from hobble.gait.recogniser import windows_with_cycles
 
 # Clips of CMU, all of healthy walks. REFERENCE: performer -> the walks with which this performer's walks are
 # compared. OTHERS: performer -> further walks: slow, quick, on curves.
@@ -57,7 +57,7 @@ def healthy_windows(
     for name, clip in clips.items():
         healthy = healthy_profile([clips[other] for other in REFERENCE[performer] if other != name])
         for part in _parts(clip):
-            yield name, profile(part), healthy
+            yield name, profile_of_walk(part), healthy
 
 
 def _parts(clip: Clip) -> list[WalkCycles]:
@@ -66,7 +66,7 @@ def _parts(clip: Clip) -> list[WalkCycles]:
     The list is empty if the clip has no cycle.
     """
     walk = measure_clip(clip)
-    parts = [part for _, part in windows(walk, len(clip), SECONDS)]
+    parts = [part for _, part in windows_with_cycles(walk, len(clip), SECONDS)]
     return parts or [walk] * bool(len(walk))
 
 
@@ -78,13 +78,13 @@ def covariance(compared_windows: Iterable[tuple[str, Profile, Profile]]) -> tupl
     """
     by_clip: dict[str, list[Array]] = {}
     for name, walk, healthy in compared_windows:
-        for pair in ((walk, healthy), (mirrored(walk), mirrored(healthy))):
+        for pair in ((walk, healthy), (mirror_profile(walk), mirror_profile(healthy))):
             by_clip.setdefault(name, []).append(np.array(list(features(*pair).values())))
     squares = [np.einsum("ni,nj->ij", x, x) / len(x) for x in map(np.array, by_clip.values())]
     return np.mean(squares, axis=0), len(by_clip)
 
 
-def derive(folder: str | Path, out: str | Path = HEALTHY) -> None:
+def derive(folder: str | Path, out: str | Path = HEALTHY_FILE) -> None:
     """Write each performer's covariance and number of clips to the file `out`.
 
     folder: the folder with the BVH files of CMU.

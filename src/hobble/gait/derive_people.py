@@ -19,12 +19,12 @@ import numpy as np
 from hobble.core.errors import HobbleError, InputError
 from hobble.core.files import load_npz, save_npz
 from hobble.gait.cycles import SCALARS
-from hobble.gait.people import FILE, GAITS
+from hobble.gait.people import GAITS, PEOPLE_FILE
 from hobble.gait.profile import profile_of_curves
 from hobble.gait.signals import CURVES
 
 
-def derive(walks: str | Path, out: str | Path = FILE) -> None:
+def derive(walks: str | Path, out: str | Path = PEOPLE_FILE) -> None:
     """Write the mean and standard deviation over people of each curve and scalar, and each person's profile.
 
     walks: path of WALKS.npz. Raises InputError if its gaits, curves or scalars are not the expected ones.

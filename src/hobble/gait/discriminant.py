@@ -40,7 +40,7 @@ class Discriminant:
         """
         return values @ self.weights + self.offset
 
-    def names(self, values: Array) -> list[str]:
+    def likeliest_classes(self, values: Array) -> list[str]:
         """The likeliest class for each row of values (n, D)."""
         return [self.classes[k] for k in np.argmax(self.scores(values), axis=1)]
 

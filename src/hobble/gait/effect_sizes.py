@@ -7,7 +7,7 @@ from collections.abc import Mapping
 import numpy as np
 
 from hobble.gait.people import GAITS, NORMAL, People
-from hobble.gait.profile import Profile, mirrored
+from hobble.gait.profile import Profile, mirror_profile
 from hobble.gait.recogniser import LEFT, RIGHT
 
 # Name of an effect -> its meaning. "hurt" and "sound" are the two sides of the body. "share of healthy" is
@@ -34,13 +34,13 @@ EFFECTS: dict[str, str] = {
 }
 
 
-def effects(walk: Profile, healthy: Profile, side: str = RIGHT) -> dict[str, float]:
+def measure_effects(walk: Profile, healthy: Profile, side: str = RIGHT) -> dict[str, float]:
     """Name of EFFECTS -> its size in a walk, relative to the healthy walk of the same figure.
 
     side: the hurt side, "right" or "left".
     """
     if side == LEFT:  # mirror, so that from here on the right side is the hurt one
-        walk, healthy = mirrored(walk), mirrored(healthy)
+        walk, healthy = mirror_profile(walk), mirror_profile(healthy)
 
     def change(name: str) -> float:
         return walk[name] - healthy[name]
@@ -77,7 +77,7 @@ def effects_of_people(recorded: People) -> Mapping[str, Mapping[str, tuple[float
         if gait == NORMAL:
             continue
         of_people = [
-            effects(recorded.profile(gait, person), recorded.profile(NORMAL, person))
+            measure_effects(recorded.profile(gait, person), recorded.profile(NORMAL, person))
             for person in range(recorded.count)
         ]
         values = {name: [of_person[name] for of_person in of_people] for name in EFFECTS}

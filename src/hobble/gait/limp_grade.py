@@ -19,11 +19,11 @@ import numpy as np
 from hobble.core.files import load_npz
 from hobble.core.quat import Array
 from hobble.gait.features import ARMS, TRUNK, TRUNK_FORWARD, TRUNK_LEFT, features
-from hobble.gait.people import NORMAL, People, people
+from hobble.gait.people import NORMAL, People, read_people
 from hobble.gait.profile import Profile
-from hobble.gait.recogniser import RIGHT, SIDES, examples
+from hobble.gait.recogniser import RIGHT, SIDES, examples_of_people
 
-HEALTHY = Path(__file__).with_name("healthy.npz")
+HEALTHY_FILE = Path(__file__).with_name("healthy.npz")
 GUARDED_ARM, LEANING = "guarded_arm", "leaning_trunk"
 # direction in which the trunk leans -> its (forward, left) components
 LEANS = {"forward": (1, 0), "backward": (-1, 0), "to the left": (0, 1), "to the right": (0, -1)}
@@ -53,8 +53,8 @@ class Grade:
     for normal; 1 is the mean of the people who imitated the impairment. distance: how far the walk is from
     the mean of the likeliest limp or of healthy walks, in standard deviations (root mean square over the
     features). For people who were left out of the learning, the distance is 0.7 on average and at most 1.5;
-    beyond 1.5 the label is less reliable. probabilities: label -> probability, both sides together. sides:
-    (label, side or direction of the lean) -> probability.
+    beyond 1.5 the label is less reliable. probabilities: label -> probability, both sides together.
+    probability_by_side: (label, side or direction of the lean) -> probability.
     """
 
     label: str
@@ -62,7 +62,7 @@ class Grade:
     strength: float
     distance: float
     probabilities: Mapping[str, float] = field(repr=False)
-    sides: Mapping[tuple[str, str], float] = field(repr=False)
+    probability_by_side: Mapping[tuple[str, str], float] = field(repr=False)
 
     @property
     def parts(self) -> tuple[str, ...]:
@@ -70,7 +70,7 @@ class Grade:
         return PARTS[self.label]
 
     @property
-    def impaired(self) -> bool:
+    def is_impaired(self) -> bool:
         """Whether the walk is more likely impaired than normal."""
         return self.probabilities[NORMAL] < 0.5
 
@@ -128,8 +128,8 @@ def learn_grader(recorded: People, numbers: Iterable[int], healthy: Array) -> Gr
 
     numbers: which people of `recorded`, from 0.
     """
-    values, classes = examples(recorded, numbers)
-    names = list(features(recorded.normal(), recorded.normal()))
+    values, classes = examples_of_people(recorded, numbers)
+    names = list(features(recorded.normal_profile(), recorded.normal_profile()))
     class_of_row = np.array(classes)
     impaired = [name for name in dict.fromkeys(classes) if name != NORMAL]  # such as "antalgic right"
     means = {name: values[class_of_row == name].mean(axis=0) for name in impaired}
@@ -149,20 +149,20 @@ def learn_grader(recorded: People, numbers: Iterable[int], healthy: Array) -> Gr
 
 
 @cache
-def grader() -> Grader:
+def grader_of_all_people() -> Grader:
     """The grader that learnt from all people in people.npz and all healthy walks in healthy.npz."""
-    return learn_grader(people(), range(people().count), healthy_covariance())
+    return learn_grader(read_people(), range(read_people().count), healthy_covariance())
 
 
 def healthy_covariance() -> Array:
     """(D, D) covariance of the features of healthy walks, relative to the same person's other walks."""
-    data = load_npz(HEALTHY)
+    data = load_npz(HEALTHY_FILE)
     return np.average(data["covariances"], axis=0, weights=data["clips"])
 
 
-def grade(walk: Profile, healthy: Profile) -> Grade:
+def grade_walk(walk: Profile, healthy: Profile) -> Grade:
     """What hurts in a walk, relative to the figure's healthy walk."""
-    return grader().grade(walk, healthy)
+    return grader_of_all_people().grade(walk, healthy)
 
 
 def _limited_to(

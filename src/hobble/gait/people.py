@@ -14,10 +14,10 @@ from pathlib import Path
 from hobble.core.files import load_npz
 from hobble.core.quat import Array
 from hobble.gait.cycles import SCALARS
-from hobble.gait.profile import NAMES, Profile
+from hobble.gait.profile import PROFILE_NAMES, Profile
 from hobble.gait.signals import CURVES
 
-FILE = Path(__file__).with_name("people.npz")
+PEOPLE_FILE = Path(__file__).with_name("people.npz")
 SOURCE = "Jun et al. 2020, IEEE Access 8, ten people"
 NORMAL = "normal"
 GAITS = (NORMAL, "antalgic", "stiff_legged", "steppage", "trendelenburg", "lurch")
@@ -27,7 +27,7 @@ GAITS = (NORMAL, "antalgic", "stiff_legged", "steppage", "trendelenburg", "lurch
 class People:
     """Ten people walking in the six ways of GAITS, with the impaired leg on the right.
 
-    profiles: (6, 10, 52) profile of each gait and person, columns as profile.NAMES. curve_mean, curve_spread:
+    profiles: (6, 10, 52) profile of each gait and person, columns as PROFILE_NAMES. curve_mean, curve_spread:
     (6, 22, 50) mean and standard deviation over people, for each gait, curve of CURVES and sample, in degrees
     or leg lengths. A curve starts as the right foot lands. scalar_mean, scalar_spread: (6, 8) mean and
     standard deviation for each gait and scalar of SCALARS.
@@ -47,11 +47,11 @@ class People:
     def profile(self, gait: str, person: int) -> Profile:
         """One person's profile of a gait."""
         row = self.profiles[GAITS.index(gait), person]
-        return dict(zip(NAMES, map(float, row), strict=True))
+        return dict(zip(PROFILE_NAMES, map(float, row), strict=True))
 
-    def normal(self) -> Profile:
+    def normal_profile(self) -> Profile:
         """The mean of the people's normal walks. A figure without a healthy walk is compared with it."""
-        return dict(zip(NAMES, map(float, self.profiles[0].mean(axis=0)), strict=True))
+        return dict(zip(PROFILE_NAMES, map(float, self.profiles[0].mean(axis=0)), strict=True))
 
     def curve(self, gait: str, name: str) -> tuple[Array, Array]:
         """Mean (50,) and standard deviation (50,) over people of one curve."""
@@ -65,8 +65,8 @@ class People:
 
 
 @cache
-def people() -> People:
+def read_people() -> People:
     """The statistics in `people.npz`."""
-    data = load_npz(FILE)
+    data = load_npz(PEOPLE_FILE)
     names = ("profiles", "curve_mean", "curve_spread", "scalar_mean", "scalar_spread")
     return People(*(data[name].astype(float) for name in names))

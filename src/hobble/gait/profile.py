@@ -13,11 +13,11 @@ from hobble.gait.signals import CURVES, SIGN_CHANGES
 
 Profile = Mapping[str, float]
 NO_CYCLE = "there is no whole cycle of straight walking to measure"
-NAMES = (*SCALARS, *(f"{statistic} {curve}" for curve in CURVES for statistic in ("range", "mean")))
+PROFILE_NAMES = (*SCALARS, *(f"{statistic} {curve}" for curve in CURVES for statistic in ("range", "mean")))
 
 
-def profile(walk: WalkCycles) -> dict[str, float]:
-    """The numbers of NAMES: each scalar, and the range and mean of each curve over a cycle.
+def profile_of_walk(walk: WalkCycles) -> dict[str, float]:
+    """The numbers of PROFILE_NAMES: each scalar, and the range and mean of each curve over a cycle.
 
     Scalars and curves are medians over the cycles. The cycles that begin as the right foot lands have the
     same weight as those that begin as the left foot lands. So the mirrored walk has exactly the mirrored
@@ -27,8 +27,8 @@ def profile(walk: WalkCycles) -> dict[str, float]:
     if not len(walk):
         raise HobbleError(NO_CYCLE)
     # `walk.left` holds mirrored cycles. Mirroring their profile undoes this.
-    right, left = _profile_of_cycles(walk.right), mirrored(_profile_of_cycles(walk.left))
-    return {name: (right[name] + left[name]) / 2 for name in NAMES}
+    right, left = _profile_of_cycles(walk.right), mirror_profile(_profile_of_cycles(walk.left))
+    return {name: (right[name] + left[name]) / 2 for name in PROFILE_NAMES}
 
 
 def profile_of_curves(curves: Array, scalars: Array) -> dict[str, float]:
@@ -37,13 +37,13 @@ def profile_of_curves(curves: Array, scalars: Array) -> dict[str, float]:
     for name, curve in zip(CURVES, curves, strict=True):
         out[f"range {name}"] = float(np.ptp(curve))
         out[f"mean {name}"] = float(np.mean(curve))
-    return {name: out[name] for name in NAMES}
+    return {name: out[name] for name in PROFILE_NAMES}
 
 
-def mirrored(values: Profile) -> dict[str, float]:
+def mirror_profile(values: Profile) -> dict[str, float]:
     """The profile of the mirrored walk."""
     out = {}
-    for name in NAMES:
+    for name in PROFILE_NAMES:
         statistic, _, curve = name.rpartition(" ")
         if name == "left_strike_phase":
             out[name] = 1 - values[name]

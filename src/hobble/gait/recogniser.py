@@ -17,8 +17,8 @@ from hobble.core.quat import Array
 from hobble.gait.cycles import WalkCycles
 from hobble.gait.discriminant import Discriminant, learn
 from hobble.gait.features import features
-from hobble.gait.people import GAITS, NORMAL, People, people
-from hobble.gait.profile import Profile, mirrored
+from hobble.gait.people import GAITS, NORMAL, People, read_people
+from hobble.gait.profile import Profile, mirror_profile
 
 # Share by which the covariance is shrunk towards its diagonal: there are only 120 examples for 21 features.
 SHRINKAGE = 0.2
@@ -32,22 +32,22 @@ class Impairment:
     """The impairment of a walk.
 
     label: one of people.GAITS. side: "right" or "left", the impaired leg; None if the label is "normal".
-    probabilities: label -> probability, both sides together; their sum is 1. sides: (impairment, side), such
-    as ("antalgic", "right") -> probability.
+    probabilities: label -> probability, both sides together; their sum is 1. probability_by_side:
+    (impairment, side), such as ("antalgic", "right") -> probability.
     """
 
     label: str
     side: str | None
     probabilities: Mapping[str, float] = field(repr=False)
-    sides: Mapping[tuple[str, str], float] = field(repr=False)
+    probability_by_side: Mapping[tuple[str, str], float] = field(repr=False)
 
     @property
-    def impaired(self) -> bool:
+    def is_impaired(self) -> bool:
         """Whether the walk is more likely impaired than normal."""
         return self.probabilities[NORMAL] < 0.5
 
 
-def examples(recorded: People, numbers: Iterable[int]) -> tuple[Array, list[str]]:
+def examples_of_people(recorded: People, numbers: Iterable[int]) -> tuple[Array, list[str]]:
     """Features (n, D) and classes of the n walks of some people: each walk as it is, and mirrored.
 
     numbers: which people of `recorded`, from 0. A class is "normal", or "antalgic right" and so on.
@@ -57,24 +57,25 @@ def examples(recorded: People, numbers: Iterable[int]) -> tuple[Array, list[str]
         healthy = recorded.profile(NORMAL, person)
         for gait in GAITS:
             walk = recorded.profile(gait, person)
-            for side, w, h in ((RIGHT, walk, healthy), (LEFT, mirrored(walk), mirrored(healthy))):
+            for side, w, h in ((RIGHT, walk, healthy), (LEFT, mirror_profile(walk), mirror_profile(healthy))):
                 values.append(list(features(w, h).values()))
                 classes.append(gait if gait == NORMAL else f"{gait} {side}")
     return np.array(values), classes
 
 
 @cache
-def classifier() -> Discriminant:
+def classifier_of_all_people() -> Discriminant:
     """The classifier that learnt from all people in `people.npz`."""
-    return learn(*examples(people(), range(people().count)), shrinkage=SHRINKAGE)
+    return learn(*examples_of_people(read_people(), range(read_people().count)), shrinkage=SHRINKAGE)
 
 
 def recognise(walk: Profile, healthy: Profile, discriminant: Discriminant | None = None) -> Impairment:
     """The impairment of a walk, relative to the figure's healthy walk.
 
-    discriminant: a classifier of the classes in `examples`; None: the one that learnt from all people.
+    discriminant: a classifier of the classes in `examples_of_people`; None: the one that learnt from all
+    people.
     """
-    discriminant = discriminant or classifier()
+    discriminant = discriminant or classifier_of_all_people()
     scores = discriminant.scores(np.array([list(features(walk, healthy).values())]))[0]
     probabilities = np.exp(scores - scores.max())
     probabilities /= probabilities.sum()
@@ -89,7 +90,7 @@ def recognise(walk: Profile, healthy: Profile, discriminant: Discriminant | None
     return Impairment(label, side, labels, sides)
 
 
-def windows(
+def windows_with_cycles(
     walk: WalkCycles, frames: int, seconds: float = 4.0, step: float = 1.0
 ) -> list[tuple[int, WalkCycles]]:
     """(first frame, cycles) of each window of a clip that has LEAST_CYCLES or more cycles.

@@ -65,7 +65,7 @@ class Signals:
         return len(self.ahead)
 
 
-def mirrored(signals: Signals) -> Signals:
+def mirror_signals(signals: Signals) -> Signals:
     """The same walk, mirrored: left and right swapped."""
     curves = {}
     for name in CURVES:
@@ -77,7 +77,7 @@ def mirrored(signals: Signals) -> Signals:
     return Signals(signals.fps, signals.leg, curves, -signals.heading, signals.ahead, hips, speed, across)
 
 
-def signals(skeleton: Skeleton, positions: Array, fps: float) -> Signals:
+def measure_signals(skeleton: Skeleton, positions: Array, fps: float) -> Signals:
     """The curves of joint positions (F, J, 3), cm, Y up, at `fps` frames a second. F is 2 or more.
 
     hip_flexion is the forward angle of the thigh from the vertical, hip_abduction its outward angle.

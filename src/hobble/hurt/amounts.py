@@ -102,7 +102,7 @@ STEP_RATIO = {"thigh": 0.44, "shank": 0.38, "foot": 0.44}
 
 
 @functools.cache
-def amounts(part: str) -> dict[str, float | Array]:
+def changes_of_hurt_part(part: str) -> dict[str, float | Array]:
     """Name -> change, for a part that is hurt on the right at severity 10.
 
     A ratio is given as its difference from 1. The names are those of ADDED_CHANGES and these: `arm`,

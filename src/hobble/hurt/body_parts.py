@@ -38,16 +38,16 @@ def part_of_link(skeleton: Skeleton, link: tuple[str, str]) -> BodyPart:
                     above_hip = role == "hip" and child != lower
                     return BodyPart("pelvis" if above_hip else name, side)
                 upper = lower
-            if upper in ancestors(skeleton, child):  # below the ankle or the wrist
+            if upper in joint_and_ancestors(skeleton, child):  # below the ankle or the wrist
                 return BodyPart(last_part, side)
     if child in _chain(skeleton, skeleton.role("chest"), skeleton.role("hips")):
         return BodyPart("back", None)
-    if skeleton.role("chest") in ancestors(skeleton, child):
+    if skeleton.role("chest") in joint_and_ancestors(skeleton, child):
         return BodyPart("neck", None)
     return BodyPart("back", None)
 
 
-def ancestors(skeleton: Skeleton, joint: int) -> list[int]:
+def joint_and_ancestors(skeleton: Skeleton, joint: int) -> list[int]:
     """Indices of the joint itself, its parent, and so on to the root."""
     out = [joint]
     while skeleton.parents[out[-1]] >= 0:
@@ -57,5 +57,5 @@ def ancestors(skeleton: Skeleton, joint: int) -> list[int]:
 
 def _chain(skeleton: Skeleton, joint: int, above: int) -> list[int]:
     """The joints from `joint` up to the one below `above`. Empty if `above` is not an ancestor."""
-    path = ancestors(skeleton, joint)
+    path = joint_and_ancestors(skeleton, joint)
     return path[: path.index(above)] if above in path else []

@@ -9,11 +9,11 @@ import numpy as np
 from hobble.core.quat import Array
 from hobble.core.skeleton import Skeleton
 from hobble.core.smooth import gaussian
-from hobble.hurt.amounts import amounts
+from hobble.hurt.amounts import changes_of_hurt_part
 from hobble.hurt.body_parts import LEFT, RIGHT, part_of_link
 
-HIGHEST = 10.0  # highest severity
-POWER = 0.82  # strength = (severity / 10) ** POWER: .37 at 3, .57 at 5, .75 at 7
+HIGHEST_SEVERITY = 10.0
+STRENGTH_POWER = 0.82  # strength = (severity / 10) ** STRENGTH_POWER: .37 at 3, .57 at 5, .75 at 7
 # Changes of the times at which a foot lands and leaves (`land`, `off`) grow with strength ** TIMING_POWER.
 # With the power 1, a character driven by a network limps nearly as unevenly at severity 5 as at 10.
 TIMING_POWER = 1.3
@@ -57,30 +57,35 @@ HELD_ARM_OF_PART = {"shoulder": "upper", "upper arm": "upper", "forearm": "fore"
 class Effects:
     """The changes of each of F frames of a clip, named as in `hobble.hurt.amounts`.
 
-    body: name -> (F,). sided: name -> (F, 2), left and right. curves: (F, 5, 5) factors of CURVES, as in
-    `Profile` of `hobble.hurt.impairment_profiles`. strength: (F,) of the worst link, 0 to 1 (see POWER).
-    shown_severity: (F, L) severities of the L links, as the motion shows them: after a change of the
-    requested severity they follow over about a second.
+    body_changes: name -> (F,). side_changes: name -> (F, 2), left and right. curves: (F, 5, 5) factors of
+    CURVES, as in `Profile` of `hobble.hurt.impairment_profiles`. strength: (F,) of the worst link, 0 to
+    1 (see STRENGTH_POWER). shown_severity: (F, L) severities of the L links, as the motion shows them: after
+    a change of the requested severity they follow over about a second.
     """
 
-    body: dict[str, Array] = field(repr=False)
-    sided: dict[str, Array] = field(repr=False)
+    body_changes: dict[str, Array] = field(repr=False)
+    side_changes: dict[str, Array] = field(repr=False)
     curves: Array = field(repr=False)
     strength: Array = field(repr=False)
     shown_severity: Array = field(repr=False)
 
     def ratio(self, name: str) -> Array:
         """A change of RATIOS (`hobble.hurt.amounts`) as a ratio to the healthy clip: (F,) or (F, 2)."""
-        return np.maximum(1.0 + (self.body[name] if name in self.body else self.sided[name]), LEAST_RATIO)
+        return np.maximum(
+            1.0 + (self.body_changes[name] if name in self.body_changes else self.side_changes[name]),
+            LEAST_RATIO,
+        )
 
 
-def effects(skeleton: Skeleton, severity: Array, fps: float) -> Effects:
+def effects_of_severities(skeleton: Skeleton, severity: Array, fps: float) -> Effects:
     """The effects of severities (F, L), 0 to 10, of the skeleton's links (the bones that can be hurt).
 
     If several links hurt, the result is at least the effect of the worst link and less than the sum of all.
     """
     frames = len(severity)
-    strength = gaussian((np.clip(severity, 0, HIGHEST) / HIGHEST) ** POWER, SETTLING_SECONDS * fps)
+    strength = gaussian(
+        (np.clip(severity, 0, HIGHEST_SEVERITY) / HIGHEST_SEVERITY) ** STRENGTH_POWER, SETTLING_SECONDS * fps
+    )
     body = {name: _Sum(np.zeros(frames)) for name in WHOLE_BODY}
     sided = {name: _Sum(np.zeros((frames, 2))) for name in SIDED}
     curves = _Sum(np.zeros((frames, 5, 5)))
@@ -93,7 +98,7 @@ def effects(skeleton: Skeleton, severity: Array, fps: float) -> Effects:
     for (part, side), part_strength in parts.items():
         if not part_strength.any():
             continue
-        for name, amount in amounts(part).items():
+        for name, amount in changes_of_hurt_part(part).items():
             if name == "curves":
                 curves.add(part_strength[:, None, None] * _curves_of_side(np.asarray(amount), side))
             elif name in WHOLE_BODY:
@@ -115,7 +120,7 @@ def effects(skeleton: Skeleton, severity: Array, fps: float) -> Effects:
 
 def _shown_severity(strength: Array) -> Array:
     """The severities (F, L) of strengths (F, L). Severities below LEAST_SEVERITY become 0."""
-    severity = np.round(HIGHEST * np.clip(strength, 0.0, 1.0) ** (1 / POWER), 3)
+    severity = np.round(HIGHEST_SEVERITY * np.clip(strength, 0.0, 1.0) ** (1 / STRENGTH_POWER), 3)
     return np.where(severity < LEAST_SEVERITY, 0.0, severity)
 
 

@@ -20,7 +20,7 @@ from hobble.hurt.healthy_clip import UP, HealthyClip, SourceStance
 from hobble.hurt.interpolate import smoothstep
 from hobble.hurt.shortened_path import ShortenedPath
 
-SIGN = (1.0, -1.0)  # sign of X on the left and on the right side of the figure
+OUTWARD_SIGN = (1.0, -1.0)  # sign of X on the left and on the right side of the figure
 # The foot's pitch is multiplied by the effect `strike` while its toe is up, by `push` while its heel is up.
 # The factor changes from `strike` to `push` as the heel rises by this angle, radians.
 BLEND_PITCH = np.radians(8.0)
@@ -137,7 +137,7 @@ def move_foot(
         _new_footprint(old, stance.middle, source, effects, path, side)
         for old, stance in zip(old_footprints, stances, strict=True)
     ]
-    yaw = quat.yaw(np.radians(SIGN[side] * effects.sided["toe_out"][:, side]))
+    yaw = quat.yaw(np.radians(OUTWARD_SIGN[side] * effects.side_changes["toe_out"][:, side]))
     ankle, least_ball = np.empty_like(foot.ankle), np.empty(len(source))
     ball = source.clip.positions[:, source.clip.skeleton.role(f"{SIDES[side]}_toe"), 1]
     # Of each stance: height of the ball in the source, cm by which the footprint rises, first and last frame.
@@ -152,7 +152,7 @@ def move_foot(
         ankle[frames] = new + quat.rotate(yaw[frames], foot.ankle[frames] - old)
     along = quat.rotate(yaw, foot.ball - foot.ankle)
     lift = effects.ratio("lift")[:, side]
-    out = effects.sided["out"][:, side] * source.leg * SIGN[side]
+    out = effects.side_changes["out"][:, side] * source.leg_length * OUTWARD_SIGN[side]
     outward = quat.rotate(source.heading, np.array([1.0, 0.0, 0.0])) * out[:, None]
     for i, ((_, off), (land, _)) in enumerate(itertools.pairwise(spans)):
         if land - off < 2:
@@ -206,10 +206,11 @@ def _new_footprint(
     velocity = (
         np.gradient(source.path[near], axis=0)[nearest - near.start] if len(source) > 1 else np.zeros(2)
     )
-    step = effects.sided["step"][near] * (1 - JOGGING * source.jog[near])[:, None]
+    step = effects.side_changes["step"][near] * (1 - JOGGING * source.jog_share[near])[:, None]
     change = interpolate_curve(step[:, side] - step[:, 1 - side], when - near.start)
     # A step lasts half a cycle. Half of its change is made by this foot, the other half by the other foot.
-    ahead = change / 2 * velocity * source.cycle[nearest] / 2
-    width = interpolate_curve(effects.sided["width"][near].max(axis=1), when - near.start) * source.leg / 2
-    outward = quat.rotate(source.heading[nearest], np.array([SIGN[side] * width, 0.0, 0.0]))
+    ahead = change / 2 * velocity * source.cycle_frames[nearest] / 2
+    widening = interpolate_curve(effects.side_changes["width"][near].max(axis=1), when - near.start)
+    width = widening * source.leg_length / 2
+    outward = quat.rotate(source.heading[nearest], np.array([OUTWARD_SIGN[side] * width, 0.0, 0.0]))
     return path.move_point(old, when) + np.array([ahead[0], 0.0, ahead[1]]) + outward

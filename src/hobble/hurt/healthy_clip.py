@@ -23,7 +23,7 @@ LONGEST_CYCLE_SECONDS = 2.5  # a longer time between two landings of a foot is n
 LEAST_SWING = 6  # frames: contacts in the labels shorten a swing, but not below this length
 PATH_SECONDS = 0.25  # sigma of the Gaussian that smooths the hips' positions to a path
 FACING_SECONDS = 0.2  # sigma of the Gaussian that smooths the heading
-WALKING_SECONDS = 0.2  # sigma of the Gaussian that smooths where the clip walks
+PHASE_KNOWN_SECONDS = 0.2  # sigma of the Gaussian that smooths `phase_known`
 JOG_SECONDS = 0.1  # sigma of the Gaussian that smooths the share of jogging
 
 
@@ -44,26 +44,26 @@ class SourceStance:
 class HealthyClip:
     """A healthy clip of F frames and its measurements. Pairs are left and right.
 
-    stances: those of each foot, in order, at least one. swinging: (F, 2) bool, whether a foot swings. swing:
-    (F, 2) 0 in stance; it rises to 1 and falls back to 0 over a swing. phase: (F,) cycles, unwrapped; a whole
-    number as the right foot lands. walking: (F,) from 0 to 1, where 1 means that the phase is known. jog:
-    (F,) share of jogging in the gait, 0 to 1. cycle: (F,) length in frames of the cycle around each frame.
-    path: (F, 2) horizontal path of the hips, x and z, cm. heading: (F, 4) rotation of the pelvis about Y.
-    leg: cm from hip to ankle of a straight leg.
+    stances: those of each foot, in order, at least one. swinging: (F, 2) bool, whether a foot swings.
+    swing_curve: (F, 2) 0 in stance; it rises to 1 and falls back to 0 over a swing. phase: (F,) cycles,
+    unwrapped; a whole number as the right foot lands. phase_known: (F,) 1 where the phase is known, 0 where
+    it is not, smoothed. jog_share: (F,) share of jogging in the gait, 0 to 1. cycle_frames: (F,) length in
+    frames of the cycle around each frame. path: (F, 2) horizontal path of the hips, x and z, cm. heading:
+    (F, 4) rotation of the pelvis about Y. leg_length: cm from hip to ankle of a straight leg.
     """
 
     clip: Clip
     labels: Labels
     stances: tuple[list[SourceStance], list[SourceStance]] = field(repr=False)
     swinging: np.ndarray = field(repr=False)
-    swing: Array = field(repr=False)
+    swing_curve: Array = field(repr=False)
     phase: Array = field(repr=False)
-    walking: Array = field(repr=False)
-    jog: Array = field(repr=False)
-    cycle: Array = field(repr=False)
+    phase_known: Array = field(repr=False)
+    jog_share: Array = field(repr=False)
+    cycle_frames: Array = field(repr=False)
     path: Array = field(repr=False)
     heading: Array = field(repr=False)
-    leg: float
+    leg_length: float
 
     def __len__(self) -> int:
         return len(self.clip)
@@ -103,7 +103,7 @@ def measure_healthy_clip(clip: Clip, labels: Labels) -> HealthyClip:
         swinging,
         swing,
         phase,
-        gaussian(known.astype(float), WALKING_SECONDS * clip.fps),
+        gaussian(known.astype(float), PHASE_KNOWN_SECONDS * clip.fps),
         gaussian(labels.gait[:, GAITS.index("jog")], JOG_SECONDS * clip.fps),
         _cycle_lengths((stances[LEFT], stances[RIGHT]), frames, clip.fps),
         gaussian(clip.positions[:, skeleton.role("hips")][:, [0, 2]], PATH_SECONDS * clip.fps),
@@ -125,7 +125,7 @@ def _without_contacts(start: int, end: int, touches: np.ndarray) -> tuple[int, i
 
 
 def _leg_length(clip: Clip, side: str) -> float:
-    """Length of thigh and shank together, cm."""
+    """Length of thigh and shank together, cm. The joint with the role heel is the ankle."""
     offsets = clip.skeleton.offsets
     joints = [clip.skeleton.role(f"{side}_{role}") for role in ("knee", "heel")]
     return float(sum(np.linalg.norm(offsets[joint]) for joint in joints))

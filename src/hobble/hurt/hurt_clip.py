@@ -13,11 +13,11 @@ from hobble.core.quat import Array
 from hobble.core.skeleton import local_rotations
 from hobble.core.smooth import gaussian
 from hobble.hurt.body_parts import LEFT, RIGHT, SIDES
-from hobble.hurt.effects import HIGHEST, Effects, effects
+from hobble.hurt.effects import HIGHEST_SEVERITY, Effects, effects_of_severities
 from hobble.hurt.foot_path import HurtFoot, footprints_of, move_foot, reduce_pitch
 from hobble.hurt.healthy_clip import HealthyClip, measure_healthy_clip
-from hobble.hurt.interpolate import at_frames, rotations_at_frames
-from hobble.hurt.legs import Leg, hips_height, knee_flexion, place_leg, reach_of, read_leg
+from hobble.hurt.interpolate import interpolate_rotations, interpolate_values
+from hobble.hurt.legs import Leg, hips_height, knee_flexion, place_leg, reach_at_flexion, read_leg
 from hobble.hurt.relabel import relabel
 from hobble.hurt.shortened_path import ShortenedPath, ground_below, shorten
 from hobble.hurt.timing import Timing, retime
@@ -26,7 +26,7 @@ from hobble.labels.clip_labels import Labels
 
 # Radians of knee flexion: a knee that straightens to lift the hips stops here. In the recordings of
 # impaired walks, the sound knee is bent by 8 to 10 degrees while a stiff leg swings.
-STRAIGHT = np.radians(9.0)
+STRAIGHT_KNEE = np.radians(9.0)
 
 
 @dataclass(frozen=True)
@@ -34,14 +34,14 @@ class HurtClip:
     """A hurt clip of N frames.
 
     severity: (N, L) severities of the L links (the bones that can be hurt), as the motion shows them: after a
-    change of the requested severity they follow over about a second. labels: those of the hurt clip. when:
-    (N,) the frame of the healthy clip, with fractions, that the body shows in each frame.
+    change of the requested severity they follow over about a second. labels: those of the hurt clip.
+    source_frames: (N,) the frame of the healthy clip, with fractions, that the body shows in each frame.
     """
 
     clip: Clip
     severity: Array = field(repr=False)
     labels: Labels = field(repr=False)
-    when: Array = field(repr=False)
+    source_frames: Array = field(repr=False)
 
 
 def hurt_clip(
@@ -70,7 +70,11 @@ def hurt_clip(
             f"clip {clip.name}: the severities have shape {severity.shape}, but should have shape "
             f"({len(clip)}, {len(clip.skeleton.links)}): frames, links"
         )
-    if not np.isfinite(severity).all() or severity.min(initial=0) < 0 or severity.max(initial=0) > HIGHEST:
+    if (
+        not np.isfinite(severity).all()
+        or severity.min(initial=0) < 0
+        or severity.max(initial=0) > HIGHEST_SEVERITY
+    ):
         raise HobbleError(f"clip {clip.name}: every severity should be a number from 0 to 10")
     name = clip.name if name is None else name
     if not severity.any() or len(clip) < 3:
@@ -79,15 +83,15 @@ def hurt_clip(
     if clip.translations is not None:
         raise HobbleError(f"clip {clip.name} has bones that change their length, so it cannot be hurt")
     source = measure_healthy_clip(clip, labels)
-    changes = effects(clip.skeleton, severity, clip.fps)
+    changes = effects_of_severities(clip.skeleton, severity, clip.fps)
     timing = retime(source, changes)
     feet = [reduce_pitch(source, changes, side) for side in (LEFT, RIGHT)]
     path = shorten(source, changes, timing.stride_ratio, None if flat else _ground_heights(source, feet))
     feet = [move_foot(source, changes, path, feet[side], side) for side in (LEFT, RIGHT)]
     out = _assemble(source, changes, timing, path, feet, name)
-    source_frame = np.clip(np.floor(timing.body + 1e-6).astype(int), 0, len(clip) - 1)
+    source_frame = np.clip(np.floor(timing.body_frames + 1e-6).astype(int), 0, len(clip) - 1)
     return HurtClip(
-        out, changes.shown_severity[source_frame], relabel(labels, timing, zero, margins), timing.body
+        out, changes.shown_severity[source_frame], relabel(labels, timing, zero, margins), timing.body_frames
     )
 
 
@@ -119,30 +123,30 @@ def _assemble(
     Body and legs are sampled at their own times in `timing`.
     """
     clip, skeleton = source.clip, source.clip.skeleton
-    world = rotations_at_frames(change_body(source, changes), timing.body)
+    world = interpolate_rotations(change_body(source, changes), timing.body_frames)
     shift = np.stack(
         [path.new[:, 0] - path.old[:, 0], path.new_ground - path.old_ground, path.new[:, 1] - path.old[:, 1]],
         axis=1,
     )
-    root = at_frames(clip.root + shift, timing.body)
+    root = interpolate_values(clip.root + shift, timing.body_frames)
     legs = [read_leg(clip, side) for side in (LEFT, RIGHT)]
     pelvis = world[:, skeleton.role("hips")]
     hips = [_hip_from_root(source, world, side) for side in (LEFT, RIGHT)]
-    ankles = [at_frames(feet[side].ankle, timing.legs[:, side]) for side in (LEFT, RIGHT)]
+    ankles = [interpolate_values(feet[side].ankle, timing.leg_frames[:, side]) for side in (LEFT, RIGHT)]
     stands = [
-        at_frames(gaussian(1.0 - source.swinging[:, side], 2.0), timing.legs[:, side])
+        interpolate_values(gaussian(1.0 - source.swinging[:, side], 2.0), timing.leg_frames[:, side])
         for side in (LEFT, RIGHT)
     ]
     reaches = [_desired_reach(legs[side], changes, source, timing, side) for side in (LEFT, RIGHT)]
-    root[:, 1] = hips_height(root, hips, ankles, reaches, stands, [leg.longest for leg in legs])
+    root[:, 1] = hips_height(root, hips, ankles, reaches, stands, [leg.longest_reach for leg in legs])
     for side in (LEFT, RIGHT):
         thigh, knee, heel, toe = (skeleton.role(f"{SIDES[side]}_{r}") for r in ("hip", "knee", "heel", "toe"))
-        when = timing.legs[:, side]
+        when = timing.leg_frames[:, side]
         world[:, thigh], world[:, knee] = place_leg(
             skeleton, side, legs[side], when, pelvis, root + hips[side], ankles[side]
         )
-        world[:, heel] = rotations_at_frames(feet[side].rotation, when)
-        world[:, toe] = quat.mul(world[:, heel], rotations_at_frames(feet[side].toe_rotation, when))
+        world[:, heel] = interpolate_rotations(feet[side].rotation, when)
+        world[:, toe] = quat.mul(world[:, heel], interpolate_rotations(feet[side].toe_rotation, when))
     return Clip(name, skeleton, clip.fps, local_rotations(skeleton, world), root)
 
 
@@ -162,11 +166,15 @@ def _desired_reach(leg: Leg, changes: Effects, source: HealthyClip, timing: Timi
     The knee bends more if the leg is spared (`crouch`). It bends less while the other leg swings stiffly
     (`vault`), which lifts the hips.
     """
-    when, other_when = timing.legs[:, side], timing.legs[:, 1 - side]
-    crouch = np.radians(changes.sided["crouch"][:, side]) * (1 - source.swing[:, side])
-    bend = at_frames(knee_flexion(leg.reach, leg.upper, leg.lower) + crouch, when)
-    source_vault = np.clip(changes.sided["vault"][:, side], 0.0, 1.0) * source.swing[:, 1 - side]
-    vault = at_frames(source_vault, other_when)
-    bend = bend - vault * np.maximum(bend - STRAIGHT, 0.0)
-    changed = (at_frames(crouch, when) > 0) | (vault > 0)
-    return np.where(changed, reach_of(bend, leg.upper, leg.lower), at_frames(leg.reach, when))
+    when, other_when = timing.leg_frames[:, side], timing.leg_frames[:, 1 - side]
+    crouch = np.radians(changes.side_changes["crouch"][:, side]) * (1 - source.swing_curve[:, side])
+    bend = interpolate_values(knee_flexion(leg.reach, leg.thigh_length, leg.shank_length) + crouch, when)
+    source_vault = np.clip(changes.side_changes["vault"][:, side], 0.0, 1.0) * source.swing_curve[:, 1 - side]
+    vault = interpolate_values(source_vault, other_when)
+    bend = bend - vault * np.maximum(bend - STRAIGHT_KNEE, 0.0)
+    changed = (interpolate_values(crouch, when) > 0) | (vault > 0)
+    return np.where(
+        changed,
+        reach_at_flexion(bend, leg.thigh_length, leg.shank_length),
+        interpolate_values(leg.reach, when),
+    )

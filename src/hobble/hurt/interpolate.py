@@ -8,14 +8,14 @@ from hobble.core import quat
 from hobble.core.quat import Array
 
 
-def at_frames(values: Array, when: Array) -> Array:
+def interpolate_values(values: Array, when: Array) -> Array:
     """Interpolate values (F, ...) linearly at the times `when` (N,), in frames. Returns (N, ...)."""
     before, share = _split_times(len(values), when)
     share = share.reshape(-1, *[1] * (values.ndim - 1))
     return values[before] * (1 - share) + values[np.minimum(before + 1, len(values) - 1)] * share
 
 
-def rotations_at_frames(rotations: Array, when: Array) -> Array:
+def interpolate_rotations(rotations: Array, when: Array) -> Array:
     """Interpolate quaternions (F, ..., 4) at the times `when` (N,), in frames. Returns (N, ..., 4)."""
     before, share = _split_times(len(rotations), when)
     share = share.reshape(-1, *[1] * (rotations.ndim - 2))

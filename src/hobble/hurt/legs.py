@@ -16,12 +16,12 @@ from hobble.core.quat import Array
 from hobble.core.skeleton import Skeleton
 from hobble.core.smooth import gaussian, smooth_above
 from hobble.hurt.body_parts import SIDES
-from hobble.hurt.interpolate import at_frames, rotations_at_frames
+from hobble.hurt.interpolate import interpolate_rotations, interpolate_values
 
 # Radians of knee flexion. Below the first value, the bend is too small to tell in which direction the knee
 # points. Above the second value, the bend is large enough. Between them, it counts partly.
 BENT = np.radians([6.0, 18.0])
-STRETCH = (0.985, 0.9985)  # least and greatest value of `Leg.longest`, in leg lengths
+STRETCH = (0.985, 0.9985)  # least and greatest value of `Leg.longest_reach`, in leg lengths
 # For the height of the hips, the horizontal distance between hip and ankle counts as at most this share of
 # the leg's length. Otherwise there would be no height at which a leg reaches a foot that is too far away.
 LEVEL_SHARE = 0.97
@@ -32,20 +32,20 @@ class Leg:
     """A leg of the healthy clip, over F frames.
 
     reach: (F,) cm from hip to ankle. thigh, shank: (F, 4) rotations relative to the pelvis. hinge: (F, 3)
-    axis about which the knee bends, relative to the pelvis. upper, lower: lengths of thigh and shank, cm.
+    axis about which the knee bends, relative to the pelvis. thigh_length, shank_length: cm.
     """
 
     reach: Array = field(repr=False)
     thigh: Array = field(repr=False)
     shank: Array = field(repr=False)
     hinge: Array = field(repr=False)
-    upper: float
-    lower: float
+    thigh_length: float
+    shank_length: float
 
     @property
-    def longest(self) -> float:
+    def longest_reach(self) -> float:
         """The largest distance from hip to ankle that is allowed, cm."""
-        length = self.upper + self.lower
+        length = self.thigh_length + self.shank_length
         return float(np.clip(self.reach.max(), STRETCH[0] * length, STRETCH[1] * length))
 
 
@@ -102,7 +102,7 @@ def knee_flexion(reach: Array, upper: float, lower: float) -> Array:
     return np.arccos(np.clip(cosine, -1.0, 1.0))
 
 
-def reach_of(flexion: Array, upper: float, lower: float) -> Array:
+def reach_at_flexion(flexion: Array, upper: float, lower: float) -> Array:
     """(...) cm from hip to ankle at a knee flexion (...) in radians: the inverse of `knee_flexion`."""
     return np.sqrt(upper**2 + lower**2 + 2 * upper * lower * np.cos(flexion))
 
@@ -120,7 +120,7 @@ def hips_height(
     root: (N, 3) positions before the change. Each list holds one entry for each leg. hips: (N, 3) position of
     the hip joint relative to the root. ankles: (N, 3) positions in the world. reaches: (N,) desired distance
     from hip to ankle while the leg stands, cm. stands: (N,) from 0 (swings) to 1 (stands). longest: the leg's
-    `Leg.longest`. No leg gets longer than this.
+    `Leg.longest_reach`. No leg gets longer than this.
     """
     # Each standing leg asks for a change of the root's height. The root gets their weighted mean, smoothed.
     weighted_change = np.zeros(len(root))
@@ -152,10 +152,10 @@ def place_leg(
     """
     bones = [skeleton.offsets[skeleton.role(f"{SIDES[side]}_{r}")] for r in ("knee", "heel")]
     thigh, shank = (
-        quat.mul(pelvis, rotations_at_frames(rotations, when)) for rotations in (leg.thigh, leg.shank)
+        quat.mul(pelvis, interpolate_rotations(rotations, when)) for rotations in (leg.thigh, leg.shank)
     )
-    hinge = quat.rotate(pelvis, at_frames(leg.hinge, when))
-    knee, end = two_bone_knee(hip, ankle, np.cross(ankle - hip, hinge), leg.upper, leg.lower)
+    hinge = quat.rotate(pelvis, interpolate_values(leg.hinge, when))
+    knee, end = two_bone_knee(hip, ankle, np.cross(ankle - hip, hinge), leg.thigh_length, leg.shank_length)
     return _point_bone(thigh, hinge, bones[0], knee - hip), _point_bone(shank, hinge, bones[1], end - knee)
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from hobble.hurt.body_parts import LEFT, RIGHT
-from hobble.hurt.interpolate import at_frames
+from hobble.hurt.interpolate import interpolate_values
 from hobble.hurt.timing import Timing
 from hobble.labels.clip_labels import Labels
 from hobble.labels.phase import dropped_frames, find_cycles, phase_of_footsteps
@@ -20,7 +20,7 @@ def relabel(labels: Labels, timing: Timing, zero: str, margins: str) -> Labels:
     """
     frames = len(timing)
     last = len(labels) - 1
-    nearest = [np.clip(np.round(timing.legs[:, side]).astype(int), 0, last) for side in (LEFT, RIGHT)]
+    nearest = [np.clip(np.round(timing.leg_frames[:, side]).astype(int), 0, last) for side in (LEFT, RIGHT)]
     # Columns of contacts: left heel, left toe, right heel, right toe. So `column // 2` is the side.
     contacts = np.stack([labels.contacts[nearest[column // 2], column] for column in range(4)], axis=1)
     footsteps = labels.footsteps.copy()  # a row holds a right landing, a left landing and a mark
@@ -28,13 +28,13 @@ def relabel(labels: Labels, timing: Timing, zero: str, margins: str) -> Labels:
         footsteps[:, column] = timing.new_frames(footsteps[:, column], side)
     phase, known = phase_of_footsteps(footsteps, frames)
     known &= ~dropped_frames(footsteps, frames)
-    body = np.clip(np.round(timing.body).astype(int), 0, last)
+    body = np.clip(np.round(timing.body_frames).astype(int), 0, last)
     cycles, _ = find_cycles(footsteps, frames, zero, margins)
     return Labels(
         contacts=contacts,
         phase=phase if zero == "right" else (phase + 0.5) % 1.0,
         phase_known=known & labels.phase_known[body],
-        gait=at_frames(labels.gait, timing.body),
+        gait=interpolate_values(labels.gait, timing.body_frames),
         footsteps=footsteps,
         cycles=cycles,
     )

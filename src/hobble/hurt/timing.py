@@ -28,41 +28,42 @@ MOST_SHIFT = 0.3  # cycles: shifts of landing and leaving stay below this
 class Timing:
     """Which of F source frames is shown in each of N new frames. Frames have fractions.
 
-    body: (N,) source frame that the body shows in each new frame. legs: (N, 2) the same for the left and the
-    right leg. cadence_times: (F,) the new frame that would show each source frame if the cadence changed, but
-    no landing or leaving was shifted. stride_ratio: (F,) new duration of a stride / old duration.
+    body_frames: (N,) source frame that the body shows in each new frame. leg_frames: (N, 2) the same for the
+    left and the right leg. cadence_times: (F,) the new frame that would show each source frame if the cadence
+    changed, but no landing or leaving was shifted. stride_ratio: (F,) new duration of a stride / old
+    duration.
     """
 
-    body: Array = field(repr=False)
-    legs: Array = field(repr=False)
+    body_frames: Array = field(repr=False)
+    leg_frames: Array = field(repr=False)
     cadence_times: Array = field(repr=False)
     stride_ratio: Array = field(repr=False)
 
     def __len__(self) -> int:
-        return len(self.body)
+        return len(self.body_frames)
 
     def new_frames(self, when: Array, leg: int | None = None) -> Array:
         """The new frames, with fractions, in which the body or a leg shows the source frames `when`.
 
         leg: LEFT or RIGHT; None: the body.
         """
-        shown = self.body if leg is None else self.legs[:, leg]
+        shown = self.body_frames if leg is None else self.leg_frames[:, leg]
         return np.interp(when, shown, np.arange(len(shown)))
 
 
 def retime(source: HealthyClip, effects: Effects) -> Timing:
     """Slow the cadence, and shift each foot's landing and leaving within the cycle, as `effects` says."""
-    stride_ratio = 1 + effects.body["stride"] * (1 - (1 - JOG_STRIDE) * source.jog)
+    stride_ratio = 1 + effects.body_changes["stride"] * (1 - (1 - JOG_STRIDE) * source.jog_share)
     cadence_times = np.concatenate([[0.0], np.cumsum((stride_ratio[1:] + stride_ratio[:-1]) / 2)])
-    new_cycle = source.cycle * stride_ratio
+    new_cycle = source.cycle_frames * stride_ratio
     new = np.arange(int(cadence_times[-1] + 1e-6) + 1, dtype=float)
     legs = []
     landings: list[tuple[float, float]] = []
-    shares = 1 - (1 - JOG_SHIFT) * source.jog
+    shares = 1 - (1 - JOG_SHIFT) * source.jog_share
     for side in (LEFT, RIGHT):
         # Delays in new frames, for each source frame.
-        land = _limit_shift(effects.sided["land"][:, side]) * shares * new_cycle
-        off = _limit_shift(effects.sided["off"][:, side]) * shares * new_cycle
+        land = _limit_shift(effects.side_changes["land"][:, side]) * shares * new_cycle
+        off = _limit_shift(effects.side_changes["off"][:, side]) * shares * new_cycle
         events = []
         for stance in source.stances[side]:
             events += [(stance.land, land), (stance.off, off)]

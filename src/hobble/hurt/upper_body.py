@@ -9,7 +9,7 @@ from hobble.core.ik import aim_bone
 from hobble.core.quat import Array
 from hobble.core.skeleton import Skeleton
 from hobble.core.smooth import gaussian
-from hobble.hurt.body_parts import LEFT, RIGHT, SIDES, ancestors
+from hobble.hurt.body_parts import LEFT, RIGHT, SIDES, joint_and_ancestors
 from hobble.hurt.effects import Effects
 from hobble.hurt.healthy_clip import HealthyClip
 from hobble.hurt.impairment_profiles import HARMONICS
@@ -91,7 +91,7 @@ def _between(skeleton: Skeleton, role: str, above: str) -> list[int]:
 
     The first of these two joints is included, the second is not.
     """
-    path = ancestors(skeleton, skeleton.role(role))
+    path = joint_and_ancestors(skeleton, skeleton.role(role))
     return path[: path.index(skeleton.role(above))]
 
 
@@ -117,22 +117,24 @@ def _positions_in_trunk(skeleton: Skeleton) -> list[tuple[str, float]]:
 
 def _added_rotations(source: HealthyClip, effects: Effects) -> tuple[Array, Array, Array]:
     """World rotations to add to pelvis, chest and head, (F, 4) each."""
-    phase, walking = source.phase, np.clip(source.walking, 0.0, 1.0)
+    phase, known = source.phase, np.clip(source.phase_known, 0.0, 1.0)
     # The harmonics of the curves, see `Profile` of `hobble.hurt.impairment_profiles`. Without steps there is
     # no phase, so only the mean of each curve counts.
     waves = [np.ones(len(source))]
     for h in range(1, HARMONICS + 1):
-        waves += [walking * np.cos(2 * np.pi * h * phase), walking * np.sin(2 * np.pi * h * phase)]
+        waves += [known * np.cos(2 * np.pi * h * phase), known * np.sin(2 * np.pi * h * phase)]
     # (F,) degrees each, in the order of CURVES.
     forward, left, left_up, turn, shoulders = np.einsum("fck,kf->cf", effects.curves, np.stack(waves))
-    side, raised = effects.sided["side"], effects.sided["list"] * source.swing
-    forward = forward + effects.body["forward"]
+    side, raised = effects.side_changes["side"], effects.side_changes["list"] * source.swing_curve
+    forward = forward + effects.body_changes["forward"]
     left = left + side[:, LEFT] - side[:, RIGHT]
     left_up = left_up + raised[:, LEFT] - raised[:, RIGHT]
     pelvis = _turn_and_lean(source, turn, left_up, PELVIS_LEAN * forward)
     chest = _turn_and_lean(source, shoulders, -left, forward)
     rest = 1 - LOOK_AHEAD  # what the head does not undo
-    head = _turn_and_lean(source, rest * shoulders, -rest * left, rest * forward + effects.body["nod"])
+    head = _turn_and_lean(
+        source, rest * shoulders, -rest * left, rest * forward + effects.body_changes["nod"]
+    )
     return pelvis, chest, head
 
 
@@ -156,7 +158,9 @@ def _hold_arm(source: HealthyClip, effects: Effects, world: Array, side: int) ->
     """
     skeleton = source.clip.skeleton
     # How much the arm is held in each way, (F,) from 0 to 1.
-    weights = {name: np.clip(effects.sided[name][:, side], 0.0, 1.0) ** HOLD_POWER for name in HELD_ARMS}
+    weights = {
+        name: np.clip(effects.side_changes[name][:, side], 0.0, 1.0) ** HOLD_POWER for name in HELD_ARMS
+    }
     weights["carry"] = CARRY_STRENGTH * weights["carry"]
     held = ARM_STILL * np.max(list(weights.values()), axis=0)
     if not held.any():
@@ -177,5 +181,5 @@ def _hold_arm(source: HealthyClip, effects: Effects, world: Array, side: int) ->
         fully_held = aim_bone(world[:, joint], np.broadcast_to(rest_bone, direction.shape), direction)
         turn = quat.mul(quat.slerp(world[:, joint], fully_held, held), quat.inv(world[:, joint]))
         for j in range(len(skeleton.joints)):
-            if joint in ancestors(skeleton, j):
+            if joint in joint_and_ancestors(skeleton, j):
                 world[:, j] = quat.mul(turn, world[:, j])

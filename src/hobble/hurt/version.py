@@ -88,4 +88,4 @@ def cut_to_length(hurt: HurtClip, frames: int, report: LabelReport) -> HurtClip:
         cycles,
     )
     part = Clip(clip.name, clip.skeleton, clip.fps, clip.rotations[:frames], clip.root[:frames])
-    return HurtClip(part, hurt.severity[:frames], short, hurt.when[:frames])
+    return HurtClip(part, hurt.severity[:frames], short, hurt.source_frames[:frames])

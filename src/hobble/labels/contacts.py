@@ -35,14 +35,14 @@ ON_TIPTOE = 0.03
 DRAWN_UP, STRETCHED = 0.55, 0.8
 
 
-def contacts(clip: Clip, options: LabelOptions) -> np.ndarray:
+def find_contacts(clip: Clip, options: LabelOptions) -> np.ndarray:
     """(F, 4) bool: whether each joint of CONTACT_ROLES is on the ground, by the rule that `options` name."""
     if options.contacts == "original":
-        return still_joints(clip, options.contact_threshold)
-    return stance(clip, options)
+        return find_still_joints(clip, options.contact_threshold)
+    return find_stance_contacts(clip, options)
 
 
-def still_joints(clip: Clip, threshold: float) -> np.ndarray:
+def find_still_joints(clip: Clip, threshold: float) -> np.ndarray:
     """(F, 4) bool: whether a joint moves less than the square root of `threshold` (cm2) to the next frame.
 
     This is the rule of Holden et al. (2017). It ignores height, and depends on the size of the body and on
@@ -55,7 +55,7 @@ def still_joints(clip: Clip, threshold: float) -> np.ndarray:
     return np.concatenate([still, still[-1:]])
 
 
-def stance(clip: Clip, options: LabelOptions) -> np.ndarray:
+def find_stance_contacts(clip: Clip, options: LabelOptions) -> np.ndarray:
     """(F, 4) bool: whether a joint is slow and near the height of its stance.
 
     Between two swings a joint has one stance. The height of the stance is the lowest height of the joint in

@@ -47,14 +47,15 @@ LAST_FRAMES = 2  # if a swing ends in this many last frames of the clip, the foo
 class Swing:
     """A foot that is in the air from frame `start` on. At frame `end` it is down again.
 
-    foot: RIGHT or LEFT. path: length of the toe's path, cm. peak: the toe's highest speed, cm a frame.
+    foot: RIGHT or LEFT. path_cm: length of the toe's path. peak_speed: the toe's highest speed, cm a
+    frame.
     """
 
     foot: int
     start: int
     end: int
-    path: float
-    peak: float
+    path_cm: float
+    peak_speed: float
 
 
 def foot_positions(clip: Clip) -> Array:
@@ -83,7 +84,7 @@ def find_swings(clip: Clip, options: LabelOptions) -> list[Swing]:
         for start, end in _swing_frames(relative[:, foot_column], options.valley_factor):
             toe_speed = speed[start:end, toe_column]
             swings.append(Swing(foot, start, end, float(toe_speed.sum()), float(toe_speed.max())))
-    real = sorted((s for s in swings if s.path >= LEAST_PATH), key=lambda s: (s.end, s.foot))
+    real = sorted((s for s in swings if s.path_cm >= LEAST_PATH), key=lambda s: (s.end, s.foot))
     return _one_swing_per_step(real)
 
 
@@ -117,7 +118,7 @@ def find_landings(swings: list[Swing], frames: int, shortest_step: float) -> lis
             continue
         if out and swing.start - resting_since > LONGEST_REST:
             out.append(END_OF_BOUT)
-        when = swing.end + SETTLING_CM / max(swing.peak, SLOWEST_PEAK)
+        when = swing.end + SETTLING_CM / max(swing.peak_speed, SLOWEST_PEAK)
         resting_since = max(resting_since, swing.end)
         if out and out[-1][1] == 1 - swing.foot and when - out[-1][0] <= shortest_step / 2:
             continue
@@ -199,12 +200,12 @@ def _one_swing_per_step(swings: list[Swing]) -> list[Swing]:
         if last is None or last.foot != swing.foot:
             out.append(swing)
             continue
-        longer = max(last, swing, key=lambda s: s.path)
-        one_is_small = min(last.path, swing.path) < LESSER_SWING * longer.path
+        longer = max(last, swing, key=lambda s: s.path_cm)
+        one_is_small = min(last.path_cm, swing.path_cm) < LESSER_SWING * longer.path_cm
         if swing.start - last.end <= SAME_SWING:
             end = last.end if one_is_small and longer is last else swing.end
-            peak = max(last.peak, swing.peak)
-            out[-1] = Swing(swing.foot, last.start, end, last.path + swing.path, peak)
+            peak = max(last.peak_speed, swing.peak_speed)
+            out[-1] = Swing(swing.foot, last.start, end, last.path_cm + swing.path_cm, peak)
         elif one_is_small:
             out[-1] = longer
         else:

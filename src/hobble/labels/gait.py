@@ -74,9 +74,10 @@ def overwrite_crouch(gait: Array, clip: Clip) -> Array:
 def automatic_gait(clip: Clip, down: np.ndarray, dominant: str | None) -> Array:
     """Find the gait from the motion. Returns shares (F, 6) of GAITS, whose sum is 1.
 
-    down: (F, 4) contacts from `hobble.labels.contacts.stance`. dominant: the clip's main gait, or None if it
-    is not known. It decides between walk and jog if both are about equally likely. "jump" and "bump" are not
-    recognised: if `dominant` is one of them, all frames get it, except those in which the person stands.
+    down: (F, 4) contacts from `hobble.labels.contacts.find_stance_contacts`. dominant: the clip's main gait,
+    or None if it is not known. It decides between walk and jog if both are about equally likely. "jump" and
+    "bump" are not recognised: if `dominant` is one of them, all frames get it, except those in which the
+    person stands.
     """
     odds = jog_odds(clip, down) + {"jog": DATA_SET_ODDS, "walk": -DATA_SET_ODDS}.get(dominant or "", 0.0)
     gait = _likeliest_path(_evidence(clip, odds), SWITCH_COST)

@@ -14,7 +14,7 @@ from hobble.core.files import write_json
 from hobble.core.quat import Array
 from hobble.labels import read_files
 from hobble.labels.clip_labels import GAITS, LabelReport, Labels
-from hobble.labels.contacts import contacts, stance
+from hobble.labels.contacts import find_contacts, find_stance_contacts
 from hobble.labels.footfall import Swing, find_landings, find_swings
 from hobble.labels.gait import automatic_gait, overwrite_crouch
 from hobble.labels.label_picture import make_label_picture
@@ -65,7 +65,7 @@ def label_clip(
     if not len(cycles):
         warnings.append(_no_cycle_warning(options.margins))
     labels = Labels(
-        contacts=contacts(clip, options),
+        contacts=find_contacts(clip, options),
         phase=phase if zero == "right" else (phase + 0.5) % 1.0,
         phase_known=known,
         gait=shares,
@@ -179,4 +179,4 @@ def _find_gait(
         return read_files.read_gait(files["gait"], time, len(clip))
     if "gait_keys" in files:
         return read_files.read_gait_keys(files["gait_keys"], time, len(clip))
-    return automatic_gait(clip, stance(clip, options), dominant)
+    return automatic_gait(clip, find_stance_contacts(clip, options), dominant)

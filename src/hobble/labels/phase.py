@@ -18,11 +18,11 @@ import numpy as np
 from hobble.core.quat import Array
 from hobble.labels.read_files import whole_frame
 
-BREAK = (np.nan, np.nan, 1.0)  # the row that ends a bout of walking
+END_OF_BOUT_ROW = (np.nan, np.nan, 1.0)  # the row that ends a bout of walking
 # Cycles a frame. At this rate the phase advances where nobody walks: a tenth of the usual rate, as for a
 # standing character at run time.
 IDLE_RATE = 0.0017
-FASTEST = 0.25  # cycles a frame: a larger change of a hand-made phase is a jump, not movement
+FASTEST_PHASE = 0.25  # cycles a frame: a larger change of a hand-made phase is a jump, not movement
 # Value of the option `margins` -> the least number of frames that a clip must have before a cycle. After the
 # cycle it must have one frame more. With "extend", cycles near an end of the clip are used, because the path
 # can be continued past the end. With "drop", they are left out.
@@ -68,7 +68,7 @@ def footsteps_of_phase(phase: Array) -> tuple[Array, np.ndarray]:
     not known where it stands still or jumps.
     """
     step = np.diff(phase) % 1.0
-    moving = np.concatenate([[False], (step > 0) & (step < FASTEST), [False]])
+    moving = np.concatenate([[False], (step > 0) & (step < FASTEST_PHASE), [False]])
     edges = np.flatnonzero(np.diff(moving))
     known = np.zeros(len(phase), bool)
     events: list[tuple[float, int]] = []
@@ -93,7 +93,7 @@ def rows_of_landings(events: list[tuple[float, int]]) -> Array:
     for when, foot in events:
         if foot == -1 or foot == last:
             if rows and not np.isnan(rows[-1][:2]).all():
-                rows.append(list(BREAK))
+                rows.append(list(END_OF_BOUT_ROW))
             last = -1
         if foot == 0:
             rows.append([when, np.nan, 0.0])

@@ -19,7 +19,11 @@ from hobble.core.untrusted import read_text
 from hobble.labels.clip_labels import GAITS
 
 FILE_GAITS = ("stand", "walk", "jog", "run", "crouch", "jump", "crawl", "unknown")  # columns of `.gait`
-TO_GAIT = {"run": "jog", "crawl": "crouch", "unknown": "bump"}  # gait that only files name -> gait of GAITS
+GAIT_OF_FILE_GAIT = {
+    "run": "jog",
+    "crawl": "crouch",
+    "unknown": "bump",
+}  # gait that only files name -> gait of GAITS
 
 
 @dataclass(frozen=True)
@@ -39,11 +43,11 @@ class SourceTime:
         """Number of source frames in the time of one frame of the clip."""
         return self.fps / 60.0
 
-    def to_clip(self, number: float) -> float:
+    def to_clip_frame(self, number: float) -> float:
         """The frame of the clip, not rounded, at the source frame `number`, which is counted from 1."""
         return (number - 1 - self.first) / self.ratio
 
-    def at_clip_frames(self, frames: int) -> Array:
+    def source_frames_of_clip(self, frames: int) -> Array:
         """(frames,) the source frame, counted from 0 and not rounded, at each frame of the clip."""
         return np.arange(frames) * self.ratio + self.first
 
@@ -119,7 +123,7 @@ def read_footsteps(path: Path, time: SourceTime) -> Array:
                     path, f"frame {landing:g} lies past the clip's last frame, {time.frames}", line=number
                 )
             last = landing
-        right, left = (time.to_clip(x) for x in (*landings, math.nan)[:2])
+        right, left = (time.to_clip_frame(x) for x in (*landings, math.nan)[:2])
         steps.append((right, left, float(marked or short_line > 0)))
     return np.array(steps, float).reshape(-1, 3)
 
@@ -156,13 +160,13 @@ def read_gait_keys(path: Path, time: SourceTime, frames: int) -> Array:
             raise InputError(
                 path, f"frame {frame:g} lies past the clip's last frame, {time.frames}", line=number
             )
-        keys.append((frame, GAITS.index(TO_GAIT.get(words[1], words[1]))))
+        keys.append((frame, GAITS.index(GAIT_OF_FILE_GAIT.get(words[1], words[1]))))
     if not keys:
         raise InputError(
             path, "holds no keys", fix="Write lines of `frame gait`, such as `1 walk`, or remove the file."
         )
     key_frames, gait = np.array(keys).T
-    when = time.at_clip_frames(frames) + 1
+    when = time.source_frames_of_clip(frames) + 1
     following = np.clip(np.searchsorted(key_frames, when, side="right"), 1, max(len(key_frames) - 1, 1))
     shares = np.eye(len(GAITS))[gait.astype(int)]
     if len(key_frames) == 1:
@@ -217,7 +221,7 @@ def _neighbouring_rows(rows: Array, time: SourceTime, frames: int) -> tuple[Arra
 
     rows: (R, ...) a row for each source frame. The results are (frames, ...), (frames, ...) and (frames,).
     """
-    when = np.clip(time.at_clip_frames(frames), 0, len(rows) - 1)
+    when = np.clip(time.source_frames_of_clip(frames), 0, len(rows) - 1)
     # A time that misses a whole source frame only by a rounding error counts as this frame.
     nearest = np.round(when)
     when = np.where(np.abs(when - nearest) < 1e-6, nearest, when)
@@ -229,5 +233,5 @@ def _shares_of_gaits(file_shares: Array) -> Array:
     """(n, 6) shares of GAITS, added up from (n, 8) shares of FILE_GAITS."""
     out = np.zeros((len(file_shares), len(GAITS)))
     for column, name in enumerate(FILE_GAITS):
-        out[:, GAITS.index(TO_GAIT.get(name, name))] += file_shares[:, column]
+        out[:, GAITS.index(GAIT_OF_FILE_GAIT.get(name, name))] += file_shares[:, column]
     return out

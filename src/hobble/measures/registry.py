@@ -13,7 +13,7 @@ from hobble.measures.measure import Measure
 
 def channel_measures() -> Iterator[Measure]:
     """The measurements that channels add: those listed in `hobble.channels.<name>.measures`, if it exists."""
-    for name in channels.NAMES:
+    for name in channels.CHANNEL_NAMES:
         module = f"hobble.channels.{name}.measures"
         if importlib.util.find_spec(module) is not None:
             yield from importlib.import_module(module).MEASURES

@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from hobble.channels import NAMES, all_channels, channel
+from hobble.channels import CHANNEL_NAMES, all_channels, channel
 from hobble.channels.speed_limits import Limits
 from hobble.core.errors import InputError
 from hobble.core.files import load_npz
@@ -141,9 +141,9 @@ def _read_layout(
         except (KeyError, TypeError, ValueError, OverflowError) as error:
             raise InputError(path, f"its layout cannot be understood: {error}") from None
         for name, columns in layout.channels:
-            if name not in NAMES:
+            if name not in CHANNEL_NAMES:
                 raise InputError(
-                    path, f"has the unknown channel {name!a:.40}; known channels: {', '.join(NAMES)}"
+                    path, f"has the unknown channel {name!a:.40}; known channels: {', '.join(CHANNEL_NAMES)}"
                 )
             checks.whole_number(path, f"layout.channels.{name}", columns, 0, x_size)
     if (layout.x_size, layout.y_size) != (x_size, y_size):
@@ -169,7 +169,7 @@ def _guess_layout(x_size: int, y_size: int, skeleton: Skeleton | None) -> RowLay
     fitting = (
         one.name for one in all_channels() if skeleton is not None and len(one.columns(skeleton)) == left_over
     )
-    return RowLayout(joints, channels=((next(fitting, NAMES[0]), left_over),))
+    return RowLayout(joints, channels=((next(fitting, CHANNEL_NAMES[0]), left_over),))
 
 
 def _read_gaits(path: str | Path, meta: Mapping[str, Any]) -> tuple[str, ...]:

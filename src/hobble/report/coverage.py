@@ -162,10 +162,10 @@ def _channel_chart(
         "colorbar": {"title": {"text": "s"}, "thickness": 10, "outlinewidth": 0},
         "hovertemplate": "%{y} at %{x}: %{z:.1f} s<extra></extra>",
     }
-    across = axis(definition.value, dtick=tenth, range=[0.4 * tenth, 10.6 * tenth])
+    across = axis(definition.value_word, dtick=tenth, range=[0.4 * tenth, 10.6 * tenth])
     caption = (
-        f"Each cell has the seconds of data at one {definition.value}, including mirrored clips. The network "
-        "was not trained on empty cells and has to interpolate there."
+        f"Each cell has the seconds of data at one {definition.value_word}, including mirrored clips. The "
+        "network was not trained on empty cells and has to interpolate there."
     )
     title, height = f"{definition.title}: amount of data", 120 + 24 * len(columns)
     layout = {"xaxis": across, "yaxis": {"automargin": True}}

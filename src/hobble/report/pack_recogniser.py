@@ -11,11 +11,11 @@ from typing import Any
 import numpy as np
 
 from hobble.core.skeleton import Skeleton
-from hobble.gait.cycles import measure
+from hobble.gait.cycles import measure_cycles
 from hobble.gait.features import features
-from hobble.gait.limp_grade import LEANING, PARTS, STRENGTHS, Grader, grader
-from hobble.gait.people import people
-from hobble.gait.profile import Profile, profile
+from hobble.gait.limp_grade import LEANING, PARTS, STRENGTHS, Grader, grader_of_all_people
+from hobble.gait.people import read_people
+from hobble.gait.profile import Profile, profile_of_walk
 from hobble.gait.recogniser import SIDES
 from hobble.models.network import Network
 from hobble.models.packing import packed
@@ -53,8 +53,8 @@ def healthy_walk(network: Network, skeleton: Skeleton, runtime: Runtime) -> Prof
         return None
     poses = [pose for _, pose in walk_straight(network, runtime, WARM_UP + MEASURED, {})][WARM_UP:]
     positions, rotations = np.array([p.positions for p in poses]), np.array([p.rotations for p in poses])
-    walk = measure(skeleton, restore_bone_lengths(skeleton, positions, rotations)[1], FPS)
-    return profile(walk) if len(walk) else None
+    walk = measure_cycles(skeleton, restore_bone_lengths(skeleton, positions, rotations)[1], FPS)
+    return profile_of_walk(walk) if len(walk) else None
 
 
 def packed_statistics(statistics: Grader | None = None) -> dict[str, Any]:
@@ -69,8 +69,8 @@ def packed_statistics(statistics: Grader | None = None) -> dict[str, Any]:
     the `mean` (D,) of the features at strength 1, and their covariance `spread` (D, D). Arrays are float64
     in base64.
     """
-    statistics = statistics or grader()
-    normal = people().normal()
+    statistics = statistics or grader_of_all_people()
+    normal = read_people().normal_profile()
     return {
         "features": list(features(normal, normal)),  # any two profiles do: only the names are used
         "strengths": STRENGTHS.tolist(),

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hobble.channels import channel
-from hobble.channels.shown import shown, words
+from hobble.channels.shown import channel_display, channel_words
 from hobble.core.skeleton import Skeleton
 from hobble.figure.mesh import body_mesh, mesh_key
 from hobble.models.network import Network, inverse
@@ -96,9 +96,9 @@ def shown_channels(network: Network, runtime: Runtime) -> list[dict[str, Any]]:
     skeleton, out, first = network.skeleton, [], 0
     assert skeleton is not None
     for name, columns in network.channels.items():
-        definition, wording, index_of = channel(name), words(name), list(columns).index
+        definition, wording, index_of = channel(name), channel_words(name), list(columns).index
         speed_limits = network.limits.get(name)
-        display = shown(name, skeleton, columns, network.trained(name))
+        display = channel_display(name, skeleton, columns, network.trained(name))
         presets = [
             {"name": preset, "values": [[index_of(column), value] for column, value in values.items()]}
             for preset, values in display.presets.items()
@@ -107,21 +107,21 @@ def shown_channels(network: Network, runtime: Runtime) -> list[dict[str, Any]]:
             {
                 "name": name,
                 "title": definition.title,
-                "key": wording.key or name,
+                "key": wording.address_key or name,
                 "first": first,
                 "columns": list(columns),
                 "trained": list(network.trained(name)),
-                "spoken": list(display.spoken),
+                "spoken": list(display.spoken_names),
                 "sliders": {label: index_of(column) for label, column in display.sliders.items()},
                 "presets": presets,
                 "regions": [list(indices) for indices in display.regions],
                 "highest": definition.highest,
-                "sliderStep": wording.step,
-                "rest": wording.rest,
-                "never": wording.never,
+                "sliderStep": wording.slider_step,
+                "rest": wording.neutral_button,
+                "never": wording.untrained_note,
                 "headline": wording.headline,
-                "says": wording.says,
-                "on": wording.on,
+                "says": wording.network_told,
+                "on": wording.active_word,
                 "rate": runtime.rates.get(name, definition.rate) / 60,  # from a second to a frame
                 "scale": runtime.scales.get(name, 1.0),
                 "limits": speed_limits.to_dict() if runtime.limits and speed_limits is not None else None,

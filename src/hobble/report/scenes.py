@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from hobble.channels import channel
-from hobble.channels.shown import ChannelDisplay, shown, words
+from hobble.channels.shown import ChannelDisplay, channel_display, channel_words
 from hobble.core.files import load_npz
 from hobble.core.quat import Array
 from hobble.core.skeleton import Skeleton
@@ -52,7 +52,9 @@ def scenes(
     if not skeleton:
         return {}
     figure = Skeleton.from_dict({"name": "", **skeleton})
-    displays = {name: shown(name, figure, columns, columns) for name, columns in (channels or {}).items()}
+    displays = {
+        name: channel_display(name, figure, columns, columns) for name, columns in (channels or {}).items()
+    }
     frame_step = max(1, round(float(data["fps"]) / FPS))
     names = [str(name) for name in data["names"]]
     bones = body_mesh(figure).bones.tolist()  # the joints that move the drawn body
@@ -111,7 +113,9 @@ def _packed_walk(
         index, highest = list(channels[swept_channel]).index(column), channel(swept_channel).highest
         display = displays[swept_channel]
         # The column's name for readers.
-        word = next((label for label, c in display.sliders.items() if c == column), display.spoken[index])
+        word = next(
+            (label for label, c in display.sliders.items() if c == column), display.spoken_names[index]
+        )
         share = np.asarray(data[f"{name}/swept_values"])[::frame_step] / highest
         out["swept"] = {
             "column": index,
@@ -121,7 +125,7 @@ def _packed_walk(
             # 0 to 250 stands for 0 to the highest value.
             "values": packed(np.clip(np.round(250 * share), 0, 250).astype(np.uint8)),
         }
-        out["description"] = words(swept_channel).grows.format(word)
+        out["description"] = channel_words(swept_channel).sweep_description.format(word)
     return out
 
 

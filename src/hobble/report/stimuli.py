@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from PIL import Image
 
 from hobble.channels import channel
-from hobble.channels.shown import SampleWalk, loops, shown
+from hobble.channels.shown import SampleWalk, channel_display, channel_loops
 from hobble.core import quat
 from hobble.core.errors import HobbleError
 from hobble.core.files import write_json
@@ -75,7 +75,9 @@ def write_stimuli(
     neutral, entries = make_loop(network, {}, runtime), []
     for name, channel_name, sample in all_loops(network):
         columns, trained = network.channels[channel_name], trained_columns(network, channel_name)
-        renderer = BodyRenderer(body_mesh(skeleton), shown(channel_name, skeleton, columns, trained).regions)
+        renderer = BodyRenderer(
+            body_mesh(skeleton), channel_display(channel_name, skeleton, columns, trained).regions
+        )
         loop = neutral
         if sample.values:
             loop = make_loop(network, {channel_name: dict(sample.values)}, runtime)
@@ -107,7 +109,7 @@ def write_stimuli(
 
 
 def all_loops(network: Network) -> list[tuple[str, str, SampleWalk]]:
-    """(name of the files, channel, walk) of each loop, as `hobble.channels.shown.loops` lists them.
+    """(name of the files, channel, walk) of each loop, as `hobble.channels.shown.channel_loops` lists them.
 
     The names of the first channel are used as they are. Names of later channels begin with "<channel>-", and
     their neutral walk is left out, because the first channel has it.
@@ -115,7 +117,7 @@ def all_loops(network: Network) -> list[tuple[str, str, SampleWalk]]:
     assert network.skeleton is not None
     out: list[tuple[str, str, SampleWalk]] = []
     for name, columns in network.channels.items():
-        for loop in loops(name, network.skeleton, columns, network.trained(name)):
+        for loop in channel_loops(name, network.skeleton, columns, network.trained(name)):
             if not out or out[0][1] == name:  # the first channel that has loops
                 out.append((loop.name, name, loop))
             elif loop.values:

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from hobble.channels import NAMES, channel
+from hobble.channels import CHANNEL_NAMES, channel
 from hobble.core.quat import Array
 from hobble.models.network import Network
 
@@ -57,7 +57,7 @@ class ChannelValues:
         (columns,) or (C, columns). characters: C. Raises the errors listed in
         `ProceduralAnimation.next_pose`.
         """
-        if name not in NAMES:
+        if name not in CHANNEL_NAMES:
             raise TypeError(f"next_pose() got an unexpected keyword argument {name!r}")
         definition, labels = channel(name), self.labels.get(name, {})
         values = np.zeros((characters, len(labels)))
@@ -67,7 +67,7 @@ class ChannelValues:
                 if np.shape(value) not in ((), (1,), (characters,)):
                     shape = np.shape(value)
                     raise ValueError(
-                        f"{label} has to be one {definition.value} for all characters, or an array of "
+                        f"{label} has to be one {definition.value_word} for all characters, or an array of "
                         f"{characters}, one for each; its shape is {shape}"
                     )
                 values[:, labels[label]] = value
@@ -84,8 +84,8 @@ class ChannelValues:
         if wrong.any():
             c, k = np.argwhere(wrong)[0]
             raise ValueError(
-                f"the {definition.value} of {list(labels)[k]} is {values[c, k]:g}, but has to be from 0 to "
-                f"{definition.highest:g}"
+                f"the {definition.value_word} of {list(labels)[k]} is {values[c, k]:g}, but has to be from 0 "
+                f"to {definition.highest:g}"
             )
         return self.columns.get(name, slice(0, 0)), values / self.scales.get(name, 1.0)
 

@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 
 from hobble.channels import channel
-from hobble.channels.shown import sweeps
+from hobble.channels.shown import channel_sweeps
 from hobble.core.files import save_npz
 from hobble.core.quat import Array
 from hobble.models.network import Network
@@ -94,7 +94,7 @@ def swept_columns(network: Network) -> dict[str, tuple[str, str]]:
     return {
         name: (of_channel, column)
         for of_channel, columns in network.channels.items()
-        for name, column in sweeps(of_channel, skeleton, columns, network.trained(of_channel)).items()
+        for name, column in channel_sweeps(of_channel, skeleton, columns, network.trained(of_channel)).items()
     }
 
 

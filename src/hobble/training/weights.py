@@ -62,7 +62,7 @@ def meta(
             "contacts": list(CONTACTS),
             "channels": {c.name: c.columns(skeleton) for c in channels},
             "limits": database.manifest.limits,
-            "units": "; ".join([UNITS, *(f"{c.value} 0 to {c.highest:g}" for c in channels)]),
+            "units": "; ".join([UNITS, *(f"{c.value_word} 0 to {c.highest:g}" for c in channels)]),
             **network.about,
             **about_training,
         }

@@ -9,7 +9,7 @@ import functools
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
-from hobble.channels import NAMES, channel
+from hobble.channels import CHANNEL_NAMES, channel
 from hobble.config.load_configuration import Catalogue
 from hobble.core.errors import HobbleError, InputError
 
@@ -28,7 +28,7 @@ class ChannelSources:
     def channels(self, dataset: str) -> tuple[str, ...]:
         """The channels of a data set: those with a section in its file, and those that need no section."""
         sections = self.catalogue.dataset(dataset).channels
-        return tuple(name for name in NAMES if name in sections or channel(name).Options is None)
+        return tuple(name for name in CHANNEL_NAMES if name in sections or channel(name).Options is None)
 
     def files(self, dataset: str, clip: str, name: str) -> list[str]:
         """The files that channel `name` reads for a clip.
@@ -63,7 +63,7 @@ class ChannelSources:
         synthetic = self.catalogue.dataset(dataset).synthetic is not None
         files = self._tables(dataset, name) if synthetic else self.files(dataset, clip, name)
         definition = channel(name)
-        return definition.is_neutral(definition.source(self.source(dataset, clip, name), files))
+        return definition.is_neutral(definition.make_source(self.source(dataset, clip, name), files))
 
     def check(self, dataset: str) -> None:
         """Raise HobbleError if the data set's clip entries or options are wrong about channels."""
@@ -79,7 +79,7 @@ class ChannelSources:
                 # Error messages show "clip", so it names the place in the data set's file.
                 fields = self.source(dataset, clip, name) | {"clip": f"data set {dataset}: clips.{clip}"}
                 definition = channel(name)
-                definition.check(definition.source(fields, self._tables(dataset, name)), rig)
+                definition.check(definition.make_source(fields, self._tables(dataset, name)), rig)
 
     def _value(self, dataset: str, clip: str, name: str) -> Any:
         """The value of channel `name` in the clip's entry, or None."""
@@ -88,7 +88,7 @@ class ChannelSources:
     def _tables(self, dataset: str, name: str) -> list[str]:
         """Paths of the tables in the options of channel `name`. Raises InputError if a table is missing."""
         definition, section = channel(name), self.catalogue.dataset(dataset).channels.get(name, {})
-        tables = definition.tables(definition.options_of(section))
+        tables = definition.table_files(definition.options_of(section))
         files = [self.clips.mocap / file for file in tables]
         for file in files:
             if not file.is_file():
@@ -108,9 +108,12 @@ def channels_of_folder(folder_name: str) -> tuple[str, ...]:
     Raises HobbleError for a name that no database can have.
     """
     names = () if folder_name == NO_CHANNEL else tuple(folder_name.split("+"))
-    if any(name not in NAMES for name in names) or list(names) != sorted(set(names), key=NAMES.index):
+    if any(name not in CHANNEL_NAMES for name in names) or list(names) != sorted(
+        set(names), key=CHANNEL_NAMES.index
+    ):
         raise HobbleError(
             f"no database can be called {folder_name}. A database without channels is called `{NO_CHANNEL}`. "
-            f"Any other is called by its channels with + between them, in the order {', '.join(NAMES)}"
+            f"Any other is called by its channels with + between them, in the order "
+            f"{', '.join(CHANNEL_NAMES)}"
         )
     return names

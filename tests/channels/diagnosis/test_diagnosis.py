@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from hobble.channels import ClipSource, channel
-from hobble.channels.clip_values import clip_values
+from hobble.channels.clip_values import read_clip_values
 from hobble.channels.diagnosis.channel import read_table
 from hobble.core.clip import Clip
 from hobble.core.errors import InputError
@@ -37,9 +37,9 @@ def test_a_diagnosis_holds_in_every_frame_of_a_clip(
     holden31: Skeleton, table: Path, clip: str, value: str | None, expected: list[float], warns: bool
 ) -> None:
     fields = {"clip": clip, "value": value, "options": {"table": table.name}}
-    source = channel("diagnosis").source(fields, [table])
+    source = channel("diagnosis").make_source(fields, [table])
     rotations = np.tile([1.0, 0, 0, 0], (7, 31, 1))
-    values, warnings = clip_values(
+    values, warnings = read_clip_values(
         "diagnosis", Clip(clip, holden31, 60.0, rotations, np.zeros((7, 3))), source, {}
     )
     np.testing.assert_array_equal(values, np.tile(np.float32(expected), (7, 1)))

@@ -22,8 +22,8 @@ from hobble.channels.injury.limp.captured_limps import (
 from hobble.channels.injury.limp.crowd_walks import FigureWalk
 from hobble.channels.injury.limp.run import SEVERITIES, hurt_side, limp_distance, measure_limps
 from hobble.gait.cycles import SCALARS, Cycle, WalkCycles
-from hobble.gait.people import NORMAL, people
-from hobble.gait.profile import profile
+from hobble.gait.people import NORMAL, read_people
+from hobble.gait.profile import profile_of_walk
 from hobble.gait.signals import CURVES, SIGN_CHANGES
 from hobble.runtime.options import Runtime
 
@@ -49,7 +49,7 @@ def walking(limp: dict[str, float], speed: float) -> FigureWalk:
     """A figure that walks like people and limps on one side, by a share of the limp of people with pain in
     the right leg.
     """
-    known, strength = people(), max(limp.values(), default=0.0)
+    known, strength = read_people(), max(limp.values(), default=0.0)
 
     def mixed(of: Callable[[str], Any]) -> Any:
         return (1 - strength) * of(NORMAL) + strength * of("antalgic")
@@ -59,7 +59,7 @@ def walking(limp: dict[str, float], speed: float) -> FigureWalk:
     cycles = [Cycle(start, start + 70, scalars, curves) for start in range(0, FRAMES - 70, 70)]
     walk = WalkCycles(60.0, tuple(cycles), tuple(map(mirrored, cycles)))
     walk = walk.mirrored() if "left" in limp else walk
-    return FigureWalk(walk, profile(walk), speed, FRAMES)
+    return FigureWalk(walk, profile_of_walk(walk), speed, FRAMES)
 
 
 @pytest.fixture
@@ -198,7 +198,7 @@ def test_a_captured_limp_is_compared_with_its_own_performer() -> None:
     hurt = clip("7_2", {RIGHT_KNEE: 8.0}, {"right": 0.8})
     healthy, whose = healthy_reference(hurt, [other, own, hurt])
     assert whose == "performer"
-    assert healthy == profile(own.walk)
+    assert healthy == profile_of_walk(own.walk)
     assert healthy_reference(hurt, [hurt])[1] == "people"
     assert limp_distance(healthy, healthy, healthy, healthy) == 0
 

@@ -97,7 +97,7 @@ def test_two_classes_are_separated_along_fishers_direction() -> None:
     # Half way between the means neither is likelier, whatever their numbers.
     middle = found.scores(np.array([[0.5, -0.5]]))[0]
     assert abs(middle[0] - middle[1]) < 0.2
-    assert found.names(np.array([[-1.0, 1.0], [2.0, -2.0]])) == ["a", "b"]
+    assert found.likeliest_classes(np.array([[-1.0, 1.0], [2.0, -2.0]])) == ["a", "b"]
 
 
 def test_neither_the_unit_of_a_feature_nor_a_constant_one_changes_the_names() -> None:
@@ -105,9 +105,9 @@ def test_neither_the_unit_of_a_feature_nor_a_constant_one_changes_the_names() ->
     values = np.concatenate([rng.normal(0, 1, (40, 3)), rng.normal(1, 1, (40, 3))])
     labels = ["a"] * 40 + ["b"] * 40
     constant = np.full((80, 1), 7.0)
-    plain = learn(values, labels).names(values)
+    plain = learn(values, labels).likeliest_classes(values)
     scaled = np.concatenate([values * [1, 1000, 0.01], constant], axis=1)
-    assert learn(scaled, labels).names(scaled) == plain
+    assert learn(scaled, labels).likeliest_classes(scaled) == plain
     with pytest.raises(ValueError, match="two classes or more"):
         learn(values, ["a"] * 80)
 
@@ -193,7 +193,7 @@ def test_cross_validation_never_learns_from_the_windows_it_names() -> None:
     found = module._cross_validate(windows, lambda name: (name,))
     assert found["windows"] == 40
     assert found["right"] < 0.8
-    leaked = learn(module.feature_table(windows), [w.hurt for w in windows]).names(
+    leaked = learn(module.feature_table(windows), [w.hurt for w in windows]).likeliest_classes(
         module.feature_table(windows)
     )
     assert leaked == [w.hurt for w in windows]

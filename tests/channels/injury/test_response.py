@@ -12,7 +12,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.stats import spearmanr
 
-from hobble.channels.injury.crowd_severities import severities
+from hobble.channels.injury.crowd_severities import severity_inputs
 from hobble.channels.injury.response.cases import divided_severities, into_a_jog, second_injuries
 from hobble.channels.injury.response.run import GAITS, injury_response, largest_accelerations
 from hobble.channels.injury.response.sweep import SEVERITIES, sweeps
@@ -190,7 +190,7 @@ def test_a_divided_severity_has_the_effect_of_the_quotient(hurtable) -> None:
 
 def test_a_figure_of_a_crowd_walks_as_it_does_alone(hurtable) -> None:
     """A character walks in a crowd as it does alone."""
-    hurt = severities(hurtable, [{}, {KNEE: 4.0}, {KNEE: 10.0}])
+    hurt = severity_inputs(hurtable, [{}, {KNEE: 4.0}, {KNEE: 10.0}])
     together = run(hurtable, [CrowdTarget(30, ["walk", "jog", "walk"], hurt)], RUNTIME)
     for figure, gait in enumerate(("walk", "jog", "walk")):
         own = {name: each[figure : figure + 1] for name, each in hurt.items()}
@@ -201,7 +201,7 @@ def test_a_figure_of_a_crowd_walks_as_it_does_alone(hurtable) -> None:
 
 
 def test_whole_cycles_are_measured(hurtable) -> None:
-    unhurt = severities(hurtable, [{}])
+    unhurt = severity_inputs(hurtable, [{}])
     walks = run(hurtable, [CrowdTarget(n, ["walk"], unhurt) for n in (20, 400, 10)], RUNTIME)
     phase = np.zeros((430, 1))
     phase[:, 0] = np.mod(0.013 * np.arange(430), 1)

@@ -11,9 +11,17 @@ from typing import Any
 
 import pytest
 
-from hobble.channels.injury.study.answer_tables import NUMERALS, tables
+from hobble.channels.injury.study.answer_tables import NUMERALS, answer_rows_by_numeral
 from hobble.channels.injury.study.answers import FilmAnswer, Study, read_answers, read_study
-from hobble.channels.injury.study.films import FILMS, FPS, GAIT, ONE, PARTS, SEVERAL, hurts_and_gait
+from hobble.channels.injury.study.films import (
+    CHANGE_OF_GAIT,
+    FILMS,
+    FPS,
+    ONE_PART,
+    PARTS,
+    SEVERAL_PARTS,
+    hurts_and_gait,
+)
 from hobble.cli.__main__ import main
 from hobble.core.errors import InputError
 
@@ -42,14 +50,14 @@ def write(folder: Path, name: str, says: Callable[[Any], tuple[list[str], int]],
 
 
 def test_the_thirteen_films_have_the_kinds_of_the_study() -> None:
-    assert Counter(film.kind for film in FILMS) == {ONE: 4, SEVERAL: 5, GAIT: 4}
+    assert Counter(film.kind for film in FILMS) == {ONE_PART: 4, SEVERAL_PARTS: 5, CHANGE_OF_GAIT: 4}
     assert [film.number for film in FILMS] == list(range(1, 14))
     assert len({(film.parts, film.gaits) for film in FILMS}) == 13
     for film in FILMS:
         assert set(film.parts) <= set(PARTS)
-        assert (len(film.parts) == 1) if film.kind == ONE else True
-        assert (len(film.parts) > 1) if film.kind == SEVERAL else True
-        assert (film.gaits[0] != film.gaits[1]) == (film.kind == GAIT)
+        assert (len(film.parts) == 1) if film.kind == ONE_PART else True
+        assert (len(film.parts) > 1) if film.kind == SEVERAL_PARTS else True
+        assert (film.gaits[0] != film.gaits[1]) == (film.kind == CHANGE_OF_GAIT)
     assert any("forearm" in part for film in FILMS for part in film.parts)
 
 
@@ -80,7 +88,7 @@ def back(film) -> tuple[list[str], int]:
 def test_known_answers_give_known_tables(folder: Path, study: Study) -> None:
     """Of three people one names all parts, one confuses the sides, and one always says the back."""
     people = [read_answers(write(folder, says.__name__, says), study) for says in (right, mirrored, back)]
-    made = tables(study, people)
+    made = answer_rows_by_numeral(study, people)
     assert tuple(made) == NUMERALS
     for numeral, film in zip(NUMERALS, FILMS, strict=False):
         rows = {row["part"]: row for row in made[numeral]}
@@ -92,7 +100,7 @@ def test_known_answers_give_known_tables(folder: Path, study: Study) -> None:
             assert row["share"] == pytest.approx(expected / 3, abs=1e-5)
     summary = made["XVI"]
     assert [row["film"] for row in summary] == [*map(str, range(1, 14)), "all", "all", "all", "all"]
-    assert [row["kind"] for row in summary[13:]] == [ONE, SEVERAL, GAIT, "all"]
+    assert [row["kind"] for row in summary[13:]] == [ONE_PART, SEVERAL_PARTS, CHANGE_OF_GAIT, "all"]
     everything = summary[-1]
     # Film 8 hurts two right parts, films 6 and 9 parts of both sides: none is named in a mirror.
     assert everything["answers"] == 39
@@ -112,7 +120,7 @@ def test_naming_one_of_three_hurt_parts_counts_a_third(study: Study) -> None:
     """
     first = [FilmAnswer(f.number, f.parts[:1] if f.number == 9 else f.parts, 4) for f in FILMS]
     second = [FilmAnswer(f.number, () if f.number == 9 else f.parts, 2) for f in FILMS]
-    rows = {row["film"]: row for row in tables(study, [first, second])["XVI"][:13]}
+    rows = {row["film"]: row for row in answer_rows_by_numeral(study, [first, second])["XVI"][:13]}
     assert rows["9"]["seen"] == pytest.approx(1 / 6, abs=1e-5)
     assert rows["9"]["exact"] == 0
     assert rows["9"]["wrong"] == 0

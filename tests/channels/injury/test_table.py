@@ -8,7 +8,7 @@ import pytest
 
 from hobble.channels.injury.__main__ import main
 from hobble.channels.injury.status import read_status
-from hobble.channels.injury.table import bvh_frames, read_table, statuses, write_statuses
+from hobble.channels.injury.table import bvh_frames, read_table, status_by_clip, write_statuses
 from hobble.core.errors import InputError
 
 LINKS = ("LeftUpLeg-LeftLeg", "LowerBack-Spine")
@@ -101,7 +101,7 @@ def test_a_file_that_is_not_csv_is_refused_with_one_message(folder, root, capsys
 
 def test_statuses_are_made_from_rows_without_reading_clips(folder):
     rows = read_table(table(folder, "walk,LowerBack-Spine,3,2,4\n"), LINKS)
-    assert statuses(rows, {"walk": 10})["walk"].spells[0].links == (("LowerBack-Spine", 3.0),)
+    assert status_by_clip(rows, {"walk": 10})["walk"].spells[0].links == (("LowerBack-Spine", 3.0),)
 
 
 def test_a_bvh_file_without_frames_is_named(tmp_path):

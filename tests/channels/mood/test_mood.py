@@ -7,7 +7,7 @@ import pytest
 from pydantic import ValidationError
 
 from hobble.channels import ClipSource, channel
-from hobble.channels.clip_values import clip_values
+from hobble.channels.clip_values import read_clip_values
 from hobble.channels.mood import CHANNEL
 from hobble.core.clip import Clip
 from hobble.core.errors import InputError
@@ -36,14 +36,14 @@ def clip(holden31: Skeleton) -> Clip:
     ],
 )
 def test_a_mood_holds_in_every_frame_of_a_clip(clip: Clip, name: str, value: object, expected: list) -> None:
-    values, warnings = clip_values("mood", clip, source(name, value), {})
+    values, warnings = read_clip_values("mood", clip, source(name, value), {})
     np.testing.assert_array_equal(values, np.tile(np.float32(expected), (7, 1)))
     assert warnings == []
     assert channel("mood").is_neutral(source(name, value)) is not any(expected)
 
 
 def test_a_clip_that_fits_no_pattern_gets_a_warning_and_is_neutral(clip: Clip) -> None:
-    values, warnings = clip_values("mood", clip, source("jump"), {})
+    values, warnings = read_clip_values("mood", clip, source("jump"), {})
     assert not values.any()
     assert warnings == ["no pattern of channels.mood fits jump; it counts as neutral."]
 
@@ -56,7 +56,7 @@ def test_an_unknown_mood_in_a_clip_entry_is_refused(holden31: Skeleton, value: o
 
 def test_a_misspelt_option_of_the_mood_channel_is_refused() -> None:
     with pytest.raises(ValidationError, match="pattern"):
-        CHANNEL.source({"clip": "walk_tired_1", "options": {"pattern": {"*": {"sad": 1}}}})
+        CHANNEL.make_source({"clip": "walk_tired_1", "options": {"pattern": {"*": {"sad": 1}}}})
     with pytest.raises(ValidationError, match="bored"):
-        CHANNEL.source({"clip": "walk_tired_1", "options": {"patterns": {"*": {"bored": 1}}}})
-    assert CHANNEL.source({"clip": "walk", "options": PATTERNS}).options == CHANNEL.options_of(PATTERNS)
+        CHANNEL.make_source({"clip": "walk_tired_1", "options": {"patterns": {"*": {"bored": 1}}}})
+    assert CHANNEL.make_source({"clip": "walk", "options": PATTERNS}).options == CHANNEL.options_of(PATTERNS)

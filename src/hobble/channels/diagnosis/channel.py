@@ -42,7 +42,7 @@ class Diagnosis(Channel):
 
     name = "diagnosis"
     title = "Diagnosis"
-    value = "amount"  # the word on the page for a value: how strong the diagnosis is, 0 to 1
+    value_word = "amount"  # the word on the page for a value: how strong the diagnosis is, 0 to 1
     highest = 1.0
     rate = 1.0
     slows = True
@@ -53,7 +53,7 @@ class Diagnosis(Channel):
         """Labels of the three columns, one for each group of diagnoses."""
         return DIAGNOSES
 
-    def tables(self, options: Section | None) -> tuple[str, ...]:
+    def table_files(self, options: Section | None) -> tuple[str, ...]:
         """The name of the table, as the data set states it."""
         return (options.table,) if isinstance(options, DiagnosisTable) else ()
 

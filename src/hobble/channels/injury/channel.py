@@ -34,7 +34,7 @@ class Injury(Channel):
 
     name = "injury"
     title = "Injury"
-    value = "severity"
+    value_word = "severity"
     highest = 10.0
     rate = 10.0  # severity per second: from healthy to the highest severity in one second
     suffix = "_injuries.txt"

@@ -15,17 +15,17 @@ from hobble.models.network import Network
 INJURY = "injury"  # name of the channel
 
 
-def links(network: Network) -> tuple[str, ...]:
+def injury_links(network: Network) -> tuple[str, ...]:
     """Names of the links of a network's injury channel; () if the network lacks this channel."""
     return network.channels.get(INJURY, ())
 
 
-def hurt_links(network: Network) -> tuple[str, ...]:
+def links_hurt_in_training(network: Network) -> tuple[str, ...]:
     """Names of the links that were hurt in training; all links if none was hurt."""
     return network.trained(INJURY)
 
 
-def severities(network: Network, injuries: Sequence[Mapping[str, float]]) -> dict[str, Array]:
+def severity_inputs(network: Network, injuries: Sequence[Mapping[str, float]]) -> dict[str, Array]:
     """{"injury": (C, L) severities of C figures and L links}; {} if the network lacks this channel.
 
     injuries: for each figure, link -> severity. All other links have severity 0.

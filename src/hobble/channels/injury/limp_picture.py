@@ -9,8 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 from PIL import Image, ImageDraw, ImageFont
 
-from hobble.channels.injury.crowd_severities import hurt_links, links
-from hobble.channels.injury.shown import body_parts
+from hobble.channels.injury.crowd_severities import injury_links, links_hurt_in_training
+from hobble.channels.injury.shown import link_index_by_part
 from hobble.core.errors import HobbleError
 from hobble.core.files import atomic_path
 from hobble.figure.mesh import body_mesh
@@ -35,11 +35,11 @@ def write_limp_picture(network: Network, path: str | Path, runtime: Runtime) -> 
     The healthy and the hurt character have the same target speed. Raises HobbleError if the network has no
     injury channel, or if the picture is too large even at the lowest quality.
     """
-    link_names = links(network)
+    link_names = injury_links(network)
     if network.skeleton is None or not link_names:
         raise HobbleError("this network has no injury channel. Use a configuration with `channels: [injury]`")
     # name of a part of the body -> index of its link
-    link_of_part = body_parts(network.skeleton, link_names, hurt_links(network))
+    link_of_part = link_index_by_part(network.skeleton, link_names, links_hurt_in_training(network))
     hurt = {link_names[link_of_part[part]]: severity for part, severity in INJURIES.items()}
     renderer = BodyRenderer(body_mesh(network.skeleton), links_of_bones(network.skeleton, link_names))
     halves = []

@@ -16,17 +16,17 @@ from hobble.figure.pack import link_ends, links_of_bones
 
 # Words on the report page; `ChannelWords` explains them. {} stands for the name of a link.
 WORDS = ChannelWords(
-    rest="Healthy",
-    step=1,
-    key="hurt",
-    grows="Walks while the {} hurts more and more",
-    never="never hurt in training, so it has no effect",
+    neutral_button="Healthy",
+    slider_step=1,
+    address_key="hurt",
+    sweep_description="Walks while the {} hurts more and more",
+    untrained_note="never hurt in training, so it has no effect",
     headline="Say where it hurts.",
-    says="that its {} hurts",
-    on="hurt",
+    network_told="that its {} hurts",
+    active_word="hurt",
 )
 # Parts of the body that have a slider on the page: label, roles of the joints at the upper and the lower end.
-PARTS = (
+PARTS_WITH_SLIDER = (
     ("left thigh", "left_hip", "left_knee"),
     ("left shank", "left_knee", "left_heel"),
     ("left foot", "left_heel", "left_toe"),
@@ -37,8 +37,8 @@ PARTS = (
     ("left upper arm", "left_shoulder", "left_elbow"),
     ("right upper arm", "right_shoulder", "right_elbow"),
 )
-# Parts of the body with a name but no slider: label and roles as in PARTS.
-OTHER_PARTS = (
+# Parts of the body with a name but no slider: label and roles as in PARTS_WITH_SLIDER.
+PARTS_WITHOUT_SLIDER = (
     ("left forearm", "left_elbow", "left_wrist"),
     ("right forearm", "right_elbow", "right_wrist"),
     ("upper back", "spine", "chest"),
@@ -90,7 +90,7 @@ def shown(skeleton: Skeleton, links: Sequence[str], trained: Collection[str]) ->
     the labels of the links that were hurt in training.
     """
     # Label of a part -> label of its link; then only those that were hurt in training.
-    parts = {label: links[i] for label, i in body_parts(skeleton, links, trained).items()}
+    parts = {label: links[i] for label, i in link_index_by_part(skeleton, links, trained).items()}
     trained_parts = {label: link for label, link in parts.items() if link in trained}
     presets = {
         name: {trained_parts[label]: float(value) for label, value in values.items()}
@@ -107,7 +107,7 @@ def loops(skeleton: Skeleton, links: Sequence[str], trained: Collection[str]) ->
 
     links, trained: as in `shown`.
     """
-    parts = {label: links[i] for label, i in body_parts(skeleton, links, trained).items()}
+    parts = {label: links[i] for label, i in link_index_by_part(skeleton, links, trained).items()}
     out = [
         SampleWalk(name, {parts[label]: LOOP_SEVERITY for label in labels}, False)
         for name, labels in PLAIN_LOOPS.items()
@@ -137,15 +137,17 @@ def sweeps(skeleton: Skeleton, links: Sequence[str], trained: Collection[str]) -
     return out
 
 
-def body_parts(skeleton: Skeleton, links: Sequence[str], hurt: Collection[str] = ()) -> dict[str, int]:
-    """Label of each part in PARTS -> index in `links` of the link that its slider sets.
+def link_index_by_part(
+    skeleton: Skeleton, links: Sequence[str], hurt: Collection[str] = ()
+) -> dict[str, int]:
+    """Label of each part in PARTS_WITH_SLIDER -> index in `links` of the link that its slider sets.
 
     hurt: the links that were hurt in training. A part may consist of several links. Its slider sets the
     uppermost of them that is in `hurt`, or the uppermost of all if none is; then the slider has no effect.
     Parts without a link are left out.
     """
     indices = {}
-    for label, upper, lower in PARTS:
+    for label, upper, lower in PARTS_WITH_SLIDER:
         of_part = [name for name in links_between(skeleton, upper, lower) if name in links]
         if of_part:
             chosen = next((name for name in of_part if name in hurt), of_part[0])
@@ -172,7 +174,7 @@ def links_between(skeleton: Skeleton, upper: str, lower: str) -> list[str]:
 
 def spoken_link(skeleton: Skeleton, link: str) -> str:
     """The name of a link for readers, such as "left thigh". A link without a name keeps its label."""
-    for label, upper, lower in (*PARTS, *OTHER_PARTS):
+    for label, upper, lower in (*PARTS_WITH_SLIDER, *PARTS_WITHOUT_SLIDER):
         if link in links_between(skeleton, upper, lower):
             return label
     # The links below a wrist are the hand, and those below a toe joint the toes.

@@ -102,7 +102,7 @@ def parse_links(
             raise InputError(path, f"{part.strip()[:80]!r} does not read as Joint-Joint[severity]", line=line)
         name, value = match[1], match[2]
         check_link(path, line, name, links)
-        pairs.append((name, check_severity(path, line, name, value)))
+        pairs.append((name, parse_severity(path, line, name, value)))
     if not pairs:
         raise InputError(path, "names no link", line=line, fix="Write Joint-Joint[severity].")
     return tuple(pairs)
@@ -161,7 +161,7 @@ def check_link(path: str | Path, line: int | None, name: str, links: Sequence[st
         raise InputError(path, f"no such link: {name[:80]}", line=line, fix=_similar_links(name, links))
 
 
-def check_severity(path: str | Path, line: int | None, link: str, text: str) -> float:
+def parse_severity(path: str | Path, line: int | None, link: str, text: str) -> float:
     """The number that `text` states. Raises InputError unless it is from 0 to 10.
 
     path, line, link: where the text stands and whose severity it is, for the message.

@@ -19,7 +19,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from hobble.channels.injury.status import InjurySpell, Status, check_link, check_severity, write_status
+from hobble.channels.injury.status import InjurySpell, Status, check_link, parse_severity, write_status
 from hobble.core.clip_files import find_clips, require_single_file
 from hobble.core.errors import InputError
 from hobble.core.untrusted import read_text, read_yaml
@@ -78,7 +78,7 @@ def read_table(path: str | Path, links: Sequence[str]) -> list[TableRow]:
         ) from None
 
 
-def statuses(
+def status_by_clip(
     rows: Sequence[TableRow], frames: Mapping[str, int], path: str | Path = "the table"
 ) -> dict[str, Status]:
     """Clip -> its status (what a status file says), for the clips in the rows.
@@ -135,7 +135,7 @@ def write_statuses(table: str | Path, folder: str | Path, links: Sequence[str]) 
     }
     frames = {clip: bvh_frames(file) for clip, file in files.items()}
     written = []
-    for clip, status in statuses(rows, frames, table).items():
+    for clip, status in status_by_clip(rows, frames, table).items():
         written.append(files[clip].with_name(f"{clip}_injuries.txt"))
         write_status(written[-1], status)
     return written
@@ -150,7 +150,7 @@ def _table_row(path: Path, line: int, values: Mapping[str, str | None], links: S
     return TableRow(
         text["clip"],
         text["link"],
-        check_severity(path, line, text["link"], text["severity"]),
+        parse_severity(path, line, text["link"], text["severity"]),
         _frame(path, line, text["from"]),
         _frame(path, line, text["to"]),
         line,

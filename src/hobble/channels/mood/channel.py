@@ -38,7 +38,7 @@ class Mood(Channel):
 
     name = "mood"
     title = "Mood"
-    value = "amount"
+    value_word = "amount"
     highest = 1.0
     rate = 1.0
     slows = True  # sad people walk at half the usual speed

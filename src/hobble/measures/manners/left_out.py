@@ -49,7 +49,7 @@ def _recognise_with_shrinkage(
     for left_out_person in np.unique(person):
         out = person == left_out_person
         if len(set(manner[~out])) > 1:
-            named[out] = learn(values[~out], manner[~out].tolist(), shrinkage).names(values[out])
+            named[out] = learn(values[~out], manner[~out].tolist(), shrinkage).likeliest_classes(values[out])
     tried = named != ""
     right, presence_right = named == manner, (named == NONE) == (manner == NONE)
     pairs = sorted(set(zip(manner.tolist(), person.tolist(), strict=True)))

@@ -152,7 +152,7 @@ def recognise_together(
     walks = generated_windows(network, walkers, name, runtime)
     rows: list[CombinedResult] = []
     for (manner, other, column), windows in zip(cases, walks, strict=True):
-        names = recogniser.names(feature_table(windows))
+        names = recogniser.likeliest_classes(feature_table(windows))
         rows.append(
             {
                 "channel": name,
@@ -191,7 +191,7 @@ def _name_windows(
     recogniser: Discriminant, values: Mapping[str, float], windows: Sequence[MannerWindow]
 ) -> NamedWindows:
     """The names that the recogniser gives to windows of generated walks. values: manner -> its value."""
-    names = recogniser.names(feature_table(windows))
+    names = recogniser.likeliest_classes(feature_table(windows))
     right_names = set(values) or {NONE}
     return {
         "manners": list(values),

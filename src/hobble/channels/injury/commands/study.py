@@ -13,7 +13,7 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
-from hobble.channels.injury.study.answer_tables import scores, tables, write_tables
+from hobble.channels.injury.study.answer_tables import answer_rows_by_numeral, score_answers, write_tables
 from hobble.channels.injury.study.answers import read_answers, read_study
 from hobble.core.untrusted import read_yaml
 from hobble.report.gather import PUBLISHED
@@ -35,9 +35,9 @@ def run(options: argparse.Namespace) -> int:
     study = read_study(options.films)
     people = [read_answers(path, study) for path in options.answers]
     published = read_yaml(PUBLISHED)["recognition"]["share"]
-    write_tables(options.out, study, tables(study, people), published)
+    write_tables(options.out, study, answer_rows_by_numeral(study, people), published)
     films = {film.number: film for film in study.films}
-    overall = scores([(films[answer.film], answer) for answers in people for answer in answers])
+    overall = score_answers([(films[answer.film], answer) for answers in people for answer in answers])
     print(f"{len(people)} people, {overall['answers']} answers. Tables: {options.out}/tables.md")
     seen, seen_without_side = (100 * overall[key] for key in ("seen", "seen_without_side"))
     print(f"Hurt parts that were ticked: {seen:.0f} % (Ferre 2019: {100 * published:.0f} %),", end=" ")

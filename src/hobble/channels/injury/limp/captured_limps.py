@@ -17,9 +17,9 @@ from hobble.core.quat import Array
 from hobble.core.skeleton import Skeleton
 from hobble.evaluation.captured import captured, rotate_by_yaw
 from hobble.evaluation.crowd import FPS
-from hobble.gait.cycles import WalkCycles, join_walks, measure
-from hobble.gait.people import people
-from hobble.gait.profile import Profile, profile
+from hobble.gait.cycles import WalkCycles, join_walks, measure_cycles
+from hobble.gait.people import read_people
+from hobble.gait.profile import Profile, profile_of_walk
 from hobble.measures.clip_parts import ClipPart
 from hobble.rows.clip_rows import ClipRows
 
@@ -33,12 +33,12 @@ PERFORMER = re.compile(r"^([^_]+)_")  # the performer in a clip's name, such as 
 class CapturedWalk:
     """The walk in one captured clip. The severities are the same in all its frames.
 
-    clip: name of the clip. hurt: link -> severity, for the links that hurt. walk: the gait cycles. speed:
-    mean speed, cm a frame.
+    clip: name of the clip. severity_by_link: those of the links that hurt. walk: the gait cycles. speed: mean
+    speed, cm a frame.
     """
 
     clip: str
-    hurt: Mapping[str, float]
+    severity_by_link: Mapping[str, float]
     walk: WalkCycles = field(repr=False)
     speed: float
 
@@ -108,12 +108,12 @@ def healthy_reference(captured_walk: CapturedWalk, walks: Sequence[CapturedWalk]
     healthy clip, it is measured over all healthy clips. "people": if there is no healthy clip at all, it is
     the mean normal walk in `hobble.gait.people`. walks: all captured walks.
     """
-    healthy = [other for other in walks if not other.hurt and len(other.walk)]
+    healthy = [other for other in walks if not other.severity_by_link and len(other.walk)]
     of_performer = [other for other in healthy if other.performer == captured_walk.performer]
     for chosen, whose in ((of_performer, "performer"), (healthy, "data set")):
         if chosen:
-            return profile(join_walks(other.walk for other in chosen)), whose
-    return people().normal(), "people"
+            return profile_of_walk(join_walks(other.walk for other in chosen)), whose
+    return read_people().normal_profile(), "people"
 
 
 def _walk_of_clip(
@@ -140,7 +140,7 @@ def _walk_of_clip(
                 continue
             # `turn` is the change of yaw in each frame, negated.
             yaw = np.concatenate([[0.0], -np.cumsum(turn[stretch.rows])[:-1]])
-            walks.append(measure(skeleton, _in_world(stretch.local, stretch.root, yaw), FPS))
+            walks.append(measure_cycles(skeleton, _in_world(stretch.local, stretch.root, yaw), FPS))
             speeds.append(np.hypot(stretch.velocity[:, 0], stretch.velocity[:, 1]).mean())
     walk = join_walks(walks) if walks else WalkCycles(FPS, (), ())
     if not len(walk):

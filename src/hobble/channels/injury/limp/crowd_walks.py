@@ -10,16 +10,16 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from hobble.channels.injury.crowd_severities import severities
+from hobble.channels.injury.crowd_severities import severity_inputs
 from hobble.core.quat import Array
 from hobble.evaluation.crowd import FPS, channel_values
-from hobble.gait.cycles import WalkCycles, measure
-from hobble.gait.profile import Profile, profile
+from hobble.gait.cycles import WalkCycles, measure_cycles
+from hobble.gait.profile import Profile, profile_of_walk
 from hobble.models.network import Network
 from hobble.runtime.animation import ProceduralAnimation
 from hobble.runtime.options import Runtime
 
-WARM_UP = 5 * FPS  # frames that are not measured, while figures reach their speed and begin to limp
+WARM_UP_FRAMES = 5 * FPS  # frames that are not measured, while figures reach their speed and begin to limp
 
 
 @dataclass(frozen=True)
@@ -55,12 +55,12 @@ def walk_figures(
     animation = ProceduralAnimation(network, characters=count, **dict(runtime))
     velocity = np.zeros((count, 2))
     velocity[:, 1] = speeds
-    channels = severities(network, injuries)
+    channels = severity_inputs(network, injuries)
     for name, values in (other_channels or {}).items():
         channels |= channel_values(network, name, values)
     shares = np.tile([float(name == gait) for name in network.gaits], (count, 1))
     positions = np.zeros((frames, count, len(network.skeleton.joints), 3), np.float32)
-    for frame in range(-WARM_UP, frames):
+    for frame in range(-WARM_UP_FRAMES, frames):
         pose = animation.next_pose(velocity, gait=shares.copy(), **channels)
         if frame >= 0:
             positions[frame] = pose.positions.reshape(count, -1, 3)
@@ -73,5 +73,5 @@ def _figure_walk(network: Network, positions: Array) -> FigureWalk:
     hips = network.skeleton.role("hips")
     # Distance on the ground between the first and the last position, divided by the frames between them.
     speed = float(np.linalg.norm((positions[-1, hips] - positions[0, hips])[::2])) / (len(positions) - 1)
-    walk = measure(network.skeleton, positions, FPS)
-    return FigureWalk(walk, profile(walk) if len(walk) else None, speed, len(positions))
+    walk = measure_cycles(network.skeleton, positions, FPS)
+    return FigureWalk(walk, profile_of_walk(walk) if len(walk) else None, speed, len(positions))

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
-from hobble.channels.injury.response.page import in_words
+from hobble.channels.injury.response.page import with_spoken_links
 from hobble.channels.shown import shown_names
 from hobble.measures.clip_parts import sample_sentence
 from hobble.measures.inputs import Json
@@ -43,7 +43,7 @@ def section(found: Json, material: ReportMaterial) -> PageSection:
     if not found.get("applies"):
         return PageSection("injury", [])
     name, shown_name = material.name, shown_names(material.network["skeleton"])
-    found = in_words(found, material)
+    found = with_spoken_links(found, material)
     return PageSection(
         "injury",
         [

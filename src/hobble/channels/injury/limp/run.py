@@ -15,8 +15,7 @@ from typing import Any
 
 import numpy as np
 
-from hobble.channels.injury.crowd_severities import hurt_links
-from hobble.channels.injury.crowd_severities import links as links_of
+from hobble.channels.injury.crowd_severities import injury_links, links_hurt_in_training
 from hobble.channels.injury.limp import Options
 from hobble.channels.injury.limp.captured_limps import (
     CapturedWalk,
@@ -30,11 +29,11 @@ from hobble.core.errors import HobbleError
 from hobble.core.skeleton import Skeleton
 from hobble.evaluation.spearman import spearman
 from hobble.gait.comparison import compare_walk
-from hobble.gait.effect_sizes import EFFECTS, effects, effects_of_people
+from hobble.gait.effect_sizes import EFFECTS, effects_of_people, measure_effects
 from hobble.gait.features import features
-from hobble.gait.people import people
-from hobble.gait.profile import Profile, profile
-from hobble.gait.recogniser import RIGHT, SIDES, examples
+from hobble.gait.people import read_people
+from hobble.gait.profile import Profile, profile_of_walk
+from hobble.gait.recogniser import RIGHT, SIDES, examples_of_people
 from hobble.hurt.body_parts import part_of_link
 from hobble.measures.clip_parts import clip_parts, sample_of, with_sample
 from hobble.measures.inputs import MeasureInputs, Outcome
@@ -49,7 +48,7 @@ SPEEDS = {"walk": 2.0, "jog": 7.0}  # target speeds, cm a frame; 2 is 1.2 m/s, a
 FIRST_SEVERITIES = (5.0, 10.0)  # of the first injury in walks with two injuries
 SECOND_SEVERITIES = (5.0, 10.0)  # of the second injury in these walks
 LEG = ("hip", "thigh", "shank", "foot")  # parts of the body that belong to a leg
-WINDOW = 4.0  # seconds; length of the stretches (windows) of a walk that a recogniser judges one by one
+WINDOW_SECONDS = 4.0  # length of the stretches (windows) of a walk that a recogniser judges one by one
 
 
 def measure_limps(
@@ -79,9 +78,9 @@ def measure_limps(
     `hobble.channels.injury.limp.with_other_channel`.
     """
     head: dict[str, Any] = {"configuration": configuration}
-    if not links_of(network) or network.skeleton is None:
+    if not injury_links(network) or network.skeleton is None:
         return {**head, "applies": False, "reason": NO_SEVERITIES}
-    links = list(links or links_of(network))
+    links = list(links or injury_links(network))
     rows = _size_rows(network, links, seconds, runtime)
     if rows is None:
         return {**head, "applies": False, "reason": NO_CYCLE}
@@ -91,16 +90,18 @@ def measure_limps(
         "asked_cm_per_second": {gait: 60 * speed for gait, speed in SPEEDS.items()},
         "seconds": seconds,
         "effects": EFFECTS,
-        "trained": [link for link in links if link in hurt_links(network)],
+        "trained": [link for link in links if link in links_hurt_in_training(network)],
         "hurt_seconds": {"captured": hurt_seconds.captured, "made": hurt_seconds.generated},
         "sizes": rows,
         "trends": _trend_rows(rows),
         "named": _recognition_by_severity(rows),
         "people": {
             gait: {name: [round(v, 5) for v in mean_and_sd] for name, mean_and_sd in of_gait.items()}
-            for gait, of_gait in effects_of_people(people()).items()
+            for gait, of_gait in effects_of_people(read_people()).items()
         },
-        "captured": [_row_of_clip(network.skeleton, clip, captured) for clip in captured if clip.hurt],
+        "captured": [
+            _row_of_clip(network.skeleton, clip, captured) for clip in captured if clip.severity_by_link
+        ],
         "held_out_limps": compare_held_out(network, captured, splits, seconds, runtime),
         "second": second_injuries(network, links, seconds, runtime),
         **_limps_with_other_channel(network, links, seconds, runtime),
@@ -186,17 +187,17 @@ def _row_of_walk(
             **dict.fromkeys(EFFECTS),
             **dict.fromkeys(("called", "graded", "impaired", "named", "wrong_side")),
         }
-    row |= _rounded_values(effects(figure.profile, healthy.profile, side))
-    found = compare_walk(figure.walk, figure.frames, healthy.profile, WINDOW)
-    answers = [answer for _, answer in found.windows]  # of the linear recogniser, for each window
-    grades = [grade for _, grade in found.grades]  # of the graded recogniser, for each window
+    row |= _rounded_values(measure_effects(figure.profile, healthy.profile, side))
+    found = compare_walk(figure.walk, figure.frames, healthy.profile, WINDOW_SECONDS)
+    answers = [answer for _, answer in found.window_answers]  # of the linear recogniser, for each window
+    grades = [grade for _, grade in found.window_grades]  # of the graded recogniser, for each window
     wrong_side = SIDES[1 - SIDES.index(side)]
     row["called"] = " ".join(filter(None, (found.answer.label, found.answer.side)))
     row["graded"] = " ".join(filter(None, (found.grade.label, found.grade.side)))
-    row["impaired"] = _share([a.impaired for a in answers])
-    row["named"] = _share([g.impaired and g.side != wrong_side for g in grades])
+    row["impaired"] = _share([a.is_impaired for a in answers])
+    row["named"] = _share([g.is_impaired and g.side != wrong_side for g in grades])
     row["wrong_side"] = (
-        _share([g.impaired and g.side == wrong_side for g in grades]) if part.side is not None else None
+        _share([g.is_impaired and g.side == wrong_side for g in grades]) if part.side is not None else None
     )
     return row
 
@@ -244,9 +245,9 @@ def _row_of_clip(skeleton: Skeleton, clip: CapturedWalk, captured: Sequence[Capt
     side of the one with the highest severity counts as hurt.
     """
     healthy, whose = healthy_reference(clip, captured)
-    side = hurt_side(skeleton, max(clip.hurt, key=lambda link: clip.hurt[link]))
-    sizes = _rounded_values(effects(profile(clip.walk), healthy, side))
-    return {"clip": clip.clip, "hurt": dict(clip.hurt), "side": side, "healthy": whose, **sizes}
+    side = hurt_side(skeleton, max(clip.severity_by_link, key=lambda link: clip.severity_by_link[link]))
+    sizes = _rounded_values(measure_effects(profile_of_walk(clip.walk), healthy, side))
+    return {"clip": clip.clip, "hurt": dict(clip.severity_by_link), "side": side, "healthy": whose, **sizes}
 
 
 def limp_distance(walk: Profile, healthy: Profile, other: Profile, other_healthy: Profile) -> float:
@@ -256,7 +257,7 @@ def limp_distance(walk: Profile, healthy: Profile, other: Profile, other_healthy
     is the root mean square of the differences of all features of the limps. Each difference is divided by the
     standard deviation of its feature over people's walks.
     """
-    features_of_people = examples(people(), range(people().count))[0]
+    features_of_people = examples_of_people(read_people(), range(read_people().count))[0]
     spread = features_of_people.std(axis=0)
     a, b = (np.array(list(features(*pair).values())) for pair in ((walk, healthy), (other, other_healthy)))
     return float(np.sqrt(np.mean(((a - b) / spread) ** 2)))
@@ -277,21 +278,25 @@ def compare_held_out(
     character; None if either of them does not walk a whole cycle. `nearer`: whether the hurt character is
     nearer, as it should be; False without distances.
     """
-    limps = [clip for clip in captured if clip.hurt and splits.get(clip.clip) == "held_out"]
+    limps = [clip for clip in captured if clip.severity_by_link and splits.get(clip.clip) == "held_out"]
     if not limps:
         return []
     figures = walk_figures(
-        network, [{}, *(clip.hurt for clip in limps)], SPEEDS["walk"], "walk", seconds, runtime
+        network, [{}, *(clip.severity_by_link for clip in limps)], SPEEDS["walk"], "walk", seconds, runtime
     )
     healthy_figure = figures[0].profile
     out = []
     for clip, figure in zip(limps, figures[1:], strict=True):
         healthy, whose = healthy_reference(clip, captured)
-        row: dict[str, Any] = {"clip": clip.clip, "hurt_links": dict(clip.hurt), "compared_with": whose}
+        row: dict[str, Any] = {
+            "clip": clip.clip,
+            "hurt_links": dict(clip.severity_by_link),
+            "compared_with": whose,
+        }
         if healthy_figure is None or figure.profile is None:
             out.append({**row, "healthy": None, "hurt": None, "nearer": False})
             continue
-        walk_of_clip = profile(clip.walk)
+        walk_of_clip = profile_of_walk(clip.walk)
         from_healthy, from_hurt = (
             limp_distance(walk_of_clip, healthy, walk, healthy_figure)
             for walk in (healthy_figure, figure.profile)
@@ -355,8 +360,8 @@ def run(inputs: MeasureInputs, options: Options) -> Outcome:
         raise HobbleError(f"{inputs.weights}: this network file has no skeleton, so limps cannot be measured")
     sample = sample_of(inputs, options)
     # A network without severities has no limps, so no clips are read.
-    parts = clip_parts(inputs.clips, sample) if links_of(network) else ()
-    captured, hurt_seconds = captured_walks(parts, inputs.splits, links_of(network), network.skeleton)
+    parts = clip_parts(inputs.clips, sample) if injury_links(network) else ()
+    captured, hurt_seconds = captured_walks(parts, inputs.splits, injury_links(network), network.skeleton)
     result = measure_limps(
         network,
         captured,

@@ -15,8 +15,7 @@ from typing import cast
 
 import numpy as np
 
-from hobble.channels.injury.crowd_severities import links as links_of
-from hobble.channels.injury.crowd_severities import severities
+from hobble.channels.injury.crowd_severities import injury_links, severity_inputs
 from hobble.channels.injury.limp.captured_limps import HURT_VERSION
 from hobble.channels.injury.recognition.results import RecognisedWindows, Recognition
 from hobble.core.quat import Array
@@ -89,7 +88,7 @@ def measure_recognition(
     parts that people recognised in a published study.
     """
     not_measured: Recognition = {"configuration": configuration, "people": people, "applies": False}
-    if not links_of(network) or network.skeleton is None:
+    if not injury_links(network) or network.skeleton is None:
         return {**not_measured, "reason": NO_SEVERITIES}
     windows = [w for stretch in motion for w in walking_windows(stretch, network)]
     training = [w for w in windows if splits[w.clip] == "train"]
@@ -137,7 +136,7 @@ def walking_windows(stretch: Captured, network: Network) -> list[InjuryWindow]:
         walks_ahead = stretch.velocity[span, 1].mean() >= AHEAD * speed and speed >= LEAST_SPEED
         same_links = np.all(is_hurt[span] == is_hurt[first])
         if walk_share[span].mean() > 0.5 and walks_ahead and same_links:
-            names = [links_of(network)[i] for i in np.flatnonzero(is_hurt[first])]
+            names = [injury_links(network)[i] for i in np.flatnonzero(is_hurt[first])]
             values = _features(network.skeleton, stretch.local, stretch.contacts, stretch.root, span)
             severity = float(stretch.channels[INJURY][span].max())
             out.append(InjuryWindow(stretch.clip, " and ".join(names) or HEALTHY, severity, values, quarter))
@@ -157,7 +156,7 @@ def generated_windows(
     cases += [(HEALTHY, 0.0, v) for v in SPEEDS] if with_healthy else []
     injuries = [{} if name == HEALTHY else dict.fromkeys(name.split(" and "), s) for name, s, _ in cases]
     script = CrowdTarget(
-        WARM_UP + USED, ["walk"] * len(cases), severities(network, injuries), [v for *_, v in cases]
+        WARM_UP + USED, ["walk"] * len(cases), severity_inputs(network, injuries), [v for *_, v in cases]
     )
     walks = run_walks(network, [script], runtime)
     out = []
@@ -254,7 +253,9 @@ def _cross_validate(windows: Sequence[InjuryWindow], parts_of_class: PartsOfClas
         others = [w for w in windows if w.quarter != quarter]
         of_quarter = [w for w in windows if w.quarter == quarter]
         if of_quarter and len({w.hurt for w in others}) > 1:
-            named += learn(feature_table(others), [w.hurt for w in others]).names(feature_table(of_quarter))
+            named += learn(feature_table(others), [w.hurt for w in others]).likeliest_classes(
+                feature_table(of_quarter)
+            )
             judged += of_quarter
     return _count_answers(sorted({w.hurt for w in windows}), judged, named, parts_of_class)
 
@@ -263,7 +264,7 @@ def _judge_windows(
     classifier: Discriminant, windows: Sequence[InjuryWindow], parts_of_class: PartsOfClass
 ) -> RecognisedWindows:
     """How the classifier recognises windows."""
-    named = classifier.names(feature_table(windows)) if windows else []
+    named = classifier.likeliest_classes(feature_table(windows)) if windows else []
     return _count_answers(classifier.classes, windows, named, parts_of_class)
 
 

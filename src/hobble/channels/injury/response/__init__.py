@@ -20,7 +20,7 @@ class Options(SampleOptions):
 MEASURE = Measure(
     name="injury",
     package=__name__,
-    inputs=("weights", "clips", "summaries"),
+    inputs=("weights", "clips", "summaries"),  # the network, the clips' rows, summaries of these rows
     options=Options,
     runtime=tuple(Runtime.model_fields),
     cost=Cost(memory_each=14, seconds_each=0.2, minutes=60),

@@ -14,7 +14,7 @@ from itertools import product
 
 import numpy as np
 
-from hobble.channels.injury.crowd_severities import severities
+from hobble.channels.injury.crowd_severities import severity_inputs
 from hobble.channels.injury.response.results import Divided, IntoAJog, SecondInjury
 from hobble.channels.injury.response.sweep import WALK_IN
 from hobble.core.quat import Array
@@ -84,9 +84,9 @@ def second_injuries(
 
     def with_second_at(severity: float) -> dict[str, Array]:
         each = [{**({a: FIRST_SEVERITY} if a else {}), b: severity} for a, b in pairs]
-        return severities(network, each)
+        return severity_inputs(network, each)
 
-    healthy = severities(network, [{}] * len(pairs))
+    healthy = severity_inputs(network, [{}] * len(pairs))
     script = [CrowdTarget(_frame_count(WALK_IN, seconds), gait, healthy)]
     script += [CrowdTarget(_frame_count(1, seconds), gait, with_second_at(s)) for s in SECOND_SEVERITIES]
     walks = run(network, script, runtime)
@@ -154,7 +154,7 @@ def into_a_jog(network: Network, links: Sequence[str], seconds: float, runtime: 
     """
     # (link, severity) of each figure.
     figures: list[tuple[str | None, float]] = [(None, 0.0), *product(links, JOG_SEVERITIES)]
-    hurt = severities(network, [{link: s} if link else {} for link, s in figures])
+    hurt = severity_inputs(network, [{link: s} if link else {} for link, s in figures])
     frames = _frame_count(1, seconds)
     walk, jog = ["walk"] * len(figures), ["jog"] * len(figures)
     walks = run(
@@ -201,9 +201,9 @@ def divided_severities(
     The result has an entry for each divisor, link and severity; `Divided` explains its keys.
     """
     gait = ["walk"] * len(links)
-    script = [CrowdTarget(_frame_count(WALK_IN, seconds), gait, severities(network, [{}] * len(links)))]
+    script = [CrowdTarget(_frame_count(WALK_IN, seconds), gait, severity_inputs(network, [{}] * len(links)))]
     script += [
-        CrowdTarget(_frame_count(1, seconds), gait, severities(network, [{link: s} for link in links]))
+        CrowdTarget(_frame_count(1, seconds), gait, severity_inputs(network, [{link: s} for link in links]))
         for s in SEVERITIES_TO_DIVIDE
     ]
     out: list[Divided] = []

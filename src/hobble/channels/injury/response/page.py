@@ -67,16 +67,16 @@ def section(found: Json, material: ReportMaterial) -> PageSection:
 
     found: the content of injury.json. material: what the report is made from.
     """
-    parts = _parts(in_words(found, material), material.name) if found.get("applies") else []
+    parts = _parts(with_spoken_links(found, material), material.name) if found.get("applies") else []
     return PageSection("injury", parts, title="Injury response", at=20)
 
 
 def hints(found: Json, material: ReportMaterial) -> Iterator[Hint]:
     """Sentences about the response, for the top of the report. found, material: as for `section`."""
-    return placed(50, injury_hints(in_words(found, material)))
+    return placed(50, injury_hints(with_spoken_links(found, material)))
 
 
-def in_words(found: Json, material: ReportMaterial) -> dict[str, Any]:
+def with_spoken_links(found: Json, material: ReportMaterial) -> dict[str, Any]:
     """`found` with names such as "left thigh" in place of the labels of links.
 
     found: the JSON of a measurement, such as injury.json.

@@ -10,8 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from hobble.channels.injury.crowd_severities import hurt_links
-from hobble.channels.injury.crowd_severities import links as links_of
+from hobble.channels.injury.crowd_severities import injury_links, links_hurt_in_training
 from hobble.channels.injury.response import Options
 from hobble.channels.injury.response.cases import divided_severities, into_a_jog, second_injuries
 from hobble.channels.injury.response.results import InjuryResponse, LinkResponse, Summary, SweepRow
@@ -50,10 +49,10 @@ def injury_response(
     into_a_jog, divided: see the functions in `hobble.channels.injury.response.cases`. summary: means over the
     links in `trained`. summary_untrained: means over the other links.
     """
-    if not links_of(network):
+    if not injury_links(network):
         return {"configuration": configuration, "applies": False, "reason": NO_SEVERITIES}
-    links = list(links or links_of(network))
-    trained = [link for link in links if link in hurt_links(network)]
+    links = list(links or injury_links(network))
+    trained = [link for link in links if link in links_hurt_in_training(network)]
     rows, falling, responses = _sweeps(network, links, trained, motion, seconds, runtime)
     return {
         "configuration": configuration,
@@ -129,7 +128,7 @@ def largest_accelerations(
             counted: list[tuple[str | None, Any]] = [(None, in_gait)]
             counted += [
                 (link, in_gait & (clip.channels[INJURY][:, i] > 0))
-                for i, link in enumerate(links_of(network))
+                for i, link in enumerate(injury_links(network))
             ]
             for link, frames in counted:
                 if np.any(frames):

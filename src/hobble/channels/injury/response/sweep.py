@@ -14,7 +14,7 @@ from typing import cast
 
 import numpy as np
 
-from hobble.channels.injury.crowd_severities import severities
+from hobble.channels.injury.crowd_severities import severity_inputs
 from hobble.channels.injury.response.results import Response, SweepRow
 from hobble.core.skeleton import Skeleton
 from hobble.evaluation.crowd import FPS, CrowdTarget, Walks, run
@@ -150,7 +150,7 @@ def sweeps(
 
     def stretch(share: float, severity: float) -> CrowdTarget:
         """`share` times `seconds` in which the link of each figure has `severity`."""
-        hurt = severities(network, [{link: severity} for link in links] * len(gaits))
+        hurt = severity_inputs(network, [{link: severity} for link in links] * len(gaits))
         return CrowdTarget(max(4, round(share * seconds * FPS)), gait_of_figure, hurt)
 
     walks = run(network, [stretch(WALK_IN, 0), *(stretch(1, s) for s in STEPS)], runtime)

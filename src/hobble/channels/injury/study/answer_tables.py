@@ -23,7 +23,7 @@ ALL = "all"  # stands for the number or the kind of a film in a row for several 
 Rows = list[dict[str, Any]]  # the rows of a table: column -> value
 
 
-def tables(study: Study, people: Sequence[Sequence[FilmAnswer]]) -> dict[str, Rows]:
+def answer_rows_by_numeral(study: Study, people: Sequence[Sequence[FilmAnswer]]) -> dict[str, Rows]:
     """Numeral -> rows of the table with this numeral. The last table is for all films.
 
     people: the answers of each person. With more than thirteen films, the numerals continue as XVI+1, XVI+2
@@ -67,16 +67,16 @@ def summary_rows(study: Study, answers: Mapping[int, Sequence[FilmAnswer]]) -> R
     """
     rows = [
         {"film": str(film.number), "kind": film.kind, "parts": ", ".join(film.parts)}
-        | scores([(film, a) for a in answers[film.number]])
+        | score_answers([(film, a) for a in answers[film.number]])
         for film in study.films
     ]
     for kind in [*dict.fromkeys(film.kind for film in study.films), ALL]:
         of_kind = [(f, a) for f in study.films if kind in (f.kind, ALL) for a in answers[f.number]]
-        rows.append({"film": ALL, "kind": kind, "parts": ""} | scores(of_kind))
+        rows.append({"film": ALL, "kind": kind, "parts": ""} | score_answers(of_kind))
     return rows
 
 
-def scores(answers: Sequence[tuple[ShownFilm, FilmAnswer]]) -> dict[str, Any]:
+def score_answers(answers: Sequence[tuple[ShownFilm, FilmAnswer]]) -> dict[str, Any]:
     """How well people answered. answers: pairs of a film and one person's answer to it.
 
     Keys of the result. answers: number of answers. seen: share of the hurt parts that were ticked. wrong:
@@ -108,8 +108,8 @@ def write_tables(
 ) -> None:
     """Write table-III.csv and so on, and tables.md with all tables.
 
-    rows_by_numeral: numeral -> rows, from `tables`. published: the share of hurt parts that people named in
-    the study of Quentin Ferre (2019).
+    rows_by_numeral: numeral -> rows, from `answer_rows_by_numeral`. published: the share of hurt parts that
+    people named in the study of Quentin Ferre (2019).
     """
     folder = Path(folder)
     folder.mkdir(parents=True, exist_ok=True)

@@ -15,11 +15,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from hobble.channels.injury.crowd_severities import INJURY, hurt_links
-from hobble.channels.injury.crowd_severities import links as links_of
-from hobble.channels.injury.shown import OTHER_PARTS as PARTS_WITHOUT_SLIDER
-from hobble.channels.injury.shown import PARTS as PARTS_WITH_SLIDER
-from hobble.channels.injury.shown import links_between
+from hobble.channels.injury.crowd_severities import INJURY, injury_links, links_hurt_in_training
+from hobble.channels.injury.shown import PARTS_WITH_SLIDER, PARTS_WITHOUT_SLIDER, links_between
 from hobble.core.errors import HobbleError
 from hobble.core.quat import Array
 from hobble.models.network import Network
@@ -29,12 +26,12 @@ from hobble.runtime.options import Runtime
 FPS = 60  # frames a second of the motion
 SEVERITY = 10.0  # the highest severity, as in the films of Quentin Ferre (2019)
 SPEEDS = {"walk": 2.5, "jog": 6.0}  # gait -> target speed, cm a frame
-WARM_UP = 4.0  # seconds of walking before a film begins
-HEALTHY, HURT = 3.0, 7.0  # seconds of a film before and after the injury begins
+WARM_UP_SECONDS = 4.0  # of walking before a film begins
+HEALTHY_SECONDS, HURT_SECONDS = 3.0, 7.0  # of a film, before and after the injury begins
 # A film with a change of gait is this many seconds longer. The gait changes in the middle of the film.
-EXTRA_FOR_CHANGE = 5.0
+EXTRA_SECONDS_FOR_CHANGE = 5.0
 # The three kinds of films.
-ONE, SEVERAL, GAIT = "one part", "several parts", "change of gait"
+ONE_PART, SEVERAL_PARTS, CHANGE_OF_GAIT = "one part", "several parts", "change of gait"
 # Parts that people can tick in the questionnaire. They include parts that hurt in no film, such as the neck.
 SIDED = ("thigh", "shank", "foot", "upper arm", "forearm")
 PARTS = (*(f"{side} {part}" for part in SIDED for side in ("left", "right")), "lower back", "neck")
@@ -44,8 +41,8 @@ PARTS = (*(f"{side} {part}" for part in SIDED for side in ("left", "right")), "l
 class Film:
     """One film.
 
-    number: counted from 1; the tables of answers have this order. kind: ONE, SEVERAL or GAIT. parts: the
-    parts that hurt. gaits: target gaits at the beginning and at the end.
+    number: counted from 1; the tables of answers have this order. kind: ONE_PART, SEVERAL_PARTS or
+    CHANGE_OF_GAIT. parts: the parts that hurt. gaits: target gaits at the beginning and at the end.
     """
 
     number: int
@@ -56,23 +53,27 @@ class Film:
     @property
     def seconds(self) -> float:
         """Length of the film, in seconds."""
-        return HEALTHY + HURT + (EXTRA_FOR_CHANGE if self.gaits[0] != self.gaits[1] else 0.0)
+        return (
+            HEALTHY_SECONDS
+            + HURT_SECONDS
+            + (EXTRA_SECONDS_FOR_CHANGE if self.gaits[0] != self.gaits[1] else 0.0)
+        )
 
 
 FILMS = (
-    Film(1, ONE, ("left thigh",)),
-    Film(2, ONE, ("right thigh",)),
-    Film(3, ONE, ("left shank",)),
-    Film(4, ONE, ("left forearm",)),
-    Film(5, SEVERAL, ("left thigh", "left shank")),
-    Film(6, SEVERAL, ("right thigh", "left shank")),
-    Film(7, SEVERAL, ("left shank", "left forearm")),
-    Film(8, SEVERAL, ("right thigh", "right forearm")),
-    Film(9, SEVERAL, ("right thigh", "left shank", "left forearm")),
-    Film(10, GAIT, ("left shank",), ("walk", "jog")),
-    Film(11, GAIT, ("right thigh",), ("walk", "jog")),
-    Film(12, GAIT, ("left forearm",), ("walk", "jog")),
-    Film(13, GAIT, ("left shank", "left forearm"), ("jog", "walk")),
+    Film(1, ONE_PART, ("left thigh",)),
+    Film(2, ONE_PART, ("right thigh",)),
+    Film(3, ONE_PART, ("left shank",)),
+    Film(4, ONE_PART, ("left forearm",)),
+    Film(5, SEVERAL_PARTS, ("left thigh", "left shank")),
+    Film(6, SEVERAL_PARTS, ("right thigh", "left shank")),
+    Film(7, SEVERAL_PARTS, ("left shank", "left forearm")),
+    Film(8, SEVERAL_PARTS, ("right thigh", "right forearm")),
+    Film(9, SEVERAL_PARTS, ("right thigh", "left shank", "left forearm")),
+    Film(10, CHANGE_OF_GAIT, ("left shank",), ("walk", "jog")),
+    Film(11, CHANGE_OF_GAIT, ("right thigh",), ("walk", "jog")),
+    Film(12, CHANGE_OF_GAIT, ("left forearm",), ("walk", "jog")),
+    Film(13, CHANGE_OF_GAIT, ("left shank", "left forearm"), ("jog", "walk")),
 )
 
 
@@ -80,14 +81,14 @@ FILMS = (
 class FilmMotion:
     """The motion of a film: F frames at 60 Hz of a character with J joints, in world coordinates.
 
-    positions: (F, J, 3) cm. rotations: (F, J, 4) quaternions. from_healthy: distance, cm, between the joints
+    positions: (F, J, 3) cm. rotations: (F, J, 4) quaternions. cm_from_healthy: distance between the joints
     and the same joints of a character that stays healthy; the mean over all joints and over all frames after
     the injury begins.
     """
 
     positions: Array
     rotations: Array
-    from_healthy: float
+    cm_from_healthy: float
 
 
 def without_side(part: str) -> str:
@@ -103,7 +104,7 @@ def part_links(network: Network, parts: Sequence[str]) -> list[str]:
     uppermost link is taken. Raises HobbleError if the network has no injury channel, or if the skeleton has
     no such part.
     """
-    links, trained = links_of(network), hurt_links(network)
+    links, trained = injury_links(network), links_hurt_in_training(network)
     if network.skeleton is None or not links:
         raise HobbleError("this network has no injury channel. Use a configuration with `channels: [injury]`")
     # Part -> roles of the joints at its two ends.
@@ -125,7 +126,7 @@ def film_motion(network: Network, film: Film, runtime: Runtime) -> FilmMotion:
     severities = dict.fromkeys(part_links(network, film.parts), SEVERITY)
     positions, rotations = _walk(network, film, severities, runtime)
     healthy_positions, _ = _walk(network, film, {}, runtime)
-    first_hurt = round(HEALTHY * FPS)  # the first frame in which the parts hurt
+    first_hurt = round(HEALTHY_SECONDS * FPS)  # the first frame in which the parts hurt
     distances = np.linalg.norm(_local(positions) - _local(healthy_positions), axis=-1)
     return FilmMotion(positions, rotations, float(distances[first_hurt:].mean()))
 
@@ -135,8 +136,8 @@ def hurts_and_gait(film: Film, frame: int) -> tuple[bool, str]:
 
     frame: 0 is the first frame of the film; frames of the warm-up are negative.
     """
-    hurts = frame >= HEALTHY * FPS
-    changed = frame >= (HEALTHY + HURT) * FPS - EXTRA_FOR_CHANGE * FPS / 2
+    hurts = frame >= HEALTHY_SECONDS * FPS
+    changed = frame >= (HEALTHY_SECONDS + HURT_SECONDS) * FPS - EXTRA_SECONDS_FOR_CHANGE * FPS / 2
     return hurts, film.gaits[1] if changed else film.gaits[0]
 
 
@@ -148,7 +149,7 @@ def _walk(
     severities: link -> its severity after the injury has begun.
     """
     animation = ProceduralAnimation(network, **dict(runtime))
-    warm_up_frames, film_frames = round(WARM_UP * FPS), round(film.seconds * FPS)
+    warm_up_frames, film_frames = round(WARM_UP_SECONDS * FPS), round(film.seconds * FPS)
     positions, rotations = [], []
     for frame in range(-warm_up_frames, film_frames):
         hurts, gait = hurts_and_gait(film, frame)

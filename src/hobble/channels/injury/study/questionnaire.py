@@ -18,7 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 from PIL import Image
 
-from hobble.channels.injury.crowd_severities import hurt_links
+from hobble.channels.injury.crowd_severities import links_hurt_in_training
 from hobble.channels.injury.study.films import (
     FILMS,
     FPS,
@@ -113,13 +113,13 @@ def _solution_of(network: Network, film: Film, motion: FilmMotion) -> dict[str, 
         "parts": list(film.parts),
         "gaits": list(dict.fromkeys(film.gaits)),
         "links": links,
-        "untrained": [link for link in links if link not in hurt_links(network)],
+        "untrained": [link for link in links if link not in links_hurt_in_training(network)],
         "seconds": film.seconds,
-        "from_healthy_cm": round(motion.from_healthy, 2),
+        "from_healthy_cm": round(motion.cm_from_healthy, 2),
     }
 
 
-def doubts(solution: dict[str, Any]) -> list[str]:
+def list_doubts(solution: dict[str, Any]) -> list[str]:
     """Warnings: films in which nobody can see the injury, and hurt links that were never hurt in training.
 
     solution: the content of films.json.
