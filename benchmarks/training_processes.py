@@ -24,7 +24,7 @@ from hobble.core.processors import processor
 # isort: split
 import torch
 
-from hobble.models.pfnn.trainable import initialise
+from hobble.models.pfnn.trainable import untrained_network
 from hobble.training.optimiser import Adam
 from hobble.training.options import Training
 from hobble.training.processes import ALONE, Processes, join_processes
@@ -41,7 +41,7 @@ LINKS = {
 
 def measured(processes: Processes, sizes: tuple[int, ...], batch: int) -> tuple[float, float]:
     """Seconds of a step, and of the sum in it."""
-    network = initialise(sizes, POINTS, 1)
+    network = untrained_network(sizes, POINTS, 1)
     adam = Adam(network, 1e-4, 0.9, 0.999, 0.01)
     step = step_for(network, Training(batch=batch))
     step.seed(1)
@@ -111,7 +111,7 @@ def main() -> None:
         for count, (whole, total) in best.items():
             numbers = f"{batch / whole:,.0f} | {best[counts[0]][0] / whole:.2f}"
             print(f"| {batch} | {count} | {numbers} | {1e3 * whole:.2f} | {1e3 * total:.2f} |")
-    on_paper(4 * (len(initialise(sizes, POINTS, 1).flat) + 1))
+    on_paper(4 * (len(untrained_network(sizes, POINTS, 1).flat) + 1))
 
 
 def on_paper(sent: int) -> None:

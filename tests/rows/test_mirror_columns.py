@@ -94,14 +94,14 @@ def test_standardised_rows_are_mirrored_as_raw_ones_are(holden31):
     rng = np.random.default_rng(2)
     y, mean, std = rng.normal(0, 9, (4, layout.y_size)), rng.normal(0, 9, layout.y_size), rng.random(311)
     std = std + std[raw.source]
-    found = raw.standardised(mean, std)((y - mean) / std)
+    found = raw.for_standardised_rows(mean, std)((y - mean) / std)
     np.testing.assert_allclose(found, (raw(y) - mean) / std, atol=1e-9)
 
 
 def test_columns_that_are_scaled_apart_are_refused():
     swap = ColumnMirror(np.array([1, 0]), np.ones(2), np.zeros(2))
     with pytest.raises(HobbleError, match=r"columns 0 and 1 .* are 1 and 2\. .*mirror: true"):
-        swap.standardised(np.zeros(2), np.array([1.0, 2.0]))
+        swap.for_standardised_rows(np.zeros(2), np.array([1.0, 2.0]))
 
 
 def test_a_skeleton_that_does_not_pair_its_sides_is_refused(holden31):

@@ -14,7 +14,7 @@ from hobble.database.reader import Database
 from hobble.measures.rollouts.roll_outs import RollOutInputs
 from hobble.models.pfnn.fused import FusedPfnnStep
 from hobble.models.pfnn.step import PfnnStep
-from hobble.models.pfnn.trainable import initialise
+from hobble.models.pfnn.trainable import untrained_network
 from hobble.training.batches import HostRows
 from hobble.training.rollout import RollOut
 from hobble.training.train import train
@@ -149,7 +149,7 @@ def test_training_uses_the_roll_outs(
 
 @pytest.mark.parametrize("kind", [PfnnStep, FusedPfnnStep])
 def test_the_training_step_keeps_its_errors_for_the_roll_out(kind: type[PfnnStep]) -> None:
-    network = initialise((6, 5, 4), 4, 1)
+    network = untrained_network((6, 5, 4), 4, 1)
     generator = torch.Generator().manual_seed(1)
     x, y = (torch.randn(7, n, generator=generator) for n in (6, 4))
     p = torch.rand(7, generator=generator)

@@ -49,8 +49,8 @@ def data(tmp_path: Path) -> Database:
 def apart(network: Trainable, data: Database) -> float:
     """How far the output for mirrored inputs is from the mirrored output, in standard deviations."""
     skeleton, s = Skeleton.from_dict(data.skeleton), data.statistics
-    x_mirror = mirror_of_x(data.layout, skeleton).standardised(s.x_mean, s.x_std)
-    y_mirror = mirror_of_y(data.layout, skeleton).standardised(s.y_mean, s.y_std)
+    x_mirror = mirror_of_x(data.layout, skeleton).for_standardised_rows(s.x_mean, s.x_std)
+    y_mirror = mirror_of_y(data.layout, skeleton).for_standardised_rows(s.y_mean, s.y_std)
     assert max(np.abs(x_mirror.shift).max(), np.abs(y_mirror.shift).max()) > 0.05, (
         "the means are not symmetric"
     )

@@ -16,7 +16,7 @@ from hobble.core import files
 from hobble.core.errors import HobbleError, InputError
 from hobble.database.merge import write_database
 from hobble.database.reader import Block, Database
-from hobble.models.pfnn.trainable import initialise
+from hobble.models.pfnn.trainable import untrained_network
 from hobble.training import checkpoint, start, train
 from hobble.training.batches import HostRows
 from hobble.training.checkpoint import State
@@ -146,7 +146,7 @@ def test_without_held_out_clips_the_errors_are_left_empty(
 def test_a_sample_of_all_held_out_rows_has_their_error(
     data: Database, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    network = initialise((data.layout.x_size, 8, data.layout.y_size), 4, 1)
+    network = untrained_network((data.layout.x_size, 8, data.layout.y_size), 4, 1)
     held_out = HeldOut(data, torch.device("cpu"), 0)
     assert sum(len(part[0]) for part in held_out.sample) == 70
     assert held_out.errors(network) == held_out.errors_on_every_row(network)
@@ -239,7 +239,7 @@ def test_bfloat16_is_chosen_where_a_device_has_it(
         return including_emulation or major >= 8
 
     monkeypatch.setattr(torch.cuda, "is_bf16_supported", supported)
-    network = initialise((4, 3, 2), 4, 1).to("meta")
+    network = untrained_network((4, 3, 2), 4, 1).to("meta")
     monkeypatch.setattr(type(network), "step", lambda self, dropout, half: half)
     assert start.step_for(network, training | {"batch": 256}) is half
 

@@ -19,7 +19,7 @@ from hobble.core.errors import InputError
 from hobble.core.files import load_npz
 from hobble.core.skeleton import Skeleton
 from hobble.core.untrusted import read_yaml
-from hobble.models import DEFAULT, MODELS, checks, model
+from hobble.models import DEFAULT_KIND, NETWORK_KINDS, checks, model_of_kind
 from hobble.models.network import TERRAIN_SIDE, Network
 from hobble.models.training_facts import TrainingFacts
 from hobble.rows.layout import GAITS, RowLayout
@@ -50,8 +50,8 @@ def load_network(path: str | Path, skeleton: Skeleton | str | Path | None = None
     if path.is_dir():
         if (path / "weights.npz").exists():
             return load_network(path / "weights.npz", skeleton)
-        for kind in MODELS:
-            if (arrays := model(kind).read_folder(path)) is not None:
+        for kind in NETWORK_KINDS:
+            if (arrays := model_of_kind(kind).read_folder(path)) is not None:
                 return network_from_arrays(path, arrays, skeleton)
         raise InputError(
             path,
@@ -70,9 +70,9 @@ def network_from_arrays(
     skeleton: for a network whose `meta` has none.
     """
     meta = _read_meta(path, arrays)
-    kind = meta.get("kind", DEFAULT)
-    if kind not in MODELS:
-        raise InputError(path, f"is a network of kind {kind!a:.40}; known kinds: {', '.join(MODELS)}")
+    kind = meta.get("kind", DEFAULT_KIND)
+    if kind not in NETWORK_KINDS:
+        raise InputError(path, f"is a network of kind {kind!a:.40}; known kinds: {', '.join(NETWORK_KINDS)}")
     statistics = checks.statistics(path, arrays)
     layout = _read_layout(path, meta, len(statistics["x_mean"]), len(statistics["y_mean"]), skeleton)
     if meta.get("skeleton"):
@@ -81,7 +81,7 @@ def network_from_arrays(
         raise InputError(
             path, f"has {layout.joints} joints, but skeleton {skeleton.name} has {len(skeleton.joints)}"
         )
-    common: dict[str, Any] = {
+    shared_fields: dict[str, Any] = {
         **statistics,
         "layout": layout,
         "skeleton": skeleton,
@@ -93,8 +93,8 @@ def network_from_arrays(
         "meta": meta,
         "training_facts": TrainingFacts.read(path, arrays, layout.x_size, layout.y_size),
     }
-    common["limits"] = _read_limits(path, meta, common["channels"], len(common["gaits"]))
-    network = model(kind).read(path, arrays, common)
+    shared_fields["limits"] = _read_limits(path, meta, shared_fields["channels"], len(shared_fields["gaits"]))
+    network = model_of_kind(kind).read(path, arrays, shared_fields)
     _check_prediction(path, network)
     return network
 

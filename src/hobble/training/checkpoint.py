@@ -66,7 +66,7 @@ def pack(state: State) -> dict[str, np.ndarray]:
         "samples": np.array(state.samples),
         "seconds": np.array(state.seconds),
         "history": np.array(state.history, float),
-        "network": np.array(state.network.described),
+        "network": np.array(state.network.description),
         "recipe": np.array(state.recipe),
     }
 
@@ -78,10 +78,10 @@ def unpack(data: Mapping[str, np.ndarray], state: State, path: Path) -> None:
     """
     try:
         described = str(data["network"])
-        if described != state.network.described:
+        if described != state.network.description:
             raise InputError(
                 path,
-                f"holds a network of {described:.200}, not of {state.network.described}",
+                f"holds a network of {described:.200}, not of {state.network.description}",
                 fix="Training can resume only with a network of the same shape: change the section network, "
                 "or remove training.continues.",
             )

@@ -9,8 +9,8 @@ from typing import Any
 
 from hobble.core.files import save_npz
 from hobble.database.reader import Database
-from hobble.models import model
-from hobble.models.model import Built
+from hobble.models import model_of_kind
+from hobble.models.model import BuiltModel
 from hobble.models.network import TERRAIN_SIDE
 from hobble.models.options import Options
 from hobble.training.build_network import build_and_save
@@ -49,7 +49,7 @@ def run(
     clip's rows in order, needed only for a network that is built, not trained.
     """
     data = Database.open(database, training.memory_mb).with_phase_weight(training.phase_weight)
-    if isinstance(model(network.kind), Built):
+    if isinstance(model_of_kind(network.kind), BuiltModel):
         build_and_save(
             data,
             clips or {},

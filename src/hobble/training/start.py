@@ -19,8 +19,8 @@ from hobble.core.processors import count_cores, multiplies_bfloat16
 from hobble.core.skeleton import Skeleton
 from hobble.database.manifest import FILE
 from hobble.database.reader import Database
-from hobble.models import model
-from hobble.models.model import Trained
+from hobble.models import model_of_kind
+from hobble.models.model import TrainedModel
 from hobble.models.options import Options
 from hobble.models.thread_trial import threads_for
 from hobble.models.trainable import Trainable, TrainingStep
@@ -201,9 +201,9 @@ def new_state(
 ) -> State:
     """The state before the first section: a new network for the database's rows, and a new optimiser."""
     skeleton = Skeleton.from_dict(database.skeleton)
-    kind = model(network.kind)
-    assert isinstance(kind, Trained), "networks of this kind are built from rows without a training"
-    new_network = kind.trainable(network, database.layout, skeleton, training.seed)
+    kind = model_of_kind(network.kind)
+    assert isinstance(kind, TrainedModel), "networks of this kind are built from rows without a training"
+    new_network = kind.untrained_network(network, database.layout, skeleton, training.seed)
     new_network = new_network.to(device(training.device, processes))
     return State(new_network, Adam(new_network, **training.model_dump(include=set(ADAM_KEYS))))
 

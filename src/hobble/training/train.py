@@ -68,8 +68,8 @@ def train(
             "`training.keep: best` and training.patience need the held-out error, but no clip is held out. "
             "List some clips under held_out in the data set."
         )
-    if training.symmetric and network.why_asymmetric:
-        raise HobbleError(f"training.symmetric: {network.why_asymmetric}. Write `symmetric: false`.")
+    if training.symmetric and network.why_not_symmetric:
+        raise HobbleError(f"training.symmetric: {network.why_not_symmetric}. Write `symmetric: false`.")
     samples, sections = database.samples(TRAIN), training.sections
     if samples < sections:
         raise HobbleError(

@@ -63,7 +63,7 @@ def meta(
             "channels": {c.name: c.columns(skeleton) for c in channels},
             "limits": database.manifest.limits,
             "units": "; ".join([UNITS, *(f"{c.value} 0 to {c.highest:g}" for c in channels)]),
-            **network.about,
+            **network.file_metadata,
             **about_training,
         }
     )  # keys are not sorted, because the skeleton's joints must keep the order of the columns

@@ -10,7 +10,7 @@ import pytest
 
 from hobble.core.errors import InputError
 from hobble.core.skeleton import Skeleton
-from hobble.models import model
+from hobble.models import model_of_kind
 from hobble.models.matching.build import find_runs, on_mean_ground
 from hobble.models.matching.options import MatchingOptions
 from hobble.models.matching.search_features import feature_groups
@@ -90,7 +90,7 @@ def test_a_group_has_its_configured_weight(holden31: Skeleton, tmp_path: Path) -
 
 def test_rows_of_another_layout_are_refused(holden31: Skeleton, tmp_path: Path) -> None:
     save_clip_rows(tmp_path / "one.npz", clip(holden31, 0))
-    kind, layout = model("matching"), RowLayout(len(holden31.joints), window=30)
+    kind, layout = model_of_kind("matching"), RowLayout(len(holden31.joints), window=30)
     with pytest.raises(InputError, match=r"one\.npz"):
         kind.build(MatchingOptions(), [tmp_path / "one.npz"], layout, holden31)
     with pytest.raises(InputError, match="no frame"):

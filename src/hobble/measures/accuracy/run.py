@@ -124,10 +124,10 @@ def relative_and_distance(truth: Array, predicted: Array) -> Array:
 def predict_function(network: Network) -> Predict:
     """The runtime's exact prediction, which takes two thirds of the time of `Network.predict`.
 
-    For a network that remembers the earlier frames of a character (`Network.memory`), the result is
+    For a network that remembers the earlier frames of a character (`Network.memory_size`), the result is
     `Network.predict`, which needs no memory. Here each frame is predicted on its own.
     """
-    if network.memory:
+    if network.memory_size:
         return network.predict
     predictor = network.predictor(storage="float32")
 

@@ -109,7 +109,7 @@ class Crowd:
         shape = (len(self.first), layout.joints, 3)
         self.joint_position = self.x[self.first][:, layout.x_joint_position].reshape(shape).astype(float)
         self.joint_velocity = np.zeros(shape)
-        self.memory = np.zeros((len(self.first), predictor.network.memory))
+        self.memory = np.zeros((len(self.first), predictor.network.memory_size))
 
     def frames(self) -> Iterator[tuple[np.ndarray, Array, dict[int, np.ndarray]]]:
         """Advance all roll-outs by one frame at a time, and yield the n roll-outs that are not yet over.
@@ -170,7 +170,7 @@ class Crowd:
         y = np.empty((len(row), self.predictor.network.layout.y_size), np.float32)
         for first in range(0, len(row), BATCH):
             part = slice(first, first + BATCH)
-            memory = {"memory": self.memory[alive[part]]} if self.predictor.network.memory else {}
+            memory = {"memory": self.memory[alive[part]]} if self.predictor.network.memory_size else {}
             y[part] = self.predictor.predict(row[part], self.phase[alive[part]], **memory)
             if memory:
                 self.memory[alive[part]] = memory["memory"]

@@ -196,7 +196,7 @@ def measure_roll_outs(
                 clip_errors[part.clip] = clip_errors.get(part.clip, RollOutErrors()) + weighed
                 if part.excerpt is not None:
                     excerpts[length][part.excerpt] = errors.to_dict()["position_error_cm"]
-            log.info("%s: %s", part.excerpt or part.clip, by_length[lengths[-1]].to_dict(network.phase))
+            log.info("%s: %s", part.excerpt or part.clip, by_length[lengths[-1]].to_dict(network.uses_phase))
     result: RollOutsFound = {
         "configuration": configuration,
         "joints": len(joints),
@@ -204,10 +204,10 @@ def measure_roll_outs(
         "lengths": [
             {
                 "length": length,
-                "train": total[length]["train"].to_dict(network.phase),
-                "held_out": total[length]["held_out"].to_dict(network.phase),
+                "train": total[length]["train"].to_dict(network.uses_phase),
+                "held_out": total[length]["held_out"].to_dict(network.uses_phase),
                 "clips": [
-                    {"clip": name, "split": splits[name], **errors.to_dict(network.phase)}
+                    {"clip": name, "split": splits[name], **errors.to_dict(network.uses_phase)}
                     for name, errors in of_clip[length].items()
                 ],
             }
