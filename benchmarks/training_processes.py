@@ -46,7 +46,7 @@ def measured(processes: Processes, sizes: tuple[int, ...], batch: int) -> tuple[
     step = step_for(network, Training(batch=batch))
     step.seed(1)
     update = update_for(step, adam, batch, processes)
-    own = len(processes.places(batch))
+    own = len(processes.own_places(batch))
     x, y, p = torch.randn(own, sizes[0]), torch.randn(own, sizes[-1]), torch.rand(own)
     sent = torch.zeros(len(network.flat) + 1)
 
@@ -57,13 +57,13 @@ def measured(processes: Processes, sizes: tuple[int, ...], batch: int) -> tuple[
             for _ in range(max(1, 512 // batch)):
                 work()  # type: ignore[operator]
                 calls += 1
-            more.fill_(float(processes.first and time.perf_counter() - start < SECONDS))
+            more.fill_(float(processes.is_first and time.perf_counter() - start < SECONDS))
             processes.sum(more)
         return (time.perf_counter() - start) / calls
 
     seconds(lambda: update(x.clone(), y, p, 1.0, batch))  # compile, and choose algorithms
     whole = seconds(lambda: update(x.clone(), y, p, 1.0, batch))
-    return whole, seconds(lambda: processes.sum(sent)) if not processes.alone else 0.0
+    return whole, seconds(lambda: processes.sum(sent)) if not processes.is_alone else 0.0
 
 
 def work(sizes: tuple[int, ...], batches: list[int]) -> None:
@@ -74,7 +74,7 @@ def work(sizes: tuple[int, ...], batches: list[int]) -> None:
         return
     with join_processes(False) as processes:
         found = [measured(processes, sizes, batch) for batch in batches]
-    if processes.first:
+    if processes.is_first:
         print(json.dumps(found))
 
 

@@ -13,8 +13,8 @@ from hobble.core.skeleton import Skeleton
 from hobble.labels.label import label_clip, mirror_labels
 from hobble.labels.options import LabelOptions
 from hobble.motion.mirror import mirror_clip
-from hobble.rows.build_rows import clip_rows, cycle_frames
-from hobble.rows.clip_rows import ClipRows, Pairs, expanded
+from hobble.rows.build_rows import build_clip_rows, cycle_frames
+from hobble.rows.clip_rows import ClipRows, Pairs, pair_batches
 from hobble.rows.layout import RowLayout
 from hobble.rows.mirror_columns import ColumnMirror, mirror_of_x, mirror_of_y
 from hobble.synthetic.generate_clip import walk_from_plan
@@ -41,19 +41,19 @@ def walked(holden31: Skeleton) -> tuple[ClipRows, ClipRows]:
     rng = np.random.default_rng(3)
     channels = {"injury": rng.uniform(0, 10, (FRAMES, 30)), "mood": rng.random((FRAMES, 5))}
     terrain = ground(*cycle_frames(labels.cycles))
-    own = clip_rows("walk", clip, vars(labels), channels, terrain, **OPTIONS)
+    own = build_clip_rows("walk", clip, vars(labels), channels, terrain, **OPTIONS)
     image = mirror_clip(clip, "image")
     other, _ = mirror_labels(labels, report, image)
     turned = {name: channel(name).mirror(values, holden31) for name, values in channels.items()}
     there = ground(*cycle_frames(other.cycles))
     left, centre, right = np.split(there["heights"], 3, axis=1)
     there["heights"] = np.concatenate([right, centre, left], axis=1)
-    return own, clip_rows("image", image, vars(other), turned, there, **OPTIONS)
+    return own, build_clip_rows("image", image, vars(other), turned, there, **OPTIONS)
 
 
 def in_both(own: ClipRows, other: ClipRows) -> tuple[Pairs, Pairs, np.ndarray, np.ndarray]:
     """The pairs of both, and the rows in each of the frames that both have (their cycles differ)."""
-    (a,), (b,) = expanded(own, own.layout), expanded(other, other.layout)
+    (a,), (b,) = pair_batches(own, own.layout), pair_batches(other, other.layout)
     frames, i, j = np.intersect1d(own.frame, other.frame, return_indices=True)
     assert len(frames) > 200
     return a, b, i, j

@@ -21,7 +21,7 @@ def test_the_compiled_adam_equals_the_plain_one(dtype: torch.dtype) -> None:
         adams[1].steps += 1
         adams[1].step_with_torch(gradients, torch.tensor(adams[1].step_factors(share)))
     assert torch.allclose(networks[0].flat, networks[1].flat, rtol=1e-4, atol=1e-6)
-    assert torch.allclose(adams[0].first, adams[1].first, rtol=1e-4, atol=1e-6)
+    assert torch.allclose(adams[0].first_moment, adams[1].first_moment, rtol=1e-4, atol=1e-6)
 
 
 def test_only_the_l1_term_moves_weights_that_have_no_gradient() -> None:

@@ -79,7 +79,7 @@ def test_new_weights_are_symmetric_and_as_large_as_before(
 ) -> None:
     made = new_state(data, network, training).network
     spread = [float(layer[:, :, :-1].std()) for layer in made.layers]
-    Symmetry(made, data).start()
+    Symmetry(made, data).make_new_network_symmetric()
     assert apart(made, data) < 1e-5
     assert [float(layer[:, :, :-1].std()) for layer in made.layers] == pytest.approx(spread, rel=0.05)
 

@@ -69,7 +69,7 @@ def test_a_captured_cuda_update_equals_the_plain_one() -> None:
     """Also with a shorter batch among others, and rates that change."""
     plain, captured = updates()
     assert torch.equal(plain.adam.network.flat, captured.adam.network.flat)
-    assert torch.count_nonzero(captured.adam.second) == 0
+    assert torch.count_nonzero(captured.adam.second_moment) == 0
     assert captured.adam.steps == 0
     generator = torch.Generator().manual_seed(1)
     losses = []

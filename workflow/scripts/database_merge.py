@@ -32,5 +32,5 @@ with job(snakemake) as log:
             seed=options.seed,
         )
     part = manifest.bytes / manifest.original_bytes
-    rows = {split: manifest.rows(split) for split in manifest.chunks}
+    rows = {split: manifest.row_count(split) for split in manifest.chunks}
     log.info("%s rows, %d bytes: %.1f%% of the original layout", rows, manifest.bytes, 100 * part)

@@ -43,8 +43,9 @@ class FinishedNetwork(Protocol):
 class Model(ABC):
     """One kind of network. Its folder in hobble.models has an instance `MODEL`.
 
-    `MODEL` is a `TrainedModel` or a `BuiltModel`. The methods import pydantic, PyTorch and numba only when they need them. So a game that runs a network
-    needs no PyTorch, and checking a configuration needs neither PyTorch nor numba.
+    `MODEL` is a `TrainedModel` or a `BuiltModel`. The methods import pydantic, PyTorch and numba only when
+    they need them. So a game that runs a network needs no PyTorch, and checking a configuration needs neither
+    PyTorch nor numba.
     """
 
     modes: ClassVar[tuple[str, ...]] = ("exact",)  # the modes of its networks, see `Network.modes`

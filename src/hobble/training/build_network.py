@@ -21,7 +21,7 @@ from hobble.models.model import BuiltModel, FinishedNetwork
 from hobble.models.network import Network
 from hobble.models.options import Options
 from hobble.training.batches import TRAIN
-from hobble.training.held_out import HeldOut
+from hobble.training.held_out import HeldOutErrors
 from hobble.training.history import duration, write_history
 from hobble.training.weights import write_weights
 
@@ -53,7 +53,7 @@ def build_and_save(
     about_training = {"passes": 1, "samples": rows, "steps": 0, "terrain_side": terrain_side}
     write_weights(weights, built, database, configuration, about_training)
     blocks = database.layout.blocks("y")
-    errors = HeldOut(database, torch.device("cpu"), 0).errors_on_every_row(
+    errors = HeldOutErrors(database, torch.device("cpu"), 0).errors_on_every_row(
         StandardisedNetwork(load_network(weights))
     )
     log.info("error on every held-out row: %.4f", errors[0])

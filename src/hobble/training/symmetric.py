@@ -37,7 +37,7 @@ class Symmetry:
             LayerSymmetry(layer, mirror) for layer, mirror in zip(network.layers, mirrors, strict=True)
         ]
 
-    def start(self) -> None:
+    def make_new_network_symmetric(self) -> None:
         """Make the random weights of a new network symmetric.
 
         Each weight becomes the mean of two independent random weights, which halves the variance. So the

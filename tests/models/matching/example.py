@@ -13,7 +13,7 @@ from hobble.models import model_of_kind
 from hobble.models.load import network_from_arrays
 from hobble.models.matching.network import Matching
 from hobble.rows.clip_rows import ClipRows, save_clip_rows
-from hobble.rows.compose import body_columns
+from hobble.rows.compose import body_column_count
 from hobble.rows.layout import RowLayout
 
 FRAMES = (70, 90)  # of each clip
@@ -47,7 +47,7 @@ def clip(skeleton: Skeleton, number: int, seed: int = 1) -> ClipRows:
         clip=f"clip-{number}",
         layout=layout,
         skeleton=skeleton.to_dict(),
-        x=smooth(rng, count, body_columns(layout), 10.0)[row],
+        x=smooth(rng, count, body_column_count(layout), 10.0)[row],
         y=y[row],
         p=(0.02 * row) % 1.0,
         channels={"injury": injury[row]},

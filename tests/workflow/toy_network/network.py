@@ -23,7 +23,7 @@ class Toy(Network):
 
     @classmethod
     def read(cls, path, arrays, shared_fields):
-        w, b = checks.numbers(path, arrays, "W0", 2), checks.numbers(path, arrays, "b0", 1)
+        w, b = checks.read_numbers(path, arrays, "W0", 2), checks.read_numbers(path, arrays, "b0", 1)
         if w.shape != (len(shared_fields["y_mean"]), len(shared_fields["x_mean"])) or b.shape != w.shape[:1]:
             raise InputError(path, f"W0 {w.shape} and b0 {b.shape} do not fit")
         return cls(weights=w, biases=b, **shared_fields)

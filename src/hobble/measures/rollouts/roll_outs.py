@@ -16,7 +16,7 @@ from hobble.character.rule import joint_place, movement_share, phase_change
 from hobble.core.quat import Array
 from hobble.evaluation.captured import rotate_by_yaw
 from hobble.models.network import Predictor
-from hobble.rows.clip_rows import ClipRows, pairs
+from hobble.rows.clip_rows import ClipRows, compose_pairs
 from hobble.rows.layout import GAITS, RowLayout
 
 BATCH = 256  # poses predicted at once; the inputs of more poses do not fit into the processor's cache
@@ -46,7 +46,7 @@ class RollOutInputs:
 def inputs_of_clip(rows: ClipRows, chosen: np.ndarray, layout: RowLayout) -> RollOutInputs:
     """The inputs and targets in some rows of a clip. chosen: (F,) their indices. layout: the network's."""
     fit = rows.first_fit[chosen]
-    x, y, *_ = pairs(rows, layout, chosen, fit)
+    x, y, *_ = compose_pairs(rows, layout, chosen, fit)
     gait = x[:, layout.x_gait].reshape(len(x), len(GAITS), layout.samples)
     stand = gait[:, GAITS.index("stand"), layout.samples // 2]
     return RollOutInputs(

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from hobble.core.errors import InputError
 from hobble.core.quat import Array
-from hobble.models.checks import weights_and_biases
+from hobble.models.checks import read_weights_and_biases
 from hobble.models.mann.forward import forward
 from hobble.models.mann.predictor import MannPredictor
 from hobble.models.network import Export, Network, standardise_inputs
@@ -54,11 +54,13 @@ class Mann(Network):
         """
         inputs, outputs = len(shared_fields["x_mean"]), len(shared_fields["y_mean"])
         columns = _read_gate_columns(path, arrays, inputs)
-        weights, biases = weights_and_biases(path, arrays, ("W", "b"), 3, inputs, outputs)
+        weights, biases = read_weights_and_biases(path, arrays, ("W", "b"), 3, inputs, outputs)
         experts = len(weights[0])
         if not 2 <= experts <= MOST_EXPERTS:
             raise InputError(path, f"has {experts} experts; 2 to {MOST_EXPERTS} are allowed")
-        gate_weights, gate_biases = weights_and_biases(path, arrays, ("V", "d"), 2, len(columns), experts)
+        gate_weights, gate_biases = read_weights_and_biases(
+            path, arrays, ("V", "d"), 2, len(columns), experts
+        )
         return cls(
             weights=weights,
             biases=biases,

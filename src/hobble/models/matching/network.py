@@ -67,10 +67,10 @@ class Matching(Network):
             len(shared_fields["x_mean"]),
             len(shared_fields["y_mean"]),
         )
-        frames = checks.numbers(path, arrays, "frames", 2, checks.LARGEST_MEAN)
-        features = checks.numbers(path, arrays, "features", 2, checks.LARGEST_MEAN)
-        phases = checks.numbers(path, arrays, "phase", 1, 1.0)
-        weights = checks.numbers(path, arrays, "feature_weights", 1, MOST_WEIGHT)
+        frames = checks.read_numbers(path, arrays, "frames", 2, checks.LARGEST_MEAN)
+        features = checks.read_numbers(path, arrays, "features", 2, checks.LARGEST_MEAN)
+        phases = checks.read_numbers(path, arrays, "phase", 1, 1.0)
+        weights = checks.read_numbers(path, arrays, "feature_weights", 1, MOST_WEIGHT)
         columns = _whole_numbers(path, arrays, "columns", inputs - 1)
         remaining = _whole_numbers(path, arrays, "remaining", MOST_ROWS)
         rows, n = len(frames), len(columns)
@@ -98,8 +98,8 @@ class Matching(Network):
             remaining=remaining,
             columns=columns,
             weights=weights,
-            every=checks.whole_number(path, "every", meta.get("every"), 1, MOST_FRAMES),
-            halflife=checks.number_in_range(path, "halflife", meta.get("halflife"), MOST_FRAMES),
+            every=checks.require_whole_number(path, "every", meta.get("every"), 1, MOST_FRAMES),
+            halflife=checks.require_number_in_range(path, "halflife", meta.get("halflife"), MOST_FRAMES),
             **shared_fields,
         )
 

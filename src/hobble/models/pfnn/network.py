@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from hobble.core.errors import InputError
 from hobble.core.quat import Array
-from hobble.models.checks import weights_and_biases
+from hobble.models.checks import read_weights_and_biases
 from hobble.models.network import Export, Network, standardise_inputs
 from hobble.models.packing import pack_layer
 from hobble.models.pfnn.forward import forward, rounded_to_bins
@@ -40,7 +40,7 @@ class Pfnn(Network):
     def read(cls, path: str | Path, arrays: Mapping[str, Any], shared_fields: Mapping[str, Any]) -> Pfnn:
         """As in `Model`. arrays: W0 (K, out, in), b0 (K, out), W1, b1, ..."""
         inputs, outputs = len(shared_fields["x_mean"]), len(shared_fields["y_mean"])
-        weights, biases = weights_and_biases(path, arrays, ("W", "b"), 3, inputs, outputs)
+        weights, biases = read_weights_and_biases(path, arrays, ("W", "b"), 3, inputs, outputs)
         points = len(weights[0])
         if not FEWEST_POINTS <= points <= MOST_POINTS:
             raise InputError(

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from hobble.core.compiled import njit
 from hobble.core.quat import Array
-from hobble.models.checks import weights_and_biases
+from hobble.models.checks import read_weights_and_biases
 from hobble.models.network import Export, Network, standardise_inputs
 from hobble.models.packing import pack_layer
 from hobble.models.stack import Stack, StackPredictor, blend_layers
@@ -40,7 +40,7 @@ class Plain(Network):
     def read(cls, path: str | Path, arrays: Mapping[str, Any], shared_fields: Mapping[str, Any]) -> Plain:
         """As in `Model`. arrays: W0 (out, in), b0 (out,), W1, b1, ..."""
         inputs, outputs = len(shared_fields["x_mean"]) + PHASE_COLUMNS, len(shared_fields["y_mean"])
-        weights, biases = weights_and_biases(path, arrays, ("W", "b"), 2, inputs, outputs)
+        weights, biases = read_weights_and_biases(path, arrays, ("W", "b"), 2, inputs, outputs)
         return cls(weights=weights, biases=biases, **shared_fields)
 
     @property
