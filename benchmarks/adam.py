@@ -18,7 +18,7 @@ from products import least
 
 from hobble.core.processors import multiplies_bfloat16, processor_name
 from hobble.models.pfnn.fused import FusedPfnnStep
-from hobble.models.pfnn.trainable import initialise
+from hobble.models.pfnn.trainable import untrained_network
 from hobble.training.optimiser import Adam, l1_slopes
 from hobble.training.start import use_threads
 
@@ -44,7 +44,7 @@ class Fused:
 
 def compare(rows: int, sizes: tuple[int, ...], half: bool) -> None:
     """Check that both move the weights alike, then print a row for each optimiser."""
-    network = initialise(sizes, POINTS, 1)
+    network = untrained_network(sizes, POINTS, 1)
     step, other = FusedPfnnStep(network, 1 - KEEP, half), Fused(network)
     ours = Adam(network, RATE, *BETAS, L1)
     batch = torch.randn(rows, sizes[0]), torch.randn(rows, sizes[-1]), torch.rand(rows)

@@ -80,9 +80,9 @@ def main() -> None:
         for name, (us, ratio) in frame_ratios(networks, count, turns).items():
             print(f"{name}: {count} characters, {us:,.0f} us a frame, {ratio:.2f} times", flush=True)
     for name, network in networks.items():
-        size, number = paths[name].stat().st_size / 1e6, np.dtype(network.storage).itemsize
-        kept = 1e-6 * number * network.stored_numbers(network.mode(None))
-        print(f"{name}: {size:.1f} MB file, {kept:.1f} MB in memory as {network.storage}", flush=True)
+        size, number = paths[name].stat().st_size / 1e6, np.dtype(network.default_storage).itemsize
+        kept = 1e-6 * number * network.stored_numbers(network.resolve_mode(None))
+        print(f"{name}: {size:.1f} MB file, {kept:.1f} MB in memory as {network.default_storage}", flush=True)
         if options.laps:
             lap = responsivity(
                 network, configuration="", runtime=Runtime(), laps=options.laps, lap_seconds=400, modes=()

@@ -147,7 +147,7 @@ def task_section(folder: Path, memory_mb: str) -> None:
     resource.setrlimit(resource.RLIMIT_AS, (status("VmSize") + limit, resource.RLIM_INFINITY))
     db = Database.open(folder / "db", int(memory_mb))
     rows = sum(len(block.p) for block in db.blocks("train", 0, 0, 10, 1, db.block_rows(BATCH)))
-    assert rows == db.section_samples("train", 0, 10)
+    assert rows == db.section_sample_count("train", 0, 10)
     print(rows, status("VmHWM") >> 20, before >> 20)
 
 
@@ -170,7 +170,7 @@ def task_pieces(folder: Path, argument: str) -> None:
 
 def reading(db: Database, folder: Path, args: argparse.Namespace) -> None:
     """Rows a second from memory, from disk and by simpler methods, and the memory under hard limits."""
-    window = db.window("train", db.block_rows(BATCH))
+    window = db.chunks_per_window("train", db.block_rows(BATCH))
     chunks = db.manifest.chunks["train"]
     print(
         f"window: {window} of {len(chunks)} chunks of {chunks[0].rows} rows, blocks of {db.block_rows(BATCH)}"
@@ -178,7 +178,7 @@ def reading(db: Database, folder: Path, args: argparse.Namespace) -> None:
     columns = db.layout.x_size + db.layout.y_size + 1
     expanded = folder / "expanded.bin"
     size = min(args.size_mb, 4 * args.memory_mb) << 20
-    write_expanded(db, expanded, min(db.samples("train"), size // (4 * columns)))
+    write_expanded(db, expanded, min(db.sample_count("train"), size // (4 * columns)))
     limit = args.memory_mb + PROGRAM_MB
     piece = (args.memory_mb << 20) // (2 * 16 * 4 * columns)
     (memory,) = child("database", folder, str(1 << 20))
@@ -218,8 +218,8 @@ def training(folder: Path, memory_mb: int, rounds: int) -> None:
     device = state.network.flat.device
     update = update_for(step_for(state.network, options), state.adam, options.batch)
     rows = disk.block_rows(options.batch)
-    stretch = WINDOWS * disk.window("train", rows) * disk.manifest.chunks["train"][0].rows
-    stretch = min(stretch, disk.section_samples("train", 0, 10))
+    stretch = WINDOWS * disk.chunks_per_window("train", rows) * disk.manifest.chunks["train"][0].rows
+    stretch = min(stretch, disk.section_sample_count("train", 0, 10))
 
     def turn(db: Database, section: int) -> tuple[float, float]:
         """Samples a second over one stretch, by the clock and by the processor time of all threads."""

@@ -33,12 +33,12 @@ from torch import Tensor
 from training import L1, PART, RATE, Batch, seconds
 
 from hobble.core.processors import multiplies_bfloat16, processor_name
-from hobble.models import model
+from hobble.models import model_of_kind
 from hobble.models.load import network_from_arrays
 from hobble.models.mann.forward import GATE_INPUTS
 from hobble.models.mann.fused import FusedMannStep
 from hobble.models.mann.step import MannStep
-from hobble.models.mann.trainable import initialise, with_one
+from hobble.models.mann.trainable import untrained_network, with_one
 from hobble.models.products import product
 from hobble.rows.layout import RowLayout
 from hobble.training.optimiser import Adam
@@ -54,7 +54,7 @@ def dropped(x: Tensor) -> Tensor:
 
 def fresh(sizes: tuple[int, ...]):
     """A network of `sizes` with a gate of the published size, on the first columns."""
-    return initialise(sizes, (GATE_INPUTS, 32, 32, EXPERTS), tuple(range(GATE_INPUTS)), 1)
+    return untrained_network(sizes, (GATE_INPUTS, 32, 32, EXPERTS), tuple(range(GATE_INPUTS)), 1)
 
 
 def shares(gate: list[Tensor], x: Tensor) -> Tensor:
@@ -168,12 +168,17 @@ def predictions() -> None:
     rng = np.random.default_rng(1)
     predictors = {}
     for kind in ("pfnn", "plain", "mann"):
-        options = model(kind).options()()
-        trainable = model(kind).trainable(options, layout, skeleton, 1)
+        options = model_of_kind(kind).options_class()()
+        trainable = model_of_kind(kind).untrained_network(options, layout, skeleton, 1)
         arrays = dict(trainable.arrays())
         for name, size in (("X", layout.x_size), ("Y", layout.y_size)):
             arrays |= {f"{name}mean": np.zeros(size, np.float32), f"{name}std": np.ones(size, np.float32)}
-        meta = {"kind": kind, "layout": layout.to_dict(), "skeleton": skeleton.to_dict(), **trainable.about}
+        meta = {
+            "kind": kind,
+            "layout": layout.to_dict(),
+            "skeleton": skeleton.to_dict(),
+            **trainable.file_metadata,
+        }
         network = network_from_arrays(kind, arrays | {"meta": np.array(json.dumps(meta))})
         for storage in ("float32", "int16"):
             predictors[kind, storage] = network.predictor(storage=storage)

@@ -35,7 +35,7 @@ from hobble.models.load import load_network
 from hobble.models.pfnn.options import PfnnOptions
 from hobble.runtime.options import Runtime
 from hobble.runtime.waypoints import TRACK, Waypoint
-from hobble.training.held_out import HeldOut
+from hobble.training.held_out import HeldOutErrors
 from hobble.training.train import train
 from hobble.training.weights import write_weights
 
@@ -63,7 +63,7 @@ def measured(
     lap = responsivity(
         character, configuration="", runtime=Runtime(), laps=1, lap_seconds=400, modes=(), track=track
     )
-    whole = HeldOut(database, torch.device("cpu"), 0).errors_on_every_row(state.network)[0]
+    whole = HeldOutErrors(database, torch.device("cpu"), 0).errors_on_every_row(state.network)[0]
     strayed = " ".join(f"{entry['held_out']['position_error_cm']:5.2f}" for entry in rolled["lengths"])
     laps = f"{lap['waypoints_reached']}/{lap['waypoints']} {lap['laps'][0]['seconds']:4.0f}"
     laps += f" {lap['path_overshoot_cm']:5.0f} {lap['largest_turn_degrees']:4.0f}"

@@ -67,13 +67,15 @@ class Mapped:
 
     def blocks(self, section: int, seed: int, block_rows: int, window: int) -> Iterator[Block]:
         """A section of the first pass, like `Database.blocks` with windows of this many chunks."""
-        visits, rows = self.db.manifest.visits, self.db.rows("train")
+        visits, rows = self.db.manifest.visits, self.db.row_count("train")
         parts = chain.from_iterable(
             self.parts((seed, 0, layer), start, stop, window)
             for layer, start, stop in order.layer_parts(rows, visits, section, SECTIONS)
         )
         return read_ahead(
-            self.db._compose_blocks(parts, self.db.section_samples("train", section, SECTIONS), block_rows)
+            self.db._compose_blocks(
+                parts, self.db.section_sample_count("train", section, SECTIONS), block_rows
+            )
         )
 
     def parts(self, of: tuple[int, int, int], start: int, stop: int, window: int) -> Iterator[tuple]:
@@ -108,7 +110,7 @@ def task_same(folder: Path, memory_mb: str) -> None:
     db = Database.open(folder / "db", int(memory_mb))
     mapped = Mapped(db, folder / "tables")
     rows, every = db.block_rows(BATCH), len(mapped.chunk_rows)
-    for width in (db.window("train", rows), every):
+    for width in (db.chunks_per_window("train", rows), every):
         pairs = zip(
             db.blocks("train", 0, 3, SECTIONS, 1, rows, window=width),
             mapped.blocks(3, 1, rows, width),
@@ -124,7 +126,7 @@ def rows_of(folder: Path, kind: str, memory_mb: int) -> Iterator[int]:
     db = Database.open(folder / "db", memory_mb)
     rows = db.block_rows(BATCH)
     mapped = None if kind == "reader" else Mapped(db, folder / "tables")
-    width = len(db.manifest.chunks["train"]) if kind == "anywhere" else db.window("train", rows)
+    width = len(db.manifest.chunks["train"]) if kind == "anywhere" else db.chunks_per_window("train", rows)
     for section in range(1_000_000):
         number = section % SECTIONS
         if mapped is None:

@@ -54,7 +54,7 @@ def main() -> None:
     made = Manifest.load(arguments.folder / "database/plain")
     splits = {clip["clip"]: clip["split"] for clip in made.clips}
     clips = {name: arguments.folder / f"database/clips/{name}.npz" for name in splits}
-    frames = f"{made.rows('train'):,} frames to learn from, {made.rows('held_out'):,} held out"
+    frames = f"{made.row_count('train'):,} frames to learn from, {made.row_count('held_out'):,} held out"
     print(f"{frames}, {arguments.passes} passes")
     print("on disk    share of the original's bytes   seed   held-out error    cm a joint   to float32")
     errors: dict[tuple[str, int], float] = {}

@@ -27,7 +27,7 @@ from torch import Tensor
 from hobble.core.processors import processor_name
 from hobble.models import products
 from hobble.models.pfnn.fused import FusedPfnnStep
-from hobble.models.pfnn.trainable import initialise
+from hobble.models.pfnn.trainable import untrained_network
 from hobble.training.start import use_threads
 
 POINTS = 4
@@ -73,7 +73,7 @@ def chosen(a: Tensor, b: Tensor) -> str:
 
 def steps(rows: int, sizes: tuple[int, ...], half: bool) -> dict[str, float]:
     """Seconds of a step with one way for all products, and with the chosen ones."""
-    network = initialise(sizes, POINTS, 1)
+    network = untrained_network(sizes, POINTS, 1)
     step = FusedPfnnStep(network, 0.03, half)
     batch = torch.randn(rows, sizes[0]), torch.randn(rows, sizes[-1]), torch.rand(rows)
 

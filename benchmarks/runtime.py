@@ -109,7 +109,7 @@ def predictions(network: Pfnn) -> None:
             predictor = PfnnPredictor(network, mode, storage)
             predictor.standardise(x, z)
             looked_up = {"constant": 1, "linear": 2, "cubic": 4}[mode]
-            size = network.parameters * np.dtype(storage).itemsize  # of one point
+            size = network.parameter_count * np.dtype(storage).itemsize  # of one point
             for cold in (False, True):
                 copies = CACHES // (size * predictor.points) + 1 if cold else 1
                 many = [PfnnPredictor(network, mode, storage) for _ in range(copies)]
@@ -152,7 +152,7 @@ def crowds(network: Pfnn) -> None:
             ours.append(timed(lambda _, x=x, p=phase: predictor.predict(x, p), 1, process_time)[0])
             theirs.append(timed(lambda _, fed=fed: session.run(None, fed), 1, process_time)[0])
         a, b = np.median(ours), np.median(theirs)
-        speed = 2e-3 * network.parameters * network.control_points * count / a
+        speed = 2e-3 * network.parameter_count * network.control_points * count / a
         print(f"{count:<14}{a:9.0f}{b:13.0f}{b / a:7.2f}{speed:9.1f}{a * 60e-6:17.2f}")
 
 

@@ -30,7 +30,7 @@ import torch
 from hobble.config.load_configuration import Catalogue
 from hobble.database.reader import Database
 from hobble.training.checkpoint import State
-from hobble.training.held_out import HeldOut
+from hobble.training.held_out import HeldOutErrors
 from hobble.training.train import train
 
 ROOT = Path(__file__).resolve().parents[1]
@@ -74,7 +74,7 @@ def trained(name: str, database: Path, threads: int) -> Curve:
             data, network=network, training=training, checkpoints=Path(folder), threads=threads
         )
     log.removeHandler(clock)
-    whole = HeldOut(data, torch.device("cpu"), 0).errors_on_every_row(state.network)[0]
+    whole = HeldOutErrors(data, torch.device("cpu"), 0).errors_on_every_row(state.network)[0]
     wall, error = ([row[column] for row in state.history] for column in (3, 5))
     print(
         f"{name:12} {state.samples:11,} samples, {state.adam.steps:9,} steps, {wall[-1]:7.1f} s "

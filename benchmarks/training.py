@@ -31,7 +31,7 @@ from torch import Tensor
 from hobble.core.processors import multiplies_bfloat16, processor_name
 from hobble.models.pfnn.fused import FusedPfnnStep
 from hobble.models.pfnn.step import PfnnStep
-from hobble.models.pfnn.trainable import coefficients, initialise
+from hobble.models.pfnn.trainable import coefficients, untrained_network
 from hobble.models.products import product
 from hobble.training.optimiser import Adam
 from hobble.training.start import use_threads
@@ -62,7 +62,7 @@ def blended(layers: list[Tensor], x: Tensor, c: Tensor) -> Tensor:
 
 
 def by_autograd(forward: Callable, part: int, sizes: tuple[int, ...]) -> Callable[[Batch], None]:
-    layers = [layer.clone().requires_grad_() for layer in initialise(sizes, POINTS, 1).layers]
+    layers = [layer.clone().requires_grad_() for layer in untrained_network(sizes, POINTS, 1).layers]
     adam = torch.optim.Adam(layers, lr=RATE)
 
     def step(batch: Batch) -> None:
@@ -78,7 +78,7 @@ def by_autograd(forward: Callable, part: int, sizes: tuple[int, ...]) -> Callabl
 
 
 def by_hand(kind: type[PfnnStep], half: bool, sizes: tuple[int, ...]) -> Callable[[Batch], None]:
-    network = initialise(sizes, POINTS, 1)
+    network = untrained_network(sizes, POINTS, 1)
     adam, step = Adam(network, RATE, 0.9, 0.999, L1), kind(network, 1 - KEEP, half)
 
     def go(batch: Batch) -> None:

@@ -29,7 +29,7 @@ from hobble.config.sections import Training
 from hobble.database.merge import write_database
 from hobble.database.reader import Database
 from hobble.models.pfnn.options import PfnnOptions
-from hobble.models.pfnn.trainable import initialise
+from hobble.models.pfnn.trainable import untrained_network
 from hobble.training.batches import LossWatch
 from hobble.training.device_rows import DeviceRows
 from hobble.training.optimiser import Adam
@@ -98,7 +98,7 @@ def main() -> None:
             training = Training(batch=size, precision=precision)
             found = []
             for way in (update_for, lambda step, adam, _: Update(step, adam)):
-                made = initialise(sizes, POINTS, 1).to(device)
+                made = untrained_network(sizes, POINTS, 1).to(device)
                 step, adam = step_for(made, training), Adam(made, RATE, 0.9, 0.999, L1)
                 found.append(speed(samples(rows, size, way(step, adam, size)), options.seconds, device))
             batch = tuple(torch.zeros(size, *tail, device=device) for tail in ((sizes[0],), (sizes[-1],), ()))

@@ -37,7 +37,7 @@ def child(database: Path, configuration: str) -> None:
 
     model = Catalogue(ROOT / "config").configuration(configuration)
     data = Database.open(database, model.training.memory_mb)
-    sections = max(1, data.samples("train") // SAMPLES)
+    sections = max(1, data.sample_count("train") // SAMPLES)
     training = model.training.model_copy(update={"passes": 1, "sections": sections})
     before = peak_mb()
 

@@ -24,7 +24,7 @@ from hobble.core.processors import processor_name
 # isort: split
 import torch
 
-from hobble.models.pfnn.trainable import initialise
+from hobble.models.pfnn.trainable import untrained_network
 from hobble.training.optimiser import Adam
 from hobble.training.options import Training
 from hobble.training.processes import ALONE, Processes, join_processes
@@ -41,12 +41,12 @@ LINKS = {
 
 def measured(processes: Processes, sizes: tuple[int, ...], batch: int) -> tuple[float, float]:
     """Seconds of a step, and of the sum in it."""
-    network = initialise(sizes, POINTS, 1)
+    network = untrained_network(sizes, POINTS, 1)
     adam = Adam(network, 1e-4, 0.9, 0.999, 0.01)
     step = step_for(network, Training(batch=batch))
     step.seed(1)
     update = update_for(step, adam, batch, processes)
-    own = len(processes.places(batch))
+    own = len(processes.own_places(batch))
     x, y, p = torch.randn(own, sizes[0]), torch.randn(own, sizes[-1]), torch.rand(own)
     sent = torch.zeros(len(network.flat) + 1)
 
@@ -57,13 +57,13 @@ def measured(processes: Processes, sizes: tuple[int, ...], batch: int) -> tuple[
             for _ in range(max(1, 512 // batch)):
                 work()  # type: ignore[operator]
                 calls += 1
-            more.fill_(float(processes.first and time.perf_counter() - start < SECONDS))
+            more.fill_(float(processes.is_first and time.perf_counter() - start < SECONDS))
             processes.sum(more)
         return (time.perf_counter() - start) / calls
 
     seconds(lambda: update(x.clone(), y, p, 1.0, batch))  # compile, and choose algorithms
     whole = seconds(lambda: update(x.clone(), y, p, 1.0, batch))
-    return whole, seconds(lambda: processes.sum(sent)) if not processes.alone else 0.0
+    return whole, seconds(lambda: processes.sum(sent)) if not processes.is_alone else 0.0
 
 
 def work(sizes: tuple[int, ...], batches: list[int]) -> None:
@@ -74,7 +74,7 @@ def work(sizes: tuple[int, ...], batches: list[int]) -> None:
         return
     with join_processes(False) as processes:
         found = [measured(processes, sizes, batch) for batch in batches]
-    if processes.first:
+    if processes.is_first:
         print(json.dumps(found))
 
 
@@ -111,7 +111,7 @@ def main() -> None:
         for count, (whole, total) in best.items():
             numbers = f"{batch / whole:,.0f} | {best[counts[0]][0] / whole:.2f}"
             print(f"| {batch} | {count} | {numbers} | {1e3 * whole:.2f} | {1e3 * total:.2f} |")
-    on_paper(4 * (len(initialise(sizes, POINTS, 1).flat) + 1))
+    on_paper(4 * (len(untrained_network(sizes, POINTS, 1).flat) + 1))
 
 
 def on_paper(sent: int) -> None:

@@ -9,30 +9,30 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from hobble.core.errors import HobbleError
-from hobble.database.precision import narrow, widen
+from hobble.database.precision import to_floats, to_stored_type
 
 
 @given(st.lists(st.floats(-(2.0**99), 2.0**99, width=32), min_size=1, max_size=40))
 def test_bfloat16_rounding_equals_torchs(values):
     array = np.array(values, np.float32)
     expected = torch.from_numpy(array).to(torch.bfloat16)
-    stored = narrow(array, "bfloat16")
+    stored = to_stored_type(array, "bfloat16")
     np.testing.assert_array_equal(stored.view(np.int16), expected.view(torch.int16).numpy())
-    np.testing.assert_array_equal(widen(stored), expected.float().numpy())
+    np.testing.assert_array_equal(to_floats(stored), expected.float().numpy())
 
 
 def test_ties_round_to_even():
     halfway = np.array([1 + 2**-8, 1 + 3 * 2**-8], np.float32)
-    np.testing.assert_array_equal(widen(narrow(halfway, "bfloat16")), [1.0, 1 + 2**-6])
+    np.testing.assert_array_equal(to_floats(to_stored_type(halfway, "bfloat16")), [1.0, 1 + 2**-6])
 
 
 @pytest.mark.parametrize("precision", ["float32", "float16"])
 def test_rounding_to_other_types_equals_numpys(precision):
     values = np.random.default_rng(0).normal(size=99)
-    np.testing.assert_array_equal(widen(narrow(values, precision)), values.astype(precision))
+    np.testing.assert_array_equal(to_floats(to_stored_type(values, precision)), values.astype(precision))
 
 
 def test_values_too_large_for_float16_are_refused():
     with pytest.raises(HobbleError, match=r"7e\+04 does not fit float16.*bfloat16"):
-        narrow(np.array([1.0, -7e4]), "float16")
-    assert widen(narrow(np.array([-7e4]), "bfloat16"))[0] == pytest.approx(-7e4, rel=2**-8)
+        to_stored_type(np.array([1.0, -7e4]), "float16")
+    assert to_floats(to_stored_type(np.array([-7e4]), "bfloat16"))[0] == pytest.approx(-7e4, rel=2**-8)

@@ -16,7 +16,7 @@ from hypothesis import strategies as st
 from hobble.core.errors import HobbleError, InputError
 from hobble.database.merge import write_database
 from hobble.database.reader import Block, Database, read_ahead
-from hobble.rows.clip_rows import expanded
+from hobble.rows.clip_rows import pair_batches
 
 MEMORY = 4096  # MB: everything at once
 DISK = 0  # MB: one chunk at a time
@@ -66,14 +66,14 @@ def test_a_pass_has_every_standardised_pair_and_flat_rows_ten_times(path, source
     s = db.statistics
     for split, names in (("train", ("flat", "mixed", "rocky")), ("held_out", ("kept",))):
         got = whole_pass(db, split, 0, 10)
-        assert len(got.p) == db.samples(split) == 10 * db.rows(split)
+        assert len(got.p) == db.sample_count(split) == 10 * db.row_count(split)
         for name in names:
             rows = sources[name]
             mine = got.clip == db.clips.index(name)
             found: dict[int, list[int]] = {}
             for i in np.flatnonzero(mine):
                 found.setdefault(int(got.frame[i]), []).append(i)
-            for pairs in expanded(rows, rows.layout):
+            for pairs in pair_batches(rows, rows.layout):
                 x, y = (pairs.x - s.x_mean) / s.x_std, (pairs.y - s.y_mean) / s.y_std
                 for k, row in enumerate(pairs.row):
                     at = found[int(rows.frame[row])]
@@ -124,7 +124,7 @@ def test_rows_are_mixed_like_independent_draws(rows_of, tmp_path):
     splits = dict.fromkeys(clips, "train")
     write_database(tmp_path / "db", clips, splits, channels=[], joint_weight=0.1, chunk_bytes=200_000)
     db = Database.open(tmp_path / "db", 1)
-    assert 1 <= db.window("train", 32) <= len(db.manifest.chunks["train"]) // 20
+    assert 1 <= db.chunks_per_window("train", 32) <= len(db.manifest.chunks["train"]) // 20
     feature = np.concatenate([b.clip for s in range(3) for b in db.blocks("train", 0, s, 10, 1, 32)])
     feature = (feature - 19.5) / np.sqrt((40**2 - 1) / 12)
     n = len(feature)
@@ -140,7 +140,7 @@ def test_severities_are_columns_only_if_they_are_inputs(path, sources, tmp_path)
     assert healthy.layout.x_size == injured.layout.x_size - 2
     block = next(iter(healthy.blocks("train", 0, 0, 10, 1)))
     assert block.x.shape[1] == healthy.layout.x_size == len(healthy.statistics.x_mean)
-    assert healthy.rows("held_out") == healthy.samples("held_out") == 0
+    assert healthy.row_count("held_out") == healthy.sample_count("held_out") == 0
     assert list(healthy.blocks("held_out", 0, 0, 10, 1)) == []
 
 

@@ -146,7 +146,7 @@ def test_rows_of_all_shards_are_mixed_like_independent_draws(rows_of, tmp_path):
     groups = [list(clips)[:4], list(clips)[4:15], list(clips)[15:18], list(clips)[18:]]  # neighbours
     path = in_shards(tmp_path, clips, dict.fromkeys(clips, "train"), groups, channels=[], chunk_bytes=15_000)
     db = Database.open(path, 1)
-    window, chunks = db.window("train", 32), len(db.manifest.chunks["train"])
+    window, chunks = db.chunks_per_window("train", 32), len(db.manifest.chunks["train"])
     assert 2 * len(groups) <= window <= chunks // 15
     feature = np.concatenate([b.clip for s in range(3) for b in db.blocks("train", 0, s, 10, 1, 32)])
     feature = (feature - 19.5) / np.sqrt((40**2 - 1) / 12)
@@ -214,8 +214,8 @@ def test_of_hurt_versions_only_every_nth_row_is_used_and_each_version_starts_wit
     found = set(zip(block.clip.tolist(), block.frame.tolist(), strict=True))
     assert found == expected
     db = Database.open(tmp_path / "db", MEMORY)
-    assert db.rows("train") == 70 + 3 * 35
-    assert db.rows("held_out") == 140  # measured in full
+    assert db.row_count("train") == 70 + 3 * 35
+    assert db.row_count("held_out") == 140  # measured in full
 
 
 def test_a_row_that_is_used_keeps_its_values_and_its_ground(rows_of):
@@ -240,4 +240,4 @@ def test_speed_limits_are_learnt_from_all_rows(clips, tmp_path):
     whole = write_database(tmp_path / "whole", clips, SPLITS, sources=SOURCES, **OPTIONS)
     part = write_database(tmp_path / "part", clips, SPLITS, sources=SOURCES, every=3, **OPTIONS)
     assert part.limits == whole.limits
-    assert part.rows("train") < whole.rows("train")
+    assert part.row_count("train") < whole.row_count("train")

@@ -7,10 +7,10 @@ from itertools import accumulate, chain, pairwise, product
 import numpy as np
 import pytest
 
-from hobble.database.sharing import PassSharing, SampleRange
+from hobble.database.sharing import SampleRange, SectionSharing
 
 
-def read(sharing: PassSharing) -> list[list[int]]:
+def read(sharing: SectionSharing) -> list[list[int]]:
     """The numbers of the samples in the section that a process reads for each batch."""
     pieces = []
     for stretch in sharing.own_stretches():
@@ -28,19 +28,22 @@ def read(sharing: PassSharing) -> list[list[int]]:
 @pytest.mark.parametrize(("batch", "most"), [(1, 1), (6, 4), (32, 5)])
 def test_a_batch_depends_only_on_the_number_of_ranges(total, batch, most):
     for stretches, processes in product(range(1, most + 1), repeat=2):
-        alone = read(PassSharing.of(total, batch, stretches))
+        alone = read(SectionSharing.for_process(total, batch, stretches))
         assert sorted(chain(*alone)) == list(range(total))
         assert [len(b) for b in alone] == [min(batch, total - at) for at in range(0, total, batch)]
-        shared = [read(PassSharing.of(total, batch, stretches, rank, processes)) for rank in range(processes)]
+        shared = [
+            read(SectionSharing.for_process(total, batch, stretches, rank, processes))
+            for rank in range(processes)
+        ]
         assert [list(chain(*parts)) for parts in zip(*shared, strict=True)] == alone
 
 
 def test_with_one_range_samples_keep_the_order_of_the_section():
-    assert list(chain(*read(PassSharing.of(95, 32)))) == list(range(95))
+    assert list(chain(*read(SectionSharing.for_process(95, 32)))) == list(range(95))
 
 
 def test_with_as_many_ranges_as_processes_each_reads_its_own_range():
-    found = [PassSharing.of(1000, 32, 4, rank, 4).own_stretches() for rank in range(4)]
+    found = [SectionSharing.for_process(1000, 32, 4, rank, 4).own_stretches() for rank in range(4)]
     assert all(len(stretches) == 1 for stretches in found)
     assert [s.high - s.low for (s,) in found] == [s.share for (s,) in found] == [8] * 4
     edges = [(s.start, s.stop) for (s,) in found]

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from hobble.database.merge import write_database
-from hobble.database.sizes import RELEASED_FLAT, RELEASED_FRAMES, sizes
+from hobble.database.sizes import RELEASED_FLAT, RELEASED_FRAMES, database_sizes
 from hobble.rows.layout import RowLayout
 
 PUBLISHED = {31: 7.12e9, 191: 10.4e9}  # bytes; the larger figure's with a quarter of the frames
@@ -35,7 +35,7 @@ def test_the_size_of_the_released_data_follows_from_its_share_of_flat_rows(rows_
     clips = {"flat": clip("flat", flat, 1), "rocky": clip("rocky", frames - flat, 10)}
     splits = dict.fromkeys(clips, "train")
     manifest = write_database(tmp_path, clips, splits, channels=[], joint_weight=0.1, dtype=dtype)
-    found = sizes(manifest)
+    found = database_sizes(manifest)
     assert (found["frames"], found["pairs"], found["joints"]) == (frames, 10 * frames, joints)
     files = sum(f.stat().st_size for f in tmp_path.rglob("*.safetensors"))
     assert found["bytes"] == files

@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 
 from hobble.channels import channel
 from hobble.database.statistics import (
-    SILENT,
+    SILENCING_STD,
     UNSEEN,
     Moments,
     clip_moments,
@@ -19,14 +19,14 @@ from hobble.database.statistics import (
     statistics_of_moments,
     x_groups,
 )
-from hobble.rows.clip_rows import ClipRows, expanded
+from hobble.rows.clip_rows import ClipRows, pair_batches
 from hobble.rows.layout import RowLayout
 
 
 def written_out(rows: ClipRows) -> tuple[np.ndarray, np.ndarray]:
     """Every pair as often as in the original, where a flat row has its one fit ten times."""
     x, y = [], []
-    for pairs in expanded(rows, rows.layout, batch=7):
+    for pairs in pair_batches(rows, rows.layout, batch=7):
         times = rows.visits // rows.fits[pairs.row]
         x.append(np.repeat(pairs.x, times, axis=0))
         y.append(np.repeat(pairs.y, times, axis=0))
@@ -49,10 +49,10 @@ def test_moments_of_parts_add_up_to_those_of_the_whole(cuts, seed):
     rng = np.random.default_rng(seed)
     parts = [rng.normal(1e6, 1.0, (n, 3)) for n in cuts]
     weights = [rng.random(n) + 0.1 for n in cuts]
-    total = Moments.nothing(3)
+    total = Moments.of_no_rows(3)
     for part, weight in zip(parts, weights, strict=True):
-        total = total + Moments.of(part, weight)
-    whole = Moments.of(np.concatenate(parts), np.concatenate(weights))
+        total = total + Moments.of_rows(part, weight)
+    whole = Moments.of_rows(np.concatenate(parts), np.concatenate(weights))
     assert total.weight == pytest.approx(whole.weight)
     np.testing.assert_allclose(total.mean, whole.mean, rtol=1e-12)
     np.testing.assert_allclose(total.squares, whole.squares, rtol=1e-6, atol=1e-9)
@@ -100,19 +100,20 @@ def test_nothing_is_ever_divided_by_zero(rows_of, layout):
     for std in (s.x_std, s.y_std):
         assert (std > 0).all()
         assert np.isfinite(std).all()
-    assert (s.x_std[layout.x_terrain] == np.float32(SILENT)).all()  # always flat: heights mean nothing yet
+    # The ground is always flat, so its heights mean nothing yet.
+    assert (s.x_std[layout.x_terrain] == np.float32(SILENCING_STD)).all()
 
 
 def test_a_gait_without_rows_has_the_deviation_of_its_group(layout):
     std = np.ones(layout.x_size)
     std[layout.x_gait] = np.repeat([0.6, 0.6, 0, 0, 0, 0], layout.samples)
-    np.testing.assert_allclose(share_in_groups(std, x_groups(layout), SILENT)[layout.x_gait], 0.2)
+    np.testing.assert_allclose(share_in_groups(std, x_groups(layout), SILENCING_STD)[layout.x_gait], 0.2)
 
 
 def test_severities_share_one_deviation_and_unused_ones_are_scaled_to_0():
     out = channel("injury").divisors(np.array([3.0, 0.0, 4.0]))
-    np.testing.assert_allclose(out, [5.0, SILENT, 5.0])
-    np.testing.assert_allclose(channel("injury").divisors(np.array([0.01, 0.0])), [1.0, SILENT])
+    np.testing.assert_allclose(out, [5.0, SILENCING_STD, 5.0])
+    np.testing.assert_allclose(channel("injury").divisors(np.array([0.01, 0.0])), [1.0, SILENCING_STD])
 
 
 def test_without_the_channel_severities_change_no_statistics(rows_of, layout):

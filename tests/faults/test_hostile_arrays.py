@@ -82,7 +82,7 @@ def test_arrays_of_one_byte_numbers_are_limited_in_memory(tmp_path: Path) -> Non
     assert path.stat().st_size < MB
     refused(lambda: read_heights(path), "a.npz: 81000000 heights, more than 67108864")
     arrays = {"Xmean": np.zeros(9), "W0": np.zeros((1, side, side), np.int8)}
-    refused(lambda: checks.numbers("a.npz", arrays, "W0", 3), "W0 holds 81000000 numbers")
+    refused(lambda: checks.read_numbers("a.npz", arrays, "W0", 3), "W0 holds 81000000 numbers")
 
 
 def test_a_layer_of_the_release_that_is_too_large_is_refused(tmp_path: Path) -> None:

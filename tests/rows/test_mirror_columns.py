@@ -13,8 +13,8 @@ from hobble.core.skeleton import Skeleton
 from hobble.labels.label import label_clip, mirror_labels
 from hobble.labels.options import LabelOptions
 from hobble.motion.mirror import mirror_clip
-from hobble.rows.build_rows import clip_rows, cycle_frames
-from hobble.rows.clip_rows import ClipRows, Pairs, expanded
+from hobble.rows.build_rows import build_clip_rows, cycle_frames
+from hobble.rows.clip_rows import ClipRows, Pairs, pair_batches
 from hobble.rows.layout import RowLayout
 from hobble.rows.mirror_columns import ColumnMirror, mirror_of_x, mirror_of_y
 from hobble.synthetic.generate_clip import walk_from_plan
@@ -41,19 +41,19 @@ def walked(holden31: Skeleton) -> tuple[ClipRows, ClipRows]:
     rng = np.random.default_rng(3)
     channels = {"injury": rng.uniform(0, 10, (FRAMES, 30)), "mood": rng.random((FRAMES, 5))}
     terrain = ground(*cycle_frames(labels.cycles))
-    own = clip_rows("walk", clip, vars(labels), channels, terrain, **OPTIONS)
+    own = build_clip_rows("walk", clip, vars(labels), channels, terrain, **OPTIONS)
     image = mirror_clip(clip, "image")
     other, _ = mirror_labels(labels, report, image)
     turned = {name: channel(name).mirror(values, holden31) for name, values in channels.items()}
     there = ground(*cycle_frames(other.cycles))
     left, centre, right = np.split(there["heights"], 3, axis=1)
     there["heights"] = np.concatenate([right, centre, left], axis=1)
-    return own, clip_rows("image", image, vars(other), turned, there, **OPTIONS)
+    return own, build_clip_rows("image", image, vars(other), turned, there, **OPTIONS)
 
 
 def in_both(own: ClipRows, other: ClipRows) -> tuple[Pairs, Pairs, np.ndarray, np.ndarray]:
     """The pairs of both, and the rows in each of the frames that both have (their cycles differ)."""
-    (a,), (b,) = expanded(own, own.layout), expanded(other, other.layout)
+    (a,), (b,) = pair_batches(own, own.layout), pair_batches(other, other.layout)
     frames, i, j = np.intersect1d(own.frame, other.frame, return_indices=True)
     assert len(frames) > 200
     return a, b, i, j
@@ -94,14 +94,14 @@ def test_standardised_rows_are_mirrored_as_raw_ones_are(holden31):
     rng = np.random.default_rng(2)
     y, mean, std = rng.normal(0, 9, (4, layout.y_size)), rng.normal(0, 9, layout.y_size), rng.random(311)
     std = std + std[raw.source]
-    found = raw.standardised(mean, std)((y - mean) / std)
+    found = raw.for_standardised_rows(mean, std)((y - mean) / std)
     np.testing.assert_allclose(found, (raw(y) - mean) / std, atol=1e-9)
 
 
 def test_columns_that_are_scaled_apart_are_refused():
     swap = ColumnMirror(np.array([1, 0]), np.ones(2), np.zeros(2))
     with pytest.raises(HobbleError, match=r"columns 0 and 1 .* are 1 and 2\. .*mirror: true"):
-        swap.standardised(np.zeros(2), np.array([1.0, 2.0]))
+        swap.for_standardised_rows(np.zeros(2), np.array([1.0, 2.0]))
 
 
 def test_a_skeleton_that_does_not_pair_its_sides_is_refused(holden31):

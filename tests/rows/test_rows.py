@@ -18,8 +18,8 @@ from hobble.core.skeleton import Skeleton
 from hobble.labels.label import label_clip
 from hobble.motion.make import make_clip
 from hobble.motion.options import ClipMotion
-from hobble.rows.build_rows import clip_rows, cycle_frames, cycle_phase, phase_change
-from hobble.rows.clip_rows import ClipRows, expanded
+from hobble.rows.build_rows import build_clip_rows, cycle_frames, cycle_phase, phase_change
+from hobble.rows.clip_rows import ClipRows, pair_batches
 from hobble.rows.layout import GAITS, RowLayout
 from hobble.terrain.clip_fits import clip_fits
 from hobble.terrain.heightmaps import TerrainMap
@@ -80,7 +80,7 @@ def rows_as_configured(shared: Path, root: Path, margins: str = "drop", **terrai
     fits = clip_fits(clip, labels, patches, "flat", sections.Terrain(**ground), sampling)
     severity = np.zeros((len(clip), len(clip.skeleton.links)), np.float32)
     window = {name: database[name] for name in OPTIONS}
-    return clip_rows(NAME, clip, labels, {"injury": severity}, vars(fits), **window)
+    return build_clip_rows(NAME, clip, labels, {"injury": severity}, vars(fits), **window)
 
 
 @pytest.fixture(scope="module")
@@ -91,7 +91,7 @@ def rows(shared: Path, root: Path) -> ClipRows:
 @pytest.mark.shared
 def test_every_column_equals_that_of_the_original_rows(rows, original):
     layout = replace(rows.layout, channels=())
-    (pairs,) = expanded(rows, rows.layout.with_channels(()))
+    (pairs,) = pair_batches(rows, rows.layout.with_channels(()))
     np.testing.assert_array_equal(np.bincount(rows.cycle), original["cycle_length"])
     np.testing.assert_allclose(pairs.p, original["P"], atol=1e-6)
     differing = []
@@ -171,11 +171,13 @@ def terrain(labels) -> dict[str, np.ndarray]:
 
 def test_rows_of_a_rigid_turning_figure_are_exact(walk, labels, terrain):
     severity = np.random.default_rng(0).random((300, 2)) * 10
-    rows = clip_rows("walk", walk, labels, {"injury": severity}, terrain, **{**OPTIONS, "facing_sigma": 0.0})
+    rows = build_clip_rows(
+        "walk", walk, labels, {"injury": severity}, terrain, **{**OPTIONS, "facing_sigma": 0.0}
+    )
     layout, frame = rows.layout, rows.frame
     assert layout == RowLayout(5, channels=(("injury", 2),))
     np.testing.assert_array_equal(frame, np.r_[60:101, 100:131, 200:240])
-    (pairs,) = expanded(rows, rows.layout)
+    (pairs,) = pair_batches(rows, rows.layout)
     x, y = ({n: v[:, s] for n, s in layout.blocks(p).items()} for p, v in (("x", pairs.x), ("y", pairs.y)))
     ahead = np.arange(-60, 60, 10)
     turned = 0.01 * frame[:, None]  # facing (sin, 0, cos); the root's x axis is (cos, 0, -sin)
@@ -223,11 +225,11 @@ def test_fits_of_a_row_differ_only_in_the_ground(walk, labels, terrain):
     rng = np.random.default_rng(1)
     n = len(terrain["frame"])
     hilly = {**terrain, "fits": np.full(n, 10), "heights": rng.normal(0, 9, (10 * n, 36))}
-    rows = clip_rows("walk", walk, labels, {"injury": np.zeros((300, 2))}, hilly, **OPTIONS)
+    rows = build_clip_rows("walk", walk, labels, {"injury": np.zeros((300, 2))}, hilly, **OPTIONS)
     layout = rows.layout
     x, y = (
         np.concatenate(parts)
-        for parts in list(zip(*expanded(rows, rows.layout.with_channels(())), strict=True))[:2]
+        for parts in list(zip(*pair_batches(rows, rows.layout.with_channels(())), strict=True))[:2]
     )
     centre = hilly["heights"][:, 12:24].mean(axis=1)
     np.testing.assert_allclose(x[:, layout.x_terrain], hilly["heights"] - centre[:, None], atol=1e-4)
@@ -238,7 +240,7 @@ def test_fits_of_a_row_differ_only_in_the_ground(walk, labels, terrain):
 
 def test_a_clip_without_cycles_has_no_rows(walk, labels):
     nothing = {**labels, "cycles": np.zeros((0, 2), int)}
-    rows = clip_rows(
+    rows = build_clip_rows(
         "walk",
         walk,
         nothing,
@@ -248,7 +250,7 @@ def test_a_clip_without_cycles_has_no_rows(walk, labels):
     )
     rows.check("walk")
     assert len(rows) == 0
-    assert list(expanded(rows, rows.layout)) == []
+    assert list(pair_batches(rows, rows.layout)) == []
 
 
 @pytest.mark.parametrize(
@@ -260,24 +262,26 @@ def test_a_clip_without_cycles_has_no_rows(walk, labels):
 )
 def test_files_that_do_not_belong_together_are_refused(walk, labels, terrain, change, message):
     with pytest.raises(InputError, match=f"^walk: .*{message}"):
-        clip_rows("walk", walk, {**labels, **change}, {"injury": np.zeros((300, 2))}, terrain, **OPTIONS)
+        build_clip_rows(
+            "walk", walk, {**labels, **change}, {"injury": np.zeros((300, 2))}, terrain, **OPTIONS
+        )
 
 
 def test_severities_and_cycles_that_do_not_fit_are_refused(walk, labels, terrain):
     with pytest.raises(InputError, match="injury has 3 columns where the skeleton needs 2"):
-        clip_rows("walk", walk, labels, {"injury": np.zeros((300, 3))}, terrain, **OPTIONS)
+        build_clip_rows("walk", walk, labels, {"injury": np.zeros((300, 3))}, terrain, **OPTIONS)
     for cycle, frame in (([0, 40], 0), ([260, 299], 299)):
         near = {**labels, "cycles": np.array([cycle])}
         ground = flat_terrain(near["cycles"], np.zeros(1))
         with pytest.raises(InputError, match=f"walk, frame {frame}: the clip has no frame before or after"):
-            clip_rows("walk", walk, near, {"injury": np.zeros((300, 2))}, ground, **OPTIONS)
+            build_clip_rows("walk", walk, near, {"injury": np.zeros((300, 2))}, ground, **OPTIONS)
 
 
 def test_beyond_the_clip_the_root_continues_straight_with_the_same_gait(walk, labels):
     """Rows near an end equal those of a longer clip that really continues like this."""
     ends = {**labels, "cycles": np.array([[1, 40], [260, 298]])}
     still = replace(walk, rotations=np.tile(walk.rotations[:1], (300, 1, 1)))
-    once = clip_rows(
+    once = build_clip_rows(
         "a", still, ends, {"injury": np.zeros((300, 2))}, flat_terrain(ends["cycles"], np.zeros(2)), **OPTIONS
     )
     n = np.arange(-70, 370)
@@ -288,7 +292,7 @@ def test_beyond_the_clip_the_root_continues_straight_with_the_same_gait(walk, la
     )
     held = {name: values[np.clip(n, 0, 299)] for name, values in labels.items() if len(values) == 300}
     held["cycles"] = ends["cycles"] + 70
-    twice = clip_rows(
+    twice = build_clip_rows(
         "a",
         longer,
         held,

@@ -53,7 +53,7 @@ def test_a_heightmap_is_in_the_callers_axes_and_unit(network, handed: str, up: s
         return rise * axes.scale
 
     def root(ground) -> np.ndarray:
-        target = axes.points_out(np.array([0.5, 0, 2.0]))
+        target = axes.points_to_caller(np.array([0.5, 0, 2.0]))
         made = walk(ProceduralAnimation(network, axes=axes), 30, target_velocity=target, terrain=ground)
         return made[-1].root / axes.scale
 
@@ -86,31 +86,33 @@ def test_motion_in_other_axes_and_units_is_the_same_motion(network, handed: str,
     def terrain(a: np.ndarray, b: np.ndarray) -> np.ndarray:
         points = np.zeros((len(a), 3))
         points[:, level] = np.stack([a, b], axis=1)
-        ours = axes.points_in(points)
+        ours = axes.points_from_caller(points)
         return hills(ours[:, 0], ours[:, 2]) * axes.scale
 
     native = ProceduralAnimation(network, position=(30, 0, 10), facing=(1, 0, 1))
     theirs = ProceduralAnimation(
         network,
         axes=axes,
-        position=axes.points_out(np.array([30.0, 0, 10])),
-        facing=axes.directions_out(np.array([1.0, 0, 1])),
+        position=axes.points_to_caller(np.array([30.0, 0, 10])),
+        facing=axes.directions_to_caller(np.array([1.0, 0, 1])),
     )
     velocity = np.array([0.5, 0, 2.0])
     for k in range(25):
         a = native.next_pose(velocity, (1, 0, 0), terrain=hills)
-        target = axes.points_out(velocity)
+        target = axes.points_to_caller(velocity)
         b = theirs.next_pose(
-            target if k % 2 else target[level], axes.directions_out(np.array([1.0, 0, 0])), terrain=terrain
+            target if k % 2 else target[level],
+            axes.directions_to_caller(np.array([1.0, 0, 0])),
+            terrain=terrain,
         )
-    np.testing.assert_allclose(axes.points_in(b.positions), a.positions, atol=1e-3)
-    np.testing.assert_allclose(axes.points_in(b.root), a.root, atol=1e-3)
+    np.testing.assert_allclose(axes.points_from_caller(b.positions), a.positions, atol=1e-3)
+    np.testing.assert_allclose(axes.points_from_caller(b.root), a.root, atol=1e-3)
     assert b.positions[:, vertical].mean() > 0.5 * 93 * axes.scale
     # A rotation takes the same bone to the same place in both conventions: M R v = R' M v.
     bone = np.array([3.0, -2.0, 5.0])
     np.testing.assert_allclose(
-        quat.rotate(b.rotations, axes.directions_out(bone)),
-        axes.directions_out(quat.rotate(a.rotations, bone)),
+        quat.rotate(b.rotations, axes.directions_to_caller(bone)),
+        axes.directions_to_caller(quat.rotate(a.rotations, bone)),
         atol=1e-5,
     )
 
@@ -129,17 +131,17 @@ def test_an_asymmetric_pose_is_the_same_in_every_convention(
     local[0, 0] = quat.from_axis_angle([0, 1.0, 0], 0.4)
     ours, placed = forward_kinematics(holden31, local, np.array([[10.0, 95, 20]]))
     axes = Axes(handed, up, unit)
-    rotations, positions = axes.rotations_out(ours[0]), axes.points_out(placed[0])
-    bones = axes.points_out(holden31.offsets)
+    rotations, positions = axes.rotations_to_caller(ours[0]), axes.points_to_caller(placed[0])
+    bones = axes.points_to_caller(holden31.offsets)
     for joint, parent in enumerate(holden31.parents):
         if parent >= 0:
             end = positions[parent] + quat.rotate(rotations[parent], bones[joint])
             np.testing.assert_allclose(end, positions[joint], atol=1e-9)
     hand = positions[holden31.role("left_wrist")] - positions[0]
-    across = quat.rotate(rotations[0], axes.directions_out(np.array([1.0, 0, 0])))
+    across = quat.rotate(rotations[0], axes.directions_to_caller(np.array([1.0, 0, 0])))
     assert hand @ across > 0.2 * np.linalg.norm(hand)
     assert hand["XYZ".index(up)] > 60 * axes.scale
-    np.testing.assert_allclose(axes.points_in(positions), placed[0], atol=1e-9)
+    np.testing.assert_allclose(axes.points_from_caller(positions), placed[0], atol=1e-9)
 
 
 def test_left_and_right_are_correct_in_unity_and_unreal() -> None:
@@ -147,13 +149,13 @@ def test_left_and_right_are_correct_in_unity_and_unreal() -> None:
     left, up, ahead = np.eye(3)
     unity, unreal, blender = Axes("left", "Y"), Axes("left", "Z"), Axes("right", "Z")
     np.testing.assert_array_equal(
-        unity.directions_out(np.array([left, up, ahead])), [[-1, 0, 0], [0, 1, 0], [0, 0, 1]]
+        unity.directions_to_caller(np.array([left, up, ahead])), [[-1, 0, 0], [0, 1, 0], [0, 0, 1]]
     )
     np.testing.assert_array_equal(
-        unreal.directions_out(np.array([left, up, ahead])), [[0, -1, 0], [0, 0, 1], [1, 0, 0]]
+        unreal.directions_to_caller(np.array([left, up, ahead])), [[0, -1, 0], [0, 0, 1], [1, 0, 0]]
     )
     np.testing.assert_array_equal(
-        blender.directions_out(np.array([left, up, ahead])), [[1, 0, 0], [0, 0, 1], [0, -1, 0]]
+        blender.directions_to_caller(np.array([left, up, ahead])), [[1, 0, 0], [0, 0, 1], [0, -1, 0]]
     )
     with pytest.raises(ValueError, match="handed has to be right or left"):
         Axes("both")

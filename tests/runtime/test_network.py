@@ -182,9 +182,9 @@ def test_a_file_without_meta_has_the_original_layout(tmp_path: Path, hurtable: N
 
 def test_hurt_links_are_those_of_training(make_network) -> None:
     network = make_network(links=30)
-    assert network.trained("injury") == network.channels["injury"]
+    assert network.trained_labels("injury") == network.channels["injury"]
     network.x_mean[network.layout.x_channel("injury").start + 3] = 0.2
-    assert network.trained("injury") == network.channels["injury"][3:4]
+    assert network.trained_labels("injury") == network.channels["injury"][3:4]
 
 
 @pytest.mark.parametrize(
@@ -251,7 +251,7 @@ def test_the_released_network_predicts_its_published_rows(shared: Path) -> None:
     data = np.load(shared / "reference" / "original_rows_LocomotionFlat09_000.npz")
     network = load_network(shared / "reference" / "pfnn_release_network.npz")
     assert network.sizes == (342, 512, 512, 311)
-    assert network.parameters == 597_815
+    assert network.parameter_count == 597_815
     y = PfnnPredictor(network, "constant").predict(data["X"], data["P"].astype(float))
     assert np.abs(y - data["Y_release"]).max() < 1e-3
     stored = PfnnPredictor(network, "constant", "int16").predict(data["X"], data["P"].astype(float))

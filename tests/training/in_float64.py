@@ -26,7 +26,7 @@ from hobble.training.other_poses import OtherPoses
 from hobble.training.processes import ALONE, Processes, join_processes
 from hobble.training.rollout import RollOut
 
-WINDOW = Database.window
+WINDOW = Database.chunks_per_window
 
 
 def widen(kind: Any) -> None:
@@ -77,7 +77,7 @@ def one(job: dict[str, Any], processes: Processes) -> None:
     """on_device: rows shuffled as on an accelerator. window: chunks held at a time, 0 for all."""
     module.rows_on_device_or_host = DeviceRows if job["on_device"] else HostRows  # type: ignore[assignment]
     window = job["window"]
-    Database.window = (lambda *_: window) if window else WINDOW  # type: ignore[method-assign]
+    Database.chunks_per_window = (lambda *_: window) if window else WINDOW  # type: ignore[method-assign]
     training = Training.model_validate(job["training"])
     state = module.train(
         Database.open(job["database"], training.memory_mb),
@@ -86,8 +86,12 @@ def one(job: dict[str, Any], processes: Processes) -> None:
         checkpoints=Path(job["checkpoints"]),
         processes=processes,
     )
-    if processes.first:
-        arrays = {"flat": state.network.flat, "first": state.adam.first, "second": state.adam.second}
+    if processes.is_first:
+        arrays = {
+            "flat": state.network.flat,
+            "first": state.adam.first_moment,
+            "second": state.adam.second_moment,
+        }
         losses = np.array([row[4] for row in state.history])
         np.savez(
             job["out"], losses=losses, steps=state.adam.steps, **{k: v.numpy() for k, v in arrays.items()}

@@ -16,7 +16,7 @@ from hobble.database.merge import write_database
 from hobble.database.reader import Database
 from hobble.training import train
 from hobble.training.checkpoint import State
-from hobble.training.held_out import HeldOut
+from hobble.training.held_out import HeldOutErrors
 from hobble.training.run import run
 from hobble.training.start import recipe_hash
 
@@ -111,7 +111,7 @@ def test_the_best_weights_are_written_and_training_resumes_from_the_last(
     )
     assert state.best is not None
     state.network.flat.copy_(state.best)
-    held = HeldOut(data, torch.device("cpu"), 0).errors(state.network)
+    held = HeldOutErrors(data, torch.device("cpu"), 0).errors(state.network)
     assert held[0] == pytest.approx(meta[0]["held_out_mse"], rel=1e-5)
 
 

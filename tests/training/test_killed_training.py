@@ -61,7 +61,7 @@ def test_a_training_killed_at_any_moment_ends_with_the_same_bits(
     final = train(data, **settings, checkpoints=killed, threads=2)
     undisturbed = train(data, **settings, checkpoints=tmp_path / "undisturbed", threads=2)
     assert torch.equal(final.network.flat, undisturbed.network.flat)
-    assert torch.equal(final.adam.second, undisturbed.adam.second)
+    assert torch.equal(final.adam.second_moment, undisturbed.adam.second_moment)
     assert final.best is not None
     assert undisturbed.best is not None
     assert torch.equal(final.best, undisturbed.best)

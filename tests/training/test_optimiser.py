@@ -5,14 +5,14 @@ from __future__ import annotations
 import pytest
 import torch
 
-from hobble.models.pfnn.trainable import initialise
+from hobble.models.pfnn.trainable import untrained_network
 from hobble.training import optimiser
 from hobble.training.optimiser import Adam
 
 
 @pytest.mark.parametrize("dtype", [torch.float32, torch.bfloat16])
 def test_the_compiled_adam_equals_the_plain_one(dtype: torch.dtype) -> None:
-    networks = [initialise((40, 30, 20), 4, 1) for _ in range(2)]
+    networks = [untrained_network((40, 30, 20), 4, 1) for _ in range(2)]
     generator = torch.Generator().manual_seed(1)
     adams = [Adam(network, 0.01, 0.9, 0.999, 0.1) for network in networks]
     for share in (0.2, 0.6, 1.0, 0.7, 0.0):
@@ -21,11 +21,11 @@ def test_the_compiled_adam_equals_the_plain_one(dtype: torch.dtype) -> None:
         adams[1].steps += 1
         adams[1].step_with_torch(gradients, torch.tensor(adams[1].step_factors(share)))
     assert torch.allclose(networks[0].flat, networks[1].flat, rtol=1e-4, atol=1e-6)
-    assert torch.allclose(adams[0].first, adams[1].first, rtol=1e-4, atol=1e-6)
+    assert torch.allclose(adams[0].first_moment, adams[1].first_moment, rtol=1e-4, atol=1e-6)
 
 
 def test_only_the_l1_term_moves_weights_that_have_no_gradient() -> None:
-    network = initialise((8, 6, 4), 4, 1)
+    network = untrained_network((8, 6, 4), 4, 1)
     network.layers[0][0, 0, 0] = 0.0
     before = network.flat.clone()
     adam = Adam(network, 0.001, 0.9, 0.999, 0.01)
@@ -40,6 +40,6 @@ def test_only_the_l1_term_moves_weights_that_have_no_gradient() -> None:
 
 def test_the_share_of_a_layer_in_the_l1_term() -> None:
     """.01 * mean|W| / 6 for three layers, because the original divides by its six arrays."""
-    network = initialise((342, 512, 512, 311), 4, 1)
+    network = untrained_network((342, 512, 512, 311), 4, 1)
     slopes = optimiser.l1_slopes(network, 0.01)
     assert slopes == pytest.approx([0.01 / 6 / (4 * n) for n in (342 * 512, 512 * 512, 512 * 311)])

@@ -152,9 +152,9 @@ def test_two_processes_change_what_one_changes_and_sections_are_alike(data: Data
     for k in range(2):
         np.testing.assert_allclose(whole[k], torch.cat([part[k] for part in parts]), rtol=1e-4, atol=1e-3)
     first = [table.clone() for table in start]
-    one.begin()
+    one.begin_section()
     one.play(*first)
-    one.begin()
+    one.begin_section()
     one.play(*start)
     assert all(torch.equal(a, b) for a, b in zip(first, start, strict=True))
 

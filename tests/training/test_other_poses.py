@@ -39,7 +39,7 @@ def of_pose(data: Database) -> list[int]:
 
 def test_a_share_of_the_rows_moves_evenly_towards_the_pose_before(data: Database) -> None:
     others, columns = OtherPoses(data, 0.4, ROWS, CPU), of_pose(data)
-    others.begin()
+    others.begin_section()
     first, p = batch(data, 0.0, 0.51)
     others.mix(first, p)
     assert torch.equal(first, batch(data, 0.0, 0.51)[0]), "no place has another pose yet"
@@ -67,7 +67,7 @@ def test_no_pose_of_another_phase_or_gait_or_of_the_same_values(
     data: Database, phase: float, jog: float, hurt: float
 ) -> None:
     others = OtherPoses(data, 1.0, ROWS, CPU)
-    others.begin()
+    others.begin_section()
     others.mix(*batch(data, 0.0, 0.52))
     x, p = batch(data, 1.0, phase, jog, hurt=hurt)
     others.mix(x, p)
@@ -76,7 +76,7 @@ def test_no_pose_of_another_phase_or_gait_or_of_the_same_values(
 
 def test_the_nearest_phase_is_taken_also_over_the_end_of_the_cycle(data: Database) -> None:
     others = OtherPoses(data, 1.0, ROWS, CPU)
-    others.begin()
+    others.begin_section()
     for pose, phase in ((10.0, 0.04), (20.0, 0.99), (30.0, 0.96)):
         others.mix(*batch(data, pose, phase))
     x, p = batch(data, 0.0, 0.01)
@@ -86,7 +86,7 @@ def test_the_nearest_phase_is_taken_also_over_the_end_of_the_cycle(data: Databas
 
 def test_only_recent_rows_are_mixed_in(data: Database) -> None:
     others = OtherPoses(data, 1.0, ROWS, CPU)
-    others.begin()
+    others.begin_section()
     others.mix(*batch(data, 10.0, 0.5))
     for _ in range(REMEMBERED_ROWS):
         others.mix(*batch(data, 0.0, 0.5, hurt=1.0))
@@ -98,7 +98,7 @@ def test_only_recent_rows_are_mixed_in(data: Database) -> None:
 def test_mixed_poses_do_not_depend_on_earlier_sections(data: Database) -> None:
     others = OtherPoses(data, 1.0, ROWS, CPU)
     for _ in range(2):
-        others.begin()
+        others.begin_section()
         x, p = batch(data, 1.0, 0.2)
         others.mix(x, p)
         assert torch.equal(x, batch(data, 1.0, 0.2)[0])

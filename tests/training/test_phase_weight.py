@@ -12,7 +12,7 @@ from hobble.database.reader import Database
 from hobble.models.pfnn.forward import forward
 from hobble.models.pfnn.options import PfnnOptions
 from hobble.training import run as stage
-from hobble.training.held_out import HeldOut
+from hobble.training.held_out import HeldOutErrors
 from training.conftest import Recipe
 
 CPU = torch.device("cpu")
@@ -42,10 +42,10 @@ class Means:
 
 
 def test_held_out_errors_do_not_depend_on_the_weight(data: Database) -> None:
-    errors = HeldOut(data, CPU, 0).errors_on_every_row(Means(data))
-    assert HeldOut(data.with_phase_weight(8.0), CPU, 0).errors_on_every_row(Means(data)) == pytest.approx(
-        errors, rel=1e-4
-    )
+    errors = HeldOutErrors(data, CPU, 0).errors_on_every_row(Means(data))
+    assert HeldOutErrors(data.with_phase_weight(8.0), CPU, 0).errors_on_every_row(
+        Means(data)
+    ) == pytest.approx(errors, rel=1e-4)
 
 
 def test_the_file_has_the_phase_in_its_own_unit(

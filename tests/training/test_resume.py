@@ -46,7 +46,7 @@ def test_a_fraction_of_a_pass_is_its_first_sections(
         return train(data, network=network, training=settings, checkpoints=tmp_path / folder, threads=2)
 
     third, whole = to(1 / 3, "a"), to(1, "b")
-    assert third.samples == data.section_samples("train", 0, 3) < data.samples("train")
+    assert third.samples == data.section_sample_count("train", 0, 3) < data.sample_count("train")
     assert [row[:3] for row in third.history] == [row[:3] for row in whole.history[:1]]
     resumed = to(1, "a")
     assert torch.equal(resumed.network.flat, whole.network.flat)

@@ -14,7 +14,7 @@ from hobble.database.reader import Database
 from hobble.measures.rollouts.roll_outs import RollOutInputs
 from hobble.models.pfnn.fused import FusedPfnnStep
 from hobble.models.pfnn.step import PfnnStep
-from hobble.models.pfnn.trainable import initialise
+from hobble.models.pfnn.trainable import untrained_network
 from hobble.training.batches import HostRows
 from hobble.training.rollout import RollOut
 from hobble.training.train import train
@@ -59,7 +59,7 @@ def test_poses_carry_the_same_errors_as_a_roll_out(data: Database) -> None:
     starts = np.arange(STARTS)
     made, _ = roll_out(predictor, given, starts, FRAMES)  # type: ignore[arg-type]
     carried = RollOut(data, 2 * STARTS, STARTS, CPU)
-    carried.begin()
+    carried.begin_section()
     whole = slice(FRAMES, None)  # places whose roll-out does not end meanwhile
     pose = slice(layout.x_joint_position.start, layout.x_joint_velocity.stop)
     for age in range(FRAMES):
@@ -83,7 +83,7 @@ def test_each_place_restarts_after_its_frames(data: Database) -> None:
     frames, rows = 5, 10
     for length in (frames, 1):
         carried = RollOut(data, length, rows, CPU)
-        carried.begin()
+        carried.begin_section()
         zero = []
         for _ in range(3 * frames):
             x = torch.zeros(rows, data.layout.x_size)
@@ -101,12 +101,12 @@ def test_each_place_restarts_after_its_frames(data: Database) -> None:
 
 def test_roll_outs_do_not_depend_on_earlier_sections_or_short_batches(data: Database) -> None:
     carried = RollOut(data, 4, 6, CPU)
-    carried.begin()
+    carried.begin_section()
     carried.remember(torch.ones(6, data.layout.y_size))
     x = torch.zeros(2, data.layout.x_size)
     carried.add(x)
     assert torch.count_nonzero(x) > 0
-    carried.begin()
+    carried.begin_section()
     x = torch.zeros(6, data.layout.x_size)
     carried.add(x)
     assert torch.count_nonzero(x) == 0
@@ -136,7 +136,7 @@ def test_training_uses_the_roll_outs(
     carried = RollOut(data, 4, 300, CPU)
     number = 0
     for section in range(2):
-        carried.begin()
+        carried.begin_section()
         for batch in HostRows(data, CPU).batches(0, section, 2, settings.seed, 300):
             x = batch.x.clone()
             carried.add(x)
@@ -149,7 +149,7 @@ def test_training_uses_the_roll_outs(
 
 @pytest.mark.parametrize("kind", [PfnnStep, FusedPfnnStep])
 def test_the_training_step_keeps_its_errors_for_the_roll_out(kind: type[PfnnStep]) -> None:
-    network = initialise((6, 5, 4), 4, 1)
+    network = untrained_network((6, 5, 4), 4, 1)
     generator = torch.Generator().manual_seed(1)
     x, y = (torch.randn(7, n, generator=generator) for n in (6, 4))
     p = torch.rand(7, generator=generator)

@@ -88,7 +88,7 @@ def test_an_interrupted_training_with_a_schedule_ends_with_the_same_bits(
             train(data, **arguments, checkpoints=tmp_path / "cut")
     resumed = train(data, **arguments, checkpoints=tmp_path / "cut")
     assert torch.equal(whole.network.flat, resumed.network.flat)
-    assert torch.equal(whole.adam.second, resumed.adam.second)
+    assert torch.equal(whole.adam.second_moment, resumed.adam.second_moment)
     assert whole.best is not None
     assert resumed.best is not None
     assert torch.equal(whole.best, resumed.best)

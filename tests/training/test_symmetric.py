@@ -49,8 +49,8 @@ def data(tmp_path: Path) -> Database:
 def apart(network: Trainable, data: Database) -> float:
     """How far the output for mirrored inputs is from the mirrored output, in standard deviations."""
     skeleton, s = Skeleton.from_dict(data.skeleton), data.statistics
-    x_mirror = mirror_of_x(data.layout, skeleton).standardised(s.x_mean, s.x_std)
-    y_mirror = mirror_of_y(data.layout, skeleton).standardised(s.y_mean, s.y_std)
+    x_mirror = mirror_of_x(data.layout, skeleton).for_standardised_rows(s.x_mean, s.x_std)
+    y_mirror = mirror_of_y(data.layout, skeleton).for_standardised_rows(s.y_mean, s.y_std)
     assert max(np.abs(x_mirror.shift).max(), np.abs(y_mirror.shift).max()) > 0.05, (
         "the means are not symmetric"
     )
@@ -79,7 +79,7 @@ def test_new_weights_are_symmetric_and_as_large_as_before(
 ) -> None:
     made = new_state(data, network, training).network
     spread = [float(layer[:, :, :-1].std()) for layer in made.layers]
-    Symmetry(made, data).start()
+    Symmetry(made, data).make_new_network_symmetric()
     assert apart(made, data) < 1e-5
     assert [float(layer[:, :, :-1].std()) for layer in made.layers] == pytest.approx(spread, rel=0.05)
 

@@ -16,12 +16,12 @@ from hobble.core import files
 from hobble.core.errors import HobbleError, InputError
 from hobble.database.merge import write_database
 from hobble.database.reader import Block, Database
-from hobble.models.pfnn.trainable import initialise
+from hobble.models.pfnn.trainable import untrained_network
 from hobble.training import checkpoint, start, train
 from hobble.training.batches import HostRows
 from hobble.training.checkpoint import State
 from hobble.training.device_rows import DeviceRows, gpu_has_room, rows_on_device_or_host
-from hobble.training.held_out import HeldOut
+from hobble.training.held_out import HeldOutErrors
 from hobble.training.history import columns, write_history
 
 from .conftest import SPLITS, clip_rows
@@ -65,7 +65,7 @@ def test_batches_are_the_sections_samples_in_order(data: Database, kind: type[Ho
     *columns, whole = zip(*seen, strict=True)
     for mine, theirs in zip(columns, zip(*blocks, strict=True), strict=True):
         assert np.array_equal(np.concatenate(mine), np.concatenate(theirs))
-    assert sum(len(batch.p) for batch in seen) == sum(whole) == data.section_samples("train", 2, 3)
+    assert sum(len(batch.p) for batch in seen) == sum(whole) == data.section_sample_count("train", 2, 3)
 
 
 @pytest.mark.parametrize("dtype", ["float32", "float16", "bfloat16"])
@@ -101,7 +101,7 @@ def test_rows_stay_with_the_host_where_there_is_no_accelerator(data: Database) -
 def test_training_twice_gives_the_same_bits(run: Run) -> None:
     one, again = run("one"), run("two")
     assert torch.equal(one.network.flat, again.network.flat)
-    assert torch.equal(one.adam.second, again.adam.second)
+    assert torch.equal(one.adam.second_moment, again.adam.second_moment)
     drop_seconds = [[v for i, v in enumerate(row) if i != 3] for row in one.history]
     assert drop_seconds == [[v for i, v in enumerate(row) if i != 3] for row in again.history]
     assert not torch.equal(one.network.flat, run("three", seed=2).network.flat)
@@ -125,7 +125,7 @@ def test_history_counts_and_agrees_with_the_network(run: Run, data: Database, tm
     seconds = [float(row["seconds"]) for row in rows]
     assert seconds == sorted(seconds)
     block = next(data.blocks("held_out", 0, 0, data.manifest.visits, 0))
-    assert len(block.p) == data.rows("held_out")
+    assert len(block.p) == data.row_count("held_out")
     y = state.network(torch.from_numpy(block.x), torch.from_numpy(block.p)).numpy()
     squares = (y - block.y) ** 2
     assert float(rows[-1]["held_out_mse"]) == pytest.approx(float(squares.mean()), rel=1e-5)
@@ -136,7 +136,7 @@ def test_history_counts_and_agrees_with_the_network(run: Run, data: Database, tm
 def test_without_held_out_clips_the_errors_are_left_empty(
     run: Run, monkeypatch: pytest.MonkeyPatch, data: Database, tmp_path: Path
 ) -> None:
-    monkeypatch.setattr(HeldOut, "_batches", lambda self: iter(()))
+    monkeypatch.setattr(HeldOutErrors, "_batches", lambda self: iter(()))
     write_history(tmp_path / "history.csv", data.layout.blocks("y"), run(passes=1).history)
     row = next(csv.DictReader((tmp_path / "history.csv").open()))
     assert row["held_out_mse"] == row["held_out_turn"] == ""
@@ -146,8 +146,8 @@ def test_without_held_out_clips_the_errors_are_left_empty(
 def test_a_sample_of_all_held_out_rows_has_their_error(
     data: Database, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    network = initialise((data.layout.x_size, 8, data.layout.y_size), 4, 1)
-    held_out = HeldOut(data, torch.device("cpu"), 0)
+    network = untrained_network((data.layout.x_size, 8, data.layout.y_size), 4, 1)
+    held_out = HeldOutErrors(data, torch.device("cpu"), 0)
     assert sum(len(part[0]) for part in held_out.sample) == 70
     assert held_out.errors(network) == held_out.errors_on_every_row(network)
 
@@ -208,9 +208,9 @@ def test_a_full_disk_ends_in_a_message(run: Run, monkeypatch: pytest.MonkeyPatch
 
 def test_cuda_without_a_gpu_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(torch.cuda, "is_available", lambda: False)
-    assert start.device("auto").type == "cpu"
+    assert start.choose_device("auto").type == "cpu"
     with pytest.raises(HobbleError, match=r"training\.device is cuda"):
-        start.device("cuda")
+        start.choose_device("cuda")
 
 
 def test_more_sections_than_samples_are_refused(run: Run) -> None:
@@ -239,7 +239,7 @@ def test_bfloat16_is_chosen_where_a_device_has_it(
         return including_emulation or major >= 8
 
     monkeypatch.setattr(torch.cuda, "is_bf16_supported", supported)
-    network = initialise((4, 3, 2), 4, 1).to("meta")
+    network = untrained_network((4, 3, 2), 4, 1).to("meta")
     monkeypatch.setattr(type(network), "step", lambda self, dropout, half: half)
     assert start.step_for(network, training | {"batch": 256}) is half
 

@@ -10,7 +10,7 @@ import torch
 
 from hobble.models.pfnn.fused import FusedPfnnStep
 from hobble.models.pfnn.step import PfnnStep
-from hobble.models.pfnn.trainable import initialise
+from hobble.models.pfnn.trainable import untrained_network
 from hobble.training.optimiser import Adam
 from hobble.training.update import CapturedUpdate, Update, update_for
 
@@ -53,7 +53,7 @@ def cuda(monkeypatch: pytest.MonkeyPatch) -> None:
 def updates() -> tuple[Update, CapturedUpdate]:
     made: list[Update] = []
     for kind in (Update, CapturedUpdate):
-        network = initialise((8, 7, 7, 5), 4, 1)
+        network = untrained_network((8, 7, 7, 5), 4, 1)
         adam = Adam(network, 0.01, 0.9, 0.999, 0.01)
         step = PfnnStep(network, 0.3)
         made.append(kind(step, adam, ROWS) if kind is CapturedUpdate else kind(step, adam))
@@ -69,7 +69,7 @@ def test_a_captured_cuda_update_equals_the_plain_one() -> None:
     """Also with a shorter batch among others, and rates that change."""
     plain, captured = updates()
     assert torch.equal(plain.adam.network.flat, captured.adam.network.flat)
-    assert torch.count_nonzero(captured.adam.second) == 0
+    assert torch.count_nonzero(captured.adam.second_moment) == 0
     assert captured.adam.steps == 0
     generator = torch.Generator().manual_seed(1)
     losses = []
@@ -88,5 +88,5 @@ def test_a_captured_cuda_update_equals_the_plain_one() -> None:
 
 
 def test_nothing_is_captured_on_a_cpu() -> None:
-    network = initialise((8, 7, 5), 4, 1)
+    network = untrained_network((8, 7, 5), 4, 1)
     assert type(update_for(FusedPfnnStep(network, 0.3), Adam(network, 0.01, 0.9, 0.999, 0.0), 32)) is Update

@@ -73,7 +73,7 @@ def mixed(data: Database, share: float = 1.0, places: slice = slice(None)) -> tu
     x = torch.from_numpy(block.x.copy())[places]
     first = places.start or 0
     versions = VersionPoses(data, share, len(x), CPU, first)
-    versions.begin()
+    versions.begin_section()
     versions.mix(x, torch.from_numpy(block.p)[places], block.clip[places])
     return block, x.numpy()
 

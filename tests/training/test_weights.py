@@ -14,7 +14,7 @@ from hobble.core.errors import HobbleError
 from hobble.core.files import load_npz
 from hobble.core.skeleton import Skeleton
 from hobble.database.reader import Database
-from hobble.models import model
+from hobble.models import model_of_kind
 from hobble.models.pfnn.options import PfnnOptions
 from hobble.models.training_facts import TrainingFacts
 from hobble.rows.layout import CONTACTS, GAITS, RowLayout
@@ -30,7 +30,7 @@ def data(small_database: Path) -> Database:
 
 def write(path: Path, data: Database, seed: int = 1) -> dict[str, np.ndarray]:
     """Write an untrained network, and return the expected arrays."""
-    made = model("pfnn").trainable(PfnnOptions(units=6), data.layout, figure(), seed)
+    made = model_of_kind("pfnn").untrained_network(PfnnOptions(units=6), data.layout, figure(), seed)
     write_weights(path, made, data, "mine", {"passes": 3})
     return {name: np.array(array) for name, array in made.arrays().items()}
 
@@ -79,8 +79,8 @@ def test_the_weights_file_has_the_ranges_of_the_training_rows_only(data: Databas
 def test_the_ranges_cover_every_row_with_every_fit(small_database: Path, memory: int) -> None:
     data = Database.open(small_database, memory)
     s = data.statistics
-    seen = TrainingFacts.of(data.layout, data.each_row("train"), s)
-    (block,) = data.blocks("train", 0, 0, 1, 0, data.samples("train"))
+    seen = TrainingFacts.from_rows(data.layout, data.each_row("train"), s)
+    (block,) = data.blocks("train", 0, 0, 1, 0, data.sample_count("train"))
     x, y = block.x * s.x_std + s.x_mean, block.y * s.y_std + s.y_mean
     for name, values in (("x", x), ("y", y)):
         np.testing.assert_array_equal(getattr(seen, f"{name}_low"), values.min(axis=0))
@@ -127,8 +127,8 @@ def test_if_no_row_stands_a_character_starts_from_the_stillest(small_database: P
     mean, std = data.statistics.x_mean.copy(), data.statistics.x_std.copy()
     mean[stand], std[stand] = 0.3, 0.0  # each row stands to 30 %
     s = replace(data.statistics, x_mean=mean, x_std=std)
-    seen = TrainingFacts.of(data.layout, data.each_row("train"), s)
-    (block,) = data.blocks("train", 0, 0, 1, 0, data.samples("train"))
+    seen = TrainingFacts.from_rows(data.layout, data.each_row("train"), s)
+    (block,) = data.blocks("train", 0, 0, 1, 0, data.sample_count("train"))
     x, y = block.x * s.x_std + s.x_mean, block.y * s.y_std + s.y_mean
     moved = np.square(x[:, data.layout.x_position]).sum(axis=1)
     moved += np.square(y[:, data.layout.y_joint_velocity]).sum(axis=1)

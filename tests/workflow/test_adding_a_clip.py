@@ -34,7 +34,7 @@ def contents(path: Path) -> dict[str, tuple[int, bytes]]:
 def all_rows(path: Path) -> tuple[list[tuple[str, int]], np.ndarray]:
     """Clip and frame of each training row, and its output in raw units, in order."""
     db = Database.open(path, 4096)
-    (block,) = db.blocks("train", 0, 0, db.manifest.visits, 1, db.rows("train"))
+    (block,) = db.blocks("train", 0, 0, db.manifest.visits, 1, db.row_count("train"))
     order = np.lexsort((block.frame, np.array(db.clips)[block.clip]))
     names = [(db.clips[block.clip[n]], int(block.frame[n])) for n in order]
     lowered = block.y * db.statistics.y_std + db.statistics.y_mean

@@ -7,7 +7,7 @@ from hobble.channels.clip_values import load_values
 from hobble.core.clip import load_clip
 from hobble.core.files import load_npz
 from hobble.database.options import RowOptions
-from hobble.rows.build_rows import clip_rows
+from hobble.rows.build_rows import build_clip_rows
 from hobble.rows.clip_rows import save_clip_rows
 from hobble.rows.summary import save_summary, summary_of_rows
 from hobble.workflow.batch_job import make_each
@@ -20,7 +20,7 @@ def make_rows(piece, log):
     """
     options = RowOptions.model_validate(piece.params["options"])
     files_of_channels = zip(piece.params["channels"], piece.input.get("channels", []), strict=True)
-    rows = clip_rows(
+    rows = build_clip_rows(
         piece.name,
         load_clip(piece.input["clip"]),
         load_npz(piece.input["labels"]),

@@ -40,7 +40,7 @@ with job(snakemake) as log:
             seed=options.seed,
         )
     share = manifest.bytes / manifest.original_bytes
-    rows = {split: manifest.rows(split) for split in manifest.chunks}
+    rows = {split: manifest.row_count(split) for split in manifest.chunks}
     log.info(
         "%s rows, %d bytes: %.1f%% of the layout of Holden et al. (2017)", rows, manifest.bytes, 100 * share
     )

@@ -132,7 +132,7 @@ class Channel(ABC):
         import numpy as np
 
         length = float(np.sqrt(np.sum(std**2)))
-        return np.where(std > CONSTANT, max(self.highest / 10, length), SILENT)
+        return np.where(std > CONSTANT_BELOW, max(self.highest / 10, length), SILENCING_STD)
 
     def summary(self, values: Array, labels: Sequence[str], fps: float) -> dict[str, Any]:
         """For the clip's report: label of a column -> `seconds` above 0, `highest` value and `spells`.
@@ -152,9 +152,9 @@ class Channel(ABC):
         }
 
 
-SILENT = 1e10  # divisor of an input that must have no effect
+SILENCING_STD = 1e10  # divisor of an input that must have no effect
 JUMP = 0.05  # share of the channel's highest value; a larger change between two frames starts a new spell
-CONSTANT = 1e-6  # a column with a smaller standard deviation counts as constant
+CONSTANT_BELOW = 1e-6  # a column with a smaller standard deviation counts as constant
 
 
 def find_spells(column: Array, fps: float, highest: float) -> list[list[float]]:

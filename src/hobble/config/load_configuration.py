@@ -17,7 +17,7 @@ from pydantic import BaseModel, ValidationError
 from hobble.config.models import Configuration, Dataset, SkeletonFile, configuration_of
 from hobble.core import untrusted
 from hobble.core.errors import HobbleError, InputError
-from hobble.models import DEFAULT, MODELS
+from hobble.models import DEFAULT_KIND, NETWORK_KINDS
 
 Model = TypeVar("Model", bound=BaseModel)
 # Names that cannot lead out of their folder and are not too long for a file name.
@@ -45,11 +45,11 @@ def merge(base: Mapping[str, Any], over: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def _network_kind(network: Mapping[str, Any], base: Mapping[str, Any] | None = None) -> Any:
-    """The kind of network in a section `network`. If it names none, the kind in `base`, or else DEFAULT.
+    """The kind of network in a section `network`. If it names none, the kind in `base`, or else DEFAULT_KIND.
 
     base: the section that this section overrides, if there is one.
     """
-    return network.get("kind", _network_kind(base) if base is not None else DEFAULT)
+    return network.get("kind", _network_kind(base) if base is not None else DEFAULT_KIND)
 
 
 def read_yaml(path: Path) -> dict[str, Any]:
@@ -186,8 +186,8 @@ class Catalogue:
         if model is not Configuration or not isinstance(network, Mapping):
             return model
         kind = _network_kind(network)
-        if kind not in MODELS:
-            kinds = ", ".join(MODELS)
+        if kind not in NETWORK_KINDS:
+            kinds = ", ".join(NETWORK_KINDS)
             raise HobbleError(f"{where}: network.kind: there is no kind {kind!r:.40}, only {kinds}.")
         return configuration_of(kind)  # type: ignore[return-value]
 

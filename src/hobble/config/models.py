@@ -10,7 +10,7 @@ from pydantic import AfterValidator, Field, create_model, field_validator, model
 from hobble.channels import CHANNEL_NAMES, all_channels, channel
 from hobble.config import sections as s
 from hobble.core.clip_files import CLIP_NAME_RULE, is_valid_clip_name
-from hobble.models import DEFAULT, model
+from hobble.models import DEFAULT_KIND, model_of_kind
 from hobble.models.options import Options
 
 
@@ -162,7 +162,9 @@ class Configuration(s.Section):
     network_of: Name | None = Field(
         None, description="use the network of this other configuration instead of training one"
     )
-    network: Options = model(DEFAULT).options()()  # for other kinds of network, see `configuration_of`
+    network: Options = model_of_kind(
+        DEFAULT_KIND
+    ).options_class()()  # for other kinds of network, see `configuration_of`
     training: s.Training = s.Training()
     runtime: s.Runtime = s.Runtime()
     evaluation: s.Evaluation = s.Evaluation()
@@ -187,9 +189,9 @@ class Configuration(s.Section):
 def configuration_of(kind: str) -> type[Configuration]:
     """A subclass of `Configuration` whose section `network` has the keys of this kind of network.
 
-    kind: one of `hobble.models.MODELS`.
+    kind: one of `hobble.models.NETWORK_KINDS`.
     """
-    options = model(kind).options()
+    options = model_of_kind(kind).options_class()
     return create_model("Configuration", __base__=Configuration, network=(options, options()))
 
 

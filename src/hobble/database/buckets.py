@@ -33,17 +33,17 @@ def gather_fits(fits: Array, count: np.ndarray, order: np.ndarray) -> Array:
 
 
 class Buckets:
-    """The buckets in a folder, each with the rows of `rows_each` consecutive places in the final order.
+    """The buckets in a folder, each with the rows of `rows_per_bucket` consecutive places in the final order.
 
     Rows can be added in any order. rows: number of all rows. columns, fit_columns: number of columns of a row
     and of a terrain fit. A bucket has three files, called tables here: "frames" (the rows), "fits" and
     "index". count: number of buckets.
     """
 
-    def __init__(self, folder: Path, rows: int, rows_each: int, columns: int, fit_columns: int) -> None:
-        self.folder, self.rows_each = folder, rows_each
+    def __init__(self, folder: Path, rows: int, rows_per_bucket: int, columns: int, fit_columns: int) -> None:
+        self.folder, self.rows_per_bucket = folder, rows_per_bucket
         self.columns, self.fit_columns = columns, fit_columns
-        self.count = -(-rows // rows_each)  # rounded up
+        self.count = -(-rows // rows_per_bucket)  # rounded up
         folder.mkdir(parents=True)
 
     def add(self, frames: Array, fits: Array, index: np.ndarray) -> None:
@@ -52,7 +52,7 @@ class Buckets:
         frames: (R, columns) the rows. fits: (S, fit_columns) their fits, row after row. index: (R,) of type
         INDEX.
         """
-        of_rows = index["place"] // self.rows_each
+        of_rows = index["place"] // self.rows_per_bucket
         order = np.argsort(of_rows, kind="stable")
         edges = np.searchsorted(of_rows[order], np.arange(self.count + 1))
         for bucket in np.unique(of_rows):

@@ -14,7 +14,7 @@ from hobble.database.chunks import read_chunk
 from hobble.database.manifest import Manifest
 from hobble.database.precision import STORED
 from hobble.database.scale import ShardConversions
-from hobble.rows.compose import fit_columns, x_columns
+from hobble.rows.compose import column_count_without_terrain, fit_column_count
 
 Buffers = Mapping[str, np.ndarray]
 
@@ -26,13 +26,13 @@ class ChunkWindow:
     chunks: the numbers of the chunks in the split. rows: number of rows of each chunk. The arrays hold R rows
     with together S terrain fits (patches of ground that suit the motion), in the types of the chunk files.
     x: (R, columns of X without terrain). y: (R, Y). count: (R,) number of fits of each row. fits: (S,
-    columns) the fits, row after row. first: (R,) index of each row's first fit in `fits`. clip: (R,) number
-    of each row's clip in the database. frame: (R,) frame in this clip. phase: (R,).
+    columns) the fits, row after row. first_fit: (R,) index of each row's first fit in `fits`. clip: (R,)
+    number of each row's clip in the database. frame: (R,) frame in this clip. phase: (R,).
     """
 
     chunks: Sequence[int]
     rows: Sequence[int]
-    first: np.ndarray
+    first_fit: np.ndarray
     x: Array
     y: Array
     fits: Array
@@ -53,9 +53,9 @@ def empty_buffers(manifest: Manifest, split: str, count: int) -> dict[str, np.nd
     fits = sum(sorted(chunk.fits for chunk in chunks)[-count:])
     floats = STORED[manifest.dtype]
     return {
-        "x": np.empty((rows, x_columns(manifest.layout)), floats),
+        "x": np.empty((rows, column_count_without_terrain(manifest.layout)), floats),
         "y": np.empty((rows, manifest.layout.y_size), floats),
-        "fits": np.empty((fits, fit_columns(manifest.layout)), floats),
+        "fits": np.empty((fits, fit_column_count(manifest.layout)), floats),
         "count": np.empty(rows, np.int32),
         "clip": np.empty(rows, np.int32),
         "frame": np.empty(rows, np.int32),

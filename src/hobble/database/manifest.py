@@ -65,7 +65,7 @@ class Manifest:
     bytes: int
     limits: Mapping[str, Any] = field(default_factory=dict)
 
-    def rows(self, split: str) -> int:
+    def row_count(self, split: str) -> int:
         """Number of rows of a split."""
         return sum(chunk.rows for chunk in self.chunks[split])
 

@@ -15,7 +15,7 @@ from typing import Any
 
 from hobble.core.errors import InputError
 from hobble.rows.clip_rows import ClipRows, Outline, read_outline
-from hobble.rows.compose import fit_columns, x_columns
+from hobble.rows.compose import column_count_without_terrain, fit_column_count
 from hobble.rows.layout import RowLayout
 
 # Size of a bucket (`hobble.database.buckets`). Sorting a bucket needs a few times as much memory.
@@ -44,7 +44,7 @@ class Plan:
     chunk_rows: int
     bucket_rows: int
 
-    def rows(self, split: str) -> int:
+    def row_count(self, split: str) -> int:
         """Number of used rows in a split ("train" or "held_out")."""
         return sum(clip["rows"] for clip in self.clips if clip["split"] == split)
 
@@ -103,7 +103,9 @@ def make_plan(
         return None
     layout = first.layout.with_channels(channels)
     # How many numbers a row has on average, with its fits.
-    row_numbers = x_columns(layout) + layout.y_size + fit_columns(layout) * pairs / max(rows, 1)
+    row_numbers = (
+        column_count_without_terrain(layout) + layout.y_size + fit_column_count(layout) * pairs / max(rows, 1)
+    )
     chunk_rows = max(1, int(chunk_bytes / (number_bytes * row_numbers + INDEX_BYTES)))
     bucket_chunks = max(1, int(BUCKET_BYTES / (chunk_rows * 4 * row_numbers)))
     return Plan(layout, first.skeleton, visits, entries, chunk_rows, chunk_rows * bucket_chunks)

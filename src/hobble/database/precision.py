@@ -22,7 +22,7 @@ STORED: dict[str, np.dtype[Any]] = {
 }
 
 
-def narrow(values: Array, precision: str) -> np.ndarray:
+def to_stored_type(values: Array, precision: str) -> np.ndarray:
     """Convert float values to the type that is stored for `precision`, a key of STORED.
 
     Rounds to the nearest number, and a value halfway between two numbers to the one whose last bit is 0.
@@ -43,7 +43,7 @@ def narrow(values: Array, precision: str) -> np.ndarray:
     return ((bits + np.uint32(0x7FFF) + ((bits >> 16) & 1)) >> 16).astype("<u2")
 
 
-def widen(values: np.ndarray) -> Array:
+def to_floats(values: np.ndarray) -> Array:
     """Convert stored bfloat16 (uint16) to float32. Other types are returned unchanged."""
     if values.dtype != STORED["bfloat16"]:
         return values

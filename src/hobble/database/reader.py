@@ -24,7 +24,7 @@ from hobble.core.quat import Array
 from hobble.database import order
 from hobble.database.chunk_window import Buffers, ChunkWindow, empty_buffers, load_chunks
 from hobble.database.manifest import STATISTICS, Manifest
-from hobble.database.precision import widen
+from hobble.database.precision import to_floats
 from hobble.database.scale import ShardConversions
 from hobble.database.sharing import SampleRange
 from hobble.database.statistics import Statistics
@@ -57,14 +57,14 @@ class UncomposedRows(NamedTuple):
 
     x: (n, X without terrain). y: (n, Y). p: (n,) phase. fits: (m, columns) the fits, row after row: ground
     heights, then the lift in cm. The lift says how far the fit's mean height is above the average of these
-    means over all fits of the row. first: (n,) index of each row's first fit in `fits`.
+    means over all fits of the row. first_fit: (n,) index of each row's first fit in `fits`.
     """
 
     x: Array
     y: Array
     p: Array
     fits: Array
-    first: np.ndarray
+    first_fit: np.ndarray
 
 
 @dataclass(frozen=True)
@@ -137,20 +137,20 @@ class Database:
         """Name of each hurt version of a clip -> name of the healthy clip from which it was made."""
         return {clip["clip"]: clip["source"] for clip in self.manifest.clips if "source" in clip}
 
-    def rows(self, split: str) -> int:
+    def row_count(self, split: str) -> int:
         """Number of rows (frames) of "train" or "held_out"."""
-        return self.manifest.rows(split)
+        return self.manifest.row_count(split)
 
-    def samples(self, split: str) -> int:
+    def sample_count(self, split: str) -> int:
         """Number of samples of a pass. A sample is a pair of a row and one of its terrain fits.
 
         A row on flat ground has a single fit, which a pass uses `visits` times.
         """
-        return self.rows(split) * self.manifest.visits
+        return self.row_count(split) * self.manifest.visits
 
-    def section_samples(self, split: str, section: int, sections: int) -> int:
+    def section_sample_count(self, split: str, section: int, sections: int) -> int:
         """Number of samples of section number `section`, from 0, of a pass in `sections` sections."""
-        total = self.samples(split)
+        total = self.sample_count(split)
         return total * (section + 1) // sections - total * section // sections
 
     def blocks(
@@ -177,13 +177,13 @@ class Database:
         """
         if not 0 <= section < sections:
             raise HobbleError(f"there is no section {section}: a pass of {sections} has 0 to {sections - 1}")
-        if self.rows(split) == 0:
+        if self.row_count(split) == 0:
             return iter(())
-        total = self.section_samples(split, section, sections)
+        total = self.section_sample_count(split, section, sections)
         stretch = stretch or SampleRange(0, total, total, 0, total)
         cut = stretch.start, stretch.stop
-        spans = order.layer_parts(self.rows(split), self.manifest.visits, section, sections, cut)
-        window = window or self.window(split, block_rows)
+        spans = order.layer_parts(self.row_count(split), self.manifest.visits, section, sections, cut)
+        window = window or self.chunks_per_window(split, block_rows)
         buffers = self._two_buffer_sets(split, window)
         picked = chain.from_iterable(
             self._pick_rows(split, (seed, pass_index, layer), start, stop, window, buffers)
@@ -194,7 +194,7 @@ class Database:
     def each_row(self, split: str) -> Iterator[UncomposedRows]:
         """Each row of a split once, with its fits, in the order of the chunks, BLOCK_ROWS at a time."""
         chunks = len(self.manifest.chunks[split])
-        window = self.window(split, BLOCK_ROWS)
+        window = self.chunks_per_window(split, BLOCK_ROWS)
         if window < chunks:
             numbers, buffers = range(chunks), self._two_buffer_sets(split, window)
             groups = (numbers[start : start + window] for start in range(0, chunks, window))
@@ -204,9 +204,9 @@ class Database:
         for loaded in windows:
             for start in range(0, len(loaded.count), BLOCK_ROWS):
                 part = slice(start, start + BLOCK_ROWS)
-                first, count = loaded.first[part], loaded.count[part]
-                fits = widen(loaded.fits[first[0] : first[-1] + count[-1]]).astype(np.float32)
-                x, y = (widen(table[part]).astype(np.float32) for table in (loaded.x, loaded.y))
+                first, count = loaded.first_fit[part], loaded.count[part]
+                fits = to_floats(loaded.fits[first[0] : first[-1] + count[-1]]).astype(np.float32)
+                x, y = (to_floats(table[part]).astype(np.float32) for table in (loaded.x, loaded.y))
                 yield UncomposedRows(x, y, loaded.phase[part], fits, first - first[0])
 
     def _pick_rows(
@@ -234,7 +234,7 @@ class Database:
         for group, _, low, high in groups:
             w, visits, key = next(windows), self.manifest.visits, (*layer_key, group)
             part = slice(low, high)
-            yield w, *order.rows_and_fits(w.chunks, w.rows, w.count, w.first, visits, key, part)
+            yield w, *order.rows_and_fits(w.chunks, w.rows, w.count, w.first_fit, visits, key, part)
 
     def _chunk_groups(
         self, split: str, layer_key: tuple[int, int, int], start: int, stop: int, window: int
@@ -262,7 +262,7 @@ class Database:
         limit = min(BLOCK_ROWS, (self.memory_mb << 20) // (4 * BLOCKS * row_bytes))
         return batch * max(1, limit // batch)
 
-    def window(self, split: str, block_rows: int) -> int:
+    def chunks_per_window(self, split: str, block_rows: int) -> int:
         """The number of chunks that may be in memory together: all chunks of the split if both splits fit.
 
         Otherwise, memory for two such groups is needed, because the next group is read while the present one
@@ -318,13 +318,13 @@ class Database:
         rows: (n,) indices of the rows. fits: (n,) indices of their fits. One core composes 2 million rows (31
         joints) a second.
         """
-        frames, ground = widen(window.x[rows]), widen(window.fits[fits])
+        frames, ground = to_floats(window.x[rows]), to_floats(window.fits[fits])
         if window.y.dtype == y.dtype:
             np.take(
                 window.y, rows, axis=0, out=y, mode="clip"
             )  # mode "raise", the default, makes another copy
         else:
-            y[...] = widen(window.y[rows])
+            y[...] = to_floats(window.y[rows])
         lift = ground[:, -1:].astype(np.float32)
         lift_or_none = lift if lift.any() else None  # None skips the subtraction
         stds = self.statistics.x_std, self.statistics.y_std

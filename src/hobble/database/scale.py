@@ -18,7 +18,7 @@ from hobble.core.files import load_npz
 from hobble.core.quat import Array
 from hobble.database.chunks import HINT
 from hobble.database.manifest import SCALES, SPLITS, Manifest
-from hobble.database.precision import narrow, widen
+from hobble.database.precision import to_floats, to_stored_type
 from hobble.database.statistics import Statistics
 
 PART_ROWS = 256  # 16-bit rows are converted so many at a time, so that their float32 copy is small
@@ -52,7 +52,7 @@ def _convert(values: np.ndarray, factors_and_summands: FactorsAndSummands, dtype
         return
     for start in range(0, len(values), PART_ROWS):
         part = values[start : start + PART_ROWS]
-        part[...] = narrow(widen(part).astype(np.float32) * factor + summand, dtype)
+        part[...] = to_stored_type(to_floats(part).astype(np.float32) * factor + summand, dtype)
 
 
 def _factors_and_summands(mean: Array, std: Array, to_mean: Array, to_std: Array) -> FactorsAndSummands:

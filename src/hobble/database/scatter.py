@@ -18,7 +18,7 @@ from hobble.database.buckets import INDEX, Buckets
 from hobble.database.manifest import SPLITS
 from hobble.database.plan import Plan, RowSource, used_rows
 from hobble.rows.clip_rows import ClipRows, load_clip_rows
-from hobble.rows.compose import fit_columns, frame_inputs, x_columns
+from hobble.rows.compose import column_count_without_terrain, fit_column_count, frame_inputs
 from hobble.rows.layout import RowLayout
 
 PART_ROWS = 8192  # rows of a clip are scattered so many at a time, to use little memory
@@ -26,9 +26,14 @@ PART_ROWS = 8192  # rows of a clip are scattered so many at a time, to use littl
 
 def make_buckets(folder: Path, plan: Plan) -> dict[str, Buckets]:
     """Empty buckets for each split, in subfolders of `folder`."""
-    columns, fit_size = x_columns(plan.layout) + plan.layout.y_size, fit_columns(plan.layout)
+    columns, fit_size = (
+        column_count_without_terrain(plan.layout) + plan.layout.y_size,
+        fit_column_count(plan.layout),
+    )
     return {
-        split: Buckets(folder / f"buckets-{split}", plan.rows(split), plan.bucket_rows, columns, fit_size)
+        split: Buckets(
+            folder / f"buckets-{split}", plan.row_count(split), plan.bucket_rows, columns, fit_size
+        )
         for split in SPLITS
     }
 
@@ -42,7 +47,7 @@ def scatter(
     all its rows, its used rows) for each clip.
     """
     places = {
-        split: np.random.default_rng([seed, number]).permutation(plan.rows(split))
+        split: np.random.default_rng([seed, number]).permutation(plan.row_count(split))
         for number, split in enumerate(SPLITS)
     }
     done = dict.fromkeys(SPLITS, 0)  # rows of each split that already have a place

@@ -60,7 +60,7 @@ def write_shard(
             write_json(folder / INDEX, {"plan": None, "chunks": {}})
             return
         buckets = make_buckets(folder, plan)
-        no_rows = Moments.nothing(plan.layout.x_size), Moments.nothing(plan.layout.y_size)
+        no_rows = Moments.of_no_rows(plan.layout.x_size), Moments.of_no_rows(plan.layout.y_size)
         moments: dict[str, MomentsXY] = dict.fromkeys(SPLITS, no_rows)
         learners = make_limit_learners(plan.layout, plan.skeleton)
         for entry, rows, used in scatter(buckets, clips, plan, seed):

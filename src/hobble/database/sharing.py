@@ -48,7 +48,7 @@ class SampleRange:
 
 
 @dataclass(frozen=True)
-class PassSharing:
+class SectionSharing:
     """A section of `total` samples in batches of `batch` samples, as one process sees it.
 
     stretches: number of stretches, at most `batch`. own: the places in a batch, from 0, that this process
@@ -61,7 +61,9 @@ class PassSharing:
     own: range
 
     @classmethod
-    def of(cls, total: int, batch: int, stretches: int = 1, rank: int = 0, processes: int = 1) -> PassSharing:
+    def for_process(
+        cls, total: int, batch: int, stretches: int = 1, rank: int = 0, processes: int = 1
+    ) -> SectionSharing:
         """A section as process `rank` (from 0) of `processes` processes sees it.
 
         The numbers of samples that the processes read of a batch differ by at most one.

@@ -10,7 +10,7 @@ from typing import TypedDict
 from hobble.database.manifest import Manifest
 from hobble.database.plan import INDEX_BYTES
 from hobble.database.precision import STORED
-from hobble.rows.compose import fit_columns, x_columns
+from hobble.rows.compose import column_count_without_terrain, fit_column_count
 
 # Number of frames at 60 Hz, mirrored ones included, in the clips released with Holden, Komura, Saito (2017).
 RELEASED_FRAMES = 465_990
@@ -41,13 +41,13 @@ class Sizes(TypedDict):
     released_bytes: int
 
 
-def sizes(manifest: Manifest) -> Sizes:
+def database_sizes(manifest: Manifest) -> Sizes:
     """The sizes of a database."""
-    frames = sum(manifest.rows(split) for split in manifest.chunks)
+    frames = sum(manifest.row_count(split) for split in manifest.chunks)
     layout, number_bytes = manifest.layout, STORED[manifest.dtype].itemsize
-    frame_bytes = number_bytes * (x_columns(layout) + layout.y_size) + INDEX_BYTES
+    frame_bytes = number_bytes * (column_count_without_terrain(layout) + layout.y_size) + INDEX_BYTES
     fits_a_frame = RELEASED_FLAT + (1 - RELEASED_FLAT) * manifest.visits
-    released = RELEASED_FRAMES * (frame_bytes + fits_a_frame * number_bytes * fit_columns(layout))
+    released = RELEASED_FRAMES * (frame_bytes + fits_a_frame * number_bytes * fit_column_count(layout))
     return {
         "joints": layout.joints,
         "dtype": manifest.dtype,

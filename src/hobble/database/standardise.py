@@ -6,7 +6,7 @@ import numpy as np
 
 from hobble.core.quat import Array
 from hobble.database.statistics import Statistics
-from hobble.rows.compose import lower_joints, without_terrain
+from hobble.rows.compose import blocks_without_terrain, lower_joints
 from hobble.rows.layout import RowLayout
 
 
@@ -27,7 +27,7 @@ def standardise_rows(
     fit_row = np.repeat(np.arange(len(count)), count)  # index of each fit's row
     row_mean = np.bincount(fit_row, fits[:, -1].astype(np.float64) / count[fit_row], len(count))
     x, y = x.astype(np.float64), y.astype(np.float64)
-    lower_joints(x, without_terrain(layout)["joint_position"], row_mean[:, None])
+    lower_joints(x, blocks_without_terrain(layout)["joint_position"], row_mean[:, None])
     lower_joints(y, layout.y_joint_position, row_mean[:, None])
     x = (x - np.delete(s.x_mean, terrain)) / np.delete(s.x_std, terrain)
     heights = (fits[:, :-1].astype(np.float64) - s.x_mean[terrain]) / s.x_std[terrain]

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from hobble.channels import channel
-from hobble.channels.channel import CONSTANT, SILENT
+from hobble.channels.channel import CONSTANT_BELOW, SILENCING_STD
 from hobble.core.quat import Array
 from hobble.rows.clip_rows import ClipRows
 from hobble.rows.compose import TERRAIN, body_layout
@@ -58,16 +58,16 @@ class Moments:
         return np.sqrt(self.squares / max(self.weight, 1e-300))
 
     @classmethod
-    def nothing(cls, columns: int) -> Moments:
+    def of_no_rows(cls, columns: int) -> Moments:
         """The moments of no rows."""
         return cls(0.0, np.zeros(columns), np.zeros(columns))
 
     @classmethod
-    def of(cls, values: Array, weights: Array | None = None) -> Moments:
+    def of_rows(cls, values: Array, weights: Array | None = None) -> Moments:
         """The moments of rows `values` (N, C). weights: (N,) the rows' weights; None: each has weight 1."""
         values = np.asarray(values, np.float64, order="C")
         if not len(values):
-            return cls.nothing(values.shape[1])
+            return cls.of_no_rows(values.shape[1])
         w = np.ones((len(values), 1)) if weights is None else np.asarray(weights, np.float64)[:, None]
         total = float(w.sum())
         # Sums, not matrix products: the last bits of a product depend on the arrays' memory addresses.
@@ -95,7 +95,7 @@ def clip_moments(rows: ClipRows, layout: RowLayout) -> tuple[Moments, Moments]:
     row on flat ground counts as much as the ten fits of another row together.
     """
     body = body_layout(layout)
-    x, y = Moments.nothing(layout.x_size), Moments.nothing(layout.y_size)
+    x, y = Moments.of_no_rows(layout.x_size), Moments.of_no_rows(layout.y_size)
     first = rows.first_fit
     for start in range(0, len(rows), BATCH):
         part = slice(start, min(start + BATCH, len(rows)))
@@ -106,10 +106,10 @@ def clip_moments(rows: ClipRows, layout: RowLayout) -> tuple[Moments, Moments]:
         mean = rows.mean[part_fits].astype(np.float64)
         row_mean: Array = np.bincount(fit_row, weight * mean, len(fits)).astype(np.float64)
         spread = float(np.sum(weight * (mean - row_mean[fit_row]) ** 2))
-        heights = Moments.of(rows.heights[part_fits], weight)
+        heights = Moments.of_rows(rows.heights[part_fits], weight)
         x_frame = _moments_of_lowered(rows.x[part], body.x_joint_position, row_mean, spread)
         parts = {name: x_frame.columns(block) for name, block in body.blocks("x").items() if name != TERRAIN}
-        parts |= {name: Moments.of(rows.channels[name][part]) for name, _ in layout.channels}
+        parts |= {name: Moments.of_rows(rows.channels[name][part]) for name, _ in layout.channels}
         parts[TERRAIN] = heights
         x = x + _join_columns(*[parts[name] for name in layout.blocks("x")])
         y = y + _moments_of_lowered(rows.y[part], layout.y_joint_position, row_mean, spread)
@@ -127,7 +127,7 @@ def _moments_of_lowered(values: Array, joints: slice, row_mean: Array, spread: f
     values = values.astype(np.float64)
     heights = slice(joints.start + 1, joints.stop, 3)
     values[:, heights] -= row_mean[:, None]
-    moments = Moments.of(values)
+    moments = Moments.of_rows(values)
     moments.squares[heights] += spread
     return moments
 
@@ -166,7 +166,7 @@ def share_in_groups(std: Array, groups: Iterable[slice], constant: float) -> Arr
     out = np.array(std, np.float64)
     for group in groups:
         mean = float(np.mean(std[group]))
-        out[group] = mean if mean > CONSTANT else constant
+        out[group] = mean if mean > CONSTANT_BELOW else constant
     return out
 
 
@@ -179,7 +179,7 @@ def statistics_of_moments(
     columns of X is divided by w * joint_weight, so that the standardised values are multiplied by it. w is
     UNSEEN for the joints in `unseen`, and 1 for others. Each channel defines the deviations of its columns.
     """
-    x_std = share_in_groups(x.std, x_groups(layout), SILENT)
+    x_std = share_in_groups(x.std, x_groups(layout), SILENCING_STD)
     w = np.ones(layout.joints)
     w[list(unseen)] = UNSEEN
     for block in (layout.x_joint_position, layout.x_joint_velocity):

@@ -14,10 +14,10 @@ import numpy as np
 from hobble.database.buckets import Buckets
 from hobble.database.chunks import Chunk, write_chunk
 from hobble.database.plan import Plan
-from hobble.database.precision import narrow
+from hobble.database.precision import to_stored_type
 from hobble.database.standardise import standardise_rows
 from hobble.database.statistics import Statistics
-from hobble.rows.compose import x_columns
+from hobble.rows.compose import column_count_without_terrain
 
 
 def write_chunks(
@@ -28,7 +28,7 @@ def write_chunks(
     A chunk has up to `plan.chunk_rows` rows of one bucket. split: "train" or "held_out". buckets: the rows.
     They are deleted. dtype: type of the stored numbers. Yields a description of each chunk.
     """
-    columns, number = x_columns(plan.layout), 0
+    columns, number = column_count_without_terrain(plan.layout), 0
     for frames, fits, index in buckets.drain():  # one bucket at a time, sorted
         ends = np.cumsum(index["count"])
         for start in range(0, len(index), plan.chunk_rows):
@@ -38,9 +38,9 @@ def write_chunks(
             raw = frames[part, :columns], frames[part, columns:], fits[fit_part]
             x, y, ground = standardise_rows(plan.layout, statistics, *raw, count)
             arrays = {
-                "x": narrow(x, dtype),
-                "y": narrow(y, dtype),
-                "fits": narrow(ground, dtype),
+                "x": to_stored_type(x, dtype),
+                "y": to_stored_type(y, dtype),
+                "fits": to_stored_type(ground, dtype),
                 "count": count,
                 "clip": index["clip"][part],
                 "frame": index["frame"][part],

@@ -15,7 +15,7 @@ from hobble.core import quat
 from hobble.core.quat import Array
 from hobble.core.skeleton import Skeleton
 from hobble.figure.mesh import Mesh, body_mesh
-from hobble.models.packing import packed
+from hobble.models.packing import to_base64
 
 UNIT = 0.01  # cm; positions of corners are stored as multiples of this
 TURN = 32767  # the integer that stands for 1 in packed rotations
@@ -34,13 +34,13 @@ def packed_body(skeleton: Skeleton) -> dict[str, Any]:
     index_type = np.uint16 if len(mesh.corners) < 1 << 16 else np.uint32
     return {
         "unit": UNIT,
-        "corners": packed(np.round(mesh.corners / UNIT).astype(np.int16)),
-        "normals": packed(np.round(mesh.normals * 127).astype(np.int8)),
-        "shade": packed(np.round(mesh.shade * 255).astype(np.uint8)),
-        "faces": packed(mesh.faces.astype(index_type)),
+        "corners": to_base64(np.round(mesh.corners / UNIT).astype(np.int16)),
+        "normals": to_base64(np.round(mesh.normals * 127).astype(np.int8)),
+        "shade": to_base64(np.round(mesh.shade * 255).astype(np.uint8)),
+        "faces": to_base64(mesh.faces.astype(index_type)),
         "wide": index_type is np.uint32,
-        "bone": packed(mesh.bones_of_corner.astype(np.uint8)),
-        "share": packed(whole_weights(mesh.weights)),
+        "bone": to_base64(mesh.bones_of_corner.astype(np.uint8)),
+        "share": to_base64(whole_weights(mesh.weights)),
         "keep": mesh.bones.tolist(),
         "places": np.round(mesh.positions, 4).tolist(),
         "turns": np.round(mesh.rotations, 6).tolist(),
@@ -128,4 +128,4 @@ def link_ends(joints: Sequence[str], links: Sequence[str]) -> list[tuple[int, in
 
 def packed_turns(rotations: Array) -> str:
     """Rotations (F, B, 4) as 16-bit integers in base64. The integer TURN stands for 1."""
-    return packed(np.round(np.clip(rotations, -1, 1) * TURN).astype(np.int16))
+    return to_base64(np.round(np.clip(rotations, -1, 1) * TURN).astype(np.int16))

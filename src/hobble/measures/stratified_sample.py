@@ -80,7 +80,7 @@ class Sample:
             for excerpt in stratum.drawn
         }
 
-    def half_width(self, split: str, values: Mapping[Excerpt, float]) -> float:
+    def confidence_half_width(self, split: str, values: Mapping[Excerpt, float]) -> float:
         """Half the width of the 95 % confidence interval of the mean over all rows of a split.
 
         values: excerpt in the sample -> mean of the measured quantity over its rows.
@@ -103,7 +103,7 @@ class Sample:
 
 
 def _variance(stratum: Stratum, values: Mapping[Excerpt, float]) -> float:
-    """Variance of the estimated mean over a stratum's rows. values: as in `Sample.half_width`.
+    """Variance of the estimated mean over a stratum's rows. values: as in `Sample.confidence_half_width`.
 
     The estimate is the mean of the drawn excerpts, weighted by their rows (a ratio estimate). The variance is
     0 if all excerpts are drawn.

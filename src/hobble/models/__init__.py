@@ -17,12 +17,12 @@ if TYPE_CHECKING:
     from hobble.models.options import Options
 
 # The values of `network.kind` in a configuration.
-MODELS = tuple(sorted(path.parent.name for path in Path(__file__).parent.glob("*/__init__.py")))
-DEFAULT = "pfnn"  # the kind of network where a configuration or a network's file names no kind
+NETWORK_KINDS = tuple(sorted(path.parent.name for path in Path(__file__).parent.glob("*/__init__.py")))
+DEFAULT_KIND = "pfnn"  # the kind of network where a configuration or a network's file names no kind
 
 
-def model(kind: str) -> Model:
-    """The `Model` of the kind named `kind`, one of MODELS."""
+def model_of_kind(kind: str) -> Model:
+    """The `Model` of the kind named `kind`, one of NETWORK_KINDS."""
     return importlib.import_module(f"hobble.models.{kind}").MODEL
 
 
@@ -31,4 +31,4 @@ def network_options(section: Mapping[str, Any]) -> Options:
 
     The function is not called `options`, because a module of this package has that name.
     """
-    return model(section.get("kind", DEFAULT)).options().model_validate(section)
+    return model_of_kind(section.get("kind", DEFAULT_KIND)).options_class().model_validate(section)

@@ -36,7 +36,7 @@ STATISTICS = {"Xmean": "x_mean", "Xstd": "x_std", "Ymean": "y_mean", "Ystd": "y_
 DIVERGED = "The training diverged, or the file is damaged."
 
 
-def numbers(
+def read_numbers(
     path: str | Path, arrays: Mapping[str, Any], name: str, axes: int, largest: float = LARGEST_WEIGHT
 ) -> Array:
     """The array `name` as float32. It must have `axes` axes and must not be empty.
@@ -81,7 +81,7 @@ def count_layers(path: str | Path, arrays: Mapping[str, Any], *prefixes: str) ->
     return len(found)
 
 
-def weights_and_biases(
+def read_weights_and_biases(
     path: str | Path,
     arrays: Mapping[str, Any],
     prefixes: tuple[str, str],
@@ -97,8 +97,8 @@ def weights_and_biases(
     outputs: number of outputs of the last layer.
     """
     count = count_layers(path, arrays, *prefixes)
-    weights = tuple(numbers(path, arrays, f"{prefixes[0]}{i}", axes) for i in range(count))
-    biases = tuple(numbers(path, arrays, f"{prefixes[1]}{i}", axes - 1) for i in range(count))
+    weights = tuple(read_numbers(path, arrays, f"{prefixes[0]}{i}", axes) for i in range(count))
+    biases = tuple(read_numbers(path, arrays, f"{prefixes[1]}{i}", axes - 1) for i in range(count))
     size, sets = inputs, weights[0].shape[:-2]
     for i, (w, b) in enumerate(zip(weights, biases, strict=True)):
         if w.shape[:-2] != sets or w.shape[-1] != size or b.shape != w.shape[:-1]:
@@ -111,7 +111,7 @@ def weights_and_biases(
     return weights, biases
 
 
-def statistics(path: str | Path, arrays: Mapping[str, Any]) -> dict[str, Array]:
+def read_statistics(path: str | Path, arrays: Mapping[str, Any]) -> dict[str, Array]:
     """The means and standard deviations of the inputs X and of the outputs Y.
 
     The keys are x_mean and x_std, each (X,), and y_mean and y_std, each (Y,).
@@ -119,7 +119,7 @@ def statistics(path: str | Path, arrays: Mapping[str, Any]) -> dict[str, Array]:
     found = {}
     for name, key in STATISTICS.items():
         is_std = key.endswith("std")
-        found[key] = numbers(path, arrays, name, 1, LARGEST_STD if is_std else LARGEST_MEAN)
+        found[key] = read_numbers(path, arrays, name, 1, LARGEST_STD if is_std else LARGEST_MEAN)
         if is_std and found[key].min() < 0:
             raise InputError(
                 path, f"{name} holds {found[key].min():g}, but a standard deviation cannot be negative"
@@ -133,7 +133,7 @@ def statistics(path: str | Path, arrays: Mapping[str, Any]) -> dict[str, Array]:
     return found
 
 
-def names(path: str | Path, what: str, value: Any) -> tuple[str, ...]:
+def require_names(path: str | Path, what: str, value: Any) -> tuple[str, ...]:
     """`value` as a tuple, if it is a list of short printable names, all different.
 
     what: in this and the following functions, the words for the value in an error message.
@@ -151,14 +151,16 @@ def names(path: str | Path, what: str, value: Any) -> tuple[str, ...]:
     return tuple(value)
 
 
-def whole_number(path: str | Path, what: str, value: Any, least: int, most: int) -> int:
+def require_whole_number(path: str | Path, what: str, value: Any, least: int, most: int) -> int:
     """`value`, if it is a whole number from `least` to `most`."""
     if isinstance(value, bool) or not isinstance(value, int) or not least <= value <= most:
         raise InputError(path, f"{what} is {_abridged(value)}, not a whole number from {least} to {most}")
     return value
 
 
-def number_in_range(path: str | Path, what: str, value: Any, most: float, least: float = 0.0) -> float:
+def require_number_in_range(
+    path: str | Path, what: str, value: Any, most: float, least: float = 0.0
+) -> float:
     """`value` as a float, if it is a finite number above `least` and up to `most`."""
     is_number = isinstance(value, int | float) and not isinstance(value, bool)
     if not is_number or not least < value <= most:
@@ -168,26 +170,26 @@ def number_in_range(path: str | Path, what: str, value: Any, most: float, least:
     return float(value)
 
 
-def mapping(path: str | Path, what: str, value: Any) -> dict[str, Any]:
+def require_mapping(path: str | Path, what: str, value: Any) -> dict[str, Any]:
     """`value`, if it is a mapping (a dict)."""
     if not isinstance(value, dict):
         raise InputError(path, f"{what} is {_abridged(value)}, not keys and values")
     return value
 
 
-def skeleton(path: str | Path, value: Any) -> Skeleton:
+def skeleton_from_data(path: str | Path, value: Any) -> Skeleton:
     """The skeleton that `value` describes in the format of `Skeleton.to_dict`.
 
     Each joint must come after its parent, and each of NEEDED_ROLES must have a joint.
     """
-    data = mapping(path, "its skeleton", value)
-    joints = mapping(path, "its skeleton's joints", data.get("joints"))
-    names(path, "its skeleton's joints", list(joints))
+    data = require_mapping(path, "its skeleton", value)
+    joints = require_mapping(path, "its skeleton's joints", data.get("joints"))
+    require_names(path, "its skeleton's joints", list(joints))
     if not joints:
         raise InputError(path, "its skeleton has no joints")
     seen: set[str] = set()
     for joint, entry in joints.items():
-        parent = mapping(path, f"joint {joint}", entry).get("parent")
+        parent = require_mapping(path, f"joint {joint}", entry).get("parent")
         if (parent is None) != (not seen) or (parent is not None and not _is_one_of(parent, seen)):
             raise InputError(
                 path,
@@ -197,7 +199,9 @@ def skeleton(path: str | Path, value: Any) -> Skeleton:
         _three_numbers(path, f"joint {joint}: its offset", entry.get("offset"))
         seen.add(joint)
     _check_named_joints(path, data, seen)
-    return Skeleton.from_dict({**data, "name": names(path, "its skeleton's name", [data.get("name")])[0]})
+    return Skeleton.from_dict(
+        {**data, "name": require_names(path, "its skeleton's name", [data.get("name")])[0]}
+    )
 
 
 def _check_named_joints(path: str | Path, data: Mapping[str, Any], joints: set[str]) -> None:
@@ -205,16 +209,16 @@ def _check_named_joints(path: str | Path, data: Mapping[str, Any], joints: set[s
 
     joints: the names of the skeleton's joints.
     """
-    roles = mapping(path, "its skeleton's roles", data.get("roles"))
+    roles = require_mapping(path, "its skeleton's roles", data.get("roles"))
     if missing := [role for role in NEEDED_ROLES if role not in roles]:
         raise InputError(path, f"its skeleton has no joint for the roles {', '.join(missing)}")
     links = data.get("links", [])
     if not isinstance(links, list) or not all(isinstance(pair, list) and len(pair) == 2 for pair in links):
         raise InputError(path, f"its skeleton's links are {_abridged(links)}, not a list of pairs of joints")
-    ends = mapping(path, "its skeleton's end sites", data.get("end_sites", {}))
+    ends = require_mapping(path, "its skeleton's end sites", data.get("end_sites", {}))
     for joint, end in ends.items():
         _three_numbers(path, f"the end site of {_abridged(joint)}", end)
-    unseen = names(path, "its skeleton's unseen joints", data.get("unseen", []))
+    unseen = require_names(path, "its skeleton's unseen joints", data.get("unseen", []))
     for name in (*roles.values(), *(joint for link in links for joint in link), *ends, *unseen):
         if not _is_one_of(name, joints):
             raise InputError(path, f"its skeleton names {_abridged(name)}, which is not one of its joints")
@@ -229,7 +233,7 @@ def _three_numbers(path: str | Path, what: str, value: Any) -> None:
     if not isinstance(value, list | tuple) or len(value) != 3:
         raise InputError(path, f"{what} is {_abridged(value)}, not three numbers")
     for number in value:
-        number_in_range(path, what, number, FARTHEST, -FARTHEST)
+        require_number_in_range(path, what, number, FARTHEST, -FARTHEST)
 
 
 def _abridged(value: Any) -> str:

@@ -56,7 +56,7 @@ class FusedBase:
             self.counter = counter_after(self.counter, rows * width)
         return masks
 
-    def multiplied(self, name: str, a: Tensor, b: Tensor) -> Tensor:
+    def multiply(self, name: str, a: Tensor, b: Tensor) -> Tensor:
         """a @ b.T, in the buffer `name`. The next call with the same name may overwrite the result."""
         return product(a, b, self.buffer(name, len(a), len(b), a.dtype))
 

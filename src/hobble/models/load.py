@@ -19,7 +19,7 @@ from hobble.core.errors import InputError
 from hobble.core.files import load_npz
 from hobble.core.skeleton import Skeleton
 from hobble.core.untrusted import read_yaml
-from hobble.models import DEFAULT, MODELS, checks, model
+from hobble.models import DEFAULT_KIND, NETWORK_KINDS, checks, model_of_kind
 from hobble.models.network import TERRAIN_SIDE, Network
 from hobble.models.training_facts import TrainingFacts
 from hobble.rows.layout import GAITS, RowLayout
@@ -31,9 +31,9 @@ LARGEST_Y = 1e9  # of the prediction for the mean input; a working network predi
 
 def read_skeleton(path: str | Path) -> Skeleton:
     """The skeleton in a file of config/skeletons. Raises InputError if the skeleton is not valid."""
-    data = checks.mapping(path, "a skeleton", read_yaml(path))
+    data = checks.require_mapping(path, "a skeleton", read_yaml(path))
     keys = {key: value for key, value in data.items() if key != "maps"}
-    return checks.skeleton(path, {"name": Path(path).stem, **keys})
+    return checks.skeleton_from_data(path, {"name": Path(path).stem, **keys})
 
 
 def load_network(path: str | Path, skeleton: Skeleton | str | Path | None = None) -> Network:
@@ -50,8 +50,8 @@ def load_network(path: str | Path, skeleton: Skeleton | str | Path | None = None
     if path.is_dir():
         if (path / "weights.npz").exists():
             return load_network(path / "weights.npz", skeleton)
-        for kind in MODELS:
-            if (arrays := model(kind).read_folder(path)) is not None:
+        for kind in NETWORK_KINDS:
+            if (arrays := model_of_kind(kind).read_folder(path)) is not None:
                 return network_from_arrays(path, arrays, skeleton)
         raise InputError(
             path,
@@ -70,31 +70,31 @@ def network_from_arrays(
     skeleton: for a network whose `meta` has none.
     """
     meta = _read_meta(path, arrays)
-    kind = meta.get("kind", DEFAULT)
-    if kind not in MODELS:
-        raise InputError(path, f"is a network of kind {kind!a:.40}; known kinds: {', '.join(MODELS)}")
-    statistics = checks.statistics(path, arrays)
+    kind = meta.get("kind", DEFAULT_KIND)
+    if kind not in NETWORK_KINDS:
+        raise InputError(path, f"is a network of kind {kind!a:.40}; known kinds: {', '.join(NETWORK_KINDS)}")
+    statistics = checks.read_statistics(path, arrays)
     layout = _read_layout(path, meta, len(statistics["x_mean"]), len(statistics["y_mean"]), skeleton)
     if meta.get("skeleton"):
-        skeleton = checks.skeleton(path, meta["skeleton"])
+        skeleton = checks.skeleton_from_data(path, meta["skeleton"])
     if skeleton is not None and len(skeleton.joints) != layout.joints:
         raise InputError(
             path, f"has {layout.joints} joints, but skeleton {skeleton.name} has {len(skeleton.joints)}"
         )
-    common: dict[str, Any] = {
+    shared_fields: dict[str, Any] = {
         **statistics,
         "layout": layout,
         "skeleton": skeleton,
         "gaits": _read_gaits(path, meta),
         "channels": {name: _read_labels(path, name, meta, layout, skeleton) for name, _ in layout.channels},
-        "terrain_side": checks.number_in_range(
+        "terrain_side": checks.require_number_in_range(
             path, "terrain_side", meta.get("terrain_side", TERRAIN_SIDE), LARGEST_SIDE
         ),
         "meta": meta,
         "training_facts": TrainingFacts.read(path, arrays, layout.x_size, layout.y_size),
     }
-    common["limits"] = _read_limits(path, meta, common["channels"], len(common["gaits"]))
-    network = model(kind).read(path, arrays, common)
+    shared_fields["limits"] = _read_limits(path, meta, shared_fields["channels"], len(shared_fields["gaits"]))
+    network = model_of_kind(kind).read(path, arrays, shared_fields)
     _check_prediction(path, network)
     return network
 
@@ -110,7 +110,7 @@ def _read_meta(path: str | Path, arrays: Mapping[str, Any]) -> dict[str, Any]:
     if len(text) > LONGEST_META:
         raise InputError(path, f"meta has {len(text)} characters; at most {LONGEST_META} are allowed")
     try:
-        return checks.mapping(path, "meta", json.loads(text))
+        return checks.require_mapping(path, "meta", json.loads(text))
     except (ValueError, RecursionError) as error:
         raise InputError(path, f"meta is not valid JSON: {error}") from None
 
@@ -125,13 +125,13 @@ def _read_layout(
     if "layout" not in meta:
         layout = _guess_layout(x_size, y_size, skeleton)
     else:
-        values = checks.mapping(path, "layout", meta["layout"])
+        values = checks.require_mapping(path, "layout", meta["layout"])
         ranges = {"joints": (1, y_size), "window": (1, x_size), "step": (1, x_size)}
         if not set(ranges) <= set(values):
             keys = ", ".join(map(ascii, values))[:80]
             raise InputError(path, f"layout has the keys {keys}; it needs {', '.join(ranges)}")
         for key, (least, most) in ranges.items():
-            checks.whole_number(path, f"layout.{key}", values[key], least, most)
+            checks.require_whole_number(path, f"layout.{key}", values[key], least, most)
         if values["window"] % values["step"]:
             raise InputError(
                 path, f"layout: the window {values['window']} is not a multiple of the step {values['step']}"
@@ -145,7 +145,7 @@ def _read_layout(
                 raise InputError(
                     path, f"has the unknown channel {name!a:.40}; known channels: {', '.join(CHANNEL_NAMES)}"
                 )
-            checks.whole_number(path, f"layout.channels.{name}", columns, 0, x_size)
+            checks.require_whole_number(path, f"layout.channels.{name}", columns, 0, x_size)
     if (layout.x_size, layout.y_size) != (x_size, y_size):
         raise InputError(
             path,
@@ -174,7 +174,7 @@ def _guess_layout(x_size: int, y_size: int, skeleton: Skeleton | None) -> RowLay
 
 def _read_gaits(path: str | Path, meta: Mapping[str, Any]) -> tuple[str, ...]:
     """The names of all gaits, in the order of their columns in X."""
-    gaits = checks.names(path, "gaits", meta.get("gaits", GAITS))
+    gaits = checks.require_names(path, "gaits", meta.get("gaits", GAITS))
     if sorted(gaits) != sorted(GAITS):
         raise InputError(path, f"gaits must be {', '.join(GAITS)}, in any order")
     return gaits
@@ -187,12 +187,12 @@ def _read_labels(
 
     Raises InputError unless there is one label for each column.
     """
-    found = checks.mapping(path, "channels", meta.get("channels", {})).get(name)
+    found = checks.require_mapping(path, "channels", meta.get("channels", {})).get(name)
     # Older files have the labels under other keys.
     found = found or next((meta[key] for key in channel(name).old_keys if meta.get(key)), None)
     if found is None and skeleton is not None:
         found = channel(name).columns(skeleton)
-    labels, columns = checks.names(path, f"channel {name}", found or ()), dict(layout.channels)[name]
+    labels, columns = checks.require_names(path, f"channel {name}", found or ()), dict(layout.channels)[name]
     if len(labels) != columns:
         raise InputError(path, f"channel {name} has {columns} columns, but {len(labels)} labels")
     return labels
@@ -206,10 +206,10 @@ def _read_limits(
     channels: channel -> labels of its columns. gaits: number of gaits.
     """
     limits = {}
-    for name, value in checks.mapping(path, "limits", meta.get("limits", {})).items():
+    for name, value in checks.require_mapping(path, "limits", meta.get("limits", {})).items():
         if name not in channels:
             raise InputError(path, f"has limits of {name!a:.40}, which is not one of its channels")
-        table = checks.mapping(path, f"limits of {name}", value)
+        table = checks.require_mapping(path, f"limits of {name}", value)
         try:
             limits[name] = Limits.from_dict(table, gaits, len(channels[name]), channel(name).highest)
         except ValueError as error:

@@ -32,35 +32,36 @@ class FinishedNetwork(Protocol):
         """The arrays of its file; `Model.read` builds the network from them."""
 
     @property
-    def about(self) -> dict[str, Any]:
+    def file_metadata(self) -> dict[str, Any]:
         """Its entries in the file's metadata, as data for JSON."""
 
     @property
-    def described(self) -> str:
+    def description(self) -> str:
         """Its size in a few words."""
 
 
 class Model(ABC):
-    """One kind of network. Its folder in hobble.models has an instance `MODEL` of `Trained` or `Built`.
+    """One kind of network. Its folder in hobble.models has an instance `MODEL`.
 
-    The methods import pydantic, PyTorch and numba only when they need them. So a game that runs a network
-    needs no PyTorch, and checking a configuration needs neither PyTorch nor numba.
+    `MODEL` is a `TrainedModel` or a `BuiltModel`. The methods import pydantic, PyTorch and numba only when
+    they need them. So a game that runs a network needs no PyTorch, and checking a configuration needs neither
+    PyTorch nor numba.
     """
 
     modes: ClassVar[tuple[str, ...]] = ("exact",)  # the modes of its networks, see `Network.modes`
 
     @abstractmethod
-    def options(self) -> type[Options]:
+    def options_class(self) -> type[Options]:
         """The keys of a configuration's `network` section."""
 
     @abstractmethod
-    def read(self, path: str | Path, arrays: Mapping[str, Any], common: Mapping[str, Any]) -> Network:
+    def read(self, path: str | Path, arrays: Mapping[str, Any], shared_fields: Mapping[str, Any]) -> Network:
         """The network of a file.
 
         path: the file, for error messages. arrays: those of the file, by name, as `FinishedNetwork.arrays`
-        returned them. common: the fields that all kinds share (`hobble.models.network.Network`), by name,
-        already checked. Raises InputError for arrays that make no network; `hobble.models.checks` has
-        functions for these checks.
+        returned them. shared_fields: the fields that the networks of all kinds have, those of
+        `hobble.models.network.Network`, by name, already checked. Raises InputError for arrays that make no
+        network; `hobble.models.checks` has functions for these checks.
         """
 
     def read_folder(self, folder: Path) -> Mapping[str, np.ndarray] | None:
@@ -68,22 +69,22 @@ class Model(ABC):
         return None
 
 
-class Trained(Model):
+class TrainedModel(Model):
     """A kind of network that is trained in passes over the shuffled rows of all training clips."""
 
     @abstractmethod
-    def parameters(self, options: Any, inputs: int, outputs: int) -> int:
+    def parameter_count(self, options: Any, inputs: int, outputs: int) -> int:
         """The number of trained parameters, for X of `inputs` columns and Y of `outputs` columns."""
 
     @abstractmethod
-    def trainable(self, options: Any, layout: RowLayout, skeleton: Skeleton, seed: int) -> Trainable:
+    def untrained_network(self, options: Any, layout: RowLayout, skeleton: Skeleton, seed: int) -> Trainable:
         """A new, untrained network on the CPU. The same seed gives the same network.
 
         layout: the columns of X and Y, with the joints of `skeleton`.
         """
 
 
-class Built(Model):
+class BuiltModel(Model):
     """A kind of network without training. It is built from the training clips' rows, in order of time."""
 
     @abstractmethod

@@ -30,8 +30,9 @@ class Predictor(Protocol):
     """A network prepared for fast evaluation, called in every frame.
 
     It may keep buffers between calls, so each group of characters that is evaluated together needs its
-    own predictor. It keeps no state of a character. If `Network.memory` is above 0, the caller keeps this
-    state: an array (C, Network.memory) float64 for C characters, zero before a character's first frame.
+    own predictor. It keeps no state of a character. If `Network.memory_size` is above 0, the caller keeps
+    this state: an array (C, Network.memory_size) float64 for C characters, zero before a character's first
+    frame.
     `evaluate` and `predict` then have one more argument `memory`, which the signatures below leave out. They
     change this array in place.
 
@@ -65,15 +66,17 @@ class Network(ABC):
     """
 
     kind: ClassVar[str] = ""  # name of its kind, and of the kind's folder in hobble.models
-    phase: ClassVar[bool] = True  # whether a prediction depends on the phase
+    uses_phase: ClassVar[bool] = True  # whether a prediction depends on the phase
     # Whether the predicted poses are recorded frames, as in motion matching. With other networks, the
     # runtime shortens the predicted movement of the root where the character should stand or go another way.
     # With recorded frames it does not, because the feet would slide.
-    recorded_poses: ClassVar[bool] = False
+    plays_recorded_poses: ClassVar[bool] = False
     # Names of the ways to evaluate the network, such as constant, linear and cubic interpolation over the
     # phase. The last one is exact.
     modes: ClassVar[tuple[str, ...]] = ("exact",)
-    storage: ClassVar[str] = "float32"  # how a predictor keeps its weights by default; one of STORAGES
+    default_storage: ClassVar[str] = (
+        "float32"  # how a predictor keeps its weights by default; one of STORAGES
+    )
 
     x_mean: Array = field(repr=False)
     x_std: Array = field(repr=False)
@@ -88,7 +91,7 @@ class Network(ABC):
     meta: Mapping[str, Any] = field(default_factory=dict, repr=False)
     training_facts: TrainingFacts | None = field(default=None, repr=False)
 
-    def trained(self, channel: str) -> tuple[str, ...]:
+    def trained_labels(self, channel: str) -> tuple[str, ...]:
         """Labels of a channel's columns that were above 0 in some training row: their `x_mean` is above 0.
 
         All labels if all means are 0; () for a channel that the network does not have.
@@ -98,12 +101,12 @@ class Network(ABC):
         return tuple(label for label, mean in zip(labels, means, strict=True) if mean > 0) or labels
 
     @property
-    def memory(self) -> int:
+    def memory_size(self) -> int:
         """How many numbers the caller keeps for each character between frames; see `Predictor`."""
         return 0
 
     @classmethod
-    def mode(cls, wanted: str | None) -> str:
+    def resolve_mode(cls, wanted: str | None) -> str:
         """The mode to run: `wanted`, or the exact one by default.
 
         A network with only one mode accepts any name. Raises ValueError for an unknown mode.
@@ -121,16 +124,16 @@ class Network(ABC):
 
     @property
     @abstractmethod
-    def parameters(self) -> int:
+    def parameter_count(self) -> int:
         """How many weights and biases the network has at one phase, or numbers in its tables."""
 
     def stored_numbers(self, mode: str) -> int:
         """How many numbers the network keeps in memory to run in `mode`, one of `modes`."""
-        return self.parameters
+        return self.parameter_count
 
     @property
     @abstractmethod
-    def described(self) -> str:
+    def description(self) -> str:
         """What the network is, in words that can follow "A" in a sentence."""
 
     @abstractmethod
@@ -146,7 +149,7 @@ class Network(ABC):
         """
 
     @abstractmethod
-    def page(self, inputs: NDArray[np.int64], outputs: NDArray[np.int64]) -> dict[str, Any]:
+    def page_data(self, inputs: NDArray[np.int64], outputs: NDArray[np.int64]) -> dict[str, Any]:
         """Data for JSON, with which the report's page evaluates the network in a browser.
 
         `network.js` in the kind's folder reads the data. The page predicts only the columns `outputs` of Y
@@ -172,12 +175,12 @@ class Network(ABC):
         return self.exports[to](Path(target), mode)
 
 
-def standardised(network: Network, x: Array) -> Array:
+def standardise_inputs(network: Network, x: Array) -> Array:
     """Inputs x (n, X) standardised: (x - mean) / std in float32, and 0 for a column that never varied."""
     std = np.where(network.x_std > 0, network.x_std, np.float32(np.inf))
     return (np.asarray(x, np.float32) - network.x_mean) / std
 
 
-def inverse(std: Array) -> Array:
+def inverse_or_0(std: Array) -> Array:
     """1 / std, and 0 for a column that never varied, to avoid a division by 0."""
     return np.where(std > 0, 1 / np.maximum(std, 1e-30), 0)

@@ -17,7 +17,7 @@ import numpy as np
 
 from hobble.core.errors import HobbleError, InputError
 from hobble.core.files import atomic_path
-from hobble.models.network import Network, inverse
+from hobble.models.network import Network, inverse_or_0
 
 OPSET = 15  # version of the ONNX operators
 # Largest allowed difference from Hobble's runtime, in units of Y; relative for values above 1.
@@ -70,7 +70,7 @@ def export(path: str | Path, network: Network, mode: str, body: Body) -> None:
         raise HobbleError('onnx is not installed: pip install "hobble[onnx]"') from error
     g = Graph(helper, numpy_helper)
     z = g("Sub", "x", g.constant(network.x_mean))
-    z = g("Mul", z, g.constant(inverse(network.x_std)))
+    z = g("Mul", z, g.constant(inverse_or_0(network.x_std)))
     h = body(g, z)
     g("Add", g("Mul", h, g.constant(network.y_std)), g.constant(network.y_mean), output="y")
     columns_of: tuple[tuple[str, list[int]], ...] = (

@@ -16,7 +16,7 @@ class Options(Section):
         return ()
 
     @property
-    def why_asymmetric(self) -> str:
+    def why_not_symmetric(self) -> str:
         """Why a network with these options cannot be trained with `training.symmetric`; "" if it can.
 
         With this key of a configuration, the network treats left and right alike.

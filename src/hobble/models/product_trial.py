@@ -42,7 +42,7 @@ REPLACES_BELOW = 0.97
 log = logging.getLogger("hobble")
 
 
-def kept_choice(name: str, trial: Callable[[], str], ways: Collection[str], default: str) -> str:
+def choose_once(name: str, trial: Callable[[], str], ways: Collection[str], default: str) -> str:
     """The way that the file stores under `name`. If the file stores none, run `trial` and store its choice.
 
     name: what is computed, such as the shape of a matrix product. trial: returns the name of a way. ways: the

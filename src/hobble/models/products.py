@@ -94,7 +94,7 @@ def _chosen_way(
 
     ways = working_ways(dtype)
     default = "linear" if dtype == torch.float32 and "linear" in ways else "plain"
-    return product_trial.kept_choice(name, trial, ways, default)
+    return product_trial.choose_once(name, trial, ways, default)
 
 
 def _is_by_rows(a: Tensor) -> bool:

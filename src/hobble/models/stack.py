@@ -17,7 +17,7 @@ import numpy as np
 
 from hobble.core.compiled import njit
 from hobble.core.quat import Array
-from hobble.models.network import STORAGES, Network, inverse
+from hobble.models.network import STORAGES, Network, inverse_or_0
 from hobble.models.tiles import WIDTH, aligned_zeros, in_panels, multiply, panel_count
 
 # Columns of the table `Stack.plan`, which has a row for each layer: the number of inputs, the number of
@@ -76,12 +76,12 @@ class StackPredictor:
     def __init__(self, network: Network) -> None:
         self.network = network
         self._x_mean, self._x_inverse = (
-            np.ascontiguousarray(a, np.float32) for a in (network.x_mean, inverse(network.x_std))
+            np.ascontiguousarray(a, np.float32) for a in (network.x_mean, inverse_or_0(network.x_std))
         )
 
     def standardise(self, x: Array, z: Array) -> None:
         """Write (x - mean) / std into z. x, z: (C, X) float32, a row for each of C characters."""
-        standardise(x, self._x_mean, self._x_inverse, z)
+        standardise_columns(x, self._x_mean, self._x_inverse, z)
 
     def evaluate(self, z: Array, phase: Array, out: Array) -> None:
         """Write Y (C, Y) float32 for standardised inputs z (C, X) at phases (C,), 0 to 1, into `out`."""
@@ -116,7 +116,7 @@ def _pack(weights: Array, storage: str) -> tuple[Array, Array]:
 
 
 @njit(fastmath=True)
-def standardise(x: Any, mean: Any, factor: Any, z: Any) -> None:
+def standardise_columns(x: Any, mean: Any, factor: Any, z: Any) -> None:
     """z = (x - mean) * factor, column by column."""
     for c in range(x.shape[0]):
         for i in range(x.shape[1]):

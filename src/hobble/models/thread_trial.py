@@ -13,7 +13,7 @@ from time import perf_counter, process_time
 
 import torch
 
-from hobble.models.product_trial import REPLACES_BELOW, kept_choice
+from hobble.models.product_trial import REPLACES_BELOW, choose_once
 
 # Size of the matrix product in the trial: that of a layer with 512 inputs and four sets of 512 outputs.
 INPUTS, OUTPUTS = 512, 2048
@@ -37,7 +37,7 @@ def threads_for(batch: int, most: int) -> int:
     rows = 1 << (batch - 1).bit_length()
     ways = ("1", str(most))
     name = f"threads for {rows} rows, at most {most}"
-    return int(kept_choice(name, partial(_trial, rows, most), ways, default=ways[1]))
+    return int(choose_once(name, partial(_trial, rows, most), ways, default=ways[1]))
 
 
 def _trial(rows: int, most: int) -> str:

@@ -96,12 +96,12 @@ class Trainable(ABC):
 
     @property
     @abstractmethod
-    def about(self) -> dict[str, Any]:
+    def file_metadata(self) -> dict[str, Any]:
         """The network's entries in the metadata of its file. One is `network`, its formula in one line."""
 
     @property
     @abstractmethod
-    def described(self) -> str:
+    def description(self) -> str:
         """The shape of the network in words, such as its units and the number of its parameters.
 
         A training resumes from a checkpoint only if the checkpoint has the same words.

@@ -56,7 +56,7 @@ class TrainingFacts:
         return {**columns, "start_phase": np.float64(self.start_phase), "fastest": np.float64(self.fastest)}
 
     @classmethod
-    def of(cls, layout: RowLayout, parts: Iterable[Any], statistics: Any) -> TrainingFacts:
+    def from_rows(cls, layout: RowLayout, parts: Iterable[Any], statistics: Any) -> TrainingFacts:
         """The facts about all rows.
 
         parts: the rows, in blocks (`UncomposedRows` in `hobble.database.reader`). statistics: means and
@@ -74,14 +74,14 @@ class TrainingFacts:
         low, high = (np.inf, np.inf), (-np.inf, -np.inf)
         nearest, start, fastest = np.inf, None, 0.0
         for part in parts:
-            least, most = (f.reduceat(part.fits, part.first, axis=0) for f in (np.minimum, np.maximum))
+            least, most = (f.reduceat(part.fits, part.first_fit, axis=0) for f in (np.minimum, np.maximum))
             # The last column of a fit, its lift, is subtracted from the heights of joints. So the heights are
             # lowest with the highest lift.
             rows = _raw(layout, part, least[:, :-1], most[:, -1:], statistics)
             low = tuple(np.minimum(a, values.min(axis=0)) for a, values in zip(low, rows, strict=True))
             rows = _raw(layout, part, most[:, :-1], least[:, -1:], statistics)
             high = tuple(np.maximum(a, values.max(axis=0)) for a, values in zip(high, rows, strict=True))
-            first_fit = part.fits[part.first]
+            first_fit = part.fits[part.first_fit]
             x, y = _raw(layout, part, first_fit[:, :-1], first_fit[:, -1:], statistics)
             speed = np.linalg.norm(y[:, layout.y_joint_velocity].reshape(len(y), -1, 3), axis=-1)
             fastest = max(fastest, float(speed.max()))
@@ -118,7 +118,7 @@ class TrainingFacts:
             return None
         found: dict[str, Any] = {}
         for name, key in ARRAYS.items():
-            found[key] = checks.numbers(path, arrays, name, 1, checks.LARGEST_MEAN)
+            found[key] = checks.read_numbers(path, arrays, name, 1, checks.LARGEST_MEAN)
             block, size = ("X", x_size) if key.startswith("x") or key == "start_x" else ("Y", y_size)
             if len(found[key]) != size:
                 raise InputError(
@@ -131,7 +131,7 @@ class TrainingFacts:
                 or np.asarray(arrays[name]).dtype.kind != "f"
             ):
                 raise InputError(path, f"{name} is missing or is not one floating-point number")
-            found[name] = checks.number_in_range(path, name, float(arrays[name]), 1e6, -1e-9)
+            found[name] = checks.require_number_in_range(path, name, float(arrays[name]), 1e6, -1e-9)
         for block in "xy":
             if (found[f"{block}_low"] > found[f"{block}_high"]).any():
                 raise InputError(

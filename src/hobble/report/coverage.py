@@ -14,7 +14,7 @@ from hobble.core.skeleton import Skeleton
 from hobble.measures.stratified_sample import shuffle_key
 from hobble.report.charts import Chart, Trace, axis
 from hobble.rows.clip_rows import row_count
-from hobble.rows.excerpts import Excerpt, excerpts, load_excerpt
+from hobble.rows.excerpts import Excerpt, cut_into_excerpts, load_excerpt
 
 FPS = 60.0  # of the clips' rows
 SPEEDS = np.arange(0, 6.01, 0.2)  # edges of the bins of speeds, metres a second
@@ -75,7 +75,9 @@ def _chosen_excerpts(paths: Sequence[str | Path]) -> tuple[list[tuple[str | Path
 
     Also returns their share of all rows.
     """
-    every = [(path, excerpt) for path in paths for excerpt in excerpts(Path(path).stem, row_count(path))]
+    every = [
+        (path, excerpt) for path in paths for excerpt in cut_into_excerpts(Path(path).stem, row_count(path))
+    ]
     if len(every) <= MOST_EXCERPTS:
         return every, 1.0
     drawn = sorted(every, key=lambda pair: shuffle_key(f"{pair[1].clip} {pair[1].first}"))[:MOST_EXCERPTS]

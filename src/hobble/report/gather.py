@@ -117,11 +117,11 @@ def describe_network(path: str | Path) -> dict[str, Any]:
     """
     network = load_network(path)
     return {
-        "described": network.described,
+        "described": network.description,
         "sizes": list(network.sizes),
         "inputs": network.layout.x_size,
         "outputs": network.layout.y_size,
-        "parameters": network.parameters,
+        "parameters": network.parameter_count,
         "bytes": Path(path).stat().st_size,
         "skeleton": network.meta.get("skeleton") or {},
         "channels": {name: list(columns) for name, columns in network.channels.items()},

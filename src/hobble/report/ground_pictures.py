@@ -18,7 +18,7 @@ from hobble.core.skeleton import Skeleton
 from hobble.figure.fit_rotations import fitted_rotations
 from hobble.figure.mesh import body_mesh, mesh_key
 from hobble.figure.pack import packed_turns
-from hobble.models.packing import packed
+from hobble.models.packing import to_base64
 
 STEPS_PER_CM = 10  # lengths are stored as 16-bit integers, in steps of a millimetre
 MOST_VIEWS = 24  # the page has at most this many views
@@ -68,11 +68,11 @@ def _packed_view(view: Mapping[str, Array]) -> dict[str, Any]:
         "z": [float(view["z"][0] - middle[2]), float(view["z"][-1] - middle[2])],
         "ground": _packed_steps(view["ground"]),
         "soles": _packed_steps(view["soles"] - middle),
-        "contacts": packed(np.asarray(view["contacts"], np.uint8)),
+        "contacts": to_base64(np.asarray(view["contacts"], np.uint8)),
         "pose": _packed_steps(view["pose"] - middle),
     }
 
 
 def _packed_steps(values: Array) -> str:
     """Lengths in cm as 16-bit integers, packed. Lengths beyond their range, about 33 m, are cut."""
-    return packed(np.clip(np.round(values * STEPS_PER_CM), -32767, 32767).astype(np.int16))
+    return to_base64(np.clip(np.round(values * STEPS_PER_CM), -32767, 32767).astype(np.int16))

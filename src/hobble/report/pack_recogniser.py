@@ -18,7 +18,7 @@ from hobble.gait.people import read_people
 from hobble.gait.profile import Profile, profile_of_walk
 from hobble.gait.recogniser import SIDES
 from hobble.models.network import Network
-from hobble.models.packing import packed
+from hobble.models.packing import to_base64
 from hobble.report.playable import playable
 from hobble.report.straight_walk import walk_straight
 from hobble.runtime.export import restore_bone_lengths
@@ -74,14 +74,14 @@ def packed_statistics(statistics: Grader | None = None) -> dict[str, Any]:
     return {
         "features": list(features(normal, normal)),  # any two profiles do: only the names are used
         "strengths": STRENGTHS.tolist(),
-        "healthySpread": packed(statistics.healthy),
+        "healthySpread": to_base64(statistics.healthy),
         "kinds": [
             {
                 "label": label,
                 "side": side,
                 "words": kind_in_words(label, side),
-                "mean": packed(mean),
-                "spread": packed(spread),
+                "mean": to_base64(mean),
+                "spread": to_base64(spread),
             }
             for (label, side), (mean, spread) in statistics.kinds.items()
         ],

@@ -13,7 +13,7 @@ from pathlib import Path
 from hobble.core.errors import InputError
 from hobble.database.manifest import FILE as MANIFEST
 from hobble.database.manifest import Manifest
-from hobble.database.sizes import Sizes, sizes
+from hobble.database.sizes import Sizes, database_sizes
 from hobble.evaluation.csv_tables import read_numbers
 from hobble.evaluation.pipeline_results import JobTotal, Pipeline, StageTotal
 from hobble.report.provenance import machine, versions
@@ -170,7 +170,7 @@ def _database_sizes(paths: Iterable[str]) -> Sizes | None:
     """The sizes of the database, or None if none of the folders `paths` is a database."""
     for path in map(Path, paths):
         if (path / MANIFEST).is_file():
-            return sizes(Manifest.load(path))
+            return database_sizes(Manifest.load(path))
     return None
 
 

@@ -12,8 +12,8 @@ from hobble.channels import channel
 from hobble.channels.shown import channel_display, channel_words
 from hobble.core.skeleton import Skeleton
 from hobble.figure.mesh import body_mesh, mesh_key
-from hobble.models.network import Network, inverse
-from hobble.models.packing import packed
+from hobble.models.network import Network, inverse_or_0
+from hobble.models.packing import to_base64
 from hobble.rows.layout import RowLayout
 from hobble.runtime import (
     advance,
@@ -43,19 +43,19 @@ def playable(network: Network, runtime: Runtime) -> dict[str, Any]:
         return {}
     layout = network.layout
     turning = turning_joints(skeleton)
-    outputs, scale = _used_outputs(layout, turning), inverse(network.x_std)
+    outputs, scale = _used_outputs(layout, turning), inverse_or_0(network.x_std)
     inputs = np.flatnonzero(scale > NO_EFFECT)
     legs = feet.leg_joints(skeleton)
     sole = feet.sole_heights(network, legs).tolist()
     parts = feet.foot_parts(skeleton, legs)
     return {
-        "network": {"kind": network.kind, **network.page(inputs, outputs)},
-        "recordedPoses": network.recorded_poses,
+        "network": {"kind": network.kind, **network.page_data(inputs, outputs)},
+        "recordedPoses": network.plays_recorded_poses,
         "inputColumns": inputs.tolist(),
-        "xMean": packed(network.x_mean[inputs].astype(np.float32)),
-        "xScale": packed(scale[inputs].astype(np.float32)),
-        "yMean": packed(network.y_mean[outputs].astype(np.float32)),
-        "yStd": packed(network.y_std[outputs].astype(np.float32)),
+        "xMean": to_base64(network.x_mean[inputs].astype(np.float32)),
+        "xScale": to_base64(scale[inputs].astype(np.float32)),
+        "yMean": to_base64(network.y_mean[outputs].astype(np.float32)),
+        "yStd": to_base64(network.y_std[outputs].astype(np.float32)),
         "turning": turning,
         "joints": layout.joints,
         "names": list(skeleton.joints),
@@ -98,7 +98,7 @@ def shown_channels(network: Network, runtime: Runtime) -> list[dict[str, Any]]:
     for name, columns in network.channels.items():
         definition, wording, index_of = channel(name), channel_words(name), list(columns).index
         speed_limits = network.limits.get(name)
-        display = channel_display(name, skeleton, columns, network.trained(name))
+        display = channel_display(name, skeleton, columns, network.trained_labels(name))
         presets = [
             {"name": preset, "values": [[index_of(column), value] for column, value in values.items()]}
             for preset, values in display.presets.items()
@@ -110,7 +110,7 @@ def shown_channels(network: Network, runtime: Runtime) -> list[dict[str, Any]]:
                 "key": wording.address_key or name,
                 "first": first,
                 "columns": list(columns),
-                "trained": list(network.trained(name)),
+                "trained": list(network.trained_labels(name)),
                 "spoken": list(display.spoken_names),
                 "sliders": {label: index_of(column) for label, column in display.sliders.items()},
                 "presets": presets,
@@ -169,7 +169,7 @@ def _bounds(network: Network, outputs: NDArray[np.int64]) -> dict[str, Any]:
     bounds = Bounds.of(network)
     y_low, y_high = bounds.y_low[outputs], bounds.y_high[outputs]
     arrays = {"xLow": bounds.x_low, "xHigh": bounds.x_high, "yLow": y_low, "yHigh": y_high}
-    return {name: packed(array.astype(np.float32)) for name, array in arrays.items()} | {
+    return {name: to_base64(array.astype(np.float32)) for name, array in arrays.items()} | {
         "fastest": bounds.fastest,
         "hips": list(bounds.hips),
     }
@@ -179,7 +179,7 @@ def _start(network: Network) -> dict[str, Any]:
     """The state in which a character begins, at the origin and facing ahead."""
     state = start_characters(network, 1, np.zeros((1, 2)), np.zeros(1))
     names = ("position", "direction", "gait", "joint_position", "joint_velocity", "joint_rotation")
-    arrays = {name: packed(getattr(state, name)[0].astype(np.float32)) for name in names}
+    arrays = {name: to_base64(getattr(state, name)[0].astype(np.float32)) for name in names}
     return {**arrays, "phase": float(state.phase[0])}
 
 

@@ -11,7 +11,7 @@ import numpy as np
 
 from hobble.core.quat import Array
 from hobble.models.network import Network
-from hobble.models.packing import packed
+from hobble.models.packing import to_base64
 from hobble.report.straight_walk import walk_straight
 from hobble.runtime.options import Runtime
 
@@ -68,7 +68,7 @@ def _are_layers(value: Any) -> bool:
 
 
 def _round_layer(packed_layer: Mapping[str, Any]) -> dict[str, Any]:
-    """A layer with weights of 8 bits. packed_layer: from `hobble.models.packing.packed_rows`."""
+    """A layer with weights of 8 bits. packed_layer: from `hobble.models.packing.pack_layer`."""
     shape = packed_layer["points"], packed_layer["rows"], packed_layer["columns"]
     integers = np.frombuffer(base64.b64decode(packed_layer["weights"]), "<i2").reshape(shape)
     scale = np.frombuffer(base64.b64decode(packed_layer["scale"]), "<f4").reshape(*shape[:2], 1)
@@ -77,8 +77,8 @@ def _round_layer(packed_layer: Mapping[str, Any]) -> dict[str, Any]:
         **packed_layer,
         "bits": 8,
         "group": GROUP,
-        "weights": packed(small.reshape(*shape[:2], -1)[..., : shape[2]]),
-        "scale": packed(factors),
+        "weights": to_base64(small.reshape(*shape[:2], -1)[..., : shape[2]]),
+        "scale": to_base64(factors),
     }
 
 

@@ -16,7 +16,7 @@ from hobble.core.skeleton import Skeleton
 from hobble.figure.fit_rotations import fitted_rotations
 from hobble.figure.mesh import body_mesh, mesh_key
 from hobble.figure.pack import packed_turns
-from hobble.models.packing import packed
+from hobble.models.packing import to_base64
 from hobble.runtime.export import restore_bone_lengths
 
 FPS = 30  # frame rate of the motion in the page
@@ -103,10 +103,10 @@ def _packed_walk(
     if contacts is not None:
         # One byte for each frame: bit 0 is the contact of FEET[0], bit 3 that of FEET[3].
         bits = (np.asarray(contacts)[::frame_step, :4] > CONTACT) @ (1 << np.arange(4))
-        out["contacts"] = packed(bits.astype(np.uint8))
+        out["contacts"] = to_base64(bits.astype(np.uint8))
     if phase is not None:
         # 0 to 255 stands for phase 0 to 1.
-        out["phase"] = packed(np.round(255 * (np.asarray(phase)[::frame_step] % 1.0)).astype(np.uint8))
+        out["phase"] = to_base64(np.round(255 * (np.asarray(phase)[::frame_step] % 1.0)).astype(np.uint8))
     # In some walks the value of one column rises from 0 to the highest.
     swept_channel, column = (str(v) for v in data.get(f"{name}/swept", ("", "")))
     if column in channels.get(swept_channel, ()):
@@ -123,7 +123,7 @@ def _packed_walk(
             "highest": highest,
             "placed": bool(display.regions),  # whether the value belongs to a part of the body
             # 0 to 250 stands for 0 to the highest value.
-            "values": packed(np.clip(np.round(250 * share), 0, 250).astype(np.uint8)),
+            "values": to_base64(np.clip(np.round(250 * share), 0, 250).astype(np.uint8)),
         }
         out["description"] = channel_words(swept_channel).sweep_description.format(word)
     return out
@@ -149,7 +149,7 @@ def pack_positions(positions: Array, keep: Sequence[int] | slice = slice(None)) 
     """
     root = positions[:, 0].astype(np.float32)
     steps = np.round((positions[:, keep] - root[:, None].astype(float)) / UNIT)
-    return {"root": packed(root), "pose": packed(np.clip(steps, -32767, 32767).astype(np.int16))}
+    return {"root": to_base64(root), "pose": to_base64(np.clip(steps, -32767, 32767).astype(np.int16))}
 
 
 def title_of(name: str) -> str:

@@ -117,7 +117,7 @@ def all_loops(network: Network) -> list[tuple[str, str, SampleWalk]]:
     assert network.skeleton is not None
     out: list[tuple[str, str, SampleWalk]] = []
     for name, columns in network.channels.items():
-        for loop in channel_loops(name, network.skeleton, columns, network.trained(name)):
+        for loop in channel_loops(name, network.skeleton, columns, network.trained_labels(name)):
             if not out or out[0][1] == name:  # the first channel that has loops
                 out.append((loop.name, name, loop))
             elif loop.values:

@@ -32,7 +32,7 @@ Arrays = Mapping[str, np.ndarray]
 MAKE_AGAIN = "Make the clip's labels, channels and terrain again."
 
 
-def clip_rows(
+def build_clip_rows(
     name: str,
     clip: Clip,
     labels: Arrays,
@@ -206,7 +206,7 @@ def _check(
     terrain: Arrays,
     frame: np.ndarray,
 ) -> None:
-    """Raise InputError if the arguments of `clip_rows` do not match. frame: (R,) frames of the rows."""
+    """Raise InputError if the arguments of `build_clip_rows` do not match. frame: (R,) frames of the rows."""
     lengths = {"labels": len(labels["phase"])}
     lengths |= {f"values of {channel_name}": len(values) for channel_name, values in channels.items()}
     for what, length in lengths.items():

@@ -18,7 +18,7 @@ from hobble.core.array_parts import ArrayParts
 from hobble.core.errors import InputError
 from hobble.core.files import load_npz, save_npz
 from hobble.core.quat import Array
-from hobble.rows.compose import body_columns, compose, frame_inputs
+from hobble.rows.compose import body_column_count, compose, frame_inputs
 from hobble.rows.layout import RowLayout
 
 CHANNEL_PREFIX = "channel_"  # in a file, the name of each channel's array begins with it
@@ -84,7 +84,7 @@ class ClipRows:
         """
         layout, rows, fits = self.layout, len(self.p), int(np.sum(self.fits))
         expected = {
-            "x": (rows, body_columns(layout)),
+            "x": (rows, body_column_count(layout)),
             "y": (rows, layout.y_size),
             "frame": (rows,),
             "cycle": (rows,),
@@ -127,7 +127,7 @@ class Pairs(NamedTuple):
     weight: Array
 
 
-def expanded(rows: ClipRows, layout: RowLayout, batch: int = 2048) -> Iterator[Pairs]:
+def pair_batches(rows: ClipRows, layout: RowLayout, batch: int = 2048) -> Iterator[Pairs]:
     """Yield all pairs of a row and one of its fits, about `batch` at a time.
 
     Values are not standardised. layout: the layout of the rows, or one with fewer channels.
@@ -138,14 +138,14 @@ def expanded(rows: ClipRows, layout: RowLayout, batch: int = 2048) -> Iterator[P
         stop = max(start + 1, int(np.searchsorted(first_fit, first_fit[start] + batch)))
         fits = rows.fits[start:stop]
         row = np.repeat(np.arange(start, stop), fits)
-        yield pairs(rows, layout, row, np.arange(first_fit[start], first_fit[stop - 1] + fits[-1]))
+        yield compose_pairs(rows, layout, row, np.arange(first_fit[start], first_fit[stop - 1] + fits[-1]))
         start = stop
 
 
-def pairs(rows: ClipRows, layout: RowLayout, row: np.ndarray, fit: np.ndarray) -> Pairs:
+def compose_pairs(rows: ClipRows, layout: RowLayout, row: np.ndarray, fit: np.ndarray) -> Pairs:
     """The n pairs of row[i] and fit[i], not standardised.
 
-    layout: see `expanded`. row: (n,) indices of rows. fit: (n,) indices of their fits in `rows.heights`.
+    layout: see `pair_batches`. row: (n,) indices of rows. fit: (n,) indices of their fits in `rows.heights`.
     """
     x = np.empty((len(row), layout.x_size), np.float32)
     y = rows.y[row].astype(np.float32)

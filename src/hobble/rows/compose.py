@@ -19,9 +19,9 @@ from hobble.rows.layout import RowLayout
 TERRAIN = "terrain"  # name of the block of ground heights in X
 
 
-def body_columns(layout: RowLayout) -> int:
+def body_column_count(layout: RowLayout) -> int:
     """Number of columns of X without terrain and channels."""
-    return x_columns(layout) - sum(columns for _, columns in layout.channels)
+    return column_count_without_terrain(layout) - sum(columns for _, columns in layout.channels)
 
 
 def body_layout(layout: RowLayout) -> RowLayout:
@@ -29,12 +29,12 @@ def body_layout(layout: RowLayout) -> RowLayout:
     return replace(layout, channels=(), order=())
 
 
-def x_columns(layout: RowLayout) -> int:
+def column_count_without_terrain(layout: RowLayout) -> int:
     """Number of columns of X without terrain. These columns depend only on the frame."""
     return layout.x_size - 3 * layout.samples
 
 
-def fit_columns(layout: RowLayout) -> int:
+def fit_column_count(layout: RowLayout) -> int:
     """Number of values that a database stores for a terrain fit: ground heights and their mean."""
     return 3 * layout.samples + 1
 
@@ -52,12 +52,12 @@ def frame_inputs(layout: RowLayout, body: Array, channels: Mapping[str, Array]) 
     """
     if not layout.order:  # the blocks of the body come first, then the channels
         return np.concatenate([body, *(channels[name] for name, _ in layout.channels)], axis=1)
-    body_blocks = without_terrain(body_layout(layout))
+    body_blocks = blocks_without_terrain(body_layout(layout))
     values = {name: body[:, block] for name, block in body_blocks.items()} | dict(channels)
-    return np.concatenate([values[name] for name in without_terrain(layout)], axis=1)
+    return np.concatenate([values[name] for name in blocks_without_terrain(layout)], axis=1)
 
 
-def without_terrain(layout: RowLayout) -> dict[str, slice]:
+def blocks_without_terrain(layout: RowLayout) -> dict[str, slice]:
     """Name -> columns of each block of X, counted without the terrain columns."""
     terrain = layout.x_terrain
     width = terrain.stop - terrain.start

@@ -59,14 +59,14 @@ class ExcerptKind:
     channels: tuple[str, ...]
 
 
-def excerpts(clip: str, rows: int, longest: int = LONGEST) -> list[Excerpt]:
+def cut_into_excerpts(clip: str, rows: int, longest: int = LONGEST) -> list[Excerpt]:
     """Cut a clip of `rows` rows into excerpts of at most `longest` rows each.
 
     The lengths of the excerpts differ by at most one row.
 
-    >>> [(excerpt.first, excerpt.rows) for excerpt in excerpts("walk", 2500)]
+    >>> [(excerpt.first, excerpt.rows) for excerpt in cut_into_excerpts("walk", 2500)]
     [(0, 833), (833, 833), (1666, 834)]
-    >>> excerpts("empty", 0)
+    >>> cut_into_excerpts("empty", 0)
     []
     """
     count = -(-rows // longest)  # rows / longest, rounded up

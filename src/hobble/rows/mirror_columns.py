@@ -34,7 +34,7 @@ class ColumnMirror:
         """Mirror the rows `values` (..., C)."""
         return values[..., self.source] * self.sign + self.shift
 
-    def standardised(self, mean: Array, std: Array) -> ColumnMirror:
+    def for_standardised_rows(self, mean: Array, std: Array) -> ColumnMirror:
         """The mirror of rows that are standardised: (row - mean) / std. mean, std: (C,).
 
         `shift` makes up for the different means of a column and its mirror. Raises HobbleError if a column

@@ -10,7 +10,7 @@ from typing import Any
 from hobble.core.errors import InputError
 from hobble.core.files import read_json, write_json
 from hobble.rows.clip_rows import DELETE_IT, ClipRows
-from hobble.rows.excerpts import Excerpt, ExcerptKind, excerpt_kind, excerpts
+from hobble.rows.excerpts import Excerpt, ExcerptKind, cut_into_excerpts, excerpt_kind
 
 
 @dataclass(frozen=True)
@@ -28,12 +28,12 @@ class RowsSummary:
     @property
     def excerpts(self) -> dict[Excerpt, ExcerptKind]:
         """Each excerpt of the clip -> what kind of motion is in it."""
-        return dict(zip(excerpts(self.clip, self.rows), self.kinds, strict=True))
+        return dict(zip(cut_into_excerpts(self.clip, self.rows), self.kinds, strict=True))
 
 
 def summary_of_rows(rows: ClipRows) -> RowsSummary:
     """Make the summary of a clip's rows."""
-    parts = excerpts(rows.clip, len(rows))
+    parts = cut_into_excerpts(rows.clip, len(rows))
     return RowsSummary(
         rows.clip, len(rows), tuple(excerpt_kind(rows, part.first, part.stop) for part in parts)
     )

@@ -155,7 +155,7 @@ class ProceduralAnimation:
         places = (
             np.broadcast_to(place, (count, 2))
             if position is None
-            else self._targets.convert_ground_vector("position", position, self.axes.points_in)
+            else self._targets.convert_ground_vector("position", position, self.axes.points_from_caller)
         )
         if np.abs(places).max() > FARTHEST:
             raise ValueError(f"position is further than {FARTHEST / 1e5:g} km from the origin: {position}")
@@ -308,9 +308,9 @@ class ProceduralAnimation:
         controller, state = self._controller, self.state
         positions, rotations = controller.pose_position.copy(), controller.pose_rotation.copy()
         root = controller.root.copy()
-        if not self.axes.native:
-            positions[:], root[:] = self.axes.points_out(positions), self.axes.points_out(root)
-            rotations = self.axes.rotations_out(rotations)
+        if not self.axes.is_native:
+            positions[:], root[:] = self.axes.points_to_caller(positions), self.axes.points_to_caller(root)
+            rotations = self.axes.rotations_to_caller(rotations)
         contacts = np.minimum(np.maximum(controller.y[:, self._contacts], 0), 1)
         channels = {
             name: state.channel_values[:, columns].copy()

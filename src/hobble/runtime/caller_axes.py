@@ -41,7 +41,7 @@ class Axes:
             )
 
     @property
-    def native(self) -> bool:
+    def is_native(self) -> bool:
         """Whether this is Hobble's own convention. Then no conversion is needed."""
         return (self.handed, self.up, self.unit) == ("right", "Y", "cm")
 
@@ -55,28 +55,28 @@ class Axes:
         """Length of one centimetre in the caller's unit."""
         return UNITS[self.unit]
 
-    def directions_out(self, v: Array) -> Array:
+    def directions_to_caller(self, v: Array) -> Array:
         """Convert Hobble's directions (..., 3) to the caller's."""
         return v @ self.matrix.T
 
-    def directions_in(self, v: Array) -> Array:
+    def directions_from_caller(self, v: Array) -> Array:
         """Convert the caller's directions (..., 3) to Hobble's."""
         return v @ self.matrix
 
-    def points_out(self, p: Array) -> Array:
+    def points_to_caller(self, p: Array) -> Array:
         """Convert Hobble's positions or velocities (..., 3), cm, to the caller's."""
-        return self.directions_out(p) * self.scale
+        return self.directions_to_caller(p) * self.scale
 
-    def points_in(self, p: Array) -> Array:
+    def points_from_caller(self, p: Array) -> Array:
         """Convert the caller's positions or velocities (..., 3) to Hobble's, cm."""
-        return self.directions_in(p) / self.scale
+        return self.directions_from_caller(p) / self.scale
 
-    def rotations_out(self, q: Array) -> Array:
+    def rotations_to_caller(self, q: Array) -> Array:
         """Convert Hobble's rotations (..., 4) to the caller's.
 
         As matrices, a rotation R becomes M R M^-1, where M is `matrix`. In a quaternion, this converts the
         axis as a direction, and negates it if the handedness changes.
         """
         out = np.array(q, float)
-        out[..., 1:] = self.directions_out(out[..., 1:]) * np.linalg.det(self.matrix).round()
+        out[..., 1:] = self.directions_to_caller(out[..., 1:]) * np.linalg.det(self.matrix).round()
         return out

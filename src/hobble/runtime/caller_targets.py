@@ -34,7 +34,7 @@ class CallerTargets:
 
         Raises ValueError for a speed above FASTEST, and as `convert_ground_vector` does.
         """
-        target = self.convert_ground_vector("target_velocity", velocity, self.axes.points_in)
+        target = self.convert_ground_vector("target_velocity", velocity, self.axes.points_from_caller)
         if (fastest := np.hypot(target[:, 0], target[:, 1]).max()) > FASTEST:
             raise ValueError(
                 f"target_velocity is {fastest:.4g} cm a frame, faster than a body can move. It may "
@@ -47,7 +47,7 @@ class CallerTargets:
 
         Raises ValueError as `convert_ground_vector` does.
         """
-        return self.convert_ground_vector("facing", facing, self.axes.directions_in)
+        return self.convert_ground_vector("facing", facing, self.axes.directions_from_caller)
 
     def convert_ground_vector(self, what: str, vector: Any, convert: Any) -> Array:
         """The caller's vector, or one for each character, as Hobble's x, z (C, 2).
@@ -67,12 +67,12 @@ class CallerTargets:
         if not np.isfinite(v).all():
             raise ValueError(f"{what} is not a finite vector: {vector}")
         if v.shape[-1] == 2:
-            if self.axes.native:
+            if self.axes.is_native:
                 return np.array(np.broadcast_to(v, (self.characters, 2)), order="C")
             full = np.zeros((*v.shape[:-1], 3))  # with height 0
             full[..., [k for k in range(3) if k != "XYZ".index(self.axes.up)]] = v
             v = full
-        if not self.axes.native:
+        if not self.axes.is_native:
             v = convert(v)
         return np.array(np.broadcast_to(v[..., ::2], (self.characters, 2)), order="C")
 

@@ -36,7 +36,7 @@ class Character:
     foot_lift (C, 2), foot_added (C, 2, 2, 4), leg_shown (C, 2, 3, 3), body_lift (C,): the rest of foot
     placement, see `Feet` and `carry_body` in `hobble.runtime.feet`.
     placed: (C,) bool, whether the joints have been lifted to the ground, which happens once, at the start.
-    memory: (C, M) the network's own state of the character, see `Network.memory`.
+    memory: (C, M) the network's own state of the character, see `Network.memory_size`.
     """
 
     position: Array
@@ -128,7 +128,7 @@ def start_characters(network: Network, count: int, position: Array, yaw: Array) 
         leg_shown=in_world[:, legs].copy(),
         body_lift=np.zeros(count),
         placed=np.zeros(count, bool),
-        memory=np.zeros((count, network.memory)),
+        memory=np.zeros((count, network.memory_size)),
     )
 
 

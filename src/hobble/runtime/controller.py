@@ -102,7 +102,7 @@ class Controller:
         self.yaw = np.arctan2(ahead[:, 0], ahead[:, 1])
         self.bounds = Bounds.of(network)
         # An argument of `evaluate`, but only if the network has a memory.
-        self._memory = (character.memory,) if network.memory else ()
+        self._memory = (character.memory,) if network.memory_size else ()
         self._unsound = np.zeros(count, bool)
         self.pose_position = character.joint_position.copy()
         self.pose_rotation = character.joint_rotation.copy()
@@ -245,7 +245,7 @@ class Controller:
         )  # fmt: skip
 
     def _update(self, velocity: Array) -> None:
-        recorded_poses = self.predictor.network.recorded_poses
+        recorded_poses = self.predictor.network.plays_recorded_poses
         steered = self.steering > 0  # otherwise the root moves as predicted
         loss = BACKWARD_LOSS if steered and not recorded_poses else 0.0
         pull = PULL if steered and recorded_poses else 0.0

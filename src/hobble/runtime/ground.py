@@ -58,7 +58,7 @@ def as_ground(terrain: Any, axes: Axes) -> Callable[[Array, Array], Array] | Non
         raise TypeError(
             f"terrain has to be a function, a Heightmap, a 2D array or None, not {type(terrain).__name__}"
         )
-    if axes.native:  # the caller's axes and unit are Hobble's
+    if axes.is_native:  # the caller's axes and unit are Hobble's
         return terrain  # type: ignore[no-any-return]
     if isinstance(terrain, Heightmap) and terrain.cell is None:
         terrain = replace(terrain, cell=CELL * axes.scale)
@@ -66,7 +66,7 @@ def as_ground(terrain: Any, axes: Axes) -> Callable[[Array, Array], Array] | Non
     ground_axes = [k for k in range(3) if k != up]
 
     def converted(x: Array, z: Array) -> Array:
-        points = axes.points_out(np.stack([x, np.zeros_like(x), z], axis=-1))
+        points = axes.points_to_caller(np.stack([x, np.zeros_like(x), z], axis=-1))
         first, second = np.ascontiguousarray(points[:, ground_axes].T)
         return np.asarray(terrain(first, second)) / axes.scale
 

@@ -94,7 +94,9 @@ def swept_columns(network: Network) -> dict[str, tuple[str, str]]:
     return {
         name: (of_channel, column)
         for of_channel, columns in network.channels.items()
-        for name, column in channel_sweeps(of_channel, skeleton, columns, network.trained(of_channel)).items()
+        for name, column in channel_sweeps(
+            of_channel, skeleton, columns, network.trained_labels(of_channel)
+        ).items()
     }
 
 

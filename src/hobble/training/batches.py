@@ -11,7 +11,7 @@ from torch import Tensor
 
 from hobble.core.errors import HobbleError
 from hobble.database.reader import Database
-from hobble.database.sharing import PassSharing, SampleRange
+from hobble.database.sharing import SampleRange, SectionSharing
 from hobble.training.processes import ALONE, Processes
 
 TRAIN = "train"
@@ -56,10 +56,10 @@ class TrainingRows:
         self.database, self.device = database, device
         self.processes, self.stretches = processes, stretches
 
-    def sharing(self, section: int, sections: int, size: int) -> PassSharing:
+    def share_section(self, section: int, sections: int, size: int) -> SectionSharing:
         """How the processes share a section in batches of `size`."""
-        total = self.database.section_samples(TRAIN, section, sections)
-        return self.processes.sharing(total, size, self.stretches)
+        total = self.database.section_sample_count(TRAIN, section, sections)
+        return self.processes.share_section(total, size, self.stretches)
 
 
 class HostRows(TrainingRows):
@@ -78,8 +78,8 @@ class HostRows(TrainingRows):
         # The number of chunks in memory at a time. The order of the rows depends on it and must be the same
         # for any number of processes. So it follows from the size of the whole batch, not of this process's
         # part.
-        window = self.database.window(TRAIN, self.database.block_rows(size))
-        sharing = self.sharing(section, sections, size)
+        window = self.database.chunks_per_window(TRAIN, self.database.block_rows(size))
+        sharing = self.share_section(section, sections, size)
         stretches = [
             self._pieces_of_stretch(order_key, stretch, window) for stretch in sharing.own_stretches()
         ]
@@ -166,7 +166,7 @@ class LossWatch:
 
     def _message(self, problem: str, number: int, batch: SampleBatch) -> str:
         text = f"training diverged in {self.where}, batch {number}: {problem}"
-        return self.processes.most_certain(*self._explain(text, batch))
+        return self.processes.choose_error_message(*self._explain(text, batch))
 
     def _explain(self, text: str, batch: SampleBatch) -> tuple[str, bool]:
         """The message that begins with `text`, and whether broken rows are the cause.

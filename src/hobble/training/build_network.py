@@ -15,13 +15,13 @@ from hobble.core.errors import HobbleError
 from hobble.core.files import save_npz
 from hobble.core.skeleton import Skeleton
 from hobble.database.reader import Database
-from hobble.models import model
+from hobble.models import model_of_kind
 from hobble.models.load import load_network
-from hobble.models.model import Built, FinishedNetwork
+from hobble.models.model import BuiltModel, FinishedNetwork
 from hobble.models.network import Network
 from hobble.models.options import Options
 from hobble.training.batches import TRAIN
-from hobble.training.held_out import HeldOut
+from hobble.training.held_out import HeldOutErrors
 from hobble.training.history import duration, write_history
 from hobble.training.weights import write_weights
 
@@ -49,16 +49,16 @@ def build_and_save(
     began = time.perf_counter()
     built, rows = build(database, network, clips)
     seconds = time.perf_counter() - began
-    log.info("%s, from %d rows in %s", built.described, rows, duration(seconds))
+    log.info("%s, from %d rows in %s", built.description, rows, duration(seconds))
     about_training = {"passes": 1, "samples": rows, "steps": 0, "terrain_side": terrain_side}
     write_weights(weights, built, database, configuration, about_training)
     blocks = database.layout.blocks("y")
-    errors = HeldOut(database, torch.device("cpu"), 0).errors_on_every_row(
+    errors = HeldOutErrors(database, torch.device("cpu"), 0).errors_on_every_row(
         StandardisedNetwork(load_network(weights))
     )
     log.info("error on every held-out row: %.4f", errors[0])
     write_history(history, blocks, [[1, 1, rows, seconds, float("nan"), *errors]])
-    save_npz(checkpoint, network=np.array(built.described), sections=np.array(0))
+    save_npz(checkpoint, network=np.array(built.description), sections=np.array(0))
 
 
 def build(
@@ -69,8 +69,8 @@ def build(
     clips: as in `build_and_save`. Raises InputError if a file does not fit the database, and HobbleError if
     a clip has no file.
     """
-    kind = model(network.kind)
-    assert isinstance(kind, Built), "this kind is trained, not built"
+    kind = model_of_kind(network.kind)
+    assert isinstance(kind, BuiltModel), "this kind is trained, not built"
     used = [clip for clip in database.manifest.clips if clip["split"] == TRAIN and clip["rows"]]
     if missing := [clip["clip"] for clip in used if clip["clip"] not in clips]:
         raise HobbleError(

@@ -57,8 +57,8 @@ def pack(state: State) -> dict[str, np.ndarray]:
     best = state.network.flat if state.best is None else state.best
     return {
         "weights": _numpy_copy(state.network.flat),
-        "first": _numpy_copy(state.adam.first),
-        "second": _numpy_copy(state.adam.second),
+        "first": _numpy_copy(state.adam.first_moment),
+        "second": _numpy_copy(state.adam.second_moment),
         "best": _numpy_copy(best),
         "best_mse": np.array(state.best_mse),
         "steps": np.array(state.adam.steps),
@@ -66,7 +66,7 @@ def pack(state: State) -> dict[str, np.ndarray]:
         "samples": np.array(state.samples),
         "seconds": np.array(state.seconds),
         "history": np.array(state.history, float),
-        "network": np.array(state.network.described),
+        "network": np.array(state.network.description),
         "recipe": np.array(state.recipe),
     }
 
@@ -78,16 +78,16 @@ def unpack(data: Mapping[str, np.ndarray], state: State, path: Path) -> None:
     """
     try:
         described = str(data["network"])
-        if described != state.network.described:
+        if described != state.network.description:
             raise InputError(
                 path,
-                f"holds a network of {described:.200}, not of {state.network.described}",
+                f"holds a network of {described:.200}, not of {state.network.description}",
                 fix="Training can resume only with a network of the same shape: change the section network, "
                 "or remove training.continues.",
             )
         state.network.flat.copy_(torch.from_numpy(data["weights"]))
-        state.adam.first.copy_(torch.from_numpy(data["first"]))
-        state.adam.second.copy_(torch.from_numpy(data["second"]))
+        state.adam.first_moment.copy_(torch.from_numpy(data["first"]))
+        state.adam.second_moment.copy_(torch.from_numpy(data["second"]))
         state.adam.steps = int(data["steps"])
         state.best, state.best_mse = torch.from_numpy(data["best"]), float(data["best_mse"])
         state.sections_done, state.samples = int(data["sections"]), int(data["samples"])

@@ -12,8 +12,8 @@ from hobble.database import order
 from hobble.database.chunk_window import empty_buffers
 from hobble.database.manifest import Manifest
 from hobble.database.reader import Database
-from hobble.database.sharing import PassSharing, SampleRange
-from hobble.rows.compose import compose, fit_columns, x_columns
+from hobble.database.sharing import SampleRange, SectionSharing
+from hobble.rows.compose import column_count_without_terrain, compose, fit_column_count
 from hobble.training.batches import TRAIN, HostRows, SampleBatch, TrainingRows
 from hobble.training.processes import ALONE, Processes
 
@@ -45,13 +45,13 @@ class DeviceRows(TrainingRows):
         rows, fits = sum(c.rows for c in self.chunks), sum(c.fits for c in self.chunks)
         dtype = getattr(torch, manifest.dtype)
         layout = database.layout
-        self.x = torch.empty(rows, x_columns(layout), dtype=dtype, device=device)
+        self.x = torch.empty(rows, column_count_without_terrain(layout), dtype=dtype, device=device)
         self.y = torch.empty(rows, layout.y_size, dtype=dtype, device=device)
-        self.fits = torch.empty(fits, fit_columns(layout), dtype=dtype, device=device)
+        self.fits = torch.empty(fits, fit_column_count(layout), dtype=dtype, device=device)
         self.phase = torch.empty(rows, device=device)
         self.count, self.clip, self.frame = (np.empty(rows, np.int32) for _ in range(3))
         self._upload()
-        self.first = order.first_fits(self.count)
+        self.first_fit = order.first_fits(self.count)
         s = database.statistics
         self.x_std, self.y_std = (torch.from_numpy(std).to(device) for std in (s.x_std, s.y_std))
 
@@ -77,7 +77,7 @@ class DeviceRows(TrainingRows):
         self, pass_index: int, section: int, sections: int, seed: int, size: int
     ) -> Iterator[SampleBatch]:
         """Yield this process's part of each batch, see `hobble.training.batches.HostRows.batches`."""
-        sharing = self.sharing(section, sections, size)
+        sharing = self.share_section(section, sections, size)
         rows, fits = self._own_indices(sharing, (pass_index, section, sections, seed))
         device_rows, device_fits = (torch.from_numpy(part).to(self.device) for part in (rows, fits))
         batch_rows = len(sharing.own)  # rows of this process in a batch
@@ -94,7 +94,7 @@ class DeviceRows(TrainingRows):
             yield SampleBatch(x[:0], y[:0], p[:0], clip[:0], frame[:0], total)
 
     def _own_indices(
-        self, sharing: PassSharing, order_key: tuple[int, int, int, int]
+        self, sharing: SectionSharing, order_key: tuple[int, int, int, int]
     ) -> tuple[np.ndarray, np.ndarray]:
         """Indices (n,) of the rows that this process has in a section, batch by batch, and of their fits.
 
@@ -128,7 +128,7 @@ class DeviceRows(TrainingRows):
         for layer, start, stop in order.layer_parts(len(self.count), visits, section, sections, part):
             layer_key = (seed, pass_index, layer, 0)  # 0: the number of the only group
             yield order.rows_and_fits(
-                chunks, chunk_rows, self.count, self.first, visits, layer_key, slice(start, stop)
+                chunks, chunk_rows, self.count, self.first_fit, visits, layer_key, slice(start, stop)
             )
 
     def _compose(self, rows: Tensor, fits: Tensor) -> tuple[Tensor, Tensor, Tensor]:

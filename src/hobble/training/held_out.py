@@ -15,7 +15,7 @@ SPLIT = "held_out"
 ROWS_AT_ONCE = 2048  # rows predicted at once: enough to be fast, in less than 50 MB
 
 
-class Predicts(Protocol):
+class PredictsStandardised(Protocol):
     """A network that predicts standardised outputs, either in training or read from a file."""
 
     @property
@@ -26,7 +26,7 @@ class Predicts(Protocol):
         """Standardised outputs (B, Y) of standardised inputs (B, X) at phases (B,)."""
 
 
-class HeldOut:
+class HeldOutErrors:
     """Measures a network on a sample of the held-out clips' rows, each with one of its terrain fits.
 
     section_samples: number of training samples in a section. The held-out sample has a tenth as many rows,
@@ -45,18 +45,18 @@ class HeldOut:
             if rows <= 0:
                 break
 
-    def errors(self, network: Predicts) -> list[float]:
+    def errors(self, network: PredictsStandardised) -> list[float]:
         """On the sample, the mean squared error of the whole standardised output, then of each block of Y.
 
         The blocks have the order of `RowLayout.blocks("y")`. Without held-out rows, all errors are nan.
         """
         return self._errors(network, self.sample)
 
-    def errors_on_every_row(self, network: Predicts) -> list[float]:
+    def errors_on_every_row(self, network: PredictsStandardised) -> list[float]:
         """The same errors as `errors`, on every held-out row."""
         return self._errors(network, self._batches())
 
-    def _errors(self, network: Predicts, batches: Iterable[tuple[Tensor, ...]]) -> list[float]:
+    def _errors(self, network: PredictsStandardised, batches: Iterable[tuple[Tensor, ...]]) -> list[float]:
         total = np.zeros(network.outputs)
         rows = 0
         for x, y, p in batches:

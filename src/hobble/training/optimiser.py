@@ -30,8 +30,8 @@ def l1_slopes(network: Trainable, l1: float) -> list[float]:
 class Adam:
     """Adam (Kingma and Ba 2015) on all parameters of a network, which are in one buffer, `network.flat`.
 
-    first, second: running means of the gradient and of its square, laid out like `network.flat`. steps:
-    number of steps so far.
+    first_moment, second_moment: running means of the gradient and of its square, laid out like
+    `network.flat`. steps: number of steps so far.
     """
 
     def __init__(
@@ -41,8 +41,8 @@ class Adam:
         self.learning_rate, self.beta1, self.beta2 = learning_rate, beta1, beta2
         self.slopes = l1_slopes(network, l1)
         self.steps = 0
-        self.first = torch.zeros_like(network.flat)
-        self.second = torch.zeros_like(network.flat)
+        self.first_moment = torch.zeros_like(network.flat)
+        self.second_moment = torch.zeros_like(network.flat)
 
     def step(self, gradients: list[Tensor], share: float = 1.0) -> None:
         """Take one step against `gradients`.
@@ -69,7 +69,11 @@ class Adam:
 
     def _step_on_cpu(self, gradients: list[Tensor], rate: float, root: float) -> None:
         """Take the step on a CPU. One loop goes through memory once, because memory limits the speed."""
-        views = [self.network.layers, self.network.views(self.first), self.network.views(self.second)]
+        views = [
+            self.network.layers,
+            self.network.views(self.first_moment),
+            self.network.views(self.second_moment),
+        ]
         for *tensors, gradient, slope in zip(*views, gradients, self.slopes, strict=True):
             arrays = [as_numpy(tensor.flatten(0, 1)) for tensor in tensors]  # w, m and v of `_adam_loop`
             arrays.append(as_numpy(gradient.view(tensors[0].shape).flatten(0, 1)))
@@ -80,7 +84,11 @@ class Adam:
     def step_with_torch(self, gradients: list[Tensor], factors: Tensor) -> None:
         """Take the step in PyTorch, on any device. factors: (2,) from `step_factors`, on the device."""
         rate, root = factors.to(self.network.flat.dtype).unbind()
-        views = [self.network.layers, self.network.views(self.first), self.network.views(self.second)]
+        views = [
+            self.network.layers,
+            self.network.views(self.first_moment),
+            self.network.views(self.second_moment),
+        ]
         for w, m, v, gradient, slope in zip(*views, gradients, self.slopes, strict=True):
             g = gradient.view(w.shape).to(w.dtype, copy=True)
             g[:, :, :-1].add_(torch.sign(w[:, :, :-1]), alpha=slope)

@@ -63,7 +63,7 @@ class OtherPaces:
         self.batch_steps = torch.tensor(STEPS_OF_BATCH, device=device, dtype=torch.float64)[:, None]
         self.batches = 0
 
-    def begin(self) -> None:
+    def begin_section(self) -> None:
         """Count batches from 0 again, so that a section does not depend on the previous one."""
         self.batches = 0
 

@@ -64,7 +64,7 @@ class OtherPoses:
         self.phases = torch.full((rows, REMEMBERED_ROWS), torch.nan, device=device)  # nan: no row yet
         self.batches = 0
 
-    def begin(self) -> None:
+    def begin_section(self) -> None:
         """Forget all rows, so that a section does not depend on the previous one."""
         self.phases.fill_(torch.nan)
         self.batches = 0

@@ -20,7 +20,7 @@ import torch.distributed
 from torch import Tensor
 
 from hobble.core.errors import HobbleError
-from hobble.database.sharing import PassSharing, own_places
+from hobble.database.sharing import SectionSharing, own_places
 
 LONGEST_WAIT = timedelta(minutes=30)  # for the slowest process; a dead process is noticed at once
 
@@ -29,60 +29,60 @@ LONGEST_WAIT = timedelta(minutes=30)  # for the slowest process; a dead process 
 class Processes:
     """A group of `count` processes, as one of them sees it.
 
-    rank: number of this process, from 0. local: its number among the processes of its machine, from 0.
+    rank: number of this process, from 0. local_rank: its number among the processes of its machine, from 0.
     """
 
     rank: int = 0
     count: int = 1
-    local: int = 0
+    local_rank: int = 0
 
     @property
-    def first(self) -> bool:
+    def is_first(self) -> bool:
         """Whether this is the first process, which writes the files and the log."""
         return self.rank == 0
 
     @property
-    def alone(self) -> bool:
+    def is_alone(self) -> bool:
         """Whether there is only one process."""
         return self.count == 1
 
-    def places(self, batch: int) -> range:
+    def own_places(self, batch: int) -> range:
         """The places in a batch that this process fills."""
         return own_places(batch, self.rank, self.count)
 
-    def sharing(self, total: int, batch: int, stretches: int | None) -> PassSharing:
+    def share_section(self, total: int, batch: int, stretches: int | None) -> SectionSharing:
         """What this process reads of a section of `total` samples, in batches of `batch` samples.
 
         stretches: number of consecutive parts that the section is cut into. Each batch takes samples from
         every part. None: one part for each process.
         """
-        return PassSharing.of(total, batch, stretches or self.count, self.rank, self.count)
+        return SectionSharing.for_process(total, batch, stretches or self.count, self.rank, self.count)
 
     def sum(self, values: Tensor) -> None:
         """Replace values (n,) by their sum over the processes. All processes get the same bits."""
-        if not self.alone:
+        if not self.is_alone:
             torch.distributed.all_reduce(values)
 
     def take_from_first(self, *tensors: Tensor) -> None:
         """Replace the tensors by those of the first process."""
-        if not self.alone:
+        if not self.is_alone:
             for tensor in tensors:
                 torch.distributed.broadcast(tensor, 0)
 
     def numbers_of_first(self, *numbers: int) -> list[int]:
         """The numbers that the first process passes. Every process calls this and gets them."""
         shared: list[Any] = [numbers]
-        if not self.alone:
+        if not self.is_alone:
             torch.distributed.broadcast_object_list(shared, 0)
         return list(shared[0])
 
-    def most_certain(self, text: str, certain: bool) -> str:
+    def choose_error_message(self, text: str, certain: bool) -> str:
         """Choose one error message for all processes. text: that of this process.
 
         certain: whether this process knows the cause of the error. The first process that knows it decides;
         if none does, process 0.
         """
-        if self.alone:
+        if self.is_alone:
             return text
         texts: list[Any] = [None] * self.count
         torch.distributed.all_gather_object(texts, (not certain, text))
@@ -90,7 +90,7 @@ class Processes:
 
     def check_same(self, flat: Tensor) -> None:
         """Raise HobbleError if the processes hold different weights. flat: the weights of this process."""
-        if self.alone:
+        if self.is_alone:
             return
         checksums: list[Any] = [None] * self.count
         torch.distributed.all_gather_object(checksums, zlib.crc32(flat.cpu().numpy().tobytes()))
@@ -110,7 +110,7 @@ def join_processes(on_cuda: bool) -> Iterator[Processes]:
     numbers = (int(os.environ[name]) for name in ("RANK", "WORLD_SIZE", "LOCAL_RANK"))
     processes = Processes(*numbers)
     if on_cuda:
-        torch.cuda.set_device(processes.local)
+        torch.cuda.set_device(processes.local_rank)
     torch.distributed.init_process_group("nccl" if on_cuda else "gloo", timeout=LONGEST_WAIT)
     try:
         yield processes

@@ -49,7 +49,7 @@ class RollOut:
         )
         self.batches = 0
 
-    def begin(self) -> None:
+    def begin_section(self) -> None:
         """Set all errors to 0, so that a section does not depend on the previous one."""
         self.position.zero_()
         self.velocity.zero_()

@@ -9,13 +9,13 @@ from typing import Any
 
 from hobble.core.files import save_npz
 from hobble.database.reader import Database
-from hobble.models import model
-from hobble.models.model import Built
+from hobble.models import model_of_kind
+from hobble.models.model import BuiltModel
 from hobble.models.network import TERRAIN_SIDE
 from hobble.models.options import Options
 from hobble.training.build_network import build_and_save
 from hobble.training.checkpoint import State, pack
-from hobble.training.held_out import HeldOut
+from hobble.training.held_out import HeldOutErrors
 from hobble.training.history import write_history
 from hobble.training.options import Training
 from hobble.training.train import train
@@ -49,7 +49,7 @@ def run(
     clip's rows in order, needed only for a network that is built, not trained.
     """
     data = Database.open(database, training.memory_mb).with_phase_weight(training.phase_weight)
-    if isinstance(model(network.kind), Built):
+    if isinstance(model_of_kind(network.kind), BuiltModel):
         build_and_save(
             data,
             clips or {},
@@ -95,10 +95,10 @@ def _write(
             state.sections_done,
         )
     blocks = data.layout.blocks("y")
-    errors = HeldOut(data, state.network.flat.device, 0).errors_on_every_row(state.network)
+    errors = HeldOutErrors(data, state.network.flat.device, 0).errors_on_every_row(state.network)
     named = zip(["all outputs", *blocks], errors, strict=True)
     log.info("error on every held-out row: %s", ", ".join(f"{name} {error:.4f}" for name, error in named))
-    if data.rows("held_out"):
+    if data.row_count("held_out"):
         about_training["held_out_mse"] = errors[0]
     write_weights(weights, state.network, data, configuration, about_training)
     write_history(history, blocks, state.history)
@@ -108,18 +108,18 @@ def _write(
 def _training_numbers(state: State, training: Training) -> dict[str, Any]:
     """Passes, samples and optimiser steps of a training, for the metadata in the file of its weights."""
     return {
-        "passes": passes_of(state.sections_done, training.sections),
+        "passes": count_passes(state.sections_done, training.sections),
         "samples": state.samples,
         "steps": state.adam.steps,
     }
 
 
-def passes_of(sections: int, per_pass: int) -> float:
+def count_passes(sections: int, per_pass: int) -> float:
     """The number of passes that `sections` sections make up; an int if it is whole.
 
     per_pass: number of sections in a pass.
 
-    >>> passes_of(40, 4), passes_of(1, 4)
+    >>> count_passes(40, 4), count_passes(1, 4)
     (10, 0.25)
     """
     return sections // per_pass if sections % per_pass == 0 else round(sections / per_pass, 6)

@@ -19,8 +19,8 @@ from hobble.core.processors import count_cores, multiplies_bfloat16
 from hobble.core.skeleton import Skeleton
 from hobble.database.manifest import FILE
 from hobble.database.reader import Database
-from hobble.models import model
-from hobble.models.model import Trained
+from hobble.models import model_of_kind
+from hobble.models.model import TrainedModel
 from hobble.models.options import Options
 from hobble.models.thread_trial import threads_for
 from hobble.models.trainable import Trainable, TrainingStep
@@ -99,7 +99,7 @@ def run_name(recipe: str, start: Arrays | None) -> str:
     return digest.hexdigest()[:16]
 
 
-def begin(
+def begin_or_resume(
     database: Database,
     network: Options,
     training: Training,
@@ -120,9 +120,9 @@ def begin(
     reads the checkpoint and sends the state to the other processes. These get `checkpoints` as the path,
     which they do not use.
     """
-    start_arrays = load_npz(start) if start is not None and processes.first else None
+    start_arrays = load_npz(start) if start is not None and processes.is_first else None
     state = new_state(database, network, training, processes)
-    if not processes.first:
+    if not processes.is_first:
         return _send_state(state, processes), checkpoints
     state, own_path = _restore(state, training, recipe, checkpoints, start, start_arrays)
     return _send_state(state, processes), own_path
@@ -130,7 +130,7 @@ def begin(
 
 def _send_state(state: State, processes: Processes) -> State:
     """Copy the first process's state to all processes."""
-    processes.take_from_first(state.network.flat, state.adam.first, state.adam.second)
+    processes.take_from_first(state.network.flat, state.adam.first_moment, state.adam.second_moment)
     numbers = processes.numbers_of_first(state.adam.steps, state.sections_done, state.samples)
     state.adam.steps, state.sections_done, state.samples = numbers
     return state
@@ -144,9 +144,10 @@ def _restore(
     start: Path | None,
     start_arrays: Arrays | None,
 ) -> tuple[State, Path]:
-    """Fill `state` from the run's own checkpoint or from `start`; see `begin`. Without both, leave it new.
+    """Fill `state` from the run's own checkpoint or from `start`. Without both, leave it new.
 
-    start_arrays: what the file `start` holds. Returns the state and the path of the run's own checkpoint.
+    For the arguments see `begin_or_resume`. start_arrays: what the file `start` holds. Returns the state and
+    the path of the run's own checkpoint.
     """
     state.recipe = run_name(recipe, start_arrays)
     own_path = checkpoints / state.recipe / "checkpoint.npz"
@@ -201,14 +202,14 @@ def new_state(
 ) -> State:
     """The state before the first section: a new network for the database's rows, and a new optimiser."""
     skeleton = Skeleton.from_dict(database.skeleton)
-    kind = model(network.kind)
-    assert isinstance(kind, Trained), "networks of this kind are built from rows without a training"
-    new_network = kind.trainable(network, database.layout, skeleton, training.seed)
-    new_network = new_network.to(device(training.device, processes))
+    kind = model_of_kind(network.kind)
+    assert isinstance(kind, TrainedModel), "networks of this kind are built from rows without a training"
+    new_network = kind.untrained_network(network, database.layout, skeleton, training.seed)
+    new_network = new_network.to(choose_device(training.device, processes))
     return State(new_network, Adam(new_network, **training.model_dump(include=set(ADAM_KEYS))))
 
 
-def device(wanted: str, processes: Processes = ALONE) -> torch.device:
+def choose_device(wanted: str, processes: Processes = ALONE) -> torch.device:
     """The device to train on. wanted: "auto", "cpu" or "cuda"; "auto" is CUDA if there is a GPU.
 
     If there are several processes, each one has its own GPU. Raises HobbleError if "cuda" is wanted but not
@@ -221,7 +222,7 @@ def device(wanted: str, processes: Processes = ALONE) -> torch.device:
         )
     if not has_cuda or wanted == "cpu":
         return torch.device("cpu")
-    return torch.device("cuda") if processes.alone else torch.device("cuda", processes.local)
+    return torch.device("cuda") if processes.is_alone else torch.device("cuda", processes.local_rank)
 
 
 def step_for(network: Trainable, training: Training) -> TrainingStep:

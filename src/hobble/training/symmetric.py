@@ -22,22 +22,22 @@ STEPS_BETWEEN = 16
 class Symmetry:
     """Keeps a network symmetric while it trains on a database.
 
-    The property `why_asymmetric` of the network's options must be empty; else it says why the network cannot
-    be symmetric. Raises HobbleError if the skeleton has no mirror image, or if left and right columns are
-    standardised differently.
+    The property `why_not_symmetric` of the network's options must be empty; else it says why the network
+    cannot be symmetric. Raises HobbleError if the skeleton has no mirror image, or if left and right columns
+    are standardised differently.
     """
 
     def __init__(self, network: Trainable, database: Database) -> None:
         layout, statistics = database.layout, database.statistics
         skeleton = Skeleton.from_dict(database.skeleton)
-        inputs = mirror_of_x(layout, skeleton).standardised(statistics.x_mean, statistics.x_std)
-        outputs = mirror_of_y(layout, skeleton).standardised(statistics.y_mean, statistics.y_std)
+        inputs = mirror_of_x(layout, skeleton).for_standardised_rows(statistics.x_mean, statistics.x_std)
+        outputs = mirror_of_y(layout, skeleton).for_standardised_rows(statistics.y_mean, statistics.y_std)
         mirrors = network.mirrors(inputs, outputs)
         self.layers = [
             LayerSymmetry(layer, mirror) for layer, mirror in zip(network.layers, mirrors, strict=True)
         ]
 
-    def start(self) -> None:
+    def make_new_network_symmetric(self) -> None:
         """Make the random weights of a new network symmetric.
 
         Each weight becomes the mean of two independent random weights, which halves the variance. So the

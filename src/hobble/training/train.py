@@ -21,7 +21,7 @@ from hobble.models.options import Options
 from hobble.training.batches import TRAIN, LossWatch
 from hobble.training.checkpoint import Saver, State, pack
 from hobble.training.device_rows import rows_on_device_or_host
-from hobble.training.held_out import SPLIT, HeldOut
+from hobble.training.held_out import SPLIT, HeldOutErrors
 from hobble.training.history import duration
 from hobble.training.options import Training
 from hobble.training.other_paces import OtherPaces
@@ -29,7 +29,7 @@ from hobble.training.other_poses import OtherPoses
 from hobble.training.processes import ALONE, Processes
 from hobble.training.rollout import RollOut
 from hobble.training.schedule import learning_rate_share
-from hobble.training.start import begin, recipe_hash, step_for, use_threads
+from hobble.training.start import begin_or_resume, recipe_hash, step_for, use_threads
 from hobble.training.symmetric import Symmetry
 from hobble.training.update import update_for
 from hobble.training.version_poses import VersionPoses
@@ -63,22 +63,22 @@ def train(
     clip is held out, and if `symmetric` is set for a network that cannot be symmetric.
     """
     use_threads(threads, training.batch)
-    if (training.patience or training.keep == "best") and not database.rows(SPLIT):
+    if (training.patience or training.keep == "best") and not database.row_count(SPLIT):
         raise HobbleError(
             "`training.keep: best` and training.patience need the held-out error, but no clip is held out. "
             "List some clips under held_out in the data set."
         )
-    if training.symmetric and network.why_asymmetric:
-        raise HobbleError(f"training.symmetric: {network.why_asymmetric}. Write `symmetric: false`.")
-    samples, sections = database.samples(TRAIN), training.sections
+    if training.symmetric and network.why_not_symmetric:
+        raise HobbleError(f"training.symmetric: {network.why_not_symmetric}. Write `symmetric: false`.")
+    samples, sections = database.sample_count(TRAIN), training.sections
     if samples < sections:
         raise HobbleError(
             f"{samples} training samples are fewer than training.sections, {sections}. "
             "Lower training.sections, or add clips."
         )
     recipe = recipe_hash(network, training, database, code)
-    state, path = begin(database, network, training, recipe, Path(checkpoints), start, processes)
-    if not processes.first:
+    state, path = begin_or_resume(database, network, training, recipe, Path(checkpoints), start, processes)
+    if not processes.is_first:
         _run(state, database, training, processes, None)
         return state
     with Saver(path) as saver:
@@ -100,14 +100,14 @@ def _run(
     update = update_for(step, state.adam, batch_size, processes, _undropped_inputs(database, training))
     symmetry = Symmetry(state.network, database) if training.symmetric else None
     if symmetry and not state.adam.steps:  # no step yet, so the weights are new
-        symmetry.start()
+        symmetry.make_new_network_symmetric()
     rows = rows_on_device_or_host(database, device, processes, training.stretches)
-    places = processes.places(batch_size)  # the places in each batch that this process fills
+    places = processes.own_places(batch_size)  # the places in each batch that this process fills
     other_poses = OtherPoses(database, training.other_poses, len(places), device, places.start)
     version_poses = VersionPoses(database, training.version_poses, len(places), device, places.start)
     other_paces = OtherPaces(database, training.other_paces, len(places), device, places.start)
     roll_out = RollOut(database, training.rollout, len(places), device, places.start)
-    samples = database.samples(TRAIN)
+    samples = database.sample_count(TRAIN)
     for index in range(state.sections_done, training.all_sections):
         if (
             training.patience
@@ -119,10 +119,10 @@ def _run(
         where = f"pass {pass_index + 1} of {training.passes:g}, section {section + 1} of {sections}"
         watch = LossWatch(where, database.clips, processes)
         step.seed(section_seed(seed, index))
-        other_poses.begin()
-        version_poses.begin()
-        other_paces.begin()
-        roll_out.begin()
+        other_poses.begin_section()
+        version_poses.begin_section()
+        other_paces.begin_section()
+        roll_out.begin_section()
         for batch in rows.batches(pass_index, section, sections, seed, batch_size):
             # Play the motion slower or faster. Mix in poses of rows with other channel values, then poses of
             # hurt or healthy versions of the same clip. Add the network's own errors.
@@ -168,8 +168,8 @@ class TrainingRecorder:
 
     def __init__(self, state: State, database: Database, training: Training, saver: Saver) -> None:
         self.state, self.saver = state, saver
-        samples = database.samples(TRAIN)
-        self.held_out = HeldOut(database, state.network.flat.device, samples // training.sections)
+        samples = database.sample_count(TRAIN)
+        self.held_out = HeldOutErrors(database, state.network.flat.device, samples // training.sections)
         self.goal = round(training.passes * samples)  # samples of the whole training
         self.samples_before, self.seconds_before = state.samples, state.seconds  # before this process began
         self.began = time.perf_counter()

@@ -66,7 +66,7 @@ class SharedUpdate(Update):
         undropped: Sequence[slice] = (),
     ) -> None:
         super().__init__(step, adam, undropped)
-        self.processes, self.own = processes, processes.places(batch)
+        self.processes, self.own = processes, processes.own_places(batch)
         # One buffer for the gradient and, in its last item, the loss, so that one message sends both.
         self.sent = torch.empty(len(adam.network.flat) + 1, dtype=adam.network.flat.dtype)
         self.sent = self.sent.to(adam.network.flat.device)
@@ -108,7 +108,7 @@ class CapturedUpdate(Update):
         self.graph = torch.cuda.CUDAGraph()
         self.graph.register_generator_state(step.generator)
         # The updates of the warm-up change these tensors, so they are put back below.
-        before = [tensor.clone() for tensor in (flat, adam.first, adam.second)]
+        before = [tensor.clone() for tensor in (flat, adam.first_moment, adam.second_moment)]
         side_stream = torch.cuda.Stream()
         side_stream.wait_stream(torch.cuda.current_stream())
         with torch.cuda.stream(side_stream):
@@ -118,7 +118,7 @@ class CapturedUpdate(Update):
         with torch.cuda.graph(self.graph):
             self.loss = self._update_from_fixed_memory()
         self.error = step.error
-        for tensor, value in zip((flat, adam.first, adam.second), before, strict=True):
+        for tensor, value in zip((flat, adam.first_moment, adam.second_moment), before, strict=True):
             tensor.copy_(value)
 
     def _update_from_fixed_memory(self) -> Tensor:
@@ -148,7 +148,7 @@ def update_for(
 
     On CUDA it is captured if there is one process and the batches are small.
     """
-    if not processes.alone:
+    if not processes.is_alone:
         return SharedUpdate(step, adam, processes, rows, undropped)
     if adam.network.flat.device.type == "cuda" and rows <= CAPTURED_UP_TO:
         return CapturedUpdate(step, adam, rows, undropped)

@@ -14,9 +14,9 @@ from torch import Tensor
 
 from hobble.core.quat import Array
 from hobble.database.chunk_window import ChunkWindow, empty_buffers
-from hobble.database.precision import widen
+from hobble.database.precision import to_floats
 from hobble.database.reader import Database
-from hobble.rows.compose import lower_joints, without_terrain
+from hobble.rows.compose import blocks_without_terrain, lower_joints
 from hobble.training.even_spread import EvenSpread
 
 SPLIT = "train"
@@ -76,9 +76,9 @@ class VersionPoses:
         self.spread = EvenSpread(batch, device, first)
         # The places of the candidates, counted from the place of the sought key.
         self.offsets = torch.arange(CANDIDATES, device=device) - CANDIDATES // 2
-        self.batches = 0  # number of batches since `begin`
+        self.batches = 0  # number of batches since `begin_section`
 
-    def begin(self) -> None:
+    def begin_section(self) -> None:
         """Count batches from 0 again, so that a section does not depend on the previous one."""
         self.batches = 0
 
@@ -119,12 +119,12 @@ def _pose_table(database: Database, clip_keys: Array) -> tuple[Array, Array, Arr
     of its clip plus the phase. The rows are sorted by key.
     """
     manifest = database.manifest
-    blocks, buffers = without_terrain(database.layout), empty_buffers(manifest, SPLIT, 1)
+    blocks, buffers = blocks_without_terrain(database.layout), empty_buffers(manifest, SPLIT, 1)
     pose_columns, direction_columns = (
         np.r_[tuple(blocks[name] for name in names)]
         for names in (("joint_position", "joint_velocity"), ("direction",))
     )
-    table_bytes = 4 * (len(pose_columns) + len(direction_columns)) * manifest.rows(SPLIT)  # float32
+    table_bytes = 4 * (len(pose_columns) + len(direction_columns)) * manifest.row_count(SPLIT)  # float32
     row_step = max(1, math.ceil(table_bytes / TABLE_BYTES))
     parts = [
         (  # arrays without rows, so that there is something to concatenate
@@ -164,9 +164,11 @@ def _chunk_table(
     """
     key = clip_keys[window.clip] + window.phase
     chosen = np.flatnonzero(key >= 0)[::row_step]
-    x = widen(window.x[chosen]).astype(np.float32)
-    lift = widen(window.fits[window.first[chosen]]).astype(np.float32)[:, -1:]
-    lower_joints(x, without_terrain(database.layout)["joint_position"], lift, _without_terrain_std(database))
+    x = to_floats(window.x[chosen]).astype(np.float32)
+    lift = to_floats(window.fits[window.first_fit[chosen]]).astype(np.float32)[:, -1:]
+    lower_joints(
+        x, blocks_without_terrain(database.layout)["joint_position"], lift, _without_terrain_std(database)
+    )
     return key[chosen], x[:, pose_columns], x[:, direction_columns]
 
 

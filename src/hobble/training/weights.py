@@ -42,11 +42,13 @@ def write_weights(
         "Ymean": statistics.y_mean,
         "Ystd": statistics.y_std,
     }
-    arrays |= TrainingFacts.of(database.layout, database.each_row(TRAIN), statistics).arrays()
-    save_npz(path, **arrays, meta=np.array(meta(network, database, configuration, about_training)))
+    arrays |= TrainingFacts.from_rows(database.layout, database.each_row(TRAIN), statistics).arrays()
+    save_npz(
+        path, **arrays, meta=np.array(network_metadata(network, database, configuration, about_training))
+    )
 
 
-def meta(
+def network_metadata(
     network: FinishedNetwork, database: Database, configuration: str, about_training: Mapping[str, Any]
 ) -> str:
     """The text of the array `meta`: JSON that says what each column means and how the network was made."""
@@ -63,7 +65,7 @@ def meta(
             "channels": {c.name: c.columns(skeleton) for c in channels},
             "limits": database.manifest.limits,
             "units": "; ".join([UNITS, *(f"{c.value_word} 0 to {c.highest:g}" for c in channels)]),
-            **network.about,
+            **network.file_metadata,
             **about_training,
         }
     )  # keys are not sorted, because the skeleton's joints must keep the order of the columns

@@ -7,8 +7,8 @@ import json
 from typing import Any
 
 from hobble.config.load_configuration import Catalogue
-from hobble.models import model
-from hobble.models.model import Built, Model
+from hobble.models import model_of_kind
+from hobble.models.model import BuiltModel, Model
 from hobble.workflow.channel_sources import database_folder
 from hobble.workflow.clips import DATASETS
 from hobble.workflow.datasets import Datasets
@@ -76,7 +76,7 @@ class Configurations:
 
     def model(self, configuration: str) -> Model:
         """The object MODEL of the package `model_package`, which describes the kind of network."""
-        return model(self.catalogue.configuration(self.network_owner(configuration)).network.kind)
+        return model_of_kind(self.catalogue.configuration(self.network_owner(configuration)).network.kind)
 
     def network(self, configuration: str, file: str) -> str:
         """Path of `file` in the folder of the configuration's network."""
@@ -89,7 +89,7 @@ class Configurations:
 
     def is_built(self, configuration: str) -> bool:
         """Whether the network is built directly from rows of the database instead of trained."""
-        return isinstance(model(self.catalogue.configuration(configuration).network.kind), Built)
+        return isinstance(model_of_kind(self.catalogue.configuration(configuration).network.kind), BuiltModel)
 
     def training_row_files(self, configuration: str) -> list[str]:
         """If the network is built: files with the rows of the training clips, in order of frames. Else []."""

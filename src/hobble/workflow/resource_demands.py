@@ -16,8 +16,8 @@ from pathlib import Path
 
 from hobble.channels import channel
 from hobble.measures.registry import measure
-from hobble.models import model
-from hobble.models.model import Trained
+from hobble.models import model_of_kind
+from hobble.models.model import TrainedModel
 from hobble.rows.layout import RowLayout
 from hobble.training.options import Machines
 from hobble.workflow.clip_batches import ClipBatch
@@ -133,7 +133,7 @@ class Demands:
         """
         training = self.project.configurations.section(configuration, "training")
         # 500 MB for PyTorch, and 32 bytes for each parameter and its part of the optimiser's state.
-        needed = 500 + training["memory_mb"] + 32e-6 * self.parameters(configuration)
+        needed = 500 + training["memory_mb"] + 32e-6 * self.parameter_count(configuration)
         if self.project.configurations.is_built(configuration):
             layout, dataset = self.layout(configuration), self.project.configurations.dataset(configuration)
             # A number of a row has 4 bytes, so it needs 4e-3 MB for a thousand rows.
@@ -151,7 +151,7 @@ class Demands:
         dataset = self.project.configurations.dataset(configuration)
         frames = 1e3 * self.all_thousands_of_frames(dataset) * MEASURED_JOINTS / self._joints(dataset)
         samples = frames * VISITS_PER_PASS * training["passes"]
-        seconds = samples * self.parameters(configuration) / 4 / 6.4e9
+        seconds = samples * self.parameter_count(configuration) / 4 / 6.4e9
         return _minutes(seconds / self.machines(configuration).count, attempt, least=60)
 
     def machines(self, configuration: str) -> Machines:
@@ -194,12 +194,14 @@ class Demands:
         """What `thousands_of_frames` returns, for each clip of a batch."""
         return [self.thousands_of_frames(batch.dataset, clip) for clip in batch.clips]
 
-    def parameters(self, configuration: str) -> float:
+    def parameter_count(self, configuration: str) -> float:
         """Number of trained parameters of a configuration's network; 0 if it is not trained."""
         chosen, layout = self.project.catalogue.configuration(configuration), self.layout(configuration)
-        kind = model(chosen.network.kind)
+        kind = model_of_kind(chosen.network.kind)
         return (
-            kind.parameters(chosen.network, layout.x_size, layout.y_size) if isinstance(kind, Trained) else 0
+            kind.parameter_count(chosen.network, layout.x_size, layout.y_size)
+            if isinstance(kind, TrainedModel)
+            else 0
         )
 
     def layout(self, configuration: str) -> RowLayout:

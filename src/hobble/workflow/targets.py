@@ -114,9 +114,9 @@ def _check_configuration(project: Project, name: str) -> None:
 
 def _check_symmetric(project: Project, name: str, configuration: Configuration) -> None:
     """Check that the network can be symmetric and that the data set has mirrored clips."""
-    if configuration.network.why_asymmetric:
+    if configuration.network.why_not_symmetric:
         raise HobbleError(
-            f"configuration {name}: training.symmetric: {configuration.network.why_asymmetric}. "
+            f"configuration {name}: training.symmetric: {configuration.network.why_not_symmetric}. "
             "Write `symmetric: false`."
         )
     dataset = configuration.dataset

@@ -7,7 +7,7 @@ import torch
 
 from hobble.models.mann.fused import FusedMannStep
 from hobble.models.mann.step import MannStep
-from hobble.models.mann.trainable import TrainableMann, initialise
+from hobble.models.mann.trainable import TrainableMann, untrained_network
 
 from .definition import output
 
@@ -22,7 +22,7 @@ SHAPES = [
 
 def problem(sizes, gate, columns, rows, dtype=torch.float64, spread=0.5):
     generator = torch.Generator().manual_seed(3)
-    network = initialise(sizes, gate, columns, 1).to("cpu", dtype)
+    network = untrained_network(sizes, gate, columns, 1).to("cpu", dtype)
     network.flat.normal_(0, spread, generator=generator)
     x, y = (torch.randn(rows, n, generator=generator, dtype=torch.float64) for n in (sizes[0], sizes[-1]))
     return network, x.to(dtype), y.to(dtype), torch.zeros(rows, dtype=dtype)
@@ -80,7 +80,7 @@ def test_batches_of_other_sizes_share_the_buffers() -> None:
 
 
 def test_initial_weights_fill_their_bounds_and_experts_have_equal_shares() -> None:
-    network: TrainableMann = initialise((40, 30, 20), (5, 8, 4), (0, 1, 2, 3, 4), 1)
+    network: TrainableMann = untrained_network((40, 30, 20), (5, 8, 4), (0, 1, 2, 3, 4), 1)
     for layer, (a, b) in zip(network.layers, ((5, 8), (8, 4), (40, 30), (30, 20)), strict=True):
         bound = (6 / (a * b)) ** 0.5
         assert torch.count_nonzero(layer[:, :, -1]) == 0

@@ -9,11 +9,11 @@ from typing import Any
 import numpy as np
 
 from hobble.core.skeleton import Skeleton
-from hobble.models import model
+from hobble.models import model_of_kind
 from hobble.models.load import network_from_arrays
 from hobble.models.matching.network import Matching
 from hobble.rows.clip_rows import ClipRows, save_clip_rows
-from hobble.rows.compose import body_columns
+from hobble.rows.compose import body_column_count
 from hobble.rows.layout import RowLayout
 
 FRAMES = (70, 90)  # of each clip
@@ -47,7 +47,7 @@ def clip(skeleton: Skeleton, number: int, seed: int = 1) -> ClipRows:
         clip=f"clip-{number}",
         layout=layout,
         skeleton=skeleton.to_dict(),
-        x=smooth(rng, count, body_columns(layout), 10.0)[row],
+        x=smooth(rng, count, body_column_count(layout), 10.0)[row],
         y=y[row],
         p=(0.02 * row) % 1.0,
         channels={"injury": injury[row]},
@@ -65,14 +65,19 @@ def built(skeleton: Skeleton, folder: Path, **options: Any) -> tuple[Any, dict[s
     for number in range(len(FRAMES)):
         files.append(folder / f"clip-{number}.npz")
         save_clip_rows(files[-1], clip(skeleton, number))
-    layout, kind = layout_of(skeleton), model("matching")
-    tables = kind.build(kind.options().model_validate(options), files, layout, skeleton)
+    layout, kind = layout_of(skeleton), model_of_kind("matching")
+    tables = kind.build(kind.options_class().model_validate(options), files, layout, skeleton)
     rng = np.random.default_rng(1)
     arrays: dict[str, Any] = dict(tables.arrays())
     for name, size in (("X", layout.x_size), ("Y", layout.y_size)):
         arrays[f"{name}mean"] = rng.normal(0, 10, size).astype(np.float32)
         arrays[f"{name}std"] = rng.uniform(0.5, 2, size).astype(np.float32)
-    meta = {"kind": "matching", "layout": layout.to_dict(), "skeleton": skeleton.to_dict(), **tables.about}
+    meta = {
+        "kind": "matching",
+        "layout": layout.to_dict(),
+        "skeleton": skeleton.to_dict(),
+        **tables.file_metadata,
+    }
     arrays["meta"] = np.array(json.dumps(meta))
     network = network_from_arrays("weights.npz", arrays)
     assert isinstance(network, Matching)

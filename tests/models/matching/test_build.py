@@ -10,11 +10,11 @@ import pytest
 
 from hobble.core.errors import InputError
 from hobble.core.skeleton import Skeleton
-from hobble.models import model
+from hobble.models import model_of_kind
 from hobble.models.matching.build import find_runs, on_mean_ground
 from hobble.models.matching.options import MatchingOptions
 from hobble.models.matching.search_features import feature_groups
-from hobble.rows.clip_rows import pairs, save_clip_rows
+from hobble.rows.clip_rows import compose_pairs, save_clip_rows
 from hobble.rows.layout import RowLayout
 
 from .example import CUT, FRAMES, built, clip, layout_of
@@ -48,7 +48,7 @@ def test_rows_lie_on_the_mean_of_their_fits(holden31: Skeleton) -> None:
     rows, layout = clip(holden31, 0), layout_of(holden31)
     x, y = on_mean_ground(rows, layout)
     first = rows.first_fit
-    each = [pairs(rows, layout, np.arange(len(rows)), first + k) for k in range(2)]
+    each = [compose_pairs(rows, layout, np.arange(len(rows)), first + k) for k in range(2)]
     np.testing.assert_allclose(x, (each[0].x + each[1].x) / 2, atol=1e-5)
     np.testing.assert_allclose(y, (each[0].y + each[1].y) / 2, atol=1e-5)
 
@@ -90,7 +90,7 @@ def test_a_group_has_its_configured_weight(holden31: Skeleton, tmp_path: Path) -
 
 def test_rows_of_another_layout_are_refused(holden31: Skeleton, tmp_path: Path) -> None:
     save_clip_rows(tmp_path / "one.npz", clip(holden31, 0))
-    kind, layout = model("matching"), RowLayout(len(holden31.joints), window=30)
+    kind, layout = model_of_kind("matching"), RowLayout(len(holden31.joints), window=30)
     with pytest.raises(InputError, match=r"one\.npz"):
         kind.build(MatchingOptions(), [tmp_path / "one.npz"], layout, holden31)
     with pytest.raises(InputError, match="no frame"):

@@ -17,8 +17,8 @@ from hobble.core.skeleton import Skeleton
 from hobble.models.load import network_from_arrays
 from hobble.models.matching.inertia import ROW, SINCE
 from hobble.models.matching.network import Matching
-from hobble.models.network import inverse, standardised
-from hobble.models.packing import packed
+from hobble.models.network import inverse_or_0, standardise_inputs
+from hobble.models.packing import to_base64
 from hobble.runtime.animation import ProceduralAnimation
 
 from .example import FRAMES, built
@@ -49,7 +49,7 @@ def test_a_query_from_a_frame_of_the_clips_finds_that_frame(made: Made) -> None:
 def test_the_nearest_frame_equals_a_search_over_all(made: Made) -> None:
     _, _, network = made
     x = network.x_mean + 10 * np.random.default_rng(1).normal(size=(20, len(network.x_mean)))
-    queries = network.input_features(standardised(network, x))
+    queries = network.input_features(standardise_inputs(network, x))
     np.testing.assert_allclose(queries, x[:, network.columns] * network.weights, rtol=1e-4, atol=1e-3)
     apart = np.square(queries[:, None] - network.features[network.start_rows][None]).sum(axis=2)
     np.testing.assert_array_equal(network.nearest_rows(queries), network.start_rows[apart.argmin(axis=1)])
@@ -62,12 +62,12 @@ def test_channel_values_have_to_match(made: Made) -> None:
     _, _, network = made
     x = x_of(network, 10)
     x[0, network.layout.x_channel("injury").start + 4] = 7.0
-    assert network.nearest_rows(network.input_features(standardised(network, x)))[0] >= FRAMES[0]
+    assert network.nearest_rows(network.input_features(standardise_inputs(network, x)))[0] >= FRAMES[0]
 
 
 def test_a_character_plays_on_between_searches(made: Made) -> None:
     _, _, network = made
-    predictor, memory = network.predictor(), np.zeros((1, network.memory))
+    predictor, memory = network.predictor(), np.zeros((1, network.memory_size))
     away = x_of(network, FRAMES[0] + 30)  # what it asks for from the second frame on
     shown = []
     for frame in range(8):
@@ -82,7 +82,7 @@ def test_a_character_plays_on_between_searches(made: Made) -> None:
 
 def test_the_end_of_a_run_starts_a_search(made: Made) -> None:
     _, _, network = made
-    predictor, memory = network.predictor(), np.zeros((1, network.memory))
+    predictor, memory = network.predictor(), np.zeros((1, network.memory_size))
     memory[0, ROW], last = FRAMES[0], FRAMES[0] - 1  # the last row of the first clip
     assert network.remaining[last] == 0
     predictor.predict(x_of(network, 40), np.zeros(1), None, memory)
@@ -91,7 +91,7 @@ def test_the_end_of_a_run_starts_a_search(made: Made) -> None:
 
 def test_no_transition_to_nearby_frames(made: Made) -> None:
     _, _, network = made
-    predictor, memory = network.predictor(), np.zeros((1, network.memory))
+    predictor, memory = network.predictor(), np.zeros((1, network.memory_size))
     memory[0, ROW], memory[0, SINCE] = 11, 4
     predictor.predict(x_of(network, 25), np.zeros(1), None, memory)
     assert memory[0, ROW] - 1 == 11, "14 frames further on is the same motion"
@@ -100,7 +100,7 @@ def test_no_transition_to_nearby_frames(made: Made) -> None:
 @pytest.mark.parametrize("wrong", [-3.0, 1e7, np.nan, np.inf])
 def test_an_invalid_memory_is_reset(made: Made, wrong: float) -> None:
     _, _, network = made
-    memory = np.full((1, network.memory), wrong)
+    memory = np.full((1, network.memory_size), wrong)
     y = network.predictor().predict(x_of(network, 30), np.zeros(1), None, memory)
     np.testing.assert_array_equal(y[0], network.frames[30])
     assert np.isfinite(memory).all()
@@ -116,8 +116,8 @@ def sequence(network: Matching, frames: int = 80) -> tuple[np.ndarray, np.ndarra
 def test_a_crowd_equals_single_characters(made: Made) -> None:
     _, _, network = made
     sequences = [np.roll(sequence(network)[0], 5 * c, axis=0) for c in range(3)]
-    together, memory = network.predictor(), np.zeros((3, network.memory))
-    alone = [(network.predictor(), np.zeros((1, network.memory))) for _ in range(3)]
+    together, memory = network.predictor(), np.zeros((3, network.memory_size))
+    alone = [(network.predictor(), np.zeros((1, network.memory_size))) for _ in range(3)]
     for frame in range(40):
         phase = np.array([0.1, 0.4, 0.8])
         y = together.predict(np.stack([one[frame] for one in sequences]), phase, None, memory)
@@ -151,12 +151,12 @@ def test_javascript_finds_the_same_frames_as_python(made: Made, tmp_path: Path) 
     read = np.arange(1, layout.x_size)
     x, phase = sequence(network)
     spec = {
-        "network": {"kind": "matching", **network.page(read, rows)},
+        "network": {"kind": "matching", **network.page_data(read, rows)},
         "inputColumns": read.tolist(),
-        "xMean": packed(network.x_mean[read]),
-        "xScale": packed(inverse(network.x_std)[read].astype(np.float32)),
-        "yMean": packed(network.y_mean[rows]),
-        "yStd": packed(network.y_std[rows]),
+        "xMean": to_base64(network.x_mean[read]),
+        "xScale": to_base64(inverse_or_0(network.x_std)[read].astype(np.float32)),
+        "yMean": to_base64(network.y_mean[rows]),
+        "yStd": to_base64(network.y_std[rows]),
     }
     (tmp_path / "inputs.json").write_text(
         json.dumps({"spec": spec, "x": x.tolist(), "phase": phase.tolist()})
@@ -176,7 +176,7 @@ def test_javascript_finds_the_same_frames_as_python(made: Made, tmp_path: Path) 
         text=True,
     )
     assert done.returncode == 0, done.stderr
-    predictor, memory = network.predictor(storage="int16"), np.zeros((1, network.memory))
+    predictor, memory = network.predictor(storage="int16"), np.zeros((1, network.memory_size))
     transitions, last = 0, 0
     for i, (y, row) in enumerate(json.loads(done.stdout)):
         expected = predictor.predict(x[i : i + 1], phase[i : i + 1], None, memory)

@@ -7,7 +7,7 @@ import torch
 
 from hobble.models.pfnn.fused import FusedPfnnStep
 from hobble.models.pfnn.step import PfnnStep
-from hobble.models.pfnn.trainable import initialise
+from hobble.models.pfnn.trainable import untrained_network
 from hobble.training.optimiser import Adam
 
 from . import definition
@@ -18,7 +18,7 @@ SHAPES = [((6, 5, 4), 4, 1), ((6, 5, 5, 3), 4, 33), ((7, 4, 4, 4, 3), 6, 8)]
 
 def problem(sizes: tuple[int, ...], k: int, rows: int, dtype: torch.dtype = torch.float64):
     generator = torch.Generator().manual_seed(3)
-    network = initialise(sizes, k, 1).to("cpu", dtype)
+    network = untrained_network(sizes, k, 1).to("cpu", dtype)
     network.flat.normal_(0, 0.5, generator=generator)
     x = torch.randn(rows, sizes[0], generator=generator, dtype=torch.float64)
     y = torch.randn(rows, sizes[-1], generator=generator, dtype=torch.float64)
@@ -105,7 +105,7 @@ def test_both_steps_round_to_bfloat16_alike() -> None:
 @pytest.mark.parametrize("kind", STEPS)
 @pytest.mark.parametrize("dropout", [0.0, 0.3])
 def test_dropout_keeps_its_share_and_scales_it_up(kind: type[PfnnStep], dropout: float) -> None:
-    network = initialise((300, 200, 10), 4, 1)
+    network = untrained_network((300, 200, 10), 4, 1)
     step = kind(network, dropout)
     step.seed(9)
     first = [mask.clone() for mask in step.masks(500)]

@@ -11,7 +11,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from hobble.models.pfnn.fused import FusedPfnnStep
-from hobble.models.pfnn.trainable import TrainablePfnn, coefficients, initialise, parameter_count
+from hobble.models.pfnn.trainable import TrainablePfnn, coefficients, parameter_count, untrained_network
 
 from .definition import output, spline
 
@@ -36,7 +36,7 @@ def test_the_spline_passes_its_control_points_and_is_cyclic(k: int) -> None:
 
 
 def test_compiled_spline_coefficients_equal_the_plain_ones() -> None:
-    network = initialise((3, 4, 2), 5, 1)
+    network = untrained_network((3, 4, 2), 5, 1)
     p = torch.tensor([0.0, 0.2, 0.37, 0.999, 1.0])
     assert torch.allclose(FusedPfnnStep(network, 0.3).coefficients(p), coefficients(p, 5), atol=1e-6)
 
@@ -54,7 +54,7 @@ def test_parameter_counts_equal_those_of_the_published_networks(sizes: tuple[int
 
 
 def test_initial_weights_fill_their_bounds_and_biases_are_zero() -> None:
-    network = initialise((40, 30, 20), 4, 1)
+    network = untrained_network((40, 30, 20), 4, 1)
     for layer, (a, b) in zip(network.layers, ((40, 30), (30, 20)), strict=True):
         bound = (6 / (a * b)) ** 0.5
         assert layer.shape == (b, 4, a + 1)
@@ -67,13 +67,13 @@ def test_initial_weights_fill_their_bounds_and_biases_are_zero() -> None:
 
 
 def test_equal_seeds_give_equal_networks() -> None:
-    one, same, other = (initialise((5, 4, 3), 4, seed).flat for seed in (1, 1, 2))
+    one, same, other = (untrained_network((5, 4, 3), 4, seed).flat for seed in (1, 1, 2))
     assert torch.equal(one, same)
     assert not torch.equal(one, other)
 
 
 def test_blended_outputs_are_those_of_blended_weights() -> None:
-    network = initialise((6, 5, 5, 3), 4, 1).to("cpu", torch.float64)
+    network = untrained_network((6, 5, 5, 3), 4, 1).to("cpu", torch.float64)
     network.flat.normal_(generator=torch.Generator().manual_seed(1))
     x, p = torch.randn(7, 6, dtype=torch.float64), torch.rand(7, dtype=torch.float64)
     ones = [torch.ones(size, dtype=torch.float64) for size in network.sizes[:-1]]

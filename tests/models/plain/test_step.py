@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 import torch
 
-from hobble.models.plain.trainable import FusedPlainStep, PlainStep, initialise
+from hobble.models.plain.trainable import FusedPlainStep, PlainStep, untrained_network
 
 
 @pytest.mark.parametrize("kind", [PlainStep, FusedPlainStep])
@@ -13,7 +13,7 @@ from hobble.models.plain.trainable import FusedPlainStep, PlainStep, initialise
 def test_loss_and_gradient_are_those_of_autograd(kind: type, units: tuple[int, ...]) -> None:
     """Written out layer by layer, with the same dropout."""
     generator = torch.Generator().manual_seed(3)
-    network = initialise(units, 1).to("cpu", torch.float64)
+    network = untrained_network(units, 1).to("cpu", torch.float64)
     network.flat.normal_(0, 0.5, generator=generator)
     x, y = (torch.randn(9, n, generator=generator, dtype=torch.float64) for n in (units[0], units[-1]))
     p = torch.rand(9, generator=generator, dtype=torch.float64)

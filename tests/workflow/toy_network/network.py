@@ -9,47 +9,47 @@ import numpy as np
 
 from hobble.core.errors import InputError
 from hobble.models import checks
-from hobble.models.network import Network, inverse, standardised
-from hobble.models.packing import packed_rows
+from hobble.models.network import Network, inverse_or_0, standardise_inputs
+from hobble.models.packing import pack_layer
 
 
 @dataclass(frozen=True)
 class Toy(Network):
     kind: ClassVar[str] = "toy"
-    phase: ClassVar[bool] = False
+    uses_phase: ClassVar[bool] = False
 
     weights: np.ndarray
     biases: np.ndarray
 
     @classmethod
-    def read(cls, path, arrays, common):
-        w, b = checks.numbers(path, arrays, "W0", 2), checks.numbers(path, arrays, "b0", 1)
-        if w.shape != (len(common["y_mean"]), len(common["x_mean"])) or b.shape != w.shape[:1]:
+    def read(cls, path, arrays, shared_fields):
+        w, b = checks.read_numbers(path, arrays, "W0", 2), checks.read_numbers(path, arrays, "b0", 1)
+        if w.shape != (len(shared_fields["y_mean"]), len(shared_fields["x_mean"])) or b.shape != w.shape[:1]:
             raise InputError(path, f"W0 {w.shape} and b0 {b.shape} do not fit")
-        return cls(weights=w, biases=b, **common)
+        return cls(weights=w, biases=b, **shared_fields)
 
     @property
     def sizes(self):
         return self.weights.shape[::-1]
 
     @property
-    def parameters(self):
+    def parameter_count(self):
         return self.weights.size + self.biases.size
 
     @property
-    def described(self):
+    def description(self):
         return "toy that is linear"
 
     def predict(self, x, phase):
-        return (standardised(self, x) @ self.weights.T + self.biases) * self.y_std + self.y_mean
+        return (standardise_inputs(self, x) @ self.weights.T + self.biases) * self.y_std + self.y_mean
 
     def predictor(self, mode=None, storage=None):
-        self.mode(mode)
+        self.resolve_mode(mode)
         return Predictor(self)
 
-    def page(self, inputs, outputs):
+    def page_data(self, inputs, outputs):
         weights, biases = self.weights[outputs][:, inputs], self.biases[outputs]
-        return {"layers": [packed_rows(weights[None], biases[None])]}
+        return {"layers": [pack_layer(weights[None], biases[None])]}
 
 
 class Predictor:
@@ -57,7 +57,7 @@ class Predictor:
         self.network = network
 
     def standardise(self, x, z):
-        z[:] = (x - self.network.x_mean) * inverse(self.network.x_std)
+        z[:] = (x - self.network.x_mean) * inverse_or_0(self.network.x_std)
 
     def evaluate(self, z, phase, out):
         n = self.network

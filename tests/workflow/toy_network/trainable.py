@@ -34,11 +34,11 @@ class TrainableToy(Trainable):
         return {"W0": np.ascontiguousarray(layer[:, :-1]), "b0": np.ascontiguousarray(layer[:, -1])}
 
     @property
-    def about(self):
+    def file_metadata(self):
         return {"network": "y = W0 x + b0 on standardised x and y"}
 
     @property
-    def described(self):
+    def description(self):
         return f"{self.inputs}-{self.outputs} linear"
 
 

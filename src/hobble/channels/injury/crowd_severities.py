@@ -22,7 +22,7 @@ def injury_links(network: Network) -> tuple[str, ...]:
 
 def links_hurt_in_training(network: Network) -> tuple[str, ...]:
     """Names of the links that were hurt in training; all links if none was hurt."""
-    return network.trained(INJURY)
+    return network.trained_labels(INJURY)
 
 
 def severity_inputs(network: Network, injuries: Sequence[Mapping[str, float]]) -> dict[str, Array]:

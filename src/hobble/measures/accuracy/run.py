@@ -33,7 +33,7 @@ from hobble.measures.results import SPLITS
 from hobble.measures.stratified_sample import Sample
 from hobble.models.load import load_network
 from hobble.models.network import Network
-from hobble.rows.clip_rows import ClipRows, expanded
+from hobble.rows.clip_rows import ClipRows, pair_batches
 from hobble.rows.excerpts import Excerpt
 from hobble.rows.layout import RowLayout
 
@@ -66,7 +66,7 @@ class Errors:
     """
 
     frames: int = 0
-    moments: Moments = field(default_factory=lambda: Moments.nothing(2), repr=False)
+    moments: Moments = field(default_factory=lambda: Moments.of_no_rows(2), repr=False)
     histogram: Array = field(default_factory=lambda: np.zeros(len(EDGES) - 1), repr=False)
 
     def __add__(self, other: Errors) -> Errors:
@@ -124,10 +124,10 @@ def relative_and_distance(truth: Array, predicted: Array) -> Array:
 def predict_function(network: Network) -> Predict:
     """The runtime's exact prediction, which takes two thirds of the time of `Network.predict`.
 
-    For a network that remembers the earlier frames of a character (`Network.memory`), the result is
+    For a network that remembers the earlier frames of a character (`Network.memory_size`), the result is
     `Network.predict`, which needs no memory. Here each frame is predicted on its own.
     """
-    if network.memory:
+    if network.memory_size:
         return network.predict
     predictor = network.predictor(storage="float32")
 
@@ -149,12 +149,12 @@ def clip_errors(
     evaluate the network; by default `Network.predict`.
     """
     layout, predict = network.layout, predict or network.predict
-    total, histogram = Moments.nothing(2), np.zeros(len(EDGES) - 1)
-    for pairs in expanded(rows, layout):
+    total, histogram = Moments.of_no_rows(2), np.zeros(len(EDGES) - 1)
+    for pairs in pair_batches(rows, layout):
         errors = joint_errors(layout, pairs.y, predict(pairs.x, pairs.p), joints)
         weights = np.repeat(pairs.weight / len(joints), len(joints))  # all weights of a frame add up to 1
         errors = errors.reshape(-1, 2)
-        total = total + Moments.of(errors, weights)
+        total = total + Moments.of_rows(errors, weights)
         histogram += np.histogram(np.minimum(errors[:, 0], EDGES[-1]), EDGES, weights=weights)[0]
     return Errors(len(rows), total, histogram)
 
@@ -234,7 +234,7 @@ def _with_intervals(
         if of_split:
             errors["mean_of_clips"] = float(np.average(list(means.values()), weights=weights))
         pairs = zip(WITH_INTERVAL, (means, distances), strict=True) if of_split else ()
-        errors["interval"] = {key: sample.half_width(split, values) for key, values in pairs}
+        errors["interval"] = {key: sample.confidence_half_width(split, values) for key, values in pairs}
     return {**result, "sample": sample.to_dict(), "excerpts": list(excerpts.values())}
 
 

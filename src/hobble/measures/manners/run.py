@@ -140,7 +140,10 @@ def recognise_together(
     target speed, cm a frame.
     """
     others = [
-        (other, column) for other in network.channels if other != name for column in network.trained(other)
+        (other, column)
+        for other in network.channels
+        if other != name
+        for column in network.trained_labels(other)
     ]
     cases = [(manner, other, column) for manner in (NONE, *learnt) for other, column in others]
     if not cases:

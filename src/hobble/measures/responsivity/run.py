@@ -52,10 +52,10 @@ def responsivity(
     `turns_held_back` frames, the runtime let a joint turn less than predicted. `runs` are the paths of the
     first STORED_PATHS laps in the mode of `runtime`.
     """
-    own = network.mode(runtime.mode)
+    own = network.resolve_mode(runtime.mode)
     laps_of_others = min(laps, laps_other_modes or laps)
     of_mode = dict(done or {})
-    for mode in dict.fromkeys((*map(network.mode, network.modes if modes is None else modes), own)):
+    for mode in dict.fromkeys((*map(network.resolve_mode, network.modes if modes is None else modes), own)):
         if mode not in of_mode:
             in_mode = runtime.model_copy(update={"mode": mode})
             count = laps if mode == own else laps_of_others
@@ -74,8 +74,8 @@ def responsivity(
         "runs": of_mode[own]["runs"],
         "parameters": parameter_counts(network.sizes) if network.sizes else None,
         "stored": {mode: network.stored_numbers(mode) for mode in network.modes},
-        "bytes_each": np.dtype(network.storage).itemsize,
-        "exact": network.mode(None),
+        "bytes_each": np.dtype(network.default_storage).itemsize,
+        "exact": network.resolve_mode(None),
         "laps_other_modes": laps_of_others,
         **of_mode[own]["laps"],
         "modes": [piece["laps"] for piece in of_mode.values()],

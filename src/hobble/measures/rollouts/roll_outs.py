@@ -16,7 +16,7 @@ from hobble.character.rule import joint_place, movement_share, phase_change
 from hobble.core.quat import Array
 from hobble.evaluation.captured import rotate_by_yaw
 from hobble.models.network import Predictor
-from hobble.rows.clip_rows import ClipRows, pairs
+from hobble.rows.clip_rows import ClipRows, compose_pairs
 from hobble.rows.layout import GAITS, RowLayout
 
 BATCH = 256  # poses predicted at once; the inputs of more poses do not fit into the processor's cache
@@ -46,7 +46,7 @@ class RollOutInputs:
 def inputs_of_clip(rows: ClipRows, chosen: np.ndarray, layout: RowLayout) -> RollOutInputs:
     """The inputs and targets in some rows of a clip. chosen: (F,) their indices. layout: the network's."""
     fit = rows.first_fit[chosen]
-    x, y, *_ = pairs(rows, layout, chosen, fit)
+    x, y, *_ = compose_pairs(rows, layout, chosen, fit)
     gait = x[:, layout.x_gait].reshape(len(x), len(GAITS), layout.samples)
     stand = gait[:, GAITS.index("stand"), layout.samples // 2]
     return RollOutInputs(
@@ -109,7 +109,7 @@ class Crowd:
         shape = (len(self.first), layout.joints, 3)
         self.joint_position = self.x[self.first][:, layout.x_joint_position].reshape(shape).astype(float)
         self.joint_velocity = np.zeros(shape)
-        self.memory = np.zeros((len(self.first), predictor.network.memory))
+        self.memory = np.zeros((len(self.first), predictor.network.memory_size))
 
     def frames(self) -> Iterator[tuple[np.ndarray, Array, dict[int, np.ndarray]]]:
         """Advance all roll-outs by one frame at a time, and yield the n roll-outs that are not yet over.
@@ -170,7 +170,7 @@ class Crowd:
         y = np.empty((len(row), self.predictor.network.layout.y_size), np.float32)
         for first in range(0, len(row), BATCH):
             part = slice(first, first + BATCH)
-            memory = {"memory": self.memory[alive[part]]} if self.predictor.network.memory else {}
+            memory = {"memory": self.memory[alive[part]]} if self.predictor.network.memory_size else {}
             y[part] = self.predictor.predict(row[part], self.phase[alive[part]], **memory)
             if memory:
                 self.memory[alive[part]] = memory["memory"]

@@ -58,8 +58,8 @@ class RollOutErrors:
 
     frames: int = 0
     starts: int = 0
-    moments: Moments = field(default_factory=lambda: Moments.nothing(2), repr=False)
-    last: Moments = field(default_factory=lambda: Moments.nothing(2), repr=False)
+    moments: Moments = field(default_factory=lambda: Moments.of_no_rows(2), repr=False)
+    last: Moments = field(default_factory=lambda: Moments.of_no_rows(2), repr=False)
     ended: int = 0
 
     def __add__(self, other: RollOutErrors) -> RollOutErrors:
@@ -128,14 +128,14 @@ def _errors_of_parts(
     crowd = Crowd(predictor, [group for _, group in owners])
     layout = predictor.network.layout
     truth = crowd.y[:, layout.y_joint_position].reshape(len(crowd.y), -1, 3)[:, joints]
-    moments = [Moments.nothing(2) for _ in owners]
+    moments = [Moments.of_no_rows(2) for _ in owners]
     last: list[Array] = [np.zeros((0, len(joints), 2)) for _ in owners]  # errors in the last frame
     for age, (at, joint_positions, members) in enumerate(crowd.frames()):
         errors = relative_and_distance(truth[at].astype(float), joint_positions[:, joints])
         for g, of_group in members.items():
             own = errors[of_group]
             weights = np.full(own[..., 0].size, 1 / len(joints))  # a frame has the weight 1
-            moments[g] = moments[g] + Moments.of(own.reshape(-1, 2), weights)
+            moments[g] = moments[g] + Moments.of_rows(own.reshape(-1, 2), weights)
             if age == owners[g][1].length - 1:
                 last[g] = own
     for (by_length, group), in_all, end, phase in zip(owners, moments, last, crowd.phases(), strict=True):
@@ -159,7 +159,7 @@ def _errors_of_group(group: RollOuts, moments: Moments, end: Array, phase: Array
     truth = group.inputs.phase[group.starts[:ended] + group.length]
     phase_error = np.abs(np.mod(phase[:ended] - truth + 0.5, 1.0) - 0.5)  # 0 to half a cycle
     last = np.stack([end[:ended, :, 1].mean(axis=1), phase_error], axis=1)
-    return RollOutErrors(frames, len(group.starts), moments, Moments.of(last), ended)
+    return RollOutErrors(frames, len(group.starts), moments, Moments.of_rows(last), ended)
 
 
 def measure_roll_outs(
@@ -196,7 +196,7 @@ def measure_roll_outs(
                 clip_errors[part.clip] = clip_errors.get(part.clip, RollOutErrors()) + weighed
                 if part.excerpt is not None:
                     excerpts[length][part.excerpt] = errors.to_dict()["position_error_cm"]
-            log.info("%s: %s", part.excerpt or part.clip, by_length[lengths[-1]].to_dict(network.phase))
+            log.info("%s: %s", part.excerpt or part.clip, by_length[lengths[-1]].to_dict(network.uses_phase))
     result: RollOutsFound = {
         "configuration": configuration,
         "joints": len(joints),
@@ -204,10 +204,10 @@ def measure_roll_outs(
         "lengths": [
             {
                 "length": length,
-                "train": total[length]["train"].to_dict(network.phase),
-                "held_out": total[length]["held_out"].to_dict(network.phase),
+                "train": total[length]["train"].to_dict(network.uses_phase),
+                "held_out": total[length]["held_out"].to_dict(network.uses_phase),
                 "clips": [
-                    {"clip": name, "split": splits[name], **errors.to_dict(network.phase)}
+                    {"clip": name, "split": splits[name], **errors.to_dict(network.uses_phase)}
                     for name, errors in of_clip[length].items()
                 ],
             }
@@ -257,7 +257,7 @@ def _with_intervals(
                     for excerpt, error in excerpts[entry["length"]].items()
                     if splits[excerpt.clip] == split
                 }
-                entry[split]["interval"] = {"position_error_cm": sample.half_width(split, values)}
+                entry[split]["interval"] = {"position_error_cm": sample.confidence_half_width(split, values)}
     return {**result, "sample": sample.to_dict()}
 
 

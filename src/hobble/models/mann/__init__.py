@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from hobble.core.skeleton import Skeleton
-from hobble.models.model import Trained
+from hobble.models.model import TrainedModel
 from hobble.rows.layout import RowLayout
 
 if TYPE_CHECKING:
@@ -20,13 +20,13 @@ if TYPE_CHECKING:
     from hobble.models.mann.trainable import TrainableMann
 
 
-class _Mann(Trained):
-    def options(self) -> type[MannOptions]:
+class _Mann(TrainedModel):
+    def options_class(self) -> type[MannOptions]:
         from hobble.models.mann.options import MannOptions
 
         return MannOptions
 
-    def parameters(self, options: MannOptions, inputs: int, outputs: int) -> int:
+    def parameter_count(self, options: MannOptions, inputs: int, outputs: int) -> int:
         from hobble.models.mann.forward import GATE_INPUTS
 
         # A layer from a to b units has a * b weights and b biases.
@@ -34,21 +34,21 @@ class _Mann(Trained):
         gate = sum((a + 1) * b for a, b in pairwise(options.gate_sizes(GATE_INPUTS)))
         return options.experts * expert + gate
 
-    def trainable(
+    def untrained_network(
         self, options: MannOptions, layout: RowLayout, skeleton: Skeleton, seed: int
     ) -> TrainableMann:
         from hobble.models.mann.forward import gate_columns
-        from hobble.models.mann.trainable import initialise
+        from hobble.models.mann.trainable import untrained_network
 
         columns = gate_columns(layout, skeleton)
-        return initialise(
+        return untrained_network(
             options.sizes(layout.x_size, layout.y_size), options.gate_sizes(len(columns)), columns, seed
         )
 
-    def read(self, path: str | Path, arrays: Mapping[str, Any], common: Mapping[str, Any]) -> Mann:
+    def read(self, path: str | Path, arrays: Mapping[str, Any], shared_fields: Mapping[str, Any]) -> Mann:
         from hobble.models.mann.network import Mann
 
-        return Mann.read(path, arrays, common)
+        return Mann.read(path, arrays, shared_fields)
 
 
 MODEL = _Mann()

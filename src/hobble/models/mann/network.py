@@ -16,11 +16,11 @@ from numpy.typing import NDArray
 
 from hobble.core.errors import InputError
 from hobble.core.quat import Array
-from hobble.models.checks import weights_and_biases
+from hobble.models.checks import read_weights_and_biases
 from hobble.models.mann.forward import forward
 from hobble.models.mann.predictor import MannPredictor
-from hobble.models.network import Export, Network, standardised
-from hobble.models.packing import packed_rows
+from hobble.models.network import Export, Network, standardise_inputs
+from hobble.models.packing import pack_layer
 
 MOST_EXPERTS = 64  # largest number of experts in a file
 
@@ -35,9 +35,9 @@ class Mann(Network):
     """
 
     kind: ClassVar[str] = "mann"
-    phase: ClassVar[bool] = False
+    uses_phase: ClassVar[bool] = False
     # Reading the weights of all experts takes most of a prediction's time. As int16 they have half the size.
-    storage: ClassVar[str] = "int16"
+    default_storage: ClassVar[str] = "int16"
 
     weights: tuple[Array, ...] = field(repr=False)
     biases: tuple[Array, ...] = field(repr=False)
@@ -46,26 +46,28 @@ class Mann(Network):
     columns: NDArray[np.int64] = field(repr=False)
 
     @classmethod
-    def read(cls, path: str | Path, arrays: Mapping[str, Any], common: Mapping[str, Any]) -> Mann:
+    def read(cls, path: str | Path, arrays: Mapping[str, Any], shared_fields: Mapping[str, Any]) -> Mann:
         """Check the arrays of a file and build the network.
 
         W0 (K, out, in), b0 (K, out), ... are the layers of the experts. V0 (out, in), d0 (out,), ... are
         those of the gate. `gate` (G,) holds the columns of X that the gate gets.
         """
-        inputs, outputs = len(common["x_mean"]), len(common["y_mean"])
+        inputs, outputs = len(shared_fields["x_mean"]), len(shared_fields["y_mean"])
         columns = _read_gate_columns(path, arrays, inputs)
-        weights, biases = weights_and_biases(path, arrays, ("W", "b"), 3, inputs, outputs)
+        weights, biases = read_weights_and_biases(path, arrays, ("W", "b"), 3, inputs, outputs)
         experts = len(weights[0])
         if not 2 <= experts <= MOST_EXPERTS:
             raise InputError(path, f"has {experts} experts; 2 to {MOST_EXPERTS} are allowed")
-        gate_weights, gate_biases = weights_and_biases(path, arrays, ("V", "d"), 2, len(columns), experts)
+        gate_weights, gate_biases = read_weights_and_biases(
+            path, arrays, ("V", "d"), 2, len(columns), experts
+        )
         return cls(
             weights=weights,
             biases=biases,
             gate_weights=gate_weights,
             gate_biases=gate_biases,
             columns=columns,
-            **common,
+            **shared_fields,
         )
 
     @property
@@ -79,13 +81,13 @@ class Mann(Network):
         return (self.weights[0].shape[2], *(w.shape[1] for w in self.weights))
 
     @property
-    def parameters(self) -> int:
+    def parameter_count(self) -> int:
         """The number of all weights and biases, because a prediction may need all experts."""
         gate = sum(w.size + b.size for w, b in zip(self.gate_weights, self.gate_biases, strict=True))
         return gate + self.experts * sum(a * b + b for a, b in pairwise(self.sizes))
 
     @property
-    def described(self) -> str:
+    def description(self) -> str:
         """As in `Network`."""
         hidden = len(self.sizes) - 2
         return (
@@ -94,19 +96,19 @@ class Mann(Network):
 
     def predict(self, x: Array, phase: Array) -> Array:
         """As in `Network`; the phase is ignored."""
-        z = standardised(self, x)
+        z = standardise_inputs(self, x)
         y = forward(self.weights, self.biases, self.gate_weights, self.gate_biases, self.columns, z)
         return y * self.y_std + self.y_mean
 
     def predictor(self, mode: str | None = None, storage: str | None = None) -> MannPredictor:
         """As in `Network`; there is one mode."""
-        self.mode(mode)
-        return MannPredictor(self, storage or self.storage)
+        self.resolve_mode(mode)
+        return MannPredictor(self, storage or self.default_storage)
 
-    def page(self, inputs: NDArray[np.int64], outputs: NDArray[np.int64]) -> dict[str, Any]:
+    def page_data(self, inputs: NDArray[np.int64], outputs: NDArray[np.int64]) -> dict[str, Any]:
         """As in `Network`.
 
-        layers: those of the experts, see `packed_rows`. gateLayers: those of the gate. gate: the columns that
+        layers: those of the experts, see `pack_layer`. gateLayers: those of the gate. gate: the columns that
         the gate gets, as positions in `inputs`.
         """
         weights, biases, gate = list(self.weights), list(self.biases), list(self.gate_weights)
@@ -116,10 +118,8 @@ class Mann(Network):
         present = [i for i, column in enumerate(self.columns) if int(column) in position]
         gate[0] = gate[0][:, present]
         return {
-            "layers": [packed_rows(w, b) for w, b in zip(weights, biases, strict=True)],
-            "gateLayers": [
-                packed_rows(w[None], b[None]) for w, b in zip(gate, self.gate_biases, strict=True)
-            ],
+            "layers": [pack_layer(w, b) for w, b in zip(weights, biases, strict=True)],
+            "gateLayers": [pack_layer(w[None], b[None]) for w, b in zip(gate, self.gate_biases, strict=True)],
             "gate": [position[int(self.columns[i])] for i in present],
         }
 

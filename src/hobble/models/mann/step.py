@@ -61,7 +61,7 @@ class MannStep:
         for number, weight in enumerate(weights):
             x = torch.nn.functional.elu(x) if number else x
             saved.append(self.prepare_inputs(number, x, masks[self.gate_layers + number]))
-            outputs.append(self.multiplied(f"outputs {number}", saved[-1][0], weight))
+            outputs.append(self.multiply(f"outputs {number}", saved[-1][0], weight))
             x = self.blend_experts(number, outputs[-1], c)
         self.error = x.sub_(y)
         dblend = self.error * (2.0 / y.numel())  # of the last layer, whose blend is the prediction
@@ -69,9 +69,9 @@ class MannStep:
         gradients = [dblend] * len(weights)
         for number in range(len(weights) - 1, -1, -1):
             da = self.gradient_by_experts(number, dblend, outputs[number], c, dc)
-            gradients[number] = self.multiplied(f"gradient {number}", da.T, saved[number][0].T)
+            gradients[number] = self.multiply(f"gradient {number}", da.T, saved[number][0].T)
             if number:
-                dh = self.multiplied(f"of inputs {number}", da, weights[number].T)
+                dh = self.multiply(f"of inputs {number}", da, weights[number].T)
                 dblend = self.gradient_before_elu(dh, saved[number][1])
         self.gradients = [*self._gate_gradients(c, dc, saved_of_gate), *gradients]
         return torch.mean(torch.square(self.error))
@@ -89,7 +89,7 @@ class MannStep:
         drawn = torch.rand(rows, sum(self.widths), generator=self.generator, device=flat.device)[own]
         return list((drawn < self.keep).to(flat.dtype).mul_(1.0 / self.keep).split(self.widths, dim=1))
 
-    def multiplied(self, name: str, a: Tensor, b: Tensor) -> Tensor:
+    def multiply(self, name: str, a: Tensor, b: Tensor) -> Tensor:
         """a @ b.T. name: of the result's buffer in `hobble.models.fused_base`; not used here."""
         return product(a, b)
 

@@ -93,7 +93,7 @@ class TrainableMann(Trainable):
         return arrays
 
     @property
-    def about(self) -> dict[str, Any]:
+    def file_metadata(self) -> dict[str, Any]:
         """As in `Trainable`."""
         # For two layers each: gate is "V1 elu(V0 x[gate] + d0) + d1", inside is "elu(W0 x + b0)".
         gate, inside = "x[gate]", "x"
@@ -106,7 +106,7 @@ class TrainableMann(Trainable):
         return {"experts": self.experts, "network": f"{text}the experts, in the shares softmax({gate})"}
 
     @property
-    def described(self) -> str:
+    def description(self) -> str:
         """As in `Trainable`."""
         units, gate = ("-".join(map(str, sizes)) for sizes in (self.sizes, self.gate_sizes))
         return (
@@ -120,7 +120,7 @@ def shapes(sizes: tuple[int, ...], gate_sizes: tuple[int, ...]) -> list[tuple[in
     return gate + [(gate_sizes[-1] * out, 1, size + 1) for size, out in pairwise(sizes)]
 
 
-def initialise(
+def untrained_network(
     sizes: tuple[int, ...], gate_sizes: tuple[int, ...], columns: tuple[int, ...], seed: int
 ) -> TrainableMann:
     """A new network. Its weights are random, uniform within +-sqrt(6 / (in * out)), its biases 0.

@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from hobble.core.skeleton import Skeleton
-from hobble.models.model import Built
+from hobble.models.model import BuiltModel
 from hobble.rows.layout import RowLayout
 
 if TYPE_CHECKING:
@@ -16,8 +16,8 @@ if TYPE_CHECKING:
     from hobble.models.matching.options import MatchingOptions
 
 
-class _Matching(Built):
-    def options(self) -> type[MatchingOptions]:
+class _Matching(BuiltModel):
+    def options_class(self) -> type[MatchingOptions]:
         from hobble.models.matching.options import MatchingOptions
 
         return MatchingOptions
@@ -29,10 +29,10 @@ class _Matching(Built):
 
         return build(options, clips, layout, skeleton)
 
-    def read(self, path: str | Path, arrays: Mapping[str, Any], common: Mapping[str, Any]) -> Matching:
+    def read(self, path: str | Path, arrays: Mapping[str, Any], shared_fields: Mapping[str, Any]) -> Matching:
         from hobble.models.matching.network import Matching
 
-        return Matching.read(path, arrays, common)
+        return Matching.read(path, arrays, shared_fields)
 
 
 MODEL = _Matching()

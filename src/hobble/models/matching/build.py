@@ -1,7 +1,7 @@
 """Builds the tables that motion matching searches and plays, from the rows of the clips.
 
-A clip's file has a row for each frame: the inputs x and the outputs y of a network in this frame. Motion
-matching searches for the frame with the nearest x, and shows its y.
+A row of a clip's file holds the inputs x and the outputs y of a network in one frame. A frame that two
+cycles of steps share has two rows. Motion matching searches for the row with the nearest x, and shows its y.
 """
 
 from __future__ import annotations
@@ -58,7 +58,7 @@ class Tables:
         }
 
     @property
-    def about(self) -> dict[str, Any]:
+    def file_metadata(self) -> dict[str, Any]:
         """As in `FinishedNetwork`."""
         return {
             "network": "a search finds the frame of the clips with the features (weighted columns of x) that "
@@ -69,7 +69,7 @@ class Tables:
         }
 
     @property
-    def described(self) -> str:
+    def description(self) -> str:
         """As in `FinishedNetwork`."""
         return f"{len(self.y):,} frames of clips, compared by {len(self.columns)} features"
 
@@ -115,8 +115,8 @@ def build(
 def on_mean_ground(rows: ClipRows, layout: RowLayout) -> tuple[Array, Array]:
     """x (R, X) and y (R, Y) of the rows, float32, raw units.
 
-    A row has several terrain fits, that is, grounds that suit its motion. In x and y it is on the mean of
-    these grounds.
+    A row has several terrain fits, that is, grounds that suit its motion. The x and y returned describe the
+    figure on the mean of these grounds.
     """
     x = np.empty((len(rows), layout.x_size), np.float32)
     y = rows.y.astype(np.float32)

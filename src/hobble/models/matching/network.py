@@ -20,8 +20,8 @@ from hobble.core.quat import Array
 from hobble.models import checks
 from hobble.models.matching.inertia import memory_size
 from hobble.models.matching.predictor import MatchingPredictor
-from hobble.models.network import Network, standardised
-from hobble.models.packing import packed, packed_columns
+from hobble.models.network import Network, standardise_inputs
+from hobble.models.packing import pack_table, to_base64
 
 # Largest number of rows of the tables. The page keeps row numbers in float32, which is exact up to here.
 MOST_ROWS = 1 << 24
@@ -47,8 +47,8 @@ class Matching(Network):
     """
 
     kind: ClassVar[str] = "matching"
-    phase: ClassVar[bool] = False
-    recorded_poses: ClassVar[bool] = True
+    uses_phase: ClassVar[bool] = False
+    plays_recorded_poses: ClassVar[bool] = True
 
     features: Array = field(repr=False)
     frames: Array = field(repr=False)
@@ -60,13 +60,17 @@ class Matching(Network):
     halflife: float
 
     @classmethod
-    def read(cls, path: str | Path, arrays: Mapping[str, Any], common: Mapping[str, Any]) -> Matching:
+    def read(cls, path: str | Path, arrays: Mapping[str, Any], shared_fields: Mapping[str, Any]) -> Matching:
         """As in `Model`. arrays: those of `hobble.models.matching.build.Tables`."""
-        meta, inputs, outputs = common["meta"], len(common["x_mean"]), len(common["y_mean"])
-        frames = checks.numbers(path, arrays, "frames", 2, checks.LARGEST_MEAN)
-        features = checks.numbers(path, arrays, "features", 2, checks.LARGEST_MEAN)
-        phases = checks.numbers(path, arrays, "phase", 1, 1.0)
-        weights = checks.numbers(path, arrays, "feature_weights", 1, MOST_WEIGHT)
+        meta, inputs, outputs = (
+            shared_fields["meta"],
+            len(shared_fields["x_mean"]),
+            len(shared_fields["y_mean"]),
+        )
+        frames = checks.read_numbers(path, arrays, "frames", 2, checks.LARGEST_MEAN)
+        features = checks.read_numbers(path, arrays, "features", 2, checks.LARGEST_MEAN)
+        phases = checks.read_numbers(path, arrays, "phase", 1, 1.0)
+        weights = checks.read_numbers(path, arrays, "feature_weights", 1, MOST_WEIGHT)
         columns = _whole_numbers(path, arrays, "columns", inputs - 1)
         remaining = _whole_numbers(path, arrays, "remaining", MOST_ROWS)
         rows, n = len(frames), len(columns)
@@ -85,7 +89,7 @@ class Matching(Network):
             or (remaining[:-1][remaining[:-1] > 0] != remaining[1:][remaining[:-1] > 0] + 1).any()
         ):
             raise InputError(path, "remaining has to count down by 1 a row, to 0 at the end of each run")
-        if common["skeleton"] is None:
+        if shared_fields["skeleton"] is None:
             raise InputError(path, "motion matching needs a skeleton, but the meta of the file has none")
         return cls(
             features=features,
@@ -94,9 +98,9 @@ class Matching(Network):
             remaining=remaining,
             columns=columns,
             weights=weights,
-            every=checks.whole_number(path, "every", meta.get("every"), 1, MOST_FRAMES),
-            halflife=checks.number_in_range(path, "halflife", meta.get("halflife"), MOST_FRAMES),
-            **common,
+            every=checks.require_whole_number(path, "every", meta.get("every"), 1, MOST_FRAMES),
+            halflife=checks.require_number_in_range(path, "halflife", meta.get("halflife"), MOST_FRAMES),
+            **shared_fields,
         )
 
     def shortened_copy(self, most: int) -> Matching:
@@ -141,7 +145,7 @@ class Matching(Network):
         return cKDTree(self.features[self.start_rows])
 
     @property
-    def memory(self) -> int:
+    def memory_size(self) -> int:
         """As in `Network`: the row shown, the number of frames since the last search, and the offsets."""
         return memory_size(self.layout.joints)
 
@@ -151,12 +155,12 @@ class Matching(Network):
         return ()
 
     @property
-    def parameters(self) -> int:
+    def parameter_count(self) -> int:
         """How many numbers the tables `frames` and `features` hold."""
         return self.frames.size + self.features.size
 
     @property
-    def described(self) -> str:
+    def description(self) -> str:
         """As in `Network`."""
         return f"motion matching over {len(self.frames):,} frames of clips"
 
@@ -175,14 +179,14 @@ class Matching(Network):
         Each row gets its own search. Runs are not played on and transitions are not smoothed, because both
         need a character's memory.
         """
-        return self.frames[self.nearest_rows(self.input_features(standardised(self, x)))]
+        return self.frames[self.nearest_rows(self.input_features(standardise_inputs(self, x)))]
 
     def predictor(self, mode: str | None = None, storage: str | None = None) -> MatchingPredictor:
         """As in `Network`; there is one mode. int16 halves the memory of the frames."""
-        self.mode(mode)
-        return MatchingPredictor(self, storage or self.storage)
+        self.resolve_mode(mode)
+        return MatchingPredictor(self, storage or self.default_storage)
 
-    def page(self, inputs: NDArray[np.int64], outputs: NDArray[np.int64]) -> dict[str, Any]:
+    def page_data(self, inputs: NDArray[np.int64], outputs: NDArray[np.int64]) -> dict[str, Any]:
         """As in `Network`. Frames are integers with a factor for each column. Features stay float32, so that
         the page finds the same rows. Large tables are shortened to about MOST_ON_PAGE rows."""
         return self.shortened_copy(MOST_ON_PAGE)._all_for_page(inputs, outputs)
@@ -201,16 +205,16 @@ class Matching(Network):
         blocks = layout.y_joint_position, layout.y_joint_velocity, layout.y_phase_change
         rotation_columns = {j: layout.y_joint_rotation.start + 3 * j for j in range(layout.joints)}
         return {
-            "frames": packed_columns(self.frames[:, outputs]),
-            "features": packed(self.features[:, on_page].astype(np.float32)),
+            "frames": pack_table(self.frames[:, outputs]),
+            "features": to_base64(self.features[:, on_page].astype(np.float32)),
             "columns": [place_in_inputs[int(column)] for column in self.columns[on_page]],
-            "weights": packed(self.weights[on_page]),
-            "phases": packed(self.phases),
-            "remaining": packed(np.minimum(self.remaining, 1 << 30).astype(np.int32)),  # 2^30 fits int32
-            "start": packed(self.start_rows.astype(np.int32)),
+            "weights": to_base64(self.weights[on_page]),
+            "phases": to_base64(self.phases),
+            "remaining": to_base64(np.minimum(self.remaining, 1 << 30).astype(np.int32)),  # 2^30 fits int32
+            "start": to_base64(self.start_rows.astype(np.int32)),
             "every": self.every,
             "halflife": self.halflife,
-            "memory": self.memory,
+            "memory": self.memory_size,
             "joints": layout.joints,
             "at": [place_in_outputs.get(block.start, -1) for block in blocks],
             "turning": [

@@ -12,8 +12,8 @@ from numpy.typing import NDArray
 
 from hobble.core.quat import Array
 from hobble.models.matching.inertia import find_following, show_rows
-from hobble.models.network import STORAGES, inverse
-from hobble.models.stack import standardise
+from hobble.models.network import STORAGES, inverse_or_0
+from hobble.models.stack import standardise_columns
 
 if TYPE_CHECKING:
     from hobble.models.matching.network import Matching
@@ -44,20 +44,20 @@ class MatchingPredictor:
         self._first_columns = np.array([block.start for block in blocks], np.int64)
         self._x_mean, self._x_inverse = (
             np.ascontiguousarray(statistic, np.float32)
-            for statistic in (network.x_mean, inverse(network.x_std))
+            for statistic in (network.x_mean, inverse_or_0(network.x_std))
         )
         _ = network.tree  # build the tree now, not in the first frame
 
     def standardise(self, x: Array, z: Array) -> None:
         """As in `Predictor`."""
-        standardise(x, self._x_mean, self._x_inverse, z)
+        standardise_columns(x, self._x_mean, self._x_inverse, z)
 
     def evaluate(self, z: Array, phase: Array, out: Array, memory: Array | None = None) -> None:
-        """As in `Predictor`. memory: (C, M) float64 with M = `Network.memory`. With None or zeros, each
+        """As in `Predictor`. memory: (C, M) float64 with M = `Network.memory_size`. With None or zeros, each
         character shows the frame nearest to its inputs."""
         network, count = self.network, len(z)
         if memory is None:
-            memory = np.zeros((count, network.memory))
+            memory = np.zeros((count, network.memory_size))
         before, following = np.empty(count, np.int64), np.empty(count, np.int64)
         due = np.empty(count, np.bool_)
         find_following(memory, network.remaining, network.every, before, following, due)

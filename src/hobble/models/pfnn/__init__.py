@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any, ClassVar, get_args
 
 from hobble.core.section import PhaseMode
 from hobble.core.skeleton import Skeleton
-from hobble.models.model import Trained
+from hobble.models.model import TrainedModel
 from hobble.rows.layout import RowLayout
 
 if TYPE_CHECKING:
@@ -23,29 +23,29 @@ if TYPE_CHECKING:
     from hobble.models.pfnn.trainable import TrainablePfnn
 
 
-class _Pfnn(Trained):
+class _Pfnn(TrainedModel):
     modes: ClassVar[tuple[str, ...]] = get_args(PhaseMode)
 
-    def options(self) -> type[PfnnOptions]:
+    def options_class(self) -> type[PfnnOptions]:
         from hobble.models.pfnn.options import PfnnOptions
 
         return PfnnOptions
 
-    def parameters(self, options: PfnnOptions, inputs: int, outputs: int) -> int:
+    def parameter_count(self, options: PfnnOptions, inputs: int, outputs: int) -> int:
         sizes = options.sizes(inputs, outputs)
         return options.control_points * sum((inputs + 1) * outputs for inputs, outputs in pairwise(sizes))
 
-    def trainable(
+    def untrained_network(
         self, options: PfnnOptions, layout: RowLayout, skeleton: Skeleton, seed: int
     ) -> TrainablePfnn:
-        from hobble.models.pfnn.trainable import initialise
+        from hobble.models.pfnn.trainable import untrained_network
 
-        return initialise(options.sizes(layout.x_size, layout.y_size), options.control_points, seed)
+        return untrained_network(options.sizes(layout.x_size, layout.y_size), options.control_points, seed)
 
-    def read(self, path: str | Path, arrays: Mapping[str, Any], common: Mapping[str, Any]) -> Pfnn:
+    def read(self, path: str | Path, arrays: Mapping[str, Any], shared_fields: Mapping[str, Any]) -> Pfnn:
         from hobble.models.pfnn.network import Pfnn
 
-        return Pfnn.read(path, arrays, common)
+        return Pfnn.read(path, arrays, shared_fields)
 
     def read_folder(self, folder: Path) -> Mapping[str, np.ndarray] | None:
         from hobble.models.pfnn.release import read_release

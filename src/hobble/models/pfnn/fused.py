@@ -26,7 +26,7 @@ class FusedPfnnStep(FusedBase, PfnnStep):
         _coefficients(p.numpy(), c.numpy())
         return c
 
-    def expanded(self, number: int, x: Tensor, c: Tensor, mask: Tensor) -> tuple[Tensor, Tensor]:
+    def expand_inputs(self, number: int, x: Tensor, c: Tensor, mask: Tensor) -> tuple[Tensor, Tensor]:
         """As in `PfnnStep`, in one loop over the rows."""
         e = self.buffer(f"e {number}", len(x), c.shape[1] * (x.shape[1] + 1), self.factors.dtype)
         slope = self.buffer(f"slope {number}", *x.shape)
@@ -34,7 +34,7 @@ class FusedPfnnStep(FusedBase, PfnnStep):
         _expand(x.numpy(), c.numpy(), mask.numpy(), as_numpy(e), slope.numpy())
         return e, slope
 
-    def contracted(self, number: int, de: Tensor, c: Tensor, slope: Tensor) -> Tensor:
+    def contract_gradient(self, number: int, de: Tensor, c: Tensor, slope: Tensor) -> Tensor:
         """As in `PfnnStep`, in one loop over the rows."""
         d = self.buffer(f"d {number}", *slope.shape)
         use_threads(de.numel())
@@ -59,7 +59,7 @@ def _coefficients(p: Any, c: Any) -> None:
 
 @njit(parallel=True, error_model="numpy")
 def _expand(x: Any, c: Any, mask: Any, e: Any, slope: Any) -> None:
-    """Write e (B, K (n + 1)) and slope (B, n) of x (B, n); see `PfnnStep.expanded`."""
+    """Write e (B, K (n + 1)) and slope (B, n) of x (B, n); see `PfnnStep.expand_inputs`."""
     rows, width = x.shape
     half = e.itemsize == 2  # e holds the bits of bfloat16
     one = slope.dtype.type(1)  # with a Python 1, numba would compute in float64

@@ -13,9 +13,9 @@ from numpy.typing import NDArray
 
 from hobble.core.errors import InputError
 from hobble.core.quat import Array
-from hobble.models.checks import weights_and_biases
-from hobble.models.network import Export, Network, standardised
-from hobble.models.packing import packed_rows
+from hobble.models.checks import read_weights_and_biases
+from hobble.models.network import Export, Network, standardise_inputs
+from hobble.models.packing import pack_layer
 from hobble.models.pfnn.forward import forward, rounded_to_bins
 from hobble.models.pfnn.predictor import MODES, PfnnPredictor
 
@@ -37,17 +37,17 @@ class Pfnn(Network):
     biases: tuple[Array, ...] = field(repr=False)
 
     @classmethod
-    def read(cls, path: str | Path, arrays: Mapping[str, Any], common: Mapping[str, Any]) -> Pfnn:
+    def read(cls, path: str | Path, arrays: Mapping[str, Any], shared_fields: Mapping[str, Any]) -> Pfnn:
         """As in `Model`. arrays: W0 (K, out, in), b0 (K, out), W1, b1, ..."""
-        inputs, outputs = len(common["x_mean"]), len(common["y_mean"])
-        weights, biases = weights_and_biases(path, arrays, ("W", "b"), 3, inputs, outputs)
+        inputs, outputs = len(shared_fields["x_mean"]), len(shared_fields["y_mean"])
+        weights, biases = read_weights_and_biases(path, arrays, ("W", "b"), 3, inputs, outputs)
         points = len(weights[0])
         if not FEWEST_POINTS <= points <= MOST_POINTS:
             raise InputError(
                 path,
                 f"{points} control points; from {FEWEST_POINTS} to {MOST_POINTS} are allowed",
             )
-        return cls(weights=weights, biases=biases, **common)
+        return cls(weights=weights, biases=biases, **shared_fields)
 
     @property
     def control_points(self) -> int:
@@ -60,16 +60,16 @@ class Pfnn(Network):
         return (self.weights[0].shape[2], *(w.shape[1] for w in self.weights))
 
     @property
-    def parameters(self) -> int:
+    def parameter_count(self) -> int:
         """How many weights and biases the layers have at one phase."""
         return sum(inputs * outputs + outputs for inputs, outputs in pairwise(self.sizes))
 
     def stored_numbers(self, mode: str) -> int:
         """As in `Network`: weights and biases at each of the mode's phases, or of each control point."""
-        return (MODES[mode] or self.control_points) * self.parameters
+        return (MODES[mode] or self.control_points) * self.parameter_count
 
     @property
-    def described(self) -> str:
+    def description(self) -> str:
         """As in `Network`."""
         hidden = len(self.sizes) - 2
         return (
@@ -79,20 +79,20 @@ class Pfnn(Network):
 
     def predict(self, x: Array, phase: Array, constant: bool = False) -> Array:
         """As in `Network`. constant: round phases down to a multiple of 1 / 50, as the mode constant does."""
-        z = standardised(self, x)
+        z = standardise_inputs(self, x)
         y = forward(self.weights, self.biases, z, rounded_to_bins(phase) if constant else phase)
         return y * self.y_std + self.y_mean
 
     def predictor(self, mode: str | None = None, storage: str | None = None) -> PfnnPredictor:
         """As in `Network`: mode "constant" (50 phases), "linear" (10, blended) or "cubic" (exact)."""
-        return PfnnPredictor(self, mode or "cubic", storage or self.storage)
+        return PfnnPredictor(self, mode or "cubic", storage or self.default_storage)
 
-    def page(self, inputs: NDArray[np.int64], outputs: NDArray[np.int64]) -> dict[str, Any]:
+    def page_data(self, inputs: NDArray[np.int64], outputs: NDArray[np.int64]) -> dict[str, Any]:
         """As in `Network`: weights at the control points, as integers with a factor for each row."""
         weights, biases = list(self.weights), list(self.biases)
         weights[0] = weights[0][:, :, inputs]
         weights[-1], biases[-1] = weights[-1][:, outputs], biases[-1][:, outputs]
-        return {"layers": [packed_rows(w, b) for w, b in zip(weights, biases, strict=True)]}
+        return {"layers": [pack_layer(w, b) for w, b in zip(weights, biases, strict=True)]}
 
     @property
     def exports(self) -> dict[str, Export]:

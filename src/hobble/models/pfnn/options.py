@@ -18,8 +18,8 @@ class PfnnOptions(Options):
     control_points: Annotated[int, Field(ge=4, le=16)] = 4
 
     @property
-    def why_asymmetric(self) -> str:
-        """As in `Options`. A symmetric network needs, for each control point, one half a cycle later."""
+    def why_not_symmetric(self) -> str:
+        """As in `Options`. In a symmetric network, each control point needs a partner half a cycle later."""
         why = f"it needs an even number of network.control_points, not {self.control_points}"
         return why if self.control_points % 2 else ""
 

@@ -58,19 +58,19 @@ class PfnnStep:
         expanded, slopes = [], []
         for number, weight in enumerate(weights):
             x = torch.nn.functional.elu(x) if number else x
-            e, slope = self.expanded(number, x, c, masks[number])
+            e, slope = self.expand_inputs(number, x, c, masks[number])
             expanded.append(e)
             slopes.append(slope)
-            x = self.multiplied(f"outputs {number}", e, weight).to(y.dtype)
+            x = self.multiply(f"outputs {number}", e, weight).to(y.dtype)
         self.error = x.sub_(y)
         d = self.error * (2.0 / y.numel())  # gradient of the mean square by the prediction
         self.gradients = [d] * len(weights)  # each is replaced below
         for number in range(len(weights) - 1, -1, -1):
             d = d.to(self.factors.dtype)
-            self.gradients[number] = self.multiplied(f"gradient {number}", d.T, expanded[number].T)
+            self.gradients[number] = self.multiply(f"gradient {number}", d.T, expanded[number].T)
             if number:
-                de = self.multiplied(f"inputs {number}", d, weights[number].T)
-                d = self.contracted(number, de, c, slopes[number])
+                de = self.multiply(f"inputs {number}", d, weights[number].T)
+                d = self.contract_gradient(number, de, c, slopes[number])
         return torch.mean(torch.square(self.error))
 
     def seed(self, seed: int) -> None:
@@ -86,7 +86,7 @@ class PfnnStep:
         drawn = torch.rand(rows, sum(widths), generator=self.generator, device=flat.device)[own]
         return list((drawn < self.keep).to(flat.dtype).mul_(1.0 / self.keep).split(widths, dim=1))
 
-    def multiplied(self, name: str, a: Tensor, b: Tensor) -> Tensor:
+    def multiply(self, name: str, a: Tensor, b: Tensor) -> Tensor:
         """a @ b.T. name: names the result's buffer in the fused step (`hobble.models.fused_base`)."""
         return product(a, b)
 
@@ -94,7 +94,7 @@ class PfnnStep:
         """Spline coefficients (B, K) of phases (B,)."""
         return coefficients(p, self.network.control_points)
 
-    def expanded(self, number: int, x: Tensor, c: Tensor, mask: Tensor) -> tuple[Tensor, Tensor]:
+    def expand_inputs(self, number: int, x: Tensor, c: Tensor, mask: Tensor) -> tuple[Tensor, Tensor]:
         """For layer `number`: e (B, K (n + 1)) of its inputs x (B, n) times the mask, and slopes (B, n).
 
         A slope is the mask times the derivative of the ELU that gave x. The derivative is x + 1 where x is
@@ -102,11 +102,11 @@ class PfnnStep:
         """
         return expand(x * mask, c).to(self.factors.dtype), mask * torch.clamp(x + 1, max=1)
 
-    def contracted(self, number: int, de: Tensor, c: Tensor, slope: Tensor) -> Tensor:
+    def contract_gradient(self, number: int, de: Tensor, c: Tensor, slope: Tensor) -> Tensor:
         """The gradient (B, n) by the outputs of the previous layer, before their ELU.
 
         number: of the layer whose inputs they are. de: (B, K (n + 1)) the gradient by e of this layer. c:
-        (B, K) spline coefficients. slope: (B, n) from `expanded`.
+        (B, K) spline coefficients. slope: (B, n) from `expand_inputs`.
         """
         parts = de.to(c.dtype).view(len(c), c.shape[1], -1)[:, :, :-1]
         return torch.bmm(c[:, None, :], parts)[:, 0, :] * slope

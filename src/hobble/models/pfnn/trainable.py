@@ -75,12 +75,12 @@ class TrainablePfnn(Trainable):
         return arrays
 
     @property
-    def about(self) -> dict[str, Any]:
+    def file_metadata(self) -> dict[str, Any]:
         """As in `Trainable`."""
         return {"control_points": self.control_points, "network": formula(len(self.sizes) - 2)}
 
     @property
-    def described(self) -> str:
+    def description(self) -> str:
         """As in `Trainable`."""
         units, count = "-".join(map(str, self.sizes)), parameter_count(self.sizes, self.control_points)
         return f"{units} units and {self.control_points} control points ({count:,} parameters)"
@@ -91,7 +91,7 @@ def parameter_count(sizes: tuple[int, ...], control_points: int) -> int:
     return control_points * sum((size + 1) * out for size, out in pairwise(sizes))
 
 
-def initialise(sizes: tuple[int, ...], control_points: int, seed: int) -> TrainablePfnn:
+def untrained_network(sizes: tuple[int, ...], control_points: int, seed: int) -> TrainablePfnn:
     """A new network. Its weights are random, uniform within +-sqrt(6 / (in * out)), and its biases are 0.
 
     The code that Holden et al. (2017) released starts in the same way.

@@ -16,9 +16,9 @@ from numpy.typing import NDArray
 
 from hobble.core.compiled import njit
 from hobble.core.quat import Array
-from hobble.models.checks import weights_and_biases
-from hobble.models.network import Export, Network, standardised
-from hobble.models.packing import packed_rows
+from hobble.models.checks import read_weights_and_biases
+from hobble.models.network import Export, Network, standardise_inputs
+from hobble.models.packing import pack_layer
 from hobble.models.stack import Stack, StackPredictor, blend_layers
 
 PHASE_COLUMNS = 2  # inputs after the columns of X: sine and cosine of the phase
@@ -37,11 +37,11 @@ class Plain(Network):
     biases: tuple[Array, ...] = field(repr=False)
 
     @classmethod
-    def read(cls, path: str | Path, arrays: Mapping[str, Any], common: Mapping[str, Any]) -> Plain:
+    def read(cls, path: str | Path, arrays: Mapping[str, Any], shared_fields: Mapping[str, Any]) -> Plain:
         """As in `Model`. arrays: W0 (out, in), b0 (out,), W1, b1, ..."""
-        inputs, outputs = len(common["x_mean"]) + PHASE_COLUMNS, len(common["y_mean"])
-        weights, biases = weights_and_biases(path, arrays, ("W", "b"), 2, inputs, outputs)
-        return cls(weights=weights, biases=biases, **common)
+        inputs, outputs = len(shared_fields["x_mean"]) + PHASE_COLUMNS, len(shared_fields["y_mean"])
+        weights, biases = read_weights_and_biases(path, arrays, ("W", "b"), 2, inputs, outputs)
+        return cls(weights=weights, biases=biases, **shared_fields)
 
     @property
     def sizes(self) -> tuple[int, ...]:
@@ -49,20 +49,20 @@ class Plain(Network):
         return (len(self.x_mean), *(len(b) for b in self.biases))
 
     @property
-    def parameters(self) -> int:
+    def parameter_count(self) -> int:
         """As in `Network`: the number of all weights and biases."""
         without_phase = sum(inputs * outputs + outputs for inputs, outputs in pairwise(self.sizes))
         return without_phase + PHASE_COLUMNS * self.sizes[1]
 
     @property
-    def described(self) -> str:
+    def description(self) -> str:
         """As in `Network`."""
         hidden = len(self.sizes) - 2
         return f"feed-forward network of {hidden} hidden layer{'s' * (hidden != 1)}, given the phase"
 
     def predict(self, x: Array, phase: Array) -> Array:
         """As in `Network`."""
-        h = np.concatenate([standardised(self, x), phase_columns(phase)], axis=1)
+        h = np.concatenate([standardise_inputs(self, x), phase_columns(phase)], axis=1)
         for number, (weight, bias) in enumerate(zip(self.weights, self.biases, strict=True)):
             h = h @ weight.T + bias
             if number < len(self.weights) - 1:  # the ELU: h above 0, else e^h - 1
@@ -71,16 +71,16 @@ class Plain(Network):
 
     def predictor(self, mode: str | None = None, storage: str | None = None) -> PlainPredictor:
         """As in `Network`; there is one mode."""
-        self.mode(mode)
-        return PlainPredictor(self, storage or self.storage)
+        self.resolve_mode(mode)
+        return PlainPredictor(self, storage or self.default_storage)
 
-    def page(self, inputs: NDArray[np.int64], outputs: NDArray[np.int64]) -> dict[str, Any]:
+    def page_data(self, inputs: NDArray[np.int64], outputs: NDArray[np.int64]) -> dict[str, Any]:
         """As in `Network`: weights as integers with a factor for each row."""
         weights, biases = list(self.weights), list(self.biases)
         phase_inputs = len(self.x_mean) + np.arange(PHASE_COLUMNS)
         weights[0] = weights[0][:, np.concatenate([inputs, phase_inputs])]
         weights[-1], biases[-1] = weights[-1][outputs], biases[-1][outputs]
-        return {"layers": [packed_rows(w[None], b[None]) for w, b in zip(weights, biases, strict=True)]}
+        return {"layers": [pack_layer(w[None], b[None]) for w, b in zip(weights, biases, strict=True)]}
 
     @property
     def exports(self) -> dict[str, Export]:

@@ -17,7 +17,7 @@ class PlainOptions(Options):
     units: Annotated[int, Field(gt=0, le=8192)] = 512
 
     @property
-    def why_asymmetric(self) -> str:
+    def why_not_symmetric(self) -> str:
         """As in `Options`: always "", because any plain network can be trained with `training.symmetric`."""
         return ""
 

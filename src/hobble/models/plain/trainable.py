@@ -86,7 +86,7 @@ class TrainablePlain(Trainable):
         return arrays
 
     @property
-    def about(self) -> dict[str, Any]:
+    def file_metadata(self) -> dict[str, Any]:
         """As in `Trainable`."""
         hidden, inside = len(self.units) - 2, "(x, sin 2 pi p, cos 2 pi p)"
         for i in range(hidden):
@@ -94,7 +94,7 @@ class TrainablePlain(Trainable):
         return {"network": f"y = W{hidden} {inside} + b{hidden} on standardised x and y; p is the phase"}
 
     @property
-    def described(self) -> str:
+    def description(self) -> str:
         """As in `Trainable`."""
         return f"{'-'.join(map(str, self.units))} units, given the phase ({self.flat.numel():,} parameters)"
 
@@ -137,7 +137,7 @@ def layer_shapes(units: tuple[int, ...]) -> list[tuple[int, int, int]]:
     return [(out, 1, size + 1) for size, out in zip(inputs, units[1:], strict=True)]
 
 
-def initialise(units: tuple[int, ...], seed: int) -> TrainablePlain:
+def untrained_network(units: tuple[int, ...], seed: int) -> TrainablePlain:
     """A new network. Its weights are random, uniform within +-sqrt(6 / (in * out)), and its biases are 0."""
     network = TrainablePlain(torch.zeros(sum(map(prod, layer_shapes(units)))), units)
     uniform_start(network.layers, np.random.default_rng([seed, 0]))

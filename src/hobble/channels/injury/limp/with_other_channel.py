@@ -33,7 +33,7 @@ def limps_together(
     makes a row.
     """
     names = [name for name in network.channels if name != INJURY]
-    columns = [(name, column) for name in names for column in network.trained(name)]
+    columns = [(name, column) for name in names for column in network.trained_labels(name)]
     if not columns:
         return []
     # A figure walks for each case. Its link is None if it has no injury.
