@@ -60,7 +60,7 @@ def test_a_file_that_holds_no_weights_is_refused(tmp_path: Path) -> None:
 
 
 def test_bars_show_every_clip_of_its_split(material: ReportMaterial) -> None:
-    chart = accuracy_page.clip_bars(material.found("accuracy"), material)
+    chart = accuracy_page.clip_bars(material.results_of("accuracy"), material)
     assert chart is not None
     bars = {trace["name"]: dict(zip(trace["y"], trace["x"], strict=True)) for trace in chart.traces}
     assert set(bars["held out"]) == {"walk_turns", "walk_turns_mirror", "hurt_back", "hurt_back_mirror"}
@@ -71,7 +71,7 @@ def test_bars_show_every_clip_of_its_split(material: ReportMaterial) -> None:
 
 
 def test_boxes_only_where_there_are_quantiles(material: ReportMaterial) -> None:
-    assert accuracy_page.clip_boxes(material.found("accuracy")) is not None
+    assert accuracy_page.clip_boxes(material.results_of("accuracy")) is not None
     clips = [{k: v for k, v in row.items() if k != "p50"} for row in material.measured["accuracy"]["clips"]]
     assert accuracy_page.clip_boxes({"clips": clips}) is None
 

@@ -28,7 +28,7 @@ MEASURE = Measure(
     package=__name__,
     inputs=("clips", "skeleton", "accuracy"),
     options=Options,
-    cost=Cost(memory_each=10, minutes=1),
+    cost=Cost(mb_per_1000_frames=10, least_minutes=1),
 )
 '''
 RUN = """from hobble.rows.clip_rows import load_clip_rows
@@ -44,7 +44,7 @@ def run(inputs: MeasureInputs, options: Options) -> Outcome:
         parts = captured(load_clip_rows(path))
         heights = [h for part in parts for h in part.local[:: options.every, joint, 1]]
         rows.append({"clip": clip, "frames": len(heights), "highest": round(float(max(heights)), 3)})
-    known = [entry["clip"] for entry in inputs.measured("accuracy")["clips"]]
+    known = [entry["clip"] for entry in inputs.results_of("accuracy")["clips"]]
     return Outcome({"every": options.every, "clips": rows, "known": known}, {"clips": rows}, "<hips>")
 """
 PAGE = """from hobble.report.page_parts import PageSection, Paragraph, SectionPart
@@ -70,7 +70,7 @@ COMPARISON = """from hobble.evaluation.comparison_rows import SideBySide
 
 
 def compared(all_measured, published):
-    highest = {m.name: max(row["highest"] for row in m.found("hips")["clips"]) for m in all_measured}
+    highest = {m.name: max(row["highest"] for row in m.results_of("hips")["clips"]) for m in all_measured}
     return SideBySide([{"configuration": name, "highest": value} for name, value in highest.items()])
 
 

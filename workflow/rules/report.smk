@@ -126,7 +126,7 @@ rule report:
         code=lambda w: package.code(
             "report",
             configurations.kind(w.configuration),
-            *part_modules("page"),
+            *names_of_modules("page"),
             *shown_modules(),
         ),
     script:
@@ -152,7 +152,7 @@ rule report_compare:
         runtime=10,
     params:
         configurations=lambda w: comparison.names(),
-        code=package.code("report_compare", *part_modules("comparison_page")),
+        code=package.code("report_compare", *names_of_modules("comparison_page")),
     script:
         "../scripts/report_compare.py"
 

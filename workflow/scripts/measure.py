@@ -8,7 +8,7 @@ from hobble.workflow.measure_job import inputs_of_job, measure_of
 with job(snakemake) as log:
     measure = measure_of(snakemake)
     options = measure.options.model_validate(snakemake.params.options)
-    found = measure.part("run").run(inputs_of_job(snakemake), options)
+    found = measure.import_module("run").run(inputs_of_job(snakemake), options)
     write_json(snakemake.output.json, found.result)
     write_tables(snakemake.output.tables, found.tables)
-    log.info("%s", found.says)
+    log.info("%s", found.log_line)

@@ -7,5 +7,5 @@ from hobble.workflow.measure_job import inputs_of_job, measure_of
 with job(snakemake):
     measure = measure_of(snakemake)
     options = measure.options.model_validate(snakemake.params.options)
-    found = measure.part("run").run_piece(inputs_of_job(snakemake), options, snakemake.params.piece)
+    found = measure.import_module("run").run_piece(inputs_of_job(snakemake), options, snakemake.params.piece)
     write_json(snakemake.output.json, found)

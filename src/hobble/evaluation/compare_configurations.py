@@ -62,7 +62,7 @@ def compare(all_measured: Sequence[ConfigurationResults], published: Json) -> Js
 def comparison_functions(name: str) -> Iterator[tuple[str, Callable[..., Any]]]:
     """Yield (name of a measurement, function `name` of its `comparison.py`), for those that have it."""
     for measure in MEASURES:
-        if (function := getattr(measure.part("comparison"), name, None)) is not None:
+        if (function := getattr(measure.import_module("comparison"), name, None)) is not None:
             yield measure.name, function
 
 

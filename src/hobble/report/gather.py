@@ -53,7 +53,7 @@ class ReportMaterial:
         """The split of a clip, "train" or "held_out"."""
         return self.splits.get(clip, "train")
 
-    def found(self, measure: str) -> Json:
+    def results_of(self, measure: str) -> Json:
         """The results of a measurement; empty if it was not run."""
         return self.measured.get(measure, {})
 

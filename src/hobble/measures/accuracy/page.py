@@ -286,7 +286,7 @@ def _centimetres(error: float, split: str, material: ReportMaterial) -> str:
 
     error: the error of the predicted joints, cm.
     """
-    lengths = {entry["length"]: entry for entry in material.found("rollouts").get("lengths", ())}
+    lengths = {entry["length"]: entry for entry in material.results_of("rollouts").get("lengths", ())}
     drawn = (lengths.get(1, {}).get(split) or {}).get("position_error_cm")
     if drawn is None:
         return f"{number(error)} cm per joint on average"

@@ -81,12 +81,12 @@ def tables(compared: Json) -> dict[str, Sequence[Row]]:
 
 def mode_entries(measured: ConfigurationResults) -> list[Json]:
     """A configuration's results in each phase mode that was run. The key `configuration` has its name."""
-    found = measured.found(NAME)
+    found = measured.results_of(NAME)
     return [{**entry, "configuration": measured.name} for entry in found.get("modes", [found])]
 
 
 def _sizes(measured: ConfigurationResults) -> Sizes:
-    found = measured.found(NAME)
+    found = measured.results_of(NAME)
     counts = found["parameters"]
     return {
         "computations": {key: counts[key] if counts else None for key in COUNTS},
@@ -126,13 +126,15 @@ def fit_lines(all_measured: Sequence[ConfigurationResults], published: Json) -> 
     Configurations with the same network are separate points. Networks without layers are left out.
     """
     out = []
-    entries = [(m, entry) for m in all_measured if m.found(NAME)["parameters"] for entry in mode_entries(m)]
+    entries = [
+        (m, entry) for m in all_measured if m.results_of(NAME)["parameters"] for entry in mode_entries(m)
+    ]
     modes = list(dict.fromkeys(entry["mode"] for _, entry in entries))
     for counts in COUNTS:
         for mode in modes:
             for step in ("total", "predict", "median"):
                 points = [
-                    (m.found(NAME)["parameters"][counts], _time(entry["milliseconds"], step))
+                    (m.results_of(NAME)["parameters"][counts], _time(entry["milliseconds"], step))
                     for m, entry in entries
                     if entry["mode"] == mode
                 ]
@@ -201,11 +203,11 @@ def _published_times(all_measured: Sequence[ConfigurationResults], published: Js
     out = []
     for row in published["responsivity"]:
         measured = by_name.get(row["configuration"])
-        ours = measured.found(NAME)["milliseconds"]["total"] if measured else None
+        ours = measured.results_of(NAME)["milliseconds"]["total"] if measured else None
         out.append(published_row("a frame", row, row["milliseconds"], ours, "ms"))
         if "sd" in row:
             in_text = {**row, "table": None}  # the standard deviation is only in the text of the thesis
-            means = lap_means(measured.found(NAME)) if measured else []
+            means = lap_means(measured.results_of(NAME)) if measured else []
             sd = float(np.std(means)) if len(means) > 1 else None
             out.append(published_row("standard deviation of the means of laps", in_text, row["sd"], sd, "ms"))
     for row in published["modes"]:

@@ -49,7 +49,7 @@ class Starts:
         animation.follower.reached[:] = self.waypoints[laps]
 
 
-def starts_of(track: Sequence[Waypoint], laps: int) -> Starts:
+def lap_starts(track: Sequence[Waypoint], laps: int) -> Starts:
     """The starts of `laps` laps.
 
     The first lap begins at the last waypoint of the track, the second lap at the first waypoint.
@@ -78,7 +78,7 @@ def walk_laps(
     If a character does not reach the waypoint where its lap begins within `longest` frames, its lap begins at
     the character's start, with no waypoint reached.
     """
-    starts = starts_of(track, laps)
+    starts = lap_starts(track, laps)
     animation = ProceduralAnimation(network, characters=laps, waypoints=track, **dict(runtime))
     starts.begin(animation, slice(None))
     recorded = _record(animation, starts.waypoints + 1, longest)

@@ -18,7 +18,7 @@ def compared(all_measured: Sequence[ConfigurationResults], published: Json) -> S
         entries=[
             {"configuration": m.name, **{k: v for k, v in entry.items() if k != "clips"}}
             for m in all_measured
-            for entry in m.found(NAME)["lengths"]
+            for entry in m.results_of(NAME)["lengths"]
         ]
     )
 

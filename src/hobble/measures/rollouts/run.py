@@ -20,11 +20,11 @@ from hobble.database.statistics import Moments
 from hobble.evaluation.captured import unbroken_stretches
 from hobble.measures.accuracy.run import (
     check_layout,
-    chosen_joints,
     joint_indices,
+    joints_to_measure,
     relative_and_distance,
 )
-from hobble.measures.clip_parts import ClipPart, LoadedPart, clip_parts, sample_of
+from hobble.measures.clip_parts import ClipPart, LoadedPart, clip_parts, sample_to_measure
 from hobble.measures.inputs import MeasureInputs, Outcome, Row
 from hobble.measures.results import SPLITS
 from hobble.measures.rollouts import Options
@@ -71,7 +71,7 @@ class RollOutErrors:
             self.ended + other.ended,
         )
 
-    def weighing(self, weight: float) -> RollOutErrors:
+    def weighted_by(self, weight: float) -> RollOutErrors:
         """The same errors with each frame counted `weight` times."""
         if weight == 1:
             return self
@@ -191,7 +191,7 @@ def measure_roll_outs(
             parts, _errors_of_parts(predictor, list(parts.values()), joints, lengths), strict=True
         ):
             for length, errors in by_length.items():
-                weighed, clip_errors = errors.weighing(part.weight), of_clip[length]
+                weighed, clip_errors = errors.weighted_by(part.weight), of_clip[length]
                 total[length][splits[part.clip]] += weighed
                 clip_errors[part.clip] = clip_errors.get(part.clip, RollOutErrors()) + weighed
                 if part.excerpt is not None:
@@ -278,9 +278,9 @@ def run(inputs: MeasureInputs, options: Options) -> Outcome:
         inputs.clips,
         inputs.splits,
         inputs.configuration,
-        chosen_joints(inputs, options),
+        joints_to_measure(inputs, options),
         options.rollouts,
         inputs.runtime.mode,
-        sample_of(inputs, options),
+        sample_to_measure(inputs, options),
     )
     return Outcome(result, {"lengths": roll_out_rows(result)})

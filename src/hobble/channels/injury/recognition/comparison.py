@@ -18,7 +18,7 @@ def compared(all_measured: Sequence[ConfigurationResults], published: Json) -> S
     published: name of a measurement -> its published result.
     """
     return SideBySide(
-        entries=[{**m.found(NAME), "configuration": m.name} for m in all_measured],
+        entries=[{**m.results_of(NAME), "configuration": m.name} for m in all_measured],
         against_published=[row for m in all_measured for row in _against_people(m, published["recognition"])],
     )
 
@@ -34,7 +34,7 @@ def _against_people(measured: ConfigurationResults, people: Json) -> list[Publis
 
     people: the published result, with the key `share`.
     """
-    found = measured.found(NAME)
+    found = measured.results_of(NAME)
     if not found["applies"]:
         return []
     published, generated = {**people, "configuration": measured.name}, found["generated"]

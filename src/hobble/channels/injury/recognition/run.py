@@ -27,7 +27,7 @@ from hobble.evaluation.crowd import run as run_walks
 from hobble.evaluation.gait_features import features
 from hobble.gait.discriminant import Discriminant, learn
 from hobble.hurt.body_parts import part_of_link
-from hobble.measures.clip_parts import captured_motion, sample_of, with_sample
+from hobble.measures.clip_parts import captured_motion, sample_to_measure, with_sample
 from hobble.measures.inputs import MeasureInputs, Outcome, Row
 from hobble.measures.sample_options import SampleOptions
 from hobble.models.load import load_network
@@ -220,7 +220,7 @@ def run(inputs: MeasureInputs, options: SampleOptions) -> Outcome:
     # out, because the classifier would learn these rules.
     clips = {clip: file for clip, file in inputs.clips.items() if not HURT_VERSION.search(clip)}
     summaries = [file for file in inputs.summaries if file.stem in clips]
-    sample = sample_of(replace(inputs, summaries=summaries), options)
+    sample = sample_to_measure(replace(inputs, summaries=summaries), options)
     result = measure_recognition(
         load_network(inputs.weights),
         captured_motion(clips, sample),

@@ -22,5 +22,5 @@ def compared(all_measured: Sequence[ConfigurationResults], published: Json) -> S
 
 
 def _entry(measured: ConfigurationResults) -> dict[str, Any]:
-    found = measured.found(NAME)
+    found = measured.results_of(NAME)
     return {"configuration": measured.name, **{key: found[key] for key in COMPARED_KEYS if key in found}}
