@@ -23,7 +23,7 @@ from hobble.models.load import load_network
 from hobble.report.captured_and_predicted import comparisons
 from hobble.report.gather import gather
 from hobble.report.pack_recogniser import playable_with_recogniser
-from hobble.report.page import render
+from hobble.report.page import render_report
 from hobble.report.scenes import scenes
 from hobble.runtime.options import Runtime
 
@@ -75,7 +75,7 @@ def rendered(results: Path, dataset: Path, count: int) -> tuple[float, float]:
         network = load_network(weights)
         runtime = Runtime.model_validate(material.resolved["configuration"]["runtime"])
         known = material.network
-        page = render(
+        page = render_report(
             material,
             scenes(results / "runtime/scenarios.npz", known["skeleton"], known["channels"]),
             playable_with_recogniser(network, runtime),

@@ -15,10 +15,10 @@ from hypothesis import strategies as st
 
 from hobble.core.errors import InputError
 from hobble.evaluation.compare_configurations import compare
-from hobble.evaluation.comparison_csv import tables
+from hobble.evaluation.comparison_csv import comparison_tables
 from hobble.evaluation.configuration_results import read_results
 from hobble.evaluation.csv_tables import write_csv
-from hobble.evaluation.series import difference, fit_line
+from hobble.evaluation.series import difference_in_sds, fit_line
 from hobble.measures.responsivity.run import parameter_counts
 
 SIZES = {
@@ -205,7 +205,7 @@ def test_a_published_figure_is_listed_with_its_own_configuration_only(compared, 
 
 
 def test_tables_with_different_columns_survive_csv(compared, tmp_path) -> None:
-    found = tables(compared)
+    found = comparison_tables(compared)
     rows = {}
     for name, table in found.items():
         write_csv(tmp_path / f"{name}.csv", table)
@@ -272,7 +272,7 @@ def test_one_configuration_alone_has_no_differences(tmp_path, published) -> None
     )
     assert found["difference"] == []
     assert found["milliseconds"]["fit"][0]["slope"] is None
-    assert tables(found)["difference"] == []
+    assert comparison_tables(found)["difference"] == []
 
 
 def test_a_damaged_history_is_named(tmp_path) -> None:
@@ -289,11 +289,11 @@ NUMBER = st.floats(-1e3, 1e3)
 def test_a_difference_depends_neither_on_the_unit_nor_on_the_order(
     a: float, sa: float, b: float, sb: float, k: float
 ) -> None:
-    found = difference(a, sa, b, sb)
-    assert found == difference(b, sb, a, sa)
-    assert found == pytest.approx(difference(k * a, k * sa, k * b, k * sb))
+    found = difference_in_sds(a, sa, b, sb)
+    assert found == difference_in_sds(b, sb, a, sa)
+    assert found == pytest.approx(difference_in_sds(k * a, k * sa, k * b, k * sb))
     assert found == pytest.approx(abs(a - b) / ((sa + sb) / 2))
-    assert difference(a, 0, b, 0) is None
+    assert difference_in_sds(a, 0, b, 0) is None
 
 
 def test_a_line_is_fitted_to_points() -> None:

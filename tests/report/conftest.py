@@ -21,7 +21,7 @@ from hobble.report.bundle import WEB, bundle, install
 from hobble.report.captured_and_predicted import comparisons
 from hobble.report.gather import ReportMaterial, gather
 from hobble.report.opening_walk import opening_walk
-from hobble.report.page import render
+from hobble.report.page import render_report
 from hobble.report.playable import playable
 from hobble.report.scenes import scenes
 
@@ -143,7 +143,7 @@ def page(
     hero: dict[str, Any],
 ) -> str:
     """The report of the examples."""
-    return render(material, play, character, compared, script, hero)
+    return render_report(material, play, character, compared, script, hero)
 
 
 @pytest.fixture(scope="module")

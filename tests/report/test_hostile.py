@@ -15,7 +15,7 @@ from hobble.core.skeleton import Skeleton
 from hobble.models.load import load_network
 from hobble.report.captured_and_predicted import comparisons
 from hobble.report.gather import gather
-from hobble.report.page import render
+from hobble.report.page import render_report
 from hobble.report.playable import playable
 from hobble.report.scenes import scenes
 
@@ -53,7 +53,7 @@ def hostile(
     (folder / "jog.npz").rename(folder / "rows.npz")
     arrays = dict(load_npz(folder / "rows.npz"))
     save_npz(rows, **{**arrays, "clip": np.array(HOSTILE)})
-    text = render(
+    text = render_report(
         material,
         scenes(folder / "scenarios.npz", material.network["skeleton"], material.network["channels"]),
         playable(network, examples.RUNTIME),

@@ -95,12 +95,15 @@ def test_turns_speeds_and_severities_are_counted_in_seconds(
     save_clip_rows(tmp_path / "walk.npz", replace(rows, y=y, channels={"injury": severity}))
     found = coverage.seconds_of_data([tmp_path / "walk.npz"], {rows.clip: "held_out"})
     seconds, hurt = len(np.unique(rows.frame)) / 60, len(np.unique(rows.frame[: len(rows) // 2])) / 60
-    turns = dict(zip(coverage._middles(coverage.TURNS), found["turns"]["held_out"], strict=True))
+    turns = dict(zip(coverage._middles(coverage.TURN_EDGES), found["turns"]["held_out"], strict=True))
     assert turns[30.0] == pytest.approx(seconds)
     assert sum(turns.values()) == pytest.approx(seconds)
     assert not found["turns"]["train"].any()
     row, column = np.argwhere(found["both"] > 0)[0]
-    assert (coverage._middles(coverage.TURNS)[row], coverage._middles(coverage.SPEEDS)[column]) == (30.0, 1.3)
+    assert (coverage._middles(coverage.TURN_EDGES)[row], coverage._middles(coverage.SPEED_EDGES)[column]) == (
+        30.0,
+        1.3,
+    )
     assert list(found["channels"]["injury"]) == ["LeftUpLeg-LeftLeg"]
     assert found["channels"]["injury"]["LeftUpLeg-LeftLeg"][6] == pytest.approx(hurt, abs=1 / 60 + 1e-9)
     (chart,) = coverage.channel_charts(found)
@@ -110,7 +113,8 @@ def test_turns_speeds_and_severities_are_counted_in_seconds(
 
 def test_strips_show_the_injured_parts(material: ReportMaterial) -> None:
     strips = {
-        strip["clip"]: strip for strip in data_section.strips(material, shown_clips.choose_clips(material))
+        strip["clip"]: strip
+        for strip in data_section.clip_strips(material, shown_clips.choose_clips(material))
     }
     assert len(strips) == 8, "a mirror says the same again"
     (row,) = strips["hurt_left_knee"]["channels"]

@@ -6,7 +6,7 @@ import yaml
 
 from hobble.core.files import write_json
 from hobble.evaluation.compare_configurations import compare
-from hobble.evaluation.comparison_csv import tables
+from hobble.evaluation.comparison_csv import comparison_tables
 from hobble.evaluation.configuration_results import read_results
 from hobble.evaluation.csv_tables import write_tables
 from hobble.workflow.job import job
@@ -19,4 +19,4 @@ with job(snakemake):
     ]
     compared = compare(measured, yaml.safe_load(Path(files.published).read_text(encoding="utf-8")))
     write_json(snakemake.output.json, compared)
-    write_tables(snakemake.output.tables, tables(compared))
+    write_tables(snakemake.output.tables, comparison_tables(compared))

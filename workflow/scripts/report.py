@@ -8,7 +8,7 @@ from hobble.report.captured_and_predicted import comparisons
 from hobble.report.gather import gather
 from hobble.report.opening_walk import opening_walk
 from hobble.report.pack_recogniser import playable_with_recogniser
-from hobble.report.page import render
+from hobble.report.page import render_report
 from hobble.report.scenes import scenes
 from hobble.runtime.options import Runtime
 from hobble.workflow.job import job
@@ -39,4 +39,4 @@ with job(snakemake):
     hero = opening_walk(trained, runtime, character, material.measured.values())
     compared = comparisons(trained, given.rows, params.splits)
     bundle = Path(given.bundle).read_text(encoding="utf-8")
-    write_text(snakemake.output.html, render(material, play, character, compared, bundle, hero))
+    write_text(snakemake.output.html, render_report(material, play, character, compared, bundle, hero))

@@ -10,7 +10,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from hobble.evaluation.captured import Captured, captured
+from hobble.evaluation.captured import Captured, captured_stretches
 from hobble.measures.inputs import Json, MeasureInputs
 from hobble.measures.sample_options import SampleOptions
 from hobble.measures.stratified_sample import Sample, draw_sample
@@ -78,7 +78,7 @@ def captured_motion(clips: Mapping[str, str | Path], sample: Sample | None) -> I
     clips: name -> file of rows. sample: the excerpts to read; None for all clips.
     """
     for part in clip_parts(clips, sample):
-        yield from captured(part.load().rows)
+        yield from captured_stretches(part.load().rows)
 
 
 def sample_to_measure(inputs: MeasureInputs, options: SampleOptions) -> Sample | None:

@@ -49,7 +49,7 @@ class ReportMaterial:
     rows: list[str] = field(repr=False)
     published: Mapping[str, Any] = field(repr=False)
 
-    def split(self, clip: str) -> str:
+    def split_of(self, clip: str) -> str:
         """The split of a clip, "train" or "held_out"."""
         return self.splits.get(clip, "train")
 

@@ -36,10 +36,10 @@ from hobble.report.verdicts import Verdict
 class OverviewColumn:
     """A column of the table of configurations, which has a row for each configuration.
 
-    values: configuration -> value in its row. at: a number; columns are sorted by it.
+    values: configuration -> value in its row. order: a number; columns are sorted by it.
     """
 
-    at: int
+    order: int
     column: Column
     values: Mapping[str, Any] = field(repr=False)
 
@@ -75,7 +75,7 @@ def compared_verdicts(compared: Json) -> list[Verdict]:
     verdicts = [
         verdict for _, show in _functions("comparison_page", "verdicts") for verdict in show(compared)
     ]
-    return sorted(verdicts, key=lambda verdict: verdict.at)
+    return sorted(verdicts, key=lambda verdict: verdict.order)
 
 
 def compared_columns(compared: Json) -> list[OverviewColumn]:

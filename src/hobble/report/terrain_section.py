@@ -15,7 +15,7 @@ import numpy as np
 from hobble.core.array_parts import ArrayParts
 from hobble.core.errors import InputError
 from hobble.core.quat import Array
-from hobble.report.charts import Chart, Trace, axis, line
+from hobble.report.charts import Chart, Trace, axis, line_trace
 from hobble.report.tables import Column, Table
 
 MOST_CLIPS = 10  # at most this many clips have their ground profile drawn
@@ -99,7 +99,9 @@ def profile_chart(fits_of_clips: list[ShownFits]) -> Chart:
                 for t, v in zip(np.insert(seconds, gaps, 0), height, strict=True)
             ]
             traces.append(
-                line(name, times, [None if not np.isfinite(v) else float(v) for v in height], colour, **more)
+                line_trace(
+                    name, times, [None if not np.isfinite(v) else float(v) for v in height], colour, **more
+                )
             )
         options[fit.clip] = traces
     return Chart(

@@ -8,9 +8,9 @@ from itertools import combinations
 import numpy as np
 
 from hobble.evaluation.comparison_rows import (
+    ComparisonAddition,
     DifferenceOf,
     PublishedRow,
-    SideBySide,
     compare_series,
     published_row,
 )
@@ -23,12 +23,12 @@ NAME = "accuracy"  # name of the measurement
 SPLIT_NAMES = {"train": "training", "held_out": "held-out"}
 
 
-def compared(all_measured: Sequence[ConfigurationResults], published: Json) -> SideBySide:
+def compared(all_measured: Sequence[ConfigurationResults], published: Json) -> ComparisonAddition:
     """The errors of each configuration, the difference of each pair, and the published errors beside ours.
 
     all_measured: the results of each configuration. published: the content of published.yaml.
     """
-    return SideBySide(
+    return ComparisonAddition(
         entries=[{"dataset": m.dataset, **m.results_of(NAME), "configuration": m.name} for m in all_measured],
         about={m.name: {"joints": m.results_of(NAME)["joints"]} for m in all_measured},
         differences=accuracy_differences(all_measured),

@@ -48,7 +48,7 @@ def section(found: Json, material: ReportMaterial) -> PageSection:
             *(SectionPart(10 * i + 1 + k, chart) for k, chart in enumerate(charts)),
         ]
     title = " and ".join(result["title"] for result in found["channels"])
-    return PageSection("manners", parts, title=title, at=21)
+    return PageSection("manners", parts, title=title, order=21)
 
 
 def summarise(result: ChannelResult) -> str:

@@ -10,9 +10,9 @@ import numpy as np
 
 from hobble.evaluation.comparison_csv import flatten
 from hobble.evaluation.comparison_rows import (
+    ComparisonAddition,
     DifferenceOf,
     PublishedRow,
-    SideBySide,
     compare_series,
     published_row,
 )
@@ -55,10 +55,10 @@ class TimeLine(StraightLine):
     y: list[float]
 
 
-def compared(all_measured: Sequence[ConfigurationResults], published: Json) -> SideBySide:
+def compared(all_measured: Sequence[ConfigurationResults], published: Json) -> ComparisonAddition:
     """The laps of the track in each phase mode, the networks' sizes, and published sizes and times."""
     sizes = {m.name: _sizes(m) for m in all_measured}
-    return SideBySide(
+    return ComparisonAddition(
         entries=[entry for m in all_measured for entry in mode_entries(m)],
         about=sizes,
         against_published=_published_sizes(sizes, published),

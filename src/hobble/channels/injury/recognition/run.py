@@ -22,9 +22,8 @@ from hobble.channels.injury.recognition.results import RecognisedWindows, Recogn
 from hobble.core.quat import Array
 from hobble.core.skeleton import Skeleton
 from hobble.evaluation.captured import Captured
-from hobble.evaluation.crowd import FPS, CrowdTarget
-from hobble.evaluation.crowd import run as run_walks
-from hobble.evaluation.gait_features import features
+from hobble.evaluation.crowd import FPS, CrowdTarget, generate_walks
+from hobble.evaluation.gait_features import gait_features
 from hobble.gait.discriminant import Discriminant, learn
 from hobble.hurt.body_parts import part_of_link
 from hobble.measures.clip_parts import captured_motion, sample_to_measure, with_sample
@@ -159,7 +158,7 @@ def generated_windows(
     script = CrowdTarget(
         WARM_UP + USED, ["walk"] * len(cases), severities(network, injuries), [v for *_, v in cases]
     )
-    walks = run_walks(network, [script], runtime)
+    walks = generate_walks(network, [script], runtime)
     out = []
     for i, (name, severity, speed) in enumerate(cases):
         for start in range(WARM_UP, WARM_UP + USED - WINDOW + 1, STEP):
@@ -243,7 +242,7 @@ def _features(
     skeleton: Skeleton, local: Array, contacts: Array, root: Array, span: slice
 ) -> dict[str, float]:
     """Name -> value of the features of the frames `span`. For the arrays see `Captured`."""
-    return features(skeleton, local[span], contacts[span], root[span])
+    return gait_features(skeleton, local[span], contacts[span], root[span])
 
 
 def _cross_validate(windows: Sequence[InjuryWindow], parts_of_class: PartsOfClass) -> RecognisedWindows:
