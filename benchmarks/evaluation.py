@@ -18,7 +18,7 @@ from runtime import SKELETON, load_skeleton, random_network
 from hobble.channels.injury.crowd_severities import severities
 from hobble.core.processors import processor
 from hobble.evaluation.crowd import CrowdTarget, generate_walks
-from hobble.measures.rollouts.roll_outs import Crowd, RollOutInputs, RollOuts
+from hobble.measures.rollouts.roll_outs import RollOutCrowd, RollOutInputs, RollOuts
 from hobble.models.load import load_network
 from hobble.models.network import Network
 from hobble.models.pfnn.predictor import PfnnPredictor
@@ -71,7 +71,7 @@ def roll_outs(network: Network) -> tuple[float, float]:
     per = 1e6 / length / len(starts)
 
     def roll_out(chosen: np.ndarray) -> None:
-        for _ in Crowd(predictor, [RollOuts(recorded, chosen, length)]).frames():
+        for _ in RollOutCrowd(predictor, [RollOuts(recorded, chosen, length)]).frames():
             pass
 
     together = seconds(lambda: roll_out(starts))

@@ -14,7 +14,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from hobble.core.errors import InputError
-from hobble.evaluation.compare_configurations import compare
+from hobble.evaluation.compare_configurations import compare_configurations
 from hobble.evaluation.comparison_csv import comparison_tables
 from hobble.evaluation.configuration_results import read_results
 from hobble.evaluation.csv_tables import write_csv
@@ -119,7 +119,7 @@ def left_behind(folder: Path, name: str, clips: dict[str, float], sizes: tuple[i
 def compared(tmp_path: Path, published: dict[str, Any]) -> dict[str, Any]:
     clips = {"holden": {"a": 0.04, "b": 0.02}, "holden-xl": {"a": 0.03, "b": 0.02}, "ava": {"b": 0.05}}
     found = [read_results(n, left_behind(tmp_path, n, clips[n], s)) for n, s in SIZES.items()]
-    return compare(found, published)
+    return compare_configurations(found, published)
 
 
 def test_parameter_counts_equal_table_6_1(compared, published) -> None:
@@ -243,7 +243,9 @@ def test_tables_with_different_columns_survive_csv(compared, tmp_path) -> None:
 
 def test_published_clips_are_listed_with_ours_of_the_same_name(tmp_path, published) -> None:
     clips = {"LocomotionFlat04_000": 0.03, "LocomotionFlat04_000_mirror": 0.07, "walk": 0.05}
-    found = compare([read_results("a", left_behind(tmp_path, "a", clips, SIZES["holden"]))], published)
+    found = compare_configurations(
+        [read_results("a", left_behind(tmp_path, "a", clips, SIZES["holden"]))], published
+    )
     rows = [r for r in found["against_published"] if "LocomotionFlat04" in r["measure"]]
     assert [(r["source"], r["published"], r["ours"]) for r in rows] == [
         ("segerstedt", 0.0448, 0.03),
@@ -267,7 +269,7 @@ def test_published_times_and_sizes_are_listed_with_their_measure(compared) -> No
 
 
 def test_one_configuration_alone_has_no_differences(tmp_path, published) -> None:
-    found = compare(
+    found = compare_configurations(
         [read_results("holden", left_behind(tmp_path, "holden", {"a": 0.1}, SIZES["holden"]))], published
     )
     assert found["difference"] == []

@@ -71,7 +71,7 @@ def test_the_sample_has_the_requested_size_and_every_kind_of_clip():
     for stratum in sample.strata:
         kinds = {(splits[n.clip], of_excerpt[n].gait, of_excerpt[n].channels) for n in stratum.drawn}
         assert len(kinds) == 1
-        assert len(stratum.drawn) >= min(LEAST_EXCERPTS, stratum.count)
+        assert len(stratum.drawn) >= min(LEAST_EXCERPTS, stratum.excerpt_count)
         measured[stratum.split] += sum(one.rows for one in stratum.drawn)
     held_out = sum(one.rows for one in clips if splits[one.clip] == "held_out")
     assert measured["held_out"] == pytest.approx(min(150_000, held_out), rel=0.1)

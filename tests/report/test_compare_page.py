@@ -13,7 +13,7 @@ import yaml
 
 from hobble.channels.injury.response.comparison_page import injury_table
 from hobble.core.skeleton import Skeleton
-from hobble.evaluation.compare_configurations import compare
+from hobble.evaluation.compare_configurations import compare_configurations
 from hobble.evaluation.configuration_results import ConfigurationResults
 from hobble.measures.accuracy import comparison_page as of_accuracy
 from hobble.measures.responsivity import comparison_page as of_responsivity
@@ -22,7 +22,7 @@ from hobble.report import compare_sections as parts
 from hobble.report import compare_tables as tables
 from hobble.report.compare_page import render_comparison
 from hobble.report.gather import PUBLISHED, ReportMaterial
-from hobble.report.playable import playable
+from hobble.report.playable import playable_data
 from hobble.report.rounded_weights import round_weights
 
 
@@ -80,7 +80,7 @@ def compared(material: ReportMaterial) -> dict[str, Any]:
                 history=material.history,
             )
         )
-    return compare(measured, yaml.safe_load(PUBLISHED.read_text()))
+    return compare_configurations(measured, yaml.safe_load(PUBLISHED.read_text()))
 
 
 @pytest.fixture(scope="module")
@@ -90,7 +90,7 @@ def pair(
     """Two characters, of which one cannot be hurt."""
     path = tmp_path_factory.mktemp("pair") / "weights.npz"
     examples.weights(path, holden31, links=False)
-    return {"holden": character, "ava": playable(load_network(path), examples.RUNTIME)}
+    return {"holden": character, "ava": playable_data(load_network(path), examples.RUNTIME)}
 
 
 @pytest.fixture(scope="module")

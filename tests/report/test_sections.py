@@ -165,10 +165,10 @@ def test_a_damaged_terrain_file_is_named(tmp_path: Path) -> None:
 
 
 def test_flat_clips_have_no_ground_to_show(material: ReportMaterial) -> None:
-    section = terrain_section.section(material.terrain)
+    section = terrain_section.section(material.terrain_files)
     assert len(section["table"].rows) == 6
     assert "hurt_back" not in section["charts"][0].options
-    pictures = ground_pictures(material.terrain, material.network["skeleton"])["pictures"]
+    pictures = ground_pictures(material.terrain_files, material.network["skeleton"])["pictures"]
     assert [p["name"] for p in pictures][:2] == ["walk_straight, cycle 2", "walk_turns, cycle 2"]
 
 

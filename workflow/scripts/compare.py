@@ -5,7 +5,7 @@ from pathlib import Path
 import yaml
 
 from hobble.core.files import write_json
-from hobble.evaluation.compare_configurations import compare
+from hobble.evaluation.compare_configurations import compare_configurations
 from hobble.evaluation.comparison_csv import comparison_tables
 from hobble.evaluation.configuration_results import read_results
 from hobble.evaluation.csv_tables import write_tables
@@ -17,6 +17,8 @@ with job(snakemake):
         read_results(name, {key: files[key][i] for key in snakemake.params.files})
         for i, name in enumerate(snakemake.params.configurations)
     ]
-    compared = compare(measured, yaml.safe_load(Path(files.published).read_text(encoding="utf-8")))
+    compared = compare_configurations(
+        measured, yaml.safe_load(Path(files.published).read_text(encoding="utf-8"))
+    )
     write_json(snakemake.output.json, compared)
     write_tables(snakemake.output.tables, comparison_tables(compared))

@@ -2,8 +2,8 @@
 
 from pathlib import Path
 
-from hobble.report.bundle import bundle
+from hobble.report.bundle import bundle_page_scripts
 from hobble.workflow.job import job
 
 with job(snakemake):
-    bundle(Path(snakemake.input.packages[0]).parent, snakemake.output.js)
+    bundle_page_scripts(Path(snakemake.input.packages[0]).parent, snakemake.output.js)

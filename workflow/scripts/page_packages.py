@@ -2,8 +2,8 @@
 
 from pathlib import Path
 
-from hobble.report.bundle import install
+from hobble.report.bundle import install_npm_packages
 from hobble.workflow.job import job
 
 with job(snakemake):
-    install(Path(snakemake.output[0]).parents[1])
+    install_npm_packages(Path(snakemake.output[0]).parents[1])

@@ -20,7 +20,7 @@ from hobble.measures.registry import MEASURES
 from hobble.models import network_options
 
 
-def compare(all_measured: Sequence[ConfigurationResults], published: Json) -> Json:
+def compare_configurations(all_measured: Sequence[ConfigurationResults], published: Json) -> Json:
     """The content of compare.json. Configurations are in the order of `all_measured`.
 
     published: the content of published.yaml. Keys of the result: `configurations`: a description of each.

@@ -28,9 +28,9 @@ def render_comparison(
     """The comparison as one HTML document.
 
     compared: the content of compare.json. playables: configuration -> data of a character that its network
-    moves in the page, from `playable` in `hobble.report.playable`. If these characters do not all fit into
-    the page, the weights of all of them are rounded to 8 bits. Characters that still do not fit are left out.
-    bundle: all scripts of the page as one script. errors: configuration -> mean distance in cm by which
+    moves in the page, from `playable_data` in `hobble.report.playable`. If these characters do not all fit
+    into the page, the weights of all of them are rounded to 8 bits. Characters that still do not fit are left
+    out. bundle: all scripts of the page as one script. errors: configuration -> mean distance in cm by which
     rounding the weights moves a predicted joint.
     """
     errors = errors or {}

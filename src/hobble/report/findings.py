@@ -18,7 +18,7 @@ from hobble.report.summary import Hint, KeyFigure, with_order
 TURNING = 40.0
 LITTLE_TURNING = 0.01  # if turning takes less than this share of the time, the page warns
 # Kinds of hints, in the order of the page.
-ORDER = ("warn", "note", "good", "fact")
+KIND_ORDER = ("warn", "note", "good", "fact")
 
 
 def _training_options(material: ReportMaterial) -> Mapping[str, Any]:
@@ -90,7 +90,7 @@ def hints(material: ReportMaterial, turns: Mapping[str, Array] | None = None) ->
         *with_order(20, _training_hints(material)),
         *with_order(90, _cost_hints(material)),
     ]
-    return sorted(found, key=lambda hint: (ORDER.index(hint.kind), hint.order))
+    return sorted(found, key=lambda hint: (KIND_ORDER.index(hint.kind), hint.order))
 
 
 def _training_hints(material: ReportMaterial) -> Iterator[Hint]:

@@ -15,8 +15,8 @@ OPENING_VALUE = 7
 def opening_slider(playable: Mapping[str, Any], measured: Iterable[Mapping[str, Any]]) -> dict[str, Any]:
     """The slider that is set when the page opens, and its value.
 
-    playable: data of the character, from `playable` in `hobble.report.playable`. measured: the results of
-    each measurement.
+    playable: data of the character, from `playable_data` in `hobble.report.playable`. measured: the results
+    of each measurement.
 
     In the result, `part` is the label of a slider, or None if no channel has sliders. It is the slider that
     makes the walk limp most. If no limps were measured, it is the slider that changes the pose most. If poses

@@ -39,20 +39,20 @@ def render_report(
 ) -> str:
     """The report as one HTML document.
 
-    The arguments come from other modules of hobble.report: scenes from `scenes.scenes`; playable from
-    `playable.playable`, or with a recogniser from `pack_recogniser.playable_with_recogniser`;
-    captured_and_predicted from `captured_and_predicted.comparisons`; bundle, the page's scripts, from
-    `bundle.bundle`; hero, the top of the page, from `opening_walk.opening_walk`. A section without data is
-    left out. Without `hero`, the characters at the top begin in the network's start frame.
+    The arguments come from other modules of hobble.report: scenes from `scenes.packed_scenes`; playable from
+    `playable.playable_data`, or with a recogniser from `pack_recogniser.playable_with_recogniser`;
+    captured_and_predicted from `captured_and_predicted.packed_comparisons`; bundle, the page's scripts, from
+    `bundle.bundle_page_scripts`; hero, the top of the page, from `opening_walk.opening_walk`. A section
+    without data is left out. Without `hero`, the characters at the top begin in the network's start frame.
 
     Texts from the user's files cannot become HTML: the template escapes every value, and the data for the
     scripts is JSON without any "<".
     """
     clips = shown_clips.choose_clips(material)
-    terrain = shown_clips.files_of(material.terrain, clips)
-    row_files = shown_clips.sample_files(material.rows)
+    terrain = shown_clips.files_of_clips(material.terrain_files, clips)
+    row_files = shown_clips.sample_files(material.row_files)
     # Seconds of data at each speed, turning speed and channel value.
-    counted = coverage.seconds_of_data(row_files, material.splits, all_clips=len(material.rows))
+    counted = coverage.seconds_of_data(row_files, material.splits, all_clips=len(material.row_files))
     sections = _sections(material, counted, clips, terrain)
     measured_sections = measure_sections.sections(material)
     scenes, playable = dict(scenes or {}), playable or {}

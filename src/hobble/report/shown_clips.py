@@ -44,6 +44,6 @@ def sample_files(paths: Sequence[str], most: int = MOST_COUNTED) -> list[str]:
     return [path for path in paths if Path(path).stem in chosen]
 
 
-def files_of(paths: Iterable[str], names: frozenset[str]) -> list[str]:
+def files_of_clips(paths: Iterable[str], names: frozenset[str]) -> list[str]:
     """Those of the paths that belong to the clips `names`. paths: files called after their clips."""
     return [path for path in paths if Path(path).stem in names]

@@ -41,7 +41,7 @@ class ShownFits:
     profile: Array = field(repr=False)
 
     @property
-    def flat(self) -> bool:
+    def is_flat(self) -> bool:
         """Whether the clip is on flat ground. Then its cycles have only one fit."""
         return self.profile.shape[1] < 2
 
@@ -71,7 +71,7 @@ def read_fits(path: str | Path) -> ShownFits:
 
 def section(paths: Iterable[str | Path]) -> dict[str, Any]:
     """Charts and a table of the fits. Clips on flat ground are left out. paths: files of terrain fits."""
-    fits_of_clips = [fit for fit in map(read_fits, paths) if not fit.flat and len(fit.profile)]
+    fits_of_clips = [fit for fit in map(read_fits, paths) if not fit.is_flat and len(fit.profile)]
     if not fits_of_clips:
         return {"charts": [], "table": None}
     return {

@@ -38,7 +38,7 @@ def timed_frames(
     frames = max(1, min(TIMED_OF_LAP, TIMED_OF_ALL // laps, longest))
     out: list[Array] = []
     for lap in range(laps):
-        starts.begin(animation, slice(lap, lap + 1))
+        starts.place_characters(animation, slice(lap, lap + 1))
         times = np.empty((frames, len(STEPS) + 1))
         for row in times:
             before = perf_counter()
