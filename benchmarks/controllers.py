@@ -21,7 +21,7 @@ import numpy as np
 from hobble.core.processors import processor_name
 from hobble.database.manifest import Manifest
 from hobble.evaluation.stability import random_targets, stability
-from hobble.measures.responsivity.run import responsivity
+from hobble.measures.responsivity.run import measure_responsivity
 from hobble.measures.rollouts.run import measure_roll_outs
 from hobble.models.load import load_network
 from hobble.models.network import Network
@@ -84,7 +84,7 @@ def main() -> None:
         kept = 1e-6 * number * network.stored_numbers(network.resolve_mode(None))
         print(f"{name}: {size:.1f} MB file, {kept:.1f} MB in memory as {network.default_storage}", flush=True)
         if options.laps:
-            lap = responsivity(
+            lap = measure_responsivity(
                 network, configuration="", runtime=Runtime(), laps=options.laps, lap_seconds=400, modes=()
             )
             print(

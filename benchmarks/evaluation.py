@@ -17,8 +17,8 @@ from runtime import SKELETON, load_skeleton, random_network
 
 from hobble.channels.injury.crowd_severities import severity_inputs
 from hobble.core.processors import processor_name
-from hobble.evaluation.crowd import CrowdTarget, run
-from hobble.measures.rollouts.roll_outs import Crowd, RollOutInputs, RollOuts
+from hobble.evaluation.crowd import CrowdTarget, generate_walks
+from hobble.measures.rollouts.roll_outs import RollOutCrowd, RollOutInputs, RollOuts
 from hobble.models.load import load_network
 from hobble.models.network import Network
 from hobble.models.pfnn.predictor import PfnnPredictor
@@ -43,7 +43,7 @@ def sweep(network: Network) -> tuple[float, float]:
 
     def walk(which: slice) -> None:
         channels = {name: rows[which] for name, rows in hurt.items()}
-        run(network, [CrowdTarget(FRAMES, ["walk"] * len(links[which]), channels)], RUNTIME)
+        generate_walks(network, [CrowdTarget(FRAMES, ["walk"] * len(links[which]), channels)], RUNTIME)
 
     per, alone = 1e6 / FRAMES / len(links), [slice(i, i + 1) for i in range(len(links))]
     return per * seconds(lambda: walk(slice(None))), per * seconds(lambda: [walk(one) for one in alone])
@@ -71,7 +71,7 @@ def roll_outs(network: Network) -> tuple[float, float]:
     per = 1e6 / length / len(starts)
 
     def roll_out(chosen: np.ndarray) -> None:
-        for _ in Crowd(predictor, [RollOuts(recorded, chosen, length)]).frames():
+        for _ in RollOutCrowd(predictor, [RollOuts(recorded, chosen, length)]).frames():
             pass
 
     together = seconds(lambda: roll_out(starts))

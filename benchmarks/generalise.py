@@ -29,7 +29,7 @@ import yaml
 
 from hobble.config.sections import Training
 from hobble.database.reader import Database
-from hobble.measures.responsivity.run import responsivity
+from hobble.measures.responsivity.run import measure_responsivity
 from hobble.measures.rollouts.run import measure_roll_outs
 from hobble.models.load import load_network
 from hobble.models.pfnn.options import PfnnOptions
@@ -60,7 +60,7 @@ def measured(
         write_weights(weights, state.network, database, "benchmark", {})
         rolled = measure_roll_outs(weights, files, clips, "benchmark", lengths=LENGTHS)
         character = load_network(weights)
-    lap = responsivity(
+    lap = measure_responsivity(
         character, configuration="", runtime=Runtime(), laps=1, lap_seconds=400, modes=(), track=track
     )
     whole = HeldOutErrors(database, torch.device("cpu"), 0).errors_on_every_row(state.network)[0]

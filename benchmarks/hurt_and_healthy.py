@@ -18,8 +18,8 @@ from pathlib import Path
 from hobble.core.processors import processor_name
 from hobble.database.reader import Database
 from hobble.evaluation.stability import stability
-from hobble.measures.accuracy.run import measure
-from hobble.measures.responsivity.run import responsivity
+from hobble.measures.accuracy.run import measure_accuracy
+from hobble.measures.responsivity.run import measure_responsivity
 from hobble.measures.rollouts.run import measure_roll_outs
 from hobble.models.load import load_network
 from hobble.runtime.options import Runtime
@@ -42,14 +42,16 @@ def values(folder: Path, files: dict[str, Path], splits: dict[str, str], minutes
     weights = folder / "network/weights.npz"
     network = load_network(weights)
     out: dict[str, object] = {}
-    steps = measure(weights, files, splits, folder.name)
+    steps = measure_accuracy(weights, files, splits, folder.name)
     rolled = measure_roll_outs(weights, files, splits, folder.name, lengths=LENGTHS)
     for split in ("train", "held_out"):
         out[f"{split}: one step, share"] = steps[split]["mean"]
         out[f"{split}: one step, cm"] = steps[split]["position_error_cm"]
         for row in rolled["lengths"]:
             out[f"{split}: {row['length']} frames, cm"] = row[split]["position_error_cm"]
-    lap = responsivity(network, configuration="", runtime=Runtime(), laps=1, lap_seconds=400, modes=())
+    lap = measure_responsivity(
+        network, configuration="", runtime=Runtime(), laps=1, lap_seconds=400, modes=()
+    )
     out["waypoints"] = f"{lap['waypoints_reached']} of {lap['waypoints']}"
     out["off the path, cm"] = lap["path_overshoot_cm"]
     found = stability(network, minutes)

@@ -19,7 +19,7 @@ import numpy as np
 from hobble.config.sections import Training
 from hobble.database.manifest import Manifest
 from hobble.database.merge import write_database
-from hobble.measures.accuracy.run import measure
+from hobble.measures.accuracy.run import measure_accuracy
 from hobble.models.pfnn.options import PfnnOptions
 from hobble.training.run import run
 
@@ -67,7 +67,7 @@ def main() -> None:
                 weights = trained(
                     database, Path(name, f"{dtype}-{seed}"), arguments.passes, seed, arguments.threads
                 )
-                found = measure(weights, clips, splits, "precision")["held_out"]
+                found = measure_accuracy(weights, clips, splits, "precision")["held_out"]
                 errors[dtype, seed] = found["mean"]
                 more = found["mean"] / errors["float32", seed] - 1
                 print(f"{dtype:<10} {manifest.bytes / manifest.original_bytes:29.1%} {seed:6}", end="")

@@ -20,11 +20,11 @@ from pathlib import Path
 from hobble.core.files import read_json
 from hobble.core.processors import processor_name
 from hobble.models.load import load_network
-from hobble.report.captured_and_predicted import comparisons
+from hobble.report.captured_and_predicted import packed_comparisons
 from hobble.report.gather import gather
 from hobble.report.pack_recogniser import playable_with_recogniser
-from hobble.report.page import render
-from hobble.report.scenes import scenes
+from hobble.report.page import render_report
+from hobble.report.scenes import packed_scenes
 from hobble.runtime.options import Runtime
 
 REPORTS = {"motion": "motion", "labels": "labels", "channels": "channels/injury"}
@@ -75,11 +75,11 @@ def rendered(results: Path, dataset: Path, count: int) -> tuple[float, float]:
         network = load_network(weights)
         runtime = Runtime.model_validate(material.resolved["configuration"]["runtime"])
         known = material.network
-        page = render(
+        page = render_report(
             material,
-            scenes(results / "runtime/scenarios.npz", known["skeleton"], known["channels"]),
+            packed_scenes(results / "runtime/scenarios.npz", known["skeleton"], known["channels"]),
             playable_with_recogniser(network, runtime),
-            comparisons(network, files["rows"], splits),
+            packed_comparisons(network, files["rows"], splits),
             (results.parent / "page/bundle.js").read_text(encoding="utf-8"),
         )
         return time.process_time() - start, len(page.encode()) / 1e6

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from hobble.evaluation.captured import captured, root_path, unbroken_stretches
+from hobble.evaluation.captured import captured_stretches, root_path, unbroken_stretches
 from hobble.evaluation.motion_measures import acceleration, in_root_coordinates
 from hobble.measures.clip_parts import captured_motion
 from hobble.measures.stratified_sample import Sample, Stratum
@@ -58,7 +58,7 @@ def rows(world) -> ClipRows:
 
 
 def test_captured_motion_is_recovered_from_its_rows(rows, world) -> None:
-    (found,) = captured(rows)
+    (found,) = captured_stretches(rows)
     assert len(found) == FRAMES
     yaw, root, joints = world["yaw"], world["root"][:-1], world["joints"][:-1]
     way = level((root - root[0])[:, None], np.full(FRAMES, yaw[0]))[:, 0]
@@ -74,7 +74,7 @@ def test_captured_motion_is_recovered_from_its_rows(rows, world) -> None:
 
 def test_a_gap_in_the_frames_separates_two_stretches(rows, tmp_path) -> None:
     rows.frame[30:] += 2
-    first, second = captured(rows)
+    first, second = captured_stretches(rows)
     assert (len(first), len(second)) == (30, 20)
     np.testing.assert_allclose(second.root[0], 0)
     assert second.rows[0] == 30

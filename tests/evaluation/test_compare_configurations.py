@@ -14,11 +14,11 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from hobble.core.errors import InputError
-from hobble.evaluation.compare_configurations import compare
-from hobble.evaluation.comparison_csv import tables
+from hobble.evaluation.compare_configurations import compare_configurations
+from hobble.evaluation.comparison_csv import comparison_tables
 from hobble.evaluation.configuration_results import read_results
 from hobble.evaluation.csv_tables import write_csv
-from hobble.evaluation.series import difference, fit_line
+from hobble.evaluation.series import difference_in_sds, fit_line
 from hobble.measures.responsivity.run import parameter_counts
 
 SIZES = {
@@ -119,7 +119,7 @@ def left_behind(folder: Path, name: str, clips: dict[str, float], sizes: tuple[i
 def compared(tmp_path: Path, published: dict[str, Any]) -> dict[str, Any]:
     clips = {"holden": {"a": 0.04, "b": 0.02}, "holden-xl": {"a": 0.03, "b": 0.02}, "ava": {"b": 0.05}}
     found = [read_results(n, left_behind(tmp_path, n, clips[n], s)) for n, s in SIZES.items()]
-    return compare(found, published)
+    return compare_configurations(found, published)
 
 
 def test_parameter_counts_equal_table_6_1(compared, published) -> None:
@@ -205,7 +205,7 @@ def test_a_published_figure_is_listed_with_its_own_configuration_only(compared, 
 
 
 def test_tables_with_different_columns_survive_csv(compared, tmp_path) -> None:
-    found = tables(compared)
+    found = comparison_tables(compared)
     rows = {}
     for name, table in found.items():
         write_csv(tmp_path / f"{name}.csv", table)
@@ -243,7 +243,9 @@ def test_tables_with_different_columns_survive_csv(compared, tmp_path) -> None:
 
 def test_published_clips_are_listed_with_ours_of_the_same_name(tmp_path, published) -> None:
     clips = {"LocomotionFlat04_000": 0.03, "LocomotionFlat04_000_mirror": 0.07, "walk": 0.05}
-    found = compare([read_results("a", left_behind(tmp_path, "a", clips, SIZES["holden"]))], published)
+    found = compare_configurations(
+        [read_results("a", left_behind(tmp_path, "a", clips, SIZES["holden"]))], published
+    )
     rows = [r for r in found["against_published"] if "LocomotionFlat04" in r["measure"]]
     assert [(r["source"], r["published"], r["ours"]) for r in rows] == [
         ("segerstedt", 0.0448, 0.03),
@@ -267,12 +269,12 @@ def test_published_times_and_sizes_are_listed_with_their_measure(compared) -> No
 
 
 def test_one_configuration_alone_has_no_differences(tmp_path, published) -> None:
-    found = compare(
+    found = compare_configurations(
         [read_results("holden", left_behind(tmp_path, "holden", {"a": 0.1}, SIZES["holden"]))], published
     )
     assert found["difference"] == []
     assert found["milliseconds"]["fit"][0]["slope"] is None
-    assert tables(found)["difference"] == []
+    assert comparison_tables(found)["difference"] == []
 
 
 def test_a_damaged_history_is_named(tmp_path) -> None:
@@ -289,11 +291,11 @@ NUMBER = st.floats(-1e3, 1e3)
 def test_a_difference_depends_neither_on_the_unit_nor_on_the_order(
     a: float, sa: float, b: float, sb: float, k: float
 ) -> None:
-    found = difference(a, sa, b, sb)
-    assert found == difference(b, sb, a, sa)
-    assert found == pytest.approx(difference(k * a, k * sa, k * b, k * sb))
+    found = difference_in_sds(a, sa, b, sb)
+    assert found == difference_in_sds(b, sb, a, sa)
+    assert found == pytest.approx(difference_in_sds(k * a, k * sa, k * b, k * sb))
     assert found == pytest.approx(abs(a - b) / ((sa + sb) / 2))
-    assert difference(a, 0, b, 0) is None
+    assert difference_in_sds(a, 0, b, 0) is None
 
 
 def test_a_line_is_fitted_to_points() -> None:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from hobble.evaluation.crowd import CrowdTarget, channel_values, run
+from hobble.evaluation.crowd import CrowdTarget, channel_values, generate_walks
 from hobble.models.pfnn.predictor import PfnnPredictor
 from hobble.runtime.options import Runtime
 
@@ -14,10 +14,14 @@ def test_a_figure_walks_the_same_alone_and_in_a_crowd(hurtable) -> None:
     links = list(hurtable.channels["injury"][:5])
     hurt = channel_values(hurtable, "injury", [{link: 2.0 * i} for i, link in enumerate(links)])
     gaits = ["walk", "jog", "walk", "jog", "walk"]
-    together = run(hurtable, [CrowdTarget(20, gaits, hurt), CrowdTarget(20, gaits, hurt)], Runtime())
+    together = generate_walks(
+        hurtable, [CrowdTarget(20, gaits, hurt), CrowdTarget(20, gaits, hurt)], Runtime()
+    )
     for i, gait in enumerate(gaits):
         own = {"injury": hurt["injury"][i : i + 1]}
-        alone = run(hurtable, [CrowdTarget(20, [gait], own), CrowdTarget(20, [gait], own)], Runtime())
+        alone = generate_walks(
+            hurtable, [CrowdTarget(20, [gait], own), CrowdTarget(20, [gait], own)], Runtime()
+        )
         for name in ("local", "contacts", "phase", "root", "acceleration"):
             np.testing.assert_array_equal(getattr(alone, name)[:, 0], getattr(together, name)[:, i], name)
 
@@ -44,11 +48,11 @@ def test_figures_walk_as_one_until_their_targets_differ(hurtable, monkeypatch: p
     ]
     # Targets that are equal again do not make one walk of two.
     script.append(CrowdTarget(4, gait, healthy))
-    walks = run(hurtable, script, Runtime())
+    walks = generate_walks(hurtable, script, Runtime())
     assert rows == [1] * 7 + [2] * 6 + [3] * 9
     assert np.ptp(walks.local[12], axis=0).max() > 0
     for i in range(3):
-        alone = run(
+        alone = generate_walks(
             hurtable,
             [
                 CrowdTarget(

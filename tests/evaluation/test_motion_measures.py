@@ -11,13 +11,13 @@ from hobble.evaluation.motion_measures import (
     acceleration,
     asymmetry,
     bend,
+    feet_in_stance,
     foot_slide,
     gait_measures,
     in_root_coordinates,
     largest_turn,
-    runs,
+    runs_of_true,
     skating,
-    stance,
 )
 
 
@@ -31,8 +31,8 @@ def test_foot_slide_is_the_distance_that_the_toe_moves_in_stance() -> None:
     toes[:, 0, 0] = 0.3 * np.arange(frames)
     toes[:, 1, 1] = np.arange(frames)  # rising is not sliding
     np.testing.assert_allclose(foot_slide(toes, contacts), [0.3 * 9, 0.0], atol=1e-9)
-    assert stance(contacts)[:, 0].sum() == 12
-    assert runs(np.ones(3, bool)).tolist() == [[0, 3]]
+    assert feet_in_stance(contacts)[:, 0].sum() == 12
+    assert runs_of_true(np.ones(3, bool)).tolist() == [[0, 3]]
 
 
 def test_skating_counts_a_low_toe_by_its_height() -> None:

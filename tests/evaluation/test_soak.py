@@ -8,7 +8,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from hobble.evaluation.soak import LIMITS, StanceSlides, grounds, soak
+from hobble.evaluation.soak import LIMITS, StanceSlides, soak, varied_ground
 from hobble.models.pfnn.network import Pfnn
 from hobble.models.training_facts import TrainingFacts
 from hobble.runtime import controller, feet
@@ -80,11 +80,13 @@ def test_slides_are_measured_over_whole_stances() -> None:
         toes = before + np.array([[0.5, 1.0, 0.0], [0.0, 0.0, 0.0]])
         slides.add(toes, before, np.array([[k < 6, k < 2]]))
         before = toes
-    np.testing.assert_allclose(np.concatenate(slides.done), [2.5])  # the right foot's contact was too short
+    np.testing.assert_allclose(
+        np.concatenate(slides.ended_slides), [2.5]
+    )  # the right foot's contact was too short
 
 
 def test_random_grounds_are_flat_sloping_and_steep() -> None:
-    ground = grounds(200, np.random.default_rng(1))
+    ground = varied_ground(200, np.random.default_rng(1))
     x = np.linspace(-400, 400, 801)
     tall = [np.ptp(ground(x + 4e4 * c, 0 * x)) for c in range(200)]
     steep = max(np.abs(np.diff(ground(x + 4e4 * c, 0 * x))).max() for c in range(200))

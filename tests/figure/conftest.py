@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 from hobble.core.errors import HobbleError
-from hobble.report.bundle import WEB, install
+from hobble.report.bundle import WEB, install_npm_packages
 
 
 @pytest.fixture(scope="session")
@@ -22,7 +22,7 @@ def page_modules(tmp_path_factory: pytest.TempPathFactory) -> Path:
         fcntl.flock(held, fcntl.LOCK_EX)
         if not (shared / "done").exists():
             try:
-                install(shared)
+                install_npm_packages(shared)
             except HobbleError as error:
                 pytest.skip(str(error))
             (shared / "done").touch()

@@ -21,7 +21,7 @@ from hobble.measures.accuracy.run import (
     equivalent_joints,
     joint_errors,
     joint_indices,
-    measure,
+    measure_accuracy,
     predict_function,
 )
 from hobble.models.checks import NEEDED_ROLES
@@ -184,7 +184,7 @@ def test_accuracy_per_clip_and_split(weights, tmp_path):
         clips[name] = tmp_path / f"{name}.npz"
         save_clip_rows(clips[name], make_rows(name, n, fits, i))
     splits = {"a": "train", "b": "train", "c": "held_out", "none": "held_out"}
-    result = measure(weights, clips, splits, "injured")
+    result = measure_accuracy(weights, clips, splits, "injured")
     assert result["configuration"] == "injured"
     assert [e["clip"] for e in result["clips"]] == ["a", "b", "c", "none"]
     by_name = {e["clip"]: e for e in result["clips"]}
@@ -203,7 +203,7 @@ def test_accuracy_per_clip_and_split(weights, tmp_path):
         table = list(csv.DictReader(file))
     assert [row["clip"] for row in table] == ["a", "b", "c", "none"]
     assert float(table[2]["mean"]) == c["mean"]
-    assert result == measure(weights, clips, splits, "injured")
+    assert result == measure_accuracy(weights, clips, splits, "injured")
 
 
 def test_without_held_out_clips_their_error_is_none():
@@ -219,7 +219,7 @@ def test_equivalent_joints_leave_out_joints_of_larger_skeletons(weights, tmp_pat
     with pytest.raises(HobbleError, match="Tail"):
         joint_indices(network, ["Tail"])
     save_clip_rows(tmp_path / "a.npz", make_rows("a", 20, 1, 0))
-    some = measure(weights, {"a": tmp_path / "a.npz"}, {"a": "train"}, "ava-m", ["Foot", "Hips"])
+    some = measure_accuracy(weights, {"a": tmp_path / "a.npz"}, {"a": "train"}, "ava-m", ["Foot", "Hips"])
     assert some["joints"] == 2
     direct = clip_errors(network, make_rows("a", 20, 1, 0), [0, 2]).to_dict()
     assert some["clips"][0]["mean"] == pytest.approx(direct["mean"])
@@ -228,7 +228,7 @@ def test_equivalent_joints_leave_out_joints_of_larger_skeletons(weights, tmp_pat
 def test_a_network_without_severities_reads_the_same_rows(tmp_path):
     np.savez(tmp_path / "w.npz", **make_network(layout=replace(LAYOUT, channels=())))
     save_clip_rows(tmp_path / "a.npz", make_rows("a", 20, 1, 0))
-    result = measure(tmp_path / "w.npz", {"a": tmp_path / "a.npz"}, {"a": "held_out"}, "holden")
+    result = measure_accuracy(tmp_path / "w.npz", {"a": tmp_path / "a.npz"}, {"a": "held_out"}, "holden")
     assert result["held_out"]["frames"] == 20
     assert result["train"]["mean"] is None
 
@@ -242,4 +242,4 @@ def test_rows_of_another_layout_are_refused(weights, tmp_path):
         ),
     )
     with pytest.raises(InputError, match=r"a\.npz: its rows .* are not those the network has learnt"):
-        measure(weights, {"a": tmp_path / "a.npz"}, {"a": "train"}, "holden")
+        measure_accuracy(weights, {"a": tmp_path / "a.npz"}, {"a": "train"}, "holden")

@@ -12,7 +12,7 @@ from hobble.core.section import Positive, Section
 from hobble.evaluation.options import joined_sections
 from hobble.measures.joints import JointOptions
 from hobble.measures.measure import INPUTS, Measure
-from hobble.measures.registry import MEASURES, channel_measures, measure, part_modules
+from hobble.measures.registry import MEASURES, channel_measures, measure_named, names_of_modules
 
 NAMES = [one.name for one in MEASURES]
 # Part -> its functions and what they are given.
@@ -38,12 +38,12 @@ class Far(JointOptions):
 
 @pytest.mark.parametrize("one", MEASURES, ids=NAMES)
 def test_each_measurement_has_known_inputs_and_the_called_functions(one: Measure) -> None:
-    assert one.has("run")
+    assert one.has_module("run")
     earlier = NAMES[: NAMES.index(one.name)]
     assert set(one.inputs) <= {*INPUTS, *earlier}
-    assert measure(one.name) is one
+    assert measure_named(one.name) is one
     for part, functions in FUNCTIONS.items():
-        module = one.part(part)
+        module = one.import_module(part)
         present = {name for name in functions if hasattr(module, name)}
         assert present or module is None, f"{part} has none of {', '.join(functions)}"
         assert part != "run" or ("run_piece" in present) == (one.pieces is not None)
@@ -59,7 +59,7 @@ def test_measurements_of_channels_are_listed() -> None:
 def test_names_of_measurements_are_unique() -> None:
     assert len(set(NAMES)) == len(NAMES)
     assert not set(NAMES) & set(INPUTS)
-    assert len(part_modules("run")) == len(NAMES)
+    assert len(names_of_modules("run")) == len(NAMES)
 
 
 def test_the_registry_imports_nothing_slow() -> None:

@@ -15,8 +15,8 @@ from hobble.evaluation.csv_tables import write_csv
 from hobble.measures.inputs import MeasureInputs
 from hobble.measures.responsivity import Options, pieces, times
 from hobble.measures.responsivity import run as module
-from hobble.measures.responsivity.laps import starts_of, turn_was_limited, walk_laps
-from hobble.measures.responsivity.run import lap_rows, parameter_counts, responsivity
+from hobble.measures.responsivity.laps import lap_starts, turn_was_limited, walk_laps
+from hobble.measures.responsivity.run import lap_rows, measure_responsivity, parameter_counts
 from hobble.runtime.controller import STEPS
 from hobble.runtime.options import Runtime
 from hobble.runtime.waypoints import Waypoint
@@ -41,7 +41,7 @@ def without_times(value: Any) -> Any:
 
 
 def run(network, track, laps=2, seconds=10.0) -> dict[str, Any]:
-    return responsivity(
+    return measure_responsivity(
         network, configuration="x", runtime=RUNTIME, laps=laps, lap_seconds=seconds, track=track
     )
 
@@ -97,7 +97,7 @@ def test_laps_begin_at_one_waypoint_after_another_and_in_later_rounds_further_ah
     """A square of 30 m: with ten laps there are three rounds, which start 0, 10/3 and 20/3 m ahead."""
     corners = ((0.0, 3000.0), (3000.0, 3000.0), (3000.0, 0.0), (0.0, 0.0))
     square = [Waypoint(place, "walk", 2.5) for place in corners]
-    starts = starts_of(square, 10)
+    starts = lap_starts(square, 10)
     assert starts.waypoints.tolist() == [3, 0, 1, 2, 3, 0, 1, 2, 3, 0]
     np.testing.assert_allclose(starts.places[:4], [corners[n] for n in (3, 0, 1, 2)])
     np.testing.assert_allclose(starts.places[4:6], [[1000 / 3, 0], [0, 3000 - 1000 / 3]])
@@ -108,7 +108,7 @@ def test_laps_begin_at_one_waypoint_after_another_and_in_later_rounds_further_ah
 
 def test_on_a_short_way_a_figure_does_not_start_before_the_waypoint_behind_it() -> None:
     near = [Waypoint(place, "walk", 2.5) for place in ((0.0, 300.0), (0.0, 0.0))]
-    places = starts_of(near, 6).places
+    places = lap_starts(near, 6).places
     np.testing.assert_allclose(places[:, 1], [0, 300, 100, 200, 200, 100])
 
 
@@ -168,7 +168,7 @@ def test_each_mode_runs_its_own_laps(network) -> None:
     # Weights looked up otherwise move the figure a little otherwise.
     ways = {mode: entry["laps"][0]["path_distance_cm"] for mode, entry in modes.items()}
     assert len(set(ways.values())) == 3
-    some = responsivity(
+    some = measure_responsivity(
         network,
         configuration="x",
         runtime=RUNTIME.model_copy(update={"mode": "linear"}),
@@ -182,7 +182,7 @@ def test_each_mode_runs_its_own_laps(network) -> None:
 
 
 def test_other_modes_run_fewer_laps(network) -> None:
-    result = responsivity(
+    result = measure_responsivity(
         network,
         configuration="x",
         runtime=RUNTIME,

@@ -233,7 +233,7 @@ def test_a_channel_s_measure_does_not_apply_to_a_network_without_it(
     save(tmp_path / "weights.npz", make_network())
     files = {"weights": tmp_path / "weights.npz", "published": ROOT / "src/hobble/evaluation/published.yaml"}
     inputs = MeasureInputs("plain", files, {"a": tmp_path / "unread.npz"}, {"a": "train"})
-    found = measure.part("run").run(inputs, measure.options())
+    found = measure.import_module("run").run(inputs, measure.options())
     assert found.result["applies"] is False
     assert "network" in found.result["reason"]
 

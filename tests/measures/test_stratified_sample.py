@@ -11,7 +11,7 @@ import pytest
 
 from hobble.core.errors import InputError
 from hobble.measures.accuracy import page
-from hobble.measures.accuracy.run import measure
+from hobble.measures.accuracy.run import measure_accuracy
 from hobble.measures.rollouts.page import rollout_chart
 from hobble.measures.rollouts.run import measure_roll_outs
 from hobble.measures.stratified_sample import LEAST_EXCERPTS, Sample, Stratum, draw_sample
@@ -71,7 +71,7 @@ def test_the_sample_has_the_requested_size_and_every_kind_of_clip():
     for stratum in sample.strata:
         kinds = {(splits[n.clip], of_excerpt[n].gait, of_excerpt[n].channels) for n in stratum.drawn}
         assert len(kinds) == 1
-        assert len(stratum.drawn) >= min(LEAST_EXCERPTS, stratum.count)
+        assert len(stratum.drawn) >= min(LEAST_EXCERPTS, stratum.excerpt_count)
         measured[stratum.split] += sum(one.rows for one in stratum.drawn)
     held_out = sum(one.rows for one in clips if splits[one.clip] == "held_out")
     assert measured["held_out"] == pytest.approx(min(150_000, held_out), rel=0.1)
@@ -180,8 +180,8 @@ def test_accuracy_and_roll_outs_count_each_clip_for_its_kind(tmp_path, clips):
     splits = dict.fromkeys(clips, "train")
     a, b, c, d, e = (whole(name, 20 + 5 * i) for i, name in enumerate("abcde"))
     sample = Sample((Stratum("train", 5, 300, (a, b, c)), Stratum("train", 3, 165, (d, e))), 8)
-    everything = measure(weights, clips, splits, "holden")
-    found = measure(weights, clips, splits, "holden", sample=sample)
+    everything = measure_accuracy(weights, clips, splits, "holden")
+    found = measure_accuracy(weights, clips, splits, "holden", sample=sample)
     means = {clip["clip"]: clip["mean"] for clip in everything["clips"]}
     assert [clip["clip"] for clip in found["clips"]] == list("abcde")
     assert found["clips"] == [pytest.approx(clip) for clip in everything["clips"][:5]]
@@ -223,7 +223,7 @@ def test_all_excerpts_of_a_clip_together_measure_what_the_clip_does(tmp_path):
     parts = [Excerpt("a", 40 * i, 40, 120) for i in range(3)]
     sample = Sample((Stratum("train", 3, 120, tuple(parts)),), 1)
     given = weights, {"a": file}, {"a": "train"}, "holden"
-    cut, uncut = measure(*given, sample=sample), measure(*given)
+    cut, uncut = measure_accuracy(*given, sample=sample), measure_accuracy(*given)
     assert cut["clips"] == [pytest.approx(uncut["clips"][0])]
     assert cut["train"]["mean_of_clips"] == pytest.approx(uncut["train"]["mean_of_clips"])
     assert [(e["first_frame"], e["last_frame"]) for e in cut["excerpts"]] == [(0, 39), (40, 79), (80, 119)]

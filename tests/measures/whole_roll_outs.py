@@ -9,7 +9,7 @@ import numpy as np
 from hobble.core.quat import Array
 from hobble.measures.clip_parts import LoadedPart
 from hobble.measures.rollouts import run as module
-from hobble.measures.rollouts.roll_outs import Crowd, RollOutInputs, RollOuts
+from hobble.measures.rollouts.roll_outs import RollOutCrowd, RollOutInputs, RollOuts
 from hobble.measures.rollouts.run import RollOutErrors
 from hobble.models.network import Predictor
 from hobble.rows.clip_rows import ClipRows
@@ -23,7 +23,7 @@ def roll_out(
     For each age from 1 to `length` there is an array (n', J, 3), in the root frame of frame start + age - 1,
     with heights minus that frame's mean. It holds the first n' roll-outs, those still inside the stretch.
     """
-    crowd = Crowd(predictor, [RollOuts(inputs, starts, length)])
+    crowd = RollOutCrowd(predictor, [RollOuts(inputs, starts, length)])
     return [place for _, place, _ in crowd.frames()], crowd.phase
 
 

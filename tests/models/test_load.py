@@ -15,7 +15,7 @@ from hobble.core.errors import InputError
 from hobble.core.skeleton import Skeleton
 from hobble.models.load import load_network
 from hobble.models.pfnn.release import PHASES
-from hobble.report.playable import playable
+from hobble.report.playable import playable_data
 from hobble.rows.layout import GAITS
 from hobble.runtime import ProceduralAnimation
 from hobble.runtime.options import Runtime
@@ -265,4 +265,4 @@ def test_the_ground_is_sampled_as_far_to_the_side_as_in_training(tmp_path: Path,
         expected = side or 25.0
         np.testing.assert_allclose(np.linalg.norm(left - path, axis=-1), expected, rtol=1e-6)
         np.testing.assert_allclose(np.linalg.norm(right - path, axis=-1), expected, rtol=1e-6)
-        assert playable(network, Runtime())["constants"]["side"] == expected
+        assert playable_data(network, Runtime())["constants"]["side"] == expected

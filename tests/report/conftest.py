@@ -17,13 +17,13 @@ from hobble.core.errors import HobbleError
 from hobble.core.skeleton import Skeleton
 from hobble.models.load import load_network
 from hobble.models.network import Network
-from hobble.report.bundle import WEB, bundle, install
-from hobble.report.captured_and_predicted import comparisons
+from hobble.report.bundle import WEB, bundle_page_scripts, install_npm_packages
+from hobble.report.captured_and_predicted import packed_comparisons
 from hobble.report.gather import ReportMaterial, gather
 from hobble.report.opening_walk import opening_walk
-from hobble.report.page import render
-from hobble.report.playable import playable
-from hobble.report.scenes import scenes
+from hobble.report.page import render_report
+from hobble.report.playable import playable_data
+from hobble.report.scenes import packed_scenes
 
 
 def load_module(name: str) -> ModuleType:
@@ -75,7 +75,7 @@ def material(inputs: dict[str, Any]) -> ReportMaterial:
 
 @pytest.fixture(scope="session")
 def play(inputs: dict[str, Any], material: ReportMaterial) -> dict[str, Any]:
-    return scenes(inputs["scenarios"], material.network["skeleton"], material.network["channels"])
+    return packed_scenes(inputs["scenarios"], material.network["skeleton"], material.network["channels"])
 
 
 @pytest.fixture(scope="session")
@@ -86,7 +86,7 @@ def network(inputs: dict[str, Any]) -> Network:
 
 @pytest.fixture(scope="session")
 def character(network: Network, examples: ModuleType) -> dict[str, Any]:
-    return playable(network, examples.RUNTIME)
+    return playable_data(network, examples.RUNTIME)
 
 
 @pytest.fixture(scope="session")
@@ -103,7 +103,7 @@ def compared(
 ) -> dict[str, Any]:
     folder = tmp_path_factory.mktemp("rows")
     paths = [examples.rows(folder / f"{clip}.npz", holden31) for clip in ("jog", "walk_turns")]
-    return comparisons(network, paths, {"jog": "train", "walk_turns": "held_out"})
+    return packed_comparisons(network, paths, {"jog": "train", "walk_turns": "held_out"})
 
 
 @pytest.fixture(scope="session")
@@ -116,7 +116,7 @@ def modules(tmp_path_factory: pytest.TempPathFactory) -> Path | None:
         fcntl.flock(held, fcntl.LOCK_EX)
         if not (shared / "done").exists():
             try:
-                install(shared)
+                install_npm_packages(shared)
             except HobbleError:
                 return None
             (shared / "done").touch()
@@ -129,7 +129,7 @@ def script(modules: Path | None, tmp_path_factory: pytest.TempPathFactory) -> st
     if modules is None:
         return ""
     target = tmp_path_factory.mktemp("bundle") / "bundle.js"
-    bundle(modules, target)
+    bundle_page_scripts(modules, target)
     return target.read_text(encoding="utf-8")
 
 
@@ -143,7 +143,7 @@ def page(
     hero: dict[str, Any],
 ) -> str:
     """The report of the examples."""
-    return render(material, play, character, compared, script, hero)
+    return render_report(material, play, character, compared, script, hero)
 
 
 @pytest.fixture(scope="module")

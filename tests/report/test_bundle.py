@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 from hobble.core.errors import HobbleError
-from hobble.report.bundle import WEB, bundle, install
+from hobble.report.bundle import WEB, bundle_page_scripts, install_npm_packages
 
 
 def test_the_lock_file_holds_every_package_by_its_hash_and_no_host() -> None:
@@ -28,7 +28,7 @@ def test_the_bundle_needs_nothing_else_and_comes_out_the_same(
 ) -> None:
     if not script:
         pytest.skip("the npm registry cannot be reached, so the page has no scripts")
-    bundle(modules, tmp_path / "again.js")
+    bundle_page_scripts(modules, tmp_path / "again.js")
     assert (tmp_path / "again.js").read_text(encoding="utf-8") == script
     assert not re.search(r"^\s*(import|export)\b", script, re.MULTILINE)
     assert "</script" not in script.lower()
@@ -40,7 +40,7 @@ def test_a_script_that_is_wrong_is_named(script: str, modules: Path, tmp_path: P
         pytest.skip("the npm registry cannot be reached, so the page has no scripts")
     (tmp_path / "index.js").write_text("const a = ;")
     with pytest.raises(HobbleError, match=r"index\.js:1"):
-        bundle(modules, tmp_path / "out.js", tmp_path)
+        bundle_page_scripts(modules, tmp_path / "out.js", tmp_path)
     assert not (tmp_path / "out.js").exists()
 
 
@@ -49,5 +49,5 @@ def test_without_the_registry_the_message_says_so(tmp_path: Path, monkeypatch: p
     monkeypatch.setenv("npm_config_cache", str(tmp_path / "cache"))
     monkeypatch.setenv("npm_config_fetch_retries", "0")
     with pytest.raises(HobbleError, match=r"could not download .* from the npm registry") as error:
-        install(tmp_path / "page")
+        install_npm_packages(tmp_path / "page")
     assert "Traceback" not in str(error.value)

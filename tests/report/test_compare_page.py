@@ -13,16 +13,16 @@ import yaml
 
 from hobble.channels.injury.response.comparison_page import injury_table
 from hobble.core.skeleton import Skeleton
-from hobble.evaluation.compare_configurations import compare
+from hobble.evaluation.compare_configurations import compare_configurations
 from hobble.evaluation.configuration_results import ConfigurationResults
 from hobble.measures.accuracy import comparison_page as of_accuracy
 from hobble.measures.responsivity import comparison_page as of_responsivity
 from hobble.models.load import load_network
 from hobble.report import compare_sections as parts
 from hobble.report import compare_tables as tables
-from hobble.report.compare_page import render_compared
+from hobble.report.compare_page import render_comparison
 from hobble.report.gather import PUBLISHED, ReportMaterial
-from hobble.report.playable import playable
+from hobble.report.playable import playable_data
 from hobble.report.rounded_weights import round_weights
 
 
@@ -80,7 +80,7 @@ def compared(material: ReportMaterial) -> dict[str, Any]:
                 history=material.history,
             )
         )
-    return compare(measured, yaml.safe_load(PUBLISHED.read_text()))
+    return compare_configurations(measured, yaml.safe_load(PUBLISHED.read_text()))
 
 
 @pytest.fixture(scope="module")
@@ -90,14 +90,14 @@ def pair(
     """Two characters, of which one cannot be hurt."""
     path = tmp_path_factory.mktemp("pair") / "weights.npz"
     examples.weights(path, holden31, links=False)
-    return {"holden": character, "ava": playable(load_network(path), examples.RUNTIME)}
+    return {"holden": character, "ava": playable_data(load_network(path), examples.RUNTIME)}
 
 
 @pytest.fixture(scope="module")
 def tab(
     compared: dict[str, Any], pair: dict[str, Any], script: str, tools: ModuleType, tmp_path_factory: Any
 ) -> Iterator[Any]:
-    yield from tools.opened(render_compared(compared, pair, script), tmp_path_factory.mktemp("compared"))
+    yield from tools.opened(render_comparison(compared, pair, script), tmp_path_factory.mktemp("compared"))
 
 
 def test_boxes_are_at_the_quantiles_with_published_means(compared: dict[str, Any]) -> None:
@@ -191,15 +191,15 @@ def test_networks_too_large_for_one_page_are_left_out(
 ) -> None:
     from hobble.report import compare_page
 
-    alone = len(render_compared(compared, {"holden": pair["holden"]}).encode())
+    alone = len(render_comparison(compared, {"holden": pair["holden"]}).encode())
     monkeypatch.setattr(compare_page, "LARGEST_PAGE", alone - 10_000 + compare_page.RESERVED)
-    page = render_compared(compared, pair, errors={"holden": 0.0312, "ava": 0.2})
+    page = render_comparison(compared, pair, errors={"holden": 0.0312, "ava": 0.2})
     assert len(page.encode()) < alone + compare_page.RESERVED
     assert "weights have 8 bits here" in page
     assert "0.03 cm (holden)" in page
-    alone = len(render_compared(compared, {"holden": round_weights(pair["holden"])}).encode())
+    alone = len(render_comparison(compared, {"holden": round_weights(pair["holden"])}).encode())
     monkeypatch.setattr(compare_page, "LARGEST_PAGE", alone + compare_page.RESERVED)
-    page = render_compared(compared, pair)
+    page = render_comparison(compared, pair)
     assert "to keep the file small: ava" in page
     assert 'id="play-second"' not in page
 

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from hobble.measures.responsivity.page import track_figures
-from hobble.report.coverage import TURNS
+from hobble.report.coverage import TURN_EDGES
 from hobble.report.findings import hints, key_figures
 from hobble.report.gather import ReportMaterial
 
@@ -187,7 +187,7 @@ def test_missing_data_comes_before_longer_training(material: ReportMaterial) -> 
 
 def test_clips_without_turns_are_reported(material: ReportMaterial) -> None:
     """A hundred seconds straight on, and some that turn by 50 degrees a second."""
-    middles = (TURNS[:-1] + TURNS[1:]) / 2
+    middles = (TURN_EDGES[:-1] + TURN_EDGES[1:]) / 2
 
     def said(seconds: float) -> bool:
         straight = np.where(np.abs(middles) < 20, 50.0, 0.0)

@@ -6,7 +6,7 @@ import numpy as np
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from hobble.report.formats import embedded, plain
+from hobble.report.formats import embedded, json_data
 
 
 @settings(max_examples=80, deadline=None)
@@ -25,4 +25,4 @@ def test_no_string_opens_a_comment_or_ends_the_script() -> None:
 
 def test_what_is_not_finite_becomes_null() -> None:
     value = {"a": np.array([1.0, np.nan]), "b": np.float32("inf"), "c": (np.int64(3), None)}
-    assert plain(value) == {"a": [1.0, None], "b": None, "c": [3, None]}
+    assert json_data(value) == {"a": [1.0, None], "b": None, "c": [3, None]}

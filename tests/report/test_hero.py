@@ -6,7 +6,7 @@ from typing import Any
 
 import pytest
 
-from hobble.report.hero import opening
+from hobble.report.hero import opening_slider
 
 PLAYABLE = {
     "channels": [
@@ -43,8 +43,8 @@ def limps(thigh: float, back: float, gait: str = "walk") -> dict[str, Any]:
     ],
 )
 def test_the_page_opens_with_the_injury_that_limps_most(measured: list[dict[str, Any]], part: str) -> None:
-    assert opening(PLAYABLE, measured) == {"part": part, "value": 7}
+    assert opening_slider(PLAYABLE, measured) == {"part": part, "value": 7}
 
 
 def test_a_page_without_sliders_opens_with_no_injury() -> None:
-    assert opening({"channels": []}, [POSES]) == {"part": None, "value": 0}
+    assert opening_slider({"channels": []}, [POSES]) == {"part": None, "value": 0}

@@ -13,11 +13,11 @@ import pytest
 from hobble.core.files import load_npz, save_npz
 from hobble.core.skeleton import Skeleton
 from hobble.models.load import load_network
-from hobble.report.captured_and_predicted import comparisons
+from hobble.report.captured_and_predicted import packed_comparisons
 from hobble.report.gather import gather
-from hobble.report.page import render
-from hobble.report.playable import playable
-from hobble.report.scenes import scenes
+from hobble.report.page import render_report
+from hobble.report.playable import playable_data
+from hobble.report.scenes import packed_scenes
 
 HOSTILE = (
     "<script>pwned=1</script></script></style><img src=x onerror=pwned=2>\"'`&amp;{{7*7}}${pwned=3}"
@@ -53,11 +53,11 @@ def hostile(
     (folder / "jog.npz").rename(folder / "rows.npz")
     arrays = dict(load_npz(folder / "rows.npz"))
     save_npz(rows, **{**arrays, "clip": np.array(HOSTILE)})
-    text = render(
+    text = render_report(
         material,
-        scenes(folder / "scenarios.npz", material.network["skeleton"], material.network["channels"]),
-        playable(network, examples.RUNTIME),
-        comparisons(network, [rows], {HOSTILE: "train", "jog": "train"}),
+        packed_scenes(folder / "scenarios.npz", material.network["skeleton"], material.network["channels"]),
+        playable_data(network, examples.RUNTIME),
+        packed_comparisons(network, [rows], {HOSTILE: "train", "jog": "train"}),
         script,
     )
     yield from tools.opened(text, folder)

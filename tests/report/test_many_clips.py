@@ -13,7 +13,7 @@ import pytest
 from hobble.core.skeleton import Skeleton
 from hobble.report import coverage, data_section, shown_clips
 from hobble.report.gather import ReportMaterial
-from hobble.report.page import render
+from hobble.report.page import render_report
 
 
 def of_many(material: ReportMaterial, copies: int) -> ReportMaterial:
@@ -35,7 +35,7 @@ def test_every_kind_of_clip_is_shown(material: ReportMaterial) -> None:
     many = of_many(material, 50)
     some = shown_clips.choose_clips(many, most=40)
     assert len(some) == 40
-    assert {many.split(clip) for clip in some} == {"train", "held_out"}
+    assert {many.split_of(clip) for clip in some} == {"train", "held_out"}
     hurt = {report["clip"] for report in many.channels if report["values"]}
     assert some & hurt
     assert some - hurt
@@ -53,7 +53,7 @@ def test_the_page_does_not_grow_with_the_clips(
     monkeypatch.setattr(data_section, "MOST_BARS", 20)
     monkeypatch.setattr(data_section, "MOST_REMARKS", 20)
     monkeypatch.setattr(shown_clips, "choose_clips", lambda material: choose(material, 12))
-    sizes = [len(render(of_many(material, copies))) for copies in (20, 100)]
+    sizes = [len(render_report(of_many(material, copies))) for copies in (20, 100)]
     assert sizes[1] < 1.01 * sizes[0]
 
 

@@ -17,7 +17,7 @@ from hobble.report.summary import KeyFigure
 
 
 def test_the_steps_of_a_frame_are_in_their_order(material: ReportMaterial) -> None:
-    chart = lap_charts.lap_chart(material.found("responsivity"), material)
+    chart = lap_charts.lap_chart(material.results_of("responsivity"), material)
     assert chart is not None
     traces = next(iter(chart.options.values()))
     assert [t["name"] for t in traces] == [
@@ -35,7 +35,7 @@ def test_the_steps_of_a_frame_are_in_their_order(material: ReportMaterial) -> No
 
 
 def test_a_row_of_the_table_of_laps_reads_as_a_sentence(material: ReportMaterial) -> None:
-    table = responsivity_page.lap_table(material.found("responsivity"), "example")
+    table = responsivity_page.lap_table(material.results_of("responsivity"), "example")
     assert table is not None
     labels = [column.label for column in table.columns]
     assert labels[:5] == ["lap", "finished", "waypoints reached", "seconds", "frames"]

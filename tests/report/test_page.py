@@ -12,7 +12,7 @@ import pytest
 from hobble.core.skeleton import Skeleton
 from hobble.report import templates
 from hobble.report.gather import ReportMaterial, gather
-from hobble.report.page import render
+from hobble.report.page import render_report
 
 SECTIONS = [
     "summary",
@@ -116,7 +116,7 @@ def test_equal_inputs_give_equal_pages(
     hero: dict[str, Any],
     page: str,
 ) -> None:
-    again = render(material, play, character, compared, script, hero)
+    again = render_report(material, play, character, compared, script, hero)
     commit = re.compile(r'<td class="hash">[0-9a-f]{40}[^<]*</td>')  # of a checkout that others may work in
     assert commit.sub("", again) == commit.sub("", page)
 
@@ -132,7 +132,7 @@ def test_a_hostile_clip_name_is_only_text(
         tmp_path, holden31, clips, terrain_names=[f"c{i}" for i in range(len(clips))]
     )
     material = gather(**{**arguments, "title": HOSTILE, "dataset": HOSTILE})
-    text = render(material)
+    text = render_report(material)
     hostile = Outline(text)
     assert len(hostile.all("script")) == len(outline.all("script"))
     assert not hostile.all("img")
@@ -144,7 +144,7 @@ def test_a_hostile_clip_name_is_only_text(
 def test_a_network_without_injuries_has_a_page(
     examples: ModuleType, holden31: Skeleton, tmp_path: Path
 ) -> None:
-    text = render(gather(**examples.write_all(tmp_path, holden31, injury=False)))
+    text = render_report(gather(**examples.write_all(tmp_path, holden31, injury=False)))
     assert 'id="injury"' not in text
     assert "Injury response" not in text
     assert 'data-chart="sweep-pose"' not in text
@@ -154,4 +154,4 @@ def test_a_network_without_injuries_has_a_page(
 
 def test_our_scripts_cannot_end_their_element(material: ReportMaterial) -> None:
     with pytest.raises(ValueError, match="bundle"):
-        render(material, bundle="'</SCRIPT>'")
+        render_report(material, bundle="'</SCRIPT>'")

@@ -12,7 +12,7 @@ from hobble.report import measure_sections
 from hobble.report.charts import Chart, ChartGroup
 from hobble.report.page_parts import ChartPair, PageSection, Paragraph, SectionPart, join_sections
 from hobble.report.tables import Column, Table
-from hobble.report.templates import specs, template
+from hobble.report.templates import chart_specs, load_template
 
 
 def chart(name: str) -> Chart:
@@ -26,15 +26,15 @@ def test_sections_with_one_name_are_joined_and_their_parts_sorted() -> None:
         "errors",
         [SectionPart(30, table), SectionPart(10, Paragraph("w"))],
         title="Errors",
-        at=10,
+        order=10,
         nav="E",
         long=True,
     )
-    alone = PageSection("laps", [SectionPart(0, chart("c"))], at=5)
+    alone = PageSection("laps", [SectionPart(0, chart("c"))], order=5)
     nothing = PageSection("none", [SectionPart(0, None)], title="None")
     first, second = join_sections([guest, nothing, owner, alone])
     assert (first.name, first.title, first.nav) == ("laps", "Laps", "Laps")
-    assert (second.title, second.nav, second.at, second.long) == ("Errors", "E", 10, True)
+    assert (second.title, second.nav, second.order, second.long) == ("Errors", "E", 10, True)
     assert [part.kind for part in second.parts] == ["words", "chart", "table"]
 
 
@@ -67,7 +67,7 @@ def test_charts_are_found_wherever_they_stand() -> None:
             SectionPart(3, chart("d")),
         ],
     )
-    assert set(specs([{"x": {"y": chart("e"), "z": None}}, [section]])) == set("abcde")
+    assert set(chart_specs([{"x": {"y": chart("e"), "z": None}}, [section]])) == set("abcde")
 
 
 def test_words_are_escaped_and_every_kind_is_drawn() -> None:
@@ -77,7 +77,7 @@ def test_words_are_escaped_and_every_kind_is_drawn() -> None:
         SectionPart(2, chart("b"), tall=True),
     ]
     section = join_sections([PageSection("s", parts, title="<S>")])
-    text = template("measured.html.j2").render(measured=section)
+    text = load_template("measured.html.j2").render(measured=section)
     assert "<p>&lt;b&gt;</p>" in text
     assert "<h2>&lt;S&gt;</h2>" in text
     assert text.count("<figure") == 2

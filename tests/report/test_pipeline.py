@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 
 from hobble.core.errors import InputError
-from hobble.report.pipeline import read_benchmark, summarise
+from hobble.report.pipeline import read_benchmark, summarise_pipeline
 
 HEADER = "s\th:m:s\tmax_rss\tmax_vms\tmax_uss\tmax_pss\tio_in\tio_out\tmean_load\tcpu_time\n"
 
@@ -29,7 +29,7 @@ def test_jobs_times_and_bytes_are_added_up(tmp_path: Path) -> None:
     one.write_bytes(b"12345")
     stages = {"motion": {"benchmarks": [str(folder)], "files": [str(tmp_path / "motion"), str(one)]}}
 
-    found = summarise("c", stages)
+    found = summarise_pipeline("c", stages)
 
     (motion,) = found["stages"]
     assert (motion["jobs"], motion["seconds"], motion["longest"]) == (3, 5.5, 3.0)
@@ -54,7 +54,7 @@ def test_the_time_of_a_resumed_training_covers_all_its_calls(
         "training": {"benchmarks": [str(tmp_path / "benchmarks")], "files": [str(tmp_path / "network")]},
         "evaluation": {"benchmarks": [str(tmp_path / "other")], "files": []},
     }
-    found = summarise("c", stages)
+    found = summarise_pipeline("c", stages)
     training, evaluation = found["stages"]
     assert (training["seconds"], training["longest"], training["jobs"]) == (took, took, 1)
     assert training["rules"][0]["seconds"] == took
@@ -74,14 +74,14 @@ def test_times_of_clips_from_earlier_calls_are_counted(tmp_path: Path) -> None:
         record = {"fingerprint": "x", "files": [1], "seconds": seconds}
         (made / f"motion/.{clip}.kept").write_text(json.dumps(record))
     places = {"benchmarks": [str(folder)], "files": [], "batches": ["00"], "made": [str(made)]}
-    (motion,) = summarise("c", {"motion": places})["stages"]
+    (motion,) = summarise_pipeline("c", {"motion": places})["stages"]
     assert {rule["rule"]: rule["seconds"] for rule in motion["rules"]} == {"motion_clips": 4.5, "other": 1.0}
     assert (motion["jobs"], motion["seconds"]) == (2, 5.5)
 
 
 def test_missing_files_are_listed(tmp_path: Path) -> None:
     nowhere = str(tmp_path / "nowhere")
-    found = summarise("c", {"training": {"benchmarks": [nowhere], "files": [f"{nowhere}.npz"]}})
+    found = summarise_pipeline("c", {"training": {"benchmarks": [nowhere], "files": [f"{nowhere}.npz"]}})
     assert found["missing"] == [nowhere, f"{nowhere}.npz"]
     assert found["stages"][0]["jobs"] == 0
     assert found["stages"][0]["max_rss_mb"] is None

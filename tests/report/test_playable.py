@@ -16,7 +16,7 @@ from hobble.core.skeleton import Skeleton
 from hobble.models.load import load_network
 from hobble.models.network import Network
 from hobble.report.formats import embedded
-from hobble.report.playable import playable
+from hobble.report.playable import playable_data
 
 
 def test_parts_are_the_links_of_their_roles(holden31: Skeleton) -> None:
@@ -52,7 +52,7 @@ def test_inputs_without_effect_are_left_out(examples: ModuleType, holden31: Skel
     x_std = network.x_std.copy()
     unread = network.layout.x_joint_position.start + 3 * holden31.index("LThumb")
     x_std[unread] *= 1e10
-    read = playable(replace(network, x_std=x_std), examples.RUNTIME)["inputColumns"]
+    read = playable_data(replace(network, x_std=x_std), examples.RUNTIME)["inputColumns"]
     assert sorted(set(range(network.layout.x_size)) - set(read)) == [unread]
 
 
@@ -70,7 +70,7 @@ def test_the_largest_network_leaves_room_in_the_page(
         network.layout.x_joint_velocity,
     ):  # as training weighs them
         x_std[block].reshape(-1, 3)[[skeleton.index(name) for name in skeleton.unseen]] *= 1e10
-    spec = playable(replace(network, x_std=x_std), examples.RUNTIME)
+    spec = playable_data(replace(network, x_std=x_std), examples.RUNTIME)
     assert len(embedded(spec)) < 13e6
     assert len(page) < 6e6
 
@@ -79,5 +79,5 @@ def test_a_network_without_links_can_still_be_played(
     examples: ModuleType, holden31: Skeleton, tmp_path: Any
 ) -> None:
     examples.weights(tmp_path / "weights.npz", holden31, links=False)
-    spec = playable(load_network(tmp_path / "weights.npz"), examples.RUNTIME)
+    spec = playable_data(load_network(tmp_path / "weights.npz"), examples.RUNTIME)
     assert spec["channels"] == []

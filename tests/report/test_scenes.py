@@ -12,7 +12,7 @@ from hobble.core import quat
 from hobble.core.skeleton import Skeleton
 from hobble.figure.mesh import body_mesh
 from hobble.figure.pack import TURN
-from hobble.report.scenes import UNIT, pack_positions, scenes
+from hobble.report.scenes import UNIT, pack_positions, packed_scenes
 
 
 def unpacked(text: str, kind: str) -> np.ndarray:
@@ -68,7 +68,7 @@ def test_motion_without_rotations_is_fitted(
     """Files without rotations: the bones are at the same places, but their twist is unknown."""
     data = {name: value for name, value in np.load(inputs["scenarios"]).items() if "/rotations" not in name}
     np.savez(tmp_path / "old.npz", **data)
-    made = scenes(tmp_path / "old.npz", material.network["skeleton"], material.network["channels"])
+    made = packed_scenes(tmp_path / "old.npz", material.network["skeleton"], material.network["channels"])
     old, new = (unpacked(one["scenarios"][0]["pose"], "<i2").astype(int) for one in (made, play))
     apart = UNIT * np.abs(old - new)
     assert apart.max() < 5

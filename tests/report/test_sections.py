@@ -60,7 +60,7 @@ def test_a_file_that_holds_no_weights_is_refused(tmp_path: Path) -> None:
 
 
 def test_bars_show_every_clip_of_its_split(material: ReportMaterial) -> None:
-    chart = accuracy_page.clip_bars(material.found("accuracy"), material)
+    chart = accuracy_page.clip_bars(material.results_of("accuracy"), material)
     assert chart is not None
     bars = {trace["name"]: dict(zip(trace["y"], trace["x"], strict=True)) for trace in chart.traces}
     assert set(bars["held out"]) == {"walk_turns", "walk_turns_mirror", "hurt_back", "hurt_back_mirror"}
@@ -71,7 +71,7 @@ def test_bars_show_every_clip_of_its_split(material: ReportMaterial) -> None:
 
 
 def test_boxes_only_where_there_are_quantiles(material: ReportMaterial) -> None:
-    assert accuracy_page.clip_boxes(material.found("accuracy")) is not None
+    assert accuracy_page.clip_boxes(material.results_of("accuracy")) is not None
     clips = [{k: v for k, v in row.items() if k != "p50"} for row in material.measured["accuracy"]["clips"]]
     assert accuracy_page.clip_boxes({"clips": clips}) is None
 
@@ -95,12 +95,15 @@ def test_turns_speeds_and_severities_are_counted_in_seconds(
     save_clip_rows(tmp_path / "walk.npz", replace(rows, y=y, channels={"injury": severity}))
     found = coverage.seconds_of_data([tmp_path / "walk.npz"], {rows.clip: "held_out"})
     seconds, hurt = len(np.unique(rows.frame)) / 60, len(np.unique(rows.frame[: len(rows) // 2])) / 60
-    turns = dict(zip(coverage._middles(coverage.TURNS), found["turns"]["held_out"], strict=True))
+    turns = dict(zip(coverage._middles(coverage.TURN_EDGES), found["turns"]["held_out"], strict=True))
     assert turns[30.0] == pytest.approx(seconds)
     assert sum(turns.values()) == pytest.approx(seconds)
     assert not found["turns"]["train"].any()
     row, column = np.argwhere(found["both"] > 0)[0]
-    assert (coverage._middles(coverage.TURNS)[row], coverage._middles(coverage.SPEEDS)[column]) == (30.0, 1.3)
+    assert (coverage._middles(coverage.TURN_EDGES)[row], coverage._middles(coverage.SPEED_EDGES)[column]) == (
+        30.0,
+        1.3,
+    )
     assert list(found["channels"]["injury"]) == ["LeftUpLeg-LeftLeg"]
     assert found["channels"]["injury"]["LeftUpLeg-LeftLeg"][6] == pytest.approx(hurt, abs=1 / 60 + 1e-9)
     (chart,) = coverage.channel_charts(found)
@@ -110,7 +113,8 @@ def test_turns_speeds_and_severities_are_counted_in_seconds(
 
 def test_strips_show_the_injured_parts(material: ReportMaterial) -> None:
     strips = {
-        strip["clip"]: strip for strip in data_section.strips(material, shown_clips.choose_clips(material))
+        strip["clip"]: strip
+        for strip in data_section.clip_strips(material, shown_clips.choose_clips(material))
     }
     assert len(strips) == 8, "a mirror says the same again"
     (row,) = strips["hurt_left_knee"]["channels"]
@@ -161,10 +165,10 @@ def test_a_damaged_terrain_file_is_named(tmp_path: Path) -> None:
 
 
 def test_flat_clips_have_no_ground_to_show(material: ReportMaterial) -> None:
-    section = terrain_section.section(material.terrain)
+    section = terrain_section.section(material.terrain_files)
     assert len(section["table"].rows) == 6
     assert "hurt_back" not in section["charts"][0].options
-    pictures = ground_pictures(material.terrain, material.network["skeleton"])["pictures"]
+    pictures = ground_pictures(material.terrain_files, material.network["skeleton"])["pictures"]
     assert [p["name"] for p in pictures][:2] == ["walk_straight, cycle 2", "walk_turns, cycle 2"]
 
 

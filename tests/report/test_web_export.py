@@ -18,7 +18,7 @@ from hobble.channels.speed_limits import Limits
 from hobble.core import quat
 from hobble.models.network import Network
 from hobble.report.bundle import WEB
-from hobble.report.playable import playable
+from hobble.report.playable import playable_data
 from hobble.report.web_export import export_web
 from hobble.runtime.animation import ProceduralAnimation
 from hobble.runtime.export import restore_bone_lengths
@@ -130,7 +130,7 @@ def test_limits_of_two_channels_are_those_of_python(
     ]
     script = SPEEDS.replace("VALUES", json.dumps(wanted))
     animation = ProceduralAnimation(both, storage="int16", **dict(examples.RUNTIME))
-    turning = playable(both, examples.RUNTIME)["turning"]
+    turning = playable_data(both, examples.RUNTIME)["turning"]
     for values, found in zip(wanted, in_node(script, tmp_path / "web"), strict=True):
         for _ in range(90):
             pose = animation.next_pose((0.0, 2.4), **values)

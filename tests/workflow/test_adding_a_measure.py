@@ -28,11 +28,11 @@ MEASURE = Measure(
     package=__name__,
     inputs=("clips", "skeleton", "accuracy"),
     options=Options,
-    cost=Cost(memory_each=10, minutes=1),
+    cost=Cost(mb_per_1000_frames=10, least_minutes=1),
 )
 '''
 RUN = """from hobble.rows.clip_rows import load_clip_rows
-from hobble.evaluation.captured import captured
+from hobble.evaluation.captured import captured_stretches
 from hobble.measures.inputs import MeasureInputs, Outcome
 from hobble.measures.hips import Options
 
@@ -41,10 +41,10 @@ def run(inputs: MeasureInputs, options: Options) -> Outcome:
     joint = list(inputs.skeleton["joints"]).index(inputs.skeleton["roles"]["hips"])
     rows = []
     for clip, path in inputs.clips.items():
-        parts = captured(load_clip_rows(path))
+        parts = captured_stretches(load_clip_rows(path))
         heights = [h for part in parts for h in part.local[:: options.every, joint, 1]]
         rows.append({"clip": clip, "frames": len(heights), "highest": round(float(max(heights)), 3)})
-    known = [entry["clip"] for entry in inputs.measured("accuracy")["clips"]]
+    known = [entry["clip"] for entry in inputs.results_of("accuracy")["clips"]]
     return Outcome({"every": options.every, "clips": rows, "known": known}, {"clips": rows}, "<hips>")
 """
 PAGE = """from hobble.report.page_parts import PageSection, Paragraph, SectionPart
@@ -56,22 +56,22 @@ def section(found, material):
     rows = [[row["clip"], row["highest"]] for row in found["clips"]]
     table = Table("hips", [Column("clip"), Column.number("highest, cm")], rows)
     parts = [SectionPart(10, table), SectionPart(0, Paragraph("How high <they> are."))]
-    return PageSection("hips", parts, title="Hips", at=15)
+    return PageSection("hips", parts, title="Hips", order=15)
 
 
 def figures(found, material):
-    yield KeyFigure("Highest hips", f"{max(row['highest'] for row in found['clips']):.1f}", "cm", at=35)
+    yield KeyFigure("Highest hips", f"{max(row['highest'] for row in found['clips']):.1f}", "cm", order=35)
 
 
 def hints(found, material):
     yield Hint("note", "The hips were looked at.", f"In {len(found['clips'])} clips.")
 """
-COMPARISON = """from hobble.evaluation.comparison_rows import SideBySide
+COMPARISON = """from hobble.evaluation.comparison_rows import ComparisonAddition
 
 
 def compared(all_measured, published):
-    highest = {m.name: max(row["highest"] for row in m.found("hips")["clips"]) for m in all_measured}
-    return SideBySide([{"configuration": name, "highest": value} for name, value in highest.items()])
+    highest = {m.name: max(row["highest"] for row in m.results_of("hips")["clips"]) for m in all_measured}
+    return ComparisonAddition([{"configuration": name, "highest": value} for name, value in highest.items()])
 
 
 def tables(compared):
@@ -88,7 +88,7 @@ def columns(compared):
 
 
 def section(compared):
-    return PageSection("hips", [SectionPart(0, Paragraph("Hips of all."))], at=15)
+    return PageSection("hips", [SectionPart(0, Paragraph("Hips of all."))], order=15)
 """
 PARTS = {
     "__init__": DECLARATION,

@@ -155,7 +155,9 @@ def test_no_stage_imports_a_later_one(root: Path) -> None:
 @pytest.mark.parametrize("measure", MEASURES, ids=lambda measure: measure.name)
 def test_a_measurement_depends_neither_on_the_page_nor_on_the_list(root: Path, measure: Measure) -> None:
     """Otherwise a new measurement or another text on a page would run all measurements again."""
-    files = fp.imported_files(root / "workflow/scripts/measure.py", root / "src", [measure.module("run")])
+    files = fp.imported_files(
+        root / "workflow/scripts/measure.py", root / "src", [measure.module_name("run")]
+    )
     used = {path.relative_to(root / "src/hobble").as_posix() for path in files}
     assert "measures/registry.py" not in used
     assert not [path for path in used if path.startswith("report/")]

@@ -84,6 +84,6 @@ rule compare:
     params:
         configurations=lambda w: comparison.names(),
         files=lambda w: sorted(comparison.input_files()),
-        code=package.code("compare", *part_modules("comparison")),
+        code=package.code("compare", *names_of_modules("comparison")),
     script:
         "../scripts/compare.py"

@@ -131,7 +131,7 @@ rule report:
         code=lambda w: package.code(
             "report",
             configurations.model_package(w.configuration),
-            *part_modules("page"),
+            *names_of_modules("page"),
             *display_modules(),
         ),
     script:
@@ -157,7 +157,7 @@ rule report_compare:
         runtime=10,
     params:
         configurations=lambda w: comparison.names(),
-        code=package.code("report_compare", *part_modules("comparison_page")),
+        code=package.code("report_compare", *names_of_modules("comparison_page")),
     script:
         "../scripts/report_compare.py"
 

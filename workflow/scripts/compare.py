@@ -5,8 +5,8 @@ from pathlib import Path
 import yaml
 
 from hobble.core.files import write_json
-from hobble.evaluation.compare_configurations import compare
-from hobble.evaluation.comparison_csv import tables
+from hobble.evaluation.compare_configurations import compare_configurations
+from hobble.evaluation.comparison_csv import comparison_tables
 from hobble.evaluation.configuration_results import read_results
 from hobble.evaluation.csv_tables import write_tables
 from hobble.workflow.job import job
@@ -18,6 +18,6 @@ with job(snakemake):
         for i, name in enumerate(snakemake.params.configurations)
     ]
     published = yaml.safe_load(Path(files.published).read_text(encoding="utf-8"))
-    comparison = compare(results, published)
+    comparison = compare_configurations(results, published)
     write_json(snakemake.output.json, comparison)
-    write_tables(snakemake.output.tables, tables(comparison))
+    write_tables(snakemake.output.tables, comparison_tables(comparison))

@@ -8,7 +8,8 @@ from hobble.workflow.measure_job import inputs_of_job, measure_of
 with job(snakemake) as log:
     measure = measure_of(snakemake)
     options = measure.options.model_validate(snakemake.params.options)
-    outcome = measure.part("run").run(inputs_of_job(snakemake), options)  # from run.py in its package
+    run = measure.import_module("run").run  # in run.py of its package
+    outcome = run(inputs_of_job(snakemake), options)
     write_json(snakemake.output.json, outcome.result)
     write_tables(snakemake.output.tables, outcome.tables)
-    log.info("%s", outcome.says)
+    log.info("%s", outcome.log_line)

@@ -2,9 +2,9 @@
 
 from pathlib import Path
 
-from hobble.report.bundle import bundle
+from hobble.report.bundle import bundle_page_scripts
 from hobble.workflow.job import job
 
 with job(snakemake):
     node_modules = Path(snakemake.input.packages[0]).parent
-    bundle(node_modules, snakemake.output.js)
+    bundle_page_scripts(node_modules, snakemake.output.js)

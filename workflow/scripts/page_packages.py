@@ -2,9 +2,9 @@
 
 from pathlib import Path
 
-from hobble.report.bundle import install
+from hobble.report.bundle import install_npm_packages
 from hobble.workflow.job import job
 
 with job(snakemake):
     node_modules = Path(snakemake.output[0]).parent
-    install(node_modules.parent)
+    install_npm_packages(node_modules.parent)

@@ -1,8 +1,10 @@
 """Creates results/<configuration>/pipeline.json: the time, memory and disk space that each stage took."""
 
 from hobble.core.files import write_json
-from hobble.report.pipeline import summarise
+from hobble.report.pipeline import summarise_pipeline
 from hobble.workflow.job import job
 
 with job(snakemake):
-    write_json(snakemake.output.json, summarise(snakemake.params.configuration, snakemake.params.stages))
+    write_json(
+        snakemake.output.json, summarise_pipeline(snakemake.params.configuration, snakemake.params.stages)
+    )

@@ -4,12 +4,12 @@ from pathlib import Path
 
 from hobble.core.files import write_text
 from hobble.models.load import load_network
-from hobble.report.captured_and_predicted import comparisons
+from hobble.report.captured_and_predicted import packed_comparisons
 from hobble.report.gather import gather
 from hobble.report.opening_walk import opening_walk
 from hobble.report.pack_recogniser import playable_with_recogniser
-from hobble.report.page import render
-from hobble.report.scenes import scenes
+from hobble.report.page import render_report
+from hobble.report.scenes import packed_scenes
 from hobble.runtime.options import Runtime
 from hobble.workflow.job import job
 
@@ -32,12 +32,12 @@ with job(snakemake):
         rows=files.rows,
     )
     description = material.network
-    walks = scenes(files.scenarios, description["skeleton"], description["channels"])
+    walks = packed_scenes(files.scenarios, description["skeleton"], description["channels"])
     network = load_network(files.weights)
     runtime = Runtime.model_validate(material.resolved["configuration"]["runtime"])
     character = playable_with_recogniser(network, runtime)
     first_walk = opening_walk(network, runtime, character, material.measured.values())
-    captured_and_predicted = comparisons(network, files.rows, params.splits)
+    captured_and_predicted = packed_comparisons(network, files.rows, params.splits)
     bundle = Path(files.bundle).read_text(encoding="utf-8")
-    page = render(material, walks, character, captured_and_predicted, bundle, first_walk)
+    page = render_report(material, walks, character, captured_and_predicted, bundle, first_walk)
     write_text(snakemake.output.html, page)

@@ -6,7 +6,7 @@ import yaml
 
 from hobble.core.files import read_json, write_text
 from hobble.models.load import load_network
-from hobble.report.compare_page import render_compared
+from hobble.report.compare_page import render_comparison
 from hobble.report.pack_recogniser import playable_with_recogniser
 from hobble.report.rounded_weights import has_weights, rounding_error
 from hobble.runtime.options import Runtime
@@ -26,5 +26,5 @@ with job(snakemake):
                 errors[name] = rounding_error(network, runtime)
         seen.add(weights)
     bundle = Path(files.bundle).read_text(encoding="utf-8")
-    page = render_compared(read_json(files.compared), characters, bundle, errors)
+    page = render_comparison(read_json(files.compared), characters, bundle, errors)
     write_text(snakemake.output.html, page)

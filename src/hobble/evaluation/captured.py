@@ -54,7 +54,7 @@ def unbroken_stretches(frame: np.ndarray) -> list[np.ndarray]:
     return np.split(first, np.flatnonzero(np.diff(frame[first]) != 1) + 1)
 
 
-def captured(rows: ClipRows) -> Iterator[Captured]:
+def captured_stretches(rows: ClipRows) -> Iterator[Captured]:
     """Each stretch of consecutive frames in a clip's rows.
 
     A row has several terrain fits (ground heights that suit the motion). Joint heights are measured from the

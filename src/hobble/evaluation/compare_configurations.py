@@ -3,7 +3,7 @@
 The comparison becomes compare.json and CSV tables. A measurement may have a module `comparison.py` with these
 functions:
 
-- `compared(all_measured, published) -> SideBySide`: what the measurement adds to compare.json,
+- `compared(all_measured, published) -> ComparisonAddition`: what the measurement adds to compare.json,
 - `tables(compared) -> Mapping[str, Sequence[Row]]`: CSV tables, table name -> rows, from the content of
   compare.json.
 """
@@ -13,14 +13,14 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from typing import Any
 
-from hobble.evaluation.comparison_rows import PublishedRow, SideBySide, published_row
+from hobble.evaluation.comparison_rows import ComparisonAddition, PublishedRow, published_row
 from hobble.evaluation.configuration_results import ConfigurationResults
 from hobble.measures.inputs import Json
 from hobble.measures.registry import MEASURES
 from hobble.models import network_options
 
 
-def compare(all_measured: Sequence[ConfigurationResults], published: Json) -> Json:
+def compare_configurations(all_measured: Sequence[ConfigurationResults], published: Json) -> Json:
     """The content of compare.json. Configurations are in the order of `all_measured`.
 
     published: the content of published.yaml. Keys of the result: `configurations`: a description of each.
@@ -33,7 +33,7 @@ def compare(all_measured: Sequence[ConfigurationResults], published: Json) -> Js
     by_measure = {
         name: compared(all_measured, published) for name, compared in comparison_functions("compared")
     }
-    times = SideBySide(milliseconds={"against_published": stage_times(all_measured, published)})
+    times = ComparisonAddition(milliseconds={"against_published": stage_times(all_measured, published)})
     additions = [*by_measure.values(), times]
     clock_keys = dict.fromkeys(
         key for added in additions for key in added.milliseconds
@@ -62,11 +62,11 @@ def compare(all_measured: Sequence[ConfigurationResults], published: Json) -> Js
 def comparison_functions(name: str) -> Iterator[tuple[str, Callable[..., Any]]]:
     """Yield (name of a measurement, function `name` of its `comparison.py`), for those that have it."""
     for measure in MEASURES:
-        if (function := getattr(measure.part("comparison"), name, None)) is not None:
+        if (function := getattr(measure.import_module("comparison"), name, None)) is not None:
             yield measure.name, function
 
 
-def describe_configuration(measured: ConfigurationResults, additions: Iterable[SideBySide]) -> Json:
+def describe_configuration(measured: ConfigurationResults, additions: Iterable[ComparisonAddition]) -> Json:
     """A configuration's entry in compare.json: data set, network, training, and what measurements add."""
     configuration = measured.resolved["configuration"]
     hidden = network_options(configuration["network"]).hidden

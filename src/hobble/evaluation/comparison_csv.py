@@ -8,7 +8,7 @@ from hobble.evaluation.compare_configurations import comparison_functions
 from hobble.measures.inputs import Json, Row
 
 
-def tables(compared: Json) -> dict[str, Sequence[Row]]:
+def comparison_tables(compared: Json) -> dict[str, Sequence[Row]]:
     """Table name -> rows, from the content of compare.json. The rows of a table have the same keys."""
     measure_tables = {
         name: rows

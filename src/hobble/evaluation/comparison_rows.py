@@ -8,12 +8,12 @@ from typing import TypedDict
 
 import numpy as np
 
-from hobble.evaluation.series import difference
+from hobble.evaluation.series import difference_in_sds
 from hobble.measures.inputs import Json, Row
 
 
 @dataclass(frozen=True)
-class SideBySide:
+class ComparisonAddition:
     """What one measurement adds to compare.json.
 
     entries: the results of each configuration, under the measurement's name. about: configuration -> entries
@@ -82,13 +82,13 @@ def compare_series(a: Json, b: Json) -> Difference:
     difference_of_means = None
     if sds[0] is not None and sds[1] is not None:
         mean_a, mean_b = (float(values.mean()) for values in means_of_both)
-        difference_of_means = difference(mean_a, sds[0], mean_b, sds[1])
+        difference_of_means = difference_in_sds(mean_a, sds[0], mean_b, sds[1])
     return {
         "mean_a": a["mean"],
         "sd_a": a["sd"],
         "mean_b": b["mean"],
         "sd_b": b["sd"],
-        "difference": difference(a["mean"], a["sd"], b["mean"], b["sd"]),
+        "difference": difference_in_sds(a["mean"], a["sd"], b["mean"], b["sd"]),
         "sd_of_means_a": sds[0],
         "sd_of_means_b": sds[1],
         "difference_of_means": difference_of_means,

@@ -32,7 +32,7 @@ class ConfigurationResults:
     pipeline: Pipeline = field(repr=False)
     history: Mapping[str, list[float | None]] = field(repr=False)
 
-    def found(self, measure: str) -> Json:
+    def results_of(self, measure: str) -> Json:
         """The content of the JSON file of the measurement `measure`."""
         return self.measured[measure]
 

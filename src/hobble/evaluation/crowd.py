@@ -51,7 +51,7 @@ class Walks:
     acceleration: Array = field(repr=False)
     starts: np.ndarray
 
-    def of(self, figures: slice) -> Walks:
+    def of_figures(self, figures: slice) -> Walks:
         """The motion of the figures in the slice `figures`."""
         return Walks(
             self.local[:, figures],
@@ -78,7 +78,7 @@ class Walks:
         return slice(start + int(np.searchsorted(cycles, cycles[-1] - whole)), stop)
 
 
-def run(network: Network, script: Sequence[CrowdTarget], runtime: Runtime) -> Walks:
+def generate_walks(network: Network, script: Sequence[CrowdTarget], runtime: Runtime) -> Walks:
     """The motion of C figures that follow `script`. They begin standing and walk ahead on flat ground.
 
     script: one `CrowdTarget` for each stretch, in order. Figures with the same targets move in the same way,

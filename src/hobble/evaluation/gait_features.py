@@ -11,7 +11,7 @@ from hobble.evaluation.motion_measures import bend, gait_measures
 SIDES = ("left", "right")
 
 
-def features(skeleton: Skeleton, local: Array, contacts: Array, root: Array) -> dict[str, float]:
+def gait_features(skeleton: Skeleton, local: Array, contacts: Array, root: Array) -> dict[str, float]:
     """The results of `gait_measures`, and means and standard deviations (sd) of angles, heights and sway.
 
     local: (F, J, 3) joint positions in root coordinates, cm. contacts: (F, 4) of left heel, left toe, right

@@ -19,17 +19,17 @@ SHORTEST_STANCE = 4  # frames; a shorter contact is neither a stance nor a step
 SKATING_BELOW = 2.5
 
 
-def runs(on: np.ndarray) -> np.ndarray:
+def runs_of_true(on: np.ndarray) -> np.ndarray:
     """(N, 2) for each run of true values in `on` (F,): its first frame, and the first frame after it.
 
-    >>> runs(np.array([False, True, True, False, True])).tolist()
+    >>> runs_of_true(np.array([False, True, True, False, True])).tolist()
     [[1, 3], [4, 5]]
     """
     edges = np.diff(np.concatenate([[0], np.asarray(on, np.int8), [0]]))
     return np.flatnonzero(edges).reshape(-1, 2)
 
 
-def stance(contacts: Array) -> np.ndarray:
+def feet_in_stance(contacts: Array) -> np.ndarray:
     """(F, 2) whether the left and the right foot stand, on heel or toe or both. contacts: (F, 4)."""
     return np.maximum(contacts[:, ::2], contacts[:, 1::2]) >= STANCE
 
@@ -43,7 +43,7 @@ def foot_slide(toes: Array, contacts: Array) -> Array:
     out = []
     for side in range(2):
         moved = np.linalg.norm(np.diff(toes[:, side, ::2], axis=0), axis=1)
-        for start, end in runs(contacts[:, 2 * side + 1] >= STANCE):
+        for start, end in runs_of_true(contacts[:, 2 * side + 1] >= STANCE):
             if end - start >= SHORTEST_STANCE:
                 out.append(moved[start : end - 1].sum())
     return np.array(out)
@@ -130,11 +130,11 @@ def gait_measures(
     """
     role = skeleton.role
     seconds = (len(local) - 1) / 60
-    standing = stance(contacts)
+    standing = feet_in_stance(contacts)
     heels = local[:, [role("left_heel"), role("right_heel")], 2]  # how far forward
     steps: list[list[float]] = [[], []]  # lengths of the left foot's steps, then of the right foot's
     for side in range(2):
-        for start, end in runs(standing[:, side]):
+        for start, end in runs_of_true(standing[:, side]):
             if start > 0 and end - start >= SHORTEST_STANCE:  # a stance from frame 0 has no landing
                 steps[side].append(heels[start, side] - heels[start, 1 - side])
     step_lengths = [float(np.mean(lengths)) if lengths else None for lengths in steps]

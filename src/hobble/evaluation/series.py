@@ -8,13 +8,13 @@ from typing import TypedDict
 import numpy as np
 
 
-def difference(mean_a: float, sd_a: float, mean_b: float, sd_b: float) -> float | None:
+def difference_in_sds(mean_a: float, sd_a: float, mean_b: float, sd_b: float) -> float | None:
     """The difference of two means, in units of the mean of both standard deviations.
 
     This is 2 |mean_a - mean_b| / (sd_a + sd_b), equation 3.2 of Segerstedt 2021. None if both standard
     deviations are 0.
 
-    >>> difference(3.0, 0.5, 1.0, 1.5)
+    >>> difference_in_sds(3.0, 0.5, 1.0, 1.5)
     2.0
     """
     deviations = sd_a + sd_b

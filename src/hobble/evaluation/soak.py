@@ -71,7 +71,7 @@ class Targets:
             self.frames_left[c] = rng.integers(FPS, 8 * FPS)
 
 
-def grounds(characters: int, rng: np.random.Generator) -> Callable[[Array, Array], Array]:
+def varied_ground(characters: int, rng: np.random.Generator) -> Callable[[Array, Array], Array]:
     """A function (x, z) -> height, all in cm, with a different ground around each character's start.
 
     The starts are START_SPACING_CM apart along x. On average a quarter of the grounds are flat. The others
@@ -95,13 +95,13 @@ class StanceSlides:
     """Adds up, frame by frame, how far the toes of C characters slide in each stance.
 
     slid: (C, 2) how far the left and right toe have slid in the present stance, cm. frames: (C, 2) how many
-    frames this stance has lasted. done: for each frame, an array with the slides of the stances that ended in
-    it, cm.
+    frames this stance has lasted. ended_slides: for each frame, an array with the slides of the stances that
+    ended in it, cm.
     """
 
     slid: Array
     frames: np.ndarray
-    done: list[Array] = field(default_factory=list)
+    ended_slides: list[Array] = field(default_factory=list)
 
     def add(self, toes: Array, before: Array, standing: np.ndarray) -> None:
         """Add a frame.
@@ -110,7 +110,7 @@ class StanceSlides:
         (C, 2) whether each toe is in a stance.
         """
         ends = ~standing & (self.frames >= SHORTEST_STANCE)
-        self.done.append(self.slid[ends])
+        self.ended_slides.append(self.slid[ends])
         stays = standing & (self.frames > 0)
         moved = np.hypot(*(toes - before)[..., ::2].transpose(2, 0, 1))
         self.slid = np.where(stays, self.slid + moved, 0.0)
@@ -207,7 +207,8 @@ def soak(
     animation = ProceduralAnimation(
         network, characters=characters, position=starts, **dict(runtime or Runtime())
     )
-    ground, targets = grounds(characters, rng), Targets.undrawn(characters, dict(network.layout.channels))
+    ground = varied_ground(characters, rng)
+    targets = Targets.undrawn(characters, dict(network.layout.channels))
     hips = skeleton.role("hips")
     toes = [skeleton.role("left_toe"), skeleton.role("right_toe")]
     worst = WorstPoses()
@@ -227,7 +228,7 @@ def soak(
             toe_contacts = pose.contacts[:, 1::2]
             slides.add(now[0][:, toes], before[0][:, toes], toe_contacts >= STANCE)
         before = now
-    slide = np.concatenate(slides.done)
+    slide = np.concatenate(slides.ended_slides)
     return {
         "frames": characters * frames,
         "finite": worst.finite,

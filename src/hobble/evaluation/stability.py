@@ -9,7 +9,7 @@ from typing import TypedDict
 import numpy as np
 
 from hobble.core.quat import Array
-from hobble.evaluation.motion_measures import foot_slide, largest_turn, skating, stance
+from hobble.evaluation.motion_measures import feet_in_stance, foot_slide, largest_turn, skating
 from hobble.models.network import Network
 from hobble.runtime.animation import ProceduralAnimation
 from hobble.runtime.feet import leg_joints, sole_heights
@@ -120,7 +120,7 @@ def stability(
                     [largest_turn(rotations if last is None else np.concatenate([last, rotations]))]
                 ),
                 "slide": foot_slide(toe_positions, contacts),
-                "down": np.asarray(stance(contacts).any(axis=1)),
+                "down": np.asarray(feet_in_stance(contacts).any(axis=1)),
                 "skating": skating(above_ground, toe_height).ravel(),
             }
         )

@@ -10,7 +10,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from hobble.evaluation.captured import Captured, captured
+from hobble.evaluation.captured import Captured, captured_stretches
 from hobble.measures.inputs import Json, MeasureInputs
 from hobble.measures.sample_options import SampleOptions
 from hobble.measures.stratified_sample import Sample, draw_sample
@@ -54,7 +54,7 @@ class LoadedPart:
     stop: int
 
     @property
-    def frames(self) -> list[int]:
+    def first_and_last_frame(self) -> list[int]:
         """The first and the last frame to measure, as frames of the clip. There must be a row to measure."""
         return [int(self.rows.frame[at]) for at in (self.first, self.stop - 1)]
 
@@ -78,10 +78,10 @@ def captured_motion(clips: Mapping[str, str | Path], sample: Sample | None) -> I
     clips: name -> file of rows. sample: the excerpts to read; None for all clips.
     """
     for part in clip_parts(clips, sample):
-        yield from captured(part.load().rows)
+        yield from captured_stretches(part.load().rows)
 
 
-def sample_of(inputs: MeasureInputs, options: SampleOptions) -> Sample | None:
+def sample_to_measure(inputs: MeasureInputs, options: SampleOptions) -> Sample | None:
     """Draw the sample to measure; None if the data set is so small that all clips are measured."""
     return draw_sample(map(load_summary, inputs.summaries), inputs.splits, options.sample_frames)
 

@@ -67,7 +67,7 @@ class MeasureInputs:
         """Name of a piece -> its result, for each piece that ran as a job of its own."""
         return {name: read_json(path) for name, path in self.pieces.items()}
 
-    def measured(self, name: str) -> Json:
+    def results_of(self, name: str) -> Json:
         """The content of the JSON file of another measurement."""
         return read_json(self.file(name))
 
@@ -76,10 +76,10 @@ class MeasureInputs:
 class Outcome:
     """The output of a measurement.
 
-    result: the content of <measure>.json. tables: name -> rows of <measure>/<name>.csv. says: a line for the
-    log.
+    result: the content of <measure>.json. tables: name -> rows of <measure>/<name>.csv. log_line: a line for
+    the log.
     """
 
     result: Json = field(repr=False)
     tables: Mapping[str, Sequence[Row]] = field(default_factory=dict, repr=False)
-    says: str = ""
+    log_line: str = ""

@@ -34,16 +34,16 @@ INPUTS = ("weights", "clips", "summaries", "skeleton", "published")
 class Cost:
     """Memory and time that the job of a measurement requests on a cluster.
 
-    memory_mb: MB that it needs in any case. memory_each: MB that it needs in addition for each thousand
-    frames of the longest clip. seconds_each: seconds for each thousand frames of all clips together.
-    memory_each and seconds_each are for 31 joints and grow in proportion to the number of joints. minutes:
-    the least time that is requested.
+    memory_mb: MB that it needs in any case. mb_per_1000_frames: MB that it needs in addition for each
+    thousand frames of the longest clip. seconds_per_1000_frames: for each thousand frames of all clips
+    together. These two are for 31 joints and grow in proportion to the number of joints. least_minutes: the
+    least time that is requested.
     """
 
     memory_mb: float = 0.0
-    memory_each: float = 0.0
-    seconds_each: float = 0.0
-    minutes: int = 10
+    mb_per_1000_frames: float = 0.0
+    seconds_per_1000_frames: float = 0.0
+    least_minutes: int = 10
 
 
 class Pieces(Protocol):
@@ -80,14 +80,14 @@ class Measure:
     people: bool = False
     cost: Cost = Cost()
 
-    def has(self, part: str) -> bool:
+    def has_module(self, part: str) -> bool:
         """Whether its package has a module named `part`, such as `page`."""
-        return importlib.util.find_spec(self.module(part)) is not None
+        return importlib.util.find_spec(self.module_name(part)) is not None
 
-    def module(self, part: str) -> str:
+    def module_name(self, part: str) -> str:
         """Full name of the module `part` of its package."""
         return f"{self.package}.{part}"
 
-    def part(self, part: str) -> ModuleType | None:
+    def import_module(self, part: str) -> ModuleType | None:
         """The module `part` of its package, imported; None if there is none."""
-        return importlib.import_module(self.module(part)) if self.has(part) else None
+        return importlib.import_module(self.module_name(part)) if self.has_module(part) else None

@@ -28,14 +28,14 @@ MEASURES: tuple[Measure, ...] = (
 )
 
 
-def measure(name: str) -> Measure:
+def measure_named(name: str) -> Measure:
     """The measurement with this name. Raises StopIteration if there is none."""
     return next(entry for entry in MEASURES if entry.name == name)
 
 
-def part_modules(part: str) -> list[str]:
+def names_of_modules(part: str) -> list[str]:
     """Full names of the modules called `part` in the packages of measurements.
 
     For "page" they include "hobble.measures.accuracy.page". A package without such a module is left out.
     """
-    return [entry.module(part) for entry in MEASURES if entry.has(part)]
+    return [entry.module_name(part) for entry in MEASURES if entry.has_module(part)]

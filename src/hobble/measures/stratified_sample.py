@@ -38,12 +38,12 @@ STANDARD_ERRORS = 1.96  # half the width of a 95 % confidence interval, in stand
 class Stratum:
     """Similar excerpts, some of which are drawn for the sample.
 
-    split: "train" or "held_out". count: number of all its excerpts. rows: number of rows in all its excerpts.
-    drawn: the excerpts in the sample.
+    split: "train" or "held_out". excerpt_count: number of all its excerpts. rows: number of rows in all its
+    excerpts. drawn: the excerpts in the sample.
     """
 
     split: str
-    count: int
+    excerpt_count: int
     rows: int
     drawn: tuple[Excerpt, ...] = field(repr=False)
 
@@ -57,11 +57,12 @@ class Stratum:
 class Sample:
     """The excerpts to measure.
 
-    strata: all strata, each with its drawn excerpts. clips: number of all clips, not only the sampled ones.
+    strata: all strata, each with its drawn excerpts. clip_count: number of all clips, not only the sampled
+    ones.
     """
 
     strata: tuple[Stratum, ...]
-    clips: int
+    clip_count: int
 
     @property
     def weights(self) -> dict[Excerpt, float]:
@@ -75,7 +76,7 @@ class Sample:
     def clip_weights(self) -> dict[Excerpt, float]:
         """Excerpt in the sample -> number of clips that it represents, which may be below 1."""
         return {
-            excerpt: excerpt.rows / excerpt.clip_rows * stratum.count / len(stratum.drawn)
+            excerpt: excerpt.rows / excerpt.clip_rows * stratum.excerpt_count / len(stratum.drawn)
             for stratum in self.strata
             for excerpt in stratum.drawn
         }
@@ -95,9 +96,9 @@ class Sample:
         drawn = [excerpt for stratum in self.strata for excerpt in stratum.drawn]
         return {
             "excerpts": len(drawn),
-            "of_excerpts": sum(stratum.count for stratum in self.strata),
+            "of_excerpts": sum(stratum.excerpt_count for stratum in self.strata),
             "clips": len({excerpt.clip for excerpt in drawn}),
-            "of": self.clips,
+            "of": self.clip_count,
             "strata": len(self.strata),
         }
 
@@ -109,12 +110,12 @@ def _variance(stratum: Stratum, values: Mapping[Excerpt, float]) -> float:
     0 if all excerpts are drawn.
     """
     n = len(stratum.drawn)
-    if n == stratum.count or n < LEAST_EXCERPTS:
+    if n == stratum.excerpt_count or n < LEAST_EXCERPTS:
         return 0.0
     rows = np.array([excerpt.rows for excerpt in stratum.drawn], float)
     means = np.array([values[excerpt] for excerpt in stratum.drawn])
     deviations = rows / rows.mean() * (means - np.average(means, weights=rows))
-    return float((1 - n / stratum.count) * (deviations**2).sum() / (n - 1) / n)
+    return float((1 - n / stratum.excerpt_count) * (deviations**2).sum() / (n - 1) / n)
 
 
 def draw_sample(summaries: Iterable[RowsSummary], splits: Mapping[str, str], frames: int) -> Sample | None:

@@ -21,7 +21,7 @@ MODELS_FOLDER = Path(__file__).parents[1] / "models"
 PACKAGE_FILES = ("package.json", "package-lock.json")  # they name the npm packages and their hashes
 
 
-def install(folder: str | Path) -> None:
+def install_npm_packages(folder: str | Path) -> None:
     """Install the npm packages of package-lock.json into folder/node_modules and check their hashes.
 
     Node and npm come from the Python environment. npm keeps downloads in a cache, so a machine needs the
@@ -42,11 +42,12 @@ def install(folder: str | Path) -> None:
         )
 
 
-def bundle(modules: str | Path, target: str | Path, sources: str | Path = WEB) -> None:
+def bundle_page_scripts(modules: str | Path, target: str | Path, sources: str | Path = WEB) -> None:
     """Bundle sources/index.js and everything it imports into one script.
 
-    modules: the folder node_modules that `install` fills. target: the file to write. Needs no internet. The
-    same input gives the same bytes. Raises HobbleError if a script has an error, and says in which line.
+    modules: the folder node_modules that `install_npm_packages` fills. target: the file to write. Needs no
+    internet. The same input gives the same bytes. Raises HobbleError if a script has an error, and says in
+    which line.
     """
     with tempfile.TemporaryDirectory() as folder:
         networks = Path(folder, "networks.js")
@@ -57,7 +58,7 @@ def bundle(modules: str | Path, target: str | Path, sources: str | Path = WEB) -
 def bundle_module(modules: str | Path, target: str | Path) -> None:
     """Bundle only the code that moves the character, as an ES module without imports.
 
-    modules, target, and the error that is raised: as for `bundle`.
+    modules, target, and the error that is raised: as for `bundle_page_scripts`.
     """
     with tempfile.TemporaryDirectory() as folder:
         networks = Path(folder, "networks.js")

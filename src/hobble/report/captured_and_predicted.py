@@ -22,7 +22,9 @@ MOST_HELD_OUT = 16  # at most this many held-out clips are shown; each takes up 
 LONGEST = 12 * 60  # at most this many frames of a clip are shown: 12 seconds
 
 
-def comparisons(network: Network, paths: Iterable[str | Path], splits: Mapping[str, str]) -> dict[str, Any]:
+def packed_comparisons(
+    network: Network, paths: Iterable[str | Path], splits: Mapping[str, str]
+) -> dict[str, Any]:
     """The longest stretch of consecutive frames of each shown clip, captured and predicted.
 
     paths: `database/clips/<clip>.npz`. splits: clip -> "held_out" or "train". At most MOST_HELD_OUT held-out

@@ -92,7 +92,7 @@ def log_axis(title: str, values: Iterable[float | None]) -> dict[str, Any]:
     return axis(title, type="log", tickvals=ticks, ticktext=[f"{tick:g}" for tick in ticks])
 
 
-def line(name: str, x: Sequence, y: Sequence, colour: str, **more: Any) -> Trace:
+def line_trace(name: str, x: Sequence, y: Sequence, colour: str, **more: Any) -> Trace:
     """The trace of a line through the points x, y.
 
     more: `dash` and `width` of the line; further settings are set in the trace.
@@ -102,7 +102,9 @@ def line(name: str, x: Sequence, y: Sequence, colour: str, **more: Any) -> Trace
     return {"type": "scatter", "mode": mode, "name": name, "x": list(x), "y": list(y), "line": stroke, **more}
 
 
-def mark(value: float, text: str, vertical: bool = True, colour: str = "@soft") -> tuple[dict, dict]:
+def reference_line(
+    value: float, text: str, vertical: bool = True, colour: str = "@soft"
+) -> tuple[dict, dict]:
     """A dotted line across the whole plot at `value`, with a text at its end.
 
     vertical: whether the line is vertical. `value` is on the x axis for a vertical line, otherwise on the y

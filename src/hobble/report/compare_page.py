@@ -10,16 +10,16 @@ from hobble.report import compare_sections, compare_tables, comparison_charts, m
 from hobble.report.formats import embedded
 from hobble.report.hero import body_channel
 from hobble.report.playable import skeleton_of
-from hobble.report.provenance import commit, machine, versions
+from hobble.report.provenance import git_commit, machine, versions
 from hobble.report.rounded_weights import has_weights, round_weights
-from hobble.report.templates import FOLDER, mark_safe, specs, style, template
+from hobble.report.templates import FOLDER, chart_specs, load_template, mark_safe, page_style
 
 LARGEST_PAGE = 19_850_000  # bytes; the page must stay under 20 MB
 RESERVED = 60_000  # bytes of LARGEST_PAGE that are kept free for the page's text, style and tables
 NAME = "compare"  # the page's name
 
 
-def render_compared(
+def render_comparison(
     compared: Mapping[str, Any],
     playables: Mapping[str, Mapping[str, Any]] | None = None,
     bundle: str = "",
@@ -28,9 +28,9 @@ def render_compared(
     """The comparison as one HTML document.
 
     compared: the content of compare.json. playables: configuration -> data of a character that its network
-    moves in the page, from `playable` in `hobble.report.playable`. If these characters do not all fit into
-    the page, the weights of all of them are rounded to 8 bits. Characters that still do not fit are left out.
-    bundle: all scripts of the page as one script. errors: configuration -> mean distance in cm by which
+    moves in the page, from `playable_data` in `hobble.report.playable`. If these characters do not all fit
+    into the page, the weights of all of them are rounded to 8 bits. Characters that still do not fit are left
+    out. bundle: all scripts of the page as one script. errors: configuration -> mean distance in cm by which
     rounding the weights moves a predicted joint.
     """
     errors = errors or {}
@@ -43,8 +43,9 @@ def render_compared(
         "training": {"curves": compare_sections.training_curves(compared)},
         "stages": {"charts": compare_sections.stage_charts(compared)},
     }
-    measured, names = measure_sections.compared_sections(compared), comparison_charts.names(compared)
-    charts = specs([sections, measured])
+    measured = measure_sections.compared_sections(compared)
+    names = comparison_charts.configuration_names(compared)
+    charts = chart_specs([sections, measured])
     # Configurations with the same skeleton share a body. Its key is in the entry `body` of a character.
     bodies = {spec["body"]: packed_body(skeleton_of(spec)) for spec in (playables or {}).values()}
     used = len(bundle.encode()) + len(embedded(charts).encode()) + len(embedded(bodies).encode())
@@ -56,7 +57,7 @@ def render_compared(
         on_page, left_out = select_fitting(smaller, LARGEST_PAGE - RESERVED - used)
     bodies = {spec["body"]: bodies[spec["body"]] for spec in on_page.values()}
     data = {"name": NAME, "charts": charts, "playable": on_page, "bodies": bodies}
-    return template("compare.html.j2").render(
+    return load_template("compare.html.j2").render(
         name=NAME,
         measured=measured,
         title=" and ".join(names) if len(names) < 3 else f"{len(names)} configurations",
@@ -67,9 +68,9 @@ def render_compared(
         left_out=left_out,
         rounding=[(name, errors[name]) for name in rounded_names if name in on_page and name in errors],
         hurts=any(body_channel(spec) for spec in on_page.values()),
-        style=style(),
+        style=page_style(),
         bundle=mark_safe("the bundle", bundle),
-        provenance={"commit": commit(FOLDER), "machine": machine(), "versions": versions()},
+        provenance={"commit": git_commit(FOLDER), "machine": machine(), "versions": versions()},
         **sections,
     )
 

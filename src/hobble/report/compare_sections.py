@@ -5,10 +5,10 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
-from hobble.report.charts import Chart, Trace, axis, line, log_axis
-from hobble.report.comparison_charts import Compared, colours, dots
+from hobble.report.charts import Chart, Trace, axis, line_trace, log_axis
+from hobble.report.comparison_charts import Compared, configuration_colours, dot_trace
 from hobble.report.cost_section import log_range
-from hobble.report.formats import duration, size
+from hobble.report.formats import format_bytes, format_duration
 
 # Column of a configuration's training history -> title of the horizontal axis.
 X_AXES = {"pass": "passes", "seconds": "seconds of training", "samples": "samples seen"}
@@ -23,13 +23,13 @@ def training_curves(compared: Compared) -> Chart | None:
         for entry in compared["training"]:
             name = entry["configuration"]
             x = _passes_done(entry) if key == "pass" else entry.get(key, [])
-            colour = colours(compared)[name]
+            colour = configuration_colours(compared)[name]
             held_out = entry.get("held_out_mse", [])
             if any(v is not None for v in held_out):
-                traces.append(line(f"{name}, held out", x, held_out, colour))
+                traces.append(line_trace(f"{name}, held out", x, held_out, colour))
                 values += held_out
             train = entry.get("train_mse", [])
-            traces.append(line(f"{name}, training", x, train, colour, width=1.2, dash="dot"))
+            traces.append(line_trace(f"{name}, training", x, train, colour, width=1.2, dash="dot"))
             values += train
         if traces:
             options[label] = traces
@@ -54,14 +54,16 @@ def stage_charts(compared: Compared) -> list[Chart]:
     order = list(dict.fromkeys(stage["stage"] for stage in compared["stages"]))[::-1]
     charts = []
     for key, title, label, as_text in (
-        ("seconds", "Time of each stage", "seconds, sum over all jobs", duration),
-        ("bytes", "Size of each stage", "bytes on disk", size),
+        ("seconds", "Time of each stage", "seconds, sum over all jobs", format_duration),
+        ("bytes", "Size of each stage", "bytes on disk", format_bytes),
     ):
         values = [stage.get(key) or 0 for stage in compared["stages"]]
         traces = []
-        for name, colour in colours(compared).items():
+        for name, colour in configuration_colours(compared).items():
             rows = [s for s in compared["stages"] if s["configuration"] == name and s.get(key)]
-            trace = dots(name, [s[key] for s in rows], [s["stage"] for s in rows], colour, "%{y}: %{text}")
+            trace = dot_trace(
+                name, [s[key] for s in rows], [s["stage"] for s in rows], colour, "%{y}: %{text}"
+            )
             traces.append(trace | {"text": [as_text(s[key]) for s in rows]})
         layout = {
             "xaxis": axis(label, type="log", tickformat="~s", dtick=1, range=log_range(values)),

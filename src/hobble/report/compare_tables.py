@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 from hobble.report.comparison_charts import Compared
-from hobble.report.formats import duration, number, size
+from hobble.report.formats import format_bytes, format_duration, format_number
 from hobble.report.measure_sections import OverviewColumn, compared_columns
 from hobble.report.published import citation
 from hobble.report.tables import Column, Table
@@ -48,7 +48,7 @@ def configuration_table(compared: Compared) -> Table:
         OverviewColumn(90, Column.count("units"), by_name("units")),
         OverviewColumn(100, Column.number("passes"), by_name("passes")),
     ]
-    columns.sort(key=lambda column: column.at)
+    columns.sort(key=lambda column: column.order)
     rows = [[name, *(column.values.get(name) for column in columns)] for name in entries]
     heads = [Column("configuration"), *(column.column for column in columns)]
     return Table("compare-configurations", heads, rows, "The configurations")
@@ -77,11 +77,11 @@ def difference_table(compared: Compared) -> Table | None:
 def published_table(compared: Compared) -> Table:
     """The published results next to ours. Results that we did not measure come last."""
     sources = compared["published"]["sources"]
-    formats = {"bytes": size, "s": duration}
+    formats = {"bytes": format_bytes, "s": format_duration}
     rows = []
     published = (*compared["against_published"], *compared["milliseconds"]["against_published"])
     for row in sorted(published, key=lambda row: row["ours"] is None):
-        as_text = formats.get(row["unit"], lambda value: number(value, 3))
+        as_text = formats.get(row["unit"], lambda value: format_number(value, 3))
         unit = f" {row['unit']}" if row["unit"] and row["unit"] not in formats else ""
         texts = [
             "" if row[key] is None else f"{as_text(float(row[key]))}{unit}" for key in ("published", "ours")

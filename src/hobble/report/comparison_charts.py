@@ -14,17 +14,17 @@ PALETTE = ("@accent", "@g2", "@g3", "@g4", "@g5", "@g0", "@g1", "@predicted")
 SPLITS = {"held_out": "held-out clips", "train": "training clips"}
 
 
-def names(compared: Compared) -> list[str]:
+def configuration_names(compared: Compared) -> list[str]:
     """The names of the configurations, in the order of the page."""
     return [entry["configuration"] for entry in compared["configurations"]]
 
 
-def colours(compared: Compared) -> dict[str, str]:
+def configuration_colours(compared: Compared) -> dict[str, str]:
     """Configuration -> its colour in all charts."""
-    return {name: PALETTE[i % len(PALETTE)] for i, name in enumerate(names(compared))}
+    return {name: PALETTE[i % len(PALETTE)] for i, name in enumerate(configuration_names(compared))}
 
 
-def dots(name: str, x: Sequence, y: Sequence, colour: str, hover: str) -> Trace:
+def dot_trace(name: str, x: Sequence, y: Sequence, colour: str, hover: str) -> Trace:
     """A plotly trace with a dot at each point x, y. name: the configuration. hover: template of the text that
     appears when the pointer is on a dot."""
     return {

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from typing import Literal
 
 from hobble.report.charts import Chart, axis
-from hobble.report.formats import duration, number, size
+from hobble.report.formats import format_bytes, format_duration, format_number
 from hobble.report.gather import ReportMaterial
 from hobble.report.tables import Column, Table
 
@@ -20,10 +20,10 @@ def stage_charts(material: ReportMaterial) -> list[Chart]:
     charts = []
     key: Literal["seconds", "bytes"]
     for key, title, label, as_text, caption in (
-        ("seconds", "Time of each stage", "seconds, sum over all jobs", duration,
+        ("seconds", "Time of each stage", "seconds, sum over all jobs", format_duration,
          "The sum over all jobs of a stage. Jobs run in parallel, so the run itself takes less time. The "
          "scale is logarithmic."),
-        ("bytes", "Size of each stage", "bytes", size,
+        ("bytes", "Size of each stage", "bytes", format_bytes,
          "The files that each stage writes. The scale is logarithmic."),
     ):  # fmt: skip
         values = [stage.get(key) or 0 for stage in stages]
@@ -69,15 +69,15 @@ def stage_table(material: ReportMaterial) -> Table:
     columns = [
         Column("stage"),
         Column.count("jobs"),
-        Column("time of all jobs", lambda v: duration(float(v)), "n"),
-        Column("longest job", lambda v: duration(float(v)), "n"),
-        Column("peak memory", lambda v: f"{number(v)} MB", "n"),
+        Column("time of all jobs", lambda v: format_duration(float(v)), "n"),
+        Column("longest job", lambda v: format_duration(float(v)), "n"),
+        Column("peak memory", lambda v: f"{format_number(v)} MB", "n"),
         Column.count("files"),
-        Column("size", lambda v: size(float(v)), "n"),
+        Column("size", lambda v: format_bytes(float(v)), "n"),
     ]
     if published:
-        columns.append(Column("published time", lambda v: duration(float(v)), "n"))
-        columns.append(Column("published size", lambda v: size(float(v)), "n"))
+        columns.append(Column("published time", lambda v: format_duration(float(v)), "n"))
+        columns.append(Column("published size", lambda v: format_bytes(float(v)), "n"))
     rows = [
         [
             stage["stage"],

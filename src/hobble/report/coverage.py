@@ -17,9 +17,9 @@ from hobble.rows.clip_rows import row_count
 from hobble.rows.excerpts import Excerpt, cut_into_excerpts, load_excerpt
 
 FPS = 60.0  # of the clips' rows
-SPEEDS = np.arange(0, 6.01, 0.2)  # edges of the bins of speeds, metres a second
+SPEED_EDGES = np.arange(0, 6.01, 0.2)  # edges of the bins of speeds, metres a second
 # Edges of the bins of turning speeds, degrees a second, positive to the left.
-TURNS = np.arange(-220, 221, 20.0)
+TURN_EDGES = np.arange(-220, 221, 20.0)
 # Middles of the bins of channel values, in tenths of the channel's highest value.
 TENTHS = np.arange(1, 11)
 MOST_EXCERPTS = 600  # the frames of at most this many excerpts of clips are counted
@@ -35,16 +35,17 @@ def seconds_of_data(
     splits: clip -> "train" or "held_out". all_clips: if `paths` are a random choice of clips, the number of
     clips from which they were chosen. Then the seconds are an estimate for all of these.
 
-    The result has `turns`: split -> seconds in each bin of TURNS; `both`: (bins of TURNS, bins of SPEEDS)
-    seconds at each combination; `channels`: channel -> column -> seconds in each bin of TENTHS; `estimate`: a
-    sentence that says which part of the data was read, empty if all was read. Turning speeds and speeds
-    outside the bins count in the outermost bin. Channel values below half a tenth do not count.
+    The result has `turns`: split -> seconds in each bin between two TURN_EDGES; `both`: seconds at each
+    combination, (bins between TURN_EDGES, bins between SPEED_EDGES); `channels`: channel -> column -> seconds
+    in each bin of TENTHS; `estimate`: a sentence that says which part of the data was read, empty if all was
+    read. Turning speeds and speeds outside the bins count in the outermost bin. Channel values below half a
+    tenth do not count.
     """
     chosen, share = _chosen_excerpts(paths)
-    # Seconds of data for which each frame that is read stands.
+    # Each frame that is read stands for this many seconds of data.
     weight = max(all_clips or 0, len(paths)) / max(len(paths), 1) / share / FPS
-    turns = {split: np.zeros(len(TURNS) - 1) for split, *_ in SPLITS}
-    both = np.zeros((len(TURNS) - 1, len(SPEEDS) - 1))
+    turns = {split: np.zeros(len(TURN_EDGES) - 1) for split, *_ in SPLITS}
+    both = np.zeros((len(TURN_EDGES) - 1, len(SPEED_EDGES) - 1))
     channels: dict[str, dict[str, Array]] = {}
     for path, excerpt in chosen:
         rows = load_excerpt(path, excerpt)
@@ -53,10 +54,10 @@ def seconds_of_data(
         speed = np.linalg.norm(y[:, layout.y_root_velocity], axis=1) * FPS / 100
         # The column y_turn has the opposite sign: it is the turn of the world relative to the root.
         turn = np.degrees(-y[:, layout.y_turn][:, 0]) * FPS
-        speed = np.clip(speed, SPEEDS[0], SPEEDS[-1] - 1e-6)
-        turn = np.clip(turn, TURNS[0], TURNS[-1] - 1e-6)
-        turns[splits.get(rows.clip, "train")] += np.histogram(turn, TURNS)[0] * weight
-        both += np.histogram2d(turn, speed, (TURNS, SPEEDS))[0] * weight
+        speed = np.clip(speed, SPEED_EDGES[0], SPEED_EDGES[-1] - 1e-6)
+        turn = np.clip(turn, TURN_EDGES[0], TURN_EDGES[-1] - 1e-6)
+        turns[splits.get(rows.clip, "train")] += np.histogram(turn, TURN_EDGES)[0] * weight
+        both += np.histogram2d(turn, speed, (TURN_EDGES, SPEED_EDGES))[0] * weight
         skeleton = Skeleton.from_dict(rows.skeleton)
         for name, table in rows.channels.items():
             definition, seconds = channel(name), channels.setdefault(name, {})
@@ -90,7 +91,7 @@ def turn_chart(counted: Mapping[str, Any]) -> Chart | None:
         {
             "type": "bar",
             "name": label,
-            "x": _middles(TURNS),
+            "x": _middles(TURN_EDGES),
             "y": np.round(counted["turns"][split], 3).tolist(),
             "marker": {"color": colour},
             "hovertemplate": "%{x}°/s: %{y:.1f} s<extra></extra>",
@@ -118,8 +119,8 @@ def speed_turn_chart(counted: Mapping[str, Any]) -> Chart | None:
     speeds_shown = int(np.flatnonzero(both.any(axis=0)).max()) + 1
     trace = {
         "type": "heatmap",
-        "x": _middles(SPEEDS)[:speeds_shown],
-        "y": _middles(TURNS),
+        "x": _middles(SPEED_EDGES)[:speeds_shown],
+        "y": _middles(TURN_EDGES),
         "z": [[v or None for v in row] for row in np.round(both[:, :speeds_shown], 3).tolist()],
         "colorscale": [[0, "@sunken"], [0.15, "@muted"], [1, "@accent"]],
         # Not the maximum: with one very full cell, all others would look alike.
@@ -129,10 +130,9 @@ def speed_turn_chart(counted: Mapping[str, Any]) -> Chart | None:
         "hovertemplate": "%{x:.1f} m/s, %{y}°/s: %{z:.1f} s<extra></extra>",
     }
     layout = {"xaxis": axis("m/s"), "yaxis": axis("degrees per second", automargin=True)}
-    caption = (
-        "Seconds of data at each combination of speed and turn. The network was not trained on empty cells."
-    )
-    return Chart("speed-turn", "Speed and turn combined", caption + counted["estimate"], [trace], layout, 300)
+    estimate = counted["estimate"]
+    caption = f"Seconds of data at each combination of speed and turn. {_empty_cells(estimate)}.{estimate}"
+    return Chart("speed-turn", "Speed and turn combined", caption, [trace], layout, 300)
 
 
 def channel_charts(counted: Mapping[str, Any], shown_name: Callable[[str], str] = str) -> list[Chart]:
@@ -166,12 +166,22 @@ def _channel_chart(
     }
     across = axis(definition.value_word, dtick=tenth, range=[0.4 * tenth, 10.6 * tenth])
     caption = (
-        f"Each cell has the seconds of data at one {definition.value_word}, including mirrored clips. The "
-        "network was not trained on empty cells and has to interpolate there."
+        f"Each cell has the seconds of data at one {definition.value_word}, including mirrored clips. "
+        f"{_empty_cells(estimate)} and has to interpolate there.{estimate}"
     )
     title, height = f"{definition.title}: amount of data", 120 + 24 * len(columns)
     layout = {"xaxis": across, "yaxis": {"automargin": True}}
-    return Chart(f"{name}-coverage", title, caption + estimate, [trace], layout, height)
+    return Chart(f"{name}-coverage", title, caption, [trace], layout, height)
+
+
+def _empty_cells(estimate: str) -> str:
+    """The beginning of a sentence on empty cells, without a full stop. estimate: from `seconds_of_data`.
+
+    If only a part of the data was read, the rest may have data for a cell that is empty.
+    """
+    if estimate:
+        return "The network was trained on little or no data in empty cells"
+    return "The network was not trained on empty cells"
 
 
 def _middles(edges: Array) -> list[float]:

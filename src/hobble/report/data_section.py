@@ -10,11 +10,11 @@ import numpy as np
 from hobble.channels.shown import shown_names
 from hobble.motion.check_retarget import MOST_DIFFERENCE, most_different
 from hobble.report.charts import Chart, Trace, axis
-from hobble.report.formats import size
+from hobble.report.formats import format_bytes
 from hobble.report.gather import ReportMaterial
 from hobble.report.tables import Column, Table
+from hobble.rows.layout import GAITS
 
-GAIT_COLOURS = {"stand": "@g0", "walk": "@g1", "jog": "@g2", "crouch": "@g3", "jump": "@g4", "bump": "@g5"}
 MOST_BARS = 200  # the chart of retargeted clips has at most this many bars
 MOST_REMARKS = 500  # the table of repairs, doubts and warnings has at most this many rows
 MOST_NAMED = 30  # if the chart of retargeted clips has more bars than this, none has a name under it
@@ -25,9 +25,9 @@ def gait_chart(material: ReportMaterial) -> Chart | None:
     """Seconds of each gait, in training clips and held-out clips; None without labels."""
     traces: list[Trace] = []
     for split, colour in (("train", "@muted"), ("held_out", "@accent")):
-        totals = dict.fromkeys(GAIT_COLOURS, 0.0)
+        totals = dict.fromkeys(GAITS, 0.0)
         for report in material.labels:
-            if material.split(report["clip"]) == split:
+            if material.split_of(report["clip"]) == split:
                 for gait, seconds in (report.get("seconds") or {}).items():
                     totals[gait] = totals.get(gait, 0.0) + seconds
         if any(totals.values()):
@@ -59,7 +59,7 @@ def speed_chart(material: ReportMaterial) -> Chart | None:
         for report in material.labels:
             curves = report.get("curves") or {}
             speed = [v for v in curves.get("speed") or () if v is not None]
-            if speed and material.split(report["clip"]) == split:
+            if speed and material.split_of(report["clip"]) == split:
                 counts, _ = np.histogram(np.clip(speed, 0, edges[-1] - 1e-6), edges)
                 # A curve may have fewer points than frames. Each stands for an equal part of the clip.
                 seconds += counts / len(speed) * curves["seconds"][-1]
@@ -90,7 +90,8 @@ def speed_chart(material: ReportMaterial) -> Chart | None:
 def retarget_chart(material: ReportMaterial) -> Chart | None:
     """A bar for each retargeted clip; None if no clip was retargeted.
 
-    A bar is the angle, in degrees, by which the joint or limb that changed most differs from the clip's file.
+    Each bar stands for the joint or limb that differs most from the clip's file. Its height is that
+    difference in degrees.
     A mirrored clip has no bar if the clip that it mirrors is in the data set.
     """
     names = {report["clip"] for report in material.motion}
@@ -118,9 +119,9 @@ def retarget_chart(material: ReportMaterial) -> Chart | None:
         "yaxis": axis("difference, degrees", rangemode="tozero"),
     }
     caption = (
-        "These clips were retargeted to the skeleton of the data set. Each bar shows by how many degrees, on "
-        "average over the clip, the joint or limb that differs most differs from the file. Clips with more "
-        f"than {MOST_DIFFERENCE:.0f} degrees are refused."
+        "These clips were retargeted to the skeleton of the data set. In each clip, one joint or limb "
+        "differs most from the file. The bar shows by how many degrees, on average over the clip. Clips with "
+        f"more than {MOST_DIFFERENCE:.0f} degrees are refused."
     )
     if total > len(bars):
         caption += f" The chart shows the {len(bars)} of {total:,} clips that differ most."
@@ -141,7 +142,7 @@ def clip_table(material: ReportMaterial, clips: frozenset[str]) -> Table:
         Column.number("seconds", 4),
         Column.count("cycles"),
         Column("labels from"),
-        Column("size", lambda v: size(float(v)), "n"),
+        Column("size", lambda v: format_bytes(float(v)), "n"),
         Column("SHA-256", lambda v: str(v)[:12], "hash"),
     ]
     rows = []
@@ -152,7 +153,7 @@ def clip_table(material: ReportMaterial, clips: frozenset[str]) -> Table:
         rows.append(
             [
                 report["clip"],
-                material.split(report["clip"]),
+                material.split_of(report["clip"]),
                 report.get("source"),
                 report.get("frames"),
                 report.get("source_fps"),
@@ -212,7 +213,7 @@ def _by_kind(rows: list[list[str]]) -> list[list[Any]]:
     return [[len({row[0] for row in kind}), kind[0][1], kind[0][0], kind[0][2]] for kind in frequent]
 
 
-def strips(material: ReportMaterial, clips: frozenset[str]) -> list[dict[str, Any]]:
+def clip_strips(material: ReportMaterial, clips: frozenset[str]) -> list[dict[str, Any]]:
     """Data for the strips. A strip is a chart of one clip over time: label curves and channel values.
 
     clips: names of the clips to show. Clips without label curves are left out, and mirrored clips if the clip

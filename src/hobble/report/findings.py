@@ -9,16 +9,16 @@ import numpy as np
 
 from hobble.core.quat import Array
 from hobble.report import measure_sections
-from hobble.report.coverage import TURNS
-from hobble.report.formats import duration, number, size
+from hobble.report.coverage import TURN_EDGES
+from hobble.report.formats import format_bytes, format_duration, format_number
 from hobble.report.gather import ReportMaterial
-from hobble.report.summary import Hint, KeyFigure, placed
+from hobble.report.summary import Hint, KeyFigure, with_order
 
 # Degrees a second: slower turning is not counted, because the body sways that much in a straight walk.
 TURNING = 40.0
 LITTLE_TURNING = 0.01  # if turning takes less than this share of the time, the page warns
 # Kinds of hints, in the order of the page.
-ORDER = ("warn", "note", "good", "fact")
+KIND_ORDER = ("warn", "note", "good", "fact")
 
 
 def _training_options(material: ReportMaterial) -> Mapping[str, Any]:
@@ -26,10 +26,10 @@ def _training_options(material: ReportMaterial) -> Mapping[str, Any]:
     return (material.resolved.get("configuration") or {}).get("training") or {}
 
 
-def lead(material: ReportMaterial) -> str:
+def lead_text(material: ReportMaterial) -> str:
     """A sentence or two on the network and its training data."""
     clips = [report["clip"] for report in material.motion]
-    held_out = sum(material.split(clip) == "held_out" for clip in clips)
+    held_out = sum(material.split_of(clip) == "held_out" for clip in clips)
     frames = sum(report.get("frames", 0) for report in material.motion)
     passes = _training_options(material).get("passes")
     network = material.network
@@ -50,45 +50,47 @@ def key_figures(material: ReportMaterial) -> list[KeyFigure]:
     figures = measure_sections.figures(material)
     seconds = sum(report.get("seconds", 0) for report in material.motion)
     if seconds:
-        held_out = sum(material.split(report["clip"]) == "held_out" for report in material.motion)
+        held_out = sum(material.split_of(report["clip"]) == "held_out" for report in material.motion)
         note = f"{len(material.motion)} clips, {held_out} of them held out"
-        value, _, unit = duration(seconds).partition(" ")
+        value, _, unit = format_duration(seconds).partition(" ")
         figures.append(KeyFigure("Motion data", value, unit, note, 30))
     network = material.network
     # A PFNN has a set of weights at each control point, and `parameters` counts one of these sets. For other
     # networks it counts all parameters. Motion matching has no layers, so its `sizes` are empty.
     which = " at each control point" if "control points" in network["described"] else ""
     note = f"parameters{which}; layers of {'–'.join(map(str, network['sizes']))}"
-    note = f"{note if network['sizes'] else 'numbers in its tables'}; {size(network['bytes'])} on disk"
-    figures.append(KeyFigure("Network", number(network["parameters"] / 1e6, 3), "M", note, 40))
+    note = (
+        f"{note if network['sizes'] else 'numbers in its tables'}; {format_bytes(network['bytes'])} on disk"
+    )
+    figures.append(KeyFigure("Network", format_number(network["parameters"] / 1e6, 3), "M", note, 40))
     total = material.pipeline.get("total_seconds")
     if total:
-        value, _, unit = duration(total).partition(" ")
-        written = size(material.pipeline.get("total_bytes"))
+        value, _, unit = format_duration(total).partition(" ")
+        written = format_bytes(material.pipeline.get("total_bytes"))
         note = (
             "sum over all jobs, from clips to measurements; jobs can run in parallel, so the run can be "
             f"shorter; {written} written"
         )
         figures.append(KeyFigure("Whole pipeline", value, unit, note, 50))
-    return sorted(figures, key=lambda figure: figure.at)
+    return sorted(figures, key=lambda figure: figure.order)
 
 
 def hints(material: ReportMaterial, turns: Mapping[str, Array] | None = None) -> list[Hint]:
     """Warnings and advice in the order in which to follow them, then what is good, then plain facts.
 
-    turns: split -> seconds in each bin of `coverage.TURNS`, if they were counted.
+    turns: split -> seconds in each bin of `coverage.TURN_EDGES`, if they were counted.
     """
-    # The first argument of `placed` is the place among hints of the same kind, `at` in
+    # The first argument of `with_order` is the place among hints of the same kind, `order` in
     # `hobble.report.summary.Hint`.
     found = [
         *measure_sections.hints(material),
-        *placed(10, _gait_hints(material)),  # before training, which cannot make up for missing data
-        *placed(10, _turning_hints(turns or {})),
-        *placed(11, _repair_hints(material)),
-        *placed(20, _training_hints(material)),
-        *placed(90, _cost_hints(material)),
+        *with_order(10, _gait_hints(material)),  # before training, which cannot make up for missing data
+        *with_order(10, _turning_hints(turns or {})),
+        *with_order(11, _repair_hints(material)),
+        *with_order(20, _training_hints(material)),
+        *with_order(90, _cost_hints(material)),
     ]
-    return sorted(found, key=lambda hint: (ORDER.index(hint.kind), hint.at))
+    return sorted(found, key=lambda hint: (KIND_ORDER.index(hint.kind), hint.order))
 
 
 def _training_hints(material: ReportMaterial) -> Iterator[Hint]:
@@ -154,11 +156,11 @@ def _gait_hints(material: ReportMaterial) -> Iterator[Hint]:
 
 
 def _turning_hints(turns: Mapping[str, Array]) -> Iterator[Hint]:
-    """A warning if hardly anybody turns. turns: split -> seconds in each bin of TURNS."""
+    """A warning if hardly anybody turns. turns: split -> seconds in each bin of TURN_EDGES."""
     seconds = np.sum(list(turns.values()), axis=0)
     if not np.any(seconds):
         return
-    middles = (TURNS[:-1] + TURNS[1:]) / 2  # of the bins, degrees a second
+    middles = (TURN_EDGES[:-1] + TURN_EDGES[1:]) / 2  # of the bins, degrees a second
     share = float(np.sum(seconds[np.abs(middles) > TURNING]) / np.sum(seconds))
     if share < LITTLE_TURNING:
         yield Hint(

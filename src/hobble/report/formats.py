@@ -10,15 +10,15 @@ import numpy as np
 from markupsafe import Markup
 
 
-def duration(seconds: float | None) -> str:
+def format_duration(seconds: float | None) -> str:
     """A time as text in a suitable unit; a dash for None.
 
-    >>> duration(0.42), duration(93), duration(5400), duration(154800), duration(None)
-    ('0.42 s', '1 min 33 s', '1 h 30 min', '43 h', '–')
+    >>> [format_duration(seconds) for seconds in (0.42, 59.4, 59.6, 93, 5400, 154800, None)]
+    ['0.42 s', '59 s', '1 min', '1 min 33 s', '1 h 30 min', '43 h', '–']
     """
     if seconds is None:
         return "–"
-    if seconds < 60:
+    if round(seconds) < 60:
         return f"{seconds:.2g} s" if seconds < 10 else f"{seconds:.0f} s"
     minutes, more_seconds = divmod(round(seconds), 60)
     if minutes < 60:
@@ -27,10 +27,10 @@ def duration(seconds: float | None) -> str:
     return f"{hours} h {minutes} min" if minutes and hours < 24 else f"{hours} h"
 
 
-def size(count: float | None) -> str:
+def format_bytes(count: float | None) -> str:
     """A number of bytes as text, in B, kB, MB or GB (powers of 1000); a dash for None.
 
-    >>> size(512), size(7_120_000_000), size(606e6), size(None)
+    >>> format_bytes(512), format_bytes(7_120_000_000), format_bytes(606e6), format_bytes(None)
     ('512 B', '7.12 GB', '606 MB', '–')
     """
     if count is None:
@@ -42,13 +42,15 @@ def size(count: float | None) -> str:
     raise AssertionError
 
 
-def number(value: float | None, digits: int = 3) -> str:
+def format_number(value: float | None, digits: int = 3) -> str:
     """A number as text with `digits` significant digits; a dash for None, NaN and infinity.
 
     Digits before the decimal point are all shown, with separators of thousands.
 
-    >>> number(0.04391), number(20000, 5), number(1234.5), number(None), number(float("nan")), number(0)
-    ('0.0439', '20,000', '1,234', '–', '–', '0')
+    >>> format_number(20000, 5)
+    '20,000'
+    >>> [format_number(value) for value in (0.04391, 1234.5, None, float("nan"), 0)]
+    ['0.0439', '1,234', '–', '–', '0']
     """
     if value is None or not math.isfinite(value):
         return "–"
@@ -58,16 +60,16 @@ def number(value: float | None, digits: int = 3) -> str:
     return f"{value:,.{places}f}"
 
 
-def plain(value: Any) -> Any:
+def json_data(value: Any) -> Any:
     """`value` as plain JSON data: tuples and arrays become lists, NaN and infinities become None."""
     if isinstance(value, dict):
-        return {str(key): plain(item) for key, item in value.items()}
+        return {str(key): json_data(item) for key, item in value.items()}
     if isinstance(value, (list, tuple)):
-        return [plain(item) for item in value]
+        return [json_data(item) for item in value]
     if isinstance(value, np.ndarray):
-        return plain(value.tolist())
+        return json_data(value.tolist())
     if isinstance(value, np.generic):
-        return plain(value.item())
+        return json_data(value.item())
     if isinstance(value, float):
         return value if math.isfinite(value) else None
     return value
@@ -76,10 +78,10 @@ def plain(value: Any) -> Any:
 def embedded(value: Any) -> Markup:
     """JSON that is safe inside a <script> element, whatever its strings contain.
 
-    Every "<" is written as an escape, so that no string can end the element or open a comment.
+    "<", ">" and "&" are written as escapes, so that no string can end the element or open a comment.
 
     >>> embedded({"clip": "</script><b>"})
     Markup('{"clip":"\\\\u003c/script\\\\u003e\\\\u003cb\\\\u003e"}')
     """
-    text = json.dumps(plain(value), separators=(",", ":"), allow_nan=False, ensure_ascii=True)
+    text = json.dumps(json_data(value), separators=(",", ":"), allow_nan=False, ensure_ascii=True)
     return Markup(text.replace("<", "\\u003c").replace(">", "\\u003e").replace("&", "\\u0026"))

@@ -29,8 +29,8 @@ class ReportMaterial:
     measurement -> the JSON with its results. pipeline: content of pipeline.json. history: column of the
     training history -> values, one for each section (part of a pass) of training, None for an empty cell.
     network: from `describe_network`. motion: the report on each clip's motion. labels: the report on each
-    clip's labels, in the same order. channels: a report for each clip and channel. terrain, rows: paths of
-    the files with the clips' terrain fits and rows. published: content of published.yaml.
+    clip's labels, in the same order. channels: a report for each clip and channel. terrain_files,
+    row_files: paths of the files with the clips' terrain fits and rows. published: content of published.yaml.
     """
 
     name: str
@@ -45,15 +45,15 @@ class ReportMaterial:
     motion: list[dict[str, Any]] = field(repr=False)
     labels: list[dict[str, Any]] = field(repr=False)
     channels: list[dict[str, Any]] = field(repr=False)
-    terrain: list[str] = field(repr=False)
-    rows: list[str] = field(repr=False)
+    terrain_files: list[str] = field(repr=False)
+    row_files: list[str] = field(repr=False)
     published: Mapping[str, Any] = field(repr=False)
 
-    def split(self, clip: str) -> str:
+    def split_of(self, clip: str) -> str:
         """The split of a clip, "train" or "held_out"."""
         return self.splits.get(clip, "train")
 
-    def found(self, measure: str) -> Json:
+    def results_of(self, measure: str) -> Json:
         """The results of a measurement; empty if it was not run."""
         return self.measured.get(measure, {})
 
@@ -102,8 +102,8 @@ def gather(
         motion=[read_json(path) for path in motion],
         labels=[read_json(path) for path in labels],
         channels=[read_json(path) for path in channels],
-        terrain=list(terrain),
-        rows=list(rows),
+        terrain_files=list(terrain),
+        row_files=list(rows),
         published=read_yaml(PUBLISHED),
     )
 

@@ -12,17 +12,17 @@ from typing import Any
 OPENING_VALUE = 7
 
 
-def opening(playable: Mapping[str, Any], measured: Iterable[Mapping[str, Any]]) -> dict[str, Any]:
+def opening_slider(playable: Mapping[str, Any], measured: Iterable[Mapping[str, Any]]) -> dict[str, Any]:
     """The slider that is set when the page opens, and its value.
 
-    playable: data of the character, from `playable` in `hobble.report.playable`. measured: the results of
-    each measurement.
+    playable: data of the character, from `playable_data` in `hobble.report.playable`. measured: the results
+    of each measurement.
 
     In the result, `part` is the label of a slider, or None if no channel has sliders. It is the slider that
     makes the walk limp most. If no limps were measured, it is the slider that changes the pose most. If poses
     were not measured either, it is the first slider. `value` is its value, in tenths of the highest.
     """
-    channel = first_shown(playable)
+    channel = opening_channel(playable)
     if channel is None:
         return {"part": None, "value": 0}
     labels = {channel["columns"][i]: label for label, i in channel["sliders"].items()}
@@ -59,6 +59,6 @@ def body_channel(playable: Mapping[str, Any]) -> Mapping[str, Any] | None:
     return next((c for c in playable.get("channels", ()) if c["regions"] and c["sliders"]), None)
 
 
-def first_shown(playable: Mapping[str, Any]) -> Mapping[str, Any] | None:
+def opening_channel(playable: Mapping[str, Any]) -> Mapping[str, Any] | None:
     """The channel that the top of the page shows: `body_channel`, or else the first with sliders, or None."""
     return body_channel(playable) or next((c for c in playable.get("channels", ()) if c["sliders"]), None)

@@ -36,27 +36,33 @@ from hobble.report.verdicts import Verdict
 class OverviewColumn:
     """A column of the table of configurations, which has a row for each configuration.
 
-    values: configuration -> value in its row. at: a number; columns are sorted by it.
+    values: configuration -> value in its row. order: a number; columns are sorted by it.
     """
 
-    at: int
+    order: int
     column: Column
     values: Mapping[str, Any] = field(repr=False)
 
 
 def sections(material: ReportMaterial) -> list[PageSection]:
     """The sections of the report that show measurements."""
-    return join_sections(show(material.found(name), material) for name, show in _functions("page", "section"))
+    return join_sections(
+        show(material.results_of(name), material) for name, show in _functions("page", "section")
+    )
 
 
 def figures(material: ReportMaterial) -> list[KeyFigure]:
     """The key figures that measurements have for the top of the report."""
-    return [f for name, show in _functions("page", "figures") for f in show(material.found(name), material)]
+    return [
+        f for name, show in _functions("page", "figures") for f in show(material.results_of(name), material)
+    ]
 
 
 def hints(material: ReportMaterial) -> list[Hint]:
     """The advice that follows from the numbers of the measurements."""
-    return [h for name, show in _functions("page", "hints") for h in show(material.found(name), material)]
+    return [
+        h for name, show in _functions("page", "hints") for h in show(material.results_of(name), material)
+    ]
 
 
 def compared_sections(compared: Json) -> list[PageSection]:
@@ -69,7 +75,7 @@ def compared_verdicts(compared: Json) -> list[Verdict]:
     verdicts = [
         verdict for _, show in _functions("comparison_page", "verdicts") for verdict in show(compared)
     ]
-    return sorted(verdicts, key=lambda verdict: verdict.at)
+    return sorted(verdicts, key=lambda verdict: verdict.order)
 
 
 def compared_columns(compared: Json) -> list[OverviewColumn]:
@@ -84,5 +90,5 @@ def _functions(module: str, name: str) -> Iterator[tuple[str, Callable[..., Any]
     the module or the function is left out.
     """
     for measure in MEASURES:
-        if (function := getattr(measure.part(module), name, None)) is not None:
+        if (function := getattr(measure.import_module(module), name, None)) is not None:
             yield measure.name, function

@@ -19,7 +19,7 @@ from hobble.gait.profile import Profile, profile_of_walk
 from hobble.gait.recogniser import SIDES
 from hobble.models.network import Network
 from hobble.models.packing import to_base64
-from hobble.report.playable import playable
+from hobble.report.playable import playable_data
 from hobble.report.straight_walk import walk_straight
 from hobble.runtime.export import restore_bone_lengths
 from hobble.runtime.options import Runtime
@@ -35,7 +35,7 @@ def playable_with_recogniser(network: Network, runtime: Runtime) -> dict[str, An
     There is no `recogniser` if no channel (group of inputs) of the network belongs to parts of the body, if
     the skeleton lacks one of ROLES, or if the healthy character walks no complete gait cycle.
     """
-    spec = playable(network, runtime)
+    spec = playable_data(network, runtime)
     if any(channel["regions"] for channel in spec.get("channels", ())):
         assert network.skeleton is not None
         healthy = healthy_walk(network, network.skeleton, runtime)

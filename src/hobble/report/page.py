@@ -21,15 +21,15 @@ from hobble.report import (
     terrain_section,
     training_section,
 )
-from hobble.report.formats import embedded, plain
+from hobble.report.formats import embedded, json_data
 from hobble.report.gather import ReportMaterial
 from hobble.report.ground_pictures import ground_pictures
-from hobble.report.hero import body_channel, first_shown, opening
-from hobble.report.provenance import commit, machine, versions
-from hobble.report.templates import FOLDER, mark_safe, specs, style, template
+from hobble.report.hero import body_channel, opening_channel, opening_slider
+from hobble.report.provenance import git_commit, machine, versions
+from hobble.report.templates import FOLDER, chart_specs, load_template, mark_safe, page_style
 
 
-def render(
+def render_report(
     material: ReportMaterial,
     scenes: Mapping[str, Any] | None = None,
     playable: Mapping[str, Any] | None = None,
@@ -39,31 +39,31 @@ def render(
 ) -> str:
     """The report as one HTML document.
 
-    The arguments come from other modules of hobble.report: scenes from `scenes.scenes`; playable from
-    `playable.playable`, or with a recogniser from `pack_recogniser.playable_with_recogniser`;
-    captured_and_predicted from `captured_and_predicted.comparisons`; bundle, the page's scripts, from
-    `bundle.bundle`; hero, the top of the page, from `opening_walk.opening_walk`. A section without data is
-    left out. Without `hero`, the characters at the top begin in the network's start frame.
+    The arguments come from other modules of hobble.report: scenes from `scenes.packed_scenes`; playable from
+    `playable.playable_data`, or with a recogniser from `pack_recogniser.playable_with_recogniser`;
+    captured_and_predicted from `captured_and_predicted.packed_comparisons`; bundle, the page's scripts, from
+    `bundle.bundle_page_scripts`; hero, the top of the page, from `opening_walk.opening_walk`. A section
+    without data is left out. Without `hero`, the characters at the top begin in the network's start frame.
 
     Texts from the user's files cannot become HTML: the template escapes every value, and the data for the
     scripts is JSON without any "<".
     """
     clips = shown_clips.choose_clips(material)
-    terrain = shown_clips.files_of(material.terrain, clips)
-    row_files = shown_clips.sample_files(material.rows)
+    terrain = shown_clips.files_of_clips(material.terrain_files, clips)
+    row_files = shown_clips.sample_files(material.row_files)
     # Seconds of data at each speed, turning speed and channel value.
-    counted = coverage.seconds_of_data(row_files, material.splits, all_clips=len(material.rows))
+    counted = coverage.seconds_of_data(row_files, material.splits, all_clips=len(material.row_files))
     sections = _sections(material, counted, clips, terrain)
     measured_sections = measure_sections.sections(material)
     scenes, playable = dict(scenes or {}), playable or {}
     captured_and_predicted = captured_and_predicted or {}
-    strips = data_section.strips(material, clips)  # the labels of each clip over time
+    strips = data_section.clip_strips(material, clips)  # the labels of each clip over time
     grounds = ground_pictures(terrain, material.network["skeleton"])
     playables = {material.name: playable} if playable else {}
     data = {
-        "charts": specs([sections, measured_sections]),
+        "charts": chart_specs([sections, measured_sections]),
         "bodies": _bodies(material),
-        "hero": hero or opening(playable, material.measured.values()),
+        "hero": hero or opening_slider(playable, material.measured.values()),
         "scenes": scenes,
         "strips": strips,
         "grounds": grounds,
@@ -71,7 +71,7 @@ def render(
         "playable": playables,
         "compare": captured_and_predicted,
     }
-    return template("page.html.j2").render(
+    return load_template("page.html.j2").render(
         material=material,
         measured=measured_sections,
         figures=findings.key_figures(material),
@@ -82,7 +82,7 @@ def render(
         captured_and_predicted=[clip["name"] for clip in captured_and_predicted.get("clips", ())],
         grounds=[picture["name"] for picture in grounds["pictures"]],
         strips=[strip["clip"] for strip in strips],
-        style=style(),
+        style=page_style(),
         bundle=mark_safe("the bundle", bundle),
         **_top_values(material, playable),
         **_origin_values(material),
@@ -109,18 +109,18 @@ def _top_values(material: ReportMaterial, playable: Mapping[str, Any]) -> dict[s
         "title": material.title or material.name,
         "titled": bool(material.title),
         "eyebrow": f"Hobble report · configuration {material.name} · data set {material.dataset}",
-        "lead": findings.lead(material),
+        "lead": findings.lead_text(material),
         "hurts": body_channel(playable) is not None,
-        "shown_channel": first_shown(playable),
+        "shown_channel": opening_channel(playable),
     }
 
 
 def _origin_values(material: ReportMaterial) -> dict[str, Any]:
     """The template's values for the last sections: the configuration, and what the page was made with."""
-    resolved = plain(dict(material.resolved))
+    resolved = json_data(dict(material.resolved))
     return {
         "configuration": yaml.safe_dump(resolved, sort_keys=False, allow_unicode=True),
-        "provenance": {"commit": commit(FOLDER), "machine": machine(), "versions": versions()},
+        "provenance": {"commit": git_commit(FOLDER), "machine": machine(), "versions": versions()},
     }
 
 

@@ -57,12 +57,12 @@ KINDS: dict[type, str] = {
 class SectionPart:
     """One part of a section.
 
-    at: its place in the section, from 0 (top) to 100 (end). content: None if there is nothing to show. tall:
-    whether the content is a chart with a row for each clip. open: whether the content is a table that is
-    unfolded at first. short: whether it is a table that needs no scroll bar.
+    order: its place in the section, from 0 (top) to 100 (end). content: None if there is nothing to show.
+    tall: whether the content is a chart with a row for each clip. open: whether the content is a table that
+    is unfolded at first. short: whether it is a table that needs no scroll bar.
     """
 
-    at: int
+    order: int
     content: Content | None = field(repr=False)
     tall: bool = False
     open: bool = False
@@ -78,7 +78,7 @@ class SectionPart:
 class PageSection:
     """A section of a page. `join_sections` joins sections with the same `name` into one.
 
-    title: the heading; only one of the joined sections needs it. at: a number; sections are sorted by it.
+    title: the heading; only one of the joined sections needs it. order: a number; sections are sorted by it.
     nav: a shorter title for the list of contents; by default the title. long: whether printing may break the
     section between pages.
     """
@@ -86,7 +86,7 @@ class PageSection:
     name: str
     parts: Sequence[SectionPart] = field(repr=False)
     title: str = ""
-    at: int = 50
+    order: int = 50
     nav: str = ""
     long: bool = False
 
@@ -103,13 +103,13 @@ def join_sections(sections: Iterable[PageSection]) -> list[PageSection]:
     out = []
     for name, same_name in by_name.items():
         parts = sorted(
-            (p for s in same_name for p in s.parts if _is_shown(p.content)), key=lambda part: part.at
+            (p for s in same_name for p in s.parts if _is_shown(p.content)), key=lambda part: part.order
         )
         titled = next((s for s in same_name if s.title), same_name[0])
         title = titled.title or name.replace("_", " ").capitalize()
         if parts:
             out.append(replace(titled, parts=parts, title=title, nav=titled.nav or title))
-    return sorted(out, key=lambda section: section.at)
+    return sorted(out, key=lambda section: section.order)
 
 
 def _is_shown(content: Content | None) -> bool:

@@ -20,7 +20,7 @@ from hobble.report.provenance import machine, versions
 from hobble.workflow.kept_files import recorded_seconds
 
 
-def summarise(configuration: str, stages: Mapping[str, Mapping[str, Iterable[str]]]) -> Pipeline:
+def summarise_pipeline(configuration: str, stages: Mapping[str, Mapping[str, Iterable[str]]]) -> Pipeline:
     """The content of `pipeline.json`.
 
     stages: in the order of the pipeline, stage -> a dict with the keys

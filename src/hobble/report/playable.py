@@ -32,7 +32,7 @@ from hobble.runtime.options import Runtime
 NO_EFFECT = 1e-7  # inputs are multiplied by 1 / standard deviation; below this factor they have no effect
 
 
-def playable(network: Network, runtime: Runtime) -> dict[str, Any]:
+def playable_data(network: Network, runtime: Runtime) -> dict[str, Any]:
     """The data of the page's JavaScript runtime; {} if the network has no skeleton.
 
     Inputs without effect are left out. So are the predicted rotations of joints that move no part of the
@@ -156,7 +156,7 @@ def _used_outputs(layout: RowLayout, turning: Sequence[int]) -> NDArray[np.int64
 
 
 def skeleton_of(spec: Mapping[str, Any]) -> Skeleton:
-    """The skeleton of a character that `playable` packed. It has all that is needed to draw the body."""
+    """The skeleton of a character that `playable_data` packed. It has all that is needed to draw the body."""
     joints, parents = tuple(spec["names"]), tuple(spec["parents"])
     return Skeleton("", joints, parents, np.array(spec["offsets"]), spec["roles"])
 

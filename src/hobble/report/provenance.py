@@ -39,7 +39,7 @@ def machine() -> Machine:
     }
 
 
-def commit(folder: Path) -> dict[str, Any] | None:
+def git_commit(folder: Path) -> dict[str, Any] | None:
     """The hash of the commit that is checked out at `folder`, and whether tracked files differ from it.
 
     None if `folder` is not in a git checkout, or if git is not installed.

@@ -37,7 +37,7 @@ DESCRIPTIONS = {
 }
 
 
-def scenes(
+def packed_scenes(
     path: str | Path, skeleton: Mapping[str, Any], channels: Mapping[str, Sequence[str]] | None = None
 ) -> dict[str, Any]:
     """The scripted walks of the page; {} without a skeleton.
@@ -84,7 +84,7 @@ def _packed_walk(
     """One scripted walk, packed for the page.
 
     data: arrays of the file, called <name>/positions and so on. frame_step: every frame_step-th frame is
-    stored. channels: as in `scenes`. displays: channel -> how it is shown. keep: joints to store.
+    stored. channels: as in `packed_scenes`. displays: channel -> how it is shown. keep: joints to store.
     """
     positions = np.asarray(data[f"{name}/positions"], float)[::frame_step]
     rotations = data.get(f"{name}/rotations")

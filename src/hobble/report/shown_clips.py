@@ -24,7 +24,7 @@ def choose_clips(material: ReportMaterial, most: int = MOST_SHOWN) -> frozenset[
     for report in material.labels:
         clip, seconds = report["clip"], report.get("seconds") or {}
         gait = max(seconds, key=lambda name: seconds[name], default="")
-        kinds.setdefault((material.split(clip), gait, clip in with_values), []).append(clip)
+        kinds.setdefault((material.split_of(clip), gait, clip in with_values), []).append(clip)
     if sum(map(len, kinds.values())) <= most:
         return frozenset(name for names in kinds.values() for name in names)
     candidates = [
@@ -44,6 +44,6 @@ def sample_files(paths: Sequence[str], most: int = MOST_COUNTED) -> list[str]:
     return [path for path in paths if Path(path).stem in chosen]
 
 
-def files_of(paths: Iterable[str], names: frozenset[str]) -> list[str]:
+def files_of_clips(paths: Iterable[str], names: frozenset[str]) -> list[str]:
     """Those of the paths that belong to the clips `names`. paths: files called after their clips."""
     return [path for path in paths if Path(path).stem in names]

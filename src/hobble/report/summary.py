@@ -8,13 +8,13 @@ from dataclasses import dataclass, replace
 
 @dataclass(frozen=True)
 class KeyFigure:
-    """A number at the top of a page. note: the smaller text under it. at: figures are sorted by it."""
+    """A number at the top of a page. note: the smaller text under it. order: figures are sorted by it."""
 
     label: str
     value: str
     unit: str = ""
     note: str = ""
-    at: int = 50
+    order: int = 50
 
 
 @dataclass(frozen=True)
@@ -22,7 +22,7 @@ class Hint:
     """Advice that follows from the numbers.
 
     kind: "warn", a problem; "note", something to improve; "good", something fine; "fact", information. head:
-    the first words, in bold. text: the words after them. at: hints of the same kind are sorted by it. It
+    the first words, in bold. text: the words after them. order: hints of the same kind are sorted by it. It
     grows along the pipeline, because earlier problems cause later ones: data below 20, training 20, network
     30, motion of the character 40, channels 50, speed 60, cost of the pipeline 90.
     """
@@ -30,9 +30,9 @@ class Hint:
     kind: str
     head: str
     text: str
-    at: int = 50
+    order: int = 50
 
 
-def placed(at: int, hints: Iterable[Hint]) -> Iterator[Hint]:
-    """The hints, each with this `at` instead of its own."""
-    return (replace(hint, at=at) for hint in hints)
+def with_order(order: int, hints: Iterable[Hint]) -> Iterator[Hint]:
+    """The hints, each with this `order` instead of its own."""
+    return (replace(hint, order=order) for hint in hints)

@@ -6,7 +6,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
-from hobble.report.formats import number
+from hobble.report.formats import format_number
 
 
 @dataclass(frozen=True)
@@ -24,7 +24,7 @@ class Column:
     @classmethod
     def number(cls, label: str, digits: int = 3) -> Column:
         """A column of numbers, shown to `digits` significant digits; the CSV has all digits."""
-        return cls(label, lambda value: number(value, digits), "n")
+        return cls(label, lambda value: format_number(value, digits), "n")
 
     @classmethod
     def count(cls, label: str) -> Column:

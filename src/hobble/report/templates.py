@@ -10,13 +10,13 @@ from jinja2 import Environment, FileSystemLoader, StrictUndefined, Template, sel
 from markupsafe import Markup
 
 from hobble.report.charts import Chart, ChartGroup
-from hobble.report.formats import duration, number, size
+from hobble.report.formats import format_bytes, format_duration, format_number
 from hobble.report.page_parts import ChartPair, PageSection
 
 FOLDER = Path(__file__).parent
 
 
-def template(name: str) -> Template:
+def load_template(name: str) -> Template:
     """The template in the file `name`. It escapes every value, and a missing value is an error."""
     environment = Environment(
         loader=FileSystemLoader(FOLDER),
@@ -25,11 +25,11 @@ def template(name: str) -> Template:
         trim_blocks=True,
         lstrip_blocks=True,
     )
-    environment.filters.update(duration=duration, size=size, number=number)
+    environment.filters.update(duration=format_duration, size=format_bytes, number=format_number)
     return environment.get_template(name)
 
 
-def specs(shown: Any) -> dict[str, Any]:
+def chart_specs(shown: Any) -> dict[str, Any]:
     """Chart name -> the chart's data for the page's script.
 
     shown: a chart, section or other part of a page, or any nesting of lists and mappings of them.
@@ -37,17 +37,17 @@ def specs(shown: Any) -> dict[str, Any]:
     if isinstance(shown, Chart):
         return {shown.name: shown.spec()}
     if isinstance(shown, ChartGroup | ChartPair):
-        return specs(shown.charts)
+        return chart_specs(shown.charts)
     if isinstance(shown, PageSection):
-        return specs([part.content for part in shown.parts])
+        return chart_specs([part.content for part in shown.parts])
     if isinstance(shown, Mapping):
-        return specs(list(shown.values()))
+        return chart_specs(list(shown.values()))
     if isinstance(shown, list | tuple):
-        return {name: spec for item in shown for name, spec in specs(item).items()}
+        return {name: spec for item in shown for name, spec in chart_specs(item).items()}
     return {}
 
 
-def style() -> Markup:
+def page_style() -> Markup:
     """The pages' style sheet."""
     return mark_safe("page.css", (FOLDER / "page.css").read_text(encoding="utf-8"))
 

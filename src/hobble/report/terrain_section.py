@@ -15,7 +15,7 @@ import numpy as np
 from hobble.core.array_parts import ArrayParts
 from hobble.core.errors import InputError
 from hobble.core.quat import Array
-from hobble.report.charts import Chart, Trace, axis, line
+from hobble.report.charts import Chart, Trace, axis, line_trace
 from hobble.report.tables import Column, Table
 
 MOST_CLIPS = 10  # at most this many clips have their ground profile drawn
@@ -41,7 +41,7 @@ class ShownFits:
     profile: Array = field(repr=False)
 
     @property
-    def flat(self) -> bool:
+    def is_flat(self) -> bool:
         """Whether the clip is on flat ground. Then its cycles have only one fit."""
         return self.profile.shape[1] < 2
 
@@ -71,7 +71,7 @@ def read_fits(path: str | Path) -> ShownFits:
 
 def section(paths: Iterable[str | Path]) -> dict[str, Any]:
     """Charts and a table of the fits. Clips on flat ground are left out. paths: files of terrain fits."""
-    fits_of_clips = [fit for fit in map(read_fits, paths) if not fit.flat and len(fit.profile)]
+    fits_of_clips = [fit for fit in map(read_fits, paths) if not fit.is_flat and len(fit.profile)]
     if not fits_of_clips:
         return {"charts": [], "table": None}
     return {
@@ -99,7 +99,9 @@ def profile_chart(fits_of_clips: list[ShownFits]) -> Chart:
                 for t, v in zip(np.insert(seconds, gaps, 0), height, strict=True)
             ]
             traces.append(
-                line(name, times, [None if not np.isfinite(v) else float(v) for v in height], colour, **more)
+                line_trace(
+                    name, times, [None if not np.isfinite(v) else float(v) for v in height], colour, **more
+                )
             )
         options[fit.clip] = traces
     return Chart(

@@ -9,8 +9,8 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 
-from hobble.report.charts import Chart, ChartGroup, axis, line, log_axis
-from hobble.report.formats import number
+from hobble.report.charts import Chart, ChartGroup, axis, line_trace, log_axis
+from hobble.report.formats import format_number
 from hobble.report.gather import ReportMaterial
 from hobble.report.tables import Column, Table
 
@@ -35,10 +35,10 @@ def passes_axis(material: ReportMaterial) -> list[float]:
 def learning_curve(material: ReportMaterial) -> Chart:
     """The training error and, if clips were held out, the held-out error, on a logarithmic scale."""
     x, history = passes_axis(material), material.history
-    traces = [line("training", x, history.get("train_mse", []), "@muted")]
+    traces = [line_trace("training", x, history.get("train_mse", []), "@muted")]
     held_out = any(v is not None for v in history.get("held_out_mse", ()))
     if held_out:
-        traces.append(line("held out", x, history["held_out_mse"], "@accent"))
+        traces.append(line_trace("held out", x, history["held_out_mse"], "@accent"))
     return Chart(
         "learning-curve",
         "Error over the passes",
@@ -76,14 +76,18 @@ def block_curves(material: ReportMaterial) -> ChartGroup | None:
     every = [v for values in blocks.values() for v in values] + whole
     charts = []
     for i, name in enumerate(sorted(blocks, key=lambda name: last[name], reverse=True)):
-        traces = [line("whole output", x, history["held_out_mse"], "@muted", width=1.2)] if whole else []
-        traces.append(line(name, x, blocks[name], "@accent"))
+        traces = (
+            [line_trace("whole output", x, history["held_out_mse"], "@muted", width=1.2)] if whole else []
+        )
+        traces.append(line_trace(name, x, blocks[name], "@accent"))
         layout = {
             "xaxis": axis("pass", rangemode="tozero"),
             "yaxis": log_axis("", every) | {"range": _log_span(every)},
             "showlegend": False,
         }
-        charts.append(Chart(f"block-{i}", f"{name}, {number(last[name])}", "", traces, layout, height=190))
+        charts.append(
+            Chart(f"block-{i}", f"{name}, {format_number(last[name])}", "", traces, layout, height=190)
+        )
     return ChartGroup(
         "block-curves",
         "Held-out error of each part of the output",

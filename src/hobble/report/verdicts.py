@@ -13,18 +13,18 @@ EQUAL = 0.03
 class Verdict:
     """A sentence about the configuration that is best in one respect.
 
-    at: place on the page, which sorts its verdicts by this number. title: heading of the sentence, such as
+    order: place on the page, which sorts its verdicts by this number. title: heading of the sentence, such as
     "Closest to captured motion". name: the best configuration. text: the sentence.
     """
 
-    at: int
+    order: int
     title: str
     name: str
     text: str
 
 
 def verdict_on_lowest(
-    at: int,
+    order: int,
     title: str,
     values: Mapping[str, float | None],
     say: Callable[[str, float], str],
@@ -32,7 +32,7 @@ def verdict_on_lowest(
 ) -> Iterator[Verdict]:
     """Yield one verdict: the configuration with the lowest value is best, and is compared with the second.
 
-    Yields nothing if fewer than two configurations have a value. at, title: see `Verdict`. values:
+    Yields nothing if fewer than two configurations have a value. order, title: see `Verdict`. values:
     configuration -> value, or None if it was not measured. say: function (configuration, value) -> half of
     the sentence. more: further text after the sentence; it begins with a space.
 
@@ -47,4 +47,4 @@ def verdict_on_lowest(
     (low, first), (second, other) = ranked[:2]
     equal = "almost equal: " if second <= low * (1 + EQUAL) else ""
     text = f"{say(first, low)}; {equal}{say(other, second)}.{more}"
-    yield Verdict(at, title, first, text[0].upper() + text[1:])
+    yield Verdict(order, title, first, text[0].upper() + text[1:])

@@ -10,7 +10,7 @@ from hobble.core.files import atomic_path, write_json
 from hobble.figure.pack import packed_body
 from hobble.models.network import Network
 from hobble.report.bundle import WEB, bundle_module
-from hobble.report.playable import playable
+from hobble.report.playable import playable_data
 from hobble.runtime.options import Runtime
 
 THREE_FILES = ("three.module.js", "three.core.js")  # files of three.js that the example page loads
@@ -30,7 +30,7 @@ def export_web(folder: str | Path, network: Network, runtime: Runtime, modules: 
         )
     folder = Path(folder)
     folder.mkdir(parents=True, exist_ok=True)
-    spec = playable(network, runtime)
+    spec = playable_data(network, runtime)
     write_json(folder / "character.json", {"spec": spec, "body": packed_body(network.skeleton)})
     bundle_module(modules, folder / "hobble.js")
     copies = {WEB / "hobble.d.ts": "hobble.d.ts", WEB / "example.html": "index.html"}

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from hobble.measures.registry import MEASURES, measure
+from hobble.measures.registry import MEASURES, measure_named
 from hobble.runtime.options import Runtime
 from hobble.workflow.clips import Clips, original
 from hobble.workflow.configurations import Configurations
@@ -37,11 +37,11 @@ class Measurements:
 
     def inputs(self, configuration: str, name: str) -> dict[str, str | list[str]]:
         """Name of each input of the measurement -> its file or files."""
-        return {item: self._input(configuration, item) for item in measure(name).inputs}
+        return {item: self._input(configuration, item) for item in measure_named(name).inputs}
 
     def pieces(self, configuration: str, name: str) -> list[str]:
         """Paths of the JSON files of the measurement's pieces; [] if there are fewer than two pieces."""
-        chosen = measure(name)
+        chosen = measure_named(name)
         if chosen.pieces is None:
             return []
         options = chosen.options.model_validate(self.options(configuration, name))
@@ -65,11 +65,11 @@ class Measurements:
             return self.clips.skeleton_file(configurations.dataset(configuration))
         if item == "published":
             return self.package.published_file()
-        return result_file(configuration, measure(item).name)
+        return result_file(configuration, measure_named(item).name)
 
     def splits(self, configuration: str, name: str) -> dict[str, str]:
         """Clip -> "train" or "held_out"; {} if the measurement does not read clips."""
-        return self.configurations.splits(configuration) if "clips" in measure(name).inputs else {}
+        return self.configurations.splits(configuration) if "clips" in measure_named(name).inputs else {}
 
     def people(self, configuration: str, name: str) -> dict[str, str]:
         """Clip -> the person who walks in it; {} if the measurement does not need this.
@@ -77,7 +77,7 @@ class Measurements:
         If the data set does not name the person in a clip, the clip's name stands for one more person. The
         mirror and the hurt versions of a clip have the clip's person.
         """
-        if not measure(name).people:
+        if not measure_named(name).people:
             return {}
         dataset = self.configurations.dataset(configuration)
         splits = self.configurations.splits(configuration)
@@ -85,17 +85,17 @@ class Measurements:
 
     def options(self, configuration: str, name: str) -> dict[str, Any]:
         """Key -> value of the section `evaluation`, for the keys that the measurement uses."""
-        keys = measure(name).options.model_fields
+        keys = measure_named(name).options.model_fields
         return self.configurations.section(configuration, "evaluation", *keys) if keys else {}
 
     def runtime(self, configuration: str, name: str) -> dict[str, Any]:
         """Key -> value of the section `runtime`, for the keys that the measurement uses."""
-        keys = measure(name).runtime
+        keys = measure_named(name).runtime
         return self.configurations.section(configuration, "runtime", *keys) if keys else {}
 
     def package_of(self, name: str) -> str:
         """Full name of the measurement's Python package."""
-        return measure(name).package
+        return measure_named(name).package
 
     def code(self, name: str, *modules: str, script: str = "measure") -> str:
         """Hash of the code of the measurement `name`.
@@ -103,4 +103,4 @@ class Measurements:
         modules: full names of modules that the code imports dynamically. script: name of the rule's script,
         without .py.
         """
-        return self.package.code(script, measure(name).module("run"), *modules)
+        return self.package.code(script, measure_named(name).module_name("run"), *modules)

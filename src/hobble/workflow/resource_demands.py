@@ -15,7 +15,7 @@ import re
 from pathlib import Path
 
 from hobble.channels import channel
-from hobble.measures.registry import measure
+from hobble.measures.registry import measure_named
 from hobble.models import model_of_kind
 from hobble.models.model import TrainedModel
 from hobble.rows.layout import RowLayout
@@ -90,21 +90,21 @@ class Demands:
 
     def measure_memory(self, configuration: str, name: str, attempt: int = 1) -> int:
         """MB for the job of the measurement `name`."""
-        cost = measure(name).cost
+        cost = measure_named(name).cost
         if self._measured_share(configuration, name) < 1:
-            return _megabytes(cost.memory_mb + cost.memory_each * EXCERPT_THOUSANDS, attempt)
+            return _megabytes(cost.memory_mb + cost.mb_per_1000_frames * EXCERPT_THOUSANDS, attempt)
         fixed = math.ceil(MEMORY_MARGIN * cost.memory_mb * attempt)
-        return fixed + self.evaluation_memory(configuration, cost.memory_each, attempt)
+        return fixed + self.evaluation_memory(configuration, cost.mb_per_1000_frames, attempt)
 
     def measure_minutes(self, configuration: str, name: str, attempt: int = 1) -> int:
         """Minutes for the job of the measurement `name`."""
-        cost = measure(name).cost
-        rate = cost.seconds_each * self._measured_share(configuration, name)
-        return self.evaluation_minutes(configuration, rate, attempt, cost.minutes)
+        cost = measure_named(name).cost
+        rate = cost.seconds_per_1000_frames * self._measured_share(configuration, name)
+        return self.evaluation_minutes(configuration, rate, attempt, cost.least_minutes)
 
     def _measured_share(self, configuration: str, name: str) -> float:
         """The share of a data set's frames that the measurement `name` reads; below 1 for a sample."""
-        if "sample_frames" not in measure(name).options.model_fields:
+        if "sample_frames" not in measure_named(name).options.model_fields:
             return 1.0
         section = self.project.configurations.section(configuration, "evaluation", "sample_frames")
         dataset = self.project.configurations.dataset(configuration)

@@ -20,7 +20,7 @@ from hobble.channels.injury.recognition.run import (
 from hobble.core import quat
 from hobble.core.skeleton import Skeleton, forward_kinematics
 from hobble.evaluation.captured import Captured
-from hobble.evaluation.gait_features import features
+from hobble.evaluation.gait_features import gait_features
 from hobble.gait.discriminant import learn
 from hobble.runtime.options import Runtime
 
@@ -114,9 +114,9 @@ def test_neither_the_unit_of_a_feature_nor_a_constant_one_changes_the_names() ->
 
 def test_features_measure_knee_and_elbow_bend_on_each_side(holden31: Skeleton) -> None:
     contacts, root = np.ones((120, 4)), np.zeros((120, 3))
-    well = features(holden31, figure(holden31, 120, 0, 0, 1), contacts, root)
-    stiff = features(holden31, figure(holden31, 120, 0.5, 0, 1), contacts, root)
-    bent = features(holden31, figure(holden31, 120, 0, 1.0, 1), contacts, root)
+    well = gait_features(holden31, figure(holden31, 120, 0, 0, 1), contacts, root)
+    stiff = gait_features(holden31, figure(holden31, 120, 0.5, 0, 1), contacts, root)
+    bent = gait_features(holden31, figure(holden31, 120, 0, 1.0, 1), contacts, root)
     assert len(well) == 50
     assert all(np.isfinite(list(f.values())).all() for f in (well, stiff, bent))
     assert stiff["knee_bend_left_sd"] == pytest.approx(0.5 * well["knee_bend_left_sd"], rel=0.1)

@@ -17,7 +17,7 @@ from hobble.channels.injury.response.cases import divided_severities, into_a_jog
 from hobble.channels.injury.response.run import GAITS, injury_response, largest_accelerations
 from hobble.channels.injury.response.sweep import SEVERITIES, sweeps
 from hobble.evaluation.captured import Captured
-from hobble.evaluation.crowd import SPEEDS, CrowdTarget, run
+from hobble.evaluation.crowd import SPEEDS, CrowdTarget, generate_walks
 from hobble.evaluation.pose_distance import mean_cycle, settling_seconds
 from hobble.evaluation.spearman import spearman
 from hobble.runtime.options import Runtime
@@ -191,10 +191,10 @@ def test_a_divided_severity_has_the_effect_of_the_quotient(hurtable) -> None:
 def test_a_figure_of_a_crowd_walks_as_it_does_alone(hurtable) -> None:
     """A character walks in a crowd as it does alone."""
     hurt = severity_inputs(hurtable, [{}, {KNEE: 4.0}, {KNEE: 10.0}])
-    together = run(hurtable, [CrowdTarget(30, ["walk", "jog", "walk"], hurt)], RUNTIME)
+    together = generate_walks(hurtable, [CrowdTarget(30, ["walk", "jog", "walk"], hurt)], RUNTIME)
     for figure, gait in enumerate(("walk", "jog", "walk")):
         own = {name: each[figure : figure + 1] for name, each in hurt.items()}
-        alone = run(hurtable, [CrowdTarget(30, [gait], own)], RUNTIME)
+        alone = generate_walks(hurtable, [CrowdTarget(30, [gait], own)], RUNTIME)
         np.testing.assert_allclose(together.local[:, figure], alone.local[:, 0], atol=2e-3)
         np.testing.assert_allclose(together.root[:, figure], alone.root[:, 0], atol=2e-3)
     assert SPEEDS["jog"] > SPEEDS["walk"]
@@ -202,7 +202,7 @@ def test_a_figure_of_a_crowd_walks_as_it_does_alone(hurtable) -> None:
 
 def test_whole_cycles_are_measured(hurtable) -> None:
     unhurt = severity_inputs(hurtable, [{}])
-    walks = run(hurtable, [CrowdTarget(n, ["walk"], unhurt) for n in (20, 400, 10)], RUNTIME)
+    walks = generate_walks(hurtable, [CrowdTarget(n, ["walk"], unhurt) for n in (20, 400, 10)], RUNTIME)
     phase = np.zeros((430, 1))
     phase[:, 0] = np.mod(0.013 * np.arange(430), 1)
     known = replace(walks, phase=phase)

@@ -15,5 +15,5 @@ MEASURE = Measure(
     inputs=("weights", "clips", "summaries", "skeleton"),
     options=Options,
     # For each thousand frames: 12 MB and 0.2 s. At least 10 minutes.
-    cost=Cost(memory_each=12, seconds_each=0.2, minutes=10),
+    cost=Cost(mb_per_1000_frames=12, seconds_per_1000_frames=0.2, least_minutes=10),
 )

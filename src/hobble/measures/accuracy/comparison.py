@@ -8,9 +8,9 @@ from itertools import combinations
 import numpy as np
 
 from hobble.evaluation.comparison_rows import (
+    ComparisonAddition,
     DifferenceOf,
     PublishedRow,
-    SideBySide,
     compare_series,
     published_row,
 )
@@ -23,14 +23,14 @@ NAME = "accuracy"  # name of the measurement
 SPLIT_NAMES = {"train": "training", "held_out": "held-out"}
 
 
-def compared(all_measured: Sequence[ConfigurationResults], published: Json) -> SideBySide:
+def compared(all_measured: Sequence[ConfigurationResults], published: Json) -> ComparisonAddition:
     """The errors of each configuration, the difference of each pair, and the published errors beside ours.
 
     all_measured: the results of each configuration. published: the content of published.yaml.
     """
-    return SideBySide(
-        entries=[{"dataset": m.dataset, **m.found(NAME), "configuration": m.name} for m in all_measured],
-        about={m.name: {"joints": m.found(NAME)["joints"]} for m in all_measured},
+    return ComparisonAddition(
+        entries=[{"dataset": m.dataset, **m.results_of(NAME), "configuration": m.name} for m in all_measured],
+        about={m.name: {"joints": m.results_of(NAME)["joints"]} for m in all_measured},
         differences=accuracy_differences(all_measured),
         against_published=[
             *_published_splits(all_measured, published),
@@ -70,7 +70,7 @@ def accuracy_differences(all_measured: Sequence[ConfigurationResults]) -> list[D
 
 def _errors_of_splits(measured: ConfigurationResults) -> dict[str, Json]:
     """Split -> its errors over all frames, with the mean errors of its clips under `means`."""
-    found = measured.found(NAME)
+    found = measured.results_of(NAME)
     return {split: {**found[split], "means": clip_means(found, split)} for split in SPLITS}
 
 
@@ -86,12 +86,12 @@ def _published_splits(all_measured: Sequence[ConfigurationResults], published: J
     for row in published["accuracy"]:
         measured = by_name.get(row["configuration"])
         for split in SPLITS:
-            ours = measured.found(NAME)[split]["mean_of_clips"] if measured else None
+            ours = measured.results_of(NAME)[split]["mean_of_clips"] if measured else None
             out.append(published_row(f"relative error, {SPLIT_NAMES[split]} clips", row, row["mean"], ours))
             if "sd" in row:
                 # The standard deviation (sd) was printed in the text of the publication, not in its table.
                 in_text = {**row, "table": None}
-                means = clip_means(measured.found(NAME), split) if measured else []
+                means = clip_means(measured.results_of(NAME), split) if measured else []
                 sd = float(np.std(means)) if len(means) > 1 else None
                 what = f"standard deviation of the means of {SPLIT_NAMES[split]} clips"
                 out.append(published_row(what, in_text, row["sd"], sd))
@@ -108,7 +108,7 @@ def _published_clips(all_measured: Sequence[ConfigurationResults], published: Js
     out = []
     for row in published["clips"]:
         for measured in all_measured:
-            for clip in measured.found(NAME)["clips"]:
+            for clip in measured.results_of(NAME)["clips"]:
                 if clip["clip"].removesuffix("_000") == row["clip"]:
                     for source in ("segerstedt", "release"):
                         entry = {"configuration": measured.name, "source": source}
@@ -119,4 +119,4 @@ def _published_clips(all_measured: Sequence[ConfigurationResults], published: Js
 
 def _errors_of_clips(measured: ConfigurationResults) -> dict[str, Json]:
     """Clip -> its errors over all frames."""
-    return {entry["clip"]: entry for entry in measured.found(NAME)["clips"]}
+    return {entry["clip"]: entry for entry in measured.results_of(NAME)["clips"]}

@@ -14,7 +14,13 @@ from typing import Any
 from hobble.measures.accuracy.page import quantiles
 from hobble.report.charts import Chart, Trace, axis
 from hobble.report.compare_tables import difference_table
-from hobble.report.comparison_charts import SPLITS, Compared, colours, dots, names
+from hobble.report.comparison_charts import (
+    SPLITS,
+    Compared,
+    configuration_colours,
+    configuration_names,
+    dot_trace,
+)
 from hobble.report.measure_sections import OverviewColumn
 from hobble.report.page_parts import PageSection, SectionPart
 from hobble.report.tables import Column
@@ -37,7 +43,7 @@ def section(compared: Compared) -> PageSection:
             SectionPart(50, clip_dots(compared), tall=True),
         ],
         title="Accuracy",
-        at=10,
+        order=10,
         long=True,
     )
 
@@ -64,7 +70,7 @@ def error_boxes(compared: Compared) -> Chart | None:
                 continue
             # In %. Each is a list, because plotly draws a box for each entry.
             low, q1, median, q3, high = ([100 * value] for value in percentiles)
-            colour = colours(compared)[entry["configuration"]]
+            colour = configuration_colours(compared)[entry["configuration"]]
             traces.append(
                 {
                     "type": "box",
@@ -83,7 +89,11 @@ def error_boxes(compared: Compared) -> Chart | None:
             )
         if traces:
             options[label] = traces
-    published = [row for row in compared["published"]["accuracy"] if row["configuration"] in names(compared)]
+    published = [
+        row
+        for row in compared["published"]["accuracy"]
+        if row["configuration"] in configuration_names(compared)
+    ]
     if not options:
         return None
     for traces in options.values():
@@ -123,11 +133,11 @@ def clip_dots(compared: Compared) -> Chart | None:
     for entry in compared["accuracy"]:
         rows = [row for row in entry["clips"] if row.get("mean") is not None]
         traces.append(
-            dots(
+            dot_trace(
                 entry["configuration"],
                 [100 * row["mean"] for row in rows],
                 [row["clip"] for row in rows],
-                colours(compared)[entry["configuration"]],
+                configuration_colours(compared)[entry["configuration"]],
                 "%{y}: %{x:.2f} %",
             )
         )
@@ -141,7 +151,7 @@ def clip_dots(compared: Compared) -> Chart | None:
 
 def difference_map(compared: Compared) -> Chart | None:
     """The difference of each two configurations. A menu selects the split and the kind of deviation."""
-    configurations, options = names(compared), {}
+    configurations, options = configuration_names(compared), {}
     for (split, label), (key, kind) in product(SPLITS.items(), DEVIATIONS.items()):
         values = {(r["a"], r["b"]): r[key] for r in compared["difference"] if r["over"] == split}
         if all(value is None for value in values.values()):

@@ -12,12 +12,12 @@ import numpy as np
 
 from hobble.measures.clip_parts import sample_in_words
 from hobble.measures.inputs import Json
-from hobble.report.charts import Chart, axis, mark
-from hobble.report.formats import duration, number
+from hobble.report.charts import Chart, axis, reference_line
+from hobble.report.formats import format_duration, format_number
 from hobble.report.gather import ReportMaterial
 from hobble.report.page_parts import PageSection, Paragraph, SectionPart, TemplatePart
 from hobble.report.published import citation
-from hobble.report.summary import Hint, KeyFigure, placed
+from hobble.report.summary import Hint, KeyFigure, with_order
 from hobble.report.tables import Column, Table
 
 INTRODUCTION = (
@@ -82,7 +82,7 @@ def clip_bars(found: Json, material: ReportMaterial) -> Chart | None:
     shapes, notes = [], []
     published = material.published_entry("accuracy")
     if published:
-        shape, note = mark(100 * published["mean"], f"{published['label']}, published")
+        shape, note = reference_line(100 * published["mean"], f"{published['label']}, published")
         shapes, notes = [shape], [note]
     order = [row["clip"] for row in rows]
     return Chart(
@@ -222,7 +222,7 @@ def section(found: Json, material: ReportMaterial) -> PageSection:
             SectionPart(90, TemplatePart("captured.html.j2")),
         ],
         title="Accuracy",
-        at=10,
+        order=10,
         long=True,
     )
 
@@ -239,7 +239,7 @@ def caveat(found: Json, material: ReportMaterial) -> str:
     frames = sum((found.get(split) or {}).get("frames") or 0 for split in ("held_out", "train"))
     return (
         "Do not compare these errors with the published ones as if the clips were the same. Ours are "
-        f"measured on {duration(frames / 60)} of gait cycles in the data set {material.dataset}, the "
+        f"measured on {format_duration(frames / 60)} of gait cycles in the data set {material.dataset}, the "
         "published ones on 80 clips of Holden et al. (2017). A small error may only mean that the clips are "
         "easy to predict."
     )
@@ -286,21 +286,20 @@ def _centimetres(error: float, split: str, material: ReportMaterial) -> str:
 
     error: the error of the predicted joints, cm.
     """
-    lengths = {entry["length"]: entry for entry in material.found("rollouts").get("lengths", ())}
+    lengths = {entry["length"]: entry for entry in material.results_of("rollouts").get("lengths", ())}
     drawn = (lengths.get(1, {}).get(split) or {}).get("position_error_cm")
     if drawn is None:
-        return f"{number(error)} cm per joint on average"
-    return (
-        f"{number(error)} cm per joint as predicted; {number(drawn)} cm as drawn (explained under Accuracy)"
-    )
+        return f"{format_number(error)} cm per joint on average"
+    drawn_text = f"{format_number(drawn)} cm as drawn (explained under Accuracy)"
+    return f"{format_number(error)} cm per joint as predicted; {drawn_text}"
 
 
 def hints(found: Json, material: ReportMaterial) -> Iterator[Hint]:
     """How well the network generalises, and which clip has the largest error."""
-    # Places of hints (`Hint.at`): under 20 for advice on the data, 30 for advice on the network.
+    # Places of hints (`Hint.order`): under 20 for advice on the data, 30 for advice on the network.
     held_out = (found.get("held_out") or {}).get("mean")
-    yield from placed(10 if held_out is None else 30, _generalisation(found))
-    yield from placed(12, _worst_clip(found))
+    yield from with_order(10 if held_out is None else 30, _generalisation(found))
+    yield from with_order(12, _worst_clip(found))
 
 
 def _generalisation(found: Json) -> Iterator[Hint]:

@@ -26,7 +26,7 @@ from hobble.measures.accuracy.results import (
     ErrorsOfExcerpt,
     ErrorsOfSplit,
 )
-from hobble.measures.clip_parts import clip_parts, sample_of
+from hobble.measures.clip_parts import clip_parts, sample_to_measure
 from hobble.measures.inputs import Json, MeasureInputs, Outcome, Row
 from hobble.measures.joints import JointOptions
 from hobble.measures.results import SPLITS
@@ -74,7 +74,7 @@ class Errors:
             self.frames + other.frames, self.moments + other.moments, self.histogram + other.histogram
         )
 
-    def weighing(self, weight: float) -> Errors:
+    def weighted_by(self, weight: float) -> Errors:
         """The same errors with `weight` times their weights. `frames` stays the number of measured frames."""
         return self if weight == 1 else Errors(self.frames, self.moments * weight, self.histogram * weight)
 
@@ -159,7 +159,7 @@ def clip_errors(
     return Errors(len(rows), total, histogram)
 
 
-def measure(
+def measure_accuracy(
     weights: str | Path,
     clips: Mapping[str, str | Path],
     splits: Mapping[str, str],
@@ -185,11 +185,11 @@ def measure(
         check_layout(part.path, loaded.rows, network)
         errors = clip_errors(network, loaded.rows, joints, predict)
         split = splits[part.clip]
-        totals[split] += errors.weighing(part.weight)
-        of_clip[part.clip] = of_clip.get(part.clip, Errors()) + errors.weighing(part.weight)
+        totals[split] += errors.weighted_by(part.weight)
+        of_clip[part.clip] = of_clip.get(part.clip, Errors()) + errors.weighted_by(part.weight)
         values = errors.to_dict()
         if part.excerpt is not None:
-            first, last = loaded.frames
+            first, last = loaded.first_and_last_frame
             place = {"clip": part.clip, "split": split, "first_frame": first, "last_frame": last}
             excerpts[part.excerpt] = ErrorsOfExcerpt(**place, **values)  # type: ignore[typeddict-item]
         log.info("%s: %s", part.excerpt or part.clip, values)
@@ -248,7 +248,7 @@ def equivalent_joints(skeleton: Json, reference: str = REFERENCE) -> list[str] |
     return None if counterparts is None else list(counterparts)
 
 
-def chosen_joints(inputs: MeasureInputs, options: JointOptions) -> list[str] | None:
+def joints_to_measure(inputs: MeasureInputs, options: JointOptions) -> list[str] | None:
     """Names of the joints that the options select; None for all."""
     return equivalent_joints(inputs.skeleton) if options.joints == "equivalent" else None
 
@@ -293,13 +293,13 @@ def clips_table(result: Accuracy) -> list[Row]:
 
 def run(inputs: MeasureInputs, options: Options) -> Outcome:
     """accuracy.json, and the tables `clips` and, if a sample was measured, `excerpts`, with their errors."""
-    sample = sample_of(inputs, options)
-    result = measure(
+    sample = sample_to_measure(inputs, options)
+    result = measure_accuracy(
         inputs.weights,
         inputs.clips,
         inputs.splits,
         inputs.configuration,
-        chosen_joints(inputs, options),
+        joints_to_measure(inputs, options),
         sample,
     )
     excerpts = {"excerpts": result.pop("excerpts")} if sample else {}

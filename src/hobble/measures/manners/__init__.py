@@ -17,5 +17,5 @@ MEASURE = Measure(
     runtime=tuple(Runtime.model_fields),
     people=True,
     # For each thousand frames: 36 MB and 0.4 s. At least 30 minutes.
-    cost=Cost(memory_each=36, seconds_each=0.4, minutes=30),
+    cost=Cost(mb_per_1000_frames=36, seconds_per_1000_frames=0.4, least_minutes=30),
 )

@@ -58,12 +58,14 @@ def _recognise_with_shrinkage(
         "people": len(set(person)),
         "people_of": {str(m): sum(m == other for other, _ in pairs) for m in sorted(set(manner))},
         "windows": int(tried.sum()),
-        "right": share(right[tried]),
-        "by_manner": {str(m): share(right[tried & (manner == m)]) for m in sorted(set(manner[tried]))},
-        "presence_right": share(presence_right[tried]),
+        "right": share_of_true(right[tried]),
+        "by_manner": {
+            str(m): share_of_true(right[tried & (manner == m)]) for m in sorted(set(manner[tried]))
+        },
+        "presence_right": share_of_true(presence_right[tried]),
     }
 
 
-def share(right: Sequence[bool] | np.ndarray) -> float | None:
+def share_of_true(right: Sequence[bool] | np.ndarray) -> float | None:
     """The share of values that are true, 0 to 1 with five decimals; None if there are no values."""
     return round(float(np.mean(right)), 5) if len(right) else None

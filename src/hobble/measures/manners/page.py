@@ -44,14 +44,14 @@ def section(found: Json, material: ReportMaterial) -> PageSection:
         charts = [together_chart(result, shown_name), *(effect_chart(result, effect) for effect in EFFECTS)]
         # The first argument of each part is its place in the section.
         parts += [
-            SectionPart(10 * i, Paragraph(summarise(result) + sample_sentence(found))),
+            SectionPart(10 * i, Paragraph(summarise_channel(result) + sample_sentence(found))),
             *(SectionPart(10 * i + 1 + k, chart) for k, chart in enumerate(charts)),
         ]
     title = " and ".join(result["title"] for result in found["channels"])
-    return PageSection("manners", parts, title=title, at=21)
+    return PageSection("manners", parts, title=title, order=21)
 
 
-def summarise(result: ChannelResult) -> str:
+def summarise_channel(result: ChannelResult) -> str:
     """A paragraph: how often the recogniser is right on generated walks, and on walks of people left out."""
     captured = result["captured"]
     text = (

@@ -17,9 +17,9 @@ from hobble.core.quat import Array
 from hobble.evaluation.captured import Captured
 from hobble.evaluation.crowd import FPS
 from hobble.gait.discriminant import Discriminant, learn
-from hobble.measures.clip_parts import captured_motion, sample_of, with_sample
+from hobble.measures.clip_parts import captured_motion, sample_to_measure, with_sample
 from hobble.measures.inputs import MeasureInputs, Outcome, Row
-from hobble.measures.manners.left_out import recognise_left_out, share
+from hobble.measures.manners.left_out import recognise_left_out, share_of_true
 from hobble.measures.manners.results import ChannelResult, CombinedResult, Effect, Manners, NamedWindows
 from hobble.measures.manners.windows import (
     EFFECTS,
@@ -163,7 +163,7 @@ def recognise_together(
                 "other": other,
                 "column": column,
                 "windows": len(names),
-                "share": share([n == manner for n in names]),
+                "share": share_of_true([n == manner for n in names]),
                 "named": _counts(names),
             }
         )
@@ -172,7 +172,7 @@ def recognise_together(
 
 def run(inputs: MeasureInputs, options: SampleOptions) -> Outcome:
     """manners.json, and its lists `effects` and `together` as tables."""
-    sample = sample_of(inputs, options)
+    sample = sample_to_measure(inputs, options)
     motion = captured_motion(inputs.clips, sample)
     result = measure_manners(
         load_network(inputs.weights), motion, inputs.splits, inputs.people, inputs.runtime
@@ -186,8 +186,8 @@ def run(inputs: MeasureInputs, options: SampleOptions) -> Outcome:
             for row in of_channel["together"]
         ],
     }
-    says = "; ".join(f"{one['channel']}, share named right: {one['right_at_1']}" for one in measured)
-    return Outcome(with_sample(result, sample), tables, says or result.get("reason", ""))
+    log_line = "; ".join(f"{one['channel']}, share named right: {one['right_at_1']}" for one in measured)
+    return Outcome(with_sample(result, sample), tables, log_line or result.get("reason", ""))
 
 
 def _name_windows(
@@ -200,7 +200,7 @@ def _name_windows(
         "manners": list(values),
         "value": next(iter(values.values()), 0.0) if len(values) < 2 else None,
         "windows": len(names),
-        "share": share([name in right_names for name in names]),
+        "share": share_of_true([name in right_names for name in names]),
         "named": _counts(names),
     }
 

@@ -14,9 +14,8 @@ from hobble.channels import channel
 from hobble.core.quat import Array
 from hobble.core.skeleton import Skeleton
 from hobble.evaluation.captured import Captured
-from hobble.evaluation.crowd import FPS, CrowdTarget, channel_values
-from hobble.evaluation.crowd import run as run_walks
-from hobble.evaluation.gait_features import features
+from hobble.evaluation.crowd import FPS, CrowdTarget, channel_values, generate_walks
+from hobble.evaluation.gait_features import gait_features
 from hobble.models.network import Network
 from hobble.rows.layout import GAITS
 from hobble.runtime.options import Runtime
@@ -95,7 +94,7 @@ def generated_windows(
         channels |= channel_values(network, key, [walker.channels.get(key, {}) for walker in walkers])
     speeds = [walker.speed for walker in walkers]
     script = CrowdTarget(WARM_UP + USED, ["walk"] * len(walkers), channels, speeds)
-    walks = run_walks(network, [script], runtime)
+    walks = generate_walks(network, [script], runtime)
     out = []
     for i, walker in enumerate(walkers):
         manner = " and ".join(walker.channels.get(name, {})) or NONE
@@ -118,8 +117,8 @@ def mean_effect(windows: Iterable[MannerWindow], effect: str) -> float:
 def _window(
     skeleton: Skeleton, clip: str, manner: str, local: Array, contacts: Array, root: Array
 ) -> MannerWindow:
-    """A window from its motion. local, contacts, root: as for `features`."""
-    values = features(skeleton, local, contacts, root)
+    """A window from its motion. local, contacts, root: as for `gait_features`."""
+    values = gait_features(skeleton, local, contacts, root)
     head, neck = (local[:, skeleton.role(part)].astype(float) for part in ("head", "neck"))
     up = (head - neck).mean(axis=0)  # from the neck to the head
     effects = {

@@ -47,5 +47,5 @@ MEASURE = Measure(
     options=Options,
     runtime=tuple(Runtime.model_fields),
     pieces=pieces,
-    cost=Cost(memory_mb=200, minutes=60),
+    cost=Cost(memory_mb=200, least_minutes=60),
 )

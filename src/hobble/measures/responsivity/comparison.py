@@ -10,9 +10,9 @@ import numpy as np
 
 from hobble.evaluation.comparison_csv import flatten
 from hobble.evaluation.comparison_rows import (
+    ComparisonAddition,
     DifferenceOf,
     PublishedRow,
-    SideBySide,
     compare_series,
     published_row,
 )
@@ -55,10 +55,10 @@ class TimeLine(StraightLine):
     y: list[float]
 
 
-def compared(all_measured: Sequence[ConfigurationResults], published: Json) -> SideBySide:
+def compared(all_measured: Sequence[ConfigurationResults], published: Json) -> ComparisonAddition:
     """The laps of the track in each phase mode, the networks' sizes, and published sizes and times."""
     sizes = {m.name: _sizes(m) for m in all_measured}
-    return SideBySide(
+    return ComparisonAddition(
         entries=[entry for m in all_measured for entry in mode_entries(m)],
         about=sizes,
         against_published=_published_sizes(sizes, published),
@@ -81,12 +81,12 @@ def tables(compared: Json) -> dict[str, Sequence[Row]]:
 
 def mode_entries(measured: ConfigurationResults) -> list[Json]:
     """A configuration's results in each phase mode that was run. The key `configuration` has its name."""
-    found = measured.found(NAME)
+    found = measured.results_of(NAME)
     return [{**entry, "configuration": measured.name} for entry in found.get("modes", [found])]
 
 
 def _sizes(measured: ConfigurationResults) -> Sizes:
-    found = measured.found(NAME)
+    found = measured.results_of(NAME)
     counts = found["parameters"]
     return {
         "computations": {key: counts[key] if counts else None for key in COUNTS},
@@ -126,13 +126,15 @@ def fit_lines(all_measured: Sequence[ConfigurationResults], published: Json) -> 
     Configurations with the same network are separate points. Networks without layers are left out.
     """
     out = []
-    entries = [(m, entry) for m in all_measured if m.found(NAME)["parameters"] for entry in mode_entries(m)]
+    entries = [
+        (m, entry) for m in all_measured if m.results_of(NAME)["parameters"] for entry in mode_entries(m)
+    ]
     modes = list(dict.fromkeys(entry["mode"] for _, entry in entries))
     for counts in COUNTS:
         for mode in modes:
             for step in ("total", "predict", "median"):
                 points = [
-                    (m.found(NAME)["parameters"][counts], _time(entry["milliseconds"], step))
+                    (m.results_of(NAME)["parameters"][counts], _time(entry["milliseconds"], step))
                     for m, entry in entries
                     if entry["mode"] == mode
                 ]
@@ -201,11 +203,11 @@ def _published_times(all_measured: Sequence[ConfigurationResults], published: Js
     out = []
     for row in published["responsivity"]:
         measured = by_name.get(row["configuration"])
-        ours = measured.found(NAME)["milliseconds"]["total"] if measured else None
+        ours = measured.results_of(NAME)["milliseconds"]["total"] if measured else None
         out.append(published_row("a frame", row, row["milliseconds"], ours, "ms"))
         if "sd" in row:
             in_text = {**row, "table": None}  # the standard deviation is only in the text of the thesis
-            means = lap_means(measured.found(NAME)) if measured else []
+            means = lap_means(measured.results_of(NAME)) if measured else []
             sd = float(np.std(means)) if len(means) > 1 else None
             out.append(published_row("standard deviation of the means of laps", in_text, row["sd"], sd, "ms"))
     for row in published["modes"]:

@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Iterator
 from typing import Any
 
-from hobble.report.charts import Chart, Trace, axis, line
-from hobble.report.comparison_charts import Compared, colours, dots, names
-from hobble.report.formats import number, size
+from hobble.report.charts import Chart, Trace, axis, line_trace
+from hobble.report.comparison_charts import Compared, configuration_colours, configuration_names, dot_trace
+from hobble.report.formats import format_bytes, format_number
 from hobble.report.measure_sections import OverviewColumn
 from hobble.report.page_parts import PageSection, SectionPart
 from hobble.report.tables import Column
@@ -17,7 +17,7 @@ from hobble.report.verdicts import Verdict, verdict_on_lowest
 def section(compared: Compared) -> PageSection:
     """Two charts: the times of the laps, and the time of a frame over the size of the network."""
     parts = [SectionPart(10, lap_lines(compared)), SectionPart(20, fit_chart(compared))]
-    return PageSection("speed", parts, title="Time per frame", at=30)
+    return PageSection("speed", parts, title="Time per frame", order=30)
 
 
 def columns(compared: Compared) -> Iterator[OverviewColumn]:
@@ -28,7 +28,7 @@ def columns(compared: Compared) -> Iterator[OverviewColumn]:
     about = {entry["configuration"]: entry for entry in compared["configurations"]}
     counts = {name: (entry["computations"] or {}).get("true") for name, entry in about.items()}
     yield OverviewColumn(40, Column.count("parameters of one frame"), counts)
-    yield OverviewColumn(110, Column("in memory", lambda v: size(float(v)), "n"), _bytes(compared))
+    yield OverviewColumn(110, Column("in memory", lambda v: format_bytes(float(v)), "n"), _bytes(compared))
 
 
 def verdicts(compared: Compared) -> Iterator[Verdict]:
@@ -44,7 +44,7 @@ def verdicts(compared: Compared) -> Iterator[Verdict]:
         20,
         "Closest to the track",
         {name: e["path_overshoot_cm"] for name, e in arrived.items()},
-        lambda name, v: f"{name} is never more than {number(v, 3)} cm off the track",
+        lambda name, v: f"{name} is never more than {format_number(v, 3)} cm off the track",
         left_out,
     )
     yield from verdict_on_lowest(
@@ -52,18 +52,18 @@ def verdicts(compared: Compared) -> Iterator[Verdict]:
         "Smoothest",
         {name: e["foot_slide_cm"] for name, e in arrived.items()},
         lambda name, v: (
-            f"the feet of {name} slide {number(v, 2)} cm a step, and no joint turns more than "
-            f"{number(exact[name]['largest_turn_degrees'], 2)} degrees in a frame"
+            f"the feet of {name} slide {format_number(v, 2)} cm a step, and no joint turns more than "
+            f"{format_number(exact[name]['largest_turn_degrees'], 2)} degrees in a frame"
         ),
     )
     yield from verdict_on_lowest(
         40,
         "Fastest",
         {name: e["milliseconds"]["spread"]["median"] for name, e in exact.items()},
-        lambda name, v: f"the median frame of {name} takes {number(v, 3)} ms",
+        lambda name, v: f"the median frame of {name} takes {format_number(v, 3)} ms",
     )
     yield from verdict_on_lowest(
-        50, "Smallest", _bytes(compared), lambda name, v: f"{name} needs {size(v)} of memory to run"
+        50, "Smallest", _bytes(compared), lambda name, v: f"{name} needs {format_bytes(v)} of memory to run"
     )
 
 
@@ -76,7 +76,7 @@ def in_exact_mode(compared: Compared) -> dict[str, Any]:
     # The exact mode of a configuration comes last, so that it replaces the other modes in `by_name`.
     ordered = sorted(compared["responsivity"], key=lambda e: e["mode"] == exact[e["configuration"]])
     by_name = {entry["configuration"]: entry for entry in ordered}
-    return {name: by_name[name] for name in names(compared) if name in by_name}
+    return {name: by_name[name] for name in configuration_names(compared) if name in by_name}
 
 
 def _bytes(compared: Compared) -> dict[str, float]:
@@ -91,19 +91,19 @@ def lap_lines(compared: Compared) -> Chart | None:
     for entry in sorted(compared["responsivity"], key=lambda entry: entry["mode"] != "cubic"):
         laps = [lap for lap in entry["laps"] if isinstance(lap.get("milliseconds"), dict)]
         x, y = [lap["lap"] for lap in laps], [lap["milliseconds"]["spread"]["median"] for lap in laps]
-        colour = colours(compared)[entry["configuration"]]
-        trace = line(entry["configuration"], x, y, colour, mode="lines+markers")
+        colour = configuration_colours(compared)[entry["configuration"]]
+        trace = line_trace(entry["configuration"], x, y, colour, mode="lines+markers")
         options.setdefault(f"{entry['mode']} phase", []).append(trace)
     if not options:
         return None
     for traces in options.values():
         for row in compared["published"]["responsivity"]:
-            if row["configuration"] in names(compared):
+            if row["configuration"] in configuration_names(compared):
                 last_lap = max((max(t["x"], default=1) for t in traces), default=1)
-                colour = colours(compared)[row["configuration"]]
+                colour = configuration_colours(compared)[row["configuration"]]
                 label = f"{row['label']}: published mean"
                 traces.append(
-                    line(label, [1, last_lap], [row["milliseconds"]] * 2, colour, dash="dot", width=1.2)
+                    line_trace(label, [1, last_lap], [row["milliseconds"]] * 2, colour, dash="dot", width=1.2)
                 )
     return Chart(
         "compare-laps",
@@ -130,11 +130,11 @@ def fit_chart(compared: Compared) -> Chart | None:
     traces: list[Trace] = []
     for fit, colour in zip(shown_fits, ("@accent", "@g2"), strict=False):
         label = "ours (medians, cubic phase)" if fit["whose"] == "hobble" else "published (means)"
-        traces.append(dots(label, fit["x"], fit["y"], colour, "%{x:,} parameters: %{y:.3f} ms"))
+        traces.append(dot_trace(label, fit["x"], fit["y"], colour, "%{x:,} parameters: %{y:.3f} ms"))
         if fit["slope"] is not None:
             ends = [min(fit["x"]), max(fit["x"])]
             values = [fit["intercept"] + fit["slope"] * x for x in ends]
-            traces.append(line(f"{label}, straight fit", ends, values, colour, width=1.4))
+            traces.append(line_trace(f"{label}, straight fit", ends, values, colour, width=1.4))
     if not traces:
         return None
     layout = {

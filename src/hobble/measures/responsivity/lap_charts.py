@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 from hobble.measures.inputs import Json
-from hobble.report.charts import Chart, Trace, axis, line, mark
+from hobble.report.charts import Chart, Trace, axis, line_trace, reference_line
 from hobble.report.gather import ReportMaterial
 
 # The steps of a frame, in order -> their colours. `hobble.runtime.controller` says what each step does.
@@ -52,7 +52,9 @@ def lap_chart(found: Json, material: ReportMaterial) -> Chart | None:
     shapes, notes = [], []
     published = material.published_entry("responsivity")
     if published:
-        shape, note = mark(published["milliseconds"], f"{published['label']}: published mean", vertical=False)
+        shape, note = reference_line(
+            published["milliseconds"], f"{published['label']}: published mean", vertical=False
+        )
         shapes, notes = [shape], [note]
     lap_counts = [max(len(trace["x"]) for trace in traces) for traces in options.values()]
     laps = max(lap_counts)
@@ -89,11 +91,11 @@ def track_chart(found: Json) -> Chart | None:
         return None
     labels = [f"{i}, {gait}" for i, gait in enumerate(track["gaits"])]
     closed_x, closed_z = [*track["x"], track["x"][0]], [*track["z"], track["z"][0]]
-    traces = [line("track", closed_x, closed_z, "@faint", dash="dash", width=1.2, hoverinfo="skip")]
+    traces = [line_trace("track", closed_x, closed_z, "@faint", dash="dash", width=1.2, hoverinfo="skip")]
     for run in runs:
         name = "laps" if run is runs[0] else f"lap {run['lap']}"
         shown = {"legendgroup": "runs", "showlegend": run is runs[0]}
-        traces.append(line(name, run["x"], run["z"], "@accent", width=1.5, hoverinfo="skip", **shown))
+        traces.append(line_trace(name, run["x"], run["z"], "@accent", width=1.5, hoverinfo="skip", **shown))
     places = [
         (x, z, cm, run["lap"])
         for run in runs

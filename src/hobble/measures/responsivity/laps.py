@@ -28,7 +28,7 @@ RUN_UP = 1000.0  # cm; a character starts at most this far before the waypoint w
 
 
 @dataclass(frozen=True)
-class Starts:
+class LapStarts:
     """Where the characters of C laps start.
 
     places: (C, 2) x and z, cm. facing: (C, 2) direction in which the character looks. waypoints: (C,) index
@@ -39,7 +39,7 @@ class Starts:
     facing: Array
     waypoints: np.ndarray
 
-    def begin(self, animation: ProceduralAnimation, laps: slice) -> None:
+    def place_characters(self, animation: ProceduralAnimation, laps: slice) -> None:
         """Put the characters of `animation` at the starts of the laps in the slice `laps`, one at each.
 
         The characters must follow the track.
@@ -49,7 +49,7 @@ class Starts:
         animation.follower.reached[:] = self.waypoints[laps]
 
 
-def starts_of(track: Sequence[Waypoint], laps: int) -> Starts:
+def lap_starts(track: Sequence[Waypoint], laps: int) -> LapStarts:
     """The starts of `laps` laps.
 
     The first lap begins at the last waypoint of the track, the second lap at the first waypoint.
@@ -67,7 +67,7 @@ def starts_of(track: Sequence[Waypoint], laps: int) -> Starts:
     )
     # A character faces the waypoint where its lap begins, or the next one if it starts there.
     facing = ways[np.where(distances > 0, waypoints, (waypoints + 1) % count)]
-    return Starts(places, facing, waypoints)
+    return LapStarts(places, facing, waypoints)
 
 
 def walk_laps(
@@ -78,9 +78,9 @@ def walk_laps(
     If a character does not reach the waypoint where its lap begins within `longest` frames, its lap begins at
     the character's start, with no waypoint reached.
     """
-    starts = starts_of(track, laps)
+    starts = lap_starts(track, laps)
     animation = ProceduralAnimation(network, characters=laps, waypoints=track, **dict(runtime))
-    starts.begin(animation, slice(None))
+    starts.place_characters(animation, slice(None))
     recorded = _record(animation, starts.waypoints + 1, longest)
     return [_measure_lap(recorded, c, int(starts.waypoints[c]) + 1, len(track), longest) for c in range(laps)]
 

@@ -16,11 +16,11 @@ from hobble.measures.responsivity.lap_charts import (
     step_order,
     track_chart,
 )
-from hobble.report.formats import number
+from hobble.report.formats import format_number
 from hobble.report.gather import ReportMaterial
 from hobble.report.page_parts import KeyFigures, PageSection, Paragraph, SectionPart
 from hobble.report.published import citation
-from hobble.report.summary import Hint, KeyFigure, placed
+from hobble.report.summary import Hint, KeyFigure, with_order
 from hobble.report.tables import Column, Table
 from hobble.runtime.network_rows import FASTEST_TURN
 
@@ -59,7 +59,7 @@ def section(found: Json, material: ReportMaterial) -> PageSection:
             SectionPart(60, lap_table(found, material.name)),
         ],
         title="Steering and time per frame",
-        at=30,
+        order=30,
         nav="Steering and time",
     )
 
@@ -69,16 +69,19 @@ def figures(found: Json, material: ReportMaterial) -> Iterator[KeyFigure]:
     milliseconds = frame_milliseconds(found)
     if milliseconds is not None:
         published = material.published_entry("responsivity")
-        note = f"median; one core can run {number(FRAME_BUDGET_MS / milliseconds, 3)} characters at 60 Hz"
+        note = (
+            f"median; one core can run {format_number(FRAME_BUDGET_MS / milliseconds, 3)} characters at 60 Hz"
+        )
         if published:
-            note += f"; mean {number(frame_mean(found), 2)} ms, published mean {published['milliseconds']} ms"
-        yield KeyFigure("Time per frame", number(milliseconds, 2), "ms", note, 20)
+            mean = format_number(frame_mean(found), 2)
+            note += f"; mean {mean} ms, published mean {published['milliseconds']} ms"
+        yield KeyFigure("Time per frame", format_number(milliseconds, 2), "ms", note, 20)
 
 
 def hints(found: Json, material: ReportMaterial) -> Iterator[Hint]:
     """Whether a frame fits into 1/60 s, and whether the character followed the track."""
-    yield from placed(60, _speed_hints(found))
-    yield from placed(40, _track_hints(found))
+    yield from with_order(60, _speed_hints(found))
+    yield from with_order(40, _track_hints(found))
 
 
 def lap_table(found: Json, name: str) -> Table | None:
@@ -121,19 +124,21 @@ def track_figures(found: Json) -> list[KeyFigure]:
         KeyFigure("Waypoints reached", reached, "", laps),
         KeyFigure(
             "Largest distance from the track",
-            number(found.get("path_overshoot_cm")),
+            format_number(found.get("path_overshoot_cm")),
             "cm",
             "the largest of all laps",
         ),
-        KeyFigure("Foot slide", number(slide), "cm" if slide is not None else "", measured),
+        KeyFigure("Foot slide", format_number(slide), "cm" if slide is not None else "", measured),
         _turn_figure(found),
-        KeyFigure("Slow frames", number(spread.get("p99")), "ms", "1 % of the frames are slower"),
+        KeyFigure("Slow frames", format_number(spread.get("p99")), "ms", "1 % of the frames are slower"),
     ]
 
 
 def _turn_figure(found: Json) -> KeyFigure:
     """The largest turn of a joint in one frame: as predicted, and as drawn after the runtime's limit."""
-    drawn, predicted = (number(found.get(key)) for key in ("largest_turn_degrees", "predicted_turn_degrees"))
+    drawn, predicted = (
+        format_number(found.get(key)) for key in ("largest_turn_degrees", "predicted_turn_degrees")
+    )
     limit = f"the runtime limits it to {np.degrees(FASTEST_TURN):.0f}°"
     if found.get("predicted_turn_degrees") is None:
         return KeyFigure("Largest turn of a joint", drawn, "°", f"in one frame, as drawn; {limit}")

@@ -26,7 +26,7 @@ from hobble.runtime.waypoints import TRACK, Waypoint
 STORED_PATHS = 5  # the paths of this many laps are stored
 
 
-def responsivity(
+def measure_responsivity(
     network: Network,
     *,
     configuration: str,
@@ -89,7 +89,7 @@ def laps_of_mode(
     lap_seconds: float,
     track: Sequence[Waypoint] = TRACK,
 ) -> PieceResults:
-    """All laps in the mode of `runtime`. For the arguments see `responsivity`."""
+    """All laps in the mode of `runtime`. For the arguments see `measure_responsivity`."""
     longest = int(lap_seconds * FPS)
     times = timed_frames(network, runtime, laps, longest, track)
     walked = walk_laps(network, runtime, laps, longest, track)
@@ -158,7 +158,7 @@ def run_piece(inputs: MeasureInputs, options: Options, piece: str) -> PieceResul
 def run(inputs: MeasureInputs, options: Options) -> Outcome:
     """responsivity.json, and its laps as a table."""
     done: dict[str, Any] = inputs.measured_pieces()
-    result = responsivity(
+    result = measure_responsivity(
         load_network(inputs.weights),
         configuration=inputs.configuration,
         runtime=inputs.runtime,

@@ -8,7 +8,7 @@ from time import perf_counter
 import numpy as np
 
 from hobble.core.quat import Array
-from hobble.measures.responsivity.laps import FPS, starts_of
+from hobble.measures.responsivity.laps import FPS, lap_starts
 from hobble.measures.responsivity.results import Milliseconds, Steps
 from hobble.models.network import Network
 from hobble.runtime.animation import ProceduralAnimation
@@ -31,14 +31,14 @@ def timed_frames(
     largest number of frames of a lap. F is the least of three numbers: TIMED_OF_LAP, `longest`, and
     TIMED_OF_ALL divided by the number of laps.
     """
-    starts = starts_of(track, laps)
+    starts = lap_starts(track, laps)
     animation = ProceduralAnimation(network, waypoints=track, **dict(runtime))
     for _ in range(WARM_UP):
         animation.next_pose()
     frames = max(1, min(TIMED_OF_LAP, TIMED_OF_ALL // laps, longest))
     out: list[Array] = []
     for lap in range(laps):
-        starts.begin(animation, slice(lap, lap + 1))
+        starts.place_characters(animation, slice(lap, lap + 1))
         times = np.empty((frames, len(STEPS) + 1))
         for row in times:
             before = perf_counter()

@@ -33,5 +33,5 @@ MEASURE = Measure(
     inputs=("weights", "clips", "summaries", "skeleton"),
     options=Options,
     runtime=("mode",),
-    cost=Cost(memory_mb=120, memory_each=27, seconds_each=0.6, minutes=30),
+    cost=Cost(memory_mb=120, mb_per_1000_frames=27, seconds_per_1000_frames=0.6, least_minutes=30),
 )

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from hobble.evaluation.comparison_rows import SideBySide
+from hobble.evaluation.comparison_rows import ComparisonAddition
 from hobble.evaluation.configuration_results import ConfigurationResults
 from hobble.measures.accuracy.run import SPLITS
 from hobble.measures.inputs import Json, Row
@@ -12,13 +12,13 @@ from hobble.measures.inputs import Json, Row
 NAME = "rollouts"
 
 
-def compared(all_measured: Sequence[ConfigurationResults], published: Json) -> SideBySide:
+def compared(all_measured: Sequence[ConfigurationResults], published: Json) -> ComparisonAddition:
     """A list entry for each configuration and length of roll-outs, without the errors of single clips."""
-    return SideBySide(
+    return ComparisonAddition(
         entries=[
             {"configuration": m.name, **{k: v for k, v in entry.items() if k != "clips"}}
             for m in all_measured
-            for entry in m.found(NAME)["lengths"]
+            for entry in m.results_of(NAME)["lengths"]
         ]
     )
 

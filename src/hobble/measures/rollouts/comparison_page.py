@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Iterator
 from functools import partial
 
-from hobble.report.charts import Chart, Trace, axis, line, log_axis
-from hobble.report.comparison_charts import SPLITS, Compared, colours
-from hobble.report.formats import number
+from hobble.report.charts import Chart, Trace, axis, line_trace, log_axis
+from hobble.report.comparison_charts import SPLITS, Compared, configuration_colours
+from hobble.report.formats import format_number
 from hobble.report.page_parts import PageSection, SectionPart
 from hobble.report.verdicts import Verdict, verdict_on_lowest
 
@@ -42,7 +42,7 @@ def verdicts(compared: Compared) -> Iterator[Verdict]:
 
 def _distance_words(ending: str, name: str, value: float) -> str:
     """Half of a sentence: the mean distance `value` of the configuration `name`, followed by `ending`."""
-    return f"the joints of {name} are {number(value, 3)} {ending}"
+    return f"the joints of {name} are {format_number(value, 3)} {ending}"
 
 
 def rollout_chart(compared: Compared) -> Chart | None:
@@ -50,13 +50,13 @@ def rollout_chart(compared: Compared) -> Chart | None:
     options: dict[str, list[Trace]] = {}
     for split, label in SPLITS.items():
         traces = []
-        for name, colour in colours(compared).items():
+        for name, colour in configuration_colours(compared).items():
             rows = [r for r in compared.get("rollouts", ()) if r["configuration"] == name]
             rows = [r for r in rows if (r[split] or {}).get("position_error_cm") is not None]
             if rows:
                 x = [row["length"] for row in rows]
                 y = [row[split]["position_error_cm"] for row in rows]
-                traces.append(line(name, x, y, colour, mode="lines+markers"))
+                traces.append(line_trace(name, x, y, colour, mode="lines+markers"))
         if traces:
             options[label] = traces
     if not options:

@@ -7,7 +7,7 @@ from typing import Any
 from hobble.measures.accuracy.page import COLOURS, NAMES
 from hobble.measures.clip_parts import sample_in_words
 from hobble.measures.inputs import Json
-from hobble.report.charts import Chart, axis, line, log_axis
+from hobble.report.charts import Chart, axis, line_trace, log_axis
 from hobble.report.gather import ReportMaterial
 from hobble.report.page_parts import PageSection, SectionPart
 
@@ -43,7 +43,7 @@ def rollout_chart(found: Json) -> Chart | None:
         if rows:
             x, y = zip(*rows, strict=True)
             error_bars = {"error_y": _error_bars(found, split)} if found.get("sample") else {}
-            traces.append(line(NAMES[split], x, y, COLOURS[split], mode="lines+markers", **error_bars))
+            traces.append(line_trace(NAMES[split], x, y, COLOURS[split], mode="lines+markers", **error_bars))
     if not traces:
         return None
     return Chart(

@@ -43,7 +43,7 @@ class LengthErrors(TypedDict):
     clips: list[ErrorsOfClip]
 
 
-class RollOutsFound(TypedDict):
+class RollOutResults(TypedDict):
     """rollouts.json.
 
     joints: number of joints measured. mode: the network's phase mode. sample: the size of the sample, if only

@@ -73,7 +73,7 @@ class RollOuts:
     length: int
 
 
-class Crowd:
+class RollOutCrowd:
     """Computes the roll-outs of several groups together. Iterate over `frames` once, then call `phases`.
 
     It computes R roll-outs: the longest from each start frame. x, y, ground, turn, velocity, moving: the

@@ -20,16 +20,16 @@ from hobble.database.statistics import Moments
 from hobble.evaluation.captured import unbroken_stretches
 from hobble.measures.accuracy.run import (
     check_layout,
-    chosen_joints,
     joint_indices,
+    joints_to_measure,
     relative_and_distance,
 )
-from hobble.measures.clip_parts import ClipPart, LoadedPart, clip_parts, sample_of
+from hobble.measures.clip_parts import ClipPart, LoadedPart, clip_parts, sample_to_measure
 from hobble.measures.inputs import MeasureInputs, Outcome, Row
 from hobble.measures.results import SPLITS
 from hobble.measures.rollouts import Options
-from hobble.measures.rollouts.results import RollOutNumbers, RollOutsFound
-from hobble.measures.rollouts.roll_outs import Crowd, RollOuts, inputs_of_clip
+from hobble.measures.rollouts.results import RollOutNumbers, RollOutResults
+from hobble.measures.rollouts.roll_outs import RollOutCrowd, RollOuts, inputs_of_clip
 from hobble.measures.stratified_sample import Sample
 from hobble.models.load import load_network
 from hobble.models.network import Network, Predictor
@@ -71,7 +71,7 @@ class RollOutErrors:
             self.ended + other.ended,
         )
 
-    def weighing(self, weight: float) -> RollOutErrors:
+    def weighted_by(self, weight: float) -> RollOutErrors:
         """The same errors with each frame counted `weight` times."""
         if weight == 1:
             return self
@@ -125,7 +125,7 @@ def _errors_of_parts(
     owners = [(by_length, group) for by_length, groups in zip(out, parts, strict=True) for group in groups]
     if not owners:
         return out
-    crowd = Crowd(predictor, [group for _, group in owners])
+    crowd = RollOutCrowd(predictor, [group for _, group in owners])
     layout = predictor.network.layout
     truth = crowd.y[:, layout.y_joint_position].reshape(len(crowd.y), -1, 3)[:, joints]
     moments = [Moments.of_no_rows(2) for _ in owners]
@@ -171,7 +171,7 @@ def measure_roll_outs(
     lengths: Sequence[int] = LENGTHS,
     mode: str = "cubic",
     sample: Sample | None = None,
-) -> RollOutsFound:
+) -> RollOutResults:
     """The content of rollouts.json: for each of `lengths`, the errors of the splits and of the clips.
 
     clips: name -> file of rows. splits: name -> "train" or "held_out". equivalents: names of the joints to
@@ -191,13 +191,13 @@ def measure_roll_outs(
             parts, _errors_of_parts(predictor, list(parts.values()), joints, lengths), strict=True
         ):
             for length, errors in by_length.items():
-                weighed, clip_errors = errors.weighing(part.weight), of_clip[length]
+                weighed, clip_errors = errors.weighted_by(part.weight), of_clip[length]
                 total[length][splits[part.clip]] += weighed
                 clip_errors[part.clip] = clip_errors.get(part.clip, RollOutErrors()) + weighed
                 if part.excerpt is not None:
                     excerpts[length][part.excerpt] = errors.to_dict()["position_error_cm"]
             log.info("%s: %s", part.excerpt or part.clip, by_length[lengths[-1]].to_dict(network.uses_phase))
-    result: RollOutsFound = {
+    result: RollOutResults = {
         "configuration": configuration,
         "joints": len(joints),
         "mode": mode,
@@ -238,11 +238,11 @@ def _part_batches(
 
 
 def _with_intervals(
-    result: RollOutsFound,
+    result: RollOutResults,
     sample: Sample,
     excerpts: Mapping[int, Mapping[Excerpt, float | None]],
     splits: Mapping[str, str],
-) -> RollOutsFound:
+) -> RollOutResults:
     """The result with the size of the sample, and the confidence intervals of each split and length.
 
     excerpts: length -> position error of each excerpt, cm. It is None for an excerpt that is too short for a
@@ -261,7 +261,7 @@ def _with_intervals(
     return {**result, "sample": sample.to_dict()}
 
 
-def roll_out_rows(result: RollOutsFound) -> list[Row]:
+def roll_out_rows(result: RollOutResults) -> list[Row]:
     """A table with a row for each length and split (`clip` is None), and for each length and clip."""
     rows: list[Row] = []
     for entry in result["lengths"]:
@@ -278,9 +278,9 @@ def run(inputs: MeasureInputs, options: Options) -> Outcome:
         inputs.clips,
         inputs.splits,
         inputs.configuration,
-        chosen_joints(inputs, options),
+        joints_to_measure(inputs, options),
         options.rollouts,
         inputs.runtime.mode,
-        sample_of(inputs, options),
+        sample_to_measure(inputs, options),
     )
     return Outcome(result, {"lengths": roll_out_rows(result)})

@@ -25,5 +25,5 @@ MEASURE = Measure(
     inputs=("weights", "clips", "summaries"),
     options=Options,
     runtime=tuple(Runtime.model_fields),
-    cost=Cost(memory_mb=600, memory_each=14, seconds_each=0.1, minutes=20),
+    cost=Cost(memory_mb=600, mb_per_1000_frames=14, seconds_per_1000_frames=0.1, least_minutes=20),
 )

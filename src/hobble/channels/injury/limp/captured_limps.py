@@ -15,7 +15,7 @@ import numpy as np
 from hobble.channels.injury.crowd_severities import INJURY
 from hobble.core.quat import Array
 from hobble.core.skeleton import Skeleton
-from hobble.evaluation.captured import captured, rotate_by_yaw
+from hobble.evaluation.captured import captured_stretches, rotate_by_yaw
 from hobble.evaluation.crowd import FPS
 from hobble.gait.cycles import WalkCycles, join_walks, measure_cycles
 from hobble.gait.people import read_people
@@ -135,7 +135,7 @@ def _walk_of_clip(
     walks, speeds = [], []
     for rows in rows_of_clip:
         turn = rows.y[:, rows.layout.y_turn][:, 0].astype(float)
-        for stretch in captured(rows):
+        for stretch in captured_stretches(rows):
             if stretch.gait.mean(axis=0).argmax() != 1:  # gait 1 is walking
                 continue
             # `turn` is the change of yaw in each frame, negated.

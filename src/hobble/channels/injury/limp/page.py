@@ -9,8 +9,8 @@ from hobble.channels.injury.response.page import with_spoken_links
 from hobble.channels.shown import shown_names
 from hobble.measures.clip_parts import sample_sentence
 from hobble.measures.inputs import Json
-from hobble.report.charts import Chart, Trace, axis, line
-from hobble.report.formats import number
+from hobble.report.charts import Chart, Trace, axis, line_trace
+from hobble.report.formats import format_number
 from hobble.report.gather import ReportMaterial
 from hobble.report.page_parts import PageSection, Paragraph, SectionPart
 from hobble.report.tables import Column, Table
@@ -83,7 +83,7 @@ def hurt_motion_in_words(
         if by_link := hurt_seconds[key]:
             names = f" ({', '.join(map(shown_name, sorted(by_link)))})" if len(by_link) <= MOST_NAMED else ""
             links = f"summed over {len(by_link)} links" if len(by_link) != 1 else "of one link"
-            seconds = number(sum(by_link.values()), 3)
+            seconds = format_number(sum(by_link.values()), 3)
             sentences.append(f"Hurt motion in training, {words}: {seconds} s, {links}{names}.")
     if any(len(by_link) > 1 for by_link in hurt_seconds.values()):
         sentences.append("A second in which two links hurt counts twice.")
@@ -103,7 +103,7 @@ def size_chart(found: Json) -> Chart:
             row["link"] for row in rows if row["part"] in CHART_PARTS or "arm" in row["part"]
         ):
             of_link = [row for row in rows if row["link"] == link]
-            trace = line(
+            trace = line_trace(
                 link,
                 [r["severity"] for r in of_link],
                 [r[effect] for r in of_link],

@@ -35,7 +35,7 @@ from hobble.gait.people import read_people
 from hobble.gait.profile import Profile, profile_of_walk
 from hobble.gait.recogniser import RIGHT, SIDES, examples_of_people
 from hobble.hurt.body_parts import part_of_link
-from hobble.measures.clip_parts import clip_parts, sample_of, with_sample
+from hobble.measures.clip_parts import clip_parts, sample_to_measure, with_sample
 from hobble.measures.inputs import MeasureInputs, Outcome
 from hobble.models.load import load_network
 from hobble.models.network import Network
@@ -358,7 +358,7 @@ def run(inputs: MeasureInputs, options: Options) -> Outcome:
     network = load_network(inputs.weights)
     if network.skeleton is None:
         raise HobbleError(f"{inputs.weights}: this network file has no skeleton, so limps cannot be measured")
-    sample = sample_of(inputs, options)
+    sample = sample_to_measure(inputs, options)
     # A network without severities has no limps, so no clips are read.
     parts = clip_parts(inputs.clips, sample) if injury_links(network) else ()
     captured, hurt_seconds = captured_walks(parts, inputs.splits, injury_links(network), network.skeleton)
@@ -373,9 +373,9 @@ def run(inputs: MeasureInputs, options: Options) -> Outcome:
     )
     tables = {name: result.get(name, []) for name in ("sizes", "trends", "named", "second", "together")}
     at_10 = next((row for row in result.get("named", []) if row["severity"] == SEVERITIES[-1]), None)
-    says = (
+    log_line = (
         f"a limp is found in {at_10['impaired']} of the windows with a leg at severity 10"
         if at_10
         else result["reason"]
     )
-    return Outcome(with_sample(result, sample), tables, says)
+    return Outcome(with_sample(result, sample), tables, log_line)

@@ -10,5 +10,5 @@ MEASURE = Measure(
     inputs=("weights", "clips", "summaries", "published"),
     options=SampleOptions,
     runtime=tuple(Runtime.model_fields),
-    cost=Cost(memory_each=18, seconds_each=0.2, minutes=30),
+    cost=Cost(mb_per_1000_frames=18, seconds_per_1000_frames=0.2, least_minutes=30),
 )

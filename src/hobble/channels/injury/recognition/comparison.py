@@ -5,20 +5,20 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from hobble.channels.injury.recognition.run import confusion_rows
-from hobble.evaluation.comparison_rows import PublishedRow, SideBySide, published_row
+from hobble.evaluation.comparison_rows import ComparisonAddition, PublishedRow, published_row
 from hobble.evaluation.configuration_results import ConfigurationResults
 from hobble.measures.inputs import Json, Row
 
 NAME = "recognition"  # name of the measurement
 
 
-def compared(all_measured: Sequence[ConfigurationResults], published: Json) -> SideBySide:
+def compared(all_measured: Sequence[ConfigurationResults], published: Json) -> ComparisonAddition:
     """The result of each configuration, and rows that compare it with people's recognition of hurt parts.
 
     published: name of a measurement -> its published result.
     """
-    return SideBySide(
-        entries=[{**m.found(NAME), "configuration": m.name} for m in all_measured],
+    return ComparisonAddition(
+        entries=[{**m.results_of(NAME), "configuration": m.name} for m in all_measured],
         against_published=[row for m in all_measured for row in _against_people(m, published["recognition"])],
     )
 
@@ -34,7 +34,7 @@ def _against_people(measured: ConfigurationResults, people: Json) -> list[Publis
 
     people: the published result, with the key `share`.
     """
-    found = measured.found(NAME)
+    found = measured.results_of(NAME)
     if not found["applies"]:
         return []
     published, generated = {**people, "configuration": measured.name}, found["generated"]

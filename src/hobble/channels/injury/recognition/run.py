@@ -21,12 +21,11 @@ from hobble.channels.injury.recognition.results import RecognisedWindows, Recogn
 from hobble.core.quat import Array
 from hobble.core.skeleton import Skeleton
 from hobble.evaluation.captured import Captured
-from hobble.evaluation.crowd import FPS, CrowdTarget
-from hobble.evaluation.crowd import run as run_walks
-from hobble.evaluation.gait_features import features
+from hobble.evaluation.crowd import FPS, CrowdTarget, generate_walks
+from hobble.evaluation.gait_features import gait_features
 from hobble.gait.discriminant import Discriminant, learn
 from hobble.hurt.body_parts import part_of_link
-from hobble.measures.clip_parts import captured_motion, sample_of, with_sample
+from hobble.measures.clip_parts import captured_motion, sample_to_measure, with_sample
 from hobble.measures.inputs import MeasureInputs, Outcome, Row
 from hobble.measures.sample_options import SampleOptions
 from hobble.models.load import load_network
@@ -158,7 +157,7 @@ def generated_windows(
     script = CrowdTarget(
         WARM_UP + USED, ["walk"] * len(cases), severity_inputs(network, injuries), [v for *_, v in cases]
     )
-    walks = run_walks(network, [script], runtime)
+    walks = generate_walks(network, [script], runtime)
     out = []
     for i, (name, severity, speed) in enumerate(cases):
         for start in range(WARM_UP, WARM_UP + USED - WINDOW + 1, STEP):
@@ -219,7 +218,7 @@ def run(inputs: MeasureInputs, options: SampleOptions) -> Outcome:
     # out, because the classifier would learn these rules.
     clips = {clip: file for clip, file in inputs.clips.items() if not HURT_VERSION.search(clip)}
     summaries = [file for file in inputs.summaries if file.stem in clips]
-    sample = sample_of(replace(inputs, summaries=summaries), options)
+    sample = sample_to_measure(replace(inputs, summaries=summaries), options)
     result = measure_recognition(
         load_network(inputs.weights),
         captured_motion(clips, sample),
@@ -242,7 +241,7 @@ def _features(
     skeleton: Skeleton, local: Array, contacts: Array, root: Array, span: slice
 ) -> dict[str, float]:
     """Name -> value of the features of the frames `span`. For the arrays see `Captured`."""
-    return features(skeleton, local[span], contacts[span], root[span])
+    return gait_features(skeleton, local[span], contacts[span], root[span])
 
 
 def _cross_validate(windows: Sequence[InjuryWindow], parts_of_class: PartsOfClass) -> RecognisedWindows:

@@ -23,5 +23,5 @@ MEASURE = Measure(
     inputs=("weights", "clips", "summaries"),  # the network, the clips' rows, summaries of these rows
     options=Options,
     runtime=tuple(Runtime.model_fields),
-    cost=Cost(memory_each=14, seconds_each=0.2, minutes=60),
+    cost=Cost(mb_per_1000_frames=14, seconds_per_1000_frames=0.2, least_minutes=60),
 )

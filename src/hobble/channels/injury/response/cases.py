@@ -19,7 +19,7 @@ from hobble.channels.injury.response.results import Divided, IntoAJog, SecondInj
 from hobble.channels.injury.response.sweep import WALK_IN
 from hobble.core.quat import Array
 from hobble.core.skeleton import Skeleton
-from hobble.evaluation.crowd import FPS, CrowdTarget, Walks, run
+from hobble.evaluation.crowd import FPS, CrowdTarget, Walks, generate_walks
 from hobble.evaluation.motion_measures import gait_measures
 from hobble.evaluation.pose_distance import distance_to_cycle, mean_cycle
 from hobble.evaluation.spearman import spearman
@@ -89,7 +89,7 @@ def second_injuries(
     healthy = severity_inputs(network, [{}] * len(pairs))
     script = [CrowdTarget(_frame_count(WALK_IN, seconds), gait, healthy)]
     script += [CrowdTarget(_frame_count(1, seconds), gait, with_second_at(s)) for s in SECOND_SEVERITIES]
-    walks = run(network, script, runtime)
+    walks = generate_walks(network, script, runtime)
     last = len(SECOND_SEVERITIES)  # index of the last stretch, because stretch 0 is only the beginning
     alone = {b: _effect_of_one(walks, last, i) for i, (a, b) in enumerate(pairs) if a is None}
     out: list[SecondInjury] = []
@@ -157,7 +157,7 @@ def into_a_jog(network: Network, links: Sequence[str], seconds: float, runtime: 
     hurt = severity_inputs(network, [{link: s} if link else {} for link, s in figures])
     frames = _frame_count(1, seconds)
     walk, jog = ["walk"] * len(figures), ["jog"] * len(figures)
-    walks = run(
+    walks = generate_walks(
         network,
         [
             CrowdTarget(frames, walk, hurt),  # stretch 0: the figures reach their speed
@@ -209,7 +209,7 @@ def divided_severities(
     out: list[Divided] = []
     for divisor in DIVISORS:
         scales = {**runtime.scales, "injury": divisor}
-        walks = run(network, script, runtime.model_copy(update={"scales": scales}))
+        walks = generate_walks(network, script, runtime.model_copy(update={"scales": scales}))
         for i, link in enumerate(links):
             healthy = _mean_cycle(walks, 1, i)
             spread, speed = _distance_from_cycle(walks, 1, i, healthy), _mean_speed(network, walks, 1, i)

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Any
 
-from hobble.evaluation.comparison_rows import SideBySide
+from hobble.evaluation.comparison_rows import ComparisonAddition
 from hobble.evaluation.configuration_results import ConfigurationResults
 from hobble.measures.inputs import Json
 
@@ -13,14 +13,14 @@ NAME = "injury"  # the measurement
 COMPARED_KEYS = ("applies", "reason", "summary")  # of injury.json
 
 
-def compared(all_measured: Sequence[ConfigurationResults], published: Json) -> SideBySide:
+def compared(all_measured: Sequence[ConfigurationResults], published: Json) -> ComparisonAddition:
     """Whether the character of each configuration can be hurt, and means over the links hurt in training.
 
     published: not used; every module `comparison` has a function with these arguments.
     """
-    return SideBySide(entries=[_entry(m) for m in all_measured])
+    return ComparisonAddition(entries=[_entry(m) for m in all_measured])
 
 
 def _entry(measured: ConfigurationResults) -> dict[str, Any]:
-    found = measured.found(NAME)
+    found = measured.results_of(NAME)
     return {"configuration": measured.name, **{key: found[key] for key in COMPARED_KEYS if key in found}}

@@ -42,7 +42,7 @@ def section(compared: Compared) -> PageSection:
     table = injury_table(compared)
     introduction = Paragraph(INTRODUCTION) if table else None
     parts = [SectionPart(0, introduction), SectionPart(10, table, open=True, short=True)]
-    return PageSection("injury", parts, title="Injury response", at=20)
+    return PageSection("injury", parts, title="Injury response", order=20)
 
 
 def injury_table(compared: Compared) -> Table | None:

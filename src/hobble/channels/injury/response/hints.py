@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from hobble.measures.inputs import Json
-from hobble.report.formats import number
+from hobble.report.formats import format_number
 from hobble.report.summary import Hint
 
 
@@ -29,7 +29,7 @@ def injury_hints(found: Json) -> Iterator[Hint]:
     if drift > 2:
         yield Hint(
             "warn",
-            f"Even a healthy walk changes, by {number(drift)} cm per joint.",
+            f"Even a healthy walk changes, by {format_number(drift)} cm per joint.",
             "So the effect of severity is hard to measure. Train for longer, or measure for longer.",
         )
     unchanged = [r["link"] for r in trained if (r.get("from_healthy_cm") or 0) < max(0.5, 2 * drift)]
@@ -71,7 +71,7 @@ def _span(low: float, high: float) -> str:
     >>> _span(3.472, 7.018), _span(2.0, 2.0)
     ('3.47 to 7.02', '2.00')
     """
-    return number(low) if low == high else f"{number(low)} to {number(high)}"
+    return format_number(low) if low == high else f"{format_number(low)} to {format_number(high)}"
 
 
 def _drift(responses: Sequence[Mapping[str, Any]], key: str) -> float:

@@ -13,10 +13,10 @@ from hobble.channels.injury.response import page_cases as cases
 from hobble.channels.injury.response.hints import injury_hints
 from hobble.channels.shown import shown_names
 from hobble.measures.inputs import Json
-from hobble.report.charts import Chart, ChartGroup, Trace, axis, line
+from hobble.report.charts import Chart, ChartGroup, Trace, axis, line_trace
 from hobble.report.gather import ReportMaterial
 from hobble.report.page_parts import ChartPair, PageSection, SectionPart
-from hobble.report.summary import Hint, placed
+from hobble.report.summary import Hint, with_order
 from hobble.report.tables import Column, Table
 
 LINK_KEYS = ("link", "first", "second")  # keys of injury.json whose values are labels of links
@@ -68,12 +68,12 @@ def section(found: Json, material: ReportMaterial) -> PageSection:
     found: the content of injury.json. material: what the report is made from.
     """
     parts = _parts(with_spoken_links(found, material), material.name) if found.get("applies") else []
-    return PageSection("injury", parts, title="Injury response", at=20)
+    return PageSection("injury", parts, title="Injury response", order=20)
 
 
 def hints(found: Json, material: ReportMaterial) -> Iterator[Hint]:
     """Sentences about the response, for the top of the report. found, material: as for `section`."""
-    return placed(50, injury_hints(with_spoken_links(found, material)))
+    return with_order(50, injury_hints(with_spoken_links(found, material)))
 
 
 def with_spoken_links(found: Json, material: ReportMaterial) -> dict[str, Any]:
@@ -170,7 +170,7 @@ def _panel_chart(
     for option, rising in rising_rows.items():
         x = [row["severity"] for row in rising]
         options[option] = [
-            line(label, x, [row.get(key) for row in rising], colour, mode="lines+markers")
+            line_trace(label, x, [row.get(key) for row in rising], colour, mode="lines+markers")
             | {"marker": {"size": 5}}
             for key, label, colour in lines
         ]
@@ -178,7 +178,7 @@ def _panel_chart(
         for key, label, colour in lines if falling else ():
             x, y = [row["severity"] for row in falling], [row.get(key) for row in falling]
             options[option].append(
-                line(f"{label}, healing", x, y, colour, width=1.3, dash="dot", showlegend=False)
+                line_trace(f"{label}, healing", x, y, colour, width=1.3, dash="dot", showlegend=False)
             )
     layout = {
         "xaxis": axis("severity", dtick=2, range=[-0.3, 10.3]),

@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Collection, Mapping, Sequence
 from typing import Any
 
-from hobble.report.charts import Chart, Trace, axis, line
+from hobble.report.charts import Chart, Trace, axis, line_trace
 from hobble.report.tables import Column, Table
 
 # Colours of the lines in a chart.
@@ -89,7 +89,7 @@ def divided_chart(rows: Sequence[Mapping[str, Any]]) -> Chart | None:
         for scale, colour in zip(scales, COLOURS, strict=False):
             of_line = [row for row in rows if row["link"] == link and row["scale"] == scale]
             x, y = [row["severity"] for row in of_line], [row["from_healthy_cm"] for row in of_line]
-            traces.append(line(f"divided by {scale:g}", x, y, colour, mode="lines+markers"))
+            traces.append(line_trace(f"divided by {scale:g}", x, y, colour, mode="lines+markers"))
         options[link] = traces
     if not options:
         return None
@@ -118,7 +118,9 @@ def jog_chart(rows: Sequence[Mapping[str, Any]], untrained: Collection[str] = ()
         of_link = [row for row in rows if row["link"] == link]
         x, y = [row["severity"] for row in of_link], [row.get("jog_from_healthy_cm") for row in of_link]
         dash = "solid" if i < len(COLOURS) else "dash"
-        traces.append(line(link, x, y, COLOURS[i % len(COLOURS)], dash=dash, mode="lines+markers", width=1.4))
+        traces.append(
+            line_trace(link, x, y, COLOURS[i % len(COLOURS)], dash=dash, mode="lines+markers", width=1.4)
+        )
     untrained_jogs: dict[float, list[float]] = {}  # severity -> distance of each link's jog, cm
     for row in rows:
         if row["link"] in untrained and row.get("jog_from_healthy_cm") is not None:
@@ -126,7 +128,7 @@ def jog_chart(rows: Sequence[Mapping[str, Any]], untrained: Collection[str] = ()
     if untrained_jogs:
         means = [sum(values) / len(values) for values in untrained_jogs.values()]
         traces.append(
-            line("never hurt in training", list(untrained_jogs), means, "@muted", dash="dot", width=1.4)
+            line_trace("never hurt in training", list(untrained_jogs), means, "@muted", dash="dot", width=1.4)
         )
     if not traces:
         return None

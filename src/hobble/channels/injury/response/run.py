@@ -17,7 +17,7 @@ from hobble.channels.injury.response.results import InjuryResponse, LinkResponse
 from hobble.channels.injury.response.sweep import SEVERITIES, sweeps
 from hobble.evaluation.captured import Captured
 from hobble.evaluation.crowd import SPEEDS
-from hobble.measures.clip_parts import captured_motion, sample_of, with_sample
+from hobble.measures.clip_parts import captured_motion, sample_to_measure, with_sample
 from hobble.measures.inputs import MeasureInputs, Outcome, Row
 from hobble.models.load import load_network
 from hobble.models.network import Network
@@ -169,7 +169,7 @@ def _mean(values: Sequence[float | None]) -> float | None:
 
 def run(inputs: MeasureInputs, options: Options) -> Outcome:
     """The content of injury.json and of the tables in injury/."""
-    sample = sample_of(inputs, options)
+    sample = sample_to_measure(inputs, options)
     result = injury_response(
         load_network(inputs.weights),
         captured_motion(inputs.clips, sample),

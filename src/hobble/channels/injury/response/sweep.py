@@ -17,7 +17,7 @@ import numpy as np
 from hobble.channels.injury.crowd_severities import severity_inputs
 from hobble.channels.injury.response.results import Response, SweepRow
 from hobble.core.skeleton import Skeleton
-from hobble.evaluation.crowd import FPS, CrowdTarget, Walks, run
+from hobble.evaluation.crowd import FPS, CrowdTarget, Walks, generate_walks
 from hobble.evaluation.motion_measures import gait_measures
 from hobble.evaluation.pose_distance import cycle_frames, distance_to_cycle, mean_cycle, settling_seconds
 from hobble.evaluation.spearman import spearman
@@ -153,9 +153,11 @@ def sweeps(
         hurt = severity_inputs(network, [{link: severity} for link in links] * len(gaits))
         return CrowdTarget(max(4, round(share * seconds * FPS)), gait_of_figure, hurt)
 
-    walks = run(network, [stretch(WALK_IN, 0), *(stretch(1, s) for s in STEPS)], runtime)
+    walks = generate_walks(network, [stretch(WALK_IN, 0), *(stretch(1, s) for s in STEPS)], runtime)
     jump = [stretch(WALK_IN, 0), stretch(1, 0), stretch(JUMP_STRETCHES, 10), stretch(JUMP_STRETCHES, 0)]
-    at_once = run(network, jump, runtime)
+    at_once = generate_walks(network, jump, runtime)
     for number, gait in enumerate(gaits):
         figures = slice(number * len(links), (number + 1) * len(links))
-        yield SeveritySweep(network.skeleton, links, gait, walks.of(figures), at_once.of(figures))
+        yield SeveritySweep(
+            network.skeleton, links, gait, walks.of_figures(figures), at_once.of_figures(figures)
+        )

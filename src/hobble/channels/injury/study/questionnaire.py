@@ -37,7 +37,7 @@ from hobble.models.network import Network
 from hobble.report.formats import embedded
 from hobble.report.raster import BodyRenderer, Camera
 from hobble.report.stimuli import VISIBLE
-from hobble.report.templates import questionnaire_script, style, template
+from hobble.report.templates import load_template, page_style, questionnaire_script
 from hobble.runtime.export import restore_bone_lengths
 from hobble.runtime.options import Runtime
 
@@ -93,8 +93,8 @@ def write_questionnaire(
         "parts": PARTS,
         "films": solutions,
     }
-    page = template("questionnaire.html.j2").render(
-        style=style(),
+    page = load_template("questionnaire.html.j2").render(
+        style=page_style(),
         script=questionnaire_script(),
         embedded=embedded({"study": study, "parts": PARTS, "films": films_on_page, "size": size}),
         count=len(films),
