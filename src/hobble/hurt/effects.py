@@ -14,9 +14,6 @@ from hobble.hurt.body_parts import LEFT, RIGHT, part_of_link
 
 HIGHEST_SEVERITY = 10.0
 STRENGTH_POWER = 0.82  # strength = (severity / 10) ** STRENGTH_POWER: .37 at 3, .57 at 5, .75 at 7
-# Changes of the times at which a foot lands and leaves (`land`, `off`) grow with strength ** TIMING_POWER.
-# With the power 1, a character driven by a network limps nearly as unevenly at severity 5 as at 10.
-TIMING_POWER = 1.3
 LEAST_RATIO = 0.02  # smaller ratios to the healthy clip are raised to this
 SETTLING_SECONDS = 0.3  # sigma of the Gaussian that smooths changes of severity
 LEAST_SEVERITY = 0.05  # smaller severities count as 0
@@ -104,9 +101,7 @@ def effects_of_severities(skeleton: Skeleton, severity: Array, fps: float) -> Ef
             elif name in WHOLE_BODY:
                 body[name].add(part_strength * amount)
             else:
-                is_timing = name.startswith(("land", "off"))
-                growth = part_strength**TIMING_POWER if is_timing else part_strength
-                _add_sided(sided, name, growth * amount, side)
+                _add_sided(sided, name, part_strength * amount, side)
         if part in HELD_ARM_OF_PART and side is not None:
             _add_sided(sided, HELD_ARM_OF_PART[part], part_strength, side)
     return Effects(
