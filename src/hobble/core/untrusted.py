@@ -48,20 +48,23 @@ def printable(text: object, most: int = 200) -> str:
 def read_bytes(path: str | Path, most: int) -> bytes:
     """The content of a regular file of at most `most` bytes.
 
-    Raises InputError if it is missing, unreadable, too large, or not a regular file.
+    Raises InputError if it is missing, unreadable, too large, or not a regular file, or if its size changes
+    while it is read.
     """
     try:
         size = check_regular(path).st_size
         with open(path, "rb") as file:
-            # read(n) allocates n bytes, so n is the file's size, not `most`; + 1 shows whether the file grew.
+            # read(n) allocates n bytes, so n is not `most` but the file's size, + 1 to see if it grew.
             data = file.read(size + 1) if size <= most else b""
     except FileNotFoundError:
         raise InputError(path, "no such file") from None
     except (OSError, ValueError) as error:
         reason = getattr(error, "strerror", None) or error
         raise InputError(path, f"cannot be read: {reason}") from None
-    if size > most or len(data) > most:
+    if size > most:
         raise InputError(path, f"larger than {most / MB:g} MB, the limit for such a file")
+    if len(data) != size:
+        raise InputError(path, "its size changed while it was read", fix="Try again when it is complete.")
     return data
 
 
