@@ -30,16 +30,17 @@ def format_duration(seconds: float | None) -> str:
 def format_bytes(count: float | None) -> str:
     """A number of bytes as text, in B, kB, MB or GB (powers of 1000); a dash for None.
 
-    >>> format_bytes(512), format_bytes(7_120_000_000), format_bytes(606e6), format_bytes(None)
-    ('512 B', '7.12 GB', '606 MB', '–')
+    >>> [format_bytes(count) for count in (512, 606e6, 999_600, 7_120_000_000, 1.2345e12, None)]
+    ['512 B', '606 MB', '1 MB', '7.12 GB', '1,234 GB', '–']
     """
     if count is None:
         return "–"
     for unit in ("B", "kB", "MB", "GB"):
-        if count < 1000 or unit == "GB":
-            return f"{count:.0f} B" if unit == "B" else f"{count:.3g} {unit}"
+        text = f"{count:.0f}" if unit == "B" else f"{count:.3g}"
+        if float(text) < 1000:  # rounding may have made it 1000
+            return f"{text} {unit}"
         count /= 1000
-    raise AssertionError
+    return f"{1000 * count:,.0f} GB"
 
 
 def format_number(value: float | None, digits: int = 3) -> str:
