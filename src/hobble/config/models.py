@@ -85,7 +85,9 @@ class Dataset(s.Section):
     source: Name | None = Field(
         None, description="use the generated or downloaded BVH files of this data set"
     )
-    folder: s.MocapPath | None = Field(None, description="folder of the BVH files, inside the mocap folder")
+    folder: s.RelativePath | None = Field(
+        None, description="folder of the BVH files, inside the mocap folder"
+    )
     download: s.Download | None = Field(
         None, description="where to download clips that are not in the folder"
     )

@@ -8,16 +8,13 @@ from typing import Annotated, Literal
 from pydantic import AfterValidator, BaseModel, ConfigDict, Field
 
 LONGEST_FILE_NAME = 255  # bytes of a file's or folder's name; the limit of Linux and other systems
-LONGEST_PATH = 1000  # characters of a path in the mocap folder
+LONGEST_PATH = 1000  # characters of a path in a configuration
 
 
-def _check_mocap_path(path: str) -> str:
-    """Return `path` if it is relative to the mocap folder, stays in it, is printable and not too long.
-
-    The mocap folder holds all motion files. Raises ValueError for other paths.
-    """
+def _check_relative_path(path: str) -> str:
+    """Return `path` if it is relative, without "..", printable and not too long; else raise ValueError."""
     if Path(path).is_absolute() or ".." in Path(path).parts or not path.isprintable():
-        raise ValueError("must be relative to the mocap folder, stay in it and have no control characters")
+        raise ValueError("must be a relative path without .. and without control characters")
     if any(len(part.encode()) > LONGEST_FILE_NAME for part in Path(path).parts) or len(path) > LONGEST_PATH:
         raise ValueError(
             f"must have at most {LONGEST_PATH} characters, and each name in it at most "
@@ -31,7 +28,8 @@ Positive = Annotated[int, Field(gt=0, le=1_000_000)]
 PositiveFloat = Annotated[float, Field(gt=0, allow_inf_nan=False)]
 Finite = Annotated[float, Field(allow_inf_nan=False)]
 Share = Annotated[float, Field(ge=0, lt=1)]
-MocapPath = Annotated[str, AfterValidator(_check_mocap_path)]
+# A path that cannot leave the folder to which it is relative, such as the mocap folder (all motion files).
+RelativePath = Annotated[str, AfterValidator(_check_relative_path)]
 # The ground on which a clip was captured. "jumpy": uneven, with jumps. "beam": a narrow beam above the floor.
 Ground = Literal["flat", "rocky", "jumpy", "beam"]
 Gait = Literal["stand", "walk", "jog", "crouch", "jump", "bump"]

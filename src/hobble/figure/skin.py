@@ -33,6 +33,7 @@ def nearest_joints(solids: Sequence[Solid], points: Array, bone_of: Mapping[str,
         nearer = distance < nearest
         joint = np.zeros(len(points), np.int64)
         along = solid.along(points)
+        # Each bone moves the points from its `begin` (cm along the solid) to that of the next bone.
         for begin, role in solid.owners:
             joint[along >= begin] = bone_of[role]
         owner[nearer], nearest[nearer] = joint[nearer], distance[nearer]
@@ -71,7 +72,7 @@ def skin_weights(
     if weights.shape[1] < MOST_BONES:
         pad = MOST_BONES - weights.shape[1]
         weights, order = np.pad(weights, ((0, 0), (0, pad))), np.pad(order, ((0, 0), (0, pad)))
-    # Lower all weights by 0.01. Along the surface, another bone may become the fourth largest. If the weights
-    # of both are at most 0.01 there, they become 0, and nothing jumps.
+    # Lower all weights by 0.01, to at least 0. From one corner to the next, another bone can take the fourth
+    # place. If the old and the new bone have at most 0.01 there, both get 0, and no weight jumps.
     weights = np.maximum(weights - 0.01, 0)
     return joints[order], weights / weights.sum(axis=1, keepdims=True)

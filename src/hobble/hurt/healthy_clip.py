@@ -74,7 +74,7 @@ def measure_healthy_clip(clip: Clip, labels: Labels) -> HealthyClip:
     frames, skeleton = len(clip), clip.skeleton
     options = LabelOptions()
     all_swings = find_swings(clip, options)
-    stances, swinging, swing = [], np.zeros((frames, 2), bool), np.zeros((frames, 2))
+    stances, swinging, swing_curve = [], np.zeros((frames, 2), bool), np.zeros((frames, 2))
     for side in (LEFT, RIGHT):
         # `find_swings` numbers the right foot 0, the left one 1.
         swings = [(s.start, min(s.end, frames - 1)) for s in all_swings if s.foot == 1 - side]
@@ -83,7 +83,7 @@ def measure_healthy_clip(clip: Clip, labels: Labels) -> HealthyClip:
         for start, end in swings:
             swinging[start:end, side] = True
             share = (np.arange(start, end) - start + 0.5) / max(end - start, 1)  # of the swing's time
-            swing[start:end, side] = np.sin(np.pi * share) ** 2
+            swing_curve[start:end, side] = np.sin(np.pi * share) ** 2
         # Stances fill the time before, between and after the swings.
         ends = [0, *(frame for swing_ends in swings for frame in swing_ends), frames - 1]
         stances.append(
@@ -101,7 +101,7 @@ def measure_healthy_clip(clip: Clip, labels: Labels) -> HealthyClip:
         labels,
         (stances[LEFT], stances[RIGHT]),
         swinging,
-        swing,
+        swing_curve,
         phase,
         gaussian(known.astype(float), PHASE_KNOWN_SECONDS * clip.fps),
         gaussian(labels.gait[:, GAITS.index("jog")], JOG_SECONDS * clip.fps),

@@ -25,9 +25,9 @@ class BodySample:
     """S moments of a clip, chosen to show how the axes of a rig's joints are turned relative to its body.
 
     In this class, the frame of a joint is a rotation (4,) that is the same at all times, not a moment of the
-    clip. It converts vectors from the axes of a figure that stands facing +Z with its arms out sideways to
-    the joint's own axes. The joint's rotation in the world, multiplied by its frame, is the rotation of the
-    body part from this stance.
+    clip. Take a figure that stands facing +Z with its arms out sideways. The frame converts vectors from the
+    axes of this figure to the joint's own axes. The joint's rotation in the world, multiplied by its frame,
+    is the rotation of the body part from this stance.
 
     body: which joint is which part. positions: (S, J, 3) cm. rotations: (S, J, 4) in the world. speeds:
     (S, J) cm a second. zero_positions: (J, 3) in the zero pose, in which all rotations are 0.
@@ -79,15 +79,15 @@ class BodySample:
         return unit_vectors(self.positions[:, end] - self.positions[:, start])
 
     def mean_in_joint_axes(self, joint: int, vectors: Array) -> Array:
-        """(3,) mean of `vectors` without outliers, along the joint's own axes.
+        """(3,) mean of `vectors` without outliers, in the joint's own axes.
 
-        vectors: (S, 3) along the axes of the world.
+        vectors: (S, 3) in the axes of the world.
         """
-        along_own_axes = quat.rotate(quat.inv(self.rotations[:, joint]), vectors)
-        return robust_mean(along_own_axes)
+        in_own_axes = quat.rotate(quat.inv(self.rotations[:, joint]), vectors)
+        return robust_mean(in_own_axes)
 
     def bone(self, start: int, end: int) -> Array:
-        """(3,) mean vector from the joint `start` to the joint `end`, along the own axes of `start`."""
+        """(3,) mean vector from the joint `start` to the joint `end`, in the own axes of `start`."""
         return self.mean_in_joint_axes(start, self.positions[:, end] - self.positions[:, start])
 
     def length(self, *joints: int) -> float:
@@ -109,7 +109,7 @@ class BodySample:
         return next((found for found in bones if np.linalg.norm(found[0]) > least), bones[-1])
 
     def hinge_axes(self, start: int, middle: int, end: int, otherwise: Array) -> Array:
-        """(S, 3) axis about which a limb of three joints bends, along the axes of the world.
+        """(S, 3) axis about which a limb of three joints bends, in the axes of the world.
 
         The axis turns with the joint `start`. For a leg it points to the body's left. otherwise: (S, 3), is
         returned if the limb hardly bends.

@@ -1,7 +1,7 @@
 """Loads the motion of a BVH file.
 
-The result is in centimetres, right-handed, with Y up, on a rig with a standing rest pose. A rig is the
-skeleton in a BVH file. A known skeleton is one that has a file in `config/skeletons`. The zero pose of a rig
+The result is in centimetres, right-handed, with Y up. A rig is the skeleton in a BVH file. A known skeleton
+is one that has a file in `config/skeletons`. Any other rig gets a standing rest pose. The zero pose of a rig
 is the one in which all rotations are zero.
 """
 
@@ -41,7 +41,7 @@ from hobble.motion.standing import why_not_standing
 from hobble.motion.upright_rest import with_upright_rest
 
 STILL = 0.1  # cm: a joint that stays this close to its offset counts as fixed to its parent
-FOUND = "found"  # stands in reports instead of the rig's name if the rig is no known skeleton
+UNKNOWN_RIG = "found"  # stands in reports instead of the rig's name if the rig is no known skeleton
 
 
 @dataclass(frozen=True)
@@ -170,7 +170,7 @@ def _load_unknown_rig(
     standing_clip = with_upright_rest(straight.clip, body, target.skeleton, named_joints)
     check_height(file.path, standing_clip.height_error, standing_clip.notes, options.accept_doubt)
     match = RigMatch(
-        known.rig if known else FOUND,
+        known.rig if known else UNKNOWN_RIG,
         standing_clip.clip.skeleton.roles,
         False,
         named or match_joints(standing_clip.clip.skeleton, standing_clip.body, target.skeleton, target_body),

@@ -18,7 +18,7 @@ from hobble.core.skeleton import Skeleton
 from hobble.motion.axes import turned_about_vertical
 from hobble.motion.body import body_by_roles
 from hobble.motion.check_retarget import check_difference, check_knees, compare_motions
-from hobble.motion.file_motion import FOUND, FileMotion, load_source
+from hobble.motion.file_motion import UNKNOWN_RIG, FileMotion, load_source
 from hobble.motion.loop import loop_clip
 from hobble.motion.options import ClipMotion
 from hobble.motion.pace import check_pace
@@ -172,6 +172,7 @@ def fit_skeleton(clip: Clip, source: FileMotion, target: Skeleton, proportions: 
             reordered = replace(reordered, skeleton=target) if has_equal_offsets else reordered
             return Fitted(reordered, 1.0, [KEPT] if source.has_moving_joints else [])
     followed_joints, unsure = match.followed_joints, source.unsure
+    # `load_source` gave an unknown rig a standing rest pose. A known rig gets one here.
     if not source.has_standing_rig:
         joints_to_keep = {clip.skeleton.index(name) for name in followed_joints.values()}
         standing = with_upright_rest(clip, body_by_roles(clip.skeleton), target, joints_to_keep)
@@ -185,7 +186,7 @@ def fit_skeleton(clip: Clip, source: FileMotion, target: Skeleton, proportions: 
         if match.rig == target.name:
             why = f"Its joints or its rest pose are not those of {target.name}"
         else:
-            why = f"Its rig is {'unknown' if match.rig == FOUND else match.rig}"
+            why = f"Its rig is {'unknown' if match.rig == UNKNOWN_RIG else match.rig}"
         repairs.append(
             f"{why}, so it could not keep its own bone lengths. It got the bone lengths of {target.name}."
         )

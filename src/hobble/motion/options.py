@@ -8,7 +8,7 @@ from typing import Annotated, Literal
 
 from pydantic import AfterValidator, Field, model_validator
 
-from hobble.core.section import Finite, Ground, MocapPath, Positive, PositiveFloat, Section
+from hobble.core.section import Finite, Ground, Positive, PositiveFloat, RelativePath, Section
 
 
 def _check_sixty(fps: float) -> float:
@@ -32,7 +32,7 @@ class Download(Section):
     url: str = Field(
         description="address of a clip; {clip} is the clip's name, {subject} is the name up to the first _"
     )
-    checksums: MocapPath = Field(
+    checksums: RelativePath = Field(
         description="file of SHA-256 sums, as sha256sum writes them; its path is relative to the folder of "
         "the data set's file"
     )

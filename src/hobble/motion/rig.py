@@ -26,7 +26,8 @@ from hobble.motion.tree import path_between
 # Name of a unit of length -> centimetres. The unit of CMU files is an inch / 0.45.
 UNITS = {"cm": 1.0, "inch": 2.54, "m": 100.0, "mm": 0.1, "CMU": 5.6444, "foot": 30.48}
 LEG = 80.0  # cm: length of thigh plus shank of an average adult
-KNOWN = 0.75  # a rig can be a known skeleton that has at least this share of the rig's joint names
+# A rig is taken for a known skeleton only if that has at least this share of the rig's joint names.
+LEAST_SHARED_NAMES = 0.75
 # Finds the names of joints (and other indented keys) in the text of a skeleton file.
 NAME = re.compile(r"^ +['\"]?([^\s'\":{}][^'\":{}]*)['\"]?\s*:", re.MULTILINE)
 # Role at the end of a bone, without the side -> degrees. Two rest poses count as equal if no bone's direction
@@ -147,7 +148,7 @@ def match_rig(rig: Skeleton, target: KnownSkeleton, folder: str | Path) -> RigMa
             has_known_rest_pose=alike,
         )
     known = nearest_skeleton(rig.joints, target, folder)
-    if _share_of_names(rig, known.skeleton) < KNOWN or _misfits(rig, known.skeleton):
+    if _share_of_names(rig, known.skeleton) < LEAST_SHARED_NAMES or _misfits(rig, known.skeleton):
         return None
     roles = _roles_in_rig(rig, known.skeleton)
     if _trunk_joints(rig, roles) != _trunk_joints(known.skeleton, known.skeleton.roles):
@@ -174,7 +175,7 @@ def match_rig(rig: Skeleton, target: KnownSkeleton, folder: str | Path) -> RigMa
 def has_equal_rest_pose(rig: Skeleton, known: Skeleton) -> bool:
     """Whether the limb bones of two rest poses have equal directions, to within MOST_APART.
 
-    Directions are measured along the body's own axes, so turned or mirrored bodies count as equal. A rig
+    Directions are measured in the body's own axes, so turned or mirrored bodies count as equal. A rig
     without toe joints (the balls of the feet) never counts as equal, because these joints have to be added.
     """
     if "left_toe" not in rig.roles:
@@ -232,6 +233,7 @@ def _differences(rig: Skeleton, target: Skeleton) -> list[str]:
 
 
 def _parent_names(skeleton: Skeleton) -> dict[str, str | None]:
+    """Name of each joint -> name of its parent, None for the root."""
     names = skeleton.joints
     return {n: names[p] if p >= 0 else None for n, p in zip(names, skeleton.parents, strict=True)}
 

@@ -25,10 +25,12 @@ def opening_slider(playable: Mapping[str, Any], measured: Iterable[Mapping[str, 
     channel = opening_channel(playable)
     if channel is None:
         return {"part": None, "value": 0}
+    # Column -> label of its slider.
     labels = {channel["columns"][i]: label for label, i in channel["sliders"].items()}
-    # Column -> its rank. `labels`: column -> label of its slider. A row names its column under "link".
+    # Column -> its highest rank. A row of a table names its column under "link".
     ranks: dict[str, tuple[float, float]] = {}
     for results in measured:
+        # `responses`: how much the pose changes with severity. `sizes`: how large each limp is.
         for table, rank in (("responses", _pose_change_rank), ("sizes", _limp_rank)):
             for row in results.get(table) or ():
                 if row.get("gait") == "walk" and row["link"] in labels:

@@ -6,14 +6,14 @@ from typing import Annotated, Literal
 
 from pydantic import Field, model_validator
 
-from hobble.core.section import Finite, MocapPath, Positive, PositiveFloat, Section
+from hobble.core.section import Finite, Positive, PositiveFloat, RelativePath, Section
 
 
 class HeightmapOptions(Section):
     """One heightmap: generated, read from a file, or matplotlib's elevation model of a real landscape."""
 
     kind: Literal["fractal", "hills", "stairs", "slope", "boxes", "beams", "elevation", "file"]
-    path: MocapPath | None = Field(
+    path: RelativePath | None = Field(
         None, description="file of the map, only for `kind: file`; relative to the mocap folder"
     )
     seed: int = 0

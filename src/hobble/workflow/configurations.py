@@ -51,7 +51,7 @@ class Configurations:
     def splits(self, configuration: str) -> dict[str, str]:
         """Clip -> "train" or "held_out", for the clips that suit the network.
 
-        Clips in which a channel that the network lacks is not 0 are left out.
+        A clip is left out if it has values other than 0 in a channel that the network lacks.
         """
         return self.datasets.splits(self.dataset(configuration), self.channels(configuration))
 
@@ -92,7 +92,10 @@ class Configurations:
         return isinstance(model_of_kind(self.catalogue.configuration(configuration).network.kind), BuiltModel)
 
     def training_row_files(self, configuration: str) -> list[str]:
-        """If the network is built: files with the rows of the training clips, in order of frames. Else []."""
+        """If the network is built: a file for each training clip, in the order of `splits`. Else [].
+
+        A file holds the rows of its clip, in order of frames.
+        """
         if not self.is_built(configuration):
             return []
         root = f"{DATASETS}/{self.dataset(configuration)}/database/clips"

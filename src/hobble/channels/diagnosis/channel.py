@@ -16,7 +16,7 @@ from pydantic import Field
 
 from hobble.channels.channel import Channel, ClipSource, HasLinks
 from hobble.core.errors import InputError
-from hobble.core.section import MocapPath, Section
+from hobble.core.section import RelativePath, Section
 from hobble.core.untrusted import MAX_TEXT_BYTES, printable, read_bytes
 
 if TYPE_CHECKING:
@@ -32,7 +32,7 @@ COLUMNS = ("file", "diagnosis")  # the columns that the table must have; all oth
 class DiagnosisTable(Section):
     """The section `channels.diagnosis` of a data set."""
 
-    table: MocapPath = Field(
+    table: RelativePath = Field(
         description="CSV in the mocap folder with the columns `file` (a BVH file) and `diagnosis`"
     )
 

@@ -10,10 +10,10 @@ from hobble.measures.results import SampleSize
 class ErrorNumbers(TypedDict):
     """Errors over `frames` frames.
 
-    mean, sd, p05 to p95: mean, standard deviation and percentiles of the relative error of a joint, which is
-    a fraction (see `hobble.measures.accuracy.run`). position_error_cm: mean distance between the predicted
-    and the captured position of a joint. If `frames` is 0, the means and sd are None, and there are no
-    percentiles.
+    mean, sd, p05 to p95: mean, standard deviation and percentiles of the relative error of a joint, that is,
+    the error of its position as a fraction of its captured distance from the root (see
+    `hobble.measures.accuracy.run`). position_error_cm: mean distance between the predicted and the captured
+    position of a joint. If `frames` is 0, the means and sd are None, and there are no percentiles.
     """
 
     frames: int

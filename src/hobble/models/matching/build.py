@@ -28,9 +28,9 @@ from hobble.rows.layout import RowLayout
 class Tables:
     """R frames of clips, in runs. A run is a sequence of consecutive frames of one clip.
 
-    features: (R, n) float32, the columns of X that a search compares, each times its weight. y: (R, Y)
+    features: (R, n) float32, the columns of x that a search compares, each times its weight. y: (R, Y)
     float32, raw units. phase: (R,) in cycles. remaining: (R,) int32, how many frames of the run follow.
-    columns: (n,) which columns of X are features. weights: (n,) their weights. every: frames between two
+    columns: (n,) which columns of x are features. weights: (n,) their weights. every: frames between two
     searches. halflife: frames in which the offset of a transition falls to about half, see
     `hobble.models.matching.inertia`.
     """
@@ -79,9 +79,9 @@ def build(
 ) -> Tables:
     """Build the tables.
 
-    clips: the files with the rows of the clips. layout: the columns of X and Y in the tables; other channels
-    of the clips are left out. skeleton: the one to which the layout belongs. Raises InputError if a file is
-    not a file of rows or has another layout, or if no file has a frame.
+    clips: the files with the rows of the clips. layout: the columns of x and y, with the channels of
+    the network; other channels of the clips are left out. skeleton: the one to which the layout belongs.
+    Raises InputError if a file is not a file of rows or has another layout, or if no file has a frame.
     """
     xs, ys, phases, remainings = [], [], [], []
     for path in clips:
@@ -128,6 +128,7 @@ def on_mean_ground(rows: ClipRows, layout: RowLayout) -> tuple[Array, Array]:
     ground = np.add.reduceat(rows.heights, rows.first_fit, axis=0) / count
     mean_height = np.add.reduceat(rows.mean, rows.first_fit)[:, None] / count
     values = {name: rows.channels[name] for name, _ in layout.channels}
+    # Fills x, and makes the joint heights in x and y relative to the mean ground, both in place.
     compose(layout, frame_inputs(layout, rows.x, values), ground, mean_height, x, y)
     return x, y
 
@@ -141,7 +142,7 @@ def find_runs(rows: ClipRows) -> tuple[NDArray[np.int64], NDArray[np.int32]]:
     frame = rows.frame
     kept = np.flatnonzero(np.diff(frame, append=-1) != 0)
     frame = frame[kept]
-    # A run ends where the next frame is not the following one, and at the last row (hence + 2).
+    # A run ends at a row if the next row's frame number is not one higher, and at the last row (hence + 2).
     ends = np.flatnonzero(np.diff(frame, append=frame[-1] + 2 if len(frame) else 0) != 1)
     index = np.arange(len(kept))
     return kept, (ends[np.searchsorted(ends, index)] - index).astype(np.int32)

@@ -10,7 +10,12 @@ from hobble.models.options import Options
 
 
 class PfnnOptions(Options):
-    """The phase-functioned network. The weights released by Holden et al. (2017) have two hidden layers."""
+    """The phase-functioned network.
+
+    hidden_layers: number of hidden layers, two in the weights released by Holden et al. (2017). units: units
+    of each of these layers. control_points: number of weight sets, evenly spaced over a cycle, between which
+    the phase interpolates.
+    """
 
     kind: Literal["pfnn"] = "pfnn"
     hidden_layers: Annotated[int, Field(ge=1, le=8)] = 2
@@ -19,7 +24,11 @@ class PfnnOptions(Options):
 
     @property
     def why_not_symmetric(self) -> str:
-        """As in `Options`. In a symmetric network, each control point needs a partner half a cycle later."""
+        """As in `Options`: "" if the network can be symmetric.
+
+        A symmetric network treats left and right alike, so each control point needs a partner half a cycle
+        later.
+        """
         why = f"it needs an even number of network.control_points, not {self.control_points}"
         return why if self.control_points % 2 else ""
 
@@ -29,5 +38,5 @@ class PfnnOptions(Options):
         return (self.units,) * self.hidden_layers
 
     def sizes(self, inputs: int, outputs: int) -> tuple[int, ...]:
-        """Units of each layer, the input first."""
+        """Units of each layer, the input first. inputs, outputs: columns of X and Y."""
         return (inputs, *self.hidden, outputs)

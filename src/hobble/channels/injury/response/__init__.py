@@ -22,6 +22,7 @@ MEASURE = Measure(
     package=__name__,
     inputs=("weights", "clips", "summaries"),  # the network, the clips' rows, summaries of these rows
     options=Options,
-    runtime=tuple(Runtime.model_fields),
+    runtime=tuple(Runtime.model_fields),  # it depends on all keys of the section `runtime`
+    # `least_minutes`: its job requests at least this time on a cluster.
     cost=Cost(mb_per_1000_frames=14, seconds_per_1000_frames=0.2, least_minutes=60),
 )
