@@ -26,16 +26,16 @@ class TwoFigures(Doubt):
     """A rig with more than one body."""
 
 
-def check_height(path: Path, error: float, notes: Sequence[str], accept: bool) -> None:
+def check_height(path: Path, error: float, doubts: Sequence[str], accept: bool) -> None:
     """Raise InputError if the height of a figure is too uncertain.
 
-    error: by how many cm the height may be off (two standard deviations). notes: what is uncertain, in
+    error: by how many cm the height may be off (two standard deviations). doubts: what is uncertain, in
     sentences. accept: take the clip anyway.
     """
     if error > MOST_HEIGHT_ERROR and not accept:
         raise InputError(
             path,
-            " ".join(notes),
+            " ".join(doubts),
             fix="Use a clip in which both feet stand flat, or one with a zero pose (all rotations zero) in "
             "which a person could stand. To use this clip anyway, set motion.accept_doubt: true.",
         )

@@ -54,9 +54,9 @@ class FileMotion:
     match: which known skeleton the rig is, if any, and which of the rig's joints each joint of the target
     follows. unit, unit_name: cm per unit of the file, and the unit in words. axes: which of the file's axes
     points up, and where the figure faces. first_frame: the file's frame (from 0) at which the clip begins.
-    repairs, notes: sentences on what was repaired, and on what else users should know. stance: where the rest
-    pose comes from, in words. has_moving_joints: whether any joint of the body except the hips moves relative
-    to its parent. unsure: sentences on what is uncertain about the rest pose.
+    repairs, notes: sentences on what was repaired, and on what else users should know. rest_source: where the
+    rest pose comes from, in words. has_moving_joints: whether any joint of the body except the hips moves
+    relative to its parent. unsure: sentences on what is uncertain about the rest pose.
     """
 
     clip: Clip
@@ -67,7 +67,7 @@ class FileMotion:
     first_frame: int
     repairs: list[str]
     notes: list[str]
-    stance: str
+    rest_source: str
     has_moving_joints: bool
     has_standing_rig: bool
     unsure: list[str] = field(default_factory=list)
@@ -120,7 +120,7 @@ def _load_known_rig(
         first_frame=0,
         repairs=repairs + decoded.repairs,
         notes=decoded.notes + straight.notes,
-        stance="its zero pose",
+        rest_source="its zero pose",
         has_moving_joints=moving,
         has_standing_rig=False,
         unsure=straight.unsure,
@@ -168,7 +168,7 @@ def _load_unknown_rig(
     named = known.followed_joints if known is not None and known.rig == target.skeleton.name else {}
     named_joints = [rig.index(joint) for joint in named.values()]
     standing_clip = with_upright_rest(straight.clip, body, target.skeleton, named_joints)
-    check_height(file.path, standing_clip.height_error, standing_clip.notes, options.accept_doubt)
+    check_height(file.path, standing_clip.height_error, standing_clip.doubts, options.accept_doubt)
     match = RigMatch(
         known.rig if known else UNKNOWN_RIG,
         standing_clip.clip.skeleton.roles,
@@ -185,10 +185,10 @@ def _load_unknown_rig(
         first_frame=0,
         repairs=repairs + decoded.repairs,
         notes=notes,
-        stance=standing_clip.rest_source,
+        rest_source=standing_clip.rest_source,
         has_moving_joints=_has_moving_joints(decoded, body, unit),
         has_standing_rig=True,
-        unsure=straight.unsure + standing_clip.notes,
+        unsure=straight.unsure + standing_clip.doubts,
     )
     return _repair_and_ground(file, source, options)
 

@@ -89,17 +89,20 @@ def make_clip(
 
 
 def _check_length(file: Bvh, clip: Clip, target: Skeleton, options: ClipMotion) -> None:
-    """Raise InputError for a clip that would need too much memory at its new frame rate.
+    """Raise InputError for a clip that would need too much memory at its new frame rate, with all its loops.
 
-    No real clip is that long: a wrong frame rate is more likely.
+    No real clip is that long: a wrong frame rate or number of loops is more likely.
     """
     frames = len(clip) / clip.fps * options.fps * options.loops
     if frames * max(len(clip.skeleton.joints), len(target.joints)) > MOST_POSES:
+        looped, fewer = "", ""
+        if options.loops > 1:
+            looped, fewer = f" with {options.loops} loops", ", or set fewer loops"
         raise InputError(
             file.path,
-            f"{len(clip)} frames at {clip.fps:g} a second become {frames:.0f} at {options.fps:g}; frames "
-            f"times joints may be at most {MOST_POSES}",
-            fix="Cut it into shorter clips, or set its source_fps.",
+            f"{len(clip)} frames at {clip.fps:g} a second become {frames:.0f} at {options.fps:g}{looped}; "
+            f"frames times joints may be at most {MOST_POSES}",
+            fix=f"Cut it into shorter clips, or set its source_fps{fewer}.",
         )
 
 
@@ -172,11 +175,12 @@ def fit_skeleton(clip: Clip, source: FileMotion, target: Skeleton, proportions: 
             reordered = replace(reordered, skeleton=target) if has_equal_offsets else reordered
             return Fitted(reordered, 1.0, [KEPT] if source.has_moving_joints else [])
     followed_joints, unsure = match.followed_joints, source.unsure
-    # `load_source` gave an unknown rig a standing rest pose. A known rig gets one here.
+    # `has_standing_rig` is true for an unknown rig: `load_source` has already given it a standing rest pose.
+    # A known rig gets one here.
     if not source.has_standing_rig:
         joints_to_keep = {clip.skeleton.index(name) for name in followed_joints.values()}
         standing = with_upright_rest(clip, body_by_roles(clip.skeleton), target, joints_to_keep)
-        clip, unsure = standing.clip, unsure + standing.notes
+        clip, unsure = standing.clip, unsure + standing.doubts
         followed_joints = {
             joint: followed for joint, followed in followed_joints.items() if followed in clip.skeleton.joints
         }
@@ -230,6 +234,6 @@ def _report(file: Bvh, source: FileMotion, new_clip: Clip) -> dict[str, Any]:
         "handedness": source.axes.handedness,
         "rest_facing": source.axes.facing,
         "rig": source.match.rig,
-        "stance": source.stance,
+        "stance": source.rest_source,
         "roles": dict(source.match.roles),
     }

@@ -41,14 +41,14 @@ class UprightMotion:
     """A clip with a standing rest pose that faces +Z with the arms out.
 
     clip: has the joints of the body, and the further joints that `with_upright_rest` was told to keep. body:
-    which joint is which part of the body. rest_source: where the rest pose comes from, in words. notes:
+    which joint is which part of the body. rest_source: where the rest pose comes from, in words. doubts:
     sentences on what is uncertain. height_error: cm by which the figure may stand too high or too low.
     """
 
     clip: Clip = field(repr=False)
     body: Body
     rest_source: str
-    notes: list[str] = field(default_factory=list)
+    doubts: list[str] = field(default_factory=list)
     height_error: float = 0.0
 
 
@@ -101,8 +101,13 @@ def with_upright_rest(
     roles = body.roles(clip.skeleton.joints)
     clip, body = with_split_joints(clip, body, axes, find_bends(trunk))
     clip, body = with_new_rest_pose(clip, body, [*body.joints, *kept], axes, roles)
-    notes = [doubt for doubt in doubts if doubt]
-    return UprightMotion(clip, body, rest_source, notes, height_error(sample, problem is None))
+    return UprightMotion(
+        clip,
+        body,
+        rest_source,
+        [doubt for doubt in doubts if doubt],
+        height_error(sample, problem is None),
+    )
 
 
 def _arms_on_neck(clip: Clip, body: Body) -> bool:
