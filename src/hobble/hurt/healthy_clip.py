@@ -22,7 +22,7 @@ CYCLE_SECONDS = 1.1  # assumed length of a cycle in clips without one
 LONGEST_CYCLE_SECONDS = 2.5  # a longer time between two landings of a foot is not a cycle
 LEAST_SWING = 6  # frames: contacts in the labels shorten a swing, but not below this length
 PATH_SECONDS = 0.25  # sigma of the Gaussian that smooths the hips' positions to a path
-FACING_SECONDS = 0.2  # sigma of the Gaussian that smooths the heading
+HEADING_SECONDS = 0.2  # sigma of the Gaussian that smooths the heading
 PHASE_KNOWN_SECONDS = 0.2  # sigma of the Gaussian that smooths `phase_known`
 JOG_SECONDS = 0.1  # sigma of the Gaussian that smooths the share of jogging
 
@@ -152,5 +152,5 @@ def _cycle_lengths(stances: tuple[list[SourceStance], list[SourceStance]], frame
 def _heading(clip: Clip) -> Array:
     """(F, 4) rotation about Y from +Z to the direction in which the pelvis faces."""
     left, right = (clip.positions[:, clip.skeleton.role(f"{side}_hip")] for side in SIDES)
-    forward = gaussian(np.cross(left - right, UP), FACING_SECONDS * clip.fps)
+    forward = gaussian(np.cross(left - right, UP), HEADING_SECONDS * clip.fps)
     return quat.yaw(np.arctan2(forward[:, 0], forward[:, 2]))

@@ -24,10 +24,9 @@ FLEXED = 0.05
 class BodySample:
     """S moments of a clip, chosen to show how the axes of a rig's joints are turned relative to its body.
 
-    In this class, the frame of a joint is a rotation (4,) that is the same at all times, not a moment of the
-    clip. Take a figure that stands facing +Z with its arms out sideways. The frame converts vectors from the
-    axes of this figure to the joint's own axes. The joint's rotation in the world, multiplied by its frame,
-    is the rotation of the body part from this stance.
+    In this class, the frame of a joint is not a moment of the clip but a constant rotation F (4,). Let R be
+    the joint's rotation in the world. R F is the identity while the figure stands in a T-pose facing +Z (with
+    its arms out sideways). At other times, R F is how far the body part has turned from the T-pose.
 
     body: which joint is which part. positions: (S, J, 3) cm. rotations: (S, J, 4) in the world. speeds:
     (S, J) cm a second. zero_positions: (J, 3) in the zero pose, in which all rotations are 0.
@@ -101,7 +100,7 @@ class BodySample:
     def first_long_bone(
         self, joint: int, following: Sequence[int], least: float = SHORT
     ) -> tuple[Array, int]:
-        """Find the first joint of `following` that is over `least` cm away from `joint`, or else its last.
+        """Find the first joint of `following` over `least` cm away from `joint`; if none is, the last one.
 
         Returns the (3,) `bone` from `joint` to the joint found, and the joint found.
         """
@@ -121,11 +120,14 @@ class BodySample:
         return quat.rotate(self.rotations[:, start], np.broadcast_to(unit_vectors(mean_axis), axis.shape))
 
     def hand_frame(self, side: str, straight: Array, sign: float) -> Array:
-        """(4,) the frame of a hand, which points to the base of one finger (the joint in `Body.fingers`).
+        """(4,) the frame of a hand.
+
+        The direction of the hand is taken to be that from the wrist to the base of one finger (the joint in
+        `Body.fingers`).
 
         straight: (4,) the frame of a hand that is in line with its forearm. It is turned to the finger, or
         returned unchanged if `Body.fingers` has no joint for this hand. sign: 1 for the left hand, whose arm
-        points to +X in the stance, and -1 for the right hand.
+        points to +X in the T-pose, and -1 for the right hand.
         """
         if side not in self.body.fingers:
             return straight

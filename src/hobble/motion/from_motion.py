@@ -1,7 +1,7 @@
 """Finds how a rig's joints are turned on its body, from the directions of the bones in motion.
 
-The result is a frame for each joint: the rotation (4,) from the axes of a figure in the stance to the joint's
-own axes. In the stance, the figure faces +Z, with its arms out sideways. The frame of a joint is the same at
+The result is a frame for each joint: the rotation (4,) from the axes of a figure in a T-pose to the joint's
+own axes. In the T-pose, the figure faces +Z, with its arms out sideways. The frame of a joint is the same at
 all times. It has nothing to do with the frames of a clip.
 """
 
@@ -131,7 +131,7 @@ def _head_frame(sample: BodySample, frames: dict[int, Array], chain: Sequence[in
 def _add_arm(sample: BodySample, frames: dict[int, Array], side: str, sign: float) -> None:
     """Add the frames of an arm's joints. side, sign: "left" and 1, or "right" and -1.
 
-    In the stance, the arm points to sign * LEFT. Its elbow bends forward, about the axis -sign * UP.
+    In the T-pose, the arm points to sign * LEFT. Its elbow bends forward, about the axis -sign * UP.
     """
     clavicle, shoulder, elbow, wrist = sample.body.arms[side]
     chest = quat.mul(sample.rotations[:, sample.body.chest], frames[sample.body.chest])
@@ -149,7 +149,7 @@ def _add_arm(sample: BodySample, frames: dict[int, Array], side: str, sign: floa
 
 
 def _add_leg(sample: BodySample, frames: dict[int, Array], side: str) -> None:
-    """Add the frames of hip and knee. In the stance, the leg points down and its knee bends about LEFT."""
+    """Add the frames of hip and knee. In the T-pose, the leg points down and its knee bends about LEFT."""
     hip, knee, heel, _ = sample.body.legs[side]
     hinge = sample.hinge_axes(hip, knee, heel, sample.hips_left)
     for start, end in ((hip, knee), (knee, heel)):

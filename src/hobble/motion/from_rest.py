@@ -2,8 +2,8 @@
 
 In the zero pose, all rotations of the file are zero. For some joints it is more reliable than the motion.
 
-The result is a frame for each joint: the rotation (4,) from the axes of a figure in the stance to the joint's
-own axes. In the stance, the figure faces +Z, with its arms out sideways. The frame of a joint is the same at
+The result is a frame for each joint: the rotation (4,) from the axes of a figure in a T-pose to the joint's
+own axes. In the T-pose, the figure faces +Z, with its arms out sideways. The frame of a joint is the same at
 all times. It has nothing to do with the frames of a clip.
 """
 
@@ -43,7 +43,7 @@ def frames_from_rest(sample: BodySample) -> dict[int, Array]:
     """Joint -> its frame (4,) according to the zero pose, in which a person must be able to stand.
 
     In the zero pose, the axes of all joints are parallel. So trunk, neck, head, clavicles and feet have the
-    same frame. Arms and legs may point in other directions than in the stance. Their bones in the zero pose
+    same frame. Arms and legs may point in other directions than in the T-pose. Their bones in the zero pose
     show how they are turned.
     """
     body, rest = sample.body, sample.zero_positions

@@ -26,7 +26,8 @@ from hobble.motion.tree import path_between
 # Name of a unit of length -> centimetres. The unit of CMU files is an inch / 0.45.
 UNITS = {"cm": 1.0, "inch": 2.54, "m": 100.0, "mm": 0.1, "CMU": 5.6444, "foot": 30.48}
 LEG = 80.0  # cm: length of thigh plus shank of an average adult
-# A rig is taken for a known skeleton only if that has at least this share of the rig's joint names.
+# A rig is taken for a known skeleton only if at least this share of the rig's joint names occur in that
+# skeleton.
 LEAST_SHARED_NAMES = 0.75
 # Finds the names of joints (and other indented keys) in the text of a skeleton file.
 NAME = re.compile(r"^ +['\"]?([^\s'\":{}][^'\":{}]*)['\"]?\s*:", re.MULTILINE)
@@ -215,7 +216,7 @@ def _bone_directions(skeleton: Skeleton) -> dict[tuple[str, str], Array]:
 
 
 def _share_of_names(rig: Skeleton, known: Skeleton) -> float:
-    """Share of the clip's joints, 0 to 1, whose names also occur in a known skeleton."""
+    """Share of the rig's joints, 0 to 1, whose names also occur in a known skeleton."""
     return len(set(rig.joints) & set(known.joints)) / len(rig.joints)
 
 

@@ -46,6 +46,7 @@ class _Mann(TrainedModel):
         )
 
     def read(self, path: str | Path, arrays: Mapping[str, Any], shared_fields: Mapping[str, Any]) -> Mann:
+        """As in `Model`. shared_fields: those that networks of all kinds have."""
         from hobble.models.mann.network import Mann
 
         return Mann.read(path, arrays, shared_fields)

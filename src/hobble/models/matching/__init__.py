@@ -30,6 +30,7 @@ class _Matching(BuiltModel):
         return build(options, clips, layout, skeleton)
 
     def read(self, path: str | Path, arrays: Mapping[str, Any], shared_fields: Mapping[str, Any]) -> Matching:
+        """As in `Model`. shared_fields: those that networks of all kinds have."""
         from hobble.models.matching.network import Matching
 
         return Matching.read(path, arrays, shared_fields)

@@ -61,9 +61,8 @@ class Tables:
     def file_metadata(self) -> dict[str, Any]:
         """As in `FinishedNetwork`."""
         return {
-            "network": "a search finds the frame of the clips with the features (weighted columns of x) that "
-            "are nearest to those of the input; y is this frame, then the frames that follow it until the "
-            "next search",
+            "network": "a search compares features (weighted columns of x) and finds the frame of the clips "
+            "nearest to the input; from there the clip is played, one y a frame, until the next search",
             "every": self.every,
             "halflife": self.halflife,
         }

@@ -43,6 +43,7 @@ class _Pfnn(TrainedModel):
         return untrained_network(options.sizes(layout.x_size, layout.y_size), options.control_points, seed)
 
     def read(self, path: str | Path, arrays: Mapping[str, Any], shared_fields: Mapping[str, Any]) -> Pfnn:
+        """As in `Model`. shared_fields: those that networks of all kinds have."""
         from hobble.models.pfnn.network import Pfnn
 
         return Pfnn.read(path, arrays, shared_fields)

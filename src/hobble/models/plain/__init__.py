@@ -36,6 +36,7 @@ class _Plain(TrainedModel):
         return untrained_network(options.sizes(layout.x_size, layout.y_size), seed)
 
     def read(self, path: str | Path, arrays: Mapping[str, Any], shared_fields: Mapping[str, Any]) -> Plain:
+        """As in `Model`. shared_fields: those that networks of all kinds have."""
         from hobble.models.plain.network import Plain
 
         return Plain.read(path, arrays, shared_fields)
