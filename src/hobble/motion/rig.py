@@ -55,7 +55,7 @@ class KnownSkeleton:
 class RigMatch:
     """Which known skeleton a clip's rig is, and how it maps to the target.
 
-    rig: name of the known skeleton, or "found" if the joints' roles were found without one. roles: role ->
+    rig: name of the known skeleton, or UNKNOWN_RIG of `hobble.motion.file_motion` if the rig is none. roles: role ->
     name of the clip's joint. is_target_skeleton: whether the clip has the target's own joints and an equal
     rest pose. followed_joints: name of a target joint -> name of the clip's joint that it follows.
     has_known_rest_pose: whether the clip's rest pose equals that of the known skeleton (as
@@ -153,8 +153,7 @@ def match_rig(rig: Skeleton, target: KnownSkeleton, folder: str | Path) -> RigMa
         return None
     roles = _roles_in_rig(rig, known.skeleton)
     if _trunk_joints(rig, roles) != _trunk_joints(known.skeleton, known.skeleton.roles):
-        # With another number of joints in the spine, a name such as Neck may mean another joint than in the
-        # skeleton file.
+        # With other joints in the spine, a name such as Neck may mean another joint than in the skeleton file.
         return RigMatch(
             known.skeleton.name,
             roles,

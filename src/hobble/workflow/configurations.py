@@ -89,7 +89,7 @@ class Configurations:
 
     def is_built(self, configuration: str) -> bool:
         """Whether the network is built directly from rows of the database instead of trained."""
-        return isinstance(model_of_kind(self.catalogue.configuration(configuration).network.kind), BuiltModel)
+        return isinstance(self.model(configuration), BuiltModel)
 
     def training_row_files(self, configuration: str) -> list[str]:
         """If the network is built: a file for each training clip, in the order of `splits`. Else [].
