@@ -153,7 +153,8 @@ def match_rig(rig: Skeleton, target: KnownSkeleton, folder: str | Path) -> RigMa
         return None
     roles = _roles_in_rig(rig, known.skeleton)
     if _trunk_joints(rig, roles) != _trunk_joints(known.skeleton, known.skeleton.roles):
-        # With other joints in the spine, a name such as Neck may mean another joint than in the skeleton file.
+        # With other joints in the spine, a name such as Neck may mean another joint than in the file of the
+        # known skeleton.
         return RigMatch(
             known.skeleton.name,
             roles,

@@ -218,10 +218,11 @@ def clip_strips(material: ReportMaterial, clips: frozenset[str]) -> list[dict[st
 
     clips: names of the clips to show. Clips without label curves are left out, and mirrored clips if the clip
     that they mirror is in the data set. Keys of a strip: those that `make_label_picture` of
-    `hobble.labels.label_picture` returns; `clip`; `length` in seconds; `channels`, a list of columns with a value above 0. Keys of such a column: `name`;
-    `spans`, stretches above 0 as [start in seconds, end in seconds, largest value in the stretch]; `highest`,
-    the largest value that the channel allows, such as 10. The channel report calls these stretches `spells`.
-    If it has none for a column, the whole clip is one span with the column's largest value.
+    `hobble.labels.label_picture` returns; `clip`; `length` in seconds; `channels`, a list of columns with a
+    value above 0. Keys of such a column: `name`; `spans`, stretches above 0 as [start in seconds, end in
+    seconds, largest value in the stretch]; `highest`, the largest value that the channel allows, such as 10.
+    The channel report calls these stretches `spells`. If it has none for a column, the whole clip is one span
+    with the column's largest value.
     """
     # Clip -> column -> (its entry in the channel report, largest value that the channel allows). The key
     # `highest` of an entry is the largest value of the column in this clip.
