@@ -50,9 +50,9 @@ def _pose_change_rank(row: Mapping[str, Any]) -> tuple[float, float]:
 def _limp_rank(row: Mapping[str, Any]) -> tuple[float, float]:
     """A rank by how much the limp changes the walk: the changes of stance, step and knee, added up.
 
-    `stance`: how much longer the sound leg stands than the hurt one, as a share of the cycle; the healthy walk
-    has 0. `step_hurt`, `knee_hurt`: length of the step and range of the knee of the hurt leg, divided by those
-    of the healthy walk.
+    `stance`: how much longer the sound leg stands than the hurt one, as a share of the cycle; the healthy
+    walk has 0. `step_hurt`, `knee_hurt`: length of the step and range of the knee of the hurt leg, divided
+    by those of the healthy walk.
     """
     ratios = [row.get(name) for name in ("step_hurt", "knee_hurt")]
     return abs(row.get("stance") or 0.0) + sum(abs(1 - ratio) for ratio in ratios if ratio is not None), 0.0
