@@ -175,8 +175,8 @@ def fit_skeleton(clip: Clip, source: FileMotion, target: Skeleton, proportions: 
             reordered = replace(reordered, skeleton=target) if has_equal_offsets else reordered
             return Fitted(reordered, 1.0, [KEPT] if source.has_moving_joints else [])
     followed_joints, unsure = match.followed_joints, source.unsure
-    # The rig needs a standing rest pose. `load_source` has already given it one if its joints or its rest
-    # pose are not those of a known skeleton (`has_standing_rig`).
+    # The rig needs a standing rest pose. For rigs that match no known skeleton, in joints or in rest pose,
+    # `load_source` has already made one (`has_standing_rig`). For the others it is made here.
     if not source.has_standing_rig:
         joints_to_keep = {clip.skeleton.index(name) for name in followed_joints.values()}
         standing = with_upright_rest(clip, body_by_roles(clip.skeleton), target, joints_to_keep)

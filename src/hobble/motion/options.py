@@ -21,8 +21,8 @@ def _check_sixty(fps: float) -> float:
 SixtyHz = Annotated[float, AfterValidator(_check_sixty)]
 
 
-# Format that may follow a name in `url`, such as 0>3 in {subject:0>3}. It has a fill character, an alignment
-# and a width. The width is at most 99, because no file name needs more.
+# Format that may follow a name in `url`, such as 0>3 in {subject:0>3}: a width, which may have an alignment
+# and a fill character before it. The width is at most 99, because no file name needs more.
 PADDING = re.compile(r"(?:.?[<>^])?\d{0,2}")
 
 
@@ -46,7 +46,7 @@ class Download(Section):
             if any(
                 conversion or not PADDING.fullmatch(spec or "") for _, _, spec, conversion in placeholders
             ):
-                raise ValueError("only a width of up to 99 may follow a name, as in {subject:0>3}")
+                raise ValueError("only padding to a width of up to 99 may follow a name, as in {subject:0>3}")
             if not names <= {"clip", "subject"} or "clip" not in names:
                 raise ValueError("must contain {clip}; only {clip} and {subject} may be in braces")
             example = self.url.format(clip="02_01", subject="02")

@@ -59,7 +59,7 @@ class RigMatch:
     role -> name of the clip's joint. is_target_skeleton: whether the clip has the target's own joints and an
     equal rest pose. followed_joints: name of a target joint -> name of the clip's joint that it follows.
     has_known_rest_pose: whether the clip's rest pose equals that of the known skeleton (as
-    `has_equal_rest_pose` compares them).
+    `has_equal_rest_pose` compares them); False if the rig has other joints between hips and head.
     """
 
     rig: str

@@ -217,19 +217,21 @@ def clip_strips(material: ReportMaterial, clips: frozenset[str]) -> list[dict[st
     """Data for the strips. A strip is a chart of one clip over time: label curves and channel values.
 
     clips: names of the clips to show. Clips without label curves are left out, and mirrored clips if the clip
-    that they mirror is in the data set. Keys of a strip: those that `make_label_picture` of
-    `hobble.labels.label_picture` returns; `clip`; `length` in seconds; `channels`, a list of columns with a
-    value above 0. Keys of such a column: `name`; `spans`, stretches above 0 as [start in seconds, end in
-    seconds, largest value in the stretch]; `highest`, the largest value that the channel allows, such as 10.
-    The channel report calls these stretches `spells`. If it has none for a column, the whole clip is one span
-    with the column's largest value.
+    that they mirror is in the data set. A strip has the keys that `make_label_picture` of
+    `hobble.labels.label_picture` returns, and
+
+    - `clip`: its name. `length`: seconds
+    - `channels`: a dict for each column with a value above 0, with its `name`; `spans`, the stretches above 0
+      as [start in seconds, end in seconds, largest value]; and `highest`, the largest value that the channel
+      allows, such as 10. If the channel report does not list the stretches (its key `spells`), there is one
+      span, the whole clip
     """
-    # Clip -> column -> (its entry in the channel report, largest value that the channel allows). The key
-    # `highest` of an entry is the largest value of the column in this clip.
+    # Clip -> column -> (its entry in the channel report, largest value that the channel allows). An entry's
+    # own `highest` is the largest value of the column in this clip.
     channels_of: dict[str, dict[str, Any]] = {}
     for report in material.channels:
         channel_highest = report.get("highest", 10.0)
-        values = {label: (value, channel_highest) for label, value in report["values"].items()}
+        values = {column: (entry, channel_highest) for column, entry in report["values"].items()}
         channels_of.setdefault(report["clip"], {}).update(values)
     shown_name = shown_names(material.network["skeleton"])
     lengths = {report["clip"]: report.get("seconds") for report in material.motion}
@@ -243,11 +245,11 @@ def clip_strips(material: ReportMaterial, clips: frozenset[str]) -> list[dict[st
         length = lengths.get(clip) or curves["seconds"][-1]
         channel_values = [
             {
-                "name": shown_name(label),
-                "spans": summary.get("spells") or [[0, length, summary["highest"]]],
+                "name": shown_name(column),
+                "spans": entry.get("spells") or [[0, length, entry["highest"]]],
                 "highest": channel_highest,
             }
-            for label, (summary, channel_highest) in channels_of.get(clip, {}).items()
+            for column, (entry, channel_highest) in channels_of.get(clip, {}).items()
         ]
         out.append({**curves, "clip": clip, "length": length, "channels": channel_values})
     return out

@@ -28,6 +28,8 @@ from hobble.rows.layout import RowLayout
 class Tables:
     """R frames of clips, in runs. A run is a sequence of consecutive frames of one clip.
 
+    It is a `FinishedNetwork` of `hobble.models.model`, which explains the methods.
+
     features: (R, n) float32, the columns of x that a search compares, each times its weight. y: (R, Y)
     float32, raw units. phase: (R,) in cycles. remaining: (R,) int32, how many frames of the run follow.
     columns: (n,) which columns of x are features. weights: (n,) their weights. every: frames between two
