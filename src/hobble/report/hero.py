@@ -42,7 +42,7 @@ def opening_slider(playable: Mapping[str, Any], measured: Iterable[Mapping[str, 
 def _pose_change_rank(row: Mapping[str, Any]) -> tuple[float, float]:
     """A rank by how far severity 10 moves the joints, cm. It is below the rank of every walk that limps.
 
-    Limps come first because who opens the page looks for a limp. By the change of pose, a bent back would win.
+    Limps come first because people open the page to see a limp. By the change of pose, a bent back would win.
     """
     return 0.0, row.get("from_healthy_cm") or 0.0
 
