@@ -217,7 +217,7 @@ def test_several_machines_need_slurm(monkeypatch: pytest.MonkeyPatch, tmp_path: 
         ({"gpus": 2, "processes": 2}, "not both"),
         ({"gpus": 2, "device": "cpu"}, "needs `device"),
         ({"nodes": 5, "processes": 8}, "40 processes share a batch of 32"),
-        ({"stretches": 33}, "above `batch`"),
+        ({"stretches": 33}, "must not be more than `batch`"),
     ],
 )
 def test_invalid_machines_are_refused(training: Recipe, changes: dict[str, Any], message: str) -> None:

@@ -27,7 +27,7 @@ class Graph:
 
     def replay(self) -> None:
         of_step = self.update.step.error
-        self.update.loss.copy_(self.update._once())
+        self.update.loss.copy_(self.update._update_from_fixed_memory())
         self.update.error.copy_(self.update.step.error)
         self.update.step.error = of_step
 

@@ -72,8 +72,8 @@ def skin_weights(
     if weights.shape[1] < MOST_BONES:
         pad = MOST_BONES - weights.shape[1]
         weights, order = np.pad(weights, ((0, 0), (0, pad))), np.pad(order, ((0, 0), (0, pad)))
-    # Lower all weights by 0.01, to at least 0. Only the four largest weights are kept, and which bone is
-    # fourth can change from one corner to its neighbour. Where the fourth weight is at most 0.01, this makes
-    # it 0, so that no weight jumps at such a change.
+    # Which bone has the fourth-largest weight can change from one corner to its neighbour, and a weight would
+    # jump there. So all weights are lowered by 0.01, but not below 0. A fourth weight of at most 0.01
+    # becomes 0.
     weights = np.maximum(weights - 0.01, 0)
     return joints[order], weights / weights.sum(axis=1, keepdims=True)

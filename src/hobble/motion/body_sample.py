@@ -30,7 +30,7 @@ class BodySample:
 
     body: which joint is which part. positions: (S, J, 3) cm. rotations: (S, J, 4) in the world. speeds:
     (S, J) cm a second. zero_positions: (J, 3) in the zero pose, in which all rotations are 0.
-    ankle_end_sites: side -> (3,) offset from the ankle to the end site of its bone, or None if it has none.
+    ankle_end_sites: side -> (3,) offset from the ankle to its end site in the file, None without one.
     target_proportions: those of the skeleton to which the clip will be retargeted. seconds: length of the
     clip.
 

@@ -55,7 +55,7 @@ class KnownSkeleton:
 class RigMatch:
     """Which known skeleton a clip's rig is, and how it maps to the target.
 
-    rig: name of the known skeleton, or UNKNOWN_RIG of `hobble.motion.file_motion` if the rig is none. roles:
+    rig: name of the known skeleton, or UNKNOWN_RIG of `hobble.motion.file_motion`. roles:
     role -> name of the clip's joint. is_target_skeleton: whether the clip has the target's own joints and an
     equal rest pose. followed_joints: name of a target joint -> name of the clip's joint that it follows.
     has_known_rest_pose: whether the clip's rest pose equals that of the known skeleton (as
@@ -133,8 +133,8 @@ def find_hips(names: Sequence[str], target: KnownSkeleton, folder: str | Path) -
 def match_rig(rig: Skeleton, target: KnownSkeleton, folder: str | Path) -> RigMatch | None:
     """Find which known skeleton a clip's rig is, and how it maps to the target.
 
-    rig: the clip's skeleton. folder: the folder of the skeleton files. Returns None if no known skeleton has
-    enough of the rig's joint names in the same hierarchy. The match has roles but no `followed_joints` if no
+    rig: the clip's skeleton. folder: the folder of the skeleton files. Returns None if the known skeleton that
+    shares most joint names with the rig shares too few, or has another hierarchy. The match has roles but no `followed_joints` if no
     map leads to the target, or if the rig has other joints between hips and head than the known skeleton.
     """
     if not _differences(rig, target.skeleton):

@@ -42,7 +42,8 @@ def opening_slider(playable: Mapping[str, Any], measured: Iterable[Mapping[str, 
 def _pose_change_rank(row: Mapping[str, Any]) -> tuple[float, float]:
     """A rank by how far severity 10 moves the joints, cm. It is below the rank of every walk that limps.
 
-    Limps come first because people open the page to see a limp. By the change of pose, a bent back would win.
+    Limps come first because people open the page to see a limp. If only the change of pose counted, the back
+    would win, because a hurt back bends the whole figure.
     """
     return 0.0, row.get("from_healthy_cm") or 0.0
 
