@@ -55,11 +55,11 @@ class KnownSkeleton:
 class RigMatch:
     """Which known skeleton a clip's rig is, and how it maps to the target.
 
-    rig: name of the known skeleton, or UNKNOWN_RIG of `hobble.motion.file_motion`. roles:
-    role -> name of the clip's joint. is_target_skeleton: whether the clip has the target's own joints and an
-    equal rest pose. followed_joints: name of a target joint -> name of the clip's joint that it follows.
-    has_known_rest_pose: whether the clip's rest pose equals that of the known skeleton (as
-    `has_equal_rest_pose` compares them); False if the rig has other joints between hips and head.
+    rig: name of the known skeleton, or UNKNOWN_RIG of `hobble.motion.file_motion`. roles: role -> name of the
+    clip's joint. is_target_skeleton: whether the clip has the target's own joints and an equal rest pose.
+    followed_joints: name of a target joint -> name of the clip's joint that it follows. has_known_rest_pose:
+    whether the clip's rest pose equals that of the known skeleton (as `has_equal_rest_pose` compares them);
+    False if the rig has other joints between hips and head.
     """
 
     rig: str
@@ -133,9 +133,10 @@ def find_hips(names: Sequence[str], target: KnownSkeleton, folder: str | Path) -
 def match_rig(rig: Skeleton, target: KnownSkeleton, folder: str | Path) -> RigMatch | None:
     """Find which known skeleton a clip's rig is, and how it maps to the target.
 
-    rig: the clip's skeleton. folder: the folder of the skeleton files. Returns None if the known skeleton that
-    shares most joint names with the rig shares too few, or has another hierarchy. The match has roles but no `followed_joints` if no
-    map leads to the target, or if the rig has other joints between hips and head than the known skeleton.
+    rig: the clip's skeleton. folder: the folder of the skeleton files. Returns None if the known skeleton
+    that shares most joint names with the rig shares too few, or has another hierarchy. The match has roles
+    but no `followed_joints` if no map leads to the target, or if the rig has other joints between hips and
+    head than the known skeleton.
     """
     if not _differences(rig, target.skeleton):
         roles = target.skeleton.roles
