@@ -180,7 +180,7 @@ def _repair_hints(material: ReportMaterial) -> Iterator[Hint]:
     if repaired or warned:
         yield Hint(
             "note",
-            f"{len(repaired)} clips were repaired, and {len(warned)} have warnings.",
+            f"Some clips were repaired ({len(repaired)}) or have warnings ({len(warned)}).",
             "They are listed under Data. Look at them, because the network also learns the errors in a clip.",
         )
 
