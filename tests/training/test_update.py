@@ -82,7 +82,7 @@ def test_a_captured_cuda_update_equals_the_plain_one() -> None:
     for mine, theirs in losses:  # looked at afterwards, as the watch does
         assert float(mine) == pytest.approx(float(theirs), rel=1e-5)
     assert plain.adam.steps == captured.adam.steps == 4
-    for name in ("first", "second"):
+    for name in ("first_moment", "second_moment"):
         assert torch.allclose(getattr(plain.adam, name), getattr(captured.adam, name), rtol=1e-4, atol=1e-7)
     assert torch.allclose(plain.adam.network.flat, captured.adam.network.flat, rtol=1e-4, atol=1e-6)
 
