@@ -53,7 +53,7 @@ def test_missing_clips_are_downloaded(base: Path) -> None:
         ("{clip}", "{clip!r}", "only padding to a width of up to 99"),
         ("https://host/", "https://host/\u202e", "must be an address like"),
         ("{clip}", "{clip", "download: url: "),
-        ("far.sha256", "../far.sha256", "checksums: must be relative"),
+        ("far.sha256", "../far.sha256", "checksums: must be a relative path"),
         ("clips: {'2_1': }\n", "", "needs a list of its `clips` and a `folder`"),
     ],
 )
