@@ -20,6 +20,9 @@ from pathlib import Path
 from types import FrameType
 from typing import Any
 
+from hobble.core.errors import HobbleError
+from hobble.core.files import write_json
+
 LOCKS = Path(".snakemake/locks")  # Snakemake's folder of lock files; a run that ends removes it
 OWNER = "owner.json"  # file in this folder that says which process made the locks
 RUN_VARIABLE = "HOBBLE_RUN"  # environment variable of a job: "<process id> <start time>" of its run
@@ -41,12 +44,10 @@ def record_lock_owner(locks: Path = LOCKS) -> None:
     """Write a file into the folder `locks` that says that this process owns Snakemake's lock."""
     if locks.is_dir():
         owner = {"host": platform.node(), "pid": os.getpid(), "began": _start_time(os.getpid())}
-        unfinished = locks / f"{OWNER}.{os.getpid()}.part"
-        with contextlib.suppress(OSError):
-            # The file must be complete even if the run is killed here. With an empty one, no later run could
-            # tell whose lock it is, and so none would clear it.
-            unfinished.write_text(json.dumps(owner), encoding="utf-8")
-            os.replace(unfinished, locks / OWNER)
+        # The file must be complete even if the run is killed here. With an empty one, no later run could tell
+        # whose lock it is, and so none would clear it.
+        with contextlib.suppress(HobbleError):
+            write_json(locks / OWNER, owner)
 
 
 def clear_stale_lock(locks: Path = LOCKS) -> bool:
@@ -160,8 +161,7 @@ def _exit_with_run(run: str, done: threading.Event) -> None:
     """End this process with SIGTERM when its run has ended.
 
     Python cannot handle SIGTERM while compiled code runs. So SIGKILL ends the process if it still runs after
-    GRACE_SECONDS. run: value of RUN_VARIABLE. done: set when the job
-    has ended.
+    GRACE_SECONDS. run: value of RUN_VARIABLE. done: set when the job has ended.
     """
     pid, _, began = run.partition(" ")
     while not done.wait(CHECK_SECONDS):
