@@ -47,11 +47,21 @@ def test_between_levels_the_speed_is_interpolated(values, speed: float) -> None:
     np.testing.assert_array_equal(LIMITS.highest_speeds(np.array([values], float)), [[speed]])
 
 
-def test_two_injuries_have_the_limit_of_the_slower_one() -> None:
-    values = np.random.default_rng(1).uniform(0, 10, (50, 2))
+def test_two_injuries_are_slower_than_each_alone_and_take_less_than_both_together() -> None:
+    values = np.random.default_rng(1).uniform(0.1, 10, (50, 2))
     both = LIMITS.highest_speeds(values)
-    alone = [LIMITS.highest_speeds(values * keep) for keep in ([1, 0], [0, 1])]
-    np.testing.assert_array_equal(both, np.minimum(*alone))
+    first, second = (LIMITS.highest_speeds(values * keep) for keep in ([1, 0], [0, 1]))
+    assert (both <= np.minimum(first, second)).all()
+    each_slows = np.maximum(first, second) < 3.99  # the second injury slows only from 5 on
+    assert each_slows.sum() > 10
+    assert (both < np.minimum(first, second))[each_slows].all()
+    assert (both > np.maximum(first + second - 4.0, 0.1 * 4.0) - 1e-9).all()  # 4 is the healthy speed
+
+
+def test_two_injuries_add_up_like_the_effects_of_hurt_versions() -> None:
+    """Each takes half of the healthy speed of 4: together (2 * .5^3)^(1/3) = .63 of it."""
+    limits = Limits(np.array([0.0, 10.0]), np.array([[[4.0, 2.0], [4.0, 2.0]]]), usual=np.array([3.5]))
+    np.testing.assert_allclose(limits.highest_speeds(np.array([[10.0, 10.0]])), [[4 * (1 - 0.25 ** (1 / 3))]])
 
 
 def test_a_hurt_version_is_compared_with_its_own_healthy_clip() -> None:

@@ -59,7 +59,7 @@ def test_a_warning_of_many_clips_is_printed_once():
     assert shared_warnings(clips[:4]) == (clips[:4], [])
 
 
-def test_a_draft_of_a_rig_file_is_printed(root, folder):
+def test_a_draft_of_a_skeleton_file_is_printed(root, folder):
     run = [sys.executable, "-m", "hobble.motion", "rig", str(folder / "healthy.bvh")]
     done = subprocess.run(run, cwd=root, capture_output=True, text=True, check=True)
     assert "  left_knee: 'LeftLeg'\n" in done.stdout

@@ -128,6 +128,7 @@ def test_limits_of_two_channels_are_those_of_python(
         {"injury": {links[i]: s}, "mood": {mood: m}}
         for i, s, mood, m in ((3, 7.0, "sad", 0.6), (9, 10.0, "old", 1.0), (2, 6.0, "happy", 0.9))
     ]
+    wanted.append({"injury": {links[3]: 9.0, links[9]: 8.0}, "mood": {"sad": 0.5}})  # two injuries
     script = SPEEDS.replace("VALUES", json.dumps(wanted))
     animation = ProceduralAnimation(both, storage="int16", **dict(examples.RUNTIME))
     turning = playable_data(both, examples.RUNTIME)["turning"]

@@ -112,15 +112,15 @@ def test_a_clip_depends_on_the_skeleton_that_it_is_retargeted_from(complete: Pat
     )
     (complete / "data/mine/b.bvh").write_text(header)
     project = Project(complete, {})
-    assert [Path(f).name for f in project.clips.rig_files("mine", "b")] == ["mixamo55.yaml"]
-    assert project.clips.rig_files("mine", "a") == []
+    assert [Path(f).name for f in project.clips.clip_skeleton_files("mine", "b")] == ["mixamo55.yaml"]
+    assert project.clips.clip_skeleton_files("mine", "a") == []
     shipped = Project(root, {}).clips
-    assert [Path(f).name for f in shipped.rig_files("synthetic-ava", "walk-1")] == ["holden31.yaml"]
-    assert shipped.rig_files("synthetic", "walk-1") == []
+    assert [Path(f).name for f in shipped.clip_skeleton_files("synthetic-ava", "walk-1")] == ["holden31.yaml"]
+    assert shipped.clip_skeleton_files("synthetic", "walk-1") == []
 
 
 @pytest.mark.shared
-def test_plan_and_job_use_the_same_rig_file(root: Path, shared: Path) -> None:
+def test_plan_and_job_use_the_same_skeleton_file(root: Path, shared: Path) -> None:
     from hobble.motion.make import load_source
     from hobble.motion.read import read_bvh
     from hobble.motion.rig import load_skeleton
@@ -131,7 +131,8 @@ def test_plan_and_job_use_the_same_rig_file(root: Path, shared: Path) -> None:
     for clip in ("Injured_Ilde", "Injured_Walk_LLL", "Injured_Run_LLL_extended_converted"):
         file = read_bvh(project.clips.source("ferre", clip))
         rig = load_source(file, target, root / "config/skeletons", options).match.rig
-        assert [Path(f).stem for f in project.clips.rig_files("ferre", clip)] == [rig] * (rig != "holden31")
+        files = project.clips.clip_skeleton_files("ferre", clip)
+        assert [Path(f).stem for f in files] == [rig] * (rig != "holden31")
 
 
 @pytest.mark.parametrize("name", ["a.bvh", "map.txt"])

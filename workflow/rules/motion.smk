@@ -34,7 +34,7 @@ for batch in batches_of_clips:
             skeleton=lambda w, batch=batch: keep_local(
                 clips.skeleton_file(batch.dataset)
             ),
-            rigs=lambda w, batch=batch: files_of_batch(batch, clips.rig_files),
+            rigs=lambda w, batch=batch: files_of_batch(batch, clips.clip_skeleton_files),
         output:
             clip=batch.of_clips("motion/{clip}.npz"),
             report=batch.of_clips("motion/{clip}.json"),
@@ -64,7 +64,7 @@ for batch in batches_of_clips:
             ],
             # Name of an input -> the number of its files for each clip.
             files_per_clip=lambda w, batch=batch: {
-                "rigs": file_counts(batch, clips.rig_files)
+                "rigs": file_counts(batch, clips.clip_skeleton_files)
             },
             skeleton_name=lambda w, batch=batch: catalogue.dataset(
                 batch.dataset

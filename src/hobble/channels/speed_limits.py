@@ -37,6 +37,9 @@ MOVING = 0.1  # cm a frame: cycles in which a healthy body is slower are left ou
 # as much as this many cycles at each level.
 EXPECTED_WEIGHT = 2.0
 SLOWEST = 0.1  # lowest share of the healthy speed; lower shares are raised to it
+# What several values of a channel take from the healthy speed adds up like a p-norm with this p (1: sum,
+# infinity: maximum). Hurt versions are made with the same p (SUM_NORM in hobble.hurt.effects).
+SUM_NORM = 3.0
 
 
 @dataclass(frozen=True)
@@ -55,8 +58,8 @@ class Limits:
     def highest_speeds(self, values: Array) -> Array:
         """(C, G) highest speeds of C characters in each gait, cm a frame, interpolated between the levels.
 
-        values: (C, L) value of each label for each character. If several values are above 0, the lowest of
-        their limits counts. If all are 0, the speed is inf.
+        values: (C, L) value of each label for each character. If several values are above 0, the body is
+        slower than with any one of them (see SUM_NORM). If all are 0, the speed is inf.
         """
         below = np.clip(np.searchsorted(self.levels, values, side="right") - 1, 0, len(self.levels) - 2)
         low, high = self.levels[below], self.levels[below + 1]
@@ -64,7 +67,12 @@ class Limits:
         label = np.arange(values.shape[1])
         speed_low, speed_high = self.speeds[:, label, below], self.speeds[:, label, below + 1]
         speeds = np.where(values > 0, speed_low + weight * (speed_high - speed_low), np.inf)
-        return np.min(speeds, axis=2, initial=np.inf).T
+        lowest = np.min(speeds, axis=2, initial=np.inf).T
+        healthy = self.speeds[:, :, 0].max(axis=1)  # (G,)
+        lost = 1 - np.minimum(speeds / healthy[:, None, None], 1.0)  # shares of the healthy speed
+        together = healthy * np.maximum(1 - (lost**SUM_NORM).sum(axis=2) ** (1 / SUM_NORM), SLOWEST).T
+        several = ((values > 0).sum(axis=1) > 1)[:, None]
+        return np.where(several, np.minimum(together, lowest), lowest)
 
     def to_dict(self) -> dict[str, Any]:
         """Plain data for a file."""

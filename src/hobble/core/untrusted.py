@@ -95,7 +95,7 @@ def read_yaml(path: str | Path) -> Any:
         node = loader.get_single_node()
         if node is None:
             return None
-        if _size_without_aliases(node, {}, set()) > MAX_YAML_NODES:
+        if _expanded_size(node, {}, set()) > MAX_YAML_NODES:
             raise InputError(path, f"has more than {MAX_YAML_NODES} values, with its aliases expanded")
         _check_keys(path, node)
         return loader.construct_document(node)
@@ -147,7 +147,7 @@ def _children(node: yaml.Node) -> list[yaml.Node]:
     return [part for pair in pairs for part in pair]
 
 
-def _size_without_aliases(node: yaml.Node, known: dict[int, int], above: set[int]) -> int:
+def _expanded_size(node: yaml.Node, known: dict[int, int], above: set[int]) -> int:
     """Number of values in a node after every alias is replaced by what it stands for.
 
     known: `id` of each list or mapping counted so far -> its number of values. above: `id`s of the nodes that
@@ -159,6 +159,6 @@ def _size_without_aliases(node: yaml.Node, known: dict[int, int], above: set[int
         raise RecursionError
     if id(node) not in known:
         above.add(id(node))
-        known[id(node)] = 1 + sum(_size_without_aliases(child, known, above) for child in _children(node))
+        known[id(node)] = 1 + sum(_expanded_size(child, known, above) for child in _children(node))
         above.remove(id(node))
     return known[id(node)]

@@ -20,14 +20,14 @@ SHORTEST_BONE = 0.5  # cm; a shorter bone is not turned, because it hardly has a
 class BindPose:
     """World positions (J, 3) in cm and rotations (J, 4) of all joints.
 
-    bone_of: role -> index of the joint that moves the part of the body below it. For "left_knee", this part
+    joint_of: role -> index of the joint that moves the part of the body below it. For "left_knee", this part
     is the shank. If the skeleton has no joint for a role, the index is that of a joint near by. position_of:
     role -> position (3,) of its joint, cm. It is estimated if the skeleton has no joint for the role.
     """
 
     positions: Array
     rotations: Array
-    bone_of: dict[str, int]
+    joint_of: dict[str, int]
     position_of: dict[str, Array]
 
 
@@ -37,11 +37,11 @@ def bind_pose(skeleton: Skeleton) -> BindPose:
     Raises KeyError if a required role is missing: hips, head, and on both sides shoulder, hip, knee, heel and
     toe.
     """
-    bone_of = _find_bones(skeleton)
-    aims = _bone_directions(bone_of)
+    joint_of = _find_bones(skeleton)
+    aims = _bone_directions(joint_of)
     count = len(skeleton.joints)
     rotations, positions = np.tile(quat.IDENTITY, (count, 1)), np.zeros((count, 3))
-    heels = {bone_of[f"{side}_heel"] for side in SIDES}  # the feet stay as in the rest pose
+    heels = {joint_of[f"{side}_heel"] for side in SIDES}  # the feet stay as in the rest pose
     for j, p in enumerate(skeleton.parents):
         if p >= 0:
             rotations[j] = rotations[p]
@@ -54,7 +54,7 @@ def bind_pose(skeleton: Skeleton) -> BindPose:
             if np.linalg.norm(bone) > SHORTEST_BONE:
                 rotations[j] = quat.mul(quat.between(bone, direction), rotations[j])
     known = {role: positions[skeleton.role(role)] for role in skeleton.roles if _has_role(skeleton, role)}
-    return BindPose(positions, rotations, bone_of, _with_missing_roles(known))
+    return BindPose(positions, rotations, joint_of, _with_missing_roles(known))
 
 
 def _has_role(skeleton: Skeleton, role: str) -> bool:
@@ -63,7 +63,7 @@ def _has_role(skeleton: Skeleton, role: str) -> bool:
 
 
 def _find_bones(skeleton: Skeleton) -> dict[str, int]:
-    """`BindPose.bone_of` for a skeleton."""
+    """`BindPose.joint_of` for a skeleton."""
     found = {role: skeleton.role(role) for role in skeleton.roles if _has_role(skeleton, role)}
     hips = found["hips"]
     found.setdefault("neck", max(skeleton.parents[found["head"]], 0))
@@ -104,7 +104,7 @@ def _rest_vector(skeleton: Skeleton, joint: int, below: int) -> Array:
     return skeleton.offsets[steps].sum(axis=0) if steps else np.zeros(3)
 
 
-def _bone_directions(bone_of: dict[str, int]) -> dict[int, tuple[int, Array]]:
+def _bone_directions(joint_of: dict[str, int]) -> dict[int, tuple[int, Array]]:
     """For joints of arms and legs: joint -> (joint below it, direction (3,) of the bone between them)."""
     out = {}
     for side, sign in zip(SIDES, (1.0, -1.0), strict=True):  # the left side is at +X
@@ -114,7 +114,7 @@ def _bone_directions(bone_of: dict[str, int]) -> dict[int, tuple[int, Array]]:
         for a, b, direction in (
             ("shoulder", "elbow", arm), ("elbow", "wrist", arm), ("hip", "knee", leg), ("knee", "heel", leg),
         ):  # fmt: skip
-            upper, lower = bone_of[f"{side}_{a}"], bone_of[f"{side}_{b}"]
+            upper, lower = joint_of[f"{side}_{a}"], joint_of[f"{side}_{b}"]
             if upper != lower:
                 out[upper] = (lower, direction / np.linalg.norm(direction))
     return out

@@ -108,14 +108,14 @@ def _build_mesh(joints_and_roles: str) -> Mesh:
     if is_person:
         pose = bind_pose(skeleton)
         solids, scale, fine = list(solids_of_person(pose)), body_scale(pose), _fine_boxes(pose)
-        bone_of = pose.bone_of
+        joint_of = pose.joint_of
     else:
-        pose, solids, bone_of = _sticks(skeleton)
+        pose, solids, joint_of = _sticks(skeleton)
         scale, fine = 1.0, []
     corners, faces = surface_mesh(solids, CORNER_SPACING * scale, fine)
     slope, _ = distance_slopes(solids, corners)
     normals = slope / np.maximum(np.linalg.norm(slope, axis=1, keepdims=True), 1e-9)
-    owner = nearest_joints(solids, corners, bone_of)
+    owner = nearest_joints(solids, corners, joint_of)
     blend_width = _blend_widths(owner, pose, scale) if is_person else 2.0
     bones_of_corner, weights = skin_weights(corners, faces, owner, blend_width)
     used = np.unique(bones_of_corner)
@@ -164,7 +164,7 @@ def _blend_widths(owner: NDArray[np.int64], pose: BindPose, scale: float) -> Arr
         ("head", ("head", "neck")),
         ("foot", ("left_toe", "right_toe", "left_heel", "right_heel")),
     ):
-        wide[np.isin(owner, [pose.bone_of[role] for role in roles])] = BLEND_WIDTH[part]
+        wide[np.isin(owner, [pose.joint_of[role] for role in roles])] = BLEND_WIDTH[part]
     return wide * scale
 
 
@@ -188,8 +188,8 @@ def _sticks(skeleton: Skeleton) -> tuple[BindPose, list[Solid], dict[str, int]]:
     for j, p in enumerate(skeleton.parents):
         if p >= 0:
             positions[j] = positions[p] + skeleton.offsets[j]
-    bone_of = {name: j for j, name in enumerate(skeleton.joints)}
-    pose = BindPose(positions, np.tile(quat.IDENTITY, (count, 1)), bone_of, {})
+    joint_of = {name: j for j, name in enumerate(skeleton.joints)}
+    pose = BindPose(positions, np.tile(quat.IDENTITY, (count, 1)), joint_of, {})
 
     def rods() -> Iterator[Solid]:
         for j, p in enumerate(skeleton.parents):
@@ -199,5 +199,5 @@ def _sticks(skeleton: Skeleton) -> tuple[BindPose, list[Solid], dict[str, int]]:
     return (
         pose,
         list(rods()) or [Rod(1.0, ((-np.inf, skeleton.joints[0]),), positions[0], positions[0], *STICK)],
-        bone_of,
+        joint_of,
     )

@@ -15,10 +15,10 @@ from hobble.figure.solids import Solid
 MOST_BONES = 4  # at most this many bones move a corner
 
 
-def nearest_joints(solids: Sequence[Solid], points: Array, bone_of: Mapping[str, int]) -> NDArray[np.int64]:
+def nearest_joints(solids: Sequence[Solid], points: Array, joint_of: Mapping[str, int]) -> NDArray[np.int64]:
     """(V,) the joint that moves the part of the body nearest to each of the points (V, 3).
 
-    bone_of: role of a bone in `Solid.owners` -> index of its joint.
+    joint_of: role in `Solid.owners` -> index of the joint that moves this part of the body.
     """
     nearest, owner = np.full(len(points), np.inf), np.zeros(len(points), np.int64)
     x, y, z = points.T
@@ -35,7 +35,7 @@ def nearest_joints(solids: Sequence[Solid], points: Array, bone_of: Mapping[str,
         along = solid.along(points)
         # Each bone moves the points from its `begin` (cm along the solid) to that of the next bone.
         for begin, role in solid.owners:
-            joint[along >= begin] = bone_of[role]
+            joint[along >= begin] = joint_of[role]
         owner[nearer], nearest[nearer] = joint[nearer], distance[nearer]
     return owner
 

@@ -22,7 +22,7 @@ from hobble.motion.file_motion import UNKNOWN_RIG, FileMotion, load_source
 from hobble.motion.loop import loop_clip
 from hobble.motion.options import ClipMotion
 from hobble.motion.pace import check_pace
-from hobble.motion.read import MOST_POSES, Bvh, read_bvh
+from hobble.motion.read import MOST_JOINT_POSES, Bvh, read_bvh
 from hobble.motion.resample import sample_positions, sample_rotations, sample_times
 from hobble.motion.retarget import plan, retarget_clip
 from hobble.motion.rig import load_skeleton
@@ -94,14 +94,14 @@ def _check_length(file: Bvh, clip: Clip, target: Skeleton, options: ClipMotion) 
     No real clip is that long: a wrong frame rate or number of loops is more likely.
     """
     frames = len(clip) / clip.fps * options.fps * options.loops
-    if frames * max(len(clip.skeleton.joints), len(target.joints)) > MOST_POSES:
+    if frames * max(len(clip.skeleton.joints), len(target.joints)) > MOST_JOINT_POSES:
         looped, fewer = "", ""
         if options.loops > 1:
             looped, fewer = f" with {options.loops} loops", ", or set fewer loops"
         raise InputError(
             file.path,
             f"{len(clip)} frames at {clip.fps:g} a second become {frames:.0f} at {options.fps:g}{looped}; "
-            f"frames times joints may be at most {MOST_POSES}",
+            f"frames times joints may be at most {MOST_JOINT_POSES}",
             fix=f"Cut it into shorter clips, or set its source_fps{fewer}.",
         )
 
@@ -175,8 +175,8 @@ def fit_skeleton(clip: Clip, source: FileMotion, target: Skeleton, proportions: 
             reordered = replace(reordered, skeleton=target) if has_equal_offsets else reordered
             return Fitted(reordered, 1.0, [KEPT] if source.has_moving_joints else [])
     followed_joints, unsure = match.followed_joints, source.unsure
-    # The rig needs a standing rest pose. For rigs that match no known skeleton, in joints or in rest pose,
-    # `load_source` has already made one (`has_standing_rig`). For the others it is made here.
+    # The rig needs a standing rest pose. `load_source` makes one (`has_standing_rig`), except for rigs with
+    # the joints and the rest pose of a known skeleton. Theirs is made here.
     if not source.has_standing_rig:
         joints_to_keep = {clip.skeleton.index(name) for name in followed_joints.values()}
         standing = with_upright_rest(clip, body_by_roles(clip.skeleton), target, joints_to_keep)

@@ -28,7 +28,7 @@ MOST_BYTES = 1 << 30
 MOST_HEADER = 1 << 24  # bytes before the word MOTION
 MOST_LINES = 50_000_000  # lines after the word MOTION
 LONGEST_LINE = 1 << 22  # bytes; a frame of 4096 joints with six values of 25 characters has 614,400
-MOST_POSES = 50_000_000  # joint poses
+MOST_JOINT_POSES = 50_000_000  # frames times joints
 CUT = "Cut the file into shorter clips."
 
 
@@ -156,10 +156,10 @@ def _read_motion(path: Path, data: bytes, at: int, header: Header) -> Bvh:
             line=frames_line,
             fix=EXPORT,
         )
-    if declared * len(header.names) > MOST_POSES:
+    if declared * len(header.names) > MOST_JOINT_POSES:
         raise InputError(
             path,
-            f"declares {declared} frames of {len(header.names)} joints: more than {MOST_POSES} joint "
+            f"declares {declared} frames of {len(header.names)} joints: more than {MOST_JOINT_POSES} joint "
             "poses (frames times joints)",
             line=frames_line,
             fix=CUT,

@@ -20,7 +20,7 @@ from hobble.core.errors import InputError
 from hobble.core.quat import Array
 from hobble.core.skeleton import Skeleton, rest_positions
 from hobble.core.untrusted import printable, read_text, read_yaml
-from hobble.motion.check_rig_file import check_rig_file
+from hobble.motion.check_skeleton_file import check_skeleton_file
 from hobble.motion.tree import path_between
 
 # Name of a unit of length -> centimetres. The unit of CMU files is an inch / 0.45.
@@ -85,7 +85,7 @@ def _load_cached(path: Path, name: str, changed: int, size: int) -> KnownSkeleto
     changed file is read again.
     """
     data: Any = read_yaml(path)
-    check_rig_file(path, data, read_text(path))
+    check_skeleton_file(path, data, read_text(path))
     try:
         maps = data.pop("maps", None) or {}
         skeleton = Skeleton.from_dict({**data, "name": name})

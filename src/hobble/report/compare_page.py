@@ -8,7 +8,7 @@ from typing import Any
 from hobble.figure.pack import packed_body
 from hobble.report import compare_sections, compare_tables, comparison_charts, measure_sections
 from hobble.report.formats import embedded
-from hobble.report.hero import body_channel
+from hobble.report.opening_slider import body_channel
 from hobble.report.playable import skeleton_of
 from hobble.report.provenance import git_commit, machine, versions
 from hobble.report.rounded_weights import has_weights, round_weights

@@ -30,7 +30,7 @@ SPLITS = (("train", "training", "@muted"), ("held_out", "held out", "@accent"))
 def seconds_of_data(
     paths: Sequence[str | Path], splits: Mapping[str, str], all_clips: int | None = None
 ) -> dict[str, Any]:
-    """Seconds of data in the files `database/clips/<clip>.npz`. A frame with several rows counts once.
+    """Seconds of data in the files `database/clips/<clip>.npz`.
 
     splits: clip -> "train" or "held_out". all_clips: if `paths` are a random choice of clips, the number of
     clips from which they were chosen. Then the seconds are an estimate for all of these.

@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike
 
 from hobble.core.quat import Array
 from hobble.models.network import Network
-from hobble.report.hero import opening_channel, opening_slider
+from hobble.report.opening_slider import opening_channel, opening_slider
 from hobble.report.straight_walk import walk_straight
 from hobble.runtime.options import Runtime
 
@@ -41,7 +41,7 @@ NESTED_FIELDS = (
 def opening_walk(
     network: Network, runtime: Runtime, playable: Mapping[str, Any], measured: Iterable[Mapping[str, Any]]
 ) -> dict[str, Any]:
-    """The result of `hobble.report.hero.opening_slider` and, under `walked`, the states of the characters.
+    """The result of `opening_slider` and, under `walked`, the states of the characters.
 
     playable, measured: the arguments of `opening_slider`, which chooses one slider of a channel and its
     value. A channel is a group of inputs of the network, for example one input for each part of the body.

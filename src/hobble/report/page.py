@@ -24,7 +24,7 @@ from hobble.report import (
 from hobble.report.formats import embedded, json_data
 from hobble.report.gather import ReportMaterial
 from hobble.report.ground_pictures import ground_pictures
-from hobble.report.hero import body_channel, opening_channel, opening_slider
+from hobble.report.opening_slider import body_channel, opening_channel, opening_slider
 from hobble.report.provenance import git_commit, machine, versions
 from hobble.report.templates import FOLDER, chart_specs, load_template, mark_safe, page_style
 

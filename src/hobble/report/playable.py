@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from hobble.channels import channel
 from hobble.channels.shown import channel_display, channel_words
+from hobble.channels.speed_limits import SLOWEST, SUM_NORM
 from hobble.core.skeleton import Skeleton
 from hobble.figure.mesh import body_mesh, mesh_key
 from hobble.models.network import Network, inverse_or_0
@@ -202,6 +203,8 @@ def _constants() -> dict[str, float]:
         "jogFrom": limits.JOG_FROM,
         "lameBelow": limits.LAME_BELOW,
         "hurryFactor": limits.HURRY_FACTOR,
+        "slowestShare": SLOWEST,
+        "sumNorm": SUM_NORM,
         "lockAt": foot_lock.LOCK_AT,
         "release": foot_lock.RELEASE,
         "tooFar": foot_lock.TOO_FAR,

@@ -14,7 +14,9 @@ from hobble.models.network import Network
 
 
 class UnknownName(KeyError):
-    """The network does not have this label or gait.
+    """The network does not have this gait or this label.
+
+    A label names a column of a channel, such as the link "LeftUpLeg-LeftLeg" of the channel "injury".
 
     what: start of the message, such as "no gait". name: what the caller gave. known: the names that exist.
     The message lists the known names that are similar, or all of them if none is.

@@ -231,7 +231,7 @@ class Clips:
         return self._skeleton(self.catalogue.dataset(dataset).skeleton)
 
     @functools.cache  # noqa: B019
-    def rig_files(self, dataset: str, clip: str) -> list[str]:
+    def clip_skeleton_files(self, dataset: str, clip: str) -> list[str]:
         """The file of the clip's own skeleton, in a list; [] if this is the data set's skeleton.
 
         A clip's own skeleton (its rig) is the known one that has the most joints of the clip's BVH file.

@@ -26,7 +26,10 @@ class Configurations:
         return {key: values[key] for key in keys} if keys else values
 
     def resolved(self, configuration: str) -> dict[str, Any]:
-        """Everything that determines a configuration's results, as plain data."""
+        """All keys of a configuration and of its data set, as plain data.
+
+        Of another configuration that it uses (`network_of`, `training.continues`) only the name is included.
+        """
         settings = self.catalogue.configuration(configuration)
         dataset = self.catalogue.dataset(settings.dataset).model_dump(mode="json")
         return {
@@ -83,7 +86,7 @@ class Configurations:
         return f"results/{self.network_owner(configuration)}/network/{file}"
 
     def database(self, configuration: str) -> str:
-        """Path of the database that the configuration learns from."""
+        """Path of the database: the rows for training, one for each frame, made from the data set's clips."""
         folder = database_folder(self.channels(configuration))
         return f"{DATASETS}/{self.dataset(configuration)}/database/{folder}"
 

@@ -164,7 +164,7 @@ def _check_dataset(project: Project, name: str) -> None:
     dataset = project.catalogue.dataset(name)
     skeleton = project.catalogue.skeleton(dataset.skeleton)
     for clip, entry in project.clips.listed_entries(name).items():
-        project.clips.rig_files(name, clip)  # raises InputError if the clip has no file
+        project.clips.clip_skeleton_files(name, clip)  # raises InputError if the clip has no file
         _check_entry(f"data set {name}: clips.{clip}", entry)
     _check_hurt(project, name, dataset, [f"{a}-{b}" for a, b in skeleton.links])
     project.datasets.channel_sources.check(name)

@@ -1,7 +1,8 @@
 """Builds the tables that motion matching searches and plays, from the rows of the clips.
 
-A row of a clip's file holds the inputs x and the outputs y of a network in one frame. A frame that two
-cycles of steps share has two rows. Motion matching searches for the row with the nearest x, and shows its y.
+A row of a clip's file holds the inputs x and the outputs y of a network in one frame. A frame in which one
+gait cycle ends and the next begins has a row for each. Motion matching searches for the row with the nearest
+x, and shows its y.
 """
 
 from __future__ import annotations

@@ -36,15 +36,19 @@ export const createTargets = (spec, c) => {
     const usual = slowed;
     for (const { first, limits } of limited) {
       const { levels, speeds } = limits;
-      let highest = Infinity;
+      let highest = Infinity, lost = 0, values = 0;
+      const healthy = max(...speeds[g].map(([first]) => first));
       for (let l = 0; l < speeds[g].length; l++) {
         const v = c.channelValues[first + l];
         if (!(v > 0)) continue;
         let i = 0;
         while (i < levels.length - 2 && levels[i + 1] <= v) i++;
-        const [low, high] = [speeds[g][l][i], speeds[g][l][i + 1]];
-        highest = min(highest, low + (v - levels[i]) / (levels[i + 1] - levels[i]) * (high - low));
+        const [low, high] = [speeds[g][l][i], speeds[g][l][i + 1]], speed = low + (v - levels[i]) / (levels[i + 1] - levels[i]) * (high - low);
+        highest = min(highest, speed);
+        lost += (1 - min(speed / healthy, 1)) ** k.sumNorm;
+        values++;
       }
+      if (values > 1) highest = min(highest, healthy * max(1 - lost ** (1 / k.sumNorm), k.slowestShare));
       least = min(least, highest);
       if (usual > 0) slowed *= min(1, highest / usual);
     }

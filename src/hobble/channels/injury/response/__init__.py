@@ -20,7 +20,7 @@ class Options(SampleOptions):
 MEASURE = Measure(
     name="injury",
     package=__name__,
-    inputs=("weights", "clips", "summaries"),  # the network, the clips' rows, summaries of these rows
+    inputs=("weights", "clips", "summaries"),  # see `INPUTS` in `hobble.measures.measure`
     options=Options,
     runtime=tuple(Runtime.model_fields),  # it depends on all keys of the section `runtime`
     # `least_minutes`: its job requests at least this time on a cluster.

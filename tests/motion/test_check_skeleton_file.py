@@ -16,12 +16,12 @@ from hobble.motion.rig import load_skeleton
 
 
 def role(name: str, joint: str):
-    """An edit of a rig file: the role gets another joint."""
+    """An edit of a skeleton file: the role gets another joint."""
     return lambda text: re.sub(rf"^  {name}: \w+$", f"  {name}: {joint}", text, flags=re.MULTILINE)
 
 
 def swapped(first: str, second: str):
-    """An edit of a rig file: two roles on each side exchange their joints."""
+    """An edit of a skeleton file: two roles on each side exchange their joints."""
 
     def edit(text: str) -> str:
         for side in ("left", "right"):
@@ -89,7 +89,7 @@ def replaced(old: str, new: str):
         (lambda text: "- Hips\n", None, "needs a section `joints`"),
     ],
 )
-def test_a_mistake_in_a_rig_file_is_refused_in_its_line(root, tmp_path, edit, line, problem):
+def test_a_mistake_in_a_skeleton_file_is_refused_in_its_line(root, tmp_path, edit, line, problem):
     text = edit((root / "config/skeletons/rig22.yaml").read_text())
     file = tmp_path / "mine.yaml"
     file.write_text(text)

@@ -37,7 +37,7 @@ APART = 0.25  # leg lengths: the joint from which the legs hang may be at most t
 MAY_SHARE = ("spine", "chest")  # if the trunk has only one joint, this joint has both roles
 
 
-class RigFile:
+class SkeletonFile:
     """A skeleton file that is being checked.
 
     data: its content as plain data. text: its content as it is written, to find the line of a mistake.
@@ -67,7 +67,7 @@ class RigFile:
         return None
 
 
-def check_rig_file(where: Path, data: Any, text: str) -> None:
+def check_skeleton_file(where: Path, data: Any, text: str) -> None:
     """Raise InputError if a skeleton file is wrong. The error names the line of the mistake if it is found.
 
     data: the content of the file as plain data. text: the content as it is written.
@@ -79,7 +79,7 @@ def check_rig_file(where: Path, data: Any, text: str) -> None:
     are required. Either both toes or none must be there. The legs must hang from a joint at or near the
     hips. If there is a chest, the arms must hang from it or from the neck.
     """
-    file = RigFile(where, data, text)
+    file = SkeletonFile(where, data, text)
     for key in ("joints", "roles"):
         if not isinstance(data, Mapping) or not isinstance(data.get(key), Mapping) or not data[key]:
             file.refuse(
@@ -92,7 +92,7 @@ def check_rig_file(where: Path, data: Any, text: str) -> None:
     _check_sides(file, data["roles"])
 
 
-def _check_joints(file: RigFile, joints: Mapping[Any, Any]) -> dict[str, int]:
+def _check_joints(file: SkeletonFile, joints: Mapping[Any, Any]) -> dict[str, int]:
     """Check the section `joints`. Returns joint -> index of its parent, -1 for the root."""
     parents: dict[str, int] = {}
     numbers = {name: number for number, name in enumerate(joints)}
@@ -119,7 +119,7 @@ def _is_offset(offset: Any) -> bool:
     return all(abs(x) <= FARTHEST for x in offset)
 
 
-def _check_roles(file: RigFile, roles: Mapping[Any, Any], parents: Mapping[str, int]) -> None:
+def _check_roles(file: SkeletonFile, roles: Mapping[Any, Any], parents: Mapping[str, int]) -> None:
     """Check that the roles are known and complete, and that no two have the same joint.
 
     parents: joint -> index of its parent.
@@ -144,7 +144,7 @@ def _check_roles(file: RigFile, roles: Mapping[Any, Any], parents: Mapping[str, 
         file.refuse(f"these roles are missing: {', '.join(missing)}", "roles")
 
 
-def _check_order(file: RigFile, roles: Mapping[str, str], parents: Mapping[str, int]) -> None:
+def _check_order(file: SkeletonFile, roles: Mapping[str, str], parents: Mapping[str, int]) -> None:
     """Check that each joint of a limb or of the trunk hangs from the joint before it.
 
     The hips must not hang from a joint that has a role.
@@ -163,7 +163,7 @@ def _check_order(file: RigFile, roles: Mapping[str, str], parents: Mapping[str, 
             file.refuse(problem, "roles", "hips", ORDER)
 
 
-def _check_hubs(file: RigFile, roles: Mapping[str, str], parents: Mapping[str, int]) -> None:
+def _check_hubs(file: SkeletonFile, roles: Mapping[str, str], parents: Mapping[str, int]) -> None:
     """Check that the arms hang from the chest or the neck, and the legs from a joint near the hips."""
     names, tree = list(parents), list(parents.values())  # tree: the index of each joint's parent
 
@@ -185,7 +185,7 @@ def _check_hubs(file: RigFile, roles: Mapping[str, str], parents: Mapping[str, i
         file.refuse(f"hips is {roles['hips']}, but the legs hang from {names[legs_hub]}", "roles", "hips")
 
 
-def _check_sides(file: RigFile, roles: Mapping[str, str]) -> None:
+def _check_sides(file: SkeletonFile, roles: Mapping[str, str]) -> None:
     """Check that no joint with a role on one side has a name that says the other side."""
     for role, joint in roles.items():
         side, side_in_name = role.partition("_")[0], side_of(joint)
