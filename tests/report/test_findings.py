@@ -147,8 +147,8 @@ def test_a_limited_turn_is_reported(material: ReportMaterial) -> None:
     ]
     figure = next(f for f in track_figures(limited) if f.label == "Largest predicted turn")
     assert figure.value == "170"
-    assert "did so in 3 of" in figure.note
-    assert "as drawn, with the feet placed, at most 25.0°" in figure.note
+    assert "limited it to 25° in 3 of" in figure.note
+    assert "after the feet were put on the ground, the largest turn was 25.0°" in figure.note
 
 
 def test_errors_of_the_prediction_and_of_the_drawn_pose_are_shown(material: ReportMaterial) -> None:

@@ -21,8 +21,9 @@ from hobble.report.summary import Hint, KeyFigure, with_order
 from hobble.report.tables import Column, Table
 
 INTRODUCTION = (
-    "The network gets the captured input of a frame and predicts the next frame. The error is measured on "
-    "every frame that belongs to a gait cycle."
+    "The network gets its input from a frame of a clip and predicts the next frame. The error is measured on "
+    "every frame that belongs to a gait cycle. Captured motion means the motion of the clip, also if it was "
+    "generated."
 )
 # Ending of a clip's name -> a sentence that explains it. Otherwise readers may take the number in _hurt1 for
 # a severity. Another ending may follow, as in walk_hurt1_mirror.
@@ -142,8 +143,8 @@ def clip_boxes(found: Json) -> Chart | None:
         "accuracy-boxes",
         "Spread within each clip",
         "Each box holds the middle half of the errors of a clip. The line in it is the median. Whiskers "
-        "reach from the 5th to the 95th percentile. A low box with a long whisker means that the clip is "
-        "easy except for a few moments.",
+        "reach from the 5th to the 95th percentile. A box near zero with a long whisker means that the clip "
+        "is easy except for a few moments.",
         traces,
         {
             "xaxis": axis("relative error, %", rangemode="tozero"),

@@ -139,13 +139,15 @@ def _turn_figure(found: Json) -> KeyFigure:
     drawn, predicted = (
         format_number(found.get(key)) for key in ("largest_turn_degrees", "predicted_turn_degrees")
     )
-    limit = f"the runtime limits it to {np.degrees(FASTEST_TURN):.0f}°"
+    limit = f"{np.degrees(FASTEST_TURN):.0f}°"
     if found.get("predicted_turn_degrees") is None:
-        return KeyFigure("Largest turn of a joint", drawn, "°", f"in one frame, as drawn; {limit}")
+        return KeyFigure(
+            "Largest turn of a joint", drawn, "°", f"in one frame, as drawn; the runtime limits it to {limit}"
+        )
     frames = sum(lap.get("frames") or 0 for lap in found["laps"])
     limited_frames = f"{found['turns_held_back']:,} of {frames:,} frames"
-    note = f"of a joint in one frame; {limit}, and did so in {limited_frames}"
-    note += f"; as drawn, with the feet placed, at most {drawn}°"
+    note = f"of a joint in one frame, as predicted; the runtime limited it to {limit} in {limited_frames}; "
+    note += f"after the feet were put on the ground, the largest turn was {drawn}°"
     return KeyFigure("Largest predicted turn", predicted, "°", note)
 
 

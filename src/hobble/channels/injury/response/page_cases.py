@@ -50,10 +50,10 @@ def second_chart(rows: Sequence[Mapping[str, Any]]) -> Chart | None:
     return Chart(
         "second-injury",
         "A second injury in addition to a first",
-        "Each row is a first injury, at severity 7, in one link of each part of the body. Each column is "
-        "a second injury, at severity 10. The cell says how much the second injury changes the walk, in "
-        "centimetres or as a share of its effect on a healthy body. A pale cell means that the second injury "
-        "hardly shows.",
+        "Each row is a first injury, at severity 7: one link of the part of the body that the row names. "
+        "Each column is a second injury, at severity 10. The cell says how much the second injury changes "
+        "the walk, in centimetres or as a share of its effect on a healthy body. A pale cell means that the "
+        "second injury hardly shows.",
         layout={
             "xaxis": {"type": "category", "tickangle": -50, "automargin": True},
             "yaxis": {"type": "category", "autorange": "reversed", "automargin": True},
@@ -95,10 +95,9 @@ def divided_chart(rows: Sequence[Mapping[str, Any]]) -> Chart | None:
         return None
     return Chart(
         "divided",
-        "Divided severities",
-        "This shows how much of the effect remains if the severities are divided before the network gets "
-        "them. Each line belongs to one divisor. Its height is the distance of the pose from the "
-        "healthy walk.",
+        "Severities divided by a number",
+        "As in an experiment of Ferre, the severities are divided by a number before the network gets them. "
+        "Each line belongs to one number. Its height is the distance of the pose from the healthy walk.",
         layout={"xaxis": axis("severity", dtick=2), "yaxis": axis("cm per joint", rangemode="tozero")},
         choose="Link",
         options=options,
