@@ -72,8 +72,7 @@ def skin_weights(
     if weights.shape[1] < MOST_BONES:
         pad = MOST_BONES - weights.shape[1]
         weights, order = np.pad(weights, ((0, 0), (0, pad))), np.pad(order, ((0, 0), (0, pad)))
-    # Which bone has the fourth-largest weight can change from one corner to its neighbour, and a weight would
-    # jump there. So all weights are lowered by 0.01, but not below 0. A fourth weight of at most 0.01
-    # becomes 0.
+    # From one corner to the next, another bone may get the fourth-largest weight, and a weight would jump
+    # there. So all weights are lowered by 0.01, but not below 0. A fourth weight of at most 0.01 becomes 0.
     weights = np.maximum(weights - 0.01, 0)
     return joints[order], weights / weights.sum(axis=1, keepdims=True)

@@ -175,8 +175,7 @@ def fit_skeleton(clip: Clip, source: FileMotion, target: Skeleton, proportions: 
             reordered = replace(reordered, skeleton=target) if has_equal_offsets else reordered
             return Fitted(reordered, 1.0, [KEPT] if source.has_moving_joints else [])
     followed_joints, unsure = match.followed_joints, source.unsure
-    # The rig needs a standing rest pose. `load_source` makes one (`has_standing_rig`), except for rigs with
-    # the joints and the rest pose of a known skeleton. Theirs is made here.
+    # Retargeting needs a rest pose that stands. If `has_standing_rig` is True, `load_source` has made one.
     if not source.has_standing_rig:
         joints_to_keep = {clip.skeleton.index(name) for name in followed_joints.values()}
         standing = with_upright_rest(clip, body_by_roles(clip.skeleton), target, joints_to_keep)

@@ -49,7 +49,8 @@ def seconds_of_data(
     channels: dict[str, dict[str, Array]] = {}
     for path, excerpt in chosen:
         rows = load_excerpt(path, excerpt)
-        first_rows = np.unique(rows.frame, return_index=True)[1]  # of each frame
+        # A frame in which one gait cycle ends and the next begins has two rows. Only the first one counts.
+        first_rows = np.unique(rows.frame, return_index=True)[1]
         y, layout = np.asarray(rows.y[first_rows], float), rows.layout
         speed = np.linalg.norm(y[:, layout.y_root_velocity], axis=1) * FPS / 100
         # The column y_turn has the opposite sign: it is the turn of the world relative to the root.
