@@ -142,9 +142,9 @@ def clip_boxes(found: Json) -> Chart | None:
     return Chart(
         "accuracy-boxes",
         "Spread within each clip",
-        "Each box holds the middle half of the errors of a clip. The line in it is the median. Whiskers "
-        "reach from the 5th to the 95th percentile. A box near zero with a long whisker means that the clip "
-        "is easy except for a few moments.",
+        "Each box holds the middle half of the errors of a clip. The solid line in it is the median, "
+        "the dotted line the mean. Whiskers reach from the 5th to the 95th percentile. A box near zero with a "
+        "long whisker means that the clip is easy except for a few moments.",
         traces,
         {
             "xaxis": axis("relative error, %", rangemode="tozero"),

@@ -51,10 +51,11 @@ def rollout_chart(found: Json) -> Chart | None:
         "Error when the network continues from its own poses",
         "Mean distance between a joint and its captured position. In a roll-out, the network continues from "
         "its own poses, as at run time. The horizontal axis shows the length of the roll-outs (60 frames are "
-        "one second). If the line flattens, the character stays stable. This chart measures the pose as "
-        "drawn, before the feet are placed. A joint is drawn halfway between its predicted position and the "
-        "position to which its predicted velocity takes it. The charts above measure only the predicted "
-        "position, so their error differs from the value at 1 frame in this chart." + sample_note(found),
+        "one second). If the line flattens, the character stays stable. A joint is drawn halfway between its "
+        "predicted position and the position to which its predicted velocity takes it. This chart measures "
+        "the drawn positions, before the feet are put on the ground. The charts above measure only the "
+        "predicted position, so their error differs from the value at 1 frame in this chart."
+        + sample_note(found),
         traces,
         {
             "xaxis": log_axis("frames", [x for trace in traces for x in trace["x"]]),

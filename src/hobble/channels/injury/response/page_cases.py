@@ -50,10 +50,10 @@ def second_chart(rows: Sequence[Mapping[str, Any]]) -> Chart | None:
     return Chart(
         "second-injury",
         "A second injury in addition to a first",
-        "Each row is a first injury, at severity 7: one link of the part of the body that the row names. "
-        "Each column is a second injury, at severity 10. The cell says how much the second injury changes "
-        "the walk, in centimetres or as a share of its effect on a healthy body. A pale cell means that the "
-        "second injury hardly shows.",
+        "Each row names the part of the body that is hurt first, at severity 7; if the part has several "
+        "links, one of them is hurt. Each column is a second injury, at severity 10. The cell says how much "
+        "the second injury changes the walk, in centimetres or as a share of its effect on a healthy body. A "
+        "pale cell means that the second injury hardly shows.",
         layout={
             "xaxis": {"type": "category", "tickangle": -50, "automargin": True},
             "yaxis": {"type": "category", "autorange": "reversed", "automargin": True},
