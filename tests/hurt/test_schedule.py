@@ -75,6 +75,15 @@ def test_an_injury_has_the_highest_severity_for_half_of_its_time(holden31) -> No
     assert {tuple(pair) for pair in halves == 10} == {(True, False), (False, True)}
 
 
+def test_a_short_version_has_one_severity_and_half_of_them_have_the_highest(holden31) -> None:
+    out = [schedule_severities(holden31, 200, 60.0, Hurt(), f"c{n}", n) for n in range(400)]
+    assert all(np.ptp(severity, axis=0).max() == 0 for severity in out)
+    highest = np.mean([severity.max() == 10 for severity in out])
+    assert 0.4 < highest < 0.85  # above one half, because a second link may have the highest
+    assert {float(severity.max()) for severity in out} == {3.0, 5.0, 7.0, 10.0}
+    assert np.ptp(schedule_severities(holden31, 260, 60.0, Hurt(), "c", 0), axis=0).max() > 0
+
+
 def test_arms_are_often_hurt_beside_another_part_but_never_too_many_at_once(holden31) -> None:
     arms = [part_of_link(holden31, link).name in ARMS for link in holden31.links]
     # Every 180th frame: each half of each stretch.

@@ -27,6 +27,9 @@ FURTHER_LINKS = 0.25  # share of the stretches in which further links hurt as we
 # learn an injury of an arm and another injury from the same stretch.
 ARM_TOO = 0.6
 ARMS = ("upper arm", "forearm")
+# A shorter stretch has one severity instead of two. With two, hardly a whole gait cycle would have the same
+# severity from start to end, and a network would learn nearly the same limp for both.
+SECONDS_FOR_TWO = 4.0
 # A clip is divided into equal stretches of about the option `seconds`. If the frames left after whole
 # stretches of `seconds` last at least this share of `seconds`, there is one stretch more.
 LEAST_REST = 0.4
@@ -40,9 +43,10 @@ def schedule_severities(
     clip: name of the hurt version. version_number: its number among all versions of the data set, from 0.
 
     The version is divided into stretches. In each stretch the link of the next card hurts, at one severity in
-    the first half and at another in the second half. All versions of a data set use the same deck.
-    `version_number` decides with which card a version begins, so that all cards are used about equally often.
-    `clip` and the option `seed` decide which links hurt besides. Raises HobbleError for an unknown link.
+    the first half and at another in the second half. In a short stretch it has only one of the two. All
+    versions of a data set use the same deck. `version_number` decides with which card a version begins, so
+    that all cards are used about equally often. `clip` and the option `seed` decide which links hurt besides,
+    and which severity a short stretch has. Raises HobbleError for an unknown link.
     """
     rng = np.random.default_rng([options.seed, zlib.crc32(clip.encode())])
     deck = _make_deck(skeleton, options)
@@ -62,9 +66,12 @@ def schedule_severities(
             link, first_half, _ = arms[rng.integers(len(arms))]
             lower = float(rng.choice(lower_severities))
             hurt += [(link, highest, lower) if first_half == highest else (link, lower, highest)]
+        if length < SECONDS_FOR_TWO * fps:
+            half = begin + length * int(rng.integers(2))  # the whole stretch is the first half, or the second
+        else:
+            half = begin + length // 2
         # Backwards: if two cards have the same link, the first card counts.
         for link, first_half, second_half in hurt[::-1]:
-            half = begin + length // 2
             out[begin:half, link] = first_half
             out[half : begin + length, link] = second_half
         begin += length

@@ -143,8 +143,8 @@ def clip_boxes(found: Json) -> Chart | None:
         "accuracy-boxes",
         "Spread within each clip",
         "Each box holds the middle half of the errors of a clip. The solid line in it is the median, "
-        "the dotted line the mean. Whiskers reach from the 5th to the 95th percentile. A box near zero with a "
-        "long whisker means that the clip is easy except for a few moments.",
+        "the dotted line the mean. Whiskers reach from the 5th to the 95th percentile. A box near zero with "
+        "a long whisker means that the clip is easy except for a few moments.",
         traces,
         {
             "xaxis": axis("relative error, %", rangemode="tozero"),
