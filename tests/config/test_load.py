@@ -225,7 +225,7 @@ def test_shipped_configurations_are_the_published_ones(root: Path) -> None:
     assert catalogue.configuration("ava-m").network_of == "ava"
     assert catalogue.configuration("injured").channels == ("injury",)
     assert catalogue.dataset("synthetic").terrain.fits == 10
-    assert catalogue.dataset("synthetic").synthetic.frames == 11_412
+    assert catalogue.dataset("synthetic").synthetic.frames == 12_795
 
 
 def test_the_shipped_release_lists_forty_clips_and_their_ground(root: Path) -> None:

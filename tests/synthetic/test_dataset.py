@@ -34,7 +34,7 @@ def test_the_data_set_names_only_existing_recipes(root, name):
 
 def test_the_data_set_uses_every_recipe(dataset):
     used = {e["recipe"] for e in dataset["clips"].values()}
-    assert used == set(RECIPES) - {"walk-straight"}  # the latter is a tiny data set's
+    assert used == set(RECIPES)
 
 
 def test_left_and_right_turns_balance_and_every_gait_has_its_share(dataset):
