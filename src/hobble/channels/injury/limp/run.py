@@ -318,7 +318,7 @@ def second_injuries(
     """A row with the speed of each walk with two injuries. Empty if `links` has no right thigh.
 
     The first injury is the right thigh at severity 5 or 10. The second is any other link at severity 5 or 10.
-    A walk lasts `seconds`, but at most 4. `speed_share`: speed, divided by the speed of the healthy walk.
+    `speed_share`: speed, divided by the speed of the healthy walk.
     `from_first`: speed, divided by the speed with the first injury alone. This should be at most 1, because a
     second injury must not make the walk faster.
     """
@@ -331,7 +331,7 @@ def second_injuries(
         (a, link, b) for a in FIRST_SEVERITIES for link in links if link != first for b in SECOND_SEVERITIES
     ]
     injuries = [{}, *({first: a} for a in FIRST_SEVERITIES), *({first: a, link: b} for a, link, b in cases)]
-    figures = walk_figures(network, injuries, SPEEDS["walk"], "walk", min(seconds, 4.0), runtime)
+    figures = walk_figures(network, injuries, SPEEDS["walk"], "walk", seconds, runtime)
     healthy = max(figures[0].speed, 1e-9)
     with_first_alone = dict(zip(FIRST_SEVERITIES, figures[1:], strict=False))
     return [
