@@ -13,7 +13,7 @@ from hobble.hurt.amounts import changes_of_hurt_part
 from hobble.hurt.body_parts import LEFT, RIGHT, part_of_link
 
 HIGHEST_SEVERITY = 10.0
-STRENGTH_POWER = 0.82  # strength = (severity / 10) ** STRENGTH_POWER: .37 at 3, .57 at 5, .75 at 7
+STRENGTH_POWER = 0.78  # strength = (severity / 10) ** STRENGTH_POWER: .39 at 3, .58 at 5, .76 at 7
 LEAST_RATIO = 0.02  # smaller ratios to the healthy clip are raised to this
 SETTLING_SECONDS = 0.3  # sigma of the Gaussian that smooths changes of severity
 LEAST_SEVERITY = 0.05  # smaller severities count as 0

@@ -23,7 +23,7 @@ ARM_STILL = 0.93  # a held arm loses up to this share of its movement
 # How firmly an arm is held grows with (strength of the injury) ** HOLD_POWER. So a mildly hurt arm swings
 # nearly as far as a healthy arm. With a power of 1, the character that a network drives holds its arms too
 # still at severity 5.
-HOLD_POWER = 1.6
+HOLD_POWER = 1.9
 # Ways to hold a hurt left arm: the directions of upper arm and forearm as (forward, left, up), relative to
 # the heading. `fore`, for a hurt forearm: the forearm lies across the belly. This is the mean posture of the
 # clip Injured_Jog_LLA by Ferre et al., a jog with a hurt forearm. `upper`, for a hurt upper arm or shoulder:
