@@ -180,6 +180,7 @@ def fit_skeleton(clip: Clip, source: FileMotion, target: Skeleton, proportions: 
         joints_to_keep = {clip.skeleton.index(name) for name in followed_joints.values()}
         standing = with_upright_rest(clip, body_by_roles(clip.skeleton), target, joints_to_keep)
         clip, unsure = standing.clip, unsure + standing.doubts
+        # Joints that are below no joint of the body were left out.
         followed_joints = {
             joint: followed for joint, followed in followed_joints.items() if followed in clip.skeleton.joints
         }

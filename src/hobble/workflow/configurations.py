@@ -86,7 +86,7 @@ class Configurations:
         return f"results/{self.network_owner(configuration)}/network/{file}"
 
     def database(self, configuration: str) -> str:
-        """Path of the database: the rows for training, one for each frame, made from the data set's clips."""
+        """Path of the folder of the database, which holds the rows for training."""
         folder = database_folder(self.channels(configuration))
         return f"{DATASETS}/{self.dataset(configuration)}/database/{folder}"
 
