@@ -23,9 +23,7 @@ def nearest_joints(solids: Sequence[Solid], points: Array, joint_of: Mapping[str
     nearest, owner = np.full(len(points), np.inf), np.zeros(len(points), np.int64)
     x, y, z = points.T
     for solid in solids:
-        if (
-            solid.is_subtracted
-        ):  # such a solid is a hole in another one, whose joint moves the surface of the hole
+        if solid.is_subtracted:  # a hole in another solid, whose joint moves the surface of the hole
             continue
         low, high = (corner.reshape(3, 1) for corner in solid.bounds())
         # Points more than 4 cm from the box around a solid are nearer to other solids.
