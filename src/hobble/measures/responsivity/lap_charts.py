@@ -70,8 +70,8 @@ def lap_chart(found: Json, material: ReportMaterial) -> Chart | None:
         "the first seconds of the lap. Prepare: the target, the path and the ground; input: collect the "
         "network's input; insert: standardise this input; predict: evaluate the network; output: turn its "
         "output into a pose; update: move on by a frame. A diamond is the median time of a whole frame. If "
-        "another program delays a few frames, the bar becomes higher, but the diamond hardly moves. At 60 Hz, "
-        "a frame may take 16.7 ms." + fewer_laps,
+        "another program delays a few frames, the bar becomes higher, but the diamond hardly moves. At 60 "
+        "Hz, a frame may take 16.7 ms." + fewer_laps,
         layout={
             "barmode": "stack",
             "xaxis": axis("lap", dtick=1 if laps < 25 else None),
