@@ -110,6 +110,8 @@ def test_effects_grow_with_severity_and_are_alike_on_both_sides(measured) -> Non
     assert last["severity"] == 10
     assert last["named"] == 1
     assert last["wrong_side"] == 0
+    for row in (*rows, *found["named"]):
+        assert max(row["named"], row["impaired"]) <= row["named_by_either"] <= row["named"] + row["impaired"]
     json.dumps(found, allow_nan=False)
 
 
@@ -131,8 +133,8 @@ def test_a_change_of_two_percent_correlates_fully_but_is_not_recognised(measured
 
 def test_a_limp_of_the_wrong_leg_is_detected(measured) -> None:
     last = measured(lambda s: 0.1 * s, other_side=True)["named"][-1]
-    assert last["named"] == 0
-    assert last["wrong_side"] == 1
+    assert last["named"] == last["named_by_either"] == 0
+    assert last["impaired"] == last["wrong_side"] == 1
 
 
 def test_a_limp_is_compared_with_the_healthy_walk_of_the_same_mood(

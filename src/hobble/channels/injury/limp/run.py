@@ -169,7 +169,8 @@ def _row_of_walk(
     called: label and side that the linear recogniser gives to the whole walk. graded: label and side that the
     graded recogniser gives to it. impaired: share of windows in which the linear recogniser finds a limp. The
     wrong side is the side opposite to `hurt_side`. named: share of windows in which the graded recogniser
-    finds a limp, and not on the wrong side. wrong_side: share of windows in which the graded recogniser finds
+    finds a limp, and not on the wrong side. named_by_either: share of windows in which at least one of the
+    two recognisers does. wrong_side: share of windows in which the graded recogniser finds
     a limp on the wrong side; None for a link on the midline. speed_share: speed, divided by the speed of the
     healthy walk. If the figure does not walk a whole cycle, only `speed_share` is measured. The effects and
     the keys of the recognisers are then None.
@@ -185,7 +186,7 @@ def _row_of_walk(
         return {
             **row,
             **dict.fromkeys(EFFECTS),
-            **dict.fromkeys(("called", "graded", "impaired", "named", "wrong_side")),
+            **dict.fromkeys(("called", "graded", "impaired", "named", "named_by_either", "wrong_side")),
         }
     row |= _rounded_values(measure_effects(figure.profile, healthy.profile, side))
     found = compare_walk(figure.walk, figure.frames, healthy.profile, WINDOW_SECONDS)
@@ -195,7 +196,11 @@ def _row_of_walk(
     row["called"] = " ".join(filter(None, (found.answer.label, found.answer.side)))
     row["graded"] = " ".join(filter(None, (found.grade.label, found.grade.side)))
     row["impaired"] = _share([a.is_impaired for a in answers])
-    row["named"] = _share([g.is_impaired and g.side != wrong_side for g in grades])
+    by_linear, by_graded = (
+        [r.is_impaired and r.side != wrong_side for r in each] for each in (answers, grades)
+    )
+    row["named"] = _share(by_graded)
+    row["named_by_either"] = _share([a or b for a, b in zip(by_linear, by_graded, strict=True)])
     row["wrong_side"] = (
         _share([g.is_impaired and g.side == wrong_side for g in grades]) if part.side is not None else None
     )
@@ -231,7 +236,7 @@ def _recognition_by_severity(rows: Sequence[Mapping[str, Any]]) -> list[dict[str
     for severity in SEVERITIES:
         legs = [r for r in rows if r["gait"] == "walk" and r["severity"] == severity and r["part"] in LEG]
         row: dict[str, Any] = {"severity": severity, "walks": len(legs)}
-        for key in ("impaired", "named", "wrong_side"):
+        for key in ("impaired", "named", "named_by_either", "wrong_side"):
             values = [r[key] for r in legs if r[key] is not None]
             row[key] = round(float(np.mean(values)), 5) if values else None
         out.append(row)
