@@ -100,7 +100,7 @@ class BodySample:
     def first_long_bone(
         self, joint: int, following: Sequence[int], least: float = SHORT
     ) -> tuple[Array, int]:
-        """Find the first joint of `following` that is more than `least` cm away from `joint`, or else the last.
+        """Find the first joint of `following` that is over `least` cm away from `joint`, or else the last.
 
         Returns the (3,) `bone` from `joint` to the joint found, and the joint found.
         """

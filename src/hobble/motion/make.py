@@ -180,8 +180,8 @@ def fit_skeleton(clip: Clip, source: FileMotion, target: Skeleton, proportions: 
         joints_to_keep = {clip.skeleton.index(name) for name in followed_joints.values()}
         standing = with_upright_rest(clip, body_by_roles(clip.skeleton), target, joints_to_keep)
         clip, unsure = standing.clip, unsure + standing.doubts
-        # `with_upright_rest` drops a joint, even one of joints_to_keep, if none of its ancestors belongs to the
-        # body.
+        # `with_upright_rest` drops a joint, even one of joints_to_keep, if none of its ancestors belongs to
+        # the body.
         followed_joints = {
             joint: followed for joint, followed in followed_joints.items() if followed in clip.skeleton.joints
         }
