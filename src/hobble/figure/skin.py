@@ -23,7 +23,7 @@ def nearest_joints(solids: Sequence[Solid], points: Array, joint_of: Mapping[str
     nearest, owner = np.full(len(points), np.inf), np.zeros(len(points), np.int64)
     x, y, z = points.T
     for solid in solids:
-        if solid.is_subtracted:  # a hole in another solid, whose joint moves the surface of the hole
+        if solid.is_subtracted:  # a hole; its surface is moved by the joint of the solid around it
             continue
         low, high = (corner.reshape(3, 1) for corner in solid.bounds())
         # Points more than 4 cm from the box around a solid are nearer to other solids.
@@ -72,7 +72,7 @@ def skin_weights(
     if weights.shape[1] < MOST_BONES:
         pad = MOST_BONES - weights.shape[1]
         weights, order = np.pad(weights, ((0, 0), (0, pad))), np.pad(order, ((0, 0), (0, pad)))
-    # From one corner to the next, another bone may get the fourth-largest weight, and a weight would jump
-    # there. So all weights are lowered by 0.01, but not below 0. A fourth weight of at most 0.01 becomes 0.
+    # Only the four largest weights are kept. Where another bone becomes the fourth, a weight would jump to 0.
+    # So all weights are lowered by 0.01, but not below 0: the fourth is usually 0 then, and cannot jump.
     weights = np.maximum(weights - 0.01, 0)
     return joints[order], weights / weights.sum(axis=1, keepdims=True)

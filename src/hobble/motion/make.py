@@ -164,8 +164,8 @@ def fit_skeleton(clip: Clip, source: FileMotion, target: Skeleton, proportions: 
     """Put the clip's motion on the target skeleton.
 
     clip: the clip of `source` at the new frame rate. proportions: "skeleton" for the target's bone lengths,
-    "clip" to keep the clip's own bone lengths. They can be kept if the clip has the target's joints and an
-    equal rest pose.
+    "clip" to keep the clip's own bone lengths. They can be kept if the clip has the target's joints,
+    and its bones point in the same directions in the rest pose.
     """
     match = source.match
     if match.is_target_skeleton:

@@ -5,8 +5,8 @@ python -m hobble.runtime onnx|bin|bvh NETWORK TARGET
 Examples:
 
 python -m hobble.runtime onnx results/holden/network holden.onnx --mode cubic
-python -m hobble.runtime bin results/holden/network exported
-python -m hobble.runtime bvh exported motions --skeleton config/skeletons/holden31.yaml
+python -m hobble.runtime bin results/holden/network out/holden
+python -m hobble.runtime bvh out/holden out/walks --skeleton config/skeletons/holden31.yaml
 """
 
 from __future__ import annotations

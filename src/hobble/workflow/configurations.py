@@ -86,12 +86,12 @@ class Configurations:
         return f"results/{self.network_owner(configuration)}/network/{file}"
 
     def database(self, configuration: str) -> str:
-        """Path of the folder of the database, which holds the rows for training."""
+        """Path of the folder with the rows for training, which is named after the network's channels."""
         folder = database_folder(self.channels(configuration))
         return f"{DATASETS}/{self.dataset(configuration)}/database/{folder}"
 
     def is_built(self, configuration: str) -> bool:
-        """Whether the network is built directly from rows of the database instead of trained."""
+        """Whether the network is built directly from the rows of the clips instead of trained."""
         return isinstance(self.model(configuration), BuiltModel)
 
     def training_row_files(self, configuration: str) -> list[str]:
