@@ -73,6 +73,6 @@ def skin_weights(
         pad = MOST_BONES - weights.shape[1]
         weights, order = np.pad(weights, ((0, 0), (0, pad))), np.pad(order, ((0, 0), (0, pad)))
     # Only the four largest weights are kept. Where another bone becomes the fourth, a weight would jump to 0.
-    # So all weights are lowered by 0.01, but not below 0: the fourth is usually 0 then, and cannot jump.
+    # So all weights are lowered by 0.01, but not below 0. A fourth weight of at most 0.01 then cannot jump.
     weights = np.maximum(weights - 0.01, 0)
     return joints[order], weights / weights.sum(axis=1, keepdims=True)

@@ -221,8 +221,8 @@ def clip_strips(material: ReportMaterial, clips: frozenset[str]) -> list[dict[st
     `hobble.labels.label_picture` returns, and
 
     - `clip`: its name. `length`: seconds
-    - `channels`: a dict for each column with a value above 0. Its keys are `name`; `spans`, the stretches above
-      0 as [start in seconds, end in seconds, largest value]; `highest`, the largest value that the channel
+    - `channels`: a dict for each column with a value above 0. Its keys are `name`; `spans`, the stretches
+      above 0 as [start in seconds, end in seconds, largest value]; `highest`, the largest value that the channel
       allows, such as 10. Spans are read from `spells` of the column's entry in the channel report. Without
       `spells` there is one span, the whole clip
     """
