@@ -222,9 +222,9 @@ def clip_strips(material: ReportMaterial, clips: frozenset[str]) -> list[dict[st
 
     - `clip`: its name. `length`: seconds
     - `channels`: a dict for each column with a value above 0. Its keys are `name`; `spans`, the stretches
-      above 0 as [start in seconds, end in seconds, largest value]; `highest`, the largest value that the channel
-      allows, such as 10. Spans are read from `spells` of the column's entry in the channel report. Without
-      `spells` there is one span, the whole clip
+      above 0 as [start in seconds, end in seconds, largest value]; `highest`, the largest value that the
+      channel allows, such as 10. Spans are read from `spells` of the column's entry in the channel report.
+      Without `spells` there is one span, the whole clip
     """
     # Clip -> column -> (its entry in the channel report, largest value that the channel allows). An entry's
     # own `highest` is the largest value of the column in this clip.
