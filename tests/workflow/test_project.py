@@ -106,7 +106,7 @@ def test_the_frames_of_the_synthetic_data_set_are_divided_among_its_clips(root: 
     total = sum(
         project.datasets.frames("synthetic", clip) for clip in project.clips.listed_entries("synthetic")
     )
-    assert abs(total - 11_412) < 20
+    assert abs(total - 12_795) < 20
 
 
 def test_network_of_reads_the_other_configurations_files(root: Path) -> None:
