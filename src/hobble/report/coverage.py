@@ -181,8 +181,8 @@ def _empty_cells(estimate: str) -> str:
     If only a part of the data was read, the rest may have data for a cell that is empty.
     """
     if estimate:
-        return "The network was trained on little or no data in empty cells"
-    return "The network was not trained on empty cells"
+        return "Where a cell is empty, the network had little or no data to learn from"
+    return "Where a cell is empty, the network had no data to learn from"
 
 
 def _middles(edges: Array) -> list[float]:

@@ -20,9 +20,11 @@ class Options(SampleOptions):
 MEASURE = Measure(
     name="injury",
     package=__name__,
-    inputs=("weights", "clips", "summaries"),  # see `INPUTS` in `hobble.measures.measure`
+    # The network, the rows of the clips, and summaries of these rows.
+    inputs=("weights", "clips", "summaries"),
     options=Options,
     runtime=tuple(Runtime.model_fields),  # it depends on all keys of the section `runtime`
-    # `least_minutes`: its job requests at least this time on a cluster.
+    # What its job requests on a cluster: MB for each 1,000 frames of the longest clip, seconds for each 1,000
+    # frames of all clips together, but at least `least_minutes`.
     cost=Cost(mb_per_1000_frames=14, seconds_per_1000_frames=0.2, least_minutes=60),
 )
