@@ -156,7 +156,7 @@ def _cycle(walk: Signals, start: int, left_landing: int, end: int) -> Cycle:
     speed = float(np.linalg.norm(walk.hips[end] - walk.hips[start])) / seconds
     right_ahead = walk.curves["ankle_forward_R"] - walk.curves["ankle_forward_L"]
     standing = {
-        side: float(np.mean(walk.ankle_speed[side][start:end] < STANDING_SPEED * speed)) for side in "LR"
+        side: _share_below(walk.ankle_speed[side][start : end + 1], STANDING_SPEED * speed) for side in "LR"
     }
     width = [walk.across["L"][i] - walk.across["R"][i] for i in (start, left_landing)]
     values = (  # in the order of SCALARS
@@ -173,3 +173,18 @@ def _cycle(walk: Signals, start: int, left_landing: int, end: int) -> Cycle:
     frames = np.arange(start, end + 1)
     curves = np.stack([np.interp(times, frames, walk.curves[name][start : end + 1]) for name in CURVES])
     return Cycle(start, end, dict(zip(SCALARS, values, strict=True)), curves)
+
+
+def _share_below(values: Array, limit: float) -> float:
+    """The share of the time in which values (F,) are below a limit, interpolated linearly between frames.
+
+    A count of frames would be too coarse: a character whose cycle lasts exactly 60 frames repeats the same
+    rounding in every cycle, and one frame is .017 of it.
+    """
+    below = np.maximum(limit - values, 0.0)
+    above = np.maximum(values - limit, 0.0)
+    # In the interval between two frames, the value is below the limit for this share.
+    first, second = below[:-1], below[1:]
+    crossing = first + second + above[:-1] + above[1:]
+    shares = np.divide(first + second, crossing, out=np.zeros(len(first)), where=crossing > 0)
+    return float(np.mean(shares))

@@ -178,7 +178,8 @@ def has_equal_rest_pose(rig: Skeleton, known: Skeleton) -> bool:
     """Whether the limb bones of two rest poses have equal directions, to within MOST_APART.
 
     Directions are measured in the body's own axes, so turned or mirrored bodies count as equal. A rig
-    without toe joints (the balls of the feet) never counts as equal. So it gets a new rest pose, with toes.
+    without toe joints (the balls of the feet) never counts as equal, so that it gets a new rest pose. Then
+    toe joints are added.
     """
     if "left_toe" not in rig.roles:
         return False

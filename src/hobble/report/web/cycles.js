@@ -18,6 +18,11 @@ const LEAST_AHEAD = .7; // mean cosine between facing and travel: if it is less,
 
 const mean = (values) => values.reduce((a, b) => a + b, 0) / values.length;
 const range = (values) => Math.max(...values) - Math.min(...values);
+// The share of the time in which values are below a limit, interpolated between frames.
+const shareBelow = (values, limit) => mean(values.slice(1).map((value, i) => {
+  const under = Math.max(limit - values[i], 0) + Math.max(limit - value, 0);
+  return under > 0 ? under / (Math.abs(limit - values[i]) + Math.abs(limit - value)) : 0;
+}));
 
 // Largest minus smallest value within `reach` frames of frame i.
 const rangeAround = (values, i, reach) => {
@@ -50,10 +55,10 @@ export const landings = (forward, fps) => {
 // The measures of the cycle of the right leg from frame a to frame b. other: the frame in which the left foot lands. scalars: in the order of
 // SCALARS. curves: those of CURVES, at SAMPLES equal steps.
 const measureCycle = (walk, a, other, b) => {
-  const { fps, curves, hips } = walk, seconds = (b - a) / fps, inCycle = (values) => values.slice(a, b);
+  const { fps, curves, hips } = walk, seconds = (b - a) / fps;
   const speed = Math.hypot(hips[b][0] - hips[a][0], hips[b][1] - hips[a][1]) / seconds;
   const stepLength = (f) => curves.ankle_forward_R[f] - curves.ankle_forward_L[f];
-  const standing = (side) => mean(inCycle(walk.ankleSpeed[side]).map((v) => Number(v < STANDING_SPEED * speed)));
+  const standing = (side) => shareBelow(walk.ankleSpeed[side].slice(a, b + 1), STANDING_SPEED * speed);
   const width = mean([a, other].map((f) => walk.across.L[f] - walk.across.R[f]));
   const scalars = [seconds, speed, (other - a) / (b - a), standing("R"), standing("L"), stepLength(a), -stepLength(other), width];
   const sampled = (values) => Array.from({ length: SAMPLES }, (_, k) => {
