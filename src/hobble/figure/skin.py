@@ -72,8 +72,8 @@ def skin_weights(
     if weights.shape[1] < MOST_BONES:
         pad = MOST_BONES - weights.shape[1]
         weights, order = np.pad(weights, ((0, 0), (0, pad))), np.pad(order, ((0, 0), (0, pad)))
-    # Only the four largest weights of a corner are kept. A bone that is fourth at one corner and fifth at the
-    # next would lose its weight suddenly. So all weights are lowered by 0.01, but not below 0. A bone whose
-    # weight was at most 0.01 then has no weight at both corners, and nothing jumps.
+    # Only the four largest weights of a corner are kept. So a bone that is fourth at one corner and fifth at
+    # the next would suddenly lose its weight. All weights are lowered by 0.01, but not below 0, so that this
+    # does not happen to weights of at most 0.01.
     weights = np.maximum(weights - 0.01, 0)
     return joints[order], weights / weights.sum(axis=1, keepdims=True)
