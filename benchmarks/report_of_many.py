@@ -66,7 +66,7 @@ def rendered(results: Path, dataset: Path, count: int) -> tuple[float, float]:
             title=None,
             splits=splits,
             configuration=results / "configuration.yaml",
-            measured=sorted(map(str, (results / "evaluation").glob("*.json"))),
+            measurements=sorted(map(str, (results / "evaluation").glob("*.json"))),
             pipeline=results / "pipeline.json",
             history=results / "network/history.csv",
             weights=weights,

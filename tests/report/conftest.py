@@ -94,7 +94,7 @@ def hero(
     network: Network, character: dict[str, Any], material: ReportMaterial, examples: ModuleType
 ) -> dict[str, Any]:
     """The figures at the top of the page."""
-    return opening_walk(network, examples.RUNTIME, character, material.measured.values())
+    return opening_walk(network, examples.RUNTIME, character, material.measurements.values())
 
 
 @pytest.fixture(scope="session")

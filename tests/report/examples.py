@@ -62,7 +62,7 @@ def write_all(
         "title": None,
         "splits": splits,
         "configuration": str(folder / "configuration.yaml"),
-        "measured": [str(folder / f"{name}.json") for name in ("accuracy", "responsivity", "injury")],
+        "measurements": [str(folder / f"{name}.json") for name in ("accuracy", "responsivity", "injury")],
         "pipeline": str(folder / "pipeline.json"),
         "history": str(folder / "history.csv"),
         "weights": str(folder / "weights.npz"),

@@ -134,7 +134,7 @@ def test_a_point_about_a_clip_opens_it_where_it_is_worst(tab: Any) -> None:
 def test_choosers_change_their_pictures(tab: Any, material: ReportMaterial) -> None:
     choose(tab, "sweeps-choice", 2)
     drawn = "document.querySelector('[data-chart=\"sweep-speed\"]').data[0].y[0]"
-    assert tab.run(drawn) == pytest.approx(material.measured["injury"]["rows"][22]["speed"])
+    assert tab.run(drawn) == pytest.approx(material.measurements["injury"]["rows"][22]["speed"])
     choose(tab, "strip-clip", 6)
     assert "left thigh" in text(tab, "strip")
 
@@ -142,7 +142,7 @@ def test_choosers_change_their_pictures(tab: Any, material: ReportMaterial) -> N
 def test_tables_sort_and_become_csv(tab: Any, material: ReportMaterial) -> None:
     table = "document.querySelector('table[data-csv=\"example-accuracy\"]')"
     ranked = [
-        row["clip"] for row in sorted(material.measured["accuracy"]["clips"], key=lambda row: row["mean"])
+        row["clip"] for row in sorted(material.measurements["accuracy"]["clips"], key=lambda row: row["mean"])
     ]
     column = f"[...{table}.tBodies[0].rows].map((row) => row.cells[0].textContent)"
     for order, name in ((ranked, "ascending"), (ranked[::-1], "descending")):
@@ -151,7 +151,7 @@ def test_tables_sort_and_become_csv(tab: Any, material: ReportMaterial) -> None:
         assert tab.run(f"{table}.tHead.rows[0].cells[3].getAttribute('aria-sort')") == name
     lines = tab.run(f"Hobble.csv({table})").split("\r\n")
     assert lines[0] == 'clip,split,frames,mean,sd,"position error, cm"'
-    worst = max(material.measured["accuracy"]["clips"], key=lambda row: row["mean"])
+    worst = max(material.measurements["accuracy"]["clips"], key=lambda row: row["mean"])
     assert lines[1].startswith(f"{worst['clip']},{worst['split']},{worst['frames']},{worst['mean']},")
 
 

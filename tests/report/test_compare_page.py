@@ -38,11 +38,14 @@ def compared(material: ReportMaterial) -> dict[str, Any]:
         }
     }
     counts = {"true": 5000, "table_6_1": 4000, "table_6_1_as_printed": 3000}
-    better = [{**row, "mean": row["mean"] / 2} for row in material.measured["accuracy"]["clips"]]
-    measured = []
-    for name, clips, factor in (("holden", material.measured["accuracy"]["clips"], 1), ("ava", better, 2)):
+    better = [{**row, "mean": row["mean"] / 2} for row in material.measurements["accuracy"]["clips"]]
+    measurements = []
+    for name, clips, factor in (
+        ("holden", material.measurements["accuracy"]["clips"], 1),
+        ("ava", better, 2),
+    ):
         responsivity = {
-            **material.measured["responsivity"],
+            **material.measurements["responsivity"],
             "parameters": {k: factor * v for k, v in counts.items()},
             "bytes_each": 4,
             "stored": {"cubic": 4 * factor * counts["true"]},
@@ -55,7 +58,7 @@ def compared(material: ReportMaterial) -> dict[str, Any]:
                 "mean_of_clips": part["mean"] / factor,
                 **{f"p{q:02}": part["mean"] * q / 50 / factor for q in (5, 25, 50, 75, 95)},
             }
-            for s, part in ((s, material.measured["accuracy"][s]) for s in ("train", "held_out"))
+            for s, part in ((s, material.measurements["accuracy"][s]) for s in ("train", "held_out"))
         }
         lengths = [
             {
@@ -65,22 +68,22 @@ def compared(material: ReportMaterial) -> dict[str, Any]:
             }
             for n in (1, 10)
         ]
-        measured.append(
+        measurements.append(
             ConfigurationResults(
                 name=name,
                 resolved=resolved,
-                measured={
-                    "accuracy": {**material.measured["accuracy"], **splits, "clips": clips, "joints": 31},
+                measurements={
+                    "accuracy": {**material.measurements["accuracy"], **splits, "clips": clips, "joints": 31},
                     "rollouts": {"lengths": lengths},
                     "responsivity": responsivity,
-                    "injury": material.measured["injury"],
+                    "injury": material.measurements["injury"],
                     "recognition": {"applies": False, "reason": "not tried"},
                 },
                 pipeline=material.pipeline,
                 history=material.history,
             )
         )
-    return compare_configurations(measured, yaml.safe_load(PUBLISHED.read_text()))
+    return compare_configurations(measurements, yaml.safe_load(PUBLISHED.read_text()))
 
 
 @pytest.fixture(scope="module")
@@ -154,14 +157,14 @@ def test_published_figures_are_shown_with_ours(compared: dict[str, Any]) -> None
 def test_frame_times_are_medians_and_measures_have_names(
     compared: dict[str, Any], material: ReportMaterial
 ) -> None:
-    median = material.measured["responsivity"]["milliseconds"]["spread"]["median"]
+    median = material.measurements["responsivity"]["milliseconds"]["spread"]["median"]
     table = tables.configuration_table(compared)
     column = [c.label for c in table.columns].index("ms per frame, median")
     assert [row[column] for row in table.rows] == [median, median]
     laps, fit = of_responsivity.lap_lines(compared), of_responsivity.fit_chart(compared)
     assert laps is not None
     assert fit is not None
-    first = material.measured["responsivity"]["laps"][0]["milliseconds"]["spread"]["median"]
+    first = material.measurements["responsivity"]["laps"][0]["milliseconds"]["spread"]["median"]
     assert next(iter(laps.options.values()))[0]["y"][0] == first
     assert fit.traces[0]["y"] == [median, median]
 

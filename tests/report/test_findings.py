@@ -16,7 +16,7 @@ def changed(material: ReportMaterial, **changes: Any) -> ReportMaterial:
     """The material with other measurements, or with other fields."""
     fields = {key: value for key, value in changes.items() if hasattr(material, key)}
     found = {key: value for key, value in changes.items() if key not in fields}
-    return replace(material, measured={**material.measured, **found}, **fields)
+    return replace(material, measurements={**material.measurements, **found}, **fields)
 
 
 def heads(material: ReportMaterial, **changes: Any) -> dict[str, str]:
@@ -25,7 +25,7 @@ def heads(material: ReportMaterial, **changes: Any) -> dict[str, str]:
 
 
 def accuracy(material: ReportMaterial, held_out: float | None, train: float = 0.04) -> dict[str, Any]:
-    return {**material.measured["accuracy"], "train": {"mean": train}, "held_out": {"mean": held_out}}
+    return {**material.measurements["accuracy"], "train": {"mean": train}, "held_out": {"mean": held_out}}
 
 
 def history(losses: list[float]) -> dict[str, list[float | None]]:
@@ -83,7 +83,7 @@ def test_only_one_hint_advises_on_more_passes(material: ReportMaterial, losses: 
 
 
 def test_missed_waypoints_flips_and_ineffective_links_are_reported(material: ReportMaterial) -> None:
-    missed = {**material.measured["responsivity"], "largest_turn_degrees": 175.0}
+    missed = {**material.measurements["responsivity"], "largest_turn_degrees": 175.0}
     found = heads(material, responsivity=missed)
     assert found["The character reached 113 of 114 waypoints."] == "warn"
     assert found["A joint turned by 175 degrees in one frame."] == "warn"
@@ -115,7 +115,7 @@ def test_links_never_hurt_in_training_only_show_the_drift_of_the_walk(material: 
 def test_the_time_of_a_frame_is_a_median(material: ReportMaterial) -> None:
     times = {"predict": 0.17, "total": 0.17, "spread": {"median": 0.025, "p99": 0.163}}
     slow = changed(
-        material, name="holden", responsivity={**material.measured["responsivity"], "milliseconds": times}
+        material, name="holden", responsivity={**material.measurements["responsivity"], "milliseconds": times}
     )
     figure = next(f for f in key_figures(slow) if f.label == "Time per frame")
     assert (figure.value, figure.unit) == ("0.025", "ms")
@@ -140,7 +140,7 @@ def test_problems_come_first_and_data_comes_before_training(material: ReportMate
 
 
 def test_a_limited_turn_is_reported(material: ReportMaterial) -> None:
-    lap = material.measured["responsivity"]
+    lap = material.measurements["responsivity"]
     limited = {**lap, "largest_turn_degrees": 25.0, "predicted_turn_degrees": 170.0, "turns_held_back": 3}
     assert heads(material, responsivity=limited)[
         "The network predicted a turn of a joint by 170 degrees in one frame."

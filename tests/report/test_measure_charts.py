@@ -29,7 +29,7 @@ def test_the_steps_of_a_frame_are_in_their_order(material: ReportMaterial) -> No
         "update",
         "median",
     ]
-    times = material.measured["responsivity"]["laps"][0]["milliseconds"]
+    times = material.measurements["responsivity"]["laps"][0]["milliseconds"]
     assert sum(trace["y"][0] for trace in traces[:-1]) == pytest.approx(times["total"])
     assert traces[-1]["y"][0] == times["spread"]["median"]
 
@@ -46,8 +46,8 @@ def test_a_row_of_the_table_of_laps_reads_as_a_sentence(material: ReportMaterial
 
 def test_feet_with_little_contact_have_no_slide(material: ReportMaterial) -> None:
     def slide(steps: int) -> KeyFigure:
-        laps = [{**lap, "steps": steps} for lap in material.measured["responsivity"]["laps"][:2]]
-        found = {**material.measured["responsivity"], "laps": laps, "foot_slide_cm": 0.0}
+        laps = [{**lap, "steps": steps} for lap in material.measurements["responsivity"]["laps"][:2]]
+        found = {**material.measurements["responsivity"], "laps": laps, "foot_slide_cm": 0.0}
         figures = responsivity_page.track_figures(found)
         return next(figure for figure in figures if figure.label == "Foot slide")
 
@@ -58,14 +58,14 @@ def test_feet_with_little_contact_have_no_slide(material: ReportMaterial) -> Non
 
 def test_links_never_hurt_in_training_are_told_from_the_others(material: ReportMaterial) -> None:
     responses = [
-        {**r, "trained": r["link"].startswith("Left")} for r in material.measured["injury"]["responses"]
+        {**r, "trained": r["link"].startswith("Left")} for r in material.measurements["injury"]["responses"]
     ]
     rows = [
         {"link": link, "severity": v, "jog_from_healthy_cm": 0.1 * v}
         for link in {r["link"]: None for r in responses}
         for v in (5.0, 10.0)
     ]
-    injury = {**material.measured["injury"], "responses": responses, "into_a_jog": rows}
+    injury = {**material.measurements["injury"], "responses": responses, "into_a_jog": rows}
     parts = [part.content for part in injury_page.section(injury, material).parts]
     (curves,) = [content for content in parts if isinstance(content, ChartGroup)]
     overview, (_, into_a_jog) = [content.charts for content in parts if isinstance(content, ChartPair)]

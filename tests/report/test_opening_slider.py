@@ -33,7 +33,7 @@ def limps(thigh: float, back: float, gait: str = "walk") -> dict[str, Any]:
 
 
 @pytest.mark.parametrize(
-    ("measured", "part"),
+    ("measurements", "part"),
     [
         ([POSES, limps(0.15, 0.01)], "left thigh"),
         ([limps(0.01, -0.15), POSES], "lower back"),
@@ -42,8 +42,10 @@ def limps(thigh: float, back: float, gait: str = "walk") -> dict[str, Any]:
         ([], "left thigh"),
     ],
 )
-def test_the_page_opens_with_the_injury_that_limps_most(measured: list[dict[str, Any]], part: str) -> None:
-    assert opening_slider(PLAYABLE, measured) == {"part": part, "value": 7}
+def test_the_page_opens_with_the_injury_that_limps_most(
+    measurements: list[dict[str, Any]], part: str
+) -> None:
+    assert opening_slider(PLAYABLE, measurements) == {"part": part, "value": 7}
 
 
 def test_a_page_without_sliders_opens_with_no_injury() -> None:

@@ -103,7 +103,7 @@ def test_ids_are_unique_and_controls_are_labelled(outline: Outline) -> None:
 
 
 def test_cells_of_tables_hold_unrounded_numbers(page: str, material: ReportMaterial) -> None:
-    row = material.measured["accuracy"]["clips"][0]
+    row = material.measurements["accuracy"]["clips"][0]
     assert f'data-v="{row["mean"]}"' in page
 
 

@@ -51,7 +51,7 @@ def test_a_pair_without_charts_is_left_out() -> None:
 
 @pytest.mark.parametrize("found", [{}, {"applies": False, "reason": "no such input"}])
 def test_a_measurement_that_found_nothing_leaves_no_section(found: dict[str, Any], material: Any) -> None:
-    nothing = replace(material, measured={one.name: found for one in MEASURES})
+    nothing = replace(material, measurements={one.name: found for one in MEASURES})
     assert measure_sections.sections(material) != []
     assert measure_sections.sections(nothing) == []
 
@@ -77,7 +77,7 @@ def test_words_are_escaped_and_every_kind_is_drawn() -> None:
         SectionPart(2, chart("b"), tall=True),
     ]
     section = join_sections([PageSection("s", parts, title="<S>")])
-    text = load_template("measured.html.j2").render(measured=section)
+    text = load_template("measurements.html.j2").render(measurements=section)
     assert "<p>&lt;b&gt;</p>" in text
     assert "<h2>&lt;S&gt;</h2>" in text
     assert text.count("<figure") == 2

@@ -65,14 +65,16 @@ def test_bars_show_every_clip_of_its_split(material: ReportMaterial) -> None:
     bars = {trace["name"]: dict(zip(trace["y"], trace["x"], strict=True)) for trace in chart.traces}
     assert set(bars["held out"]) == {"walk_turns", "walk_turns_mirror", "hurt_back", "hurt_back_mirror"}
     assert len(bars["training"]) == 12
-    row = next(r for r in material.measured["accuracy"]["clips"] if r["clip"] == "jog")
+    row = next(r for r in material.measurements["accuracy"]["clips"] if r["clip"] == "jog")
     assert bars["training"]["jog"] == pytest.approx(100 * row["mean"])
     assert set(chart.layout["yaxis"]["categoryarray"]) == set(bars["held out"]) | set(bars["training"])
 
 
 def test_boxes_only_where_there_are_quantiles(material: ReportMaterial) -> None:
     assert accuracy_page.clip_boxes(material.results_of("accuracy")) is not None
-    clips = [{k: v for k, v in row.items() if k != "p50"} for row in material.measured["accuracy"]["clips"]]
+    clips = [
+        {k: v for k, v in row.items() if k != "p50"} for row in material.measurements["accuracy"]["clips"]
+    ]
     assert accuracy_page.clip_boxes({"clips": clips}) is None
 
 

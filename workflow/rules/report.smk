@@ -80,7 +80,7 @@ rule pipeline_summary:
 rule report:
     """The report of a configuration as one HTML file."""
     input:
-        measured=expand(rules.measure.output.json, measure=MEASURES, allow_missing=True),
+        measurements=expand(rules.measure.output.json, measure=MEASURES, allow_missing=True),
         pipeline=rules.pipeline_summary.output.json,
         scenarios=rules.generate.output.scenarios,
         configuration=rules.configuration.output.yaml,

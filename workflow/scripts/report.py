@@ -21,7 +21,7 @@ with job(snakemake):
         title=params.title,
         splits=params.splits,
         configuration=files.configuration,
-        measured=files.measured,
+        measurements=files.measurements,
         pipeline=files.pipeline,
         history=files.history,
         weights=files.weights,
@@ -36,7 +36,7 @@ with job(snakemake):
     network = load_network(files.weights)
     runtime = Runtime.model_validate(material.resolved["configuration"]["runtime"])
     character = playable_with_recogniser(network, runtime)
-    first_walk = opening_walk(network, runtime, character, material.measured.values())
+    first_walk = opening_walk(network, runtime, character, material.measurements.values())
     captured_and_predicted = packed_comparisons(network, files.rows, params.splits)
     bundle = Path(files.bundle).read_text(encoding="utf-8")
     page = render_report(material, walks, character, captured_and_predicted, bundle, first_walk)

@@ -20,21 +20,21 @@ class ConfigurationResults:
     """The results of one configuration.
 
     name: the configuration's name. resolved: the content of its configuration.yaml: all keys of the
-    configuration and of its data set, also those with default values. measured: name of a measurement -> the
-    content of its JSON file. pipeline: the content of pipeline.json: time, memory and size of each stage of
-    the workflow. history: the content of history.csv, column -> a value for each pass of the training, None
-    for an empty field.
+    configuration and of its data set, also those with default values. measurements: name of a measurement ->
+    the content of its JSON file. pipeline: the content of pipeline.json: time, memory and size of each stage
+    of the workflow. history: the content of history.csv, column -> a value for each pass of the training,
+    None for an empty field.
     """
 
     name: str
     resolved: Json = field(repr=False)
-    measured: Mapping[str, Json] = field(repr=False)
+    measurements: Mapping[str, Json] = field(repr=False)
     pipeline: Pipeline = field(repr=False)
     history: Mapping[str, list[float | None]] = field(repr=False)
 
     def results_of(self, measure: str) -> Json:
         """The content of the JSON file of the measurement `measure`."""
-        return self.measured[measure]
+        return self.measurements[measure]
 
     @property
     def dataset(self) -> str:

@@ -18,8 +18,8 @@ def gait_features(skeleton: Skeleton, local: Array, contacts: Array, root: Array
     heel, right toe. root: (F, 3) positions of the root in the world, cm. Returns name -> value. Angles are in
     degrees, lengths in cm, the speed in cm/s. Step lengths and asymmetries are 0 if there is no step.
     """
-    measured = gait_measures(skeleton, local, contacts, root)
-    out = {name: value if value is not None else 0.0 for name, value in measured.items()}
+    measurements = gait_measures(skeleton, local, contacts, root)
+    out = {name: value if value is not None else 0.0 for name, value in measurements.items()}
     joints = {
         f"{side}_{part}": local[:, skeleton.role(f"{side}_{part}")].astype(float)
         for side in SIDES

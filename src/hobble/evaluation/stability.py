@@ -102,7 +102,7 @@ def stability(
     toes = [role("left_toe"), role("right_toe")]
     toe_height = float(sole_heights(network, leg_joints(network.skeleton))[1])
     # For each kind: the measurements during each of its targets, as name -> array.
-    measured: dict[str, list[dict[str, Array]]] = {kind: [] for kind in KINDS}
+    measurements: dict[str, list[dict[str, Array]]] = {kind: [] for kind in KINDS}
     last = None  # rotations (1, J, 4) in the last frame of the target before
     for target in random_targets(minutes, seed):
         poses = [
@@ -112,7 +112,7 @@ def stability(
         contacts = np.array([p.contacts for p in poses])
         toe_positions = np.array([p.positions[toes] for p in poses])
         above_ground = toe_positions - np.array([[0.0, p.root[1], 0.0] for p in poses])[:, None]
-        measured[target.kind].append(
+        measurements[target.kind].append(
             {
                 "finite": np.array([np.isfinite(p.positions).all() for p in poses]),
                 "hips": np.array([p.positions[role("hips"), 1] - p.root[1] for p in poses]),
@@ -125,17 +125,17 @@ def stability(
             }
         )
         last = rotations[-1:]
-    worst = _worst([of_target for of_kind in measured.values() for of_target in of_kind])
+    worst = _worst([of_target for of_kind in measurements.values() for of_target in of_kind])
     return {
         "minutes": minutes,
         **worst,
-        "kinds": {kind: _worst(of_kind) for kind, of_kind in measured.items() if of_kind},
+        "kinds": {kind: _worst(of_kind) for kind, of_kind in measurements.items() if of_kind},
     }
 
 
-def _worst(measured: list[dict[str, Array]]) -> WorstMotion:
-    """The worst or mean values over some targets. measured: for each target, name -> measured values."""
-    joined = {key: np.concatenate([of_target[key] for of_target in measured]) for key in measured[0]}
+def _worst(measurements: list[dict[str, Array]]) -> WorstMotion:
+    """The worst or mean values over some targets. measurements: for each target, name -> measured values."""
+    joined = {key: np.concatenate([of_target[key] for of_target in measurements]) for key in measurements[0]}
     out: WorstMotion = {
         "frames": len(joined["hips"]),
         "finite": bool(joined["finite"].all() and np.isfinite(joined["turn"]).all()),

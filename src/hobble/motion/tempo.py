@@ -76,14 +76,14 @@ def times_too_fast(clip: Clip, steps: int, scale: float = 1.0) -> TooFast | None
 
     steps: the number of steps in the clip. scale: size of the clip's figure / size of the captured person.
     """
-    measured = measure_accelerations(clip, steps, GRAVITY * scale)
-    if measured is None:
+    accelerations = measure_accelerations(clip, steps, GRAVITY * scale)
+    if accelerations is None:
         return None
-    s = float(np.log2(np.clip(measured.step, *STEPS)))
-    usual = {"level": LEVEL, **(RUN if measured.runs else WALK)}
+    s = float(np.log2(np.clip(accelerations.step, *STEPS)))
+    usual = {"level": LEVEL, **(RUN if accelerations.runs else WALK)}
     estimates = []
     for name, (a, b, c) in usual.items():
-        value = np.log2(max(getattr(measured, name), 0.02))
+        value = np.log2(max(getattr(accelerations, name), 0.02))
         # Half the logarithm, because accelerations grow with the square of the speed.
         estimates.append(0.5 * (value - (a + b * s + c * s * s)))
     low, likely, high = sorted(estimates)

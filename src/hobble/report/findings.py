@@ -97,12 +97,12 @@ def _training_hints(material: ReportMaterial) -> Iterator[Hint]:
     """Whether the held-out error rises, still falls, or has stopped falling."""
     history = material.history
     curve = zip(history.get("pass", ()), history.get("held_out_mse", ()), strict=False)
-    measured = [(p, error) for p, error in curve if p is not None and error is not None]
-    if len(measured) < 8:  # with fewer values, a trend is only noise
+    measurements = [(p, error) for p, error in curve if p is not None and error is not None]
+    if len(measurements) < 8:  # with fewer values, a trend is only noise
         return
-    passes, errors = zip(*measured, strict=True)
+    passes, errors = zip(*measurements, strict=True)
     # The error is measured several times in a pass. One value is noisy, so compare means over passes.
-    means = {p: np.mean([error for q, error in measured if q == p]) for p in passes}
+    means = {p: np.mean([error for q, error in measurements if q == p]) for p in passes}
     best = min(means, key=lambda p: means[p])
     if means[passes[-1]] > 1.05 * means[best]:
         yield Hint(

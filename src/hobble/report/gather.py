@@ -25,7 +25,7 @@ class ReportMaterial:
     """The results of one configuration.
 
     name: of the configuration. dataset: name of the data set. title: heading of the page, if it is not the
-    name. splits: clip -> "train" or "held_out". resolved: the configuration with all defaults. measured:
+    name. splits: clip -> "train" or "held_out". resolved: the configuration with all defaults. measurements:
     measurement -> the JSON with its results. pipeline: content of pipeline.json. history: column of the
     training history -> values, one for each section (part of a pass) of training, None for an empty cell.
     network: from `describe_network`. motion: the report on each clip's motion. labels: the report on each
@@ -38,7 +38,7 @@ class ReportMaterial:
     title: str | None
     splits: Mapping[str, str] = field(repr=False)
     resolved: Mapping[str, Any] = field(repr=False)
-    measured: Mapping[str, Json] = field(repr=False)
+    measurements: Mapping[str, Json] = field(repr=False)
     pipeline: Pipeline = field(repr=False)
     history: Mapping[str, list[float | None]] = field(repr=False)
     network: Mapping[str, Any] = field(repr=False)
@@ -55,7 +55,7 @@ class ReportMaterial:
 
     def results_of(self, measure: str) -> Json:
         """The results of a measurement; empty if it was not run."""
-        return self.measured.get(measure, {})
+        return self.measurements.get(measure, {})
 
     def published_entry(self, what: str) -> Json | None:
         """The first entry for this configuration in the list `what` of published.yaml, or None."""
@@ -75,7 +75,7 @@ def gather(
     title: str | None,
     splits: Mapping[str, str],
     configuration: str,
-    measured: Iterable[str],
+    measurements: Iterable[str],
     pipeline: str,
     history: str,
     weights: str,
@@ -95,7 +95,7 @@ def gather(
         title=title,
         splits=dict(splits),
         resolved=read_yaml(configuration) or {},
-        measured={Path(path).stem: read_json(path) for path in measured},
+        measurements={Path(path).stem: read_json(path) for path in measurements},
         pipeline=read_json(pipeline),
         history=read_numbers(history),
         network=describe_network(weights),

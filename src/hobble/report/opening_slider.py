@@ -12,11 +12,11 @@ from typing import Any
 OPENING_VALUE = 7
 
 
-def opening_slider(playable: Mapping[str, Any], measured: Iterable[Mapping[str, Any]]) -> dict[str, Any]:
+def opening_slider(playable: Mapping[str, Any], measurements: Iterable[Mapping[str, Any]]) -> dict[str, Any]:
     """The slider that is set when the page opens, and its value.
 
-    playable: data of the character, from `playable_data` in `hobble.report.playable`. measured: the results
-    of each measurement.
+    playable: data of the character, from `playable_data` in `hobble.report.playable`. measurements: the
+    results of each measurement.
 
     In the result, `part` is the label of a slider, or None if no channel has sliders. It is the slider that
     makes the walk limp most. If no limps were measured, it is the slider that changes the pose most. If poses
@@ -29,7 +29,7 @@ def opening_slider(playable: Mapping[str, Any], measured: Iterable[Mapping[str, 
     labels = {channel["columns"][i]: label for label, i in channel["sliders"].items()}
     # Column -> its highest rank. A row of a table names its column under "link".
     ranks: dict[str, tuple[float, float]] = {}
-    for results in measured:
+    for results in measurements:
         # `responses`: how much the pose changes with severity. `sizes`: how large each limp is.
         for table, rank in (("responses", _pose_change_rank), ("sizes", _limp_rank)):
             for row in results.get(table) or ():

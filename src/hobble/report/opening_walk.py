@@ -39,18 +39,18 @@ NESTED_FIELDS = (
 
 
 def opening_walk(
-    network: Network, runtime: Runtime, playable: Mapping[str, Any], measured: Iterable[Mapping[str, Any]]
+    network: Network, runtime: Runtime, playable: Mapping[str, Any], measurements: Iterable[Mapping[str, Any]]
 ) -> dict[str, Any]:
     """The result of `opening_slider` and, under `walked`, the states of the characters.
 
-    playable, measured: the arguments of `opening_slider`, which chooses one slider of a channel and its
+    playable, measurements: the arguments of `opening_slider`, which chooses one slider of a channel and its
     value. A channel is a group of inputs of the network, for example one input for each part of the body.
 
     The characters have walked straight on for FRAMES frames on flat ground. If the network has a channel with
     sliders, there are two characters: the first has the slider's value, in the second all values are 0.
     Otherwise there is only one character. Names and units in a state are those of web/state.js.
     """
-    chosen, channel = opening_slider(playable, measured), opening_channel(playable)
+    chosen, channel = opening_slider(playable, measurements), opening_channel(playable)
     if channel is None:
         return chosen | {"walked": [_state_after_walk(network, runtime, {})]}
     column = channel["columns"][channel["sliders"][chosen["part"]]]

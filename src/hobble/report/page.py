@@ -63,7 +63,7 @@ def render_report(
     data = {
         "charts": chart_specs([sections, measured_sections]),
         "bodies": _bodies(material),
-        "hero": hero or opening_slider(playable, material.measured.values()),
+        "hero": hero or opening_slider(playable, material.measurements.values()),
         "scenes": scenes,
         "strips": strips,
         "grounds": grounds,
@@ -73,7 +73,7 @@ def render_report(
     }
     return load_template("page.html.j2").render(
         material=material,
-        measured=measured_sections,
+        measurements=measured_sections,
         figures=findings.key_figures(material),
         hints=findings.hints(material, counted["turns"]),
         embedded={name: embedded(part) for name, part in data.items()},

@@ -134,10 +134,10 @@ def _scale_times(rows: list[dict[str, float]], seconds: float) -> None:
     The measured time is too short if the jobs found clips that earlier starts of the workflow had made. Times
     are never made shorter.
     """
-    measured = sum(row.get("s", 0.0) for row in rows)
-    if seconds > measured > 0:
+    measurements = sum(row.get("s", 0.0) for row in rows)
+    if seconds > measurements > 0:
         for row in rows:
-            row["s"] = row.get("s", 0.0) * seconds / measured
+            row["s"] = row.get("s", 0.0) * seconds / measurements
 
 
 def _file_sizes(paths: Iterable[str], missing: list[str]) -> list[int]:

@@ -65,8 +65,10 @@ def measure_manners(
         for name, channel_windows in windows.items():
             channel_windows += captured_windows(stretch, network, name)
     results = [measure_channel(network, name, windows[name], splits, people, runtime) for name in names]
-    measured = [result for result in results if result]
-    return {"applies": True, "channels": measured} if measured else {"applies": False, "reason": TOO_FEW}
+    measurements = [result for result in results if result]
+    return (
+        {"applies": True, "channels": measurements} if measurements else {"applies": False, "reason": TOO_FEW}
+    )
 
 
 def measure_channel(
@@ -177,16 +179,16 @@ def run(inputs: MeasureInputs, options: SampleOptions) -> Outcome:
     result = measure_manners(
         load_network(inputs.weights), motion, inputs.splits, inputs.people, inputs.runtime
     )
-    measured = result.get("channels", [])
+    measurements = result.get("channels", [])
     tables: dict[str, list[Row]] = {
-        "effects": [row for of_channel in measured for row in of_channel["effects"]],
+        "effects": [row for of_channel in measurements for row in of_channel["effects"]],
         "together": [
             {k: v for k, v in row.items() if k != "named"}
-            for of_channel in measured
+            for of_channel in measurements
             for row in of_channel["together"]
         ],
     }
-    log_line = "; ".join(f"{one['channel']}, share named right: {one['right_at_1']}" for one in measured)
+    log_line = "; ".join(f"{one['channel']}, share named right: {one['right_at_1']}" for one in measurements)
     return Outcome(with_sample(result, sample), tables, log_line or result.get("reason", ""))
 
 

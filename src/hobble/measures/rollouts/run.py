@@ -82,12 +82,12 @@ class RollOutErrors:
 
         phase: whether the network uses the phase. If not, the phase error has no meaning and is None.
         """
-        measured, ended = self.frames > 0, self.ended > 0
+        has_frames, ended = self.frames > 0, self.ended > 0
         return {
             "frames": self.frames,
-            "mean": float(self.moments.mean[0]) if measured else None,
-            "sd": float(self.moments.std[0]) if measured else None,
-            "position_error_cm": float(self.moments.mean[1]) if measured else None,
+            "mean": float(self.moments.mean[0]) if has_frames else None,
+            "sd": float(self.moments.std[0]) if has_frames else None,
+            "position_error_cm": float(self.moments.mean[1]) if has_frames else None,
             "ended": self.ended,
             "last_cm": float(self.last.mean[0]) if ended else None,
             "last_phase": float(self.last.mean[1]) if ended and phase else None,
