@@ -42,7 +42,7 @@ from hobble.training.weights import write_weights
 LENGTHS = (1, 10, 60)
 
 
-def measurements(
+def measure_recipe(
     database: Database,
     recipe: dict,
     threads: int,
@@ -80,7 +80,7 @@ def main() -> None:
     print(f"  train  held out  cm over {lengths} frames; lap: reached, s, cm, degrees", flush=True)
     for line in sys.stdin:
         recipe = yaml.safe_load("{" + line + "}")
-        print(f"{measurements(database, recipe, options.threads)}  {line.strip()}", flush=True)
+        print(f"{measure_recipe(database, recipe, options.threads)}  {line.strip()}", flush=True)
 
 
 if __name__ == "__main__":

@@ -39,7 +39,7 @@ LINKS = {
 }
 
 
-def measurements(processes: Processes, sizes: tuple[int, ...], batch: int) -> tuple[float, float]:
+def measure_step(processes: Processes, sizes: tuple[int, ...], batch: int) -> tuple[float, float]:
     """Seconds of a step, and of the sum in it."""
     network = untrained_network(sizes, POINTS, 1)
     adam = Adam(network, 1e-4, 0.9, 0.999, 0.01)
@@ -70,10 +70,10 @@ def work(sizes: tuple[int, ...], batches: list[int]) -> None:
     """What each of the processes does; the first prints."""
     use_threads(1)
     if "RANK" not in os.environ:
-        print(json.dumps([measurements(ALONE, sizes, batch) for batch in batches]))
+        print(json.dumps([measure_step(ALONE, sizes, batch) for batch in batches]))
         return
     with join_processes(False) as processes:
-        found = [measurements(processes, sizes, batch) for batch in batches]
+        found = [measure_step(processes, sizes, batch) for batch in batches]
     if processes.is_first:
         print(json.dumps(found))
 

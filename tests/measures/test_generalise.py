@@ -48,7 +48,7 @@ def test_the_benchmark_prints_one_line_for_each_recipe(
         save_clip_rows(tmp_path / "clips" / f"{name}.npz", rows)
     splits = {"walk": "train", "turn": "held_out"}
     write_database(tmp_path / "plain", clips, splits, channels=[], joint_weight=0.1)
-    line = generalise.measurements(
+    line = generalise.measure_recipe(
         Database.open(tmp_path / "plain", 64),
         {"passes": 1, "sections": 1, "memory_mb": 64, "device": "cpu"},
         1,

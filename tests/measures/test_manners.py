@@ -70,9 +70,7 @@ def motion(both: Network) -> list[Captured]:
     return [clip(both, f"{m}-{n}", m, lean=lean + n) for m, lean in leans.items() for n in (1, 2, 3)]
 
 
-def measurements(
-    network: Network, motion: Sequence[Captured], people: Mapping[str, str] | None = None
-) -> Any:
+def measure(network: Network, motion: Sequence[Captured], people: Mapping[str, str] | None = None) -> Any:
     splits = {one.clip: "train" for one in motion}
     who = people or {one.clip: one.clip for one in motion}
     return run.measure_manners(network, motion, splits, who, Runtime())
@@ -156,7 +154,7 @@ def test_each_manner_is_tried_with_each_column_of_another_channel(
         return [real[None if gone else mood] for mood, gone in zip(moods, lost, strict=True)]
 
     monkeypatch.setattr(run, "generated_windows", generated_windows)
-    [found] = measurements(both, motion)["channels"]
+    [found] = measure(both, motion)["channels"]
     assert found["manners"] == ["old", "sad"]
     assert found["captured"]["right"] == 1.0
     assert found["captured"]["shrinkage"] == 0.6, "of equals the largest"
@@ -184,7 +182,7 @@ LEANS = ((None, 1.0), ("sad", 13.0), ("old", 31.0))
 
 
 def test_a_network_walks_in_every_manner_and_mixture(both: Network, motion: list[Captured]) -> None:
-    [found] = measurements(both, motion)["channels"]
+    [found] = measure(both, motion)["channels"]
     per = (USED - WINDOW) // STEP + 1
     assert [row["windows"] for row in found["generated"]] == [3 * per] * 6
     assert [row["manners"] for row in found["generated"]] == [
@@ -197,6 +195,6 @@ def test_a_network_walks_in_every_manner_and_mixture(both: Network, motion: list
 
 
 def test_missing_results_are_explained(hurtable, both: Network, motion: list[Captured]) -> None:
-    assert measurements(hurtable, [])["reason"] == run.NO_MANNERS
-    assert measurements(both, motion[:6:2])["reason"] == run.TOO_FEW
-    assert page.section(measurements(hurtable, []), SimpleNamespace(network={"skeleton": {}})).parts == []
+    assert measure(hurtable, [])["reason"] == run.NO_MANNERS
+    assert measure(both, motion[:6:2])["reason"] == run.TOO_FEW
+    assert page.section(measure(hurtable, []), SimpleNamespace(network={"skeleton": {}})).parts == []

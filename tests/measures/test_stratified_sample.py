@@ -67,15 +67,15 @@ def test_the_sample_has_the_requested_size_and_every_kind_of_clip():
     sample = draw_sample(clips, splits, 300_000)
     assert sample is not None
     of_excerpt = {excerpt: kind for one in clips for excerpt, kind in one.excerpts.items()}
-    measurements = dict.fromkeys(("train", "held_out"), 0)
+    rows_drawn = dict.fromkeys(("train", "held_out"), 0)
     for stratum in sample.strata:
         kinds = {(splits[n.clip], of_excerpt[n].gait, of_excerpt[n].channels) for n in stratum.drawn}
         assert len(kinds) == 1
         assert len(stratum.drawn) >= min(LEAST_EXCERPTS, stratum.excerpt_count)
-        measurements[stratum.split] += sum(one.rows for one in stratum.drawn)
+        rows_drawn[stratum.split] += sum(one.rows for one in stratum.drawn)
     held_out = sum(one.rows for one in clips if splits[one.clip] == "held_out")
-    assert measurements["held_out"] == pytest.approx(min(150_000, held_out), rel=0.1)
-    assert measurements["train"] == pytest.approx(300_000 - measurements["held_out"], rel=0.1)
+    assert rows_drawn["held_out"] == pytest.approx(min(150_000, held_out), rel=0.1)
+    assert rows_drawn["train"] == pytest.approx(300_000 - rows_drawn["held_out"], rel=0.1)
     assert sum(s.rows for s in sample.strata) == sum(one.rows for one in clips)
     assert sum(stratum.split == "train" for stratum in sample.strata) == 2 * 3 * 2
 

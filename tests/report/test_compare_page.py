@@ -39,7 +39,7 @@ def compared(material: ReportMaterial) -> dict[str, Any]:
     }
     counts = {"true": 5000, "table_6_1": 4000, "table_6_1_as_printed": 3000}
     better = [{**row, "mean": row["mean"] / 2} for row in material.measurements["accuracy"]["clips"]]
-    measurements = []
+    results = []
     for name, clips, factor in (
         ("holden", material.measurements["accuracy"]["clips"], 1),
         ("ava", better, 2),
@@ -68,7 +68,7 @@ def compared(material: ReportMaterial) -> dict[str, Any]:
             }
             for n in (1, 10)
         ]
-        measurements.append(
+        results.append(
             ConfigurationResults(
                 name=name,
                 resolved=resolved,
@@ -83,7 +83,7 @@ def compared(material: ReportMaterial) -> dict[str, Any]:
                 history=material.history,
             )
         )
-    return compare_configurations(measurements, yaml.safe_load(PUBLISHED.read_text()))
+    return compare_configurations(results, yaml.safe_load(PUBLISHED.read_text()))
 
 
 @pytest.fixture(scope="module")

@@ -77,7 +77,7 @@ def test_words_are_escaped_and_every_kind_is_drawn() -> None:
         SectionPart(2, chart("b"), tall=True),
     ]
     section = join_sections([PageSection("s", parts, title="<S>")])
-    text = load_template("measurements.html.j2").render(measurements=section)
+    text = load_template("measurements.html.j2").render(measured_sections=section)
     assert "<p>&lt;b&gt;</p>" in text
     assert "<h2>&lt;S&gt;</h2>" in text
     assert text.count("<figure") == 2

@@ -56,18 +56,18 @@ def in_page(tab: Any, skeleton: Skeleton, places: Array) -> Any:
 def test_cycles_and_their_measurements_equal_those_of_python(
     tab: Any, walks: dict[str, Array], holden31: Skeleton
 ) -> None:
-    measurements = 0
+    walks_with_cycles = 0
     for name, places in walks.items():
         walk, found = measure_cycles(holden31, places, 60), in_page(tab, holden31, places)
         assert found["spans"] == [[[c.start, c.end] for c in side] for side in (walk.right, walk.left)], name
         if not len(walk):
             assert found["profile"] is None
             continue
-        measurements += 1
+        walks_with_cycles += 1
         expected = profile_of_walk(walk)
         for key, value in found["profile"].items():
             assert value == pytest.approx(expected[key], abs=1e-6), (name, key)
-    assert measurements >= 3, "three of the walks have cycles"
+    assert walks_with_cycles >= 3, "three of the walks have cycles"
 
 
 def test_javascript_recognises_the_same_limps_as_python(tab: Any) -> None:

@@ -19,6 +19,7 @@ from typing import Any
 import numpy as np
 
 from hobble.core.quat import Array
+from hobble.core.several_effects import SUM_NORM
 
 UNLIMITED = 1e4  # cm a frame: limit of a gait if the database has no healthy forward cycle in this gait
 LEVELS = 5  # the limits are stored for this many values of a column, evenly spaced from 0 to the highest
@@ -37,9 +38,6 @@ MOVING = 0.1  # cm a frame: cycles in which a healthy body is slower are left ou
 # as much as this many cycles at each level.
 EXPECTED_WEIGHT = 2.0
 SLOWEST = 0.1  # lowest share of the healthy speed; lower shares are raised to it
-# What several values of a channel take from the healthy speed adds up like a p-norm with this p (1: sum,
-# infinity: maximum). Hurt versions are made with the same p (SUM_NORM in hobble.hurt.effects).
-SUM_NORM = 3.0
 
 
 @dataclass(frozen=True)
@@ -58,8 +56,8 @@ class Limits:
     def highest_speeds(self, values: Array) -> Array:
         """(C, G) highest speeds of C characters in each gait, cm a frame, interpolated between the levels.
 
-        values: (C, L) value of each label for each character. If several values are above 0, the body is
-        slower than with any one of them (see SUM_NORM). If all are 0, the speed is inf.
+        values: (C, L) value of each label for each character. If several values are above 0, the shares
+        of the healthy speed that they take add up as a p-norm (see SUM_NORM). If all are 0, the speed is inf.
         """
         below = np.clip(np.searchsorted(self.levels, values, side="right") - 1, 0, len(self.levels) - 2)
         low, high = self.levels[below], self.levels[below + 1]

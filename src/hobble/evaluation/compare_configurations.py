@@ -66,18 +66,14 @@ def comparison_functions(name: str) -> Iterator[tuple[str, Callable[..., Any]]]:
             yield measure.name, function
 
 
-def describe_configuration(
-    measurements: ConfigurationResults, additions: Iterable[ComparisonAddition]
-) -> Json:
+def describe_configuration(results: ConfigurationResults, additions: Iterable[ComparisonAddition]) -> Json:
     """A configuration's entry in compare.json: data set, network, training, and what measurements add."""
-    configuration = measurements.resolved["configuration"]
+    configuration = results.resolved["configuration"]
     hidden = network_options(configuration["network"]).hidden
-    about = {
-        key: value for added in additions for key, value in added.about.get(measurements.name, {}).items()
-    }
+    about = {key: value for added in additions for key, value in added.about.get(results.name, {}).items()}
     return {
-        "configuration": measurements.name,
-        "dataset": measurements.dataset,
+        "configuration": results.name,
+        "dataset": results.dataset,
         "network_of": configuration.get("network_of"),
         "channels": list(configuration.get("channels") or ()),
         "hidden_layers": len(hidden) or None,

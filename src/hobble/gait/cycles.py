@@ -181,10 +181,7 @@ def _share_below(values: Array, limit: float) -> float:
     A count of frames would be too coarse: a character whose cycle lasts exactly 60 frames repeats the same
     rounding in every cycle, and one frame is .017 of it.
     """
-    below = np.maximum(limit - values, 0.0)
-    above = np.maximum(values - limit, 0.0)
-    # In the interval between two frames, the value is below the limit for this share.
-    first, second = below[:-1], below[1:]
-    crossing = first + second + above[:-1] + above[1:]
-    shares = np.divide(first + second, crossing, out=np.zeros(len(first)), where=crossing > 0)
-    return float(np.mean(shares))
+    below, distance = np.maximum(limit - values, 0.0), np.abs(limit - values)
+    # For each interval between two frames, the share of it in which the line between the values is below.
+    under, whole = below[:-1] + below[1:], distance[:-1] + distance[1:]
+    return float(np.mean(np.divide(under, whole, out=np.zeros(len(under)), where=whole > 0)))

@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from hobble.core.quat import Array
+from hobble.core.several_effects import SUM_NORM
 from hobble.core.skeleton import Skeleton
 from hobble.core.smooth import gaussian
 from hobble.hurt.amounts import changes_of_hurt_part
@@ -17,7 +18,6 @@ STRENGTH_POWER = 0.78  # strength = (severity / 10) ** STRENGTH_POWER: .39 at 3,
 LEAST_RATIO = 0.02  # smaller ratios to the healthy clip are raised to this
 SETTLING_SECONDS = 0.3  # sigma of the Gaussian that smooths changes of severity
 LEAST_SEVERITY = 0.05  # smaller severities count as 0
-SUM_NORM = 3.0  # effects of several hurt parts add like a p-norm with this p (1: sum, infinity: maximum)
 WHOLE_BODY = ("speed", "stride", "back", "head", "forward", "nod")  # changes of the whole body
 # Changes of one side. The last three say how much an arm is held in each way (HELD_ARM_OF_PART).
 SIDED = (

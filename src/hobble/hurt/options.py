@@ -25,7 +25,8 @@ class Hurt(Section):
     )
     severities: Annotated[tuple[Severity, ...], Field(min_length=1)] = Field(
         (3.0, 5.0, 7.0, 10.0),
-        description="for half of its time an injury has the highest of these, for the other half another one",
+        description="for half of its time an injury has the highest of these, for the other half another "
+        "one; a short injury has only one of the two",
     )
     versions: Annotated[int, Field(ge=0, le=9)] = Field(1, description="hurt versions of each healthy clip")
     every: Annotated[int, Field(ge=1, le=9)] = Field(

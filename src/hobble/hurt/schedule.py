@@ -27,8 +27,8 @@ FURTHER_LINKS = 0.25  # share of the stretches in which further links hurt as we
 # learn an injury of an arm and another injury from the same stretch.
 ARM_TOO = 0.6
 ARMS = ("upper arm", "forearm")
-# A shorter stretch has one severity instead of two. With two, hardly a whole gait cycle would have the same
-# severity from start to end, and a network would learn nearly the same limp for both.
+# A stretch of fewer seconds has one severity instead of two. With two, hardly a whole gait cycle would have
+# the same severity from start to end, and a network would learn nearly the same limp for both.
 SECONDS_FOR_TWO = 4.0
 # A clip is divided into equal stretches of about the option `seconds`. If the frames left after whole
 # stretches of `seconds` last at least this share of `seconds`, there is one stretch more.

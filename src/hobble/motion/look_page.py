@@ -209,12 +209,12 @@ def _row(line: _ClipLine) -> str:
     remarks = "; ".join([*summary.warnings, *labels["warnings"]])
     name = html.escape(summary.name) + (f"<br><small>{html.escape(remarks)}</small>" if remarks else "")
     # These cells stay empty if the clip was not read.
-    picture, measurements, foot_down = "", ["", ""], ""
+    picture, measured_cells, foot_down = "", ["", ""], ""
     if line.foot_down is not None:
         picture = '<canvas width="80" height="80"></canvas>'
-        measurements = [f"{summary.hip_height:.0f}", f"{summary.cadence:.0f}"]
+        measured_cells = [f"{summary.hip_height:.0f}", f"{summary.cadence:.0f}"]
         foot_down = f"{100 * line.foot_down:.0f} %"
-    numbers = [f"{summary.fps:.4g}", f"{summary.seconds:.1f}", *measurements, str(labels["cycles"])]
+    numbers = [f"{summary.fps:.4g}", f"{summary.seconds:.1f}", *measured_cells, str(labels["cycles"])]
     cells = "".join(f'<td class="n">{value}</td>' for value in numbers)
     return (
         f"<tr><td>{name}</td><td>{picture}</td>"

@@ -133,9 +133,9 @@ def find_hips(names: Sequence[str], target: KnownSkeleton, folder: str | Path) -
 def match_rig(rig: Skeleton, target: KnownSkeleton, folder: str | Path) -> RigMatch | None:
     """Find which known skeleton a clip's rig is, and how it maps to the target.
 
-    rig: the clip's skeleton. folder: the folder of the skeleton files. The known skeleton that
-    shares most joint names with the rig is tried. Returns None if it shares too few, if the rig lacks one of
-    its mandatory joints, or if the hierarchies differ. The match has roles but no `followed_joints` if no map
+    rig: the clip's skeleton. folder: the folder of the skeleton files. The known skeleton that shares most
+    joint names with the rig is tried. Returns None if it shares too few, if the rig lacks one of its
+    mandatory joints, or if the hierarchies differ. The match has roles but no `followed_joints` if no map
     leads to the target, or if the rig has other joints between hips and head than the known skeleton.
     """
     if not _differences(rig, target.skeleton):

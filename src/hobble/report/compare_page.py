@@ -43,9 +43,9 @@ def render_comparison(
         "training": {"curves": compare_sections.training_curves(compared)},
         "stages": {"charts": compare_sections.stage_charts(compared)},
     }
-    measurements = measure_sections.compared_sections(compared)
+    measured_sections = measure_sections.compared_sections(compared)
     names = comparison_charts.configuration_names(compared)
-    charts = chart_specs([sections, measurements])
+    charts = chart_specs([sections, measured_sections])
     # Configurations with the same skeleton share a body. Its key is in the entry `body` of a character.
     bodies = {spec["body"]: packed_body(skeleton_of(spec)) for spec in (playables or {}).values()}
     used = len(bundle.encode()) + len(embedded(charts).encode()) + len(embedded(bodies).encode())
@@ -59,7 +59,7 @@ def render_comparison(
     data = {"name": NAME, "charts": charts, "playable": on_page, "bodies": bodies}
     return load_template("compare.html.j2").render(
         name=NAME,
-        measurements=measurements,
+        measured_sections=measured_sections,
         title=" and ".join(names) if len(names) < 3 else f"{len(names)} configurations",
         eyebrow="Hobble report · comparison of configurations",
         lead="The same measurements of " + ", ".join(names) + ", compared with published results.",

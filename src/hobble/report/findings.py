@@ -68,7 +68,7 @@ def key_figures(material: ReportMaterial) -> list[KeyFigure]:
         value, _, unit = format_duration(total).partition(" ")
         written = format_bytes(material.pipeline.get("total_bytes"))
         note = (
-            "sum over all jobs, from clips to measurements; jobs can run in parallel, so the run can be "
+            "sum over all jobs, from clips to points; jobs can run in parallel, so the run can be "
             f"shorter; {written} written"
         )
         figures.append(KeyFigure("Whole pipeline", value, unit, note, 50))
@@ -97,12 +97,12 @@ def _training_hints(material: ReportMaterial) -> Iterator[Hint]:
     """Whether the held-out error rises, still falls, or has stopped falling."""
     history = material.history
     curve = zip(history.get("pass", ()), history.get("held_out_mse", ()), strict=False)
-    measurements = [(p, error) for p, error in curve if p is not None and error is not None]
-    if len(measurements) < 8:  # with fewer values, a trend is only noise
+    points = [(p, error) for p, error in curve if p is not None and error is not None]
+    if len(points) < 8:  # with fewer values, a trend is only noise
         return
-    passes, errors = zip(*measurements, strict=True)
+    passes, errors = zip(*points, strict=True)
     # The error is measured several times in a pass. One value is noisy, so compare means over passes.
-    means = {p: np.mean([error for q, error in measurements if q == p]) for p in passes}
+    means = {p: np.mean([error for q, error in points if q == p]) for p in passes}
     best = min(means, key=lambda p: means[p])
     if means[passes[-1]] > 1.05 * means[best]:
         yield Hint(

@@ -73,7 +73,7 @@ def render_report(
     }
     return load_template("page.html.j2").render(
         material=material,
-        measurements=measured_sections,
+        measured_sections=measured_sections,
         figures=findings.key_figures(material),
         hints=findings.hints(material, counted["turns"]),
         embedded={name: embedded(part) for name, part in data.items()},

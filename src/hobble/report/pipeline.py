@@ -134,10 +134,10 @@ def _scale_times(rows: list[dict[str, float]], seconds: float) -> None:
     The measured time is too short if the jobs found clips that earlier starts of the workflow had made. Times
     are never made shorter.
     """
-    measurements = sum(row.get("s", 0.0) for row in rows)
-    if seconds > measurements > 0:
+    measured_seconds = sum(row.get("s", 0.0) for row in rows)
+    if seconds > measured_seconds > 0:
         for row in rows:
-            row["s"] = row.get("s", 0.0) * seconds / measurements
+            row["s"] = row.get("s", 0.0) * seconds / measured_seconds
 
 
 def _file_sizes(paths: Iterable[str], missing: list[str]) -> list[int]:

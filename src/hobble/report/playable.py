@@ -10,7 +10,8 @@ from numpy.typing import NDArray
 
 from hobble.channels import channel
 from hobble.channels.shown import channel_display, channel_words
-from hobble.channels.speed_limits import SLOWEST, SUM_NORM
+from hobble.channels.speed_limits import SLOWEST
+from hobble.core.several_effects import SUM_NORM
 from hobble.core.skeleton import Skeleton
 from hobble.figure.mesh import body_mesh, mesh_key
 from hobble.models.network import Network, inverse_or_0

@@ -63,7 +63,7 @@ def walking(limp: dict[str, float], speed: float) -> FigureWalk:
 
 
 @pytest.fixture
-def measurements(hurtable, holden31, monkeypatch):
+def measure(hurtable, holden31, monkeypatch):
     """measured(effect): limp.json of a character whose limp at a severity is `effect(severity)` of people's
     limp.
     """
@@ -93,8 +93,8 @@ def measurements(hurtable, holden31, monkeypatch):
     return run
 
 
-def test_effects_grow_with_severity_and_are_alike_on_both_sides(measurements) -> None:
-    found = measurements(lambda s: 0.1 * s)
+def test_effects_grow_with_severity_and_are_alike_on_both_sides(measure) -> None:
+    found = measure(lambda s: 0.1 * s)
     rows = [row for row in found["sizes"] if row["gait"] == "walk"]
     assert [row["severity"] for row in rows] == 2 * list(SEVERITIES)
     rows = [row for row in rows if row["side"] == "right"]  # people's normal walks are not quite even
@@ -115,24 +115,24 @@ def test_effects_grow_with_severity_and_are_alike_on_both_sides(measurements) ->
     json.dumps(found, allow_nan=False)
 
 
-def test_severities_without_effect_are_not_recognised_as_a_limp(measurements) -> None:
-    found = measurements(lambda s: 0.0)
+def test_severities_without_effect_are_not_recognised_as_a_limp(measure) -> None:
+    found = measure(lambda s: 0.0)
     assert all(row["called"] == "normal" for row in found["sizes"] if row["gait"] == "walk")
     assert [row["named"] for row in found["named"]] == [0, 0, 0, 0]
     assert [row["impaired"] for row in found["named"]] == [0, 0, 0, 0]
 
 
-def test_a_change_of_two_percent_correlates_fully_but_is_not_recognised(measurements) -> None:
+def test_a_change_of_two_percent_correlates_fully_but_is_not_recognised(measure) -> None:
     """The rank correlation of an effect, and its size at 10."""
-    found = measurements(lambda s: 0.002 * s)
+    found = measure(lambda s: 0.002 * s)
     knee = next(row for row in found["trends"] if row["gait"] == "walk" and row["effect"] == "knee_hurt")
     assert knee["spearman"] == pytest.approx(-1)
     assert 0.95 < knee["at_10"] < 1
     assert found["named"][-1]["named"] == 0
 
 
-def test_a_limp_of_the_wrong_leg_is_detected(measurements) -> None:
-    last = measurements(lambda s: 0.1 * s, other_side=True)["named"][-1]
+def test_a_limp_of_the_wrong_leg_is_detected(measure) -> None:
+    last = measure(lambda s: 0.1 * s, other_side=True)["named"][-1]
     assert last["named"] == last["named_by_either"] == 0
     assert last["impaired"] == last["wrong_side"] == 1
 
@@ -180,19 +180,19 @@ def clip(name: str, hurt: dict[str, float], limp: dict[str, float]) -> CapturedW
     return CapturedWalk(name, hurt, walking(limp, 2.0).walk, 2.0)
 
 
-def test_a_held_out_limp_is_nearer_only_if_the_same_leg_is_hurt(measurements) -> None:
+def test_a_held_out_limp_is_nearer_only_if_the_same_leg_is_hurt(measure) -> None:
     every = (
         clip("7_1", {}, {}),
         clip("7_2", {RIGHT_KNEE: 8.0}, {"right": 0.8}),
         clip("7_3", {RIGHT_KNEE: 8.0}, {"right": 0.8}),
     )
     splits = {"7_1": "train", "7_2": "held_out", "7_3": "train"}
-    (row,) = measurements(lambda s: 0.1 * s, every=every, splits=splits)["held_out_limps"]
+    (row,) = measure(lambda s: 0.1 * s, every=every, splits=splits)["held_out_limps"]
     assert row["clip"] == "7_2"
     assert row["nearer"]
     assert row["hurt"] < 0.3 * row["healthy"]
-    assert not measurements(lambda s: 0.1 * s, True, every, splits)["held_out_limps"][0]["nearer"]
-    assert not measurements(lambda s: 0.0, False, every, splits)["held_out_limps"][0]["nearer"]
+    assert not measure(lambda s: 0.1 * s, True, every, splits)["held_out_limps"][0]["nearer"]
+    assert not measure(lambda s: 0.0, False, every, splits)["held_out_limps"][0]["nearer"]
 
 
 def test_a_captured_limp_is_compared_with_its_own_performer() -> None:

@@ -68,9 +68,9 @@ def accuracy_differences(all_measured: Sequence[ConfigurationResults]) -> list[D
     return out
 
 
-def _errors_of_splits(measurements: ConfigurationResults) -> dict[str, Json]:
+def _errors_of_splits(results: ConfigurationResults) -> dict[str, Json]:
     """Split -> its errors over all frames, with the mean errors of its clips under `means`."""
-    found = measurements.results_of(NAME)
+    found = results.results_of(NAME)
     return {split: {**found[split], "means": clip_means(found, split)} for split in SPLITS}
 
 
@@ -84,14 +84,14 @@ def _published_splits(all_measured: Sequence[ConfigurationResults], published: J
     by_name = {m.name: m for m in all_measured}
     out = []
     for row in published["accuracy"]:
-        measurements = by_name.get(row["configuration"])
+        results = by_name.get(row["configuration"])
         for split in SPLITS:
-            ours = measurements.results_of(NAME)[split]["mean_of_clips"] if measurements else None
+            ours = results.results_of(NAME)[split]["mean_of_clips"] if results else None
             out.append(published_row(f"relative error, {SPLIT_NAMES[split]} clips", row, row["mean"], ours))
             if "sd" in row:
                 # The standard deviation (sd) was printed in the text of the publication, not in its table.
                 in_text = {**row, "table": None}
-                means = clip_means(measurements.results_of(NAME), split) if measurements else []
+                means = clip_means(results.results_of(NAME), split) if results else []
                 sd = float(np.std(means)) if len(means) > 1 else None
                 what = f"standard deviation of the means of {SPLIT_NAMES[split]} clips"
                 out.append(published_row(what, in_text, row["sd"], sd))
@@ -107,16 +107,16 @@ def _published_clips(all_measured: Sequence[ConfigurationResults], published: Js
     """
     out = []
     for row in published["clips"]:
-        for measurements in all_measured:
-            for clip in measurements.results_of(NAME)["clips"]:
+        for results in all_measured:
+            for clip in results.results_of(NAME)["clips"]:
                 if clip["clip"].removesuffix("_000") == row["clip"]:
                     for source in ("segerstedt", "release"):
-                        entry = {"configuration": measurements.name, "source": source}
+                        entry = {"configuration": results.name, "source": source}
                         what = f"relative error, {clip['clip']}"
                         out.append(published_row(what, entry, row[source], clip["mean"]))
     return out
 
 
-def _errors_of_clips(measurements: ConfigurationResults) -> dict[str, Json]:
+def _errors_of_clips(results: ConfigurationResults) -> dict[str, Json]:
     """Clip -> its errors over all frames."""
-    return {entry["clip"]: entry for entry in measurements.results_of(NAME)["clips"]}
+    return {entry["clip"]: entry for entry in results.results_of(NAME)["clips"]}

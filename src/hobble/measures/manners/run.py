@@ -65,10 +65,8 @@ def measure_manners(
         for name, channel_windows in windows.items():
             channel_windows += captured_windows(stretch, network, name)
     results = [measure_channel(network, name, windows[name], splits, people, runtime) for name in names]
-    measurements = [result for result in results if result]
-    return (
-        {"applies": True, "channels": measurements} if measurements else {"applies": False, "reason": TOO_FEW}
-    )
+    channels = [result for result in results if result]
+    return {"applies": True, "channels": channels} if channels else {"applies": False, "reason": TOO_FEW}
 
 
 def measure_channel(
@@ -179,16 +177,16 @@ def run(inputs: MeasureInputs, options: SampleOptions) -> Outcome:
     result = measure_manners(
         load_network(inputs.weights), motion, inputs.splits, inputs.people, inputs.runtime
     )
-    measurements = result.get("channels", [])
+    channels = result.get("channels", [])
     tables: dict[str, list[Row]] = {
-        "effects": [row for of_channel in measurements for row in of_channel["effects"]],
+        "effects": [row for of_channel in channels for row in of_channel["effects"]],
         "together": [
             {k: v for k, v in row.items() if k != "named"}
-            for of_channel in measurements
+            for of_channel in channels
             for row in of_channel["together"]
         ],
     }
-    log_line = "; ".join(f"{one['channel']}, share named right: {one['right_at_1']}" for one in measurements)
+    log_line = "; ".join(f"{one['channel']}, share named right: {one['right_at_1']}" for one in channels)
     return Outcome(with_sample(result, sample), tables, log_line or result.get("reason", ""))
 
 

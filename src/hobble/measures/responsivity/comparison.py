@@ -79,14 +79,14 @@ def tables(compared: Json) -> dict[str, Sequence[Row]]:
     }
 
 
-def mode_entries(measurements: ConfigurationResults) -> list[Json]:
+def mode_entries(results: ConfigurationResults) -> list[Json]:
     """A configuration's results in each phase mode that was run. The key `configuration` has its name."""
-    found = measurements.results_of(NAME)
-    return [{**entry, "configuration": measurements.name} for entry in found.get("modes", [found])]
+    found = results.results_of(NAME)
+    return [{**entry, "configuration": results.name} for entry in found.get("modes", [found])]
 
 
-def _sizes(measurements: ConfigurationResults) -> Sizes:
-    found = measurements.results_of(NAME)
+def _sizes(results: ConfigurationResults) -> Sizes:
+    found = results.results_of(NAME)
     counts = found["parameters"]
     return {
         "computations": {key: counts[key] if counts else None for key in COUNTS},
@@ -202,17 +202,17 @@ def _published_times(all_measured: Sequence[ConfigurationResults], published: Js
     by_name = {m.name: m for m in all_measured}
     out = []
     for row in published["responsivity"]:
-        measurements = by_name.get(row["configuration"])
-        ours = measurements.results_of(NAME)["milliseconds"]["total"] if measurements else None
+        results = by_name.get(row["configuration"])
+        ours = results.results_of(NAME)["milliseconds"]["total"] if results else None
         out.append(published_row("a frame", row, row["milliseconds"], ours, "ms"))
         if "sd" in row:
             in_text = {**row, "table": None}  # the standard deviation is only in the text of the thesis
-            means = lap_means(measurements.results_of(NAME)) if measurements else []
+            means = lap_means(results.results_of(NAME)) if results else []
             sd = float(np.std(means)) if len(means) > 1 else None
             out.append(published_row("standard deviation of the means of laps", in_text, row["sd"], sd, "ms"))
     for row in published["modes"]:
-        measurements = by_name.get(row["configuration"])
-        entries = mode_entries(measurements) if measurements else []
+        results = by_name.get(row["configuration"])
+        entries = mode_entries(results) if results else []
         times = {entry["mode"]: entry["milliseconds"]["predict"] for entry in entries}
         what = f"a prediction, {row['mode']}"
         out.append(published_row(what, row, row["milliseconds"], times.get(row["mode"]), "ms"))

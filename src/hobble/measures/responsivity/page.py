@@ -118,7 +118,7 @@ def track_figures(found: Json) -> list[KeyFigure]:
     reached = f"{found.get('waypoints_reached')} of {found.get('waypoints')}"
     steps = sum(lap.get("steps") or 0 for lap in found["laps"])
     slide = None if _too_few_steps(steps) else found.get("foot_slide_cm")
-    measurements = f"mean slide of a toe during a stance, averaged over the laps ({steps:,} steps)"
+    slide_note = f"mean slide of a toe during a stance, averaged over the laps ({steps:,} steps)"
     laps = f"{found.get('laps_finished')} of {len(found['laps'])} laps finished"
     return [
         KeyFigure("Waypoints reached", reached, "", laps),
@@ -128,7 +128,7 @@ def track_figures(found: Json) -> list[KeyFigure]:
             "cm",
             "the largest of all laps",
         ),
-        KeyFigure("Foot slide", format_number(slide), "cm" if slide is not None else "", measurements),
+        KeyFigure("Foot slide", format_number(slide), "cm" if slide is not None else "", slide_note),
         _turn_figure(found),
         KeyFigure("Slow frames", format_number(spread.get("p99")), "ms", "1 % of the frames are slower"),
     ]

@@ -30,14 +30,15 @@ export const createTargets = (spec, c) => {
 
   // The channels that limit the speed.
   const limited = spec.channels.filter((one) => one.limits);
+  // Of each of these channels: for each gait, the highest speed of a healthy body, cm a frame.
+  const healthySpeeds = limited.map(({ limits }) => limits.speeds.map((labels) => max(...labels.map(([unhurt]) => unhurt))));
   // The highest speed in gait g, cm a frame, under the limits of all channels, as in `combine_limits` of `hobble.channels.speed_limits`.
   const highestSpeed = (g) => {
     let least = Infinity, slowed = limited[0].limits.usual[g];
     const usual = slowed;
-    for (const { first, limits } of limited) {
-      const { levels, speeds } = limits;
+    limited.forEach(({ first, limits }, channel) => {
+      const { levels, speeds } = limits, healthy = healthySpeeds[channel][g];
       let highest = Infinity, lost = 0, values = 0;
-      const healthy = max(...speeds[g].map(([first]) => first));
       for (let l = 0; l < speeds[g].length; l++) {
         const v = c.channelValues[first + l];
         if (!(v > 0)) continue;
@@ -51,7 +52,7 @@ export const createTargets = (spec, c) => {
       if (values > 1) highest = min(highest, healthy * max(1 - lost ** (1 / k.sumNorm), k.slowestShare));
       least = min(least, highest);
       if (usual > 0) slowed *= min(1, highest / usual);
-    }
+    });
     return least < usual ? slowed : least;
   };
   // The target velocity within the limits. gait: the target share of each gait. It is changed if the body cannot jog.

@@ -170,10 +170,10 @@ def _row_of_walk(
     graded recogniser gives to it. impaired: share of windows in which the linear recogniser finds a limp. The
     wrong side is the side opposite to `hurt_side`. named: share of windows in which the graded recogniser
     finds a limp, and not on the wrong side. named_by_either: share of windows in which at least one of the
-    two recognisers does. wrong_side: share of windows in which the graded recogniser finds
-    a limp on the wrong side; None for a link on the midline. speed_share: speed, divided by the speed of the
-    healthy walk. If the figure does not walk a whole cycle, only `speed_share` is measured. The effects and
-    the keys of the recognisers are then None.
+    two recognisers does. wrong_side: share of windows in which the graded recogniser finds a limp on the
+    wrong side; None for a link on the midline. speed_share: speed, divided by the speed of the healthy walk.
+    If the figure does not walk a whole cycle, only `speed_share` is measured. The effects and the keys of the
+    recognisers are then None.
     """
     assert network.skeleton is not None
     assert healthy.profile is not None

@@ -29,15 +29,15 @@ def tables(compared: Json) -> dict[str, list[Row]]:
     return {NAME: [{"configuration": name, **row} for name, row in named_rows]}
 
 
-def _against_people(measurements: ConfigurationResults, people: Json) -> list[PublishedRow]:
+def _against_people(results: ConfigurationResults, people: Json) -> list[PublishedRow]:
     """The shares of hurt parts that the classifier recognises, each next to the share of people.
 
     people: the published result, with the key `share`.
     """
-    found = measurements.results_of(NAME)
+    found = results.results_of(NAME)
     if not found["applies"]:
         return []
-    published, generated = {**people, "configuration": measurements.name}, found["generated"]
+    published, generated = {**people, "configuration": results.name}, found["generated"]
     shares = {
         "all severities": generated["right"],
         "all severities, left and right not distinguished": generated["right_without_side"],

@@ -21,6 +21,6 @@ def compared(all_measured: Sequence[ConfigurationResults], published: Json) -> C
     return ComparisonAddition(entries=[_entry(m) for m in all_measured])
 
 
-def _entry(measurements: ConfigurationResults) -> dict[str, Any]:
-    found = measurements.results_of(NAME)
-    return {"configuration": measurements.name, **{key: found[key] for key in COMPARED_KEYS if key in found}}
+def _entry(results: ConfigurationResults) -> dict[str, Any]:
+    found = results.results_of(NAME)
+    return {"configuration": results.name, **{key: found[key] for key in COMPARED_KEYS if key in found}}

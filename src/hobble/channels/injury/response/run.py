@@ -163,8 +163,8 @@ def _summary(responses: Sequence[LinkResponse]) -> dict[str, Summary]:
 
 def _mean(values: Sequence[float | None]) -> float | None:
     """The mean of the values that are not None; None if there are none."""
-    measurements = [v for v in values if v is not None]
-    return round(float(np.mean(measurements)), 5) if measurements else None
+    known = [v for v in values if v is not None]
+    return round(float(np.mean(known)), 5) if known else None
 
 
 def run(inputs: MeasureInputs, options: Options) -> Outcome:
