@@ -21,11 +21,11 @@ MIXES: dict[str, dict[str, float]] = {
     "pelvis": {"trendelenburg": 0.55, "lurch": 0.25, "antalgic": 0.2},
     "hip": {"trendelenburg": 0.75, "antalgic": 0.25},
     "thigh": {"antalgic": 0.6, "stiff_legged": 0.4},
-    "shank": {"antalgic": 0.95, "steppage": 0.05},
+    "shank": {"antalgic": 0.8, "stiff_legged": 0.15, "steppage": 0.05},
     "foot": {"antalgic": 0.65, "steppage": 0.35},
 }
 # Part -> factor on the mixed curves of trunk, pelvis and shoulders.
-CURVE_FACTOR: dict[str, float] = {"pelvis": 1.6, "hip": 2.1, "thigh": 1.25, "shank": 1.0, "foot": 0.9}
+CURVE_FACTOR: dict[str, float] = {"pelvis": 1.6, "hip": 2.1, "thigh": 1.25, "shank": 1.5, "foot": 0.9}
 # Part -> changes that the recordings do not show.
 # - Ratios to the healthy clip: speed; stride (time); lift (height of the swinging foot); push and strike
 #   (pitch of the foot while the heel is up and while the toe is up); arms (swing of both arms); back and head
@@ -40,7 +40,8 @@ ADDED_CHANGES: dict[str, dict[str, float]] = {
     "thigh": {
         "speed": 0.62,
         "stride": 1.04,
-        "push": 0.2,
+        "push": 0.25,
+        "crouch": 4.0,
         "lift": 0.1,
         "out": 0.07,
         "strike": 0.4,
@@ -50,11 +51,11 @@ ADDED_CHANGES: dict[str, dict[str, float]] = {
     "shank": {
         "speed": 0.62,
         "stride": 1.02,
-        "push": 0.15,
+        "push": 0.5,
         "lift": 0.05,
         "out": 0.05,
         "strike": 0.0,
-        "crouch": 6.0,
+        "crouch": 15.0,
         "toe_out": 4.0,
         "list": 4.0,
         "vault_sound": 0.8,
