@@ -40,7 +40,7 @@ ADDED_CHANGES: dict[str, dict[str, float]] = {
     "thigh": {
         "speed": 0.62,
         "stride": 1.04,
-        "push": 0.25,
+        "push": 0.35,
         "crouch": 4.0,
         "lift": 0.1,
         "out": 0.07,
@@ -60,7 +60,7 @@ ADDED_CHANGES: dict[str, dict[str, float]] = {
         "list": 4.0,
         "vault_sound": 0.8,
     },
-    "foot": {"speed": 0.66, "stride": 1.03, "push": 0.3, "lift": 0.7, "strike": 0.9, "toe_out": 14.0},
+    "foot": {"speed": 0.66, "stride": 1.03, "push": 0.5, "lift": 0.7, "strike": 0.9, "toe_out": 14.0},
     "back": {
         "speed": 0.68,
         "push": 0.6,
