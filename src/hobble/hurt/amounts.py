@@ -29,7 +29,8 @@ CURVE_FACTOR: dict[str, float] = {"pelvis": 1.6, "hip": 2.1, "thigh": 1.25, "sha
 # Part -> changes that the recordings do not show.
 # - Ratios to the healthy clip: speed; stride (time); lift (height of the swinging foot); push and strike
 #   (pitch of the foot while the heel is up and while the toe is up); arms (swing of both arms); back and head
-#   (movement of the joints of back and neck).
+#   (movement of the joints of back and neck). With a smaller push than these, the heel stays on the ground
+#   for so long that the hips sink, and the sound knee bends more than in the recordings.
 # - Share: vault (how far the standing knee straightens while the other leg swings; 1 is nearly straight).
 # - Leg lengths: out (how far the foot swings outward).
 # - Degrees: toe_out; crouch (knee flexion added in stance); forward and side (lean of the trunk forward and
