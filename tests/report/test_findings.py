@@ -165,6 +165,11 @@ def test_key_figures_show_the_published_values(material: ReportMaterial) -> None
     assert figures["Network"].note.startswith("parameters at each control point; layers of 372–16–16–311")
 
 
+def test_the_time_of_the_pipeline_says_what_it_covers(material: ReportMaterial) -> None:
+    figure = next(f for f in key_figures(material) if f.label == "Whole pipeline")
+    assert "from clips to measurements" in figure.note
+
+
 def test_key_figures_without_results(material: ReportMaterial) -> None:
     bare = changed(
         material, accuracy={}, responsivity={}, injury={}, pipeline={}, history={}, motion=[], labels=[]

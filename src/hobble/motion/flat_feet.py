@@ -76,12 +76,12 @@ NOTED = 1.0  # cm: an uncertainty of the height (two standard deviations) above 
 class Tilt:
     """The tilt of each foot when it stands flat, in radians.
 
-    measured_tilt: side -> tilt in the frames in which the foot is flat. flat: side -> tilt that is taken as
+    measured: side -> tilt in the frames in which the foot is flat. flat: side -> tilt that is taken as
     correct. Both are None for a foot without a ball. error: standard deviation of the mean of both feet's
     `flat`.
     """
 
-    measured_tilt: dict[str, float | None]
+    measured: dict[str, float | None]
     flat: dict[str, float | None]
     error: float
 
@@ -95,8 +95,8 @@ def frames_of_feet(sample: BodySample) -> dict[int, Array]:
     tilt = feet_tilt(sample)
     frames: dict[int, Array] = {}
     for side in SIDES:
-        measured_tilt, correct = tilt.measured_tilt[side], tilt.flat[side]
-        steeper_by = 0.0 if measured_tilt is None or correct is None else correct - measured_tilt
+        measured, correct = tilt.measured[side], tilt.flat[side]
+        steeper_by = 0.0 if measured is None or correct is None else correct - measured
         correction = quat.from_axis_angle(LEFT, np.array(steeper_by))
         flat = flat_moments(sample, side)
         # The rotations from a figure that faces +Z to one that faces where the foot points.
@@ -127,18 +127,18 @@ def feet_tilt(sample: BodySample) -> Tilt:
     ]:
         return Tilt(by_side, _around_mean(by_side, float(np.mean(exact))), EXACT_ERROR)
     raised = RAISED if figure_runs(sample) else 0.0
-    measured_tilt = float(np.mean(measured_tilts)) - raised
+    measured = float(np.mean(measured_tilts)) - raised
     if len(zero_tilts) == len(SIDES) and np.ptp(zero_tilts) < AGREE:
         # A foot that limps or stands on a slope may never come down. So it is enough if one foot agrees, to
         # within half of AGREE.
         best_foot = min(abs(a - b + raised) for a, b in zip(zero_tilts, measured_tilts, strict=True))
-        if min(abs(np.mean(zero_tilts) - measured_tilt), 2 * best_foot) < AGREE:
+        if min(abs(np.mean(zero_tilts) - measured), 2 * best_foot) < AGREE:
             return Tilt(by_side, zero, EXACT_ERROR)
     if _is_target(sample):
         return Tilt(by_side, _around_mean(by_side, sample.target_proportions.foot_tilt), EXACT_ERROR)
     # The more the two feet differ, the less certain is their mean.
     error = float(np.hypot(CAPTURED_ERROR, 0.25 * np.ptp(measured_tilts)))
-    angle, error = _expected_tilt(measured_tilt, error)
+    angle, error = _expected_tilt(measured, error)
     return Tilt(by_side, _around_mean(by_side, angle), error if sample.seconds >= BRIEF else BRIEF_ERROR)
 
 
@@ -167,20 +167,20 @@ def _around_mean(by_side: dict[str, float | None], angle: float) -> dict[str, fl
     }
 
 
-def _expected_tilt(measured_tilt: float, error: float) -> tuple[float, float]:
+def _expected_tilt(measured: float, error: float) -> tuple[float, float]:
     """The expected tilt of a captured rig's feet and its standard deviation, radians.
 
-    measured_tilt: radians. error: its standard deviation. The feet are built either like a person's or
+    measured: the measured tilt. error: its standard deviation. The feet are built either like a person's or
     in any way. Each case is weighted by how well it explains the measured tilt. So the tilt before the
     measurement has a mixture of two distributions, a normal and an even one, and the result is its mean after
     the measurement.
     """
-    apart, deviation = PERSON - measured_tilt, float(np.hypot(error, PERSON_DEVIATION))
+    apart, deviation = PERSON - measured, float(np.hypot(error, PERSON_DEVIATION))
     density = np.exp(-0.5 * (apart / deviation) ** 2) / (np.sqrt(2 * np.pi) * deviation)
     person = density / (density + 1 / ANY_FOOT)  # the probability of feet like a person's
     pull = (error / deviation) ** 2  # share of the way to PERSON, if the feet are like a person's
     variance = error**2 * (1 - person * pull) + person * (1 - person) * (pull * apart) ** 2
-    return measured_tilt + person * pull * apart, float(np.sqrt(variance))
+    return measured + person * pull * apart, float(np.sqrt(variance))
 
 
 def height_error(sample: BodySample, zero: bool) -> float:
@@ -201,11 +201,7 @@ def feet_doubt(sample: BodySample, zero: bool) -> str | None:
     zero: whether a person could stand in the zero pose. If so, the pose shows how the feet are turned.
     """
     tilt = feet_tilt(sample)
-    tilts = [
-        np.degrees(measured_tilt)
-        for measured_tilt in tilt.measured_tilt.values()
-        if measured_tilt is not None
-    ]
+    tilts = [np.degrees(measured) for measured in tilt.measured.values() if measured is not None]
     if len(tilts) < len(SIDES):
         result = "the figure may stand 3 cm too high or low"
         if not zero:

@@ -102,11 +102,11 @@ def zero_doubt(sample: BodySample, zero: dict[int, Array]) -> str | None:
     They may differ because the figure stands on its toes or leans in the zero pose. On uneven ground, feet
     stand at any angle, so there is no warning. zero: the result of `frames_from_rest`.
     """
-    measured_tilt = feet_tilt(sample).measured_tilt
+    measured = feet_tilt(sample).measured
     differences, lengths, heights = [], [], []
     for side in SIDES:
         heel, toe = sample.body.legs[side][2:]
-        if toe is not None and (tilt := measured_tilt[side]) is not None and upright_while_flat(sample, side):
+        if toe is not None and (tilt := measured[side]) is not None and upright_while_flat(sample, side):
             x, y, z = quat.rotate(quat.inv(zero[heel]), sample.bone(heel, toe))
             # Radians by which a foot points further down while it stands than in the zero pose. A runner's
             # foot is steeper than flat by RAISED.

@@ -68,7 +68,7 @@ def key_figures(material: ReportMaterial) -> list[KeyFigure]:
         value, _, unit = format_duration(total).partition(" ")
         written = format_bytes(material.pipeline.get("total_bytes"))
         note = (
-            "sum over all jobs, from clips to points; jobs can run in parallel, so the run can be "
+            "sum over all jobs, from clips to measurements; jobs can run in parallel, so the run can be "
             f"shorter; {written} written"
         )
         figures.append(KeyFigure("Whole pipeline", value, unit, note, 50))
