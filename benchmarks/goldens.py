@@ -1,11 +1,12 @@
-"""What a change must not change: motion, labels, weights and measurements, written from one checkout, compared with another.
+"""What a change must not change: motion, labels, weights and measurements of two checkouts.
 
-    python benchmarks/goldens.py write FOLDER [motion] [labels] [test] [limp]    # in each of the two checkouts
+    python benchmarks/goldens.py write FOLDER [motion] [labels] [test] [limp]    # in each checkout
     python benchmarks/goldens.py compare FOLDER OTHER
 
-`motion` and `labels` run the commands `hobble motion` and `hobble labels` on every folder of clips below shared/mocap and
-shared/wild; `test` and `limp` run the workflow. Only commands and files are used, no function of the package, so that both
-checkouts can look quite different. `compare` exits with 1 if anything differs and says by how much.
+`motion` and `labels` run the commands `hobble motion` and `hobble labels` on every folder of clips below
+shared/mocap and shared/wild; `test` and `limp` run the workflow. Only commands and files are used, no function of
+the package, so both checkouts can look quite different. `compare` exits with 1 if anything differs and says by
+how much.
 """
 
 from __future__ import annotations
@@ -54,7 +55,7 @@ def write_commands(folder: Path, part: str) -> None:
     for clips in clip_folders():
         out = folder / part / clips.relative_to(SHARED)
         out.mkdir(parents=True, exist_ok=True)
-        said = run(sys.executable, "-m", "hobble.cli", part, clips, out, *options)
+        said = run(sys.executable, "-m", "hobble.cli.__main__", part, clips, out, *options)
         (out / "said.txt").write_text(said)
         print(part, clips.relative_to(SHARED), flush=True)
 
