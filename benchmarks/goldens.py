@@ -4,9 +4,9 @@
     python benchmarks/goldens.py compare FOLDER OTHER
 
 `motion` and `labels` run the commands `hobble motion` and `hobble labels` on every folder of clips below
-shared/mocap and shared/wild; `test` and `limp` run the workflow. Only commands and files are used, no function of
-the package, so both checkouts can look quite different. `compare` exits with 1 if anything differs and says by
-how much.
+shared/mocap and shared/wild; `test` and `limp` run the workflow. Only commands and files are used, no
+function of the package, so both checkouts can look quite different. `compare` exits with 1 if anything
+differs and says by how much.
 """
 
 from __future__ import annotations
