@@ -12,9 +12,9 @@ from typing import Any
 import numpy as np
 from numba.extending import register_jitable
 
-from hobble.character import rule
 from hobble.core.compiled import njit
 from hobble.rows.layout import RowLayout
+from hobble.runtime import rule
 from hobble.runtime.trajectory import STILL, Trajectory
 
 phase_change, movement_share = register_jitable(rule.phase_change), register_jitable(rule.movement_share)

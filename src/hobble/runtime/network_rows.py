@@ -10,8 +10,8 @@ from typing import Any
 import numpy as np
 from numba.extending import register_jitable
 
-from hobble.character import rule
 from hobble.core.compiled import njit
+from hobble.runtime import rule
 from hobble.runtime.trajectory import Trajectory
 
 # The rule for a joint's new position, in a form that compiled functions can call.

@@ -5,8 +5,8 @@ from __future__ import annotations
 import torch
 from torch import Tensor
 
-from hobble.character.rule import joint_place
 from hobble.database.reader import Database
+from hobble.runtime.rule import joint_place
 
 
 class RollOut:

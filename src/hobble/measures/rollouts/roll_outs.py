@@ -12,12 +12,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from hobble.character.rule import joint_place, movement_share, phase_change
 from hobble.core.quat import Array
 from hobble.evaluation.captured import rotate_by_yaw
 from hobble.models.network import Predictor
 from hobble.rows.clip_rows import ClipRows, compose_pairs
 from hobble.rows.layout import GAITS, RowLayout
+from hobble.runtime.rule import joint_place, movement_share, phase_change
 
 BATCH = 256  # poses predicted at once; the inputs of more poses do not fit into the processor's cache
 
@@ -31,7 +31,7 @@ class RollOutInputs:
     to the mean ground height. ground: (F,) this mean height, cm. phase: (F,) in cycles. turn: (F,) negated
     change of the root's yaw until the next frame, radians. velocity: (F, 2) movement of the root until the
     next frame, cm. moving: (F,) the share of the root's predicted movement that is applied, see
-    `hobble.character.rule.movement_share`.
+    `hobble.runtime.rule.movement_share`.
     """
 
     x: Array

@@ -7,8 +7,7 @@ import pytest
 import torch
 from numba import njit
 
-from hobble.character import rule
-from hobble.runtime import advance, network_rows
+from hobble.runtime import advance, network_rows, rule
 
 
 def test_places_standing_and_phase_follow_the_formulas() -> None:

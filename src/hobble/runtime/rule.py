@@ -2,10 +2,6 @@
 
 The functions take numbers, numpy arrays or tensors. The runtime compiles them with numba; roll-outs and
 training call them directly. The only other implementation is in the report page's JavaScript.
-
-numba caches the runtime's compiled functions on disk. It compiles such a function again only if the file in
-`hobble.runtime` changes, not if this file does. So after a change here, delete the `__pycache__` of the
-package `hobble.runtime`.
 """
 
 from __future__ import annotations
