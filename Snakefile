@@ -14,7 +14,11 @@ from hobble.workflow.costs import stages
 from hobble.workflow.resource_demands import Demands
 from hobble.workflow.measurements import NAMES as MEASURES
 from hobble.workflow.project import Project
-from hobble.workflow.targets import check_targets, needed_datasets, notes_on_unused_files
+from hobble.workflow.targets import (
+    check_targets,
+    needed_datasets,
+    notes_on_unused_files,
+)
 from hobble.workflow.channel_sources import channels_of_folder
 
 # While Snakemake plans, it makes millions of small objects and frees few of them. If the garbage collector runs less
@@ -45,7 +49,9 @@ try:
         project.batches.of_hurt_versions, datasets_needed, sys.argv[1:]
     )
     batches_of_synthetic_clips = project.batches.needed(
-        project.batches.of_listed_clips, project.datasets.walkers(datasets_needed), sys.argv[1:]
+        project.batches.of_listed_clips,
+        project.datasets.walkers(datasets_needed),
+        sys.argv[1:],
     )
 except HobbleError as error:
     raise WorkflowError(str(error)) from None

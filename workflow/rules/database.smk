@@ -121,7 +121,9 @@ rule database_shard:
         channels=lambda w: channels_of_folder(w.channels),
         # Hurt version -> the healthy clip from which it is made.
         sources=lambda w: datasets.sources(
-            datasets.splits_in_shard(w.dataset, channels_of_folder(w.channels), int(w.shard))
+            datasets.splits_in_shard(
+                w.dataset, channels_of_folder(w.channels), int(w.shard)
+            )
         ),
         # Training uses every n-th row of hurt versions; this is n.
         every=lambda w: datasets.hurt_row_step(w.dataset),

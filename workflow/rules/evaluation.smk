@@ -62,7 +62,9 @@ rule measure_piece:
         runtime=lambda w: measurements.runtime(w.configuration, w.measure),
         options=lambda w: measurements.options(w.configuration, w.measure),
         code=lambda w: measurements.code(
-            w.measure, configurations.model_package(w.configuration), script="measure_piece"
+            w.measure,
+            configurations.model_package(w.configuration),
+            script="measure_piece",
         ),
     script:
         "../scripts/measure_piece.py"

@@ -53,6 +53,8 @@ for batch in batches_of_hurt_versions:
                 }
                 for clip in batch.clips
             ],
-            code=lambda w: package.code("hurt_clips", *channel_packages([clips.hurt_channel])),
+            code=lambda w: package.code(
+                "hurt_clips", *channel_packages([clips.hurt_channel])
+            ),
         script:
             "../scripts/hurt_clips.py"

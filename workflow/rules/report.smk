@@ -80,7 +80,9 @@ rule pipeline_summary:
 rule report:
     """The report of a configuration as one HTML file."""
     input:
-        measurements=expand(rules.measure.output.json, measure=MEASURES, allow_missing=True),
+        measurements=expand(
+            rules.measure.output.json, measure=MEASURES, allow_missing=True
+        ),
         pipeline=rules.pipeline_summary.output.json,
         scenarios=rules.generate.output.scenarios,
         configuration=rules.configuration.output.yaml,
@@ -178,7 +180,9 @@ rule stimuli:
     params:
         runtime=lambda w: configurations.section(w.configuration, "runtime"),
         code=lambda w: package.code(
-            "stimuli", configurations.model_package(w.configuration), *display_modules()
+            "stimuli",
+            configurations.model_package(w.configuration),
+            *display_modules(),
         ),
     script:
         "../scripts/stimuli.py"
@@ -204,7 +208,9 @@ rule questionnaire:
         configuration=lambda w: w.configuration,
         runtime=lambda w: configurations.section(w.configuration, "runtime"),
         code=lambda w: package.code(
-            "questionnaire", configurations.model_package(w.configuration), *display_modules()
+            "questionnaire",
+            configurations.model_package(w.configuration),
+            *display_modules(),
         ),
     script:
         "../scripts/questionnaire.py"
@@ -228,7 +234,9 @@ rule export_web:
         runtime=10,
     params:
         runtime=lambda w: configurations.section(w.configuration, "runtime"),
-        code=lambda w: package.code("export_web", configurations.model_package(w.configuration)),
+        code=lambda w: package.code(
+            "export_web", configurations.model_package(w.configuration)
+        ),
     script:
         "../scripts/export_web.py"
 

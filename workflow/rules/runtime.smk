@@ -19,7 +19,9 @@ rule generate:
     params:
         runtime=lambda w: configurations.section(w.configuration, "runtime"),
         code=lambda w: package.code(
-            "generate", configurations.model_package(w.configuration), *display_modules()
+            "generate",
+            configurations.model_package(w.configuration),
+            *display_modules(),
         ),
     script:
         "../scripts/generate.py"
@@ -43,7 +45,9 @@ rule export_onnx:
         runtime=10,
     params:
         mode=lambda w: w.mode,
-        code=lambda w: package.code("export_onnx", configurations.model_package(w.configuration)),
+        code=lambda w: package.code(
+            "export_onnx", configurations.model_package(w.configuration)
+        ),
     script:
         "../scripts/export_onnx.py"
 
@@ -86,6 +90,8 @@ rule export_glb:
         mem_mb=1500,
         runtime=10,
     params:
-        code=lambda w: package.code("export_glb", configurations.model_package(w.configuration)),
+        code=lambda w: package.code(
+            "export_glb", configurations.model_package(w.configuration)
+        ),
     script:
         "../scripts/export_glb.py"

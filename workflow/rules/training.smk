@@ -42,6 +42,8 @@ rule training:
         )["terrain_side"],
         # The folder in which a later run of a killed job finds its checkpoints.
         checkpoints="results/{configuration}/checkpoints",
-        code=lambda w: package.code("training", configurations.model_package(w.configuration)),
+        code=lambda w: package.code(
+            "training", configurations.model_package(w.configuration)
+        ),
     script:
         "../scripts/training.py"
