@@ -20,11 +20,10 @@ from pathlib import Path
 from hobble.core.files import read_json
 from hobble.core.processors import processor_name
 from hobble.models.load import load_network
-from hobble.report.captured_and_predicted import packed_comparisons
+from hobble.report.character import playable_with_recogniser
 from hobble.report.gather import gather
-from hobble.report.pack_recogniser import playable_with_recogniser
 from hobble.report.page import render_report
-from hobble.report.scenes import packed_scenes
+from hobble.report.recorded_motion import packed_comparisons, packed_scenes
 from hobble.runtime.options import Runtime
 
 REPORTS = {"motion": "motion", "labels": "labels", "channels": "channels/injury"}

@@ -26,7 +26,7 @@ from hobble.measures.manners.windows import (
     captured_windows,
 )
 from hobble.models.network import Network
-from hobble.report.page_parts import Paragraph
+from hobble.report.parts import Paragraph
 from hobble.runtime.options import Runtime
 
 FRAMES = 300

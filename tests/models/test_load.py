@@ -15,7 +15,7 @@ from hobble.core.errors import InputError
 from hobble.core.skeleton import Skeleton
 from hobble.models.load import load_network
 from hobble.models.pfnn.release import PHASES
-from hobble.report.playable import playable_data
+from hobble.report.character import playable_data
 from hobble.rows.layout import GAITS
 from hobble.runtime import ProceduralAnimation
 from hobble.runtime.options import Runtime

@@ -18,12 +18,10 @@ from hobble.core.skeleton import Skeleton
 from hobble.models.load import load_network
 from hobble.models.network import Network
 from hobble.report.bundle import WEB, bundle_page_scripts, install_npm_packages
-from hobble.report.captured_and_predicted import packed_comparisons
+from hobble.report.character import opening_walk, playable_data
 from hobble.report.gather import ReportMaterial, gather
-from hobble.report.opening_walk import opening_walk
 from hobble.report.page import render_report
-from hobble.report.playable import playable_data
-from hobble.report.scenes import packed_scenes
+from hobble.report.recorded_motion import packed_comparisons, packed_scenes
 
 
 def load_module(name: str) -> ModuleType:

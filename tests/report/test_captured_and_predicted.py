@@ -11,8 +11,7 @@ from hobble.core.skeleton import Skeleton
 from hobble.evaluation.captured import headings, root_path
 from hobble.figure.mesh import body_mesh
 from hobble.models.network import Network
-from hobble.report.captured_and_predicted import in_world
-from hobble.report.scenes import UNIT
+from hobble.report.recorded_motion import UNIT, in_world
 
 
 def positions(clip: dict[str, Any], table: str, joints: int) -> np.ndarray:

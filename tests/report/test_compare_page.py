@@ -18,12 +18,10 @@ from hobble.evaluation.configuration_results import ConfigurationResults
 from hobble.measures.accuracy import comparison_page as of_accuracy
 from hobble.measures.responsivity import comparison_page as of_responsivity
 from hobble.models.load import load_network
-from hobble.report import compare_sections as parts
-from hobble.report import compare_tables as tables
+from hobble.report import compare_page
+from hobble.report.character import playable_data, round_weights
 from hobble.report.compare_page import render_comparison
 from hobble.report.gather import PUBLISHED, ReportMaterial
-from hobble.report.playable import playable_data
-from hobble.report.rounded_weights import round_weights
 
 
 @pytest.fixture(scope="module")
@@ -117,7 +115,7 @@ def test_boxes_are_at_the_quantiles_with_published_means(compared: dict[str, Any
 def test_training_is_drawn_over_passes_seconds_and_samples(
     compared: dict[str, Any], material: ReportMaterial
 ) -> None:
-    chart = parts.training_curves(compared)
+    chart = compare_page.training_curves(compared)
     assert chart is not None
     assert list(chart.options) == ["passes", "seconds of training", "samples seen"]
     assert chart.options["seconds of training"][0]["x"] == material.history["seconds"]
@@ -125,7 +123,7 @@ def test_training_is_drawn_over_passes_seconds_and_samples(
 
 
 def test_every_pair_is_in_the_table_and_the_map(compared: dict[str, Any]) -> None:
-    table, chart = tables.difference_table(compared), of_accuracy.difference_map(compared)
+    table, chart = compare_page.difference_table(compared), of_accuracy.difference_map(compared)
     assert table is not None
     assert chart is not None
     held_out = chart.options["held-out clips, sd of single frames"]
@@ -137,19 +135,19 @@ def test_every_pair_is_in_the_table_and_the_map(compared: dict[str, Any]) -> Non
 
 
 def test_published_figures_are_shown_with_ours(compared: dict[str, Any]) -> None:
-    rows = {(row[0], row[1]): row[2:4] for row in tables.published_table(compared).rows}
+    rows = {(row[0], row[1]): row[2:4] for row in compare_page.published_table(compared).rows}
     assert rows["a frame, mean", "holden"][0] == "0.376 ms"
     assert rows["a frame, mean", "holden"][1].endswith(" ms")
     assert rows["relative error, held-out clips", "holden-xl"] == ["0.0448", ""]
     assert rows["database, on disk", "holden"] == ["7.12 GB", "30 MB"]
     assert rows["database, time", "holden"] == ["1 h 30 min", "21 s"]
-    of_clips = {row[0] for row in tables.published_table(compared).rows if "80 clips" in row[4]}
+    of_clips = {row[0] for row in compare_page.published_table(compared).rows if "80 clips" in row[4]}
     assert of_clips == {
         f"{what} {split} clips"
         for what in ("relative error,", "standard deviation of the means of")
         for split in ("training", "held-out")
     }
-    cited = {(row[0], row[1]): row[4] for row in tables.published_table(compared).rows}
+    cited = {(row[0], row[1]): row[4] for row in compare_page.published_table(compared).rows}
     assert cited["a frame, mean", "ava"] == "Segerstedt (2021), Table 5.1 (but 1.479 ms in Appendix A.4)"
     assert cited["relative error, training clips", "ava"].endswith(", Table 5.2 (but 0.0311 in Appendix A.5)")
 
@@ -158,7 +156,7 @@ def test_frame_times_are_medians_and_measures_have_names(
     compared: dict[str, Any], material: ReportMaterial
 ) -> None:
     median = material.measurements["responsivity"]["milliseconds"]["spread"]["median"]
-    table = tables.configuration_table(compared)
+    table = compare_page.configuration_table(compared)
     column = [c.label for c in table.columns].index("ms per frame, median")
     assert [row[column] for row in table.rows] == [median, median]
     laps, fit = of_responsivity.lap_lines(compared), of_responsivity.fit_chart(compared)
@@ -192,7 +190,6 @@ def test_the_table_of_injuries_has_a_column_for_each_gait() -> None:
 def test_networks_too_large_for_one_page_are_left_out(
     compared: dict[str, Any], pair: dict[str, Any], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    from hobble.report import compare_page
 
     alone = len(render_comparison(compared, {"holden": pair["holden"]}).encode())
     monkeypatch.setattr(compare_page, "LARGEST_PAGE", alone - 10_000 + compare_page.RESERVED)

@@ -7,9 +7,9 @@ import numpy as np
 import pytest
 
 from hobble.measures.responsivity.page import track_figures
-from hobble.report.coverage import TURN_EDGES
-from hobble.report.findings import hints, key_figures
+from hobble.report.data_section import TURN_EDGES
 from hobble.report.gather import ReportMaterial
+from hobble.report.page import hints, key_figures
 
 
 def changed(material: ReportMaterial, **changes: Any) -> ReportMaterial:

@@ -6,7 +6,7 @@ import numpy as np
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from hobble.report.formats import embedded, json_data
+from hobble.report.parts import embedded, json_data
 
 
 @settings(max_examples=80, deadline=None)

@@ -13,11 +13,10 @@ import pytest
 from hobble.core.files import load_npz, save_npz
 from hobble.core.skeleton import Skeleton
 from hobble.models.load import load_network
-from hobble.report.captured_and_predicted import packed_comparisons
+from hobble.report.character import playable_data
 from hobble.report.gather import gather
 from hobble.report.page import render_report
-from hobble.report.playable import playable_data
-from hobble.report.scenes import packed_scenes
+from hobble.report.recorded_motion import packed_comparisons, packed_scenes
 
 HOSTILE = (
     "<script>pwned=1</script></script></style><img src=x onerror=pwned=2>\"'`&amp;{{7*7}}${pwned=3}"

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from hobble.core.skeleton import Skeleton
-from hobble.report import coverage, data_section, shown_clips
+from hobble.report import data_section
 from hobble.report.gather import ReportMaterial
 from hobble.report.page import render_report
 
@@ -28,31 +28,31 @@ def of_many(material: ReportMaterial, copies: int) -> ReportMaterial:
 
 
 def test_few_clips_are_all_shown(material: ReportMaterial) -> None:
-    assert shown_clips.choose_clips(material) == {report["clip"] for report in material.labels}
+    assert data_section.choose_clips(material) == {report["clip"] for report in material.labels}
 
 
 def test_every_kind_of_clip_is_shown(material: ReportMaterial) -> None:
     many = of_many(material, 50)
-    some = shown_clips.choose_clips(many, most=40)
+    some = data_section.choose_clips(many, most=40)
     assert len(some) == 40
     assert {many.split_of(clip) for clip in some} == {"train", "held_out"}
     hurt = {report["clip"] for report in many.channels if report["values"]}
     assert some & hurt
     assert some - hurt
     reordered = replace(many, labels=many.labels[::-1])
-    assert shown_clips.choose_clips(reordered, most=40) == some
+    assert data_section.choose_clips(reordered, most=40) == some
     more = {**many.labels[0], "clip": "another"}
-    assert len(shown_clips.choose_clips(replace(many, labels=[*many.labels, more]), most=40) - some) <= 1
+    assert len(data_section.choose_clips(replace(many, labels=[*many.labels, more]), most=40) - some) <= 1
 
 
 def test_the_page_does_not_grow_with_the_clips(
     material: ReportMaterial, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """With smaller limits, so that a test need not make hundreds of clips."""
-    choose = shown_clips.choose_clips
+    choose = data_section.choose_clips
     monkeypatch.setattr(data_section, "MOST_BARS", 20)
     monkeypatch.setattr(data_section, "MOST_REMARKS", 20)
-    monkeypatch.setattr(shown_clips, "choose_clips", lambda material: choose(material, 12))
+    monkeypatch.setattr(data_section, "choose_clips", lambda material: choose(material, 12))
     sizes = [len(render_report(of_many(material, copies))) for copies in (20, 100)]
     assert sizes[1] < 1.01 * sizes[0]
 
@@ -64,14 +64,14 @@ def test_seconds_are_estimated_from_a_random_choice_of_clips(
     paths = [str(tmp_path / f"walk-{i}.npz") for i in range(30)]
     for path in paths:
         shutil.copy(tmp_path / "walk.npz", path)
-    some = shown_clips.sample_files(paths, most=10)
+    some = data_section.sample_files(paths, most=10)
     assert len(some) == 10
     assert some != paths[:10]
-    every, few = coverage.seconds_of_data(paths, {}), coverage.seconds_of_data(some, {}, all_clips=30)
+    every, few = data_section.seconds_of_data(paths, {}), data_section.seconds_of_data(some, {}, all_clips=30)
     np.testing.assert_allclose(few["both"], every["both"])
     np.testing.assert_allclose(few["turns"]["train"], every["turns"]["train"])
     assert every["estimate"] == ""
-    chart = coverage.turn_chart(few)
+    chart = data_section.turn_chart(few)
     assert chart is not None
     assert chart.caption.endswith("Estimated from 10 of 30 clips.")
 
@@ -82,9 +82,9 @@ def test_seconds_are_estimated_from_random_excerpts_of_clips(
     paths = [tmp_path / f"walk-{i}.npz" for i in range(4)]
     for path in paths:
         examples.rows(path, holden31)
-    every = coverage.seconds_of_data(paths, {})
-    monkeypatch.setattr(coverage, "MOST_EXCERPTS", 3)
-    few = coverage.seconds_of_data(paths, {}, all_clips=8)
+    every = data_section.seconds_of_data(paths, {})
+    monkeypatch.setattr(data_section, "MOST_EXCERPTS", 3)
+    few = data_section.seconds_of_data(paths, {}, all_clips=8)
     np.testing.assert_allclose(few["both"], 2 * every["both"])
     assert few["estimate"] == " Estimated from 4 of 8 clips and 75 % of their frames."
 

@@ -10,10 +10,8 @@ from hobble.channels.injury.response import page_cases
 from hobble.measures.accuracy.page import caveat
 from hobble.measures.responsivity import lap_charts
 from hobble.measures.responsivity import page as responsivity_page
-from hobble.report.charts import ChartGroup
 from hobble.report.gather import ReportMaterial
-from hobble.report.page_parts import ChartPair
-from hobble.report.summary import KeyFigure
+from hobble.report.parts import ChartGroup, ChartPair, KeyFigure
 
 
 def test_the_steps_of_a_frame_are_in_their_order(material: ReportMaterial) -> None:

@@ -6,7 +6,7 @@ from typing import Any
 
 import pytest
 
-from hobble.report.opening_slider import opening_slider
+from hobble.report.character import opening_slider
 
 PLAYABLE = {
     "channels": [

@@ -13,7 +13,6 @@ from hobble.core import quat
 from hobble.core.skeleton import Skeleton
 from hobble.figure.mesh import body_mesh
 from hobble.models.network import Network
-from hobble.report import opening_walk, straight_walk
 from hobble.runtime.animation import ProceduralAnimation
 from hobble.runtime.export import restore_bone_lengths
 from tests.report.example_motion import hills
@@ -89,12 +88,12 @@ def test_the_figures_at_the_top_move_as_the_python_runtime_does(
     column = one["columns"][one["sliders"][hero["part"]]]
     for i, values in enumerate(({column: 7.0}, {})):
         animation = ProceduralAnimation(network, **dict(examples.RUNTIME))
-        for _ in range(opening_walk.FRAMES + 30):
-            pose = animation.next_pose(straight_walk.AHEAD, None, "walk", injury=values)
+        for _ in range(OPENING_FRAMES + 30):
+            pose = animation.next_pose(AHEAD, None, "walk", injury=values)
         seen = tab.run(f"""(() => {{
           const c = Hobble.character(Hobble.material.playable.example);
           c.follow(Hobble.material.hero.walked[{i}]);
-          for (let f = 0; f < 30; f++) c.frame({json.dumps(straight_walk.AHEAD)}, null, "walk", () => 0);
+          for (let f = 0; f < 30; f++) c.frame({json.dumps(AHEAD)}, null, "walk", () => 0);
           return Array.from(c.posePosition);
         }})()""")
         np.testing.assert_allclose(np.reshape(seen, (-1, 3)), pose.positions, atol=0.05)

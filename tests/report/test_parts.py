@@ -8,11 +8,18 @@ from typing import Any
 import pytest
 
 from hobble.measures.registry import MEASURES
-from hobble.report import measure_sections
-from hobble.report.charts import Chart, ChartGroup
-from hobble.report.page_parts import ChartPair, PageSection, Paragraph, SectionPart, join_sections
-from hobble.report.tables import Column, Table
-from hobble.report.templates import chart_specs, load_template
+from hobble.report.parts import (
+    Chart,
+    ChartGroup,
+    ChartPair,
+    Column,
+    PageSection,
+    Paragraph,
+    SectionPart,
+    Table,
+    join_sections,
+)
+from hobble.report.templates import chart_specs, load_template, measured_sections
 
 
 def chart(name: str) -> Chart:
@@ -52,8 +59,8 @@ def test_a_pair_without_charts_is_left_out() -> None:
 @pytest.mark.parametrize("found", [{}, {"applies": False, "reason": "no such input"}])
 def test_a_measurement_that_found_nothing_leaves_no_section(found: dict[str, Any], material: Any) -> None:
     nothing = replace(material, measurements={one.name: found for one in MEASURES})
-    assert measure_sections.sections(material) != []
-    assert measure_sections.sections(nothing) == []
+    assert measured_sections(material) != []
+    assert measured_sections(nothing) == []
 
 
 def test_charts_are_found_wherever_they_stand() -> None:

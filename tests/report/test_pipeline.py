@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 
 from hobble.core.errors import InputError
-from hobble.report.pipeline import read_benchmark, summarise_pipeline
+from hobble.report.provenance import read_benchmark, summarise_pipeline
 
 HEADER = "s\th:m:s\tmax_rss\tmax_vms\tmax_uss\tmax_pss\tio_in\tio_out\tmean_load\tcpu_time\n"
 

@@ -15,8 +15,8 @@ from hobble.channels.injury.shown import PARTS_WITH_SLIDER, link_index_by_part
 from hobble.core.skeleton import Skeleton
 from hobble.models.load import load_network
 from hobble.models.network import Network
-from hobble.report.formats import embedded
-from hobble.report.playable import playable_data
+from hobble.report.character import playable_data
+from hobble.report.parts import embedded
 
 
 def test_parts_are_the_links_of_their_roles(holden31: Skeleton) -> None:

@@ -17,7 +17,7 @@ from hobble.gait.limp_grade import grade_walk, grader_of_all_people
 from hobble.gait.people import read_people
 from hobble.gait.profile import profile_of_walk
 from hobble.models.network import Network
-from hobble.report.pack_recogniser import (
+from hobble.report.character import (
     healthy_walk,
     kind_in_words,
     packed_statistics,
@@ -110,7 +110,7 @@ def test_a_walk_is_compared_with_the_healthy_walk_of_the_same_figure(
     assert spec["recogniser"]["healthy"]["speed_per_leg"] > 0.5
     without = {role: joint for role, joint in holden31.roles.items() if role != "left_knee"}
     assert healthy_walk(network, replace(holden31, roles=without), examples.RUNTIME) is None
-    monkeypatch.setattr("hobble.report.straight_walk.AHEAD", (0.0, 0.0))
+    monkeypatch.setattr("hobble.report.character.AHEAD", (0.0, 0.0))
     assert healthy_walk(network, holden31, examples.RUNTIME) is None
     assert "recogniser" not in playable_with_recogniser(network, examples.RUNTIME)
 

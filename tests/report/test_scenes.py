@@ -12,7 +12,7 @@ from hobble.core import quat
 from hobble.core.skeleton import Skeleton
 from hobble.figure.mesh import body_mesh
 from hobble.figure.pack import TURN
-from hobble.report.scenes import UNIT, pack_positions, packed_scenes
+from hobble.report.recorded_motion import UNIT, pack_positions, packed_scenes
 
 
 def unpacked(text: str, kind: str) -> np.ndarray:

@@ -12,22 +12,15 @@ from hobble.core.errors import InputError
 from hobble.core.skeleton import Skeleton
 from hobble.evaluation.csv_tables import read_numbers
 from hobble.measures.accuracy import page as accuracy_page
-from hobble.report import (
-    cost_section,
-    coverage,
-    data_section,
-    shown_clips,
-    terrain_section,
-    training_section,
-)
-from hobble.report.charts import Chart
+from hobble.report import data_section, sections
 from hobble.report.gather import ReportMaterial, describe_network
-from hobble.report.ground_pictures import ground_pictures
+from hobble.report.parts import Chart
+from hobble.report.recorded_motion import ground_pictures
 from hobble.rows.clip_rows import load_clip_rows, save_clip_rows
 
 
 def test_sections_of_a_pass_are_spread_evenly_on_the_axis(material: ReportMaterial) -> None:
-    x = training_section.passes_axis(material)
+    x = sections.passes_axis(material)
     assert (x[0], x[9], x[10], x[-1]) == (pytest.approx(0.1), 1.0, pytest.approx(1.1), 20.0)
 
 
@@ -48,7 +41,7 @@ def test_empty_cells_of_the_history_are_read_and_words_refused(tmp_path: Path) -
 
 def test_a_learning_curve_needs_no_held_out_clips(material: ReportMaterial) -> None:
     nothing = {**material.history, "held_out_mse": [None] * 200}
-    chart = training_section.learning_curve(replace(material, history=nothing))
+    chart = sections.learning_curve(replace(material, history=nothing))
     assert [trace["name"] for trace in chart.traces] == ["training"]
 
 
@@ -95,20 +88,23 @@ def test_turns_speeds_and_severities_are_counted_in_seconds(
     knee = holden31.link_names.index("LeftUpLeg-LeftLeg")
     severity[: len(rows) // 2, knee] = 7.2
     save_clip_rows(tmp_path / "walk.npz", replace(rows, y=y, channels={"injury": severity}))
-    found = coverage.seconds_of_data([tmp_path / "walk.npz"], {rows.clip: "held_out"})
+    found = data_section.seconds_of_data([tmp_path / "walk.npz"], {rows.clip: "held_out"})
     seconds, hurt = len(np.unique(rows.frame)) / 60, len(np.unique(rows.frame[: len(rows) // 2])) / 60
-    turns = dict(zip(coverage._middles(coverage.TURN_EDGES), found["turns"]["held_out"], strict=True))
+    turns = dict(zip(data_section._middles(data_section.TURN_EDGES), found["turns"]["held_out"], strict=True))
     assert turns[30.0] == pytest.approx(seconds)
     assert sum(turns.values()) == pytest.approx(seconds)
     assert not found["turns"]["train"].any()
     row, column = np.argwhere(found["both"] > 0)[0]
-    assert (coverage._middles(coverage.TURN_EDGES)[row], coverage._middles(coverage.SPEED_EDGES)[column]) == (
+    assert (
+        data_section._middles(data_section.TURN_EDGES)[row],
+        data_section._middles(data_section.SPEED_EDGES)[column],
+    ) == (
         30.0,
         1.3,
     )
     assert list(found["channels"]["injury"]) == ["LeftUpLeg-LeftLeg"]
     assert found["channels"]["injury"]["LeftUpLeg-LeftLeg"][6] == pytest.approx(hurt, abs=1 / 60 + 1e-9)
-    (chart,) = coverage.channel_charts(found)
+    (chart,) = data_section.channel_charts(found)
     assert chart is not None
     assert chart.traces[0]["z"][0][6] == pytest.approx(hurt, abs=0.02)
 
@@ -116,7 +112,7 @@ def test_turns_speeds_and_severities_are_counted_in_seconds(
 def test_strips_show_the_injured_parts(material: ReportMaterial) -> None:
     strips = {
         strip["clip"]: strip
-        for strip in data_section.clip_strips(material, shown_clips.choose_clips(material))
+        for strip in data_section.clip_strips(material, data_section.choose_clips(material))
     }
     assert len(strips) == 8, "a mirror says the same again"
     (row,) = strips["hurt_left_knee"]["channels"]
@@ -137,7 +133,7 @@ def test_stages_are_listed_with_published_values_of_the_same_configuration(mater
         "example": {},
     }
     for name, theirs in known.items():
-        table = cost_section.stage_table(replace(material, name=name))
+        table = sections.stage_table(replace(material, name=name))
         if not theirs:
             assert [c.label for c in table.columns if "published" in c.label] == []
             continue
@@ -153,7 +149,7 @@ def test_ground_profiles_hold_the_present_height_under_the_root(tmp_path: Path) 
         path, frame=np.arange(6), fits=np.full(6, 3), heights=heights, error=np.zeros((1, 10)),
         foot_error=np.zeros((1, 10, 2)),
     )  # fmt: skip
-    fits = terrain_section.read_fits(path)
+    fits = sections.read_fits(path)
     assert fits.frame.tolist() == [0, 3]
     # Of 12 centre samples, -60 to +50 by tens, the seventh is the present one: column 12 + 6.
     assert fits.profile.tolist() == [heights[0:3, 18].tolist(), heights[9:12, 18].tolist()]
@@ -163,11 +159,11 @@ def test_a_damaged_terrain_file_is_named(tmp_path: Path) -> None:
     path = tmp_path / "clip.npz"
     np.savez(path, frame=np.arange(3))
     with pytest.raises(InputError, match=r"clip\.npz: holds no array 'fits'"):
-        terrain_section.read_fits(path)
+        sections.read_fits(path)
 
 
 def test_flat_clips_have_no_ground_to_show(material: ReportMaterial) -> None:
-    section = terrain_section.section(material.terrain_files)
+    section = sections.terrain_section(material.terrain_files)
     assert len(section["table"].rows) == 6
     assert "hurt_back" not in section["charts"][0].options
     pictures = ground_pictures(material.terrain_files, material.network["skeleton"])["pictures"]

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from hobble.report.triangles import corner_normals, draw_triangles, fill_triangles, finish_picture
+from hobble.report.raster import corner_normals, draw_triangles, fill_triangles, finish_picture
 
 FACE = np.array([[0, 1, 2]])
 # Screen coordinates: y points down, and a front face has a negative area.

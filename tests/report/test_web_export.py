@@ -17,9 +17,8 @@ from hobble.channels import channel
 from hobble.channels.speed_limits import Limits
 from hobble.core import quat
 from hobble.models.network import Network
-from hobble.report.bundle import WEB
-from hobble.report.playable import playable_data
-from hobble.report.web_export import export_web
+from hobble.report.bundle import WEB, export_web
+from hobble.report.character import playable_data
 from hobble.runtime.animation import ProceduralAnimation
 from hobble.runtime.export import restore_bone_lengths
 

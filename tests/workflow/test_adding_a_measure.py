@@ -47,9 +47,9 @@ def run(inputs: MeasureInputs, options: Options) -> Outcome:
     known = [entry["clip"] for entry in inputs.results_of("accuracy")["clips"]]
     return Outcome({"every": options.every, "clips": rows, "known": known}, {"clips": rows}, "<hips>")
 """
-PAGE = """from hobble.report.page_parts import PageSection, Paragraph, SectionPart
-from hobble.report.summary import Hint, KeyFigure
-from hobble.report.tables import Column, Table
+PAGE = """from hobble.report.parts import PageSection, Paragraph, SectionPart
+from hobble.report.parts import Hint, KeyFigure
+from hobble.report.parts import Column, Table
 
 
 def section(found, material):
@@ -77,9 +77,9 @@ def compared(all_measured, published):
 def tables(compared):
     return {"hips": compared["hips"]}
 """
-COMPARISON_PAGE = """from hobble.report.measure_sections import OverviewColumn
-from hobble.report.page_parts import PageSection, Paragraph, SectionPart
-from hobble.report.tables import Column
+COMPARISON_PAGE = """from hobble.report.parts import OverviewColumn
+from hobble.report.parts import PageSection, Paragraph, SectionPart
+from hobble.report.parts import Column
 
 
 def columns(compared):

@@ -3,7 +3,7 @@
 from pathlib import Path
 
 from hobble.models.load import load_network
-from hobble.report.web_export import export_web
+from hobble.report.bundle import export_web
 from hobble.runtime.options import Runtime
 from hobble.workflow.job import job
 

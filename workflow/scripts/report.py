@@ -4,12 +4,10 @@ from pathlib import Path
 
 from hobble.core.files import write_text
 from hobble.models.load import load_network
-from hobble.report.captured_and_predicted import packed_comparisons
+from hobble.report.character import opening_walk, playable_with_recogniser
 from hobble.report.gather import gather
-from hobble.report.opening_walk import opening_walk
-from hobble.report.pack_recogniser import playable_with_recogniser
 from hobble.report.page import render_report
-from hobble.report.scenes import packed_scenes
+from hobble.report.recorded_motion import packed_comparisons, packed_scenes
 from hobble.runtime.options import Runtime
 from hobble.workflow.job import job
 

@@ -6,9 +6,8 @@ import yaml
 
 from hobble.core.files import read_json, write_text
 from hobble.models.load import load_network
+from hobble.report.character import has_weights, playable_with_recogniser, rounding_error
 from hobble.report.compare_page import render_comparison
-from hobble.report.pack_recogniser import playable_with_recogniser
-from hobble.report.rounded_weights import has_weights, rounding_error
 from hobble.runtime.options import Runtime
 from hobble.workflow.job import job
 

@@ -21,7 +21,7 @@ from hobble.evaluation.options import Evaluation
 from hobble.hurt.options import Hurt
 from hobble.labels.options import LabelOptions
 from hobble.motion.options import Download, MotionOptions
-from hobble.report.options import ReportOptions
+from hobble.report import ReportOptions
 from hobble.runtime.options import Runtime
 from hobble.synthetic.options import Synthetic
 from hobble.terrain.options import HeightmapOptions, Terrain

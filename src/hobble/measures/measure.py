@@ -6,11 +6,11 @@ because planning imports it. The other modules of the package are found by name:
 - `run.py`: its function `run(inputs, options)` measures and returns an `Outcome` (see
   `hobble.measures.inputs`). A long measurement may be split into pieces, which run as jobs of their own:
   `run_piece(inputs, options, piece) -> Json` measures one piece, and `run` puts their results together;
-- `page.py`, if the report shows the measurement: how it shows it (see `hobble.report.measure_sections`);
+- `page.py`, if the report shows the measurement: how it shows it (see `hobble.report.templates`);
 - `comparison.py`, if the measurement is part of the comparison of several configurations: what it adds to
   compare.json (see `hobble.evaluation.compare_configurations`);
 - `comparison_page.py`, if the page of this comparison shows the measurement: how it shows it (see
-  `hobble.report.measure_sections`).
+  `hobble.report.templates`).
 """
 
 from __future__ import annotations

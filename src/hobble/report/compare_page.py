@@ -6,13 +6,38 @@ from collections.abc import Mapping
 from typing import Any
 
 from hobble.figure.pack import packed_body
-from hobble.report import compare_sections, compare_tables, comparison_charts, measure_sections
-from hobble.report.formats import embedded
-from hobble.report.opening_slider import body_channel
-from hobble.report.playable import skeleton_of
+from hobble.report.character import body_channel, has_weights, round_weights, skeleton_of
+from hobble.report.parts import (
+    Chart,
+    Column,
+    Compared,
+    OverviewColumn,
+    Table,
+    Trace,
+    axis,
+    citation,
+    configuration_colours,
+    configuration_names,
+    dot_trace,
+    embedded,
+    format_bytes,
+    format_duration,
+    format_number,
+    line_trace,
+    log_axis,
+)
 from hobble.report.provenance import git_commit, machine, versions
-from hobble.report.rounded_weights import has_weights, round_weights
-from hobble.report.templates import FOLDER, chart_specs, load_template, mark_safe, page_style
+from hobble.report.sections import log_range
+from hobble.report.templates import (
+    FOLDER,
+    chart_specs,
+    compared_columns,
+    compared_sections,
+    compared_verdicts,
+    load_template,
+    mark_safe,
+    page_style,
+)
 
 LARGEST_PAGE = 19_850_000  # bytes; the page must stay under 20 MB
 RESERVED = 60_000  # bytes of LARGEST_PAGE that are kept free for the page's text, style and tables
@@ -28,7 +53,7 @@ def render_comparison(
     """The comparison as one HTML document.
 
     compared: the content of compare.json. playables: configuration -> data of a character that its network
-    moves in the page, from `playable_data` in `hobble.report.playable`. If these characters do not all fit
+    moves in the page, from `playable_data` in `hobble.report.character`. If these characters do not all fit
     into the page, the weights of all of them are rounded to 8 bits. Characters that still do not fit are left
     out. bundle: all scripts of the page as one script. errors: configuration -> mean distance in cm by which
     rounding the weights moves a predicted joint.
@@ -36,16 +61,16 @@ def render_comparison(
     errors = errors or {}
     sections: dict[str, dict[str, Any]] = {
         "overview": {
-            "verdicts": measure_sections.compared_verdicts(compared),
-            "table": compare_tables.configuration_table(compared),
-            "published": compare_tables.published_table(compared),
+            "verdicts": compared_verdicts(compared),
+            "table": configuration_table(compared),
+            "published": published_table(compared),
         },
-        "training": {"curves": compare_sections.training_curves(compared)},
-        "stages": {"charts": compare_sections.stage_charts(compared)},
+        "training": {"curves": training_curves(compared)},
+        "stages": {"charts": stage_charts(compared)},
     }
-    measured_sections = measure_sections.compared_sections(compared)
-    names = comparison_charts.configuration_names(compared)
-    charts = chart_specs([sections, measured_sections])
+    measurements = compared_sections(compared)
+    names = configuration_names(compared)
+    charts = chart_specs([sections, measurements])
     # Configurations with the same skeleton share a body. Its key is in the entry `body` of a character.
     bodies = {spec["body"]: packed_body(skeleton_of(spec)) for spec in (playables or {}).values()}
     used = len(bundle.encode()) + len(embedded(charts).encode()) + len(embedded(bodies).encode())
@@ -59,7 +84,7 @@ def render_comparison(
     data = {"name": NAME, "charts": charts, "playable": on_page, "bodies": bodies}
     return load_template("compare.html.j2").render(
         name=NAME,
-        measured_sections=measured_sections,
+        measured_sections=measurements,
         title=" and ".join(names) if len(names) < 3 else f"{len(names)} configurations",
         eyebrow="Hobble report · comparison of configurations",
         lead="The same measurements of " + ", ".join(names) + ", compared with published results.",
@@ -95,3 +120,167 @@ def select_fitting(
             used += needed
             kept[name] = spec
     return kept, left_out
+
+
+# Column of a configuration's training history -> title of the horizontal axis.
+X_AXES = {"pass": "passes", "seconds": "seconds of training", "samples": "samples seen"}
+
+
+def training_curves(compared: Compared) -> Chart | None:
+    """Training and held-out error of all configurations. A menu selects the horizontal axis, see X_AXES."""
+    options: dict[str, list[Trace]] = {}
+    values: list[float | None] = []
+    for key, label in X_AXES.items():
+        traces = []
+        for entry in compared["training"]:
+            name = entry["configuration"]
+            x = _passes_done(entry) if key == "pass" else entry.get(key, [])
+            colour = configuration_colours(compared)[name]
+            held_out = entry.get("held_out_mse", [])
+            if any(v is not None for v in held_out):
+                traces.append(line_trace(f"{name}, held out", x, held_out, colour))
+                values += held_out
+            train = entry.get("train_mse", [])
+            traces.append(line_trace(f"{name}, training", x, train, colour, width=1.2, dash="dot"))
+            values += train
+        if traces:
+            options[label] = traces
+    if not options:
+        return None
+    return Chart(
+        "compare-training",
+        "Error during training",
+        "Mean squared error of the standardised output. Solid lines: held-out clips. Dotted lines: training "
+        "clips, measured with dropout.",
+        layout={"yaxis": log_axis("mean squared error", values)},
+        height=420,
+        choose="Horizontal axis",
+        options=options,
+        option_layouts={label: {"xaxis": {**axis(label), "rangemode": "tozero"}} for label in options},
+    )
+
+
+def stage_charts(compared: Compared) -> list[Chart]:
+    """Two charts: the time and the size on disk of each stage of the pipeline."""
+    # Plotly draws the first category at the bottom, so the order is reversed.
+    order = list(dict.fromkeys(stage["stage"] for stage in compared["stages"]))[::-1]
+    charts = []
+    for key, title, label, as_text in (
+        ("seconds", "Time of each stage", "seconds, sum over all jobs", format_duration),
+        ("bytes", "Size of each stage", "bytes on disk", format_bytes),
+    ):
+        values = [stage.get(key) or 0 for stage in compared["stages"]]
+        traces = []
+        for name, colour in configuration_colours(compared).items():
+            rows = [s for s in compared["stages"] if s["configuration"] == name and s.get(key)]
+            trace = dot_trace(
+                name, [s[key] for s in rows], [s["stage"] for s in rows], colour, "%{y}: %{text}"
+            )
+            traces.append(trace | {"text": [as_text(s[key]) for s in rows]})
+        layout = {
+            "xaxis": axis(label, type="log", tickformat="~s", dtick=1, range=log_range(values)),
+            "yaxis": {"automargin": True, "categoryorder": "array", "categoryarray": order},
+        }
+        caption = "The stages that prepare a data set run only once for all configurations that use it."
+        charts.append(Chart(f"compare-{key}", title, caption, traces, layout, 110 + 32 * len(order)))
+    return charts
+
+
+def _passes_done(entry: Mapping[str, Any]) -> list[float]:
+    """How many passes were done at the end of each section of training. A section is a part of a pass.
+
+    entry: an entry of `training` in compare.json.
+    """
+    sections = [s for s in entry.get("section", ()) if s is not None]
+    per_pass = max(sections, default=1)
+    passes = zip(entry.get("pass", ()), entry.get("section", ()), strict=True)
+    return [pass_number - 1 + section / per_pass for pass_number, section in passes]
+
+
+# Published measure -> a longer name, if its own name is unclear.
+LONGER_NAMES = {
+    "patches": "patches: pieces of ground cut from height maps (ours: all files of the terrain stage)",
+    "database": "database, on disk",
+    "weights of 50 phases": "weights of 50 phases, as the code of Holden et al. stores them",
+}
+# Columns of the table of pairs of configurations: (key in compare.json, heading). "one" and "other" are the
+# two configurations of a pair. "sd of frames" is the standard deviation over single frames. "sd of means" is
+# that of the means of clips, or, for frame times, of the means of laps on the test track.
+PAIR_COLUMNS = (
+    ("mean_a", "mean, one"),
+    ("sd_a", "sd of frames, one"),
+    ("sd_of_means_a", "sd of means, one"),
+    ("mean_b", "mean, other"),
+    ("sd_b", "sd of frames, other"),
+    ("sd_of_means_b", "sd of means, other"),
+    ("difference", "eq. 3.2, frames"),
+    ("difference_of_means", "eq. 3.2, means"),
+)
+
+
+def configuration_table(compared: Compared) -> Table:
+    """A row for each configuration: its settings and the main results of its measurements."""
+    entries = {entry["configuration"]: entry for entry in compared["configurations"]}
+
+    def by_name(key: str) -> dict[str, Any]:
+        """Configuration -> its entry `key` in compare.json."""
+        return {name: entry[key] for name, entry in entries.items()}
+
+    channel_names = {name: ", ".join(channels) or "none" for name, channels in by_name("channels").items()}
+    columns = [
+        *compared_columns(compared),
+        OverviewColumn(50, Column("channels"), channel_names),
+        OverviewColumn(60, Column("data set"), by_name("dataset")),
+        OverviewColumn(80, Column.count("layers"), by_name("hidden_layers")),
+        OverviewColumn(90, Column.count("units"), by_name("units")),
+        OverviewColumn(100, Column.number("passes"), by_name("passes")),
+    ]
+    columns.sort(key=lambda column: column.order)
+    rows = [[name, *(column.values.get(name) for column in columns)] for name in entries]
+    heads = [Column("configuration"), *(column.column for column in columns)]
+    return Table("compare-configurations", heads, rows, "The configurations")
+
+
+def difference_table(compared: Compared) -> Table | None:
+    """Errors and frame times of each pair of configurations, and their difference; None without pairs.
+
+    By eq. 3.2 of Segerstedt (2021), the difference of two means is divided by the mean of their standard
+    deviations. One column has the result for deviations over single frames, another for those over means of
+    clips or laps.
+    """
+    pairs = [("error", r) for r in compared["difference"]]
+    pairs += [("mean ms a frame", r) for r in compared["milliseconds"].get("difference", ())]
+    rows = [
+        [r["a"], r["b"], f"{what}, {r['over'].replace('_', ' ')}", *(r.get(key) for key, _ in PAIR_COLUMNS)]
+        for what, r in pairs
+    ]
+    if not rows:
+        return None
+    columns = [Column("one"), Column("other"), Column("measured")]
+    columns += [Column.number(label) for _, label in PAIR_COLUMNS]
+    return Table("compare-difference", columns, rows, "Differences between all pairs")
+
+
+def published_table(compared: Compared) -> Table:
+    """The published results next to ours. Results that we did not measure come last."""
+    sources = compared["published"]["sources"]
+    formats = {"bytes": format_bytes, "s": format_duration}
+    rows = []
+    published = (*compared["against_published"], *compared["milliseconds"]["against_published"])
+    for row in sorted(published, key=lambda row: row["ours"] is None):
+        as_text = formats.get(row["unit"], lambda value: format_number(value, 3))
+        unit = f" {row['unit']}" if row["unit"] and row["unit"] not in formats else ""
+        texts = [
+            "" if row[key] is None else f"{as_text(float(row[key]))}{unit}" for key in ("published", "ours")
+        ]
+        measure = LONGER_NAMES.get(row["measure"], row["measure"])
+        measure += ", mean" if row["unit"] == "ms" and not measure.startswith("standard") else ""
+        rows.append([measure, row["configuration"], *texts, citation(row, sources)])
+    columns = [
+        Column("measure"),
+        Column("configuration"),
+        Column("published"),
+        Column("ours"),
+        Column("source"),
+    ]
+    return Table("compare-published", columns, rows, "Comparison with published results")

@@ -2,31 +2,44 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from typing import Any
 
+import numpy as np
 import yaml
 
 from hobble.channels.shown import shown_names
+from hobble.core.quat import Array
 from hobble.core.skeleton import Skeleton
 from hobble.figure.mesh import mesh_key
 from hobble.figure.pack import packed_body
-from hobble.report import (
-    cost_section,
-    coverage,
-    data_section,
-    findings,
-    measure_sections,
-    shown_clips,
-    terrain_section,
-    training_section,
-)
-from hobble.report.formats import embedded, json_data
+from hobble.report import data_section as data
+from hobble.report import sections as own
+from hobble.report.character import body_channel, opening_channel, opening_slider
+from hobble.report.data_section import TURN_EDGES
 from hobble.report.gather import ReportMaterial
-from hobble.report.ground_pictures import ground_pictures
-from hobble.report.opening_slider import body_channel, opening_channel, opening_slider
+from hobble.report.parts import (
+    Hint,
+    KeyFigure,
+    embedded,
+    format_bytes,
+    format_duration,
+    format_number,
+    json_data,
+    with_order,
+)
 from hobble.report.provenance import git_commit, machine, versions
-from hobble.report.templates import FOLDER, chart_specs, load_template, mark_safe, page_style
+from hobble.report.recorded_motion import ground_pictures
+from hobble.report.templates import (
+    FOLDER,
+    chart_specs,
+    load_template,
+    mark_safe,
+    measured_figures,
+    measured_hints,
+    measured_sections,
+    page_style,
+)
 
 
 def render_report(
@@ -39,29 +52,29 @@ def render_report(
 ) -> str:
     """The report as one HTML document.
 
-    The arguments come from other modules of hobble.report: scenes from `scenes.packed_scenes`; playable from
-    `playable.playable_data`, or with a recogniser from `pack_recogniser.playable_with_recogniser`;
-    captured_and_predicted from `captured_and_predicted.packed_comparisons`; bundle, the page's scripts, from
-    `bundle.bundle_page_scripts`; hero, the top of the page, from `opening_walk.opening_walk`. A section
-    without data is left out. Without `hero`, the characters at the top begin in the network's start frame.
+    scenes: from `recorded_motion.packed_scenes`. playable: from `character.playable_data` or
+    `character.playable_with_recogniser`. captured_and_predicted: from `recorded_motion.packed_comparisons`.
+    bundle: the page's scripts, from `bundle.bundle_page_scripts`. hero: the top of the page, from
+    `character.opening_walk`. A section without data is left out. Without `hero`,
+    the characters at the top begin in the network's start frame.
 
     Texts from the user's files cannot become HTML: the template escapes every value, and the data for the
     scripts is JSON without any "<".
     """
-    clips = shown_clips.choose_clips(material)
-    terrain = shown_clips.files_of_clips(material.terrain_files, clips)
-    row_files = shown_clips.sample_files(material.row_files)
+    clips = data.choose_clips(material)
+    terrain = data.files_of_clips(material.terrain_files, clips)
+    row_files = data.sample_files(material.row_files)
     # Seconds of data at each speed, turning speed and channel value.
-    counted = coverage.seconds_of_data(row_files, material.splits, all_clips=len(material.row_files))
+    counted = data.seconds_of_data(row_files, material.splits, all_clips=len(material.row_files))
     sections = _sections(material, counted, clips, terrain)
-    measured_sections = measure_sections.sections(material)
+    measurements = measured_sections(material)
     scenes, playable = dict(scenes or {}), playable or {}
     captured_and_predicted = captured_and_predicted or {}
-    strips = data_section.clip_strips(material, clips)  # the labels of each clip over time
+    strips = data.clip_strips(material, clips)  # the labels of each clip over time
     grounds = ground_pictures(terrain, material.network["skeleton"])
     playables = {material.name: playable} if playable else {}
-    data = {
-        "charts": chart_specs([sections, measured_sections]),
+    embedded_data = {
+        "charts": chart_specs([sections, measurements]),
         "bodies": _bodies(material),
         "hero": hero or opening_slider(playable, material.measurements.values()),
         "scenes": scenes,
@@ -73,10 +86,10 @@ def render_report(
     }
     return load_template("page.html.j2").render(
         material=material,
-        measured_sections=measured_sections,
-        figures=findings.key_figures(material),
-        hints=findings.hints(material, counted["turns"]),
-        embedded={name: embedded(part) for name, part in data.items()},
+        measured_sections=measurements,
+        figures=key_figures(material),
+        hints=hints(material, counted["turns"]),
+        embedded={name: embedded(part) for name, part in embedded_data.items()},
         scene_names=[scene["name"] for scene in scenes.get("scenarios", ())],
         playable=playables,
         captured_and_predicted=[clip["name"] for clip in captured_and_predicted.get("clips", ())],
@@ -109,7 +122,7 @@ def _top_values(material: ReportMaterial, playable: Mapping[str, Any]) -> dict[s
         "title": material.title or material.name,
         "titled": bool(material.title),
         "eyebrow": f"Hobble report · configuration {material.name} · data set {material.dataset}",
-        "lead": findings.lead_text(material),
+        "lead": lead_text(material),
         "hurts": body_channel(playable) is not None,
         "shown_channel": opening_channel(playable),
     }
@@ -129,29 +142,210 @@ def _sections(
 ) -> dict[str, dict[str, Any]]:
     """Section -> name in the template -> chart, table or list of charts; None if there is nothing to show.
 
-    counted: from `coverage.seconds_of_data`. clips: names of the clips that are shown one by one. terrain:
+    counted: from `seconds_of_data`. clips: names of the clips that are shown one by one. terrain:
     files of their terrain fits.
     """
-    costs, data, training = cost_section, data_section, training_section
     return {
         "training": {
-            "curve": training.learning_curve(material),
-            "blocks": training.block_curves(material),
-            "table": training.history_table(material),
+            "curve": own.learning_curve(material),
+            "blocks": own.block_curves(material),
+            "table": own.history_table(material),
         },
-        "terrain": terrain_section.section(terrain),
+        "terrain": own.terrain_section(terrain),
         "stages": {
-            **dict(zip(("seconds", "bytes"), costs.stage_charts(material), strict=True)),
-            "table": costs.stage_table(material),
+            **dict(zip(("seconds", "bytes"), own.stage_charts(material), strict=True)),
+            "table": own.stage_table(material),
         },
         "data": {
             "gaits": data.gait_chart(material),
             "speeds": data.speed_chart(material),
-            "turns": coverage.turn_chart(counted),
-            "both": coverage.speed_turn_chart(counted),
-            "channels": coverage.channel_charts(counted, shown_names(material.network["skeleton"])),
+            "turns": data.turn_chart(counted),
+            "both": data.speed_turn_chart(counted),
+            "channels": data.channel_charts(counted, shown_names(material.network["skeleton"])),
             "retarget": data.retarget_chart(material),
             "clips": data.clip_table(material, clips),
             "remarks": data.remarks_table(material),
         },
     }
+
+
+# Degrees a second: slower turning is not counted, because the body sways that much in a straight walk.
+TURNING = 40.0
+LITTLE_TURNING = 0.01  # if turning takes less than this share of the time, the page warns
+# Kinds of hints, in the order of the page.
+KIND_ORDER = ("warn", "note", "good", "fact")
+
+
+def _training_options(material: ReportMaterial) -> Mapping[str, Any]:
+    """The options of training in the configuration; empty if they are not known."""
+    return (material.resolved.get("configuration") or {}).get("training") or {}
+
+
+def lead_text(material: ReportMaterial) -> str:
+    """A sentence or two on the network and its training data."""
+    clips = [report["clip"] for report in material.motion]
+    held_out = sum(material.split_of(clip) == "held_out" for clip in clips)
+    frames = sum(report.get("frames", 0) for report in material.motion)
+    passes = _training_options(material).get("passes")
+    network = material.network
+    text = (
+        f"A {network['described']}, with {network['inputs']} inputs and {network['outputs']} outputs, trained"
+        if network["sizes"]
+        else f"A character driven by {network['described']}, built"
+    )
+    text += f" for {passes:g} passes" if passes and network["sizes"] else ""
+    text += f" on {len(clips) - held_out} clips of the data set {material.dataset}"
+    text += f", and tested on {held_out} held-out clips" if held_out else ""
+    return f"{text}. All clips together have {frames:,} frames at 60\u00a0Hz."
+
+
+def key_figures(material: ReportMaterial) -> list[KeyFigure]:
+    """The numbers at the top of the page, most important first."""
+    # The last argument of a KeyFigure is its place among the figures, which are sorted by it.
+    figures = measured_figures(material)
+    seconds = sum(report.get("seconds", 0) for report in material.motion)
+    if seconds:
+        held_out = sum(material.split_of(report["clip"]) == "held_out" for report in material.motion)
+        note = f"{len(material.motion)} clips, {held_out} of them held out"
+        value, _, unit = format_duration(seconds).partition(" ")
+        figures.append(KeyFigure("Motion data", value, unit, note, 30))
+    network = material.network
+    # A PFNN has a set of weights at each control point, and `parameters` counts one of these sets. For other
+    # networks it counts all parameters. Motion matching has no layers, so its `sizes` are empty.
+    which = " at each control point" if "control points" in network["described"] else ""
+    note = f"parameters{which}; layers of {'–'.join(map(str, network['sizes']))}"
+    note = (
+        f"{note if network['sizes'] else 'numbers in its tables'}; {format_bytes(network['bytes'])} on disk"
+    )
+    figures.append(KeyFigure("Network", format_number(network["parameters"] / 1e6, 3), "M", note, 40))
+    total = material.pipeline.get("total_seconds")
+    if total:
+        value, _, unit = format_duration(total).partition(" ")
+        written = format_bytes(material.pipeline.get("total_bytes"))
+        note = (
+            "sum over all jobs, from clips to measurements; jobs can run in parallel, so the run can be "
+            f"shorter; {written} written"
+        )
+        figures.append(KeyFigure("Whole pipeline", value, unit, note, 50))
+    return sorted(figures, key=lambda figure: figure.order)
+
+
+def hints(material: ReportMaterial, turns: Mapping[str, Array] | None = None) -> list[Hint]:
+    """Warnings and advice in the order in which to follow them, then what is good, then plain facts.
+
+    turns: split -> seconds in each bin of `coverage.TURN_EDGES`, if they were counted.
+    """
+    # The first argument of `with_order` is the place among hints of the same kind, `order` in
+    # `hobble.report.parts.Hint`.
+    found = [
+        *measured_hints(material),
+        *with_order(10, _gait_hints(material)),  # before training, which cannot make up for missing data
+        *with_order(10, _turning_hints(turns or {})),
+        *with_order(11, _repair_hints(material)),
+        *with_order(20, _training_hints(material)),
+        *with_order(90, _cost_hints(material)),
+    ]
+    return sorted(found, key=lambda hint: (KIND_ORDER.index(hint.kind), hint.order))
+
+
+def _training_hints(material: ReportMaterial) -> Iterator[Hint]:
+    """Whether the held-out error rises, still falls, or has stopped falling."""
+    history = material.history
+    curve = zip(history.get("pass", ()), history.get("held_out_mse", ()), strict=False)
+    points = [(p, error) for p, error in curve if p is not None and error is not None]
+    if len(points) < 8:  # with fewer values, a trend is only noise
+        return
+    passes, errors = zip(*points, strict=True)
+    # The error is measured several times in a pass. One value is noisy, so compare means over passes.
+    means = {p: np.mean([error for q, error in points if q == p]) for p in passes}
+    best = min(means, key=lambda p: means[p])
+    if means[passes[-1]] > 1.05 * means[best]:
+        yield Hint(
+            "warn",
+            f"The held-out error was lowest in pass {best:.0f} and has risen since.",
+            "The network overfits: train for fewer passes, with more dropout, or on more data.",
+        )
+        return
+    quarter = max(1, len(errors) // 4)
+    before, after = np.mean(errors[-2 * quarter : -quarter]), np.mean(errors[-quarter:])
+    fall = 1 - after / before
+    if _training_options(material).get("schedule", "constant") != "constant":
+        # The error fell because the learning rate fell, so it does not show whether more passes would help.
+        return
+    if fall > 0.03:
+        yield Hint(
+            "note",
+            f"The held-out error still fell by {100 * fall:.0f} % in the last quarter of training.",
+            "More passes will help. Another configuration can continue from the last checkpoint of this one.",
+        )
+    else:
+        yield Hint("good", "The held-out error has stopped falling.", "More passes will change little.")
+
+
+def _gait_hints(material: ReportMaterial) -> Iterator[Hint]:
+    """Gaits of which there is little data or none."""
+    totals: dict[str, float] = {}
+    for report in material.labels:
+        for gait, seconds in (report.get("seconds") or {}).items():
+            totals[gait] = totals.get(gait, 0.0) + seconds
+    everything = sum(totals.values())
+    if everything and not totals.get("stand"):
+        yield Hint(
+            "warn",
+            "Nobody stands, starts or stops in these clips.",
+            "So the character steps on the spot when it should stand, and more training will not change "
+            "that. Add clips in which somebody stands, starts and stops.",
+        )
+    scarce = [
+        gait
+        for gait, seconds in totals.items()
+        if 0 < seconds < 0.03 * everything and gait not in ("jump", "bump")
+    ]
+    if scarce:
+        yield Hint(
+            "note",
+            f"There is little data of {' and '.join(sorted(scarce))}:",
+            f"less than three per cent of the time{' each' if len(scarce) > 1 else ''}. Add clips, or expect "
+            "the character to be unsteady there.",
+        )
+
+
+def _turning_hints(turns: Mapping[str, Array]) -> Iterator[Hint]:
+    """A warning if hardly anybody turns. turns: split -> seconds in each bin of TURN_EDGES."""
+    seconds = np.sum(list(turns.values()), axis=0)
+    if not np.any(seconds):
+        return
+    middles = (TURN_EDGES[:-1] + TURN_EDGES[1:]) / 2  # of the bins, degrees a second
+    share = float(np.sum(seconds[np.abs(middles) > TURNING]) / np.sum(seconds))
+    if share < LITTLE_TURNING:
+        yield Hint(
+            "warn",
+            f"Hardly anybody turns in these clips: only {100 * share:.1f} % of the time has turns of "
+            f"{TURNING:.0f} degrees per second or more.",
+            "So the character turns badly, and more training will not change that. Add clips in which "
+            "somebody turns to both sides.",
+        )
+
+
+def _repair_hints(material: ReportMaterial) -> Iterator[Hint]:
+    """How many clips were repaired or have warnings."""
+    repaired = {report["clip"] for report in material.motion if report.get("repairs")}
+    with_warnings = (report for report in (*material.labels, *material.channels) if report.get("warnings"))
+    warned = {report["clip"] for report in with_warnings}
+    if repaired or warned:
+        yield Hint(
+            "note",
+            f"Some clips were repaired ({len(repaired)}) or have warnings ({len(warned)}).",
+            "They are listed under Data. Look at them, because the network also learns the errors in a clip.",
+        )
+
+
+def _cost_hints(material: ReportMaterial) -> Iterator[Hint]:
+    """The stage that took more than half of the time, if any."""
+    stages = material.pipeline.get("stages") or []
+    total = material.pipeline.get("total_seconds") or 0
+    if stages and total:
+        slowest = max(stages, key=lambda stage: stage["seconds"])
+        share = slowest["seconds"] / total
+        if share > 0.5:
+            yield Hint("fact", f"The {slowest['stage']} stage took {100 * share:.0f} % of the time.", "")

@@ -1,17 +1,26 @@
-"""Finds out how a result was made: with which versions and commit, and on which machine."""
+"""How a result was made: versions, commit and machine, and the time, memory and disk space of each stage."""
 
 from __future__ import annotations
 
+import csv
 import json
 import os
 import platform
 import subprocess
+from collections import defaultdict
+from collections.abc import Container, Iterable, Mapping
 from importlib import metadata
 from pathlib import Path
 from typing import Any
 
+from hobble.core.errors import InputError
 from hobble.core.processors import processor_name
-from hobble.evaluation.pipeline_results import Machine
+from hobble.database.manifest import FILE as MANIFEST
+from hobble.database.manifest import Manifest
+from hobble.database.sizes import Sizes, database_sizes
+from hobble.evaluation.csv_tables import read_numbers
+from hobble.evaluation.pipeline_results import JobTotal, Machine, Pipeline, StageTotal
+from hobble.workflow.kept_files import recorded_seconds
 
 WEB = Path(__file__).parent / "web"  # the page's scripts
 # The Python packages whose versions are reported.
@@ -66,3 +75,170 @@ def _memory_gb() -> float | None:
         return round(os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES") / 1e9, 1)
     except (ValueError, OSError, AttributeError):
         return None
+
+
+def summarise_pipeline(configuration: str, stages: Mapping[str, Mapping[str, Iterable[str]]]) -> Pipeline:
+    """The content of `pipeline.json`.
+
+    stages: in the order of the pipeline, stage -> a dict with the keys
+
+    - "benchmarks": tsv files or folders of them;
+    - "files": artefacts or folders of them;
+    - "made", only for stages that make the clips of a data set in batches: for each rule with batches, a
+      folder that is named after the rule and has a record of each finished clip (see
+      `hobble.workflow.kept_files`);
+    - "batches", only for these stages: the names of the benchmarks of all present batches. For a rule in
+      "made", other benchmarks do not count. They are left from batches that have changed since, for example
+      because a clip was added.
+
+    A missing file is listed under `missing`. It is no error, because a stage may have been copied from
+    another machine without its benchmarks.
+
+    If a job was stopped and started again, its benchmark covers only the last start. Its true time is also in
+    the history of training (history.csv), or in the records in "made". The longer of both times counts.
+
+    The result has `stages` (for each stage: jobs, seconds, `longest` job in seconds, max_rss_mb, cpu_seconds,
+    files, bytes; and `rules`, which has the same for each rule, but not files and bytes), `total_seconds`,
+    `total_bytes`, `database` (see `hobble.database.sizes`; None without a database), `missing`, `machine`,
+    `versions`. Raises InputError for a malformed benchmark or history.
+    """
+    missing: list[str] = []
+    entries: list[StageTotal] = []
+    for stage, paths in stages.items():
+        clip_seconds = {Path(folder).name: recorded_seconds(Path(folder)) for folder in paths.get("made", ())}
+        jobs = _read_jobs(paths.get("benchmarks", ()), missing, clip_seconds, set(paths.get("batches", ())))
+        training_seconds = _training_seconds(paths.get("files", ()))
+        file_sizes = _file_sizes(paths.get("files", ()), missing)
+        by_rule: dict[str, list[dict[str, float]]] = defaultdict(list)
+        for rule, row in jobs:
+            if rule == "training":
+                row["s"] = max(row.get("s", 0.0), training_seconds)
+            by_rule[rule].append(row)
+        for rule, seconds in clip_seconds.items():
+            _scale_times(by_rule[rule], seconds)
+        entries.append(
+            {
+                "stage": stage,
+                **_total_of_jobs([row for _, row in jobs]),
+                "files": len(file_sizes),
+                "bytes": sum(file_sizes),
+                "rules": [
+                    {"rule": rule, **_total_of_jobs(rows)} for rule, rows in sorted(by_rule.items()) if rows
+                ],
+            }
+        )
+    return {
+        "configuration": configuration,
+        "stages": entries,
+        "total_seconds": round(sum(entry["seconds"] for entry in entries), 3),
+        "total_bytes": sum(entry["bytes"] for entry in entries),
+        "database": _database_sizes(stages.get("database", {}).get("files", ())),
+        "missing": sorted(missing),
+        "machine": machine(),
+        "versions": versions(),
+    }
+
+
+def read_benchmark(path: str | Path) -> list[dict[str, float]]:
+    """The rows of a Snakemake benchmark file: column -> value. There is a row for each run of the job.
+
+    Values that were not measured ("-", "NA") are left out. Raises InputError if the file is not a benchmark.
+    """
+    with open(path, encoding="utf-8", newline="") as file:
+        rows = list(csv.DictReader(file, delimiter="\t"))
+    if rows and "s" not in rows[0]:
+        raise InputError(path, "not a Snakemake benchmark: it has no column `s`", fix="Delete it.")
+    return [
+        {key: number for key, text in row.items() if (number := _number(text)) is not None} for row in rows
+    ]
+
+
+def _number(text: str | None) -> float | None:
+    """The number in a cell, or None if the cell has none."""
+    try:
+        return float(text) if text else None
+    except ValueError:
+        return None
+
+
+def _read_jobs(
+    paths: Iterable[str], missing: list[str], batch_rules: Container[str], batches: Container[str]
+) -> list[tuple[str, dict[str, float]]]:
+    """(rule, row) of every benchmark in `paths`, whose files are called <rule>.tsv or <rule>/<name>.tsv.
+
+    Of the rules in `batch_rules`, only benchmarks whose name is in `batches` are read. Missing paths are
+    added to `missing`.
+    """
+    jobs = []
+    for root in map(Path, paths):
+        if root.is_dir():
+            files = [
+                (p.relative_to(root).parts[0].removesuffix(".tsv"), p) for p in sorted(root.rglob("*.tsv"))
+            ]
+        elif root.is_file():
+            files = [(root.stem, root)]
+        else:
+            missing.append(str(root))
+            continue
+        files = [(rule, path) for rule, path in files if rule not in batch_rules or path.stem in batches]
+        jobs += [(rule, row) for rule, path in files for row in read_benchmark(path)]
+    return jobs
+
+
+def _scale_times(rows: list[dict[str, float]], seconds: float) -> None:
+    """Make the times of a rule's jobs longer, so that they add up to `seconds`, the time of all its clips.
+
+    The measured time is too short if the jobs found clips that earlier starts of the workflow had made. Times
+    are never made shorter.
+    """
+    measured_seconds = sum(row.get("s", 0.0) for row in rows)
+    if seconds > measured_seconds > 0:
+        for row in rows:
+            row["s"] = row.get("s", 0.0) * seconds / measured_seconds
+
+
+def _file_sizes(paths: Iterable[str], missing: list[str]) -> list[int]:
+    """Bytes of every file in `paths`. Missing paths are added to `missing`.
+
+    Hidden files do not count, because they are half-written.
+    """
+    out = []
+    for root in map(Path, paths):
+        if root.is_dir():
+            files = [p for p in root.rglob("*") if p.is_file() and not p.name.startswith(".")]
+            out += [p.stat().st_size for p in files]
+        elif root.is_file():
+            out.append(root.stat().st_size)
+        else:
+            missing.append(str(root))
+    return out
+
+
+def _training_seconds(paths: Iterable[str]) -> float:
+    """Seconds of training over all starts, from history.csv in one of the folders `paths`; 0 without it."""
+    for path in map(Path, paths):
+        if (path / "history.csv").is_file():
+            seconds = read_numbers(path / "history.csv").get("seconds", [])
+            return max((s for s in seconds if s is not None), default=0.0)
+    return 0.0
+
+
+def _database_sizes(paths: Iterable[str]) -> Sizes | None:
+    """The sizes of the database, or None if none of the folders `paths` is a database."""
+    for path in map(Path, paths):
+        if (path / MANIFEST).is_file():
+            return database_sizes(Manifest.load(path))
+    return None
+
+
+def _total_of_jobs(rows: list[dict[str, float]]) -> JobTotal:
+    """Totals over jobs. rows: from `read_benchmark`."""
+    seconds = [row.get("s", 0.0) for row in rows]
+    memory = [row["max_rss"] for row in rows if "max_rss" in row]
+    return {
+        "jobs": len(rows),
+        "seconds": round(sum(seconds), 3),
+        "longest": round(max(seconds, default=0.0), 3),
+        "cpu_seconds": round(sum(row.get("cpu_time", 0.0) for row in rows), 3),
+        "max_rss_mb": round(max(memory), 1) if memory else None,
+    }

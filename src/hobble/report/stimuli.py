@@ -23,8 +23,8 @@ from hobble.core.quat import Array
 from hobble.core.skeleton import Skeleton
 from hobble.figure.mesh import body_mesh
 from hobble.models.network import Network
+from hobble.report.character import walk_straight
 from hobble.report.raster import GRID, BodyRenderer, Camera
-from hobble.report.straight_walk import walk_straight
 from hobble.runtime.export import export_bvh, fitted_skeleton, restore_bone_lengths
 from hobble.runtime.options import Runtime
 

@@ -11,7 +11,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
-from hobble.report.pipeline import read_benchmark
+from hobble.report.provenance import read_benchmark
 from hobble.workflow.clip_batches import family_of
 from hobble.workflow.resource_demands import ENGINE_MB
 

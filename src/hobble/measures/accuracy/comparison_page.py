@@ -12,18 +12,21 @@ from itertools import product
 from typing import Any
 
 from hobble.measures.accuracy.page import quantiles
-from hobble.report.charts import Chart, Trace, axis
-from hobble.report.compare_tables import difference_table
-from hobble.report.comparison_charts import (
+from hobble.report.compare_page import difference_table
+from hobble.report.parts import (
     SPLITS,
+    Chart,
+    Column,
     Compared,
+    OverviewColumn,
+    PageSection,
+    SectionPart,
+    Trace,
+    axis,
     configuration_colours,
     configuration_names,
     dot_trace,
 )
-from hobble.report.measure_sections import OverviewColumn
-from hobble.report.page_parts import PageSection, SectionPart
-from hobble.report.tables import Column
 
 # The difference between two configurations is the difference of their mean errors, divided by standard
 # deviations (sd; eq. 3.2 of Segerstedt 2021). compare.json has it twice, with different standard deviations.

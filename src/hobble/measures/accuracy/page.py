@@ -12,13 +12,24 @@ import numpy as np
 
 from hobble.measures.clip_parts import sample_in_words
 from hobble.measures.inputs import Json
-from hobble.report.charts import Chart, axis, reference_line
-from hobble.report.formats import format_duration, format_number
 from hobble.report.gather import ReportMaterial
-from hobble.report.page_parts import PageSection, Paragraph, SectionPart, TemplatePart
-from hobble.report.published import citation
-from hobble.report.summary import Hint, KeyFigure, with_order
-from hobble.report.tables import Column, Table
+from hobble.report.parts import (
+    Chart,
+    Column,
+    Hint,
+    KeyFigure,
+    PageSection,
+    Paragraph,
+    SectionPart,
+    Table,
+    TemplatePart,
+    axis,
+    citation,
+    format_duration,
+    format_number,
+    reference_line,
+    with_order,
+)
 
 INTRODUCTION = (
     "The network gets its input from a frame of a clip and predicts the next frame. The error is measured on "

@@ -13,9 +13,8 @@ from hobble.measures.clip_parts import sample_sentence
 from hobble.measures.inputs import Json
 from hobble.measures.manners.results import ChannelResult
 from hobble.measures.manners.windows import EFFECTS, NONE
-from hobble.report.charts import Chart
 from hobble.report.gather import ReportMaterial
-from hobble.report.page_parts import PageSection, Paragraph, SectionPart
+from hobble.report.parts import Chart, PageSection, Paragraph, SectionPart
 
 UNITS = {  # effect of a manner -> its unit
     "speed": "m/s",

@@ -5,13 +5,24 @@ from __future__ import annotations
 from collections.abc import Iterator
 from typing import Any
 
-from hobble.report.charts import Chart, Trace, axis, line_trace
-from hobble.report.comparison_charts import Compared, configuration_colours, configuration_names, dot_trace
-from hobble.report.formats import format_bytes, format_number
-from hobble.report.measure_sections import OverviewColumn
-from hobble.report.page_parts import PageSection, SectionPart
-from hobble.report.tables import Column
-from hobble.report.verdicts import Verdict, verdict_on_lowest
+from hobble.report.parts import (
+    Chart,
+    Column,
+    Compared,
+    OverviewColumn,
+    PageSection,
+    SectionPart,
+    Trace,
+    Verdict,
+    axis,
+    configuration_colours,
+    configuration_names,
+    dot_trace,
+    format_bytes,
+    format_number,
+    line_trace,
+    verdict_on_lowest,
+)
 
 
 def section(compared: Compared) -> PageSection:

@@ -5,8 +5,8 @@ from __future__ import annotations
 from typing import Any
 
 from hobble.measures.inputs import Json
-from hobble.report.charts import Chart, Trace, axis, line_trace, reference_line
 from hobble.report.gather import ReportMaterial
+from hobble.report.parts import Chart, Trace, axis, line_trace, reference_line
 
 # The steps of a frame, in order -> their colours. `hobble.runtime.controller` says what each step does.
 STEPS = {

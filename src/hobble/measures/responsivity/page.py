@@ -16,12 +16,20 @@ from hobble.measures.responsivity.lap_charts import (
     step_order,
     track_chart,
 )
-from hobble.report.formats import format_number
 from hobble.report.gather import ReportMaterial
-from hobble.report.page_parts import KeyFigures, PageSection, Paragraph, SectionPart
-from hobble.report.published import citation
-from hobble.report.summary import Hint, KeyFigure, with_order
-from hobble.report.tables import Column, Table
+from hobble.report.parts import (
+    Column,
+    Hint,
+    KeyFigure,
+    KeyFigures,
+    PageSection,
+    Paragraph,
+    SectionPart,
+    Table,
+    citation,
+    format_number,
+    with_order,
+)
 from hobble.runtime.network_rows import FASTEST_TURN
 
 FEWEST_STEPS = 10  # if the character takes fewer steps, the mean foot slide is not shown

@@ -5,11 +5,21 @@ from __future__ import annotations
 from collections.abc import Iterator
 from functools import partial
 
-from hobble.report.charts import Chart, Trace, axis, line_trace, log_axis
-from hobble.report.comparison_charts import SPLITS, Compared, configuration_colours
-from hobble.report.formats import format_number
-from hobble.report.page_parts import PageSection, SectionPart
-from hobble.report.verdicts import Verdict, verdict_on_lowest
+from hobble.report.parts import (
+    SPLITS,
+    Chart,
+    Compared,
+    PageSection,
+    SectionPart,
+    Trace,
+    Verdict,
+    axis,
+    configuration_colours,
+    format_number,
+    line_trace,
+    log_axis,
+    verdict_on_lowest,
+)
 
 FRAMES_PER_SECOND = 60
 

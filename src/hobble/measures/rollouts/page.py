@@ -7,9 +7,8 @@ from typing import Any
 from hobble.measures.accuracy.page import COLOURS, NAMES
 from hobble.measures.clip_parts import sample_in_words
 from hobble.measures.inputs import Json
-from hobble.report.charts import Chart, axis, line_trace, log_axis
 from hobble.report.gather import ReportMaterial
-from hobble.report.page_parts import PageSection, SectionPart
+from hobble.report.parts import Chart, PageSection, SectionPart, axis, line_trace, log_axis
 
 
 def section(found: Json, material: ReportMaterial) -> PageSection:

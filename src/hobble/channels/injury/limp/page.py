@@ -9,11 +9,19 @@ from hobble.channels.injury.response.page import with_spoken_links
 from hobble.channels.shown import shown_names
 from hobble.measures.clip_parts import sample_sentence
 from hobble.measures.inputs import Json
-from hobble.report.charts import Chart, Trace, axis, line_trace
-from hobble.report.formats import format_number
 from hobble.report.gather import ReportMaterial
-from hobble.report.page_parts import PageSection, Paragraph, SectionPart
-from hobble.report.tables import Column, Table
+from hobble.report.parts import (
+    Chart,
+    Column,
+    PageSection,
+    Paragraph,
+    SectionPart,
+    Table,
+    Trace,
+    axis,
+    format_number,
+    line_trace,
+)
 
 # The effects in the chart and in the table of captured limps.
 SHOWN_EFFECTS = ("speed", "stance", "step_hurt", "knee_hurt", "hip_hurt", "lean", "pelvis_drop", "arm_hurt")

@@ -4,9 +4,8 @@ from __future__ import annotations
 
 from hobble.measures.clip_parts import sample_sentence
 from hobble.measures.inputs import Json
-from hobble.report.charts import Chart, Trace
 from hobble.report.gather import ReportMaterial
-from hobble.report.page_parts import PageSection, SectionPart
+from hobble.report.parts import Chart, PageSection, SectionPart, Trace
 
 
 def section(found: Json, material: ReportMaterial) -> PageSection:

@@ -8,9 +8,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from hobble.report.comparison_charts import Compared
-from hobble.report.page_parts import PageSection, Paragraph, SectionPart
-from hobble.report.tables import Column, Table
+from hobble.report.parts import Column, Compared, PageSection, Paragraph, SectionPart, Table
 
 INTRODUCTION = (
     "The character walks or jogs while the severity of one link (the piece of the body between two "

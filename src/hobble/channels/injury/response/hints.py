@@ -11,8 +11,7 @@ from typing import Any
 import numpy as np
 
 from hobble.measures.inputs import Json
-from hobble.report.formats import format_number
-from hobble.report.summary import Hint
+from hobble.report.parts import Hint, format_number
 
 
 def injury_hints(found: Json) -> Iterator[Hint]:

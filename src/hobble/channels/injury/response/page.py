@@ -13,11 +13,21 @@ from hobble.channels.injury.response import page_cases as cases
 from hobble.channels.injury.response.hints import injury_hints
 from hobble.channels.shown import shown_names
 from hobble.measures.inputs import Json
-from hobble.report.charts import Chart, ChartGroup, Trace, axis, line_trace
 from hobble.report.gather import ReportMaterial
-from hobble.report.page_parts import ChartPair, PageSection, SectionPart
-from hobble.report.summary import Hint, with_order
-from hobble.report.tables import Column, Table
+from hobble.report.parts import (
+    Chart,
+    ChartGroup,
+    ChartPair,
+    Column,
+    Hint,
+    PageSection,
+    SectionPart,
+    Table,
+    Trace,
+    axis,
+    line_trace,
+    with_order,
+)
 
 LINK_KEYS = ("link", "first", "second")  # keys of injury.json whose values are labels of links
 UNTRAINED = "never hurt in training"

@@ -9,8 +9,7 @@ from __future__ import annotations
 from collections.abc import Collection, Mapping, Sequence
 from typing import Any
 
-from hobble.report.charts import Chart, Trace, axis, line_trace
-from hobble.report.tables import Column, Table
+from hobble.report.parts import Chart, Column, Table, Trace, axis, line_trace
 
 # Colours of the lines in a chart.
 COLOURS = ("@accent", "@g2", "@g3", "@g4", "@g5", "@g0")

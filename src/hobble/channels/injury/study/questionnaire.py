@@ -34,7 +34,7 @@ from hobble.core.skeleton import Skeleton
 from hobble.core.smooth import gaussian
 from hobble.figure.mesh import body_mesh
 from hobble.models.network import Network
-from hobble.report.formats import embedded
+from hobble.report.parts import embedded
 from hobble.report.raster import BodyRenderer, Camera
 from hobble.report.stimuli import VISIBLE
 from hobble.report.templates import load_template, page_style, questionnaire_script

@@ -1,0 +1,495 @@
+"""The parts of which pages are made: numbers as text, charts, tables, key figures, hints and sections.
+
+Measurements import from here what their sections need. A colour such as "@accent" stands for the CSS variable
+--accent of the page.
+"""
+
+from __future__ import annotations
+
+import json
+import math
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from typing import Any
+
+import numpy as np
+from markupsafe import Markup
+
+
+def format_duration(seconds: float | None) -> str:
+    """A time as text in a suitable unit; a dash for None.
+
+    >>> [format_duration(seconds) for seconds in (0.42, 59.4, 59.6, 93, 5400, 154800, None)]
+    ['0.42 s', '59 s', '1 min', '1 min 33 s', '1 h 30 min', '43 h', '–']
+    """
+    if seconds is None:
+        return "–"
+    if round(seconds) < 60:
+        return f"{seconds:.2g} s" if seconds < 10 else f"{seconds:.0f} s"
+    minutes, more_seconds = divmod(round(seconds), 60)
+    if minutes < 60:
+        return f"{minutes} min {more_seconds} s" if more_seconds else f"{minutes} min"
+    hours, minutes = divmod(minutes, 60)
+    return f"{hours} h {minutes} min" if minutes and hours < 24 else f"{hours} h"
+
+
+def format_bytes(count: float | None) -> str:
+    """A number of bytes as text, in B, kB, MB or GB (powers of 1000); a dash for None.
+
+    >>> [format_bytes(count) for count in (512, 606e6, 999_600, 7_120_000_000, 1.2345e12, None)]
+    ['512 B', '606 MB', '1 MB', '7.12 GB', '1,234 GB', '–']
+    """
+    if count is None:
+        return "–"
+    for unit in ("B", "kB", "MB", "GB"):
+        text = f"{count:.0f}" if unit == "B" else f"{count:.3g}"
+        if float(text) < 1000:  # rounding may have made it 1000
+            return f"{text} {unit}"
+        count /= 1000
+    return f"{1000 * count:,.0f} GB"
+
+
+def format_number(value: float | None, digits: int = 3) -> str:
+    """A number as text with `digits` significant digits; a dash for None, NaN and infinity.
+
+    Digits before the decimal point are all shown, with separators of thousands.
+
+    >>> format_number(20000, 5)
+    '20,000'
+    >>> [format_number(value) for value in (0.04391, 1234.5, None, float("nan"), 0)]
+    ['0.0439', '1,234', '–', '–', '0']
+    """
+    if value is None or not math.isfinite(value):
+        return "–"
+    if value == 0:
+        return "0"
+    places = max(0, digits - 1 - math.floor(math.log10(abs(value))))
+    return f"{value:,.{places}f}"
+
+
+def json_data(value: Any) -> Any:
+    """`value` as plain JSON data: tuples and arrays become lists, NaN and infinities become None."""
+    if isinstance(value, dict):
+        return {str(key): json_data(item) for key, item in value.items()}
+    if isinstance(value, (list, tuple)):
+        return [json_data(item) for item in value]
+    if isinstance(value, np.ndarray):
+        return json_data(value.tolist())
+    if isinstance(value, np.generic):
+        return json_data(value.item())
+    if isinstance(value, float):
+        return value if math.isfinite(value) else None
+    return value
+
+
+def embedded(value: Any) -> Markup:
+    """JSON that is safe inside a <script> element, whatever its strings contain.
+
+    "<", ">" and "&" are written as escapes, so that no string can end the element or open a comment.
+
+    >>> embedded({"clip": "</script><b>"})
+    Markup('{"clip":"\\\\u003c/script\\\\u003e\\\\u003cb\\\\u003e"}')
+    """
+    text = json.dumps(json_data(value), separators=(",", ":"), allow_nan=False, ensure_ascii=True)
+    return Markup(text.replace("<", "\\u003c").replace(">", "\\u003e").replace("&", "\\u0026"))
+
+
+Trace = dict[str, Any]
+
+
+@dataclass(frozen=True)
+class Chart:
+    """A chart, with a caption that says how to read it.
+
+    name: the chart's id in the page. traces, layout: as plotly takes them. height: pixels.
+
+    A chart with a menu has `options` instead of `traces`: text in the menu -> the traces to show. choose:
+    the menu's label. option_layouts: text in the menu -> changes of the layout.
+    """
+
+    name: str
+    title: str
+    caption: str
+    traces: Sequence[Trace] = field(repr=False, default=())
+    layout: Mapping[str, Any] = field(repr=False, default_factory=dict)
+    height: int = 340
+    choose: str | None = None
+    options: Mapping[str, Sequence[Trace]] = field(repr=False, default_factory=dict)
+    option_layouts: Mapping[str, Mapping[str, Any]] = field(repr=False, default_factory=dict)
+
+    def spec(self) -> dict[str, Any]:
+        """What the page's script needs to draw the chart: its id, traces, layout and menu."""
+        traces = list(self.traces) or list(next(iter(self.options.values()), ()))
+        return {
+            "name": self.name,
+            "traces": _escaped(traces),
+            "layout": _escaped({"height": self.height, **self.layout}),
+            "options": [
+                {"label": key, "traces": _escaped(list(value)), "layout": self.option_layouts.get(key)}
+                for key, value in self.options.items()
+            ],
+        }
+
+
+@dataclass(frozen=True)
+class ChartGroup:
+    """Small charts that share a title and a caption.
+
+    name: the group's id in the page. choose: label of a menu that selects one of the `options` of all charts;
+    "" for no menu.
+    """
+
+    name: str
+    title: str
+    caption: str
+    charts: Sequence[Chart] = field(repr=False)
+    choose: str = ""
+
+
+def _escaped(value: Any) -> Any:
+    """`value` with "<" and "&" escaped in every text, because plotly reads texts as HTML.
+
+    Hover templates are not escaped. They are written in the code, and only refer to data.
+    """
+    if isinstance(value, Mapping):
+        return {k: v if k == "hovertemplate" else _escaped(v) for k, v in value.items()}
+    if isinstance(value, (list, tuple)):
+        return [_escaped(item) for item in value]
+    return value.replace("&", "&amp;").replace("<", "&lt;") if isinstance(value, str) else value
+
+
+def axis(title: str, **more: Any) -> dict[str, Any]:
+    """A plotly axis with a title. more: further settings of the axis."""
+    return {"title": {"text": title}, **more}
+
+
+def log_axis(title: str, values: Iterable[float | None]) -> dict[str, Any]:
+    """A logarithmic axis with ticks at 1, 2 and 5 times the powers of ten, as plain numbers.
+
+    values: the values that the chart shows.
+    """
+    positive = [v for v in values if v is not None and v > 0]
+    if not positive:
+        return axis(title, type="log")
+    decades = range(math.floor(math.log10(min(positive))) - 1, math.ceil(math.log10(max(positive))) + 1)
+    ticks = [float(f"{digit}e{decade}") for decade in decades for digit in (1, 2, 5)]
+    return axis(title, type="log", tickvals=ticks, ticktext=[f"{tick:g}" for tick in ticks])
+
+
+def line_trace(name: str, x: Sequence, y: Sequence, colour: str, **more: Any) -> Trace:
+    """The trace of a line through the points x, y.
+
+    more: `dash` and `width` of the line; further settings are set in the trace.
+    """
+    stroke = {"color": colour, "width": more.pop("width", 2), "dash": more.pop("dash", "solid")}
+    mode = more.pop("mode", "lines")
+    return {"type": "scatter", "mode": mode, "name": name, "x": list(x), "y": list(y), "line": stroke, **more}
+
+
+def reference_line(
+    value: float, text: str, vertical: bool = True, colour: str = "@soft"
+) -> tuple[dict, dict]:
+    """A dotted line across the whole plot at `value`, with a text at its end.
+
+    vertical: whether the line is vertical. `value` is on the x axis for a vertical line, otherwise on the y
+    axis. Returns the line as a plotly shape and the text as a plotly annotation.
+    """
+    dotted = {"type": "line", "line": {"color": colour, "width": 1, "dash": "dot"}}
+    note = {"text": text, "showarrow": False, "font": {"size": 11, "color": colour}}
+    if vertical:
+        shape = {**dotted, "x0": value, "x1": value, "yref": "paper", "y0": 0, "y1": 1}
+        return shape, {**note, "x": value, "yref": "paper", "y": 1, "yanchor": "bottom"}
+    shape = {**dotted, "y0": value, "y1": value, "xref": "paper", "x0": 0, "x1": 1}
+    return shape, {**note, "y": value, "xref": "paper", "x": 1, "xanchor": "right", "yanchor": "bottom"}
+
+
+@dataclass(frozen=True)
+class Column:
+    """A column of a table.
+
+    label: its heading. show: a function from a value to the text in the cell. kind: its CSS class. Columns of
+    the class "n" are sorted as numbers, others as text.
+    """
+
+    label: str
+    show: Callable[[Any], str] = str
+    kind: str = "text"
+
+    @classmethod
+    def number(cls, label: str, digits: int = 3) -> Column:
+        """A column of numbers, shown to `digits` significant digits; the CSV has all digits."""
+        return cls(label, lambda value: format_number(value, digits), "n")
+
+    @classmethod
+    def count(cls, label: str) -> Column:
+        """A column of whole numbers."""
+        return cls(label, lambda value: f"{value:,.0f}", "n")
+
+
+@dataclass(frozen=True)
+class Table:
+    """A table.
+
+    name: of its CSV file, without ".csv". rows: a value for each column; None for an empty cell. title: the
+    line above the table; a click on it folds or unfolds the table.
+    """
+
+    name: str
+    columns: Sequence[Column]
+    rows: Sequence[Sequence[Any]] = field(repr=False)
+    title: str = "Table of the values"
+
+    @property
+    def cells(self) -> list[list[tuple[str, str, str]]]:
+        """For each row, (kind of the column, whole value as text, shown text) of each cell."""
+        return [
+            [
+                (c.kind, "" if v is None else str(v), "–" if v is None else c.show(v))
+                for c, v in zip(self.columns, row, strict=True)
+            ]
+            for row in self.rows
+        ]
+
+
+@dataclass(frozen=True)
+class KeyFigure:
+    """A number at the top of a page. note: the smaller text under it. order: figures are sorted by it."""
+
+    label: str
+    value: str
+    unit: str = ""
+    note: str = ""
+    order: int = 50
+
+
+@dataclass(frozen=True)
+class Hint:
+    """Advice that follows from the numbers.
+
+    kind: "warn", a problem; "note", something to improve; "good", something fine; "fact", information. head:
+    the first words, in bold. text: the words after them. order: hints of the same kind are sorted by it. It
+    grows along the pipeline, because earlier problems cause later ones: data below 20, training 20, network
+    30, motion of the character 40, channels 50, speed 60, cost of the pipeline 90.
+    """
+
+    kind: str
+    head: str
+    text: str
+    order: int = 50
+
+
+def with_order(order: int, hints: Iterable[Hint]) -> Iterator[Hint]:
+    """The hints, each with this `order` instead of its own."""
+    return (replace(hint, order=order) for hint in hints)
+
+
+def citation(row: Mapping[str, Any], sources: Mapping[str, str]) -> str:
+    """Source and table of a published number. If its publication also gives another value, this is added.
+
+    row: the number's entry in `hobble/evaluation/published.yaml`. sources: key of a source -> its authors and
+    year.
+
+    >>> citation({"source": "a", "table": "5.2", "other_figure": "3 in Appendix A"}, {"a": "Author (2021)"})
+    'Author (2021), Table 5.2 (but 3 in Appendix A)'
+    >>> citation({"source": "a"}, {"a": "Author (2021)"})
+    'Author (2021)'
+    """
+    text = sources.get(row["source"], row["source"])
+    if row.get("table"):
+        text += f", Table {row['table']}"
+    return f"{text} (but {row['other_figure']})" if row.get("other_figure") else text
+
+
+# Two values are called almost equal if the higher one exceeds the lower one by at most this share.
+EQUAL = 0.03
+
+
+@dataclass(frozen=True)
+class Verdict:
+    """A sentence about the configuration that is best in one respect.
+
+    order: place on the page, which sorts its verdicts by this number. title: heading of the sentence, such as
+    "Closest to captured motion". name: the best configuration. text: the sentence.
+    """
+
+    order: int
+    title: str
+    name: str
+    text: str
+
+
+def verdict_on_lowest(
+    order: int,
+    title: str,
+    values: Mapping[str, float | None],
+    say: Callable[[str, float], str],
+    more: str = "",
+) -> Iterator[Verdict]:
+    """Yield one verdict: the configuration with the lowest value is best, and is compared with the second.
+
+    Yields nothing if fewer than two configurations have a value. order, title: see `Verdict`. values:
+    configuration -> value, or None if it was not measured. say: function (configuration, value) -> half of
+    the sentence. more: further text after the sentence; it begins with a space.
+
+    >>> seconds = {"a": 2.0, "b": 3.0}
+    >>> found = verdict_on_lowest(1, "Fastest", seconds, lambda name, s: f"a frame of {name} takes {s} s")
+    >>> [verdict.text for verdict in found]
+    ['A frame of a takes 2.0 s; a frame of b takes 3.0 s.']
+    """
+    ranked = sorted((value, name) for name, value in values.items() if value is not None)
+    if len(ranked) < 2:
+        return
+    (low, first), (second, other) = ranked[:2]
+    equal = "almost equal: " if second <= low * (1 + EQUAL) else ""
+    text = f"{say(first, low)}; {equal}{say(other, second)}.{more}"
+    yield Verdict(order, title, first, text[0].upper() + text[1:])
+
+
+@dataclass(frozen=True)
+class Paragraph:
+    """A paragraph. Markup is not escaped, so only text from the source code may be Markup."""
+
+    text: str | Markup
+
+
+@dataclass(frozen=True)
+class KeyFigures:
+    """A row of key figures."""
+
+    figures: Sequence[KeyFigure]
+
+
+@dataclass(frozen=True)
+class ChartPair:
+    """Charts side by side, if the window is wide enough. None: there is nothing to show in this place."""
+
+    charts: Sequence[Chart | None]
+
+
+@dataclass(frozen=True)
+class TemplatePart:
+    """A part that a script of the page draws. template: file name of its HTML in this folder."""
+
+    template: str
+
+
+Content = Chart | ChartGroup | Table | Paragraph | KeyFigures | ChartPair | TemplatePart
+# Type of content -> its kind, which the page's template reads.
+KINDS: dict[type, str] = {
+    Chart: "chart",
+    ChartGroup: "family",
+    Table: "table",
+    Paragraph: "words",
+    KeyFigures: "numbers",
+    ChartPair: "pair",
+    TemplatePart: "fragment",
+}
+
+
+@dataclass(frozen=True)
+class SectionPart:
+    """One part of a section.
+
+    order: its place in the section, from 0 (top) to 100 (end). content: None if there is nothing to show.
+    tall: whether the content is a chart with a row for each clip. open: whether the content is a table that
+    is unfolded at first. short: whether it is a table that needs no scroll bar.
+    """
+
+    order: int
+    content: Content | None = field(repr=False)
+    tall: bool = False
+    open: bool = False
+    short: bool = False
+
+    @property
+    def kind(self) -> str:
+        """Name of the kind of content, for the template."""
+        return KINDS[type(self.content)]
+
+
+@dataclass(frozen=True)
+class PageSection:
+    """A section of a page. `join_sections` joins sections with the same `name` into one.
+
+    title: the heading; only one of the joined sections needs it. order: a number; sections are sorted by it.
+    nav: a shorter title for the list of contents; by default the title. long: whether printing may break the
+    section between pages.
+    """
+
+    name: str
+    parts: Sequence[SectionPart] = field(repr=False)
+    title: str = ""
+    order: int = 50
+    nav: str = ""
+    long: bool = False
+
+
+def join_sections(sections: Iterable[PageSection]) -> list[PageSection]:
+    """The sections of a page, in order. Sections of the same name become one; empty sections are left out.
+
+    A joined section has the parts of all its sections. Its other fields are those of its first section that
+    has a title.
+    """
+    by_name: dict[str, list[PageSection]] = {}
+    for section in sections:
+        by_name.setdefault(section.name, []).append(section)
+    out = []
+    for name, same_name in by_name.items():
+        parts = sorted(
+            (p for s in same_name for p in s.parts if _is_shown(p.content)), key=lambda part: part.order
+        )
+        titled = next((s for s in same_name if s.title), same_name[0])
+        title = titled.title or name.replace("_", " ").capitalize()
+        if parts:
+            out.append(replace(titled, parts=parts, title=title, nav=titled.nav or title))
+    return sorted(out, key=lambda section: section.order)
+
+
+def _is_shown(content: Content | None) -> bool:
+    """Whether the content has anything to show."""
+    if isinstance(content, ChartPair):
+        return any(chart is not None for chart in content.charts)
+    return content is not None
+
+
+Compared = Mapping[str, Any]  # the content of compare.json
+# The page's CSS colours for the configurations. After the last, they begin again.
+PALETTE = ("@accent", "@g2", "@g3", "@g4", "@g5", "@g0", "@g1", "@predicted")
+# Split -> its name in the charts.
+SPLITS = {"held_out": "held-out clips", "train": "training clips"}
+
+
+def configuration_names(compared: Compared) -> list[str]:
+    """The names of the configurations, in the order of the page."""
+    return [entry["configuration"] for entry in compared["configurations"]]
+
+
+def configuration_colours(compared: Compared) -> dict[str, str]:
+    """Configuration -> its colour in all charts."""
+    return {name: PALETTE[i % len(PALETTE)] for i, name in enumerate(configuration_names(compared))}
+
+
+def dot_trace(name: str, x: Sequence, y: Sequence, colour: str, hover: str) -> Trace:
+    """A plotly trace with a dot at each point x, y. name: the configuration. hover: template of the text that
+    appears when the pointer is on a dot."""
+    return {
+        "type": "scatter",
+        "mode": "markers",
+        "name": name,
+        "x": list(x),
+        "y": list(y),
+        "marker": {"color": colour, "size": 9, "opacity": 0.85},
+        "hovertemplate": f"{hover}<extra>%{{fullData.name}}</extra>",
+    }
+
+
+@dataclass(frozen=True)
+class OverviewColumn:
+    """A column of the table of configurations, which has a row for each configuration.
+
+    values: configuration -> value in its row. order: a number; columns are sorted by it.
+    """
+
+    order: int
+    column: Column
+    values: Mapping[str, Any] = field(repr=False)
