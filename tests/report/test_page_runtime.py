@@ -13,6 +13,7 @@ from hobble.core import quat
 from hobble.core.skeleton import Skeleton
 from hobble.figure.mesh import body_mesh
 from hobble.models.network import Network
+from hobble.report.character import AHEAD, OPENING_FRAMES
 from hobble.runtime.animation import ProceduralAnimation
 from hobble.runtime.export import restore_bone_lengths
 from tests.report.example_motion import hills
